@@ -15,6 +15,7 @@
 #include "libmap/fusion/frame_registration.h"
 #include "libmap/fusion/fusion_frames.h"
 #include "libmap/fusion/fusion_tiling.h"
+#include "libmap/fusion/registration_check.h"
 #include "libmap/fusion/surface_points.h"
 #include "libmap/fusion/surface_refinement.h"
 #include "libmap/fusion/surface_voxels.h"
@@ -223,6 +224,9 @@ class Fusion {
   std::vector<SurfaceElement> registration_elements_of_sample() {
     std::vector<SurfaceElement> elements = surface_elements(sample_, false);
     sample_ = {};
+    std::erase_if(elements, [](const SurfaceElement& element) {
+      return TileMask::is_held_out(element.position.head<2>());
+    });
     const std::size_t step =
         std::max<std::size_t>(1, elements.size() / wanted_elements(frames().size()));
     for (std::size_t n = 0; n * step < elements.size(); ++n) {
@@ -253,7 +257,10 @@ class Fusion {
 
   void register_frames() {
     if (frames().size() < 2) return;
-    for (int round = 1; round <= options_.registration_rounds; ++round) {
+    // Only color could accept it: depth has been used for the poses.
+    survey_.registration_rejected = options_.refined_poses && !images_.has_color(frames());
+    for (int round = 1; round <= options_.registration_rounds && !survey_.registration_rejected;
+         ++round) {
       progress_->begin("registration", (round == 1 ? 1 : 2) * frames().size());
       if (round > 1) sample_again();
       const FrameRegistration found = registration(round);
@@ -261,11 +268,20 @@ class Fusion {
       survey_.disagreement_after_m = found.disagreement_before_m;
       // Poses that are right stay as they are.
       if (!(found.correction_m > min_correction_voxels * options_.voxel_size_m)) break;
-      for (std::size_t n = 0; n < frames().size(); ++n)
-        move(survey_.frames[n], found.corrected_from_given[n]);
+      std::vector<FusionFrame> moved = frames();
+      for (std::size_t n = 0; n < moved.size(); ++n) move(moved[n], found.corrected_from_given[n]);
+      const RegistrationCheck check =
+          check_registration(images_, frames(), moved, options_.planes, options_.voxel_size_m);
+      if (round == 1) survey_.registration_check = check;
+      if (!check.is_accepted(options_.refined_poses)) {
+        survey_.registration_rejected = round == 1;
+        break;
+      }
+      survey_.frames = std::move(moved);
       survey_.disagreement_after_m = found.disagreement_after_m;
       ++survey_.registration_rounds;
     }
+    sample_ = {};
   }
 
   FusionTiling tiling_of(double tile_m) const {
@@ -311,6 +327,8 @@ DepthFusionResult Fusion::report() const {
   DepthFusionResult result;
   result.frames = frames().size();
   result.registration_rounds = survey_.registration_rounds;
+  result.registration_rejected = survey_.registration_rejected;
+  result.registration_check = survey_.registration_check;
   result.disagreement_before_m = survey_.disagreement_before_m;
   result.disagreement_after_m = survey_.disagreement_after_m;
   result.skipped = survey_.skipped;

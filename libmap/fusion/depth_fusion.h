@@ -26,6 +26,7 @@
 #include "libmap/core/stage_timer.h"
 #include "libmap/fusion/depth_planes.h"
 #include "libmap/fusion/fusion_frames.h"
+#include "libmap/fusion/registration_check.h"
 #include "libmap/fusion/surface_points.h"
 #include "libmap/scan/scan_source.h"
 #include "libmap/tiles/xy_tile.h"
@@ -42,6 +43,8 @@ struct DepthFusionOptions {
   // >= 0: times, at most, that all poses are corrected so that frames agree before they are fused
   // (frame_registration); 0: poses are taken as they are.
   int registration_rounds = 3;
+  // The poses were refined by depth and color already: only color accepts a registration.
+  bool refined_poses = false;
   SurfacePointOptions points{};
   // Points one voxel beyond the edge of what was measured, unless views see through them.
   bool extend_edges = true;
@@ -68,7 +71,9 @@ struct FusionSurvey {
   Eigen::Vector3d grid_origin = Eigen::Vector3d::Zero();
   std::vector<FusionFrame> frames;               // by ascending node
   std::vector<std::pair<int, Error>> skipped{};  // node and what it lacks
-  int registration_rounds = 0;  // that moved frames; 0: the poses are those that were given
+  int registration_rounds = 0;         // that moved frames; 0: the poses are those that were given
+  bool registration_rejected = false;  // its first round
+  RegistrationCheck registration_check{};  // of the first round
   // Of heights that frames measured of a place, about their mean: by the poses given, and in the
   // end.
   double disagreement_before_m = 0.0;
@@ -86,6 +91,8 @@ struct DepthFusionResult : FusionCounts {
   Trajectory poses;
   // Of FusionSurvey, and root mean squares over the frames against the poses that were given.
   int registration_rounds = 0;
+  bool registration_rejected = false;
+  RegistrationCheck registration_check{};
   double registration_shift_m = 0.0;
   double registration_turn_deg = 0.0;
   double disagreement_before_m = 0.0;

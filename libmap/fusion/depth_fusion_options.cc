@@ -73,6 +73,17 @@ void describe(ResultTable& table, const DepthFusionResult& result) {
   describe(table, result.pixels);
   table.add("registration_rounds", result.registration_rounds,
             "rounds of registration that moved frames");
+  table.add("registration_rejected", result.registration_rejected,
+            "whether held-out measurements rejected the registration");
+  const auto add_check = [&](const std::string& kind, const PairCosts& costs) {
+    if (costs.count == 0) return;
+    table.add("held_out_" + kind + "_before", costs.before,
+              "mean cost of held-out " + kind + " with the given poses");
+    table.add("held_out_" + kind + "_after", costs.after,
+              "mean cost of held-out " + kind + " after the first round of registration");
+  };
+  add_check("depth", result.registration_check.depth);
+  add_check("color", result.registration_check.color);
   table.add("registration_shift_m", result.registration_shift_m,
             "shift of the frames by registration, root mean square");
   table.add("registration_turn_deg", result.registration_turn_deg,

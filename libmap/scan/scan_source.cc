@@ -1,6 +1,7 @@
 #include "libmap/scan/scan_source.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
@@ -12,6 +13,7 @@
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
 #include "libmap/scan/frame_folder.h"
+#include "libmap/scan/lens_rays.h"
 #include "libmap/scan/rtabmap_reader.h"
 #include "libmap/scan/sqlite_file.h"
 
@@ -170,27 +172,46 @@ class CalibratedScan : public ScanSource {
  private:
   std::unique_ptr<ScanSource> scan_;
   CameraFile calibration_;
+  mutable LensRays rays_;
 };
 
 std::string size_of(const Camera& camera) {
   return std::to_string(camera.width) + " x " + std::to_string(camera.height);
 }
 
-// Depth at a place between pixels whose four neighbors are of one surface, else at the nearest.
-double depth_between(const DepthImage& depth, const Eigen::Vector2d& at) {
+// What is measured at a position between pixels, in the depth camera. The depth is interpolated
+// where the four neighbors are of one surface, else it is that of the nearest pixel; the ray is
+// always interpolated (within 1e-6 of the lens's own). Without depth or a ray, z is not positive.
+Eigen::Vector3d point_between(const DepthImage& depth, const LensRays::Table& rays,
+                              const Eigen::Vector2d& at) {
   const int left = std::clamp(static_cast<int>(std::floor(at.x())), 0, depth.width - 2);
   const int top = std::clamp(static_cast<int>(std::floor(at.y())), 0, depth.height - 2);
-  const auto z = [&](int i, int j) { return static_cast<double>(depth.at(left + i, top + j)); };
-  const double u = std::clamp(at.x() - left, 0.0, 1.0);
-  const double v = std::clamp(at.y() - top, 0.0, 1.0);
-  const auto [least, most] = std::minmax({z(0, 0), z(1, 0), z(0, 1), z(1, 1)});
-  if (!(least > 0.0 && most - least < max_step * most)) return z(u < 0.5 ? 0 : 1, v < 0.5 ? 0 : 1);
-  return (1.0 - v) * ((1.0 - u) * z(0, 0) + u * z(1, 0)) + v * ((1.0 - u) * z(0, 1) + u * z(1, 1));
+  const std::size_t first = depth.index(left, top);
+  const std::size_t below = first + static_cast<std::size_t>(depth.width);
+  const auto between = [](double u, double v, const auto& values) {
+    return (1.0 - v) * ((1.0 - u) * values[0] + u * values[1]) +
+           v * ((1.0 - u) * values[2] + u * values[3]);
+  };
+  const auto near = [&](auto&& of) {
+    return std::array{of(first), of(first + 1), of(below), of(below + 1)};
+  };
+  const double u = at.x() - left;
+  const double v = at.y() - top;
+  const double inner_u = std::clamp(u, 0.0, 1.0);
+  const double inner_v = std::clamp(v, 0.0, 1.0);
+  const auto depths = near([&](std::size_t n) { return static_cast<double>(depth.pixels[n]); });
+  const auto [least, most] = std::minmax_element(depths.begin(), depths.end());
+  const double z = *least > 0.0 && *most - *least < max_step * *most
+                       ? between(inner_u, inner_v, depths)
+                       : depths[(inner_v < 0.5 ? 0U : 2U) + (inner_u < 0.5 ? 0U : 1U)];
+  const Eigen::Vector2d ray(between(u, v, near([&](std::size_t n) { return rays[n].x(); })),
+                            between(u, v, near([&](std::size_t n) { return rays[n].y(); })));
+  return z * ray.homogeneous();
 }
 
 // The depth image as the color camera sees it. Each pixel looks for the measurement that falls on
 // it, from pixel to pixel by how far it misses.
-DepthImage registered_depth(const RgbdFrame& frame, const Pose& color_from_depth) {
+DepthImage registered_depth(const RgbdFrame& frame, const Pose& color_from_depth, LensRays& rays) {
   const DepthImage& taken = frame.depth;
   DepthImage seen(taken.width, taken.height);
   if (taken.width < 2 || taken.height < 2) return seen;
@@ -198,16 +219,16 @@ DepthImage registered_depth(const RgbdFrame& frame, const Pose& color_from_depth
   depth_only.cameras = frame.cameras;
   depth_only.depth = taken;
   const Camera camera = camera_views(depth_only).front().depth_camera;
+  const auto table = rays.rays_of(camera);
   for (int y = 0; y < taken.height; ++y)
     for (int x = 0; x < taken.width; ++x) {
       Eigen::Vector2d source(x, y);
       Eigen::Vector3d point = Eigen::Vector3d::Zero();
       double miss_px = std::numeric_limits<double>::infinity();
       for (int round = 0; round < search_rounds && miss_px > 0.05; ++round) {
-        const double z = depth_between(taken, source);
-        const auto ray = pixel_to_ray(camera, source);
-        if (!(z > 0.0) || !ray) break;
-        point = color_from_depth * Eigen::Vector3d(z * ray->homogeneous());
+        const Eigen::Vector3d measured = point_between(taken, *table, source);
+        if (!(measured.z() > 0.0)) break;
+        point = color_from_depth * measured;
         const auto pixel = project_point(camera, point);
         if (!pixel) break;
         const Eigen::Vector2d miss = Eigen::Vector2d(x, y) - *pixel;
@@ -222,19 +243,7 @@ DepthImage registered_depth(const RgbdFrame& frame, const Pose& color_from_depth
   return seen;
 }
 
-RgbdFrame CalibratedScan::read_frame(int node, FrameParts parts) const {
-  RgbdFrame frame = scan_->read_frame(node, parts);
-  try {
-    apply_calibration(frame, calibration_);
-  } catch (const Error& error) {
-    throw error.in_field("node " + std::to_string(node)).in_file(scan_->path().string());
-  }
-  return frame;
-}
-
-}  // namespace
-
-void apply_calibration(RgbdFrame& frame, const CameraFile& calibration) {
+void apply(RgbdFrame& frame, const CameraFile& calibration, LensRays& rays) {
   if (frame.cameras.empty() && frame.stereo.empty()) return;
   if (frame.cameras.size() != 1 || !frame.stereo.empty())
     throw Error("a calibration is of one camera",
@@ -250,10 +259,27 @@ void apply_calibration(RgbdFrame& frame, const CameraFile& calibration) {
   // By the stored camera, as it was estimated.
   const Pose color_from_depth = calibration.color_from_depth_at(frame.stamp_s);
   if (!color_from_depth.matrix().isIdentity(0.0))
-    frame.depth = registered_depth(frame, color_from_depth);
+    frame.depth = registered_depth(frame, color_from_depth, rays);
   camera = known;
   camera.base_from_camera = base_from_camera;
   correct_depth(frame.depth, calibration.depth);
+}
+
+RgbdFrame CalibratedScan::read_frame(int node, FrameParts parts) const {
+  RgbdFrame frame = scan_->read_frame(node, parts);
+  try {
+    apply(frame, calibration_, rays_);
+  } catch (const Error& error) {
+    throw error.in_field("node " + std::to_string(node)).in_file(scan_->path().string());
+  }
+  return frame;
+}
+
+}  // namespace
+
+void apply_calibration(RgbdFrame& frame, const CameraFile& calibration) {
+  LensRays rays;
+  apply(frame, calibration, rays);
 }
 
 std::unique_ptr<ScanSource> with_calibration(std::unique_ptr<ScanSource> scan,
