@@ -18,9 +18,9 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FusionFrame, node, grid_from_base, image_pixe
                                    max_ray_length, max_pixel_pitch)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(PairCosts, count, before, after, deviation)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(RegistrationCheck, depth, color)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FusionSurvey, grid_origin, frames, skipped, registration_rounds,
-                                   registration_rejected, registration_check, disagreement_before_m,
-                                   disagreement_after_m)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FusionSurvey, grid_origin, frames, skipped, redundant,
+                                   registration_rounds, registration_rejected, registration_check,
+                                   disagreement_before_m, disagreement_after_m)
 
 }  // namespace libmap
 
@@ -86,6 +86,9 @@ void tell_results(const libmap::DepthFusionResult& result, const FuseOptions& op
       pixels.grazing, pixels.without_ray);
   tell_registration(result, run);
   tell_contradictions(result, run);
+  if (result.redundant_frames > 0)
+    run.say("{} frames left out: earlier frames have measured their surface (enough_views)",
+            result.redundant_frames);
   run.say("{} frames, {} measurements -> {} points", result.frames, pixels.used,
           result.points_made);
   if (result.points_made > 0) return;

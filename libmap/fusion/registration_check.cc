@@ -138,10 +138,12 @@ RegistrationCheck check_registration(FusionFrames& images, std::span<const Fusio
       const ViewComparison two = compare_views(from, onto, back ? moved.inverse() : moved, gate);
       keep_held_out(from, voxel_size_m, one);
       const double noise = sensor.noise.axial_of_range + sensor.noise.axial_m;
-      add(one.depth, two.depth, [&](float off) {
-        return std::log1p(off * off / (2.0 * noise * noise) / cost_scale);
-      }, depth[n]);
-      add(one.color, two.color, [](float off) { return static_cast<double>(off); }, color[n]);
+      add(
+          one.depth, two.depth,
+          [&](float off) { return std::log1p(off * off / (2.0 * noise * noise) / cost_scale); },
+          depth[n]);
+      add(
+          one.color, two.color, [](float off) { return static_cast<double>(off); }, color[n]);
     }
   });
   return {costs_of(depth), costs_of(color)};

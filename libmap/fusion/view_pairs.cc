@@ -101,8 +101,8 @@ class ViewPair {
       for (int column = x - reach; column <= x + reach; column += patch_step_, ++k) {
         const std::size_t n = index(column, row);
         if (!(std::abs(from_.depth_m[n] - middle) < max_patch_relief * middle)) return unknown;
-        const auto pixel = project_point(onto_.depth_camera,
-                                         onto_from_ * point_at(n).cast<double>());
+        const auto pixel =
+            project_point(onto_.depth_camera, onto_from_ * point_at(n).cast<double>());
         if (!pixel) return unknown;
         const auto here = brightness(from_, Eigen::Vector2d(column, row));
         const auto there = brightness(onto_, *pixel);

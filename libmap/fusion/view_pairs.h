@@ -11,8 +11,8 @@ namespace libmap {
 // One entry for each sampled pixel of the first view; NaN where the second view does not show it.
 struct ViewComparison {
   std::vector<Eigen::Vector3f> points;  // in the first camera; 0 without depth
-  std::vector<float> depth;  // measured minus expected depth, in expected depths
-  std::vector<float> color;  // 1 - correlation of the brightness of 5 x 5 pixels
+  std::vector<float> depth;             // measured minus expected depth, in expected depths
+  std::vector<float> color;             // 1 - correlation of the brightness of 5 x 5 pixels
 };
 
 // Samples the pixels of `from` on a grid, about 2000. Entries of `color` also require a

@@ -1,7 +1,6 @@
 #include "libmap/scan/scan_source.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
@@ -155,6 +154,7 @@ namespace {
 
 constexpr double max_step = 0.03;  // of depth between pixels of one surface
 constexpr double max_miss_px = 0.5;
+constexpr double close_px = 0.03;
 constexpr int search_rounds = 5;
 
 class CalibratedScan : public ScanSource {
@@ -179,38 +179,69 @@ std::string size_of(const Camera& camera) {
   return std::to_string(camera.width) + " x " + std::to_string(camera.height);
 }
 
-// What is measured at a position between pixels, in the depth camera. The depth is interpolated
-// where the four neighbors are of one surface, else it is that of the nearest pixel; the ray is
-// always interpolated (within 1e-6 of the lens's own). Without depth or a ray, z is not positive.
-Eigen::Vector3d point_between(const DepthImage& depth, const LensRays::Table& rays,
-                              const Eigen::Vector2d& at) {
+// Depth at a place between pixels whose four neighbors are of one surface, else at the nearest.
+double depth_between(const DepthImage& depth, const Eigen::Vector2d& at) {
   const int left = std::clamp(static_cast<int>(std::floor(at.x())), 0, depth.width - 2);
   const int top = std::clamp(static_cast<int>(std::floor(at.y())), 0, depth.height - 2);
-  const std::size_t first = depth.index(left, top);
-  const std::size_t below = first + static_cast<std::size_t>(depth.width);
-  const auto between = [](double u, double v, const auto& values) {
-    return (1.0 - v) * ((1.0 - u) * values[0] + u * values[1]) +
-           v * ((1.0 - u) * values[2] + u * values[3]);
-  };
-  const auto near = [&](auto&& of) {
-    return std::array{of(first), of(first + 1), of(below), of(below + 1)};
-  };
-  const double u = at.x() - left;
-  const double v = at.y() - top;
-  const double inner_u = std::clamp(u, 0.0, 1.0);
-  const double inner_v = std::clamp(v, 0.0, 1.0);
-  const auto depths = near([&](std::size_t n) { return static_cast<double>(depth.pixels[n]); });
-  const auto [least, most] = std::minmax_element(depths.begin(), depths.end());
-  const double z = *least > 0.0 && *most - *least < max_step * *most
-                       ? between(inner_u, inner_v, depths)
-                       : depths[(inner_v < 0.5 ? 0U : 2U) + (inner_u < 0.5 ? 0U : 1U)];
-  const Eigen::Vector2d ray(between(u, v, near([&](std::size_t n) { return rays[n].x(); })),
-                            between(u, v, near([&](std::size_t n) { return rays[n].y(); })));
-  return z * ray.homogeneous();
+  const float* const row = &depth.pixels[depth.index(left, top)];
+  const float* const below = row + depth.width;
+  const double u = std::clamp(at.x() - left, 0.0, 1.0);
+  const double v = std::clamp(at.y() - top, 0.0, 1.0);
+  const double least = std::min(std::min(row[0], row[1]), std::min(below[0], below[1]));
+  const double most = std::max(std::max(row[0], row[1]), std::max(below[0], below[1]));
+  if (!(least > 0.0 && most - least < max_step * most))
+    return (v < 0.5 ? row : below)[u < 0.5 ? 0 : 1];
+  return (1.0 - v) * ((1.0 - u) * row[0] + u * row[1]) + v * ((1.0 - u) * below[0] + u * below[1]);
 }
 
-// The depth image as the color camera sees it. Each pixel looks for the measurement that falls on
-// it, from pixel to pixel by how far it misses.
+// Searches for the measurement that falls on the ray of a pixel of the color image. A miss moves
+// the search by as many pixels as it has pitches of the rays around the pixel.
+class DepthSearch {
+ public:
+  DepthSearch(const DepthImage& taken, const LensRays::Table& rays, const Pose& color_from_depth)
+      : taken_(taken),
+        rays_(rays),
+        rotation_(color_from_depth.linear()),
+        shift_(color_from_depth.translation()) {}
+
+  // The depth that the color camera sees at x, y; 0: none. Begins at `source`, which becomes the
+  // position of the measurement.
+  double find(int x, int y, Eigen::Vector2d& source) const {
+    const Eigen::Vector2d wanted = rays_[taken_.index(x, y)];
+    const int left = std::max(x - 1, 0);
+    const int top = std::max(y - 1, 0);
+    Eigen::Matrix2d pitch;  // of the rays, by columns and rows
+    pitch << rays_[taken_.index(left + 1, y)] - rays_[taken_.index(left, y)],
+        rays_[taken_.index(x, top + 1)] - rays_[taken_.index(x, top)];
+    const Eigen::Matrix2d pixels_of_pitch = pitch.inverse();
+    for (int round = 0; round < search_rounds; ++round) {
+      if (!(source.x() > -0.5 && source.y() > -0.5 && source.x() < taken_.width - 0.5 &&
+            source.y() < taken_.height - 0.5))
+        return 0.0;
+      const double z = depth_between(taken_, source);
+      const int column = static_cast<int>(source.x() + 0.5);
+      const int row = static_cast<int>(source.y() + 0.5);
+      const Eigen::Vector2d ray =
+          rays_[taken_.index(column, row)] + pitch * (source - Eigen::Vector2d(column, row));
+      const Eigen::Vector3d point = rotation_ * (z * ray.homogeneous()) + shift_;
+      if (!(z > 0.0 && point.z() > 0.0)) return 0.0;
+      const Eigen::Vector2d miss = pixels_of_pitch * (wanted - point.head<2>() / point.z());
+      const double miss_px = miss.norm();
+      if (miss_px <= close_px || (round + 1 == search_rounds && miss_px < max_miss_px))
+        return point.z();
+      source += miss;
+    }
+    return 0.0;
+  }
+
+ private:
+  const DepthImage& taken_;
+  const LensRays::Table& rays_;
+  Eigen::Matrix3d rotation_;
+  Eigen::Vector3d shift_;
+};
+
+// The depth image as the color camera sees it.
 DepthImage registered_depth(const RgbdFrame& frame, const Pose& color_from_depth, LensRays& rays) {
   const DepthImage& taken = frame.depth;
   DepthImage seen(taken.width, taken.height);
@@ -218,28 +249,18 @@ DepthImage registered_depth(const RgbdFrame& frame, const Pose& color_from_depth
   RgbdFrame depth_only;
   depth_only.cameras = frame.cameras;
   depth_only.depth = taken;
-  const Camera camera = camera_views(depth_only).front().depth_camera;
-  const auto table = rays.rays_of(camera);
-  for (int y = 0; y < taken.height; ++y)
+  const auto table = rays.rays_of(camera_views(depth_only).front().depth_camera);
+  const DepthSearch search(taken, *table, color_from_depth);
+  for (int y = 0; y < taken.height; ++y) {
+    Eigen::Vector2d offset = Eigen::Vector2d::Zero();  // of the pixel before
     for (int x = 0; x < taken.width; ++x) {
-      Eigen::Vector2d source(x, y);
-      Eigen::Vector3d point = Eigen::Vector3d::Zero();
-      double miss_px = std::numeric_limits<double>::infinity();
-      for (int round = 0; round < search_rounds && miss_px > 0.05; ++round) {
-        const Eigen::Vector3d measured = point_between(taken, *table, source);
-        if (!(measured.z() > 0.0)) break;
-        point = color_from_depth * measured;
-        const auto pixel = project_point(camera, point);
-        if (!pixel) break;
-        const Eigen::Vector2d miss = Eigen::Vector2d(x, y) - *pixel;
-        miss_px = miss.norm();
-        source += miss;
-        if (!(source.x() > -0.5 && source.y() > -0.5 && source.x() < taken.width - 0.5 &&
-              source.y() < taken.height - 0.5))
-          break;
-      }
-      if (miss_px < max_miss_px) seen.at(x, y) = static_cast<float>(point.z());
+      Eigen::Vector2d source = Eigen::Vector2d(x, y) + offset;
+      double z = search.find(x, y, source);
+      if (!(z > 0.0) && !offset.isZero(0.0)) z = search.find(x, y, source = Eigen::Vector2d(x, y));
+      offset = z > 0.0 ? Eigen::Vector2d(source - Eigen::Vector2d(x, y)) : Eigen::Vector2d::Zero();
+      seen.at(x, y) = static_cast<float>(z);
     }
+  }
   return seen;
 }
 
