@@ -1,5 +1,6 @@
 // graspmap fuse: the depth images of a scan -> one oriented, colored cloud.
 #include "libmap/fusion/depth_fusion.h"
+#include "libmap/fusion/pose_consistency.h"
 #include "libmap/io/cloud_io.h"
 #include "libmap/poses/trajectory_io.h"
 #include "libmap/scan/rig_io.h"
@@ -222,6 +223,15 @@ void fuse(FuseOptions options, Run& run) {
                    libmap::parse_share(options.tile), run);
     if (folder->is_complete()) return;
   }
+  const libmap::PoseConsistency consistency =
+      run.timed("consistency", [&] { return libmap::check_pose_consistency(*scan, poses); });
+  run.detail(
+      "{} pairs of frames: {} measurements in common, {:.1f} % contradict each other, median "
+      "{:.2f} % of depth",
+      consistency.pairs, consistency.given.measurements, 100 * consistency.given.contradicted,
+      100 * consistency.given.difference);
+  const std::string doubt = consistency.warning();
+  if (!doubt.empty()) run.warn("{}: {}", options.poses.source, doubt);
   in_file(options.scan,
           [&] { make_tiles(options, *scan, poses, folder ? &*folder : nullptr, run); });
 }

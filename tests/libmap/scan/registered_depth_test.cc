@@ -61,8 +61,8 @@ void expect_registered(DistortionModel model, const Pose& color_from_depth) {
 
 TEST(RegisteredDepth, OfAMovedCamera) {
   const Pose motion = make_pose_from_rpy({0.01, -0.005, 0.02}, {0.5, -2.0, 1.0});
-  for (const DistortionModel model : {DistortionModel::none, DistortionModel::radial_tangential,
-                                      DistortionModel::equidistant})
+  for (const DistortionModel model :
+       {DistortionModel::none, DistortionModel::radial_tangential, DistortionModel::equidistant})
     expect_registered(model, motion);
 }
 
@@ -71,8 +71,7 @@ TEST(RegisteredDepth, HolesAndEdgesGiveNoDepthBetweenSurfaces) {
   frame.cameras = {lens(DistortionModel::none)};
   frame.depth = DepthImage(width, height, 1.0F);
   for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x)
-      frame.depth.at(x, y) = x < 60 ? 1.0F : x < 70 ? 0.0F : 2.0F;
+    for (int x = 0; x < width; ++x) frame.depth.at(x, y) = x < 60 ? 1.0F : x < 70 ? 0.0F : 2.0F;
   CameraFile calibration;
   calibration.camera = lens(DistortionModel::none);
   calibration.color_from_depth = make_pose_from_rpy({0, 0, 0}, {0, 0.5, 0});
