@@ -1,5 +1,6 @@
 // graspmap fuse: the depth images of a scan -> one oriented, colored cloud.
 #include "libmap/fusion/depth_fusion.h"
+#include "libmap/fusion/pose_consistency.h"
 #include "libmap/io/cloud_io.h"
 #include "libmap/poses/trajectory_io.h"
 #include "libmap/scan/rig_io.h"
@@ -16,7 +17,10 @@ namespace libmap {
 
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FusionFrame, node, grid_from_base, image_pixels, reach,
                                    max_ray_length, max_pixel_pitch)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FusionSurvey, grid_origin, frames, skipped, registration_rounds,
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(PairCosts, count, before, after, deviation)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(RegistrationCheck, depth, color)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FusionSurvey, grid_origin, frames, skipped, redundant,
+                                   registration_rounds, registration_rejected, registration_check,
                                    disagreement_before_m, disagreement_after_m)
 
 }  // namespace libmap
@@ -55,6 +59,21 @@ void tell_contradictions(const libmap::DepthFusionResult& result, Run& run) {
       dropped, points.seen_through, points.missed, points.beside);
 }
 
+void tell_registration(const libmap::DepthFusionResult& result, Run& run) {
+  const libmap::PairCosts& color = result.registration_check.color;
+  const libmap::PairCosts& depth = result.registration_check.depth;
+  const libmap::PairCosts& shown = color.count > 0 ? color : depth;
+  if (result.registration_rounds > 0)
+    run.say("poses corrected so that frames agree: by {:.1f} mm and {:.2f} deg (RMS)",
+            1e3 * result.registration_shift_m, result.registration_turn_deg);
+  else if (result.registration_rejected && shown.count > 0)
+    run.say(
+        "poses not corrected: held-out {} does not fit better by registration, {:.4f} -> {:.4f}",
+        color.count > 0 ? "color" : "depth", shown.before, shown.after);
+  else if (result.registration_rejected)
+    run.say("poses not corrected: they are refined and there is no color to validate it by");
+}
+
 void tell_results(const libmap::DepthFusionResult& result, const FuseOptions& options, Run& run) {
   for (const auto& [node, fault] : result.skipped)
     run.warn(std::string("skipped: ") + fault.what());
@@ -66,10 +85,11 @@ void tell_results(const libmap::DepthFusionResult& result, const FuseOptions& op
       "ray",
       pixels.used, pixels.pixels, pixels.unmeasured, pixels.out_of_range, pixels.flying,
       pixels.grazing, pixels.without_ray);
-  if (result.registration_rounds > 0)
-    run.say("poses corrected so that frames agree: by {:.1f} mm and {:.2f} deg (RMS)",
-            1e3 * result.registration_shift_m, result.registration_turn_deg);
+  tell_registration(result, run);
   tell_contradictions(result, run);
+  if (result.redundant_frames > 0)
+    run.say("{} frames left out: earlier frames have measured their surface (enough_views)",
+            result.redundant_frames);
   run.say("{} frames, {} measurements -> {} points", result.frames, pixels.used,
           result.points_made);
   if (result.points_made > 0) return;
@@ -192,6 +212,7 @@ void fuse(FuseOptions options, Run& run) {
   options.camera = known_camera(options.calibration, options.scan, options.poses, run);
   const auto scan = open_scan(options.scan, strict, run, options.camera);
   const libmap::Trajectory poses = find_poses(*scan, options.poses, strict, run);
+  options.fusion.refined_poses = are_refined(options.poses);
   const bool in_true_frame = options.frame == CloudFrame::ground_truth;
   if (in_true_frame) require_truth(*scan);
   if (fs::is_regular_file(options.scan)) run.add_input(options.scan);
@@ -202,6 +223,15 @@ void fuse(FuseOptions options, Run& run) {
                    libmap::parse_share(options.tile), run);
     if (folder->is_complete()) return;
   }
+  const libmap::PoseConsistency consistency =
+      run.timed("consistency", [&] { return libmap::check_pose_consistency(*scan, poses); });
+  run.detail(
+      "{} pairs of frames: {} measurements in common, {:.1f} % contradict each other, median "
+      "{:.2f} % of depth",
+      consistency.pairs, consistency.given.measurements, 100 * consistency.given.contradicted,
+      100 * consistency.given.difference);
+  const std::string doubt = consistency.warning();
+  if (!doubt.empty()) run.warn("{}: {}", options.poses.source, doubt);
   in_file(options.scan,
           [&] { make_tiles(options, *scan, poses, folder ? &*folder : nullptr, run); });
 }

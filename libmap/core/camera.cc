@@ -26,7 +26,8 @@ struct Distorted {
   Matrix2 derivative;  // of the distorted by the undistorted ray
 };
 
-// OpenCV's model of 4, 5, 8 or 12 terms; missing ones are 0.
+// OpenCV's model of 4, 5, 8 or 12 terms; missing ones are 0. Most calls need no derivative.
+template <bool with_derivative>
 Distorted distort_radial_tangential(const std::vector<double>& terms, const Eigen::Vector2d& ray) {
   std::array<double, 12> k{};
   std::copy_n(terms.begin(), std::min(terms.size(), k.size()), k.begin());
@@ -36,14 +37,15 @@ Distorted distort_radial_tangential(const std::vector<double>& terms, const Eige
   const double top = 1 + r2 * (k[0] + r2 * (k[1] + r2 * k[4]));
   const double bottom = 1 + r2 * (k[5] + r2 * (k[6] + r2 * k[7]));
   const double radial = top / bottom;
-  const double top_slope = k[0] + r2 * (2 * k[1] + r2 * 3 * k[4]);
-  const double bottom_slope = k[5] + r2 * (2 * k[6] + r2 * 3 * k[7]);
-  const double slope = (top_slope - radial * bottom_slope) / bottom;  // of radial by r2
   const double p1 = k[2];
   const double p2 = k[3];
   Distorted out;
   out.ray.x() = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x) + r2 * (k[8] + r2 * k[9]);
   out.ray.y() = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y + r2 * (k[10] + r2 * k[11]);
+  if (!with_derivative) return out;
+  const double top_slope = k[0] + r2 * (2 * k[1] + r2 * 3 * k[4]);
+  const double bottom_slope = k[5] + r2 * (2 * k[6] + r2 * 3 * k[7]);
+  const double slope = (top_slope - radial * bottom_slope) / bottom;  // of radial by r2
   const double prism_x = 2 * (k[8] + 2 * r2 * k[9]);
   const double prism_y = 2 * (k[10] + 2 * r2 * k[11]);
   const double cross = 2 * x * y * slope;
@@ -70,11 +72,12 @@ Distorted distort_equidistant(const std::vector<double>& terms, const Eigen::Vec
           scale * Matrix2::Identity() + (radius_slope - scale) * (unit * unit.transpose())};
 }
 
+template <bool with_derivative>
 Distorted distort(const Camera& camera, const Eigen::Vector2d& ray) {
   if (!camera.is_distorted()) return {ray, Matrix2::Identity()};
   return camera.distortion_model == DistortionModel::equidistant
              ? distort_equidistant(camera.distortion, ray)
-             : distort_radial_tangential(camera.distortion, ray);
+             : distort_radial_tangential<with_derivative>(camera.distortion, ray);
 }
 
 [[noreturn]] void refuse(const std::string& field, double value, const std::string& bound) {
@@ -126,7 +129,7 @@ Camera without_distortion(Camera camera) {
 }
 
 Eigen::Vector2d distort_to_pixel(const Camera& camera, const Eigen::Vector2d& ray) {
-  const Eigen::Vector2d bent = distort(camera, ray).ray;
+  const Eigen::Vector2d bent = distort<false>(camera, ray).ray;
   return {camera.fx * bent.x() + camera.cx, camera.fy * bent.y() + camera.cy};
 }
 
@@ -142,7 +145,7 @@ std::optional<Eigen::Vector2d> pixel_to_ray(const Camera& camera, const Eigen::V
     if (angle > 0) ray = wanted * (std::tan(angle) / angle);
   }
   for (int step = 0; step < 50; ++step) {
-    const Distorted at = distort(camera, ray);
+    const Distorted at = distort<true>(camera, ray);
     const Eigen::Vector2d miss = at.ray - wanted;
     if (!miss.allFinite()) return std::nullopt;
     // Beyond the fold of the polynomial a second ray would give the same pixel.
@@ -152,7 +155,7 @@ std::optional<Eigen::Vector2d> pixel_to_ray(const Camera& camera, const Eigen::V
     const double limit = 0.5 * (1 + ray.norm());
     ray -= move.norm() > limit ? Eigen::Vector2d(move * (limit / move.norm())) : move;
   }
-  if ((distort(camera, ray).ray - wanted).norm() <= 1e-9) return ray;
+  if ((distort<false>(camera, ray).ray - wanted).norm() <= 1e-9) return ray;
   return std::nullopt;
 }
 

@@ -15,10 +15,12 @@
 #include "libmap/fusion/frame_registration.h"
 #include "libmap/fusion/fusion_frames.h"
 #include "libmap/fusion/fusion_tiling.h"
+#include "libmap/fusion/registration_check.h"
 #include "libmap/fusion/surface_points.h"
 #include "libmap/fusion/surface_refinement.h"
 #include "libmap/fusion/surface_voxels.h"
 #include "libmap/fusion/tile_mask.h"
+#include "libmap/fusion/view_coverage.h"
 
 namespace libmap {
 
@@ -39,6 +41,9 @@ constexpr unsigned max_thinning = 32;
 constexpr double first_search_voxels = 3.0;
 // Corrections of heights, root mean square, that are not worth another round.
 constexpr double min_correction_voxels = 0.05;
+// Width of the cells in which frames are compared with those before them.
+constexpr double coverage_voxels = 8.0;
+
 void check(const DepthFusionOptions& options) {
   check_parameters(options);
   if (!(options.planes.max_depth_m > options.planes.min_depth_m))
@@ -55,6 +60,7 @@ struct CoarseFrame {
   DepthPixelCounts pixels;
   std::size_t number = 0;      // among the frames
   FusionFrame frame;           // of the survey
+  FrameCoverage coverage;      // of the survey
   std::optional<Error> fault;  // of the survey; none: it can be used
 };
 
@@ -163,56 +169,69 @@ class Fusion {
     coarse.voxels = std::move(voxels).take_frame();
   }
 
-  // What the frame can be used for, and how far it reaches.
-  void survey_frame(CoarseFrame& coarse, const TileMask& cells) {
+  // What the frame can be used for, how far it reaches, and what it adds to the surface.
+  void survey_frame(CoarseFrame& coarse) {
     FusionFrame& frame = coarse.frame;
     const std::shared_ptr<const RgbdFrame> depth = images_.depth_of(frame.node);
     images_.measure_reach(*depth, options_.planes.max_depth_m, frame);
-    if (options_.registration_rounds > 0)
-      add_frame(*depth, frame.grid_from_base, cells, FittedPixels::in_cells, coarse);
+    for (const CameraView& view : camera_views(*depth))
+      coarse.coverage.add(view.depth, *images_.rays_of(view.depth_camera),
+                          frame.grid_from_base * view.depth_camera.base_from_camera,
+                          options_.planes, coverage_voxels * options_.voxel_size_m);
   }
 
   std::size_t wanted_elements(std::size_t frames) const {
     return std::max(registration_elements, registration_elements_per_frame * frames);
   }
 
+  // Frames are compared with those before them.
   void survey(const std::vector<FusionFrame>& given) {
     progress_->begin("survey", given.size());
-    const std::size_t max_voxels = voxels_per_element * wanted_elements(given.size());
+    ViewCoverage known;
+    for (std::size_t first = 0; first < given.size(); first += frames_in_flight) {
+      std::vector<CoarseFrame> parts(std::min(frames_in_flight, given.size() - first));
+      parallel_each(parts.size(), [&](std::size_t n) {
+        parts[n].frame = given[first + n];
+        try {
+          survey_frame(parts[n]);
+        } catch (const Error& error) {
+          if (error.kind() != ErrorKind::bad_input) throw;
+          parts[n].fault = error;
+        }
+      });
+      for (const CoarseFrame& part : parts) {
+        if (part.fault) {
+          skip(part.frame.node, *part.fault);
+        } else if (options_.enough_views > 0.0 && survey_.frames.size() > 1 &&
+                   !known.is_improved_by(part.coverage, options_.enough_views)) {
+          survey_.redundant.push_back(part.frame.node);
+        } else {
+          survey_.frames.push_back(part.frame);
+          known.add(part.coverage);
+        }
+      }
+      if (!survey_.redundant.empty()) images_.keep_only(frames());
+      progress_->advance(parts.size());
+    }
+  }
+
+  // The coarse surface in random squares of the plan, by the poses as they are now.
+  void sample_surface() {
+    sample_ = {};
+    const std::size_t max_voxels = voxels_per_element * wanted_elements(frames().size());
     const auto make = [&](std::size_t n, const TileMask& wanted) {
       CoarseFrame coarse;
-      coarse.frame = given[n];
-      try {
-        survey_frame(coarse, wanted);
-      } catch (const Error& error) {
-        if (error.kind() != ErrorKind::bad_input) throw;
-        coarse.fault = error;
-      }
+      add_frame(*images_.depth_of(frames()[n].node), frames()[n].grid_from_base, wanted,
+                FittedPixels::in_cells, coarse);
       return coarse;
     };
-    each_frame(given.size(), sampled_, make, [&](const CoarseFrame& coarse) {
-      if (coarse.fault) return skip(coarse.frame.node, *coarse.fault);
-      survey_.frames.push_back(coarse.frame);
+    each_frame(frames().size(), sampled_, make, [&](const CoarseFrame& coarse) {
       sample_.merge(coarse.voxels, sampled_);
       while (sample_.size() > max_voxels && sampled_.thinning < max_thinning) {
         ++sampled_.thinning;
         sample_ = sample_.in(sampled_);
       }
     });
-  }
-
-  // By the poses as they are now.
-  void sample_again() {
-    sample_ = {};
-    each_frame(
-        frames().size(), sampled_,
-        [&](std::size_t n, const TileMask& wanted) {
-          CoarseFrame coarse;
-          add_frame(*images_.depth_of(frames()[n].node), frames()[n].grid_from_base, wanted,
-                    FittedPixels::in_cells, coarse);
-          return coarse;
-        },
-        [&](const CoarseFrame& coarse) { sample_.merge(coarse.voxels, sampled_); });
   }
 
   SurfaceSearch search_within(double search_m) const {
@@ -223,6 +242,9 @@ class Fusion {
   std::vector<SurfaceElement> registration_elements_of_sample() {
     std::vector<SurfaceElement> elements = surface_elements(sample_, false);
     sample_ = {};
+    std::erase_if(elements, [](const SurfaceElement& element) {
+      return TileMask::is_held_out(element.position.head<2>());
+    });
     const std::size_t step =
         std::max<std::size_t>(1, elements.size() / wanted_elements(frames().size()));
     for (std::size_t n = 0; n * step < elements.size(); ++n) {
@@ -253,19 +275,31 @@ class Fusion {
 
   void register_frames() {
     if (frames().size() < 2) return;
-    for (int round = 1; round <= options_.registration_rounds; ++round) {
-      progress_->begin("registration", (round == 1 ? 1 : 2) * frames().size());
-      if (round > 1) sample_again();
+    // Only color could accept it: depth has been used for the poses.
+    survey_.registration_rejected = options_.refined_poses && !images_.has_color(frames());
+    for (int round = 1; round <= options_.registration_rounds && !survey_.registration_rejected;
+         ++round) {
+      progress_->begin("registration", 2 * frames().size());
+      sample_surface();
       const FrameRegistration found = registration(round);
       if (round == 1) survey_.disagreement_before_m = found.disagreement_before_m;
       survey_.disagreement_after_m = found.disagreement_before_m;
       // Poses that are right stay as they are.
       if (!(found.correction_m > min_correction_voxels * options_.voxel_size_m)) break;
-      for (std::size_t n = 0; n < frames().size(); ++n)
-        move(survey_.frames[n], found.corrected_from_given[n]);
+      std::vector<FusionFrame> moved = frames();
+      for (std::size_t n = 0; n < moved.size(); ++n) move(moved[n], found.corrected_from_given[n]);
+      const RegistrationCheck check =
+          check_registration(images_, frames(), moved, options_.planes, options_.voxel_size_m);
+      if (round == 1) survey_.registration_check = check;
+      if (!check.is_accepted(options_.refined_poses)) {
+        survey_.registration_rejected = round == 1;
+        break;
+      }
+      survey_.frames = std::move(moved);
       survey_.disagreement_after_m = found.disagreement_after_m;
       ++survey_.registration_rounds;
     }
+    sample_ = {};
   }
 
   FusionTiling tiling_of(double tile_m) const {
@@ -286,6 +320,8 @@ class Fusion {
     return {tile_m, options_.voxel_size_m, survey_.grid_origin, shift_m, disc_m};
   }
 
+  const TrajectoryPose& given_pose(int node) const;
+  void add_redundant_poses(Trajectory& poses) const;
   TileFusion::Tile fuse_tile(const TileMask& cells, int element_margin, const Members& members);
   SurfaceVoxels coarse_surface(const Members& members, const TileMask& around,
                                const TileMask& cells, FusionCounts& counts);
@@ -306,11 +342,40 @@ class Fusion {
   StageTimings timings_s_;
 };
 
+const TrajectoryPose& Fusion::given_pose(int node) const {
+  const auto given = std::find_if(world_from_base_.begin(), world_from_base_.end(),
+                                  [&](const TrajectoryPose& pose) { return pose.node == node; });
+  if (given == world_from_base_.end()) throw Error("no pose", {.field = node_name(node)});
+  return *given;
+}
+
+// Frames that were left out are corrected as the nearest one by number is that was used.
+void Fusion::add_redundant_poses(Trajectory& poses) const {
+  const Trajectory used = poses;
+  for (const int node : survey_.redundant) {
+    TrajectoryPose pose = given_pose(node);
+    if (survey_.registration_rounds > 0) {
+      const auto nearest = std::min_element(used.begin(), used.end(), [&](auto& a, auto& b) {
+        return std::abs(a.node - node) < std::abs(b.node - node);
+      });
+      pose.world_from_base = nearest->world_from_base *
+                             given_pose(nearest->node).world_from_base.inverse() *
+                             pose.world_from_base;
+    }
+    poses.push_back(pose);
+  }
+  std::stable_sort(poses.begin(), poses.end(),
+                   [](const auto& a, const auto& b) { return a.node < b.node; });
+}
+
 // The frames with the poses that they are fused by.
 DepthFusionResult Fusion::report() const {
   DepthFusionResult result;
+  result.redundant_frames = survey_.redundant.size();
   result.frames = frames().size();
   result.registration_rounds = survey_.registration_rounds;
+  result.registration_rejected = survey_.registration_rejected;
+  result.registration_check = survey_.registration_check;
   result.disagreement_before_m = survey_.disagreement_before_m;
   result.disagreement_after_m = survey_.disagreement_after_m;
   result.skipped = survey_.skipped;
@@ -318,20 +383,18 @@ DepthFusionResult Fusion::report() const {
   double turns = 0.0;
   double shifts = 0.0;
   for (const FusionFrame& frame : frames()) {
-    const auto given =
-        std::find_if(world_from_base_.begin(), world_from_base_.end(),
-                     [&](const TrajectoryPose& pose) { return pose.node == frame.node; });
-    if (given == world_from_base_.end()) throw Error("no pose", {.field = node_name(frame.node)});
-    TrajectoryPose pose = *given;
+    TrajectoryPose pose = given_pose(frame.node);
     if (survey_.registration_rounds > 0) {
-      pose.world_from_base = Eigen::Translation3d(survey_.grid_origin) * frame.grid_from_base;
-      const Pose given_from_used = given->world_from_base.inverse() * pose.world_from_base;
+      const Pose used = Eigen::Translation3d(survey_.grid_origin) * frame.grid_from_base;
+      const Pose given_from_used = pose.world_from_base.inverse() * used;
+      pose.world_from_base = used;
       const double turn = Eigen::AngleAxisd(given_from_used.linear()).angle();
       turns += turn * turn;
       shifts += given_from_used.translation().squaredNorm();
     }
     result.poses.push_back(pose);
   }
+  add_redundant_poses(result.poses);
   const auto count = static_cast<double>(frames().size());
   result.registration_turn_deg = std::sqrt(turns / count) * 180.0 / std::numbers::pi;
   result.registration_shift_m = std::sqrt(shifts / count);

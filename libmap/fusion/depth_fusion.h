@@ -42,6 +42,11 @@ struct DepthFusionOptions {
   // >= 0: times, at most, that all poses are corrected so that frames agree before they are fused
   // (frame_registration); 0: poses are taken as they are.
   int registration_rounds = 3;
+  // The poses were refined by depth and color already: only color accepts a registration.
+  bool refined_poses = false;
+  // >= 0: frames are left out that add less than 1/enough_views to what earlier frames have
+  // measured of nearly all their surface; 0: all frames are fused.
+  double enough_views = 10.0;
   SurfacePointOptions points{};
   // Points one voxel beyond the edge of what was measured, unless views see through them.
   bool extend_edges = true;
@@ -61,6 +66,27 @@ struct FusionCounts {
 };
 void describe(ResultTable& table, const FusionCounts& counts);
 
+// Mean costs of one kind of measurements by the poses before and after a registration.
+struct PairCosts {
+  std::size_t count = 0;
+  double before = 0.0;
+  double after = 0.0;
+  double deviation = 0.0;  // standard error of after - before, between pairs of frames
+
+  // By more than two standard errors and half a percent.
+  bool is_clearly_worse() const;
+  bool is_clearly_better() const;
+};
+
+struct RegistrationCheck {
+  PairCosts depth;  // in the held-out squares of the plan
+  PairCosts color;  // everywhere: registration uses depth only
+
+  // No kind is clearly worse and both together are better. Refined poses have used depth already:
+  // color must be clearly better.
+  bool is_accepted(bool refined_poses) const;
+};
+
 // The frames that can be used, where they are fused: what all tiles have in common.
 struct FusionSurvey {
   // The grid's origin is a corner of the world's own voxels near the first camera: single precision
@@ -68,7 +94,10 @@ struct FusionSurvey {
   Eigen::Vector3d grid_origin = Eigen::Vector3d::Zero();
   std::vector<FusionFrame> frames;               // by ascending node
   std::vector<std::pair<int, Error>> skipped{};  // node and what it lacks
-  int registration_rounds = 0;  // that moved frames; 0: the poses are those that were given
+  std::vector<int> redundant{};                  // nodes whose frames add next to nothing
+  int registration_rounds = 0;         // that moved frames; 0: the poses are those that were given
+  bool registration_rejected = false;  // its first round
+  RegistrationCheck registration_check{};  // of the first round
   // Of heights that frames measured of a place, about their mean: by the poses given, and in the
   // end.
   double disagreement_before_m = 0.0;
@@ -82,10 +111,13 @@ struct DepthFusionResult : FusionCounts {
   // where the surface bends within a disc.
   PointCloud cloud;
   std::size_t frames = 0;  // used
-  // The frames that were used, by ascending node, with the poses that they were fused by.
+  std::size_t redundant_frames = 0;
+  // The used and the redundant frames, by ascending node, with their poses after registration.
   Trajectory poses;
   // Of FusionSurvey, and root mean squares over the frames against the poses that were given.
   int registration_rounds = 0;
+  bool registration_rejected = false;
+  RegistrationCheck registration_check{};
   double registration_shift_m = 0.0;
   double registration_turn_deg = 0.0;
   double disagreement_before_m = 0.0;

@@ -48,6 +48,9 @@ void bind(ParameterTable& table, DepthFusionOptions& options) {
             "standard deviation of a whole frame, along a normal");
   table.add("registration_rounds", options.registration_rounds, {0, 20},
             "times, at most, that poses are corrected so that frames agree; 0: not at all");
+  table.add("enough_views", options.enough_views, not_negative,
+            "frames are left out that add less than 1/enough_views to what earlier frames measured "
+            "of nearly all their surface; 0: all frames are fused");
   table.add("min_views", options.points.min_views, {1},
             "points that fewer frames measured are dropped");
   table.add("max_seen_through", options.points.max_seen_through, not_negative,
@@ -69,10 +72,23 @@ void describe(ResultTable& table, const FusionCounts& counts) {
 
 void describe(ResultTable& table, const DepthFusionResult& result) {
   table.add("frames", result.frames, "frames that were fused");
+  table.add("redundant_frames", result.redundant_frames,
+            "frames left out because earlier frames have measured their surface");
   table.add("skipped_frames", result.skipped.size(), "frames that could not be used");
   describe(table, result.pixels);
   table.add("registration_rounds", result.registration_rounds,
             "rounds of registration that moved frames");
+  table.add("registration_rejected", result.registration_rejected,
+            "whether held-out measurements rejected the registration");
+  const auto add_check = [&](const std::string& kind, const PairCosts& costs) {
+    if (costs.count == 0) return;
+    table.add("held_out_" + kind + "_before", costs.before,
+              "mean cost of held-out " + kind + " with the given poses");
+    table.add("held_out_" + kind + "_after", costs.after,
+              "mean cost of held-out " + kind + " after the first round of registration");
+  };
+  add_check("depth", result.registration_check.depth);
+  add_check("color", result.registration_check.color);
   table.add("registration_shift_m", result.registration_shift_m,
             "shift of the frames by registration, root mean square");
   table.add("registration_turn_deg", result.registration_turn_deg,

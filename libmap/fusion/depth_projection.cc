@@ -5,18 +5,9 @@
 #include <string>
 
 #include "libmap/core/error.h"
+#include "libmap/scan/lens_rays.h"
 
 namespace libmap {
-
-namespace {
-
-bool same_lens(const Camera& a, const Camera& b) {
-  return a.width == b.width && a.height == b.height && a.fx == b.fx && a.fy == b.fy &&
-         a.cx == b.cx && a.cy == b.cy && a.distortion_model == b.distortion_model &&
-         a.distortion == b.distortion;
-}
-
-}  // namespace
 
 PixelRays pixel_rays(const Camera& camera) {
   const std::vector<Eigen::Vector2d> table = ray_table(camera);

@@ -91,6 +91,10 @@ void FusionFrames::keep_only(std::span<const FusionFrame> frames) {
     }
 }
 
+bool FusionFrames::has_color(std::span<const FusionFrame> frames) {
+  return !frames.empty() && !views_of(frames.front(), 0, true).front().color.empty();
+}
+
 std::vector<RefinementView> FusionFrames::views_of(const FusionFrame& frame, std::uint32_t number,
                                                    bool color) {
   RgbdFrame images = *depth_of(frame.node);

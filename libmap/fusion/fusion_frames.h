@@ -54,6 +54,9 @@ class FusionFrames {
   // Makes room: forgets the depth of all other frames.
   void keep_only(std::span<const FusionFrame> frames);
 
+  // Whether the first of these frames has a color image.
+  bool has_color(std::span<const FusionFrame> frames);
+
   std::shared_ptr<const PixelRays> rays_of(const Camera& camera) { return rays_.rays_of(camera); }
 
   // Sets all of `frame` that follows from its depth image and its pose. Throws Error: a camera that
@@ -64,9 +67,10 @@ class FusionFrames {
   using UseViews = std::function<void(std::span<const RefinementView> views, std::size_t frames)>;
   void each_view_group(std::span<const FusionFrame> frames, bool color, const UseViews& use);
 
- private:
+  // The frame's cameras, made ready. May be called from several threads.
   std::vector<RefinementView> views_of(const FusionFrame& frame, std::uint32_t number, bool color);
 
+ private:
   const ScanSource& scan_;
   Options options_;
   PixelRayCache rays_;

@@ -104,7 +104,13 @@ class ViewGather {
             static_cast<float>(1.0 / std::min(view.depth_camera.fx, view.depth_camera.fy))),
         min_incidence_(
             static_cast<float>(std::cos(sensor.max_incidence_deg * std::numbers::pi / 180.0))),
-        is_distorted_(view.depth_camera.is_distorted()) {}
+        is_distorted_(view.depth_camera.is_distorted()) {
+    // Beyond the pixels at the edge by one or two of their widths.
+    const Eigen::Vector2d beyond = (view.rays->max - view.rays->min) * 2.0 /
+                                   std::max(1, std::min(view.rays->width, view.rays->height));
+    lowest_ray_ = view.rays->min - beyond;
+    highest_ray_ = view.rays->max + beyond;
+  }
 
   bool may_see(const Chunk& chunk) const {
     const Eigen::Vector3d p = rotation_ * chunk.center + translation_;
@@ -153,6 +159,8 @@ class ViewGather {
     const Eigen::Vector3d p = rotation_ * element.position.cast<double>() + translation_;
     if (!(p.z() >= sensor_.min_depth_m && p.z() <= sensor_.max_depth_m)) return false;
     if (is_distorted_) {
+      const Eigen::Array2d ray = p.head<2>() / p.z();
+      if (!((ray > lowest_ray_).all() && (ray < highest_ray_).all())) return false;
       const auto pixel = project_point(view_.depth_camera, p);
       if (!pixel) return false;
       seen.pixel = pixel->cast<float>();
@@ -303,6 +311,8 @@ class ViewGather {
   float pixel_pitch_;
   float min_incidence_;
   bool is_distorted_;
+  Eigen::Array2d lowest_ray_;
+  Eigen::Array2d highest_ray_;
 };
 
 void close_frame(ElementSum& sum, float pose_variance) {

@@ -23,6 +23,15 @@ struct TileMask {
     const auto square = [&](int axis) { return static_cast<std::uint64_t>(cell[axis] >> 2); };
     return mix_bits(square(0), square(1)) >> (64U - thinning) == 0;
   }
+  // One of ten squares of 4 x 4 columns: frames are not registered by it, but the registration is
+  // validated by it.
+  static bool is_held_out(const Eigen::Vector2f& place) {
+    const Eigen::Array2i square = (place.array() / 4.0F).floor().cast<int>();
+    return mix_bits(~static_cast<std::uint64_t>(square.x()),
+                    static_cast<std::uint64_t>(square.y())) %
+               10 ==
+           0;
+  }
   // The place is in voxels.
   bool has_place(const Eigen::Vector2f& place) const {
     return (place.array().abs() < static_cast<float>(voxel_cell_limit)).all() &&

@@ -156,6 +156,27 @@ void register_to_color(RgbdFrame& frame, const Camera& depth_camera) {
                                target.base_from_camera.inverse() * depth_camera.base_from_camera);
 }
 
+// Depth that is registered to color covers the same view.
+void require_aspect_of_color(const RgbdFrame& frame) {
+  constexpr double max_difference = 0.03;
+  double width = frame.color.width;
+  double height = frame.color.height;
+  if (frame.color.empty()) {
+    width = 0.0;
+    for (const Camera& camera : frame.cameras) {
+      width += camera.width;
+      height = camera.height;
+    }
+  }
+  const double ratio = frame.depth.width * height / (frame.depth.height * width);
+  if (width > 0.0 && std::abs(std::log(ratio)) > max_difference)
+    throw Error(
+        "has another aspect ratio than color; it is turned, or of a depth camera of its own",
+        {.value = size_text(frame.depth.width, frame.depth.height),
+         .bound = "as " + size_text(static_cast<int>(width), static_cast<int>(height)) +
+                  ", or depth_calibration in " + frame_folder_files::options});
+}
+
 std::string count_of(std::size_t count, const std::string& what) {
   return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
 }
@@ -436,10 +457,14 @@ RgbdFrame FrameFolder::read_frame(int node, FrameParts parts) const {
   }
   if (frame.stereo.empty())
     for (const std::size_t camera : of_node.cameras) frame.cameras.push_back(cameras_[camera]);
-  if (depth_camera_ && !frame.depth.empty())
+  if (!frame.depth.empty())
     in_file(path_ / of_node.depth, [&] {
-      in_field("node " + std::to_string(node) + ": depth",
-               [&] { register_to_color(frame, *depth_camera_); });
+      in_field("node " + std::to_string(node) + ": depth", [&] {
+        if (depth_camera_)
+          register_to_color(frame, *depth_camera_);
+        else
+          require_aspect_of_color(frame);
+      });
     });
   return frame;
 }

@@ -264,10 +264,21 @@ void check_motion(const std::map<int, Pose>& own, ImportedPoses& result) {
 
 }  // namespace
 
+Pose with_quaternion_order(const Pose& read, QuaternionOrder order) {
+  if (order == QuaternionOrder::xyzw) return read;
+  const Eigen::Quaterniond q(read.linear());
+  Pose pose = read;
+  pose.linear() = Eigen::Quaterniond(q.x(), q.y(), q.z(), q.w()).toRotationMatrix();
+  return pose;
+}
+
 void bind(ParameterTable& table, PoseImportOptions& options) {
   table.add("poses_format", options.format, trajectory_format_names(),
             "of a file of poses; auto: by extension, else by content. tum-motion-capture and "
             "kitti-optical are RTAB-Map's formats 1 and 2, whose axes are others");
+  table.add("poses_quaternion", options.quaternion,
+            {{"xyzw", QuaternionOrder::xyzw}, {"wxyz", QuaternionOrder::wxyz}},
+            "order of the quaternions in a file of poses (TUM, g2o)");
   table.add(
       "poses_of", options.frame, pose_frame_names(),
       "whose poses a file contains: the base's, or the first camera's optical frame's; those of "
@@ -279,7 +290,9 @@ void bind(ParameterTable& table, PoseImportOptions& options) {
 
 ImportedPoses import_poses(const fs::path& path, const ScanSource& scan,
                            const PoseImportOptions& options) {
-  const TrajectoryFile file = read_trajectory(path, options.format);
+  TrajectoryFile file = read_trajectory(path, options.format);
+  for (TrajectoryPose& pose : file.poses)
+    pose.world_from_base = with_quaternion_order(pose.world_from_base, options.quaternion);
   return in_file(path, [&] {
     ImportedPoses result;
     std::vector<CameraPose> cameras;

@@ -13,8 +13,14 @@
 
 namespace libmap {
 
+// Order of the numbers of a file's quaternions: that of its format, or w first.
+enum class QuaternionOrder { xyzw, wxyz };
+// The pose whose quaternion, read as x y z w, was written in `order`.
+Pose with_quaternion_order(const Pose& read, QuaternionOrder order);
+
 struct PoseImportOptions {
   TrajectoryFormat format = TrajectoryFormat::automatic;
+  QuaternionOrder quaternion = QuaternionOrder::xyzw;
   // Whose poses the file holds: the base's, or those of the first camera's optical frame. Those of
   // COLMAP are always the cameras'.
   PoseFrame frame = PoseFrame::base;

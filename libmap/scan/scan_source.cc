@@ -12,6 +12,7 @@
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
 #include "libmap/scan/frame_folder.h"
+#include "libmap/scan/lens_rays.h"
 #include "libmap/scan/rtabmap_reader.h"
 #include "libmap/scan/sqlite_file.h"
 
@@ -153,6 +154,7 @@ namespace {
 
 constexpr double max_step = 0.03;  // of depth between pixels of one surface
 constexpr double max_miss_px = 0.5;
+constexpr double close_px = 0.03;
 constexpr int search_rounds = 5;
 
 class CalibratedScan : public ScanSource {
@@ -170,65 +172,95 @@ class CalibratedScan : public ScanSource {
  private:
   std::unique_ptr<ScanSource> scan_;
   CameraFile calibration_;
+  mutable LensRays rays_;
 };
 
 // Depth at a place between pixels whose four neighbors are of one surface, else at the nearest.
 double depth_between(const DepthImage& depth, const Eigen::Vector2d& at) {
   const int left = std::clamp(static_cast<int>(std::floor(at.x())), 0, depth.width - 2);
   const int top = std::clamp(static_cast<int>(std::floor(at.y())), 0, depth.height - 2);
-  const auto z = [&](int i, int j) { return static_cast<double>(depth.at(left + i, top + j)); };
+  const float* const row = &depth.pixels[depth.index(left, top)];
+  const float* const below = row + depth.width;
   const double u = std::clamp(at.x() - left, 0.0, 1.0);
   const double v = std::clamp(at.y() - top, 0.0, 1.0);
-  const auto [least, most] = std::minmax({z(0, 0), z(1, 0), z(0, 1), z(1, 1)});
-  if (!(least > 0.0 && most - least < max_step * most)) return z(u < 0.5 ? 0 : 1, v < 0.5 ? 0 : 1);
-  return (1.0 - v) * ((1.0 - u) * z(0, 0) + u * z(1, 0)) + v * ((1.0 - u) * z(0, 1) + u * z(1, 1));
+  const double least = std::min(std::min(row[0], row[1]), std::min(below[0], below[1]));
+  const double most = std::max(std::max(row[0], row[1]), std::max(below[0], below[1]));
+  if (!(least > 0.0 && most - least < max_step * most))
+    return (v < 0.5 ? row : below)[u < 0.5 ? 0 : 1];
+  return (1.0 - v) * ((1.0 - u) * row[0] + u * row[1]) + v * ((1.0 - u) * below[0] + u * below[1]);
 }
 
-// The depth image as the color camera sees it. Each pixel looks for the measurement that falls on
-// it, from pixel to pixel by how far it misses.
-DepthImage registered_depth(const RgbdFrame& frame, const Pose& color_from_depth) {
+// Searches for the measurement that falls on the ray of a pixel of the color image. A miss moves
+// the search by as many pixels as it has pitches of the rays around the pixel.
+class DepthSearch {
+ public:
+  DepthSearch(const DepthImage& taken, const LensRays::Table& rays, const Pose& color_from_depth)
+      : taken_(taken),
+        rays_(rays),
+        rotation_(color_from_depth.linear()),
+        shift_(color_from_depth.translation()) {}
+
+  // The depth that the color camera sees at x, y; 0: none. Begins at `source`, which becomes the
+  // position of the measurement.
+  double find(int x, int y, Eigen::Vector2d& source) const {
+    const Eigen::Vector2d wanted = rays_[taken_.index(x, y)];
+    const int left = std::max(x - 1, 0);
+    const int top = std::max(y - 1, 0);
+    Eigen::Matrix2d pitch;  // of the rays, by columns and rows
+    pitch << rays_[taken_.index(left + 1, y)] - rays_[taken_.index(left, y)],
+        rays_[taken_.index(x, top + 1)] - rays_[taken_.index(x, top)];
+    const Eigen::Matrix2d pixels_of_pitch = pitch.inverse();
+    for (int round = 0; round < search_rounds; ++round) {
+      if (!(source.x() > -0.5 && source.y() > -0.5 && source.x() < taken_.width - 0.5 &&
+            source.y() < taken_.height - 0.5))
+        return 0.0;
+      const double z = depth_between(taken_, source);
+      const int column = static_cast<int>(source.x() + 0.5);
+      const int row = static_cast<int>(source.y() + 0.5);
+      const Eigen::Vector2d ray =
+          rays_[taken_.index(column, row)] + pitch * (source - Eigen::Vector2d(column, row));
+      const Eigen::Vector3d point = rotation_ * (z * ray.homogeneous()) + shift_;
+      if (!(z > 0.0 && point.z() > 0.0)) return 0.0;
+      const Eigen::Vector2d miss = pixels_of_pitch * (wanted - point.head<2>() / point.z());
+      const double miss_px = miss.norm();
+      if (miss_px <= close_px || (round + 1 == search_rounds && miss_px < max_miss_px))
+        return point.z();
+      source += miss;
+    }
+    return 0.0;
+  }
+
+ private:
+  const DepthImage& taken_;
+  const LensRays::Table& rays_;
+  Eigen::Matrix3d rotation_;
+  Eigen::Vector3d shift_;
+};
+
+// The depth image as the color camera sees it.
+DepthImage registered_depth(const RgbdFrame& frame, const Pose& color_from_depth, LensRays& rays) {
   const DepthImage& taken = frame.depth;
   DepthImage seen(taken.width, taken.height);
   if (taken.width < 2 || taken.height < 2) return seen;
   RgbdFrame depth_only;
   depth_only.cameras = frame.cameras;
   depth_only.depth = taken;
-  const Camera camera = camera_views(depth_only).front().depth_camera;
-  for (int y = 0; y < taken.height; ++y)
+  const auto table = rays.rays_of(camera_views(depth_only).front().depth_camera);
+  const DepthSearch search(taken, *table, color_from_depth);
+  for (int y = 0; y < taken.height; ++y) {
+    Eigen::Vector2d offset = Eigen::Vector2d::Zero();  // of the pixel before
     for (int x = 0; x < taken.width; ++x) {
-      Eigen::Vector2d source(x, y);
-      Eigen::Vector3d point = Eigen::Vector3d::Zero();
-      double miss_px = std::numeric_limits<double>::infinity();
-      for (int round = 0; round < search_rounds && miss_px > 0.05; ++round) {
-        const double z = depth_between(taken, source);
-        const auto ray = pixel_to_ray(camera, source);
-        if (!(z > 0.0) || !ray) break;
-        point = color_from_depth * Eigen::Vector3d(z * ray->homogeneous());
-        const auto pixel = project_point(camera, point);
-        if (!pixel) break;
-        const Eigen::Vector2d miss = Eigen::Vector2d(x, y) - *pixel;
-        miss_px = miss.norm();
-        source += miss;
-        if (!(source.x() > -0.5 && source.y() > -0.5 && source.x() < taken.width - 0.5 &&
-              source.y() < taken.height - 0.5))
-          break;
-      }
-      if (miss_px < max_miss_px) seen.at(x, y) = static_cast<float>(point.z());
+      Eigen::Vector2d source = Eigen::Vector2d(x, y) + offset;
+      double z = search.find(x, y, source);
+      if (!(z > 0.0) && !offset.isZero(0.0)) z = search.find(x, y, source = Eigen::Vector2d(x, y));
+      offset = z > 0.0 ? Eigen::Vector2d(source - Eigen::Vector2d(x, y)) : Eigen::Vector2d::Zero();
+      seen.at(x, y) = static_cast<float>(z);
     }
+  }
   return seen;
 }
 
-RgbdFrame CalibratedScan::read_frame(int node, FrameParts parts) const {
-  RgbdFrame frame = scan_->read_frame(node, parts);
-  in_file(scan_->path(), [&] {
-    in_field("node " + std::to_string(node), [&] { apply_calibration(frame, calibration_); });
-  });
-  return frame;
-}
-
-}  // namespace
-
-void apply_calibration(RgbdFrame& frame, const CameraFile& calibration) {
+void apply(RgbdFrame& frame, const CameraFile& calibration, LensRays& rays) {
   if (frame.cameras.empty() && frame.stereo.empty()) return;
   if (frame.cameras.size() != 1 || !frame.stereo.empty())
     throw Error("a calibration is of one camera",
@@ -246,10 +278,25 @@ void apply_calibration(RgbdFrame& frame, const CameraFile& calibration) {
   // By the stored camera, as it was estimated.
   const Pose color_from_depth = calibration.color_from_depth_at(frame.stamp_s);
   if (!color_from_depth.matrix().isIdentity(0.0))
-    frame.depth = registered_depth(frame, color_from_depth);
+    frame.depth = registered_depth(frame, color_from_depth, rays);
   camera = known;
   camera.base_from_camera = base_from_camera;
   correct_depth(frame.depth, calibration.depth);
+}
+
+RgbdFrame CalibratedScan::read_frame(int node, FrameParts parts) const {
+  RgbdFrame frame = scan_->read_frame(node, parts);
+  in_file(scan_->path(), [&] {
+    in_field("node " + std::to_string(node), [&] { apply(frame, calibration_, rays_); });
+  });
+  return frame;
+}
+
+}  // namespace
+
+void apply_calibration(RgbdFrame& frame, const CameraFile& calibration) {
+  LensRays rays;
+  apply(frame, calibration, rays);
 }
 
 std::unique_ptr<ScanSource> with_calibration(std::unique_ptr<ScanSource> scan,

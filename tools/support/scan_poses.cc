@@ -207,6 +207,12 @@ libmap::Trajectory find_poses(const libmap::ScanSource& scan, PosesOption& poses
   return found;
 }
 
+bool are_refined(const PosesOption& poses) {
+  if (poses.source == "auto" || source_named(poses.source)) return false;
+  const std::optional<libmap::Manifest> made = libmap::read_manifest_of(poses.source);
+  return made && made->command == "refine";
+}
+
 libmap::Trajectory require_truth(const libmap::ScanSource& scan) {
   libmap::Trajectory truth = libmap::trajectory_of(scan.graph(), PoseSource::ground_truth);
   if (truth.empty())

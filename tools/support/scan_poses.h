@@ -54,6 +54,9 @@ std::unique_ptr<libmap::ScanSource> open_scan(const std::vector<std::string>& sc
 libmap::Trajectory find_poses(const libmap::ScanSource& scan, PosesOption& poses, bool strict,
                               Run& run);
 
+// Whether the manifest of a file of poses names `refine` as the command that wrote them.
+bool are_refined(const PosesOption& poses);
+
 // The scan's true poses. Throws Error if it has none.
 libmap::Trajectory require_truth(const libmap::ScanSource& scan);
 

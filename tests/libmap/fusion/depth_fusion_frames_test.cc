@@ -144,6 +144,54 @@ TEST(DepthFusionFrames, EachDepthImageIsReadOnce) {
   EXPECT_EQ(scan.depth_reads, 6);
 }
 
+TEST(DepthFusionFrames, FramesOfAKnownSurfaceAreLeftOut) {
+  MemoryScan scan;
+  for (int n = 0; n < 16; ++n) {
+    const bool is_last = n == 15;  // sees other ground
+    const Eigen::Vector3d target(is_last ? 2.0 : 0.001 * n, 0, 0);
+    scan.see(plane_z(0), looking(target + Eigen::Vector3d(0.5, 0, 1), target), small_camera(), {},
+             random_engine());
+  }
+  DepthFusionOptions options;
+  options.enough_views = 5;
+  const DepthFusionResult result = fuse_depth(scan, scan.poses, options);
+  EXPECT_GE(result.redundant_frames, 7U) << "five to eight are fused, and the last one";
+  EXPECT_LE(result.redundant_frames, 10U);
+  EXPECT_EQ(result.frames + result.redundant_frames, 16U);
+  ASSERT_EQ(result.poses.size(), 16U);
+  EXPECT_EQ(result.poses[12].node, scan.poses[12].node);
+  EXPECT_EQ(result.poses[12].world_from_base.matrix(), scan.poses[12].world_from_base.matrix());
+  bool has_last = false;
+  for (const Eigen::Vector3d& point : result.cloud.positions) has_last |= point.x() > 2.0;
+  EXPECT_TRUE(has_last);
+  // Nearer views know the surface better.
+  scan.see(plane_z(0), looking({0.1, 0, 0.2}, {0, 0, 0}), small_camera(), {}, random_engine());
+  EXPECT_EQ(fuse_depth(scan, scan.poses, options).frames, result.frames + 1);
+  options.enough_views = 0;
+  EXPECT_EQ(fuse_depth(scan, scan.poses, options).frames, 17U);
+}
+
+// The frames that are left out move with the nearest one that is used.
+TEST(DepthFusionFrames, PosesOfLeftOutFramesAreCorrected) {
+  MemoryScan scan;
+  for (int n = 0; n < 16; ++n)
+    scan.see(plane_z(0), looking({0.5, 0.001 * n, 1}, {0, 0, 0}), small_camera(), {0.001, 0.001},
+             random_engine());
+  Trajectory given = scan.poses;
+  for (TrajectoryPose& pose : given)
+    pose.world_from_base.translation().z() += pose.node <= 2 ? 0.015 : -0.015;
+  DepthFusionOptions options;
+  options.enough_views = 4;
+  const DepthFusionResult result = fuse_depth(scan, given, options);
+  ASSERT_GT(result.registration_rounds, 0);
+  ASSERT_GT(result.redundant_frames, 8U);
+  for (std::size_t n = 5; n < 16; ++n)
+    EXPECT_NEAR(result.poses[n].world_from_base.translation().z() -
+                    result.poses[0].world_from_base.translation().z(),
+                0.0, 0.005)
+        << n;
+}
+
 TEST(DepthFusionFrames, NothingToFuse) {
   MemoryScan scan = ring_scan(plane_z(0), 2, {});
   EXPECT_THAT(error_of([&] { fuse_depth(scan, {}); }).what(), HasSubstr("no poses"));

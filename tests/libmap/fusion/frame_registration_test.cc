@@ -203,6 +203,90 @@ TEST(FrameRegistration, SolvesTheLeastSquaresProblem) {
   }
 }
 
+// Colors of the frames of `scan`, of a texture that is bound to the ground.
+void paint(const Surface& surface, MemoryScan& scan) {
+  for (const TrajectoryPose& pose : scan.poses) {
+    RgbdFrame& frame = scan.frames.at(pose.node);
+    const Camera& camera = frame.cameras.front();
+    const Pose eye = pose.world_from_base * camera.base_from_camera;
+    const auto rays = ray_table(camera);
+    frame.color = ColorImage(camera.width, camera.height);
+    for (std::size_t n = 0; n < rays.size(); ++n) {
+      const Eigen::Vector3d ray = eye.linear() * rays[n].homogeneous();
+      const Eigen::Vector3d place = eye.translation() + surface(eye.translation(), ray) * ray;
+      const double wave = std::sin(70 * place.x()) * std::sin(60 * place.y() + 50 * place.z());
+      frame.color.pixels[n].fill(static_cast<std::uint8_t>(128 + 100 * wave));
+    }
+  }
+}
+
+// Views from nearly one position, where color shows each turn. Depth is tilted to the right and to
+// the left in turn: surfaces agree better when frames are turned.
+MemoryScan tilted_scan(const Surface& surface) {
+  MemoryScan scan;
+  for (int n = 0; n < 8; ++n)
+    scan.see(surface, looking({1.0, 0.02 * n, 1.0}, {0, 0, 0.05}), small_camera(), {0.002, 0.002},
+             random_engine());
+  paint(surface, scan);
+  for (auto& [node, frame] : scan.frames)
+    for (int y = 0; y < frame.depth.height; ++y)
+      for (int x = 0; x < frame.depth.width; ++x)
+        frame.depth.at(x, y) *=
+            1.0F + (node % 2 == 0 ? 0.03F : -0.03F) * static_cast<float>(x - 64) / 64.0F;
+  return scan;
+}
+
+TEST(FrameRegistration, ColorRejectsWhatWrongDepthSuggests) {
+  MemoryScan scan = tilted_scan(rocky_ground());
+  const DepthFusionResult result = fuse_depth(scan, scan.poses);
+  EXPECT_TRUE(result.registration_rejected);
+  EXPECT_EQ(result.registration_rounds, 0);
+  EXPECT_GT(result.registration_check.color.count, 1000U);
+  EXPECT_TRUE(result.registration_check.color.is_clearly_worse());
+  for (std::size_t n = 0; n < result.poses.size(); ++n)
+    EXPECT_EQ(result.poses[n].world_from_base.matrix(), scan.poses[n].world_from_base.matrix());
+  // Without color nothing contradicts: depth alone cannot show its own fault.
+  for (auto& [node, frame] : scan.frames) frame.color = {};
+  EXPECT_GT(fuse_depth(scan, scan.poses).registration_rounds, 0);
+}
+
+TEST(FrameRegistration, OnlyColorCorrectsRefinedPoses) {
+  MemoryScan scan = ring_scan(rocky_ground(), 12);
+  const Trajectory given = shaken(scan.poses, 0.01, 0.5);
+  DepthFusionOptions refined;
+  refined.refined_poses = true;
+  const DepthFusionResult without = fuse_depth(scan, given, refined);
+  EXPECT_TRUE(without.registration_rejected);
+  EXPECT_EQ(without.registration_check.depth.count, 0U);
+  EXPECT_EQ(without.poses[3].world_from_base.matrix(), given[3].world_from_base.matrix());
+  paint(rocky_ground(), scan);
+  const DepthFusionResult result = fuse_depth(scan, given, refined);
+  EXPECT_FALSE(result.registration_rejected);
+  EXPECT_TRUE(result.registration_check.color.is_clearly_better());
+  EXPECT_LT(errors_of(result.poses, scan.poses).place_m,
+            0.25 * errors_of(given, scan.poses).place_m);
+}
+
+TEST(FrameRegistration, ACheckWeighsBothKinds) {
+  const PairCosts better{100, 1.0, 0.9, 0.01};
+  const PairCosts worse{100, 1.0, 1.1, 0.01};
+  const PairCosts a_little_worse{100, 1.0, 1.01, 0.01};
+  const PairCosts none;
+  const auto accepted = [](const PairCosts& depth, const PairCosts& color, bool refined) {
+    return RegistrationCheck{depth, color}.is_accepted(refined);
+  };
+  EXPECT_TRUE(accepted(better, better, false));
+  EXPECT_TRUE(accepted(better, none, false));
+  EXPECT_TRUE(accepted(better, a_little_worse, false));
+  EXPECT_FALSE(accepted(better, worse, false));
+  EXPECT_FALSE(accepted(worse, better, false));
+  EXPECT_FALSE(accepted(a_little_worse, none, false));
+  EXPECT_FALSE(accepted(none, none, false));
+  EXPECT_TRUE(accepted(a_little_worse, better, true));
+  EXPECT_FALSE(accepted(better, none, true));
+  EXPECT_FALSE(accepted(better, a_little_worse, true));
+}
+
 TEST(FrameRegistration, StoredPosesOfARealScanComeNearTheTruth) {
   GRASPMAP_REQUIRE_DATA();
   const auto scan = open_scan(graspmap_test::data_folder() / "scans/site_full.db");

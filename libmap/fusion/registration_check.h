@@ -1,0 +1,17 @@
+// Registration of frames, accepted or rejected by measurements that it has not used. Inner part of
+// depth_fusion.
+#pragma once
+
+#include <span>
+
+#include "libmap/fusion/depth_fusion.h"
+#include "libmap/fusion/fusion_frames.h"
+
+namespace libmap {
+
+// Compares up to 72 pairs of overlapping frames by their poses before and after a registration.
+RegistrationCheck check_registration(FusionFrames& images, std::span<const FusionFrame> before,
+                                     std::span<const FusionFrame> after, const DepthSensor& sensor,
+                                     double voxel_size_m);
+
+}  // namespace libmap

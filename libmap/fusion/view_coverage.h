@@ -1,0 +1,37 @@
+// How well frames have measured a surface, in cells of the grid. Inner part of depth_fusion.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "libmap/core/pose.h"
+#include "libmap/fusion/depth_noise.h"
+#include "libmap/fusion/depth_projection.h"
+#include "libmap/geometry/voxel_key.h"
+
+namespace libmap {
+
+// What one frame adds: the inverse variances of some of its pixels, summed over each cell.
+struct FrameCoverage {
+  VoxelIndex cells;
+  std::vector<float> information;
+  std::vector<std::uint32_t> pixels;
+
+  // Adds about 5000 pixels of a depth image, within the sensor's range.
+  void add(const DepthImage& depth, const PixelRays& rays, const Pose& grid_from_camera,
+           const DepthSensor& sensor, double cell_size_m);
+};
+
+class ViewCoverage {
+ public:
+  // Whether a frame adds more than 1/views to what is known of a cell, for more than 5 % of its
+  // pixels.
+  bool is_improved_by(const FrameCoverage& frame, double views) const;
+  void add(const FrameCoverage& frame);
+
+ private:
+  VoxelIndex cells_;
+  std::vector<float> information_;
+};
+
+}  // namespace libmap

@@ -1,0 +1,24 @@
+// Depth and color of one camera, compared with those of another one at a given motion between them.
+#pragma once
+
+#include <vector>
+
+#include "libmap/core/pose.h"
+#include "libmap/fusion/surface_refinement.h"
+
+namespace libmap {
+
+// One entry for each sampled pixel of the first view; NaN where the second view does not show it.
+struct ViewComparison {
+  std::vector<Eigen::Vector3f> points;  // in the first camera; 0 without depth
+  std::vector<float> depth;             // measured minus expected depth, in expected depths
+  std::vector<float> color;             // 1 - correlation of the brightness of 5 x 5 pixels
+};
+
+// Samples the pixels of `from` on a grid, about 2000. Entries of `color` also require a
+// texture, depth without a jump, and depth of `onto` that is within `gate` (in depths) of the
+// expected depth.
+ViewComparison compare_views(const RefinementView& from, const RefinementView& onto,
+                             const Pose& onto_from, float gate);
+
+}  // namespace libmap
