@@ -237,6 +237,8 @@ void bind(ParameterTable& table, FeatureOptions& options) {
             "standard deviation of depth at range 0");
   table.add("range_noise", options.planes.noise.axial_of_range, not_negative,
             "what each meter of range adds to it, m a m");
+  table.add("square_noise", options.planes.noise.axial_of_square, not_negative,
+            "what range squared adds to it, as of stereo and structured light, 1/m");
 }
 
 Eigen::Vector3d FrameFeatures::point_in_camera(std::size_t n) const {

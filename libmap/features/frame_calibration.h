@@ -45,6 +45,9 @@ struct SensorCalibration {
 // The frame as if it had been recorded with the calibration: features and surfaces.
 void calibrate(FrameFeatures& frame, const SensorCalibration& calibration);
 
+// The frame as if its depth camera had another noise.
+void set_depth_noise(FrameFeatures& frame, const DepthNoise& before, const DepthNoise& after);
+
 // Its cameras and features alone, without surfaces and descriptors.
 FrameFeatures calibrated_features(const FrameFeatures& frame, const SensorCalibration& calibration);
 

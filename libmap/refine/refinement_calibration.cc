@@ -40,6 +40,8 @@ void add_figures(const CalibrationEstimate& estimate, StageReport& report) {
     add(camera + "cx_px", found.intrinsics[n].cx_px);
     add(camera + "cy_px", found.intrinsics[n].cy_px);
   }
+  for (const auto& [model, reason] : estimate.impossible)
+    report.warnings.push_back(model + " was not accepted: " + reason);
   for (std::size_t n = 0; n < found.timing.size(); ++n) {
     const std::string camera = "camera_" + std::to_string(n) + "_";
     add(camera + "depth_delay_s", found.timing[n].depth_delay_s);
@@ -108,8 +110,10 @@ void scale_state(double factor, RefinementState& state) {
 
 CalibrationInput calibration_input(const RefinementInput& input, const RefinementState& state,
                                    const std::vector<GraphLinkResult>& other_links) {
-  return {*state.stored_frames, state.feature_links,    state.poses,
-          other_links,          state.graph.components, input.options.bundle_adjustment};
+  CalibrationInput data{*state.stored_frames, state.feature_links,    state.poses,
+                        other_links,          state.graph.components, input.options.bundle_adjustment};
+  data.options.depth_noise = state.noise;
+  return data;
 }
 
 SharedFrames calibrated(const std::vector<FrameFeatures>& stored,
@@ -172,7 +176,8 @@ BlockSystem information_of(const RefinementInput& input, const RefinementState& 
 }
 
 // How the poses would move with calibrations one standard deviation away, to first order.
-CalibrationMoves calibration_moves(const RefinementInput& input, const RefinementState& state) {
+CalibrationMoves calibration_moves(const RefinementInput& input, const RefinementState& state,
+                                   SensorCalibration& deviations) {
   CalibrationMoves moves;
   if (state.calibration.empty()) return moves;
   const std::vector<GraphLinkResult> others = state.results_of_other_links();
@@ -199,6 +204,7 @@ CalibrationMoves calibration_moves(const RefinementInput& input, const Refinemen
   if (!solver.valid()) return moves;
   const double deviation =
       varied.calibration.timing.empty() ? calibration_deviation_scale : timing_deviation_scale;
+  deviations = std::move(varied.deviations);
   for (const SensorCalibration& alternative : varied.alternatives) {
     std::vector<Vector6d> side = side_with(alternative);
     for (std::size_t n = 0; n < side.size(); ++n) side[n] -= best[n];
