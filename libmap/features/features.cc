@@ -192,7 +192,8 @@ FoundFeatures features_of(const ScanSource& scan, int node, const FeatureOptions
   if (!result.from_cache) cache.write(key, frame);
   for (Feature& feature : frame.features)
     if (!has_plane(frame, feature)) feature.depth_noise_m = unknown_depth_m;
-  frame.stamp_s = read.stamp_s;
+  frame.depth_later_s = read.depth_later_s;
+  frame.stamp_s = read.stamp_s - read.depth_later_s;
   return result;
 }
 

@@ -79,7 +79,8 @@ void register_surfaces(FrameFeatures& frame, const SensorCalibration& calibratio
     const auto motion = calibration.motion.find(frame.node);
     if (n < calibration.timing.size() && motion != calibration.motion.end())
       camera.base_from_camera =
-          moved(Pose::Identity(), calibration.timing[n].depth_delay_s * motion->second) *
+          moved(Pose::Identity(),
+                (calibration.timing[n].depth_delay_s + frame.depth_later_s) * motion->second) *
           camera.base_from_camera;
     frame.surfaces[n].set_camera(camera);
   }
@@ -143,6 +144,7 @@ FrameFeatures calibrated_features(const FrameFeatures& frame,
   FrameFeatures result;
   result.node = frame.node;
   result.stamp_s = frame.stamp_s;
+  result.depth_later_s = frame.depth_later_s;
   result.cameras = frame.cameras;
   result.features = frame.features;
   // By pixels, which the stored camera made of the features' rays.
@@ -215,7 +217,8 @@ Pose color_from_depth_of(const FrameFeatures& frame, const Feature& feature,
   const Camera& camera = frame.cameras[feature.camera];
   const CameraTiming& timing = calibration.timing[feature.camera];
   const double later_s =
-      timing.depth_delay_s - timing.rolling_shutter_s * row_share_of(feature, camera);
+      timing.depth_delay_s + frame.depth_later_s -
+      timing.rolling_shutter_s * row_share_of(feature, camera);
   return moved(Pose::Identity(), later_s * motion_in_camera(camera, motion->second)) * pose;
 }
 

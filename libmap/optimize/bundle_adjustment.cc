@@ -260,8 +260,10 @@ CalibratedObservation Adjustment::calibrated(const Observation& seen) const {
   if (options_.refine_timing) {
     const CameraTiming& timing = start_.timing[its.camera];
     calibrated.row_share = row_share_of(its, camera);
+    calibrated.depth_later_s = frame.depth_later_s;
     calibrated.known_step =
-        (timing.depth_delay_s - timing.rolling_shutter_s * calibrated.row_share) *
+        (timing.depth_delay_s + frame.depth_later_s -
+         timing.rolling_shutter_s * calibrated.row_share) *
         motion_in_camera(camera, start_.motion.at(frame.node));
   }
   return calibrated;

@@ -453,6 +453,27 @@ RefinementResult finish(const RefinementInput& input, RefinementState state,
   return result;
 }
 
+// Frames in which no features match are linked by their depth.
+void link_by_depth(Run& run) {
+  std::set<std::size_t> linked;
+  for (const FeatureLink& link : run.state.feature_links) {
+    linked.insert(link.frames.first);
+    linked.insert(link.frames.second);
+  }
+  if (linked.size() == run.state.frames->size() || run.input.options.icp.mode == IcpMode::off)
+    return;
+  StageResult stage = depth_link_stage(run.input, run.state);
+  if (stage.report.closures.candidates == 0) return;
+  if (run.propose(std::move(stage)))
+    run.result.stages.back().figures.emplace_back("rejected_by_optimization",
+                                                  drop_rejected_links(run.state));
+}
+
+bool has_matches(const RefinementState& state) {
+  return std::any_of(state.feature_links.begin(), state.feature_links.end(),
+                     [](const FeatureLink& link) { return !link.matches.empty(); });
+}
+
 // Without links of features the poses rest on the scan's own links.
 void require_other_links(Run& run) {
   const RefinementState& state = run.state;
@@ -518,12 +539,14 @@ RefinementResult refine_poses(const ScanSource& scan, const RefinementOptions& g
   if (state.frames->size() <= options.features.max_frames_in_memory)
     run.input.known_matches = &matches;
   link_frames(run);
+  link_by_depth(run);
   CalibrationMoves moves;
   if (state.feature_links.empty()) {
     require_other_links(run);
   } else {
-    if (options.bundle) run.propose(bundle_stage(run.input, state));
-    if (options.bundle && (options.intrinsics != IntrinsicsMode::fixed || options.correct_depth))
+    const bool bundle = options.bundle && has_matches(state);
+    if (bundle) run.propose(bundle_stage(run.input, state));
+    if (bundle && (options.intrinsics != IntrinsicsMode::fixed || options.correct_depth))
       calibrate_sensor(run);
     drop_descriptors(state);
     matches.clear();

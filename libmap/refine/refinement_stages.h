@@ -88,6 +88,9 @@ std::set<FramePair> candidate_pairs(const RefinementInput& input, const Refineme
 // Links pairs of frames by their features and optimizes the pose graph.
 StageResult link_stage(const RefinementInput& input, const RefinementState& state, int round,
                        const std::vector<FramePair>& pairs);
+// Links frames that no feature link joins by aligning their depth, from the poses as they are, with
+// frames that follow each other or are near. The links have no matches.
+StageResult depth_link_stage(const RefinementInput& input, const RefinementState& state);
 // Drops links of features that the pose graph has rejected. Returns their number.
 std::size_t drop_rejected_links(RefinementState& state);
 

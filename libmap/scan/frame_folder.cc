@@ -296,7 +296,11 @@ void FrameFolder::add_images(const Listing& color, const Listing& depth) {
   if (depth.names.empty()) throw Error("lists no depth image", {.file = path_.string()});
   std::vector<std::string> color_of_depth(depth.names.size());
   const auto pairs = pair_by_stamp(color.stamps, depth.stamps, options_.pairing_tolerance_s);
-  for (const auto& [i, j] : pairs) color_of_depth[j] = color.names[i];
+  std::vector<double> later_s(depth.names.size(), 0.0);
+  for (const auto& [i, j] : pairs) {
+    color_of_depth[j] = color.names[i];
+    later_s[j] = depth.stamps[j] - color.stamps[i];
+  }
   std::vector<std::size_t> order;
   for (std::size_t j = 0; j < depth.names.size(); ++j)
     if (color.names.empty() || !color_of_depth[j].empty()) order.push_back(j);
@@ -321,6 +325,7 @@ void FrameFolder::add_images(const Listing& color, const Listing& depth) {
     Files of_node;
     of_node.color = color_of_depth[j];
     of_node.depth = depth.names[j];
+    of_node.depth_later_s = later_s[j];
     of_node.cameras = {camera};
     files_.emplace(node.id, std::move(of_node));
   }
@@ -413,6 +418,7 @@ RgbdFrame FrameFolder::read_frame(int node, FrameParts parts) const {
   RgbdFrame frame;
   frame.node = node;
   frame.stamp_s = graph_.find_node(node)->stamp_s;
+  frame.depth_later_s = of_node.depth_later_s;
   const auto read = [&](const std::string& name, const char* part, const auto& decode) {
     if (name.empty()) return;
     const std::string field = "node " + std::to_string(node) + ": " + part;

@@ -248,7 +248,7 @@ void apply_calibration(RgbdFrame& frame, const CameraFile& calibration) {
                 {.field = "camera", .value = size_of(camera), .bound = size_of(known)});
   const Pose base_from_camera = camera.base_from_camera;
   // By the stored camera, as it was estimated.
-  const Pose color_from_depth = calibration.color_from_depth_at(frame.stamp_s);
+  const Pose color_from_depth = calibration.color_from_depth_at(frame.stamp_s, frame.depth_later_s);
   if (!color_from_depth.matrix().isIdentity(0.0))
     frame.depth = registered_depth(frame, color_from_depth);
   camera = known;
