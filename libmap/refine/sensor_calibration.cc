@@ -287,7 +287,7 @@ void ModelSearch::settle_motions() {
 // Timing alone, then with everything else: a correction of depth also fits what late depth and
 // rows of pictures distort. False if timing alone is not clearly better than the stored camera.
 bool ModelSearch::begins_with_timing(const CalibrationParts& others) {
-  best_ = attempt({.timing = true}, {}, part_.poses, 1);
+  best_ = attempt({.timing = true}, {}, part_.poses, max_rounds - 1);
   const HeldOutEvaluation change = evaluate_held_out(before_, best_.costs);
   if (!is_good(best_) || change.change() > -min_timing_gain * change.before()) return false;
   CalibrationParts all = others;
