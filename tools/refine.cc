@@ -242,7 +242,7 @@ void say_result(const RefineOptions& options, const libmap::RefinementResult& re
   for (const std::string& warning : result.warnings) run.warn(first + ": " + warning);
   for (const libmap::StageReport& stage : result.stages) say_stage(stage, run);
   for (const std::string& finding : result.findings) run.say(finding);
-  if (!result.noise.empty()) run.say(result.noise);
+  if (!result.noise.empty()) run.detail("{}", result.noise);
   if (!result.calibration.empty() && (with_known_camera || result.cameras.size() > 1) &&
       options.database.empty())
     run.warn("{}: what was corrected is in the poses alone: {}", first,

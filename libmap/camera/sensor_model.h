@@ -22,7 +22,7 @@ struct SensorModel {
 };
 void bind(ParameterTable& table, SensorModel& model);
 
-// A path, or the name of a file in data/sensors. Throws Error: unknown name (with the nearest known
+// A path, or the name of a file in data/sensors; "d435" and "ipad" will do. Throws Error: unknown name (with the nearest known
 // one), or a file that cannot be read.
 SensorModel read_sensor_model(const std::string& name);
 

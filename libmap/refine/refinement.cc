@@ -27,7 +27,7 @@ constexpr double settled_s = 1e-3;
 // scans.
 constexpr double min_deviation_scale = 1.3;
 // A noise of depth that is this much larger or smaller than the assumed one replaces it.
-constexpr double other_noise = 1.5;
+constexpr double other_noise = 1.8;
 constexpr double explained_cost = 0.35;  // of held-out matches; of normal errors it is 0.26
 
 bool is_motion(const PoseLink& link) {
@@ -443,6 +443,8 @@ RefinementResult finish(const RefinementInput& input, RefinementState state,
   }
   result.calibration = std::move(state.calibration);
   result.findings = findings(result.calibration, result.deviations, result.cameras);
+  if (!has_noise(input.options.features.planes, state.noise))
+    result.findings.push_back(result.noise);
   result.components = std::move(state.graph.components);
   result.without_links = std::move(state.graph.without_links);
   result.warnings = std::move(state.warnings);
