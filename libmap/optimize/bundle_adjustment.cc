@@ -22,6 +22,8 @@ namespace {
 constexpr std::size_t dense_below = 120;  // poses: the Schur complement of more is never formed
 constexpr double registration_prior_m = 0.02;
 constexpr double registration_prior_rad = 0.03;
+// Standard deviation of the delays of depth by its stamps that determines the motions' scale.
+constexpr double stamps_tell_s = 0.005;
 // Keeps a pose that nothing binds from making the system singular.
 constexpr double pose_damping = 1e-6;
 
@@ -135,6 +137,8 @@ class Adjustment {
   std::map<int, std::size_t> place_;  // of each node among the poses
   std::vector<Eigen::Index> first_;   // number of each camera
   std::vector<bool> sees_;            // of each camera, anything
+  double mean_later_s_ = 0.0;         // of FrameFeatures::depth_later_s
+  double later_deviation_s_ = 0.0;
   std::vector<Eigen::Index> free_;    // numbers
   std::vector<std::size_t> points_;   // their tracks
   JointProblem problem_;
@@ -201,6 +205,11 @@ void Adjustment::start_numbers(const SensorCalibration& start,
   }
   if (!options_.refine_timing) return;
   problem_.moving = true;
+  const double count = static_cast<double>(std::max<std::size_t>(1, frames_.size()));
+  for (const FrameFeatures& frame : frames_) mean_later_s_ += frame.depth_later_s / count;
+  for (const FrameFeatures& frame : frames_)
+    later_deviation_s_ += std::pow(frame.depth_later_s - mean_later_s_, 2) / count;
+  later_deviation_s_ = std::sqrt(later_deviation_s_);
   const std::map<int, KnownMotion> between = relative_motions(frames_, state_.poses, components);
   for (const auto& [node, pose] : state_.poses) {
     const auto found = between.find(node);
@@ -332,7 +341,8 @@ void Adjustment::add_depth_priors(std::size_t camera, Priors& priors) {
 // on those between poses has the slope 1. The hand's tremor is missing in the latter, so that least
 // squares with both as measurements makes times too long.
 double Adjustment::motion_scale() const {
-  if (!problem_.moving || problem_.fix_cameras) return 1.0;
+  // Different delays by stamps determine it.
+  if (!problem_.moving || problem_.fix_cameras || later_deviation_s_ > stamps_tell_s) return 1.0;
   double mixed = 0.0;
   double squares = 0.0;
   for (std::size_t n = 0; n < state_.motions.size(); ++n) {
@@ -356,7 +366,9 @@ SensorCalibration Adjustment::calibration(const JointState& state, double motion
           moved(Pose::Identity(), Eigen::Map<const Vector6d>(own + registration_at)) *
           start_.color_from_depth[n]);
     if (options_.refine_timing)
-      found.timing.push_back({motion_scale * own[timing_at], motion_scale * own[timing_at + 1]});
+      found.timing.push_back(
+          {motion_scale * (own[timing_at] + mean_later_s_) - mean_later_s_,
+           motion_scale * own[timing_at + 1]});
     if (options_.refine_depth) {
       found.depth.push_back(corrections_[n]);
       std::copy_n(own + radial_at, 3, found.depth[n].radial.begin());
@@ -388,6 +400,8 @@ void Adjustment::find_alternatives() {
     spread.camera_params.setZero();
     spread.camera_params(free_) = modes.deviations.tail(static_cast<Eigen::Index>(free_.size()));
     result_.deviations = calibration(spread, scale);
+    for (CameraTiming& timing : result_.deviations.timing)
+      timing.depth_delay_s += (1.0 - scale) * mean_later_s_;
   }
   for (const Eigen::VectorXd& change : modes.changes) {
     JointState other = state_;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <iterator>
 #include <numbers>
+#include <optional>
 #include <set>
 #include <tuple>
 #include <utility>
@@ -237,7 +238,8 @@ class ModelSearch {
   void simplify_to(const CalibrationParts& simpler);
   void leave_out();
   void settle_motions();
-  bool begins_with_timing(const CalibrationParts& others);
+  bool is_timing_enough(const CalibrationParts& others);
+  void use_timing_alone();
   void try_timing();
 
   const SubScan& part_;
@@ -246,6 +248,7 @@ class ModelSearch {
   const CalibrationChoice& choice_;
   HeldOutCosts before_;
   Candidate best_;
+  std::optional<Candidate> timed_;  // timing alone, if it is clearly better than the stored camera
   CalibrationEstimate estimate_;
 };
 
@@ -278,30 +281,32 @@ void ModelSearch::leave_out() {
   }
 }
 
-// Motions need more rounds than a comparison.
 void ModelSearch::settle_motions() {
   Candidate settled = attempt_from_best(best_.model, max_rounds - 1);
   if (is_good(settled)) best_ = std::move(settled);
 }
 
-// Timing alone, then with everything else: a correction of depth also fits what late depth and
-// rows of pictures distort. False if timing alone is not clearly better than the stored camera.
-bool ModelSearch::begins_with_timing(const CalibrationParts& others) {
-  best_ = attempt({.timing = true}, {}, part_.poses, max_rounds - 1);
-  const HeldOutEvaluation change = evaluate_held_out(before_, best_.costs);
-  if (!is_good(best_) || change.change() > -min_timing_gain * change.before()) return false;
+// Timing alone: a correction of depth also fits what late depth and rows of pictures distort.
+// Returns whether everything else together with it is not clearly better.
+bool ModelSearch::is_timing_enough(const CalibrationParts& others) {
+  timed_ = attempt({.timing = true}, {}, part_.poses, max_rounds - 1);
+  const HeldOutEvaluation change = evaluate_held_out(before_, timed_->costs);
+  if (!is_good(*timed_) || change.change() > -min_timing_gain * change.before()) {
+    timed_.reset();
+    return false;
+  }
   CalibrationParts all = others;
   all.timing = true;
-  if (all != best_.model) {
-    Candidate candidate = attempt_from_best(all, 1);
-    if (is_good(candidate) && is_needed(best_.costs, candidate.costs, min_timing_gain)) {
-      best_ = std::move(candidate);
-      simplify_to(others);
-      leave_out();
-    }
-  }
-  if (best_.model.timing) settle_motions();
-  return true;
+  if (all == timed_->model) return true;
+  const Candidate candidate = attempt(all, timed_->adjustment.calibration,
+                                      timed_->adjustment.map_from_base, 1);
+  return !is_good(candidate) || !is_needed(timed_->costs, candidate.costs, min_timing_gain);
+}
+
+// The motions need more rounds than a comparison.
+void ModelSearch::use_timing_alone() {
+  best_ = std::move(*timed_);
+  settle_motions();
 }
 
 void ModelSearch::try_timing() {
@@ -319,13 +324,17 @@ CalibrationEstimate ModelSearch::run() {
   CalibrationParts all = choice_.parts;
   all.timing = all.timing && !choice_.start.timing.empty();
   const bool may_time = choice_.parts.timing && choice_.leave_out && !all.timing;
-  if (!may_time || !begins_with_timing(all)) {
+  if (may_time && is_timing_enough(all)) {
+    use_timing_alone();
+  } else {
     best_ = attempt(all, choice_.start, part_.poses, max_rounds);
     // Too much freedom for little data may hide what intrinsics alone explain.
     if (!is_good(best_) && choice_.leave_out && all.intrinsics && (all.depth || all.registration))
       best_ = attempt({.intrinsics = true}, {}, part_.poses, 1);
     leave_out();
     if (may_time) try_timing();
+    if (timed_ && (!is_good(best_) || evaluate_held_out(timed_->costs, best_.costs).change() > 0.0))
+      use_timing_alone();
   }
   if (is_good(best_) && choice_.settle) {
     Candidate settled = try_model(best_.model, part_, options_, best_.adjustment.calibration,
