@@ -48,6 +48,7 @@ void say_stage(const libmap::StageReport& stage, Run& run) {
     text += fmt::format("; error {:.2f} mm, {:.3f} deg", 1e3 * stage.error->absolute.rmse_m,
                         stage.error->absolute.mean_rotation_deg);
   run.say(text);
+  for (const std::string& warning : stage.warnings) run.say("{}: {}", stage.name, warning);
   run.detail("{}: {:.2f} s", stage.name, stage.seconds);
   if (stage.rejected_error)
     run.detail("  given up: {:.2f} mm, {:.3f} deg", 1e3 * stage.rejected_error->absolute.rmse_m,
@@ -241,6 +242,7 @@ void say_result(const RefineOptions& options, const libmap::RefinementResult& re
   for (const std::string& warning : result.warnings) run.warn(first + ": " + warning);
   for (const libmap::StageReport& stage : result.stages) say_stage(stage, run);
   for (const std::string& finding : result.findings) run.say(finding);
+  if (!result.noise.empty()) run.detail("{}", result.noise);
   if (!result.calibration.empty() && (with_known_camera || result.cameras.size() > 1) &&
       options.database.empty())
     run.warn("{}: what was corrected is in the poses alone: {}", first,

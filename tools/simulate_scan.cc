@@ -217,6 +217,8 @@ int graspmap_tools::simulate_scan(int argc, char** argv) {
                 "cloud or a folder of clouds of any size (.pcd, .ply, .csv)");
   command.output(options.output, "RTAB-Map database with true poses (.db)");
   bind(command.parameters(), options);
+  std::vector<std::pair<std::string, std::string>> for_refine;  // of libmap::SensorModel
+  command.parameters().add_overrides("refine", for_refine);
   command.config_resolver(
       [](const std::string& name) { return libmap::find_data_file("sensors", name); });
   return command.run(argc, argv, [&](Run& run) { simulate(options, run); });

@@ -231,15 +231,16 @@ std::string quoted(const std::string& text) {
 
 }  // namespace
 
-Pose CameraFile::color_from_depth_at(double stamp_s) const {
+Pose CameraFile::color_from_depth_at(double stamp_s, double depth_later_s) const {
+  const double delay_s = depth_delay_s + depth_later_s;
   const auto motion = std::lower_bound(
       motions.begin(), motions.end(), stamp_s,
       [](const FrameMotion& frame, double stamp) { return frame.stamp_s < stamp; });
-  if (depth_delay_s == 0.0 || motion == motions.end() || motion->stamp_s != stamp_s)
+  if (delay_s == 0.0 || motion == motions.end() || motion->stamp_s != stamp_s)
     return color_from_depth;
-  const Eigen::Vector3d turn = depth_delay_s * motion->turn_rate;
+  const Eigen::Vector3d turn = delay_s * motion->turn_rate;
   Pose base_motion = Pose::Identity();
-  base_motion.translation() = depth_delay_s * motion->velocity;
+  base_motion.translation() = delay_s * motion->velocity;
   if (turn.norm() > 0.0)
     base_motion.linear() = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
   return camera.base_from_camera.inverse() * base_motion * camera.base_from_camera *

@@ -62,15 +62,16 @@ struct CameraFile {
   // camera's own place (depth_registration, 3 x 4; may be missing), and what is added to it.
   Pose color_from_depth = Pose::Identity();
   DepthCorrection depth{};
-  // Depth is taken this much after the middle row of the picture, and the picture's rows one after
-  // the other in this time. The motions are those of the scan that they were estimated from.
+  // Depth is taken this much after the middle row of the picture, beyond what their stamps say, and
+  // the picture's rows one after the other in this time. The motions are those of the scan that they were estimated from.
   double depth_delay_s = 0.0;
   double rolling_shutter_s = 0.0;
   std::vector<FrameMotion> motions{};   // by ascending stamp
   std::vector<std::string> findings{};  // what the estimation found, a sentence each
 
   // Of the frame of this stamp; the base does not move in frames that `motions` does not list.
-  Pose color_from_depth_at(double stamp_s) const;
+  // `depth_later_s` as in RgbdFrame.
+  Pose color_from_depth_at(double stamp_s, double depth_later_s = 0.0) const;
   bool changes_depth() const {
     return !depth.empty() || !color_from_depth.matrix().isIdentity(0.0) ||
            (depth_delay_s != 0.0 && !motions.empty());

@@ -20,8 +20,9 @@ constexpr double max_correction_m = 1.0;
 
 DepthCorrection::Terms DepthCorrection::terms(double depth_m, double radius2) const {
   Terms terms;
-  terms.radial = {radius2, radius2 * radius2, depth_m * radius2};
   const double pieces = static_cast<double>(spline_m.size()) - 3.0;
+  const double within_m = std::clamp(depth_m, first_m, last_m());
+  terms.radial = {radius2, radius2 * radius2, within_m * radius2};
   const double place = std::clamp((depth_m - first_m) / step_m, 0.0, pieces);
   const double piece = std::min(std::floor(place), pieces - 1.0);
   const double t = place - piece;

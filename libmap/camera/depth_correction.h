@@ -14,7 +14,8 @@
 namespace libmap {
 
 struct DepthCorrection {
-  double first_m = 0.0;            // nearer depths are corrected as this one
+  double first_m = 0.0;            // nearer depths are corrected as this one, farther than last_m()
+                                   // as that one
   double step_m = 0.0;             // between the spline's knots
   std::vector<double> spline_m{};  // its coefficients, 4 or more; empty: no correction at all
   std::array<double, 3> radial{};  // of r^2 and r^4 (m), of depth r^2; r is 1 in corners
@@ -34,6 +35,10 @@ struct DepthCorrection {
   Terms terms(double depth_m, double radius2) const;
   // The corrected depth less `depth_m`.
   double at(double depth_m, double radius2) const;
+  // The same without the change by the scale alone.
+  double bend(double depth_m, double radius2) const {
+    return at(depth_m, radius2) - (scale - 1.0) * depth_m;
+  }
   // Throws Error naming the field: a step > 0, no or 4 to 1000 coefficients of less than 1 m each,
   // a scale from 0.5 to 2.
   void check() const;

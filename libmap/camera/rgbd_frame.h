@@ -24,6 +24,7 @@ struct StereoCamera {
 struct RgbdFrame {
   int node = 0;
   double stamp_s = 0.0;
+  double depth_later_s = 0.0;   // stamp of depth after that of color, where both have one
   std::vector<Camera> cameras;  // of the color images; of the depth images where there is no color
   ColorImage color;             // empty if not stored or not asked for
   DepthImage depth;

@@ -38,7 +38,7 @@ bool CalibratedFeature::evaluate(const Pose& map_from_base, const Vector6d& moti
   double added = calibrated_.added_m;
   if (calibrated_.timing) {
     moving.time_s = camera_params[timing_at + 1] * calibrated_.row_share;
-    moving.later_s = camera_params[timing_at] - moving.time_s;
+    moving.later_s = camera_params[timing_at] + calibrated_.depth_later_s - moving.time_s;
     moving.velocity = motion.head<3>() + motion.tail<3>().cross(in_base);
     by_base -= moving.time_s * camera_from_base_ * cross_matrix(motion.tail<3>());
     // The step of the registration that a motion makes: motion_in_camera, transposed.

@@ -31,6 +31,7 @@ struct CalibratedObservation {
   Vector6d by_step = Vector6d::Zero();     // of the depth, by a step of the registration
   Vector6d known_step = Vector6d::Zero();  // of the known timing
   double row_share = 0.0;                  // row_share_of
+  double depth_later_s = 0.0;              // FrameFeatures::depth_later_s
 };
 
 // Parameters of a camera: a step of the intrinsics (4), one of the registration (6), its timing

@@ -23,6 +23,10 @@ void set_normal(DepthSurface::Cell& cell, double x, double y) {
   cell.normal_y = static_cast<std::int16_t>(std::lround(y * normal_scale));
 }
 
+void set_cell_noise(DepthSurface::Cell& cell, double units) {
+  cell.noise = static_cast<std::uint16_t>(std::clamp(units, 1.0, 65535.0));
+}
+
 }  // namespace
 
 DepthSurface::DepthSurface(const DepthPlanes& planes, const Camera& depth_camera,
@@ -52,8 +56,7 @@ DepthSurface::DepthSurface(const DepthPlanes& planes, const Camera& depth_camera
       kept.set_depth_m(planes.depth_m[pixel]);
       set_normal(kept, static_cast<double>(planes.normals[pixel].x()),
                  static_cast<double>(planes.normals[pixel].y()));
-      kept.noise =
-          static_cast<std::uint16_t>(std::clamp(along_normal / noise_unit_m, 1.0, 65535.0));
+      set_cell_noise(kept, along_normal / noise_unit_m);
     }
 }
 
@@ -101,6 +104,13 @@ void DepthSurface::set_camera(const Camera& depth_camera) {
           Eigen::Vector3d(x, y, facing - x * ray.x() - y * ray.y()).normalized();
       set_normal(cell, normal.x(), normal.y());
     }
+}
+
+void DepthSurface::set_noise(const DepthNoise& before, const DepthNoise& after) {
+  for (Cell& cell : cells_) {
+    const auto z = static_cast<double>(cell.depth_m());
+    if (z > 0.0) set_cell_noise(cell, cell.noise * after.axial_at(z) / before.axial_at(z));
+  }
 }
 
 // z(u, v) + c(z, r): its slopes by the pixel are z' (1 + dc/dz) + dc/du.

@@ -49,6 +49,8 @@ class DepthSurface {
   // The same measurements seen through another camera of the same size and distortion: depths stay
   // at their pixels, normals turn with the rays.
   void set_camera(const Camera& depth_camera);
+  // The same measurements with another noise of depth.
+  void set_noise(const DepthNoise& before, const DepthNoise& after);
   // The same with other depths, normals as they turn by them.
   void correct(const DepthCorrection& correction);
   int step_px() const { return step_px_; }

@@ -192,7 +192,8 @@ FoundFeatures features_of(const ScanSource& scan, int node, const FeatureOptions
   if (!result.from_cache) cache.write(key, frame);
   for (Feature& feature : frame.features)
     if (!has_plane(frame, feature)) feature.depth_noise_m = unknown_depth_m;
-  frame.stamp_s = read.stamp_s;
+  frame.depth_later_s = read.depth_later_s;
+  frame.stamp_s = read.stamp_s - read.depth_later_s;
   return result;
 }
 
@@ -237,6 +238,8 @@ void bind(ParameterTable& table, FeatureOptions& options) {
             "standard deviation of depth at range 0");
   table.add("range_noise", options.planes.noise.axial_of_range, not_negative,
             "what each meter of range adds to it, m a m");
+  table.add("square_noise", options.planes.noise.axial_of_square, not_negative,
+            "what range squared adds to it, as of stereo and structured light, 1/m");
 }
 
 Eigen::Vector3d FrameFeatures::point_in_camera(std::size_t n) const {

@@ -2,13 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <cstddef>
 
 namespace libmap {
 
 namespace {
 
 constexpr double plane_radius_px = 3.0;  // of the disc that it is fitted to
+constexpr double unmeasured_share = 0.01;  // of the nearest and of the farthest depths
 
 // The plane of depth that a feature's ray meets if the depth's camera is at `color_from_depth`;
 // false where there is none.
@@ -39,15 +40,20 @@ bool plane_at(const FrameFeatures& frame, const Feature& feature, const Pose& co
 
 DepthCorrection correction_for(const std::vector<FrameFeatures>& frames, std::size_t camera,
                                double knot_m) {
-  float nearest = std::numeric_limits<float>::infinity();
-  float farthest = 0.0F;
+  std::vector<float> depths;
   for (const FrameFeatures& frame : frames)
     for (const Feature& feature : frame.features)
-      if (feature.camera == camera) {
-        nearest = std::min(nearest, feature.depth_m);
-        farthest = std::max(farthest, feature.depth_m);
-      }
+      if (feature.camera == camera) depths.push_back(feature.depth_m);
   DepthCorrection correction;
+  if (depths.empty()) return correction;
+  const auto quantile = [&](double share) {
+    const auto at = depths.begin() + static_cast<std::ptrdiff_t>(
+                                         share * static_cast<double>(depths.size() - 1));
+    std::nth_element(depths.begin(), at, depths.end());
+    return *at;
+  };
+  const float nearest = quantile(unmeasured_share);
+  const float farthest = quantile(1.0 - unmeasured_share);
   if (!(farthest > nearest)) return correction;
   const double reach = static_cast<double>(farthest) - static_cast<double>(nearest);
   const double pieces = std::clamp(std::ceil(reach / knot_m), 1.0, 100.0);
@@ -73,7 +79,8 @@ void register_surfaces(FrameFeatures& frame, const SensorCalibration& calibratio
     const auto motion = calibration.motion.find(frame.node);
     if (n < calibration.timing.size() && motion != calibration.motion.end())
       camera.base_from_camera =
-          moved(Pose::Identity(), calibration.timing[n].depth_delay_s * motion->second) *
+          moved(Pose::Identity(),
+                (calibration.timing[n].depth_delay_s + frame.depth_later_s) * motion->second) *
           camera.base_from_camera;
     frame.surfaces[n].set_camera(camera);
   }
@@ -123,11 +130,21 @@ Camera moved(Camera camera, const IntrinsicsStep& step) {
   return camera;
 }
 
+void set_depth_noise(FrameFeatures& frame, const DepthNoise& before, const DepthNoise& after) {
+  for (Feature& feature : frame.features) {
+    if (feature.depth_noise_m >= unknown_depth_m) continue;
+    const auto z = static_cast<double>(feature.depth_m);
+    feature.depth_noise_m *= static_cast<float>(after.axial_at(z) / before.axial_at(z));
+  }
+  for (DepthSurface& surface : frame.surfaces) surface.set_noise(before, after);
+}
+
 FrameFeatures calibrated_features(const FrameFeatures& frame,
                                   const SensorCalibration& calibration) {
   FrameFeatures result;
   result.node = frame.node;
   result.stamp_s = frame.stamp_s;
+  result.depth_later_s = frame.depth_later_s;
   result.cameras = frame.cameras;
   result.features = frame.features;
   // By pixels, which the stored camera made of the features' rays.
@@ -200,7 +217,8 @@ Pose color_from_depth_of(const FrameFeatures& frame, const Feature& feature,
   const Camera& camera = frame.cameras[feature.camera];
   const CameraTiming& timing = calibration.timing[feature.camera];
   const double later_s =
-      timing.depth_delay_s - timing.rolling_shutter_s * row_share_of(feature, camera);
+      timing.depth_delay_s + frame.depth_later_s -
+      timing.rolling_shutter_s * row_share_of(feature, camera);
   return moved(Pose::Identity(), later_s * motion_in_camera(camera, motion->second)) * pose;
 }
 

@@ -24,7 +24,8 @@ struct IntrinsicsStep {
 // When a camera takes what it stores as one frame. Rows of a picture are exposed one after the
 // other, the middle row at the time of the frame's pose; depth is taken at one moment.
 struct CameraTiming {
-  double depth_delay_s = 0.0;      // depth after the picture's middle row
+  double depth_delay_s = 0.0;      // depth after the picture's middle row, beyond what the stamps of
+                                   // both say (FrameFeatures::depth_later_s)
   double rolling_shutter_s = 0.0;  // from the first to the last row of the picture
 };
 
@@ -44,6 +45,9 @@ struct SensorCalibration {
 
 // The frame as if it had been recorded with the calibration: features and surfaces.
 void calibrate(FrameFeatures& frame, const SensorCalibration& calibration);
+
+// The frame as if its depth camera had another noise.
+void set_depth_noise(FrameFeatures& frame, const DepthNoise& before, const DepthNoise& after);
 
 // Its cameras and features alone, without surfaces and descriptors.
 FrameFeatures calibrated_features(const FrameFeatures& frame, const SensorCalibration& calibration);

@@ -26,10 +26,11 @@ const Pose* pose_of(const FrameFeatures& frame, const std::map<int, Pose>& map_f
   return pose == map_from_base.end() ? nullptr : &pose->second;
 }
 
-void add_surface_costs(const std::vector<BaseElement>& samples, const FrameFeatures& onto,
-                       const Pose* from_pose, const Pose* onto_pose, std::vector<double>& costs) {
+void add_residuals(const std::vector<BaseElement>& samples, const FrameFeatures& onto,
+                   const Pose* from_pose, const Pose* onto_pose,
+                   std::vector<SurfaceResidual>& residuals) {
   for (const BaseElement& sample : samples) {
-    costs.push_back(std::numeric_limits<double>::quiet_NaN());
+    residuals.push_back({.distance_m = std::numeric_limits<double>::quiet_NaN()});
     if (from_pose == nullptr || onto_pose == nullptr) continue;
     const Pose onto_from_from = onto_pose->inverse() * *from_pose;
     const Eigen::Vector3d point = onto_from_from * sample.point;
@@ -37,9 +38,9 @@ void add_surface_costs(const std::vector<BaseElement>& samples, const FrameFeatu
     if (!seen_from_base(onto, point, plane) ||
         plane.normal.dot(onto_from_from.linear() * sample.normal) < min_cosine)
       continue;
-    const double distance = plane.normal.dot(point - plane.point);
-    costs.back() = cost_of(distance * distance /
-                           (sample.noise_m * sample.noise_m + plane.noise_m * plane.noise_m));
+    residuals.back() = {plane.normal.dot(point - plane.point),
+                        std::hypot(sample.noise_m, plane.noise_m),
+                        std::max(sample.range_m, plane.range_m)};
   }
 }
 
@@ -97,26 +98,36 @@ std::vector<double> match_costs(const std::vector<FrameFeatures>& frames,
   return costs;
 }
 
-std::vector<double> surface_costs(const std::vector<FrameFeatures>& frames,
-                                  const std::vector<FeatureLink>& links,
-                                  const std::map<int, Pose>& map_from_base) {
+std::vector<SurfaceResidual> surface_residuals(const std::vector<FrameFeatures>& frames,
+                                               const std::vector<FeatureLink>& links,
+                                               const std::map<int, Pose>& map_from_base) {
   std::vector<std::vector<BaseElement>> samples(frames.size());
   parallel_for(frames.size(), 8, [&](std::size_t begin, std::size_t end) {
     for (std::size_t f = begin; f < end; ++f)
       samples[f] = surface_samples(frames[f], samples_of_frame, SampleUse::checks);
   });
-  std::vector<std::vector<double>> of_link(links.size());
+  std::vector<std::vector<SurfaceResidual>> of_link(links.size());
   parallel_for(links.size(), 16, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
       const auto [a, b] = links[n].frames;
       const Pose* of_a = pose_of(frames[a], map_from_base);
       const Pose* of_b = pose_of(frames[b], map_from_base);
-      add_surface_costs(samples[a], frames[b], of_a, of_b, of_link[n]);
-      add_surface_costs(samples[b], frames[a], of_b, of_a, of_link[n]);
+      add_residuals(samples[a], frames[b], of_a, of_b, of_link[n]);
+      add_residuals(samples[b], frames[a], of_b, of_a, of_link[n]);
     }
   });
+  std::vector<SurfaceResidual> residuals;
+  for (const auto& some : of_link) residuals.insert(residuals.end(), some.begin(), some.end());
+  return residuals;
+}
+
+std::vector<double> surface_costs(const std::vector<FrameFeatures>& frames,
+                                  const std::vector<FeatureLink>& links,
+                                  const std::map<int, Pose>& map_from_base) {
   std::vector<double> costs;
-  for (const auto& some : of_link) costs.insert(costs.end(), some.begin(), some.end());
+  for (const SurfaceResidual& residual : surface_residuals(frames, links, map_from_base))
+    costs.push_back(
+        cost_of(residual.distance_m * residual.distance_m / (residual.noise_m * residual.noise_m)));
   return costs;
 }
 

@@ -33,6 +33,17 @@ std::vector<double> surface_costs(const std::vector<FrameFeatures>& frames,
                                   const std::vector<FeatureLink>& links,
                                   const std::map<int, Pose>& map_from_base);
 
+// Depth that was kept back against the plane of another frame.
+struct SurfaceResidual {
+  double distance_m = 0.0;  // along the normal; NaN where the other frame does not see it
+  double noise_m = 0.0;     // standard deviation of the distance
+  double range_m = 0.0;     // of the farther one of both
+};
+// The residuals of surface_costs, in their order.
+std::vector<SurfaceResidual> surface_residuals(const std::vector<FrameFeatures>& frames,
+                                               const std::vector<FeatureLink>& links,
+                                               const std::map<int, Pose>& map_from_base);
+
 struct HeldOutCosts {
   std::vector<double> matches;
   std::vector<double> surfaces;

@@ -41,7 +41,8 @@ std::vector<BaseElement> surface_samples(const FrameFeatures& frame, int count, 
         if (is_for_checks(frame.node, camera, row, column) == (use == SampleUse::checks) &&
             surface.at(column, row, element))
           samples.push_back({base_from_camera * element.point,
-                             base_from_camera.linear() * element.normal, element.noise_m});
+                             base_from_camera.linear() * element.normal, element.noise_m,
+                             element.point.z()});
       }
   }
   return samples;
@@ -54,7 +55,7 @@ bool seen_from_base(const FrameFeatures& frame, const Eigen::Vector3d& point_in_
     SurfacePatch seen;
     if (!surface.seen_at(base_from_camera.inverse() * point_in_base, seen)) continue;
     element = {base_from_camera * seen.point, base_from_camera.linear() * seen.normal,
-               seen.noise_m};
+               seen.noise_m, seen.point.z()};
     return true;
   }
   return false;

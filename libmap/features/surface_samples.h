@@ -12,6 +12,7 @@ struct BaseElement {
   Eigen::Vector3d point = Eigen::Vector3d::Zero();
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
   double noise_m = 0.0;  // standard deviation along the normal
+  double range_m = 0.0;  // along the optical axis
 };
 
 // One in ten patches of each depth image serves for checks alone: no pose is estimated from what it

@@ -22,6 +22,7 @@ struct DepthPlaneLoops {
     float gate;  // standard deviations
     float axial_m;
     float axial_of_range;
+    float axial_of_square;
   };
   // How many are not measured, and beyond the limits.
   struct MeasureCounts {
@@ -82,6 +83,7 @@ struct DepthPlaneLoops {
     float scale;
     float axial_m;
     float axial_of_range;
+    float axial_of_square;
   };
   struct Places {
     float* place[3];

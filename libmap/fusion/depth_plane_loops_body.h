@@ -87,8 +87,9 @@ DepthPlaneLoops::MeasureCounts measure(const float* depth, int count,
     const Floats divisor = is_used ? z : Floats{} + 1.0F;
     const Floats value = one / divisor;
     store(value, inverse + x);
-    store(limits.gate * (limits.axial_m + limits.axial_of_range * divisor) * value * value,
-          tolerance + x);
+    const Floats axial =
+        limits.axial_m + (limits.axial_of_range + limits.axial_of_square * divisor) * divisor;
+    store(limits.gate * axial * value * value, tolerance + x);
   }
   return {sum(unmeasured), sum(out_of_range)};
 }
@@ -249,7 +250,8 @@ void place(const DepthPlaneLoops::Planes& planes, const float* ray_x, const floa
       store(turned(row, px, py, z) + placement.translation[axis], places.place[axis] + x);
       store(turned(row, nx, ny, nz), places.normal[axis] + x);
     }
-    const Floats sigma = placement.axial_m + placement.axial_of_range * depth;
+    const Floats sigma = placement.axial_m +
+                         (placement.axial_of_range + placement.axial_of_square * depth) * depth;
     const Floats support = __builtin_convertvector(
         __builtin_convertvector(load<Bytes>(planes.support + x), Ints), Floats);
     // Front views know lateral places and normals better.

@@ -121,7 +121,8 @@ void PlaneFit::take_measurements() {
       // The difference of a pixel and the mean of two has 3/2 of the
       // variance of one.
       static_cast<float>(gate_sigmas * std::sqrt(1.5)), static_cast<float>(options_.noise.axial_m),
-      static_cast<float>(options_.noise.axial_of_range)};
+      static_cast<float>(options_.noise.axial_of_range),
+      static_cast<float>(options_.noise.axial_of_square)};
   for (int y = 0; y < height_; ++y) {
     const Loops::MeasureCounts counts =
         loops_.measure(&depth_.pixels[at(0, y)], width_, limits, &measured_[margin_at(0, y)],
@@ -310,6 +311,7 @@ Loops::Placement placement_of(const Pose& grid_from_camera, const DepthNoise& no
   }
   placement.axial_m = static_cast<float>(noise.axial_m);
   placement.axial_of_range = static_cast<float>(noise.axial_of_range);
+  placement.axial_of_square = static_cast<float>(noise.axial_of_square);
   return placement;
 }
 

@@ -6,6 +6,7 @@
 #include <iterator>
 #include <utility>
 
+#include "libmap/core/text.h"
 #include "libmap/features/bundle_residuals.h"
 #include "libmap/geometry/rigid_motion.h"
 #include "libmap/geometry/symmetric_eigen.h"
@@ -21,7 +22,8 @@ namespace {
 constexpr std::size_t dense_below = 120;  // poses: the Schur complement of more is never formed
 constexpr double registration_prior_m = 0.02;
 constexpr double registration_prior_rad = 0.03;
-constexpr double timing_prior_s = 0.03;
+// Standard deviation of the delays of depth by its stamps that determines the motions' scale.
+constexpr double stamps_tell_s = 0.005;
 // Keeps a pose that nothing binds from making the system singular.
 constexpr double pose_damping = 1e-6;
 
@@ -69,8 +71,12 @@ struct FreeRows {
 // Changes of the parameters by one standard deviation in independent directions, poses being
 // unknown (Schur complement): the `count` ones that move the positions of the poses most. Points
 // are eliminated from the information already.
-std::vector<Eigen::VectorXd> calibration_modes(const Eigen::MatrixXd& information,
-                                               const FreeRows& rows, std::size_t count) {
+struct CalibrationModes {
+  std::vector<Eigen::VectorXd> changes;
+  Eigen::VectorXd deviations;  // of each parameter
+};
+CalibrationModes calibration_modes(const Eigen::MatrixXd& information, const FreeRows& rows,
+                                   std::size_t count) {
   if (rows.params.empty()) return {};
   std::vector<Eigen::Index> steps;
   for (const Eigen::Index first : rows.poses)
@@ -93,10 +99,10 @@ std::vector<Eigen::VectorXd> calibration_modes(const Eigen::MatrixXd& informatio
     squares += moves.transpose() * moves;
   }
   const SymmetricEigen<Eigen::Dynamic> effects = symmetric_eigen<Eigen::Dynamic>(squares);
-  std::vector<Eigen::VectorXd> changes;
-  for (Eigen::Index n = params - 1; n >= 0 && changes.size() < count; --n)
-    changes.emplace_back(deviations * effects.vectors.col(n));
-  return changes;
+  CalibrationModes modes{.changes = {}, .deviations = deviations.rowwise().norm()};
+  for (Eigen::Index n = params - 1; n >= 0 && modes.changes.size() < count; --n)
+    modes.changes.emplace_back(deviations * effects.vectors.col(n));
+  return modes;
 }
 
 class Adjustment {
@@ -131,6 +137,8 @@ class Adjustment {
   std::map<int, std::size_t> place_;  // of each node among the poses
   std::vector<Eigen::Index> first_;   // number of each camera
   std::vector<bool> sees_;            // of each camera, anything
+  double mean_later_s_ = 0.0;         // of FrameFeatures::depth_later_s
+  double later_deviation_s_ = 0.0;
   std::vector<Eigen::Index> free_;    // numbers
   std::vector<std::size_t> points_;   // their tracks
   JointProblem problem_;
@@ -197,6 +205,11 @@ void Adjustment::start_numbers(const SensorCalibration& start,
   }
   if (!options_.refine_timing) return;
   problem_.moving = true;
+  const double count = static_cast<double>(std::max<std::size_t>(1, frames_.size()));
+  for (const FrameFeatures& frame : frames_) mean_later_s_ += frame.depth_later_s / count;
+  for (const FrameFeatures& frame : frames_)
+    later_deviation_s_ += std::pow(frame.depth_later_s - mean_later_s_, 2) / count;
+  later_deviation_s_ = std::sqrt(later_deviation_s_);
   const std::map<int, KnownMotion> between = relative_motions(frames_, state_.poses, components);
   for (const auto& [node, pose] : state_.poses) {
     const auto found = between.find(node);
@@ -256,8 +269,10 @@ CalibratedObservation Adjustment::calibrated(const Observation& seen) const {
   if (options_.refine_timing) {
     const CameraTiming& timing = start_.timing[its.camera];
     calibrated.row_share = row_share_of(its, camera);
+    calibrated.depth_later_s = frame.depth_later_s;
     calibrated.known_step =
-        (timing.depth_delay_s - timing.rolling_shutter_s * calibrated.row_share) *
+        (timing.depth_delay_s + frame.depth_later_s -
+         timing.rolling_shutter_s * calibrated.row_share) *
         motion_in_camera(camera, start_.motion.at(frame.node));
   }
   return calibrated;
@@ -278,8 +293,9 @@ void Adjustment::add_camera_priors(std::size_t camera, Priors& priors) {
       Eigen::Vector3d::Constant(registration_prior_rad);
   add(options_.refine_registration, registration_at,
       step_between(start_.color_from_depth[camera], Pose::Identity()), registration);
-  add(options_.refine_timing, timing_at, Eigen::Vector2d::Zero(),
-      Eigen::Vector2d::Constant(timing_prior_s));
+  add(options_.refine_timing, timing_at,
+      Eigen::Vector2d(options_.timing_mean.depth_delay_s, options_.timing_mean.rolling_shutter_s),
+      Eigen::Vector2d::Constant(options_.bounds.frame_time_s));
   if (options_.refine_depth && !corrections_[camera].empty()) add_depth_priors(camera, priors);
 }
 
@@ -290,11 +306,21 @@ void Adjustment::add_depth_priors(std::size_t camera, Priors& priors) {
   const Eigen::Index radial = first_[camera] + radial_at;
   const Eigen::Index spline = first_[camera] + spline_at;
   static_assert(radial_at + 3 == spline_at);
-  priors.add_near(radial, Eigen::VectorXd::Zero(3 + knots),
-                  Eigen::VectorXd::Constant(3 + knots, options_.depth_prior_m));
+  const auto noise_at = [&](double z) { return options_.depth_noise.axial_at(z); };
+  const auto knot_m = [&](Eigen::Index n) {
+    return depth.first_m + static_cast<double>(n - 1) * depth.step_m;
+  };
+  Eigen::VectorXd deviations(3 + knots);
+  const double middle_m = 0.5 * (depth.first_m + depth.last_m());
+  deviations.head<3>() =
+      noise_at(middle_m) * Eigen::Vector3d(1.0, 1.0, 1.0 / middle_m);
+  for (Eigen::Index n = 0; n < knots; ++n)
+    deviations[3 + n] = noise_at(std::max(depth.first_m, knot_m(n)));
+  priors.add_near(radial, Eigen::VectorXd::Zero(3 + knots), options_.depth_prior * deviations);
   for (Eigen::Index n = 0; n < 3 + knots; ++n) free_.push_back(radial + n);
   for (Eigen::Index n = 0; n + 2 < knots; ++n)
-    priors.add().segment<3>(spline + n) = Eigen::Vector3d(1.0, -2.0, 1.0) / options_.depth_bend_m;
+    priors.add().segment<3>(spline + n) =
+        Eigen::Vector3d(1.0, -2.0, 1.0) / (options_.depth_bend * deviations[4 + n]);
   Eigen::VectorXd& gauge = priors.add();
   double count = 0.0;
   for (const FrameFeatures& frame : frames_)
@@ -315,7 +341,8 @@ void Adjustment::add_depth_priors(std::size_t camera, Priors& priors) {
 // on those between poses has the slope 1. The hand's tremor is missing in the latter, so that least
 // squares with both as measurements makes times too long.
 double Adjustment::motion_scale() const {
-  if (!problem_.moving || problem_.fix_cameras) return 1.0;
+  // Different delays by stamps determine it.
+  if (!problem_.moving || problem_.fix_cameras || later_deviation_s_ > stamps_tell_s) return 1.0;
   double mixed = 0.0;
   double squares = 0.0;
   for (std::size_t n = 0; n < state_.motions.size(); ++n) {
@@ -339,7 +366,9 @@ SensorCalibration Adjustment::calibration(const JointState& state, double motion
           moved(Pose::Identity(), Eigen::Map<const Vector6d>(own + registration_at)) *
           start_.color_from_depth[n]);
     if (options_.refine_timing)
-      found.timing.push_back({motion_scale * own[timing_at], motion_scale * own[timing_at + 1]});
+      found.timing.push_back(
+          {motion_scale * (own[timing_at] + mean_later_s_) - mean_later_s_,
+           motion_scale * own[timing_at + 1]});
     if (options_.refine_depth) {
       found.depth.push_back(corrections_[n]);
       std::copy_n(own + radial_at, 3, found.depth[n].radial.begin());
@@ -365,8 +394,16 @@ void Adjustment::find_alternatives() {
   const double scale = motion_scale();
   const Eigen::MatrixXd information =
       joint_system(problem_, state_).matrix.selfadjointView<Eigen::Lower>();
-  for (const Eigen::VectorXd& change :
-       calibration_modes(information, rows, options_.alternatives)) {
+  const CalibrationModes modes = calibration_modes(information, rows, options_.alternatives);
+  if (modes.deviations.size() > 0) {
+    JointState spread = state_;
+    spread.camera_params.setZero();
+    spread.camera_params(free_) = modes.deviations.tail(static_cast<Eigen::Index>(free_.size()));
+    result_.deviations = calibration(spread, scale);
+    for (CameraTiming& timing : result_.deviations.timing)
+      timing.depth_delay_s += (1.0 - scale) * mean_later_s_;
+  }
+  for (const Eigen::VectorXd& change : modes.changes) {
     JointState other = state_;
     for (std::size_t n = 0; n < rows.params.size(); ++n) {
       const Eigen::Index row = rows.params[n];
@@ -428,11 +465,72 @@ void bind(ParameterTable& table, BundleAdjustmentOptions& options) {
             "standard deviation of the focal length, of itself");
   table.add("center_prior_px", options.center_prior_px, positive,
             "standard deviation of the principal point");
-  table.add("depth_prior_m", options.depth_prior_m, positive,
-            "standard deviation of a correction of depth");
-  table.add("depth_bend_m", options.depth_bend_m, positive,
-            "standard deviation of its second difference from knot to knot");
+  table.add("depth_prior", options.depth_prior, positive,
+            "standard deviation of a correction of depth, in standard deviations of depth");
+  table.add("depth_bend", options.depth_bend, positive,
+            "the same of its second difference from knot to knot");
   table.add("depth_knot_m", options.depth_knot_m, {0.02}, "between its knots");
+  table.add("frame_time_s", options.bounds.frame_time_s, positive,
+            "maximum delay of depth and maximum time of a picture's rows; more is impossible");
+  table.add("max_bend_m", options.bounds.max_bend_m, not_negative,
+            "maximum correction of depth at range 0");
+  table.add("bend_of_range", options.bounds.bend_of_range, not_negative,
+            "what each meter of range adds to max_bend_m, m a m");
+}
+
+namespace {
+
+// The largest absolute correction at depths of its range, m.
+std::vector<std::pair<double, double>> largest_bends(const DepthCorrection& depth) {
+  constexpr int depths = 40;
+  constexpr int radii = 4;
+  std::vector<std::pair<double, double>> bends;
+  if (depth.spline_m.empty()) return bends;
+  for (int k = 0; k <= depths; ++k) {
+    auto& [z, bend] = bends.emplace_back(
+        depth.first_m + (depth.last_m() - depth.first_m) * k / depths, 0.0);
+    for (int n = 0; n <= radii; ++n)
+      bend = std::max(bend, std::abs(depth.bend(z, static_cast<double>(n) / radii)));
+  }
+  return bends;
+}
+
+}  // namespace
+
+std::optional<std::string> exceeded_bound(const SensorCalibration& calibration,
+                                          const BundleAdjustmentOptions& options) {
+  const CalibrationBounds& bounds = options.bounds;
+  const auto exceeds = [](const char* what, double value, double bound, const char* unit) {
+    return what + (" " + to_fixed_text(value, 1)) + unit + ", at most " + to_fixed_text(bound, 1) +
+           unit + " is possible";
+  };
+  for (const CameraTiming& timing : calibration.timing) {
+    const double rows_s = std::abs(timing.rolling_shutter_s);
+    const double delay_s = std::abs(timing.depth_delay_s);
+    if (std::max(rows_s, delay_s) >= bounds.frame_time_s)
+      return exceeds(rows_s > delay_s ? "rows of a picture exposed over" : "delay of depth",
+                     1e3 * std::max(rows_s, delay_s), 1e3 * bounds.frame_time_s, " ms");
+  }
+  for (const IntrinsicsStep& step : calibration.intrinsics) {
+    const double focal = std::max(std::abs(step.fx_share), std::abs(step.fy_share));
+    const double center_px = std::max(std::abs(step.cx_px), std::abs(step.cy_px));
+    if (focal >= bounds.deviations * options.focal_prior)
+      return exceeds("focal length off by", 100.0 * focal,
+                     100.0 * bounds.deviations * options.focal_prior, " %");
+    if (center_px >= bounds.deviations * options.center_prior_px)
+      return exceeds("principal point off by", center_px,
+                     bounds.deviations * options.center_prior_px, " px");
+  }
+  for (const Pose& pose : calibration.color_from_depth)
+    if (pose.translation().norm() >= bounds.deviations * registration_prior_m)
+      return exceeds("depth registered to color", 1e3 * pose.translation().norm(),
+                     1e3 * bounds.deviations * registration_prior_m, " mm off");
+  for (const DepthCorrection& depth : calibration.depth)
+    for (const auto& [z, bend] : largest_bends(depth))
+      if (const double most = bounds.max_bend_m + bounds.bend_of_range * z; bend >= most)
+        return exceeds("depth bends by", 1e3 * bend, 1e3 * most, " mm") + " at " +
+               to_fixed_text(z, 1) + " m";
+  return std::nullopt;
 }
 
 BundleAdjustmentResult adjust_bundle(

@@ -5,16 +5,27 @@
 
 #include <cstddef>
 #include <map>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "libmap/core/parameters.h"
 #include "libmap/core/progress.h"
 #include "libmap/features/feature_tracks.h"
 #include "libmap/features/frame_calibration.h"
+#include "libmap/fusion/depth_noise.h"
 #include "libmap/optimize/block_system.h"
 #include "libmap/optimize/pose_graph_optimization.h"
 
 namespace libmap {
+
+// Values that no camera exceeds: a calibration beyond them explains other errors.
+struct CalibrationBounds {
+  double frame_time_s = 0.033;  // > 0: of a delay of depth and of the rows of a picture
+  double max_bend_m = 0.01;     // >= 0: of a correction of depth at range 0 ...
+  double bend_of_range = 0.02;  // >= 0: ... and what each meter of range adds, m/m
+  double deviations = 4.0;      // not bound; of other parameters, from their prior
+};
 
 struct BundleAdjustmentOptions {
   double robust_scale = 3.0;         // > 0: of Cauchy's loss, standard deviations of an observation
@@ -26,10 +37,13 @@ struct BundleAdjustmentOptions {
   bool refine_timing = false;        // a CameraTiming of each camera, and the motion at each node
   double focal_prior = 0.02;         // > 0: standard deviation of the focal length, of itself
   double center_prior_px = 8.0;      // > 0: ... and of the principal point
-  double depth_prior_m = 0.03;       // > 0: ... and of a correction of depth
-  double depth_bend_m = 0.005;       // > 0: ... and of its second difference from knot to knot
+  double depth_prior = 4.0;          // > 0: ... and of a correction of depth, of depth's own noise
+  double depth_bend = 0.7;           // > 0: ... and of its second difference from knot to knot
   double depth_knot_m = 0.2;         // >= 0.02: between the knots of its spline
+  CalibrationBounds bounds{};
   // Not bound.
+  DepthNoise depth_noise{};
+  CameraTiming timing_mean{};  // of the prior; its deviation is the frame time
   double tolerance = 1e-6;    // steps end when one lowers the cost by less than this share
   bool hold_cameras = false;  // at the start's calibration: of what is free, motions alone change
   bool hold_poses = false;
@@ -41,6 +55,11 @@ struct BundleAdjustmentOptions {
   }
 };
 void bind(ParameterTable& table, BundleAdjustmentOptions& options);
+
+// A sentence about the first parameter of a calibration that is outside its bounds; nullopt if the
+// calibration is physically possible.
+std::optional<std::string> exceeded_bound(const SensorCalibration& calibration,
+                                          const BundleAdjustmentOptions& options);
 
 // The mean share of the depths of its features by which a camera's depth may be corrected: pictures
 // and depth alone cannot tell a scale of depth from a larger scene, so the scale stays that of the
@@ -54,6 +73,7 @@ struct BundleAdjustmentResult {
   // Calibrations one standard deviation away in independent directions: those that move the
   // positions of the poses most.
   std::vector<SensorCalibration> alternatives;
+  SensorCalibration deviations;  // standard deviations of intrinsics and timing, with alternatives
   // Of steps of the poses (rigid_motion.h), in the order of map_from_base, the points eliminated
   // (Schur complement), at the end: the links among them.
   BlockSystem information{0};

@@ -7,7 +7,10 @@
 #include <utility>
 
 #include "libmap/core/error.h"
+#include "libmap/camera/sensor_model.h"
+#include "libmap/core/text.h"
 #include "libmap/optimize/graph_covariance.h"
+#include "libmap/refine/noise_estimate.h"
 #include "libmap/refine/refinement_stages.h"
 
 namespace libmap {
@@ -23,6 +26,8 @@ constexpr double settled_s = 1e-3;
 // Features err alike in the pictures of one place, which no residual shows: measured on simulated
 // scans.
 constexpr double min_deviation_scale = 1.3;
+// A noise of depth that is this much larger or smaller than the assumed one replaces it.
+constexpr double other_noise = 1.8;
 constexpr double explained_cost = 0.35;  // of held-out matches; of normal errors it is 0.26
 
 bool is_motion(const PoseLink& link) {
@@ -138,6 +143,12 @@ struct Run {
   }
   bool propose(StageResult stage) { return propose(std::move(stage), state); }
 };
+
+bool has_noise(const DepthSensor& sensor, const DepthNoise& noise) {
+  return sensor.noise.axial_m == noise.axial_m &&
+         sensor.noise.axial_of_range == noise.axial_of_range &&
+         sensor.noise.axial_of_square == noise.axial_of_square;
+}
 
 void start(Run& run) {
   const RefinementOptions& options = run.input.options;
@@ -256,6 +267,59 @@ void link_again(Run& run) {
     run.state.feature_links = rematched_links(run.input, run.state);
 }
 
+// The useful range, noise, timing and bounds of the named sensor where options have their defaults.
+RefinementOptions with_sensor(RefinementOptions options) {
+  if (options.sensor == "auto") return options;
+  const SensorModel model = read_sensor_model(options.sensor);
+  const RefinementOptions defaults;
+  const auto set = [](double& field, double unset, double value) {
+    if (field == unset) field = value;
+  };
+  DepthPlaneOptions& planes = options.features.planes;
+  const DepthPlaneOptions& unset = defaults.features.planes;
+  set(planes.min_depth_m, unset.min_depth_m, model.near_m);
+  set(planes.max_depth_m, unset.max_depth_m, model.far_m);
+  if (has_noise(planes, unset.noise))
+    planes.noise = {std::max(1e-6, model.noise_m), model.noise_of_range, model.noise_of_square,
+                    planes.noise.lateral_px};
+  BundleAdjustmentOptions& bundle = options.bundle_adjustment;
+  const CalibrationBounds& bounds = defaults.bundle_adjustment.bounds;
+  set(bundle.bounds.frame_time_s, bounds.frame_time_s, model.frame_time_s);
+  set(bundle.bounds.max_bend_m, bounds.max_bend_m, model.max_bend_m);
+  set(bundle.bounds.bend_of_range, bounds.bend_of_range, model.bend_of_range);
+  bundle.timing_mean = {model.depth_delay_s, model.rolling_shutter_s};
+  return options;
+}
+
+// Replaces an assumed noise of depth by that of the held-out depth. Returns whether it differs.
+bool adapt_noise(Run& run) {
+  RefinementState& state = run.state;
+  const RefinementOptions& options = run.input.options;
+  if (options.sensor != "auto" || !has_noise(options.features.planes, DepthNoise{})) {
+    run.result.noise = "depth noise " + describe(state.noise) + " as given";
+    return false;
+  }
+  const auto found =
+      estimate_noise(surface_residuals(*state.frames, state.feature_links, state.poses), state.noise);
+  if (!found) {
+    run.result.noise = "depth noise " + describe(state.noise) + " assumed: too few held-out depths";
+    return false;
+  }
+  const bool is_other = found->largest_ratio > other_noise;
+  run.result.noise = "depth noise " + describe(found->noise) + " by " +
+                     std::to_string(found->residuals) + " held-out depths from " +
+                     to_fixed_text(found->nearest_m, 1) + " to " +
+                     to_fixed_text(found->farthest_m, 1) + " m: " +
+                     (is_other ? "replaces " : "agrees with ") + describe(state.noise);
+  if (!is_other) return false;
+  for (const SharedFrames& frames : {state.frames, state.stored_frames}) {
+    for (FrameFeatures& frame : *frames) set_depth_noise(frame, state.noise, found->noise);
+    if (state.frames == state.stored_frames) break;
+  }
+  state.noise = found->noise;
+  return true;
+}
+
 // Repeats the calibration with features that are matched by it: the matches of the stored camera
 // are those that it lets pass. A wrong registration hides most of them.
 void calibrate_sensor(Run& run) {
@@ -266,7 +330,13 @@ void calibrate_sensor(Run& run) {
     stored.frames = stored.stored_frames;
     StageResult stage = calibrate_stage(run.input, stored);
     stage.report.name = pass == 1 ? "calibration" : "calibration " + std::to_string(pass);
-    if (!run.propose(std::move(stage), stored)) {
+    const bool accepted = run.propose(std::move(stage), stored);
+    const bool is_other_noise = pass == 1 && run.result.noise.empty() && adapt_noise(run);
+    if (!accepted) {
+      if (is_other_noise) {
+        run.propose(bundle_stage(run.input, state));
+        return calibrate_sensor(run);
+      }
       if (pass == 1) return;
       break;
     }
@@ -372,7 +442,9 @@ RefinementResult finish(const RefinementInput& input, RefinementState state,
     (link.rejected ? result.rejected_links : result.links).push_back(link.link);
   }
   result.calibration = std::move(state.calibration);
-  result.findings = findings(result.calibration, result.cameras);
+  result.findings = findings(result.calibration, result.deviations, result.cameras);
+  if (!has_noise(input.options.features.planes, state.noise))
+    result.findings.push_back(result.noise);
   result.components = std::move(state.graph.components);
   result.without_links = std::move(state.graph.without_links);
   result.warnings = std::move(state.warnings);
@@ -381,6 +453,27 @@ RefinementResult finish(const RefinementInput& input, RefinementState state,
     result.warnings.push_back("visual odometry lost its way: " + describe(result.losses));
   drop_unjoined(input, state, result);
   return result;
+}
+
+// Frames in which no features match are linked by their depth.
+void link_by_depth(Run& run) {
+  std::set<std::size_t> linked;
+  for (const FeatureLink& link : run.state.feature_links) {
+    linked.insert(link.frames.first);
+    linked.insert(link.frames.second);
+  }
+  if (linked.size() == run.state.frames->size() || run.input.options.icp.mode == IcpMode::off)
+    return;
+  StageResult stage = depth_link_stage(run.input, run.state);
+  if (stage.report.closures.candidates == 0) return;
+  if (run.propose(std::move(stage)))
+    run.result.stages.back().figures.emplace_back("rejected_by_optimization",
+                                                  drop_rejected_links(run.state));
+}
+
+bool has_matches(const RefinementState& state) {
+  return std::any_of(state.feature_links.begin(), state.feature_links.end(),
+                     [](const FeatureLink& link) { return !link.matches.empty(); });
 }
 
 // Without links of features the poses rest on the scan's own links.
@@ -413,6 +506,9 @@ void bind(ParameterTable& table, RefinementOptions& options) {
   bind(table, options.closures);
   bind(table, options.graph);
   table.add("bundle", options.bundle, "adjust poses and points together");
+  table.add("sensor", options.sensor,
+            "depth camera, a name in data/sensors or a file: noise, useful range, timing and bounds; "
+            "auto: the noise is estimated");
   table.add("intrinsics", options.intrinsics,
             {{"fixed", IntrinsicsMode::fixed},
              {"refined", IntrinsicsMode::refined},
@@ -432,10 +528,12 @@ void bind(ParameterTable& table, RefinementOptions& options) {
   table.add("seed", options.seed, not_negative, "of all that is random");
 }
 
-RefinementResult refine_poses(const ScanSource& scan, const RefinementOptions& options,
+RefinementResult refine_poses(const ScanSource& scan, const RefinementOptions& given,
                               Progress& progress, const FeatureCache& cache) {
+  const RefinementOptions options = with_sensor(given);
   Run run{.input = {scan, options, progress}};
   RefinementState& state = run.state;
+  state.noise = options.features.planes.noise;
   start(run);
   require_one_scale(options);
   find_frames(run, cache);
@@ -443,18 +541,20 @@ RefinementResult refine_poses(const ScanSource& scan, const RefinementOptions& o
   if (state.frames->size() <= options.features.max_frames_in_memory)
     run.input.known_matches = &matches;
   link_frames(run);
+  link_by_depth(run);
   CalibrationMoves moves;
   if (state.feature_links.empty()) {
     require_other_links(run);
   } else {
-    if (options.bundle) run.propose(bundle_stage(run.input, state));
-    if (options.bundle && (options.intrinsics != IntrinsicsMode::fixed || options.correct_depth))
+    const bool bundle = options.bundle && has_matches(state);
+    if (bundle) run.propose(bundle_stage(run.input, state));
+    if (bundle && (options.intrinsics != IntrinsicsMode::fixed || options.correct_depth))
       calibrate_sensor(run);
     drop_descriptors(state);
     matches.clear();
     if (options.icp.mode != IcpMode::off) run.propose(surface_stage(run.input, state));
     keep_start_if_better(run.input, state);
-    moves = calibration_moves(run.input, state);
+    moves = calibration_moves(run.input, state, run.result.deviations);
   }
   run.result.covariance = covariances(run.input, state, moves);
   ScaleResult scale = scale_stage(run.input, state, run.result.covariance, moves);
@@ -484,6 +584,7 @@ void describe(ResultTable& table, const RefinementResult& result) {
   table.add("frames_skipped", result.skipped.size(), "frames without features");
   table.add("features", result.features, "features of all frames");
   table.add("sensor", sensor, "findings about the sensor");
+  table.add("noise", result.noise, "noise of depth and its source");
   table.add("scale", result.scale, "source and uncertainty of the scale");
   table.add("stages_undone", rejected, "stages that were rejected");
   table.add("trajectory_rmse_m", rmse_m, "absolute error of the trajectory, of a scan with truth");

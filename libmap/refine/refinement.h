@@ -43,6 +43,9 @@ struct RefinementOptions {
   int rounds = 5;  // >= 0: of loop closures, each on the poses of the last
   bool bundle = true;
   IntrinsicsMode intrinsics = IntrinsicsMode::automatic;
+  // Name in data/sensors or a path: its noise, useful range, timing and bounds replace what the
+  // other options leave at their defaults. "auto": the noise is estimated.
+  std::string sensor = "auto";
   bool correct_depth = true;  // estimate a correction of depth, if what was held out asks for it
   FeatureOptions features{};
   VisualOdometryOptions odometry{};
@@ -72,6 +75,7 @@ struct StageReport {
   HeldOutEvaluation held_out{};                     // of this stage's links and of those before
   std::map<std::string, LinkGroupResult> groups{};  // of an optimized graph
   std::vector<std::pair<std::string, double>> figures{};  // metrics of the stage
+  std::vector<std::string> warnings{};
   std::optional<StageError> error{};
   std::optional<StageError> rejected_error{};  // of the poses that were given up
   double seconds = 0.0;
@@ -94,8 +98,10 @@ struct RefinementResult {
   std::vector<PoseLink> rejected_links;  // stored ones
   std::size_t features = 0;
   SensorCalibration calibration;      // as estimated
+  SensorCalibration deviations;       // BundleAdjustmentResult::deviations
   std::vector<Camera> cameras;        // of the pictures, as stored
   std::vector<std::string> findings;  // about the sensor, a sentence each
+  std::string noise;                  // of depth, and its source, a sentence
   std::string scale;                  // a sentence: what it comes from, and how certain it is
   std::vector<std::string> warnings;
 };

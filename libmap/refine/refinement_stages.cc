@@ -4,6 +4,9 @@
 #include <iterator>
 #include <utility>
 
+#include "libmap/core/parallel.h"
+#include "libmap/optimize/graph_links.h"
+
 namespace libmap {
 
 namespace {
@@ -93,6 +96,51 @@ StageResult link_stage(const RefinementInput& input, const RefinementState& stat
   input.progress.end();
   next.poses = next.graph.map_from_base;
   report.groups = next.graph.groups;
+  return result;
+}
+
+StageResult depth_link_stage(const RefinementInput& input, const RefinementState& state) {
+  const RefinementOptions& options = input.options;
+  const std::vector<FrameFeatures>& frames = *state.frames;
+  StageResult result{.state = state, .report = {.name = "links by depth"}};
+  RefinementState& next = result.state;
+  std::vector<bool> linked(frames.size(), false);
+  for (const FeatureLink& link : state.feature_links)
+    linked[link.frames.first] = linked[link.frames.second] = true;
+  std::set<FramePair> candidates = consecutive_pairs(frames, options.closures.neighbors);
+  candidates.merge(near_pairs(frames, state.poses, state.graph.components, options.closures));
+  std::vector<FramePair> pairs;
+  for (const FramePair& pair : candidates)
+    if ((!linked[pair.first] || !linked[pair.second]) &&
+        state.poses.contains(frames[pair.first].node) &&
+        state.poses.contains(frames[pair.second].node))
+      pairs.push_back(pair);
+  std::vector<std::optional<PoseLink>> found(pairs.size());
+  input.progress.begin("links by depth", pairs.size());
+  parallel_each(pairs.size(), [&](std::size_t n) {
+    const FrameFeatures& a = frames[pairs[n].first];
+    const FrameFeatures& b = frames[pairs[n].second];
+    found[n] = align_pair(a, b, state.poses.at(a.node).inverse() * state.poses.at(b.node));
+    input.progress.advance(1);
+  });
+  input.progress.end();
+  std::vector<FeatureLink> links;
+  for (std::size_t n = 0; n < pairs.size(); ++n) {
+    if (!found[n]) continue;
+    if (pairs[n].second > pairs[n].first + 1) found[n]->type = LinkType::local_space_closure;
+    links.push_back({.frames = pairs[n], .link = *found[n]});
+  }
+  RejectionCounts& counts = result.report.closures;
+  counts.candidates = pairs.size();
+  counts.not_converged = pairs.size() - links.size();
+  counts.accepted = links.size();
+  check_against_graph(links, state.graph, options.closures, counts);
+  next.feature_links.insert(next.feature_links.end(), links.begin(), links.end());
+  next.graph = optimize_pose_graph(next.poses, all_links(next), options.graph);
+  next.poses = next.graph.map_from_base;
+  next.information = link_system(next.poses, next.graph.links);
+  result.report.groups = next.graph.groups;
+  result.report.rejected = links.empty();
   return result;
 }
 

@@ -48,6 +48,7 @@ struct RefinementState {
   std::vector<FramePair> surface_pairs{};  // that have moved the poses
   double surface_distance_m = 0.0;         // IcpResult::max_distance_m
   double deviation_scale = 1.0;            // IcpResult::deviation_scale
+  DepthNoise noise{};                      // that the frames have
   std::vector<std::string> warnings{};
 
   // Of the graph's links, those that are not of features.
@@ -87,6 +88,9 @@ std::set<FramePair> candidate_pairs(const RefinementInput& input, const Refineme
 // Links pairs of frames by their features and optimizes the pose graph.
 StageResult link_stage(const RefinementInput& input, const RefinementState& state, int round,
                        const std::vector<FramePair>& pairs);
+// Links frames that no feature link joins by aligning their depth, from the poses as they are, with
+// frames that follow each other or are near. The links have no matches.
+StageResult depth_link_stage(const RefinementInput& input, const RefinementState& state);
 // Drops links of features that the pose graph has rejected. Returns their number.
 std::size_t drop_rejected_links(RefinementState& state);
 
@@ -108,7 +112,9 @@ StageResult surface_stage(const RefinementInput& input, const RefinementState& s
 
 // Moves of each node for calibrations that are as likely: independent, one standard deviation each.
 using CalibrationMoves = std::map<int, std::vector<Vector6d>>;
-CalibrationMoves calibration_moves(const RefinementInput& input, const RefinementState& state);
+// `deviations` receives the standard deviations of intrinsics and timing.
+CalibrationMoves calibration_moves(const RefinementInput& input, const RefinementState& state,
+                                   SensorCalibration& deviations);
 
 struct ScaleResult {
   std::string sentence{};              // source and uncertainty of the scale

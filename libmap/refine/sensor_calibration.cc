@@ -2,10 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <deque>
 #include <iterator>
 #include <numbers>
+#include <optional>
 #include <set>
+#include <tuple>
 #include <utility>
 
 #include "libmap/core/text.h"
@@ -26,26 +27,48 @@ struct SubScan {
 };
 
 constexpr std::size_t max_frames = 80;
+// Frames that follow each other determine motions, runs that are far apart in time views.
+constexpr std::size_t frames_a_run = 10;
+constexpr std::size_t min_run_links = 10;  // to the runs that are taken already
 
-// Breadth first from the frame with most links.
+// Runs of consecutive frames: the one with most links, then those that are farthest in time from
+// all taken ones and are linked to them, at last those with most links to them.
 std::set<std::size_t> joined_frames(std::size_t frames, const std::vector<FeatureLink>& links) {
-  std::vector<std::vector<std::size_t>> joined(frames);
+  const std::size_t length = frames <= max_frames ? 1 : frames_a_run;
+  const std::size_t runs = (frames + length - 1) / length;
+  std::vector<std::map<std::size_t, std::size_t>> joined(runs);
+  std::vector<std::size_t> all(runs, 0);
   for (const FeatureLink& link : links) {
-    joined[link.frames.first].push_back(link.frames.second);
-    joined[link.frames.second].push_back(link.frames.first);
+    const std::size_t a = link.frames.first / length;
+    const std::size_t b = link.frames.second / length;
+    ++joined[a][b];
+    if (a != b) ++joined[b][a];
+    ++all[a];
+    ++all[b];
   }
-  const auto first =
-      std::max_element(joined.begin(), joined.end(),
-                       [](const auto& a, const auto& b) { return a.size() < b.size(); });
   std::set<std::size_t> taken;
-  std::deque<std::size_t> next = {static_cast<std::size_t>(first - joined.begin())};
-  while (!next.empty() && taken.size() < max_frames) {
-    const std::size_t frame = next.front();
-    next.pop_front();
-    if (!taken.insert(frame).second) continue;
-    next.insert(next.end(), joined[frame].begin(), joined[frame].end());
+  std::vector<std::size_t> to_taken(runs, 0);
+  std::vector<std::size_t> apart(runs, runs);
+  auto next = static_cast<std::size_t>(std::max_element(all.begin(), all.end()) - all.begin());
+  while (next < runs && (taken.size() + 1) * length <= max_frames) {
+    taken.insert(next);
+    for (const auto& [run, count] : joined[next]) to_taken[run] += count;
+    for (std::size_t run = 0; run < runs; ++run)
+      apart[run] = std::min(apart[run], run > next ? run - next : next - run);
+    const auto rank = [&](std::size_t run) {
+      const bool well = to_taken[run] >= (length == 1 ? 1 : min_run_links);
+      return std::tuple(well, well ? apart[run] : 0, to_taken[run]);
+    };
+    next = runs;
+    for (std::size_t run = 0; run < runs; ++run)
+      if (to_taken[run] > 0 && !taken.contains(run) && (next == runs || rank(run) > rank(next)))
+        next = run;
   }
-  return taken;
+  std::set<std::size_t> chosen;
+  for (const std::size_t run : taken)
+    for (std::size_t f = run * length; f < std::min(frames, (run + 1) * length); ++f)
+      chosen.insert(f);
+  return chosen;
 }
 
 SubScan sub_scan_of(const CalibrationInput& input, const std::set<std::size_t>& chosen) {
@@ -116,6 +139,7 @@ struct Candidate {
   CalibrationParts model;
   BundleAdjustmentResult adjustment;
   HeldOutCosts costs;
+  bool possible = true;
 };
 
 Candidate try_model(const CalibrationParts& model, const SubScan& part,
@@ -200,6 +224,10 @@ class ModelSearch {
                     const std::map<int, Pose>& poses, int rounds) {
     Candidate candidate = try_model(model, part_, rough_, start, poses, rounds);
     estimate_.tried.emplace_back(model.name(), evaluate_held_out(before_, candidate.costs));
+    if (const auto reason = exceeded_bound(candidate.adjustment.calibration, options_)) {
+      candidate.possible = false;
+      estimate_.impossible.emplace_back(model.name(), *reason);
+    }
     return candidate;
   }
   // One round is enough for a comparison: planes are met where the best meets them.
@@ -209,6 +237,9 @@ class ModelSearch {
   bool is_good(const Candidate& candidate) const;
   void simplify_to(const CalibrationParts& simpler);
   void leave_out();
+  void settle_motions();
+  bool is_timing_enough(const CalibrationParts& others);
+  void use_timing_alone();
   void try_timing();
 
   const SubScan& part_;
@@ -217,12 +248,13 @@ class ModelSearch {
   const CalibrationChoice& choice_;
   HeldOutCosts before_;
   Candidate best_;
+  std::optional<Candidate> timed_;  // timing alone, if it is clearly better than the stored camera
   CalibrationEstimate estimate_;
 };
 
 bool ModelSearch::is_good(const Candidate& candidate) const {
   const HeldOutEvaluation change = evaluate_held_out(before_, candidate.costs);
-  return candidate.adjustment.converged &&
+  return candidate.adjustment.converged && candidate.possible &&
          (choice_.only_if_better
               ? change.is_clearly_better() && change.change() < -min_whole_gain * change.before()
               : !change.is_worse());
@@ -249,29 +281,61 @@ void ModelSearch::leave_out() {
   }
 }
 
+void ModelSearch::settle_motions() {
+  Candidate settled = attempt_from_best(best_.model, max_rounds - 1);
+  if (is_good(settled)) best_ = std::move(settled);
+}
+
+// Timing alone: a correction of depth also fits what late depth and rows of pictures distort.
+// Returns whether everything else together with it is not clearly better.
+bool ModelSearch::is_timing_enough(const CalibrationParts& others) {
+  timed_ = attempt({.timing = true}, {}, part_.poses, max_rounds - 1);
+  const HeldOutEvaluation change = evaluate_held_out(before_, timed_->costs);
+  if (!is_good(*timed_) || change.change() > -min_timing_gain * change.before()) {
+    timed_.reset();
+    return false;
+  }
+  CalibrationParts all = others;
+  all.timing = true;
+  if (all == timed_->model) return true;
+  const Candidate candidate = attempt(all, timed_->adjustment.calibration,
+                                      timed_->adjustment.map_from_base, 1);
+  return !is_good(candidate) || !is_needed(timed_->costs, candidate.costs, min_timing_gain);
+}
+
+// The motions need more rounds than a comparison.
+void ModelSearch::use_timing_alone() {
+  best_ = std::move(*timed_);
+  settle_motions();
+}
+
 void ModelSearch::try_timing() {
-  const bool was_good = is_good(best_);
-  CalibrationParts timed = was_good ? best_.model : CalibrationParts{};
+  if (!is_good(best_)) return;  // alone it has been tried
+  CalibrationParts timed = best_.model;
   timed.timing = true;
-  Candidate candidate = was_good ? attempt_from_best(timed, 1) : attempt(timed, {}, part_.poses, 1);
-  if (!is_good(candidate) ||
-      (was_good && !is_needed(best_.costs, candidate.costs, min_timing_gain)))
-    return;
+  Candidate candidate = attempt_from_best(timed, 1);
+  if (!is_good(candidate) || !is_needed(best_.costs, candidate.costs, min_timing_gain)) return;
   best_ = std::move(candidate);
   leave_out();
-  Candidate settled = attempt_from_best(best_.model, max_rounds - 1);  // motions need more rounds
-  if (is_good(settled)) best_ = std::move(settled);
+  settle_motions();
 }
 
 CalibrationEstimate ModelSearch::run() {
   CalibrationParts all = choice_.parts;
   all.timing = all.timing && !choice_.start.timing.empty();
-  best_ = attempt(all, choice_.start, part_.poses, max_rounds);
-  // Too much freedom for little data may hide what intrinsics alone explain.
-  if (!is_good(best_) && choice_.leave_out && all.intrinsics && (all.depth || all.registration))
-    best_ = attempt({.intrinsics = true}, {}, part_.poses, 1);
-  leave_out();
-  if (choice_.parts.timing && choice_.leave_out && !all.timing) try_timing();
+  const bool may_time = choice_.parts.timing && choice_.leave_out && !all.timing;
+  if (may_time && is_timing_enough(all)) {
+    use_timing_alone();
+  } else {
+    best_ = attempt(all, choice_.start, part_.poses, max_rounds);
+    // Too much freedom for little data may hide what intrinsics alone explain.
+    if (!is_good(best_) && choice_.leave_out && all.intrinsics && (all.depth || all.registration))
+      best_ = attempt({.intrinsics = true}, {}, part_.poses, 1);
+    leave_out();
+    if (may_time) try_timing();
+    if (timed_ && (!is_good(best_) || evaluate_held_out(timed_->costs, best_.costs).change() > 0.0))
+      use_timing_alone();
+  }
   if (is_good(best_) && choice_.settle) {
     Candidate settled = try_model(best_.model, part_, options_, best_.adjustment.calibration,
                                   best_.adjustment.map_from_base, 1);
@@ -401,6 +465,7 @@ CameraFile calibrated_camera(const Camera& stored, const Camera& picture,
 }
 
 std::vector<std::string> findings(const SensorCalibration& calibration,
+                                  const SensorCalibration& deviations,
                                   const std::vector<Camera>& cameras) {
   std::vector<std::string> sentences;
   const auto of_camera = [&](std::size_t n) {
@@ -418,20 +483,17 @@ std::vector<std::string> findings(const SensorCalibration& calibration,
     const DepthCorrection& depth = calibration.depth[n];
     if (depth.spline_m.empty()) continue;
     constexpr int places = 100;
-    const auto bend = [&](double z, double radius2) {
-      return depth.at(z, radius2) - (depth.scale - 1.0) * z;
-    };
-    double lowest = bend(depth.first_m, 0.0);
+    double lowest = depth.bend(depth.first_m, 0.0);
     double highest = lowest;
     for (int k = 0; k <= places; ++k) {
       const double z = depth.first_m + (depth.last_m() - depth.first_m) * k / places;
-      lowest = std::min(lowest, bend(z, 0.0));
-      highest = std::max(highest, bend(z, 0.0));
+      lowest = std::min(lowest, depth.bend(z, 0.0));
+      highest = std::max(highest, depth.bend(z, 0.0));
     }
     const double middle = 0.5 * (depth.first_m + depth.last_m());
     sentences.push_back(of_camera(n) + "depth bends by " +
                         to_fixed_text(500.0 * (highest - lowest), 1) + " mm with range and by " +
-                        to_fixed_text(1e3 * std::abs(bend(middle, 1.0) - bend(middle, 0.0)), 1) +
+                        to_fixed_text(1e3 * std::abs(depth.bend(middle, 1.0) - depth.bend(middle, 0.0)), 1) +
                         " mm toward the corners: corrected");
   }
   for (std::size_t n = 0; n < std::min(calibration.color_from_depth.size(), cameras.size()); ++n) {
@@ -445,10 +507,17 @@ std::vector<std::string> findings(const SensorCalibration& calibration,
   for (std::size_t n = 0; n < std::min(calibration.timing.size(), cameras.size()); ++n) {
     const CameraTiming& timing = calibration.timing[n];
     const double delay_ms = 1e3 * timing.depth_delay_s;
+    const auto within = [&](double CameraTiming::*const time) {
+      return n < deviations.timing.size()
+                 ? " +- " + to_fixed_text(1e3 * deviations.timing[n].*time, 1)
+                 : std::string();
+    };
     sentences.push_back(of_camera(n) + "depth taken " + to_fixed_text(std::abs(delay_ms), 1) +
-                        " ms " + (delay_ms < 0.0 ? "before" : "after") +
+                        within(&CameraTiming::depth_delay_s) + " ms " +
+                        (delay_ms < 0.0 ? "before" : "after") +
                         " color, rows of a picture exposed over " +
-                        to_fixed_text(1e3 * timing.rolling_shutter_s, 1) + " ms: corrected");
+                        to_fixed_text(1e3 * timing.rolling_shutter_s, 1) +
+                        within(&CameraTiming::rolling_shutter_s) + " ms: corrected");
   }
   return sentences;
 }

@@ -22,7 +22,7 @@ struct CalibrationInput {
   const std::map<int, Pose>& map_from_base;
   const std::vector<GraphLinkResult>& graph_links;  // other links than those of features
   const std::vector<GraphComponent>& components;
-  const BundleAdjustmentOptions& options;
+  BundleAdjustmentOptions options;
 };
 
 // Parts of a calibration: which are estimated.
@@ -53,6 +53,7 @@ struct CalibrationEstimate {
   BundleAdjustmentResult adjustment;  // of those frames, with the best tried; without information
   HeldOutEvaluation held_out;         // of those frames: as they were, and with the best model
   std::vector<std::pair<std::string, HeldOutEvaluation>> tried;  // the same of each model
+  std::vector<std::pair<std::string, std::string>> impossible;   // models, and their exceeded bound
 };
 
 // Bundle adjustments with free intrinsics, depth corrections and registration of depth to color,
@@ -81,8 +82,10 @@ bool takes_depth_from_near(const SensorCalibration& a, const SensorCalibration& 
 CameraFile calibrated_camera(const Camera& stored, const Camera& picture,
                              const SensorCalibration& calibration, const PoseGraph& graph);
 
-// One sentence for each thing that was found wrong and corrected.
+// One sentence for each thing that was found wrong and corrected; `deviations` as
+// BundleAdjustmentResult::deviations.
 std::vector<std::string> findings(const SensorCalibration& calibration,
+                                  const SensorCalibration& deviations,
                                   const std::vector<Camera>& cameras);
 
 }  // namespace libmap

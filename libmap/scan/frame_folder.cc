@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <initializer_list>
+#include <numeric>
 #include <optional>
 #include <system_error>
 
@@ -311,11 +312,49 @@ void FrameFolder::read_images() {
   }
 }
 
+namespace {
+
+// Stamps of arrival jitter by several milliseconds, while the phase of two free-running cameras
+// drifts slowly: the median of the differences of neighbors in time that are near each one's own.
+std::vector<double> smoothed_differences(const std::vector<double>& stamps,
+                                         const std::vector<double>& differences) {
+  constexpr double window_s = 1.5;
+  constexpr double jitter_s = 0.01;
+  std::vector<double> smoothed = differences;
+  std::vector<std::size_t> order(stamps.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return stamps[a] < stamps[b]; });
+  std::size_t first = 0;
+  for (const std::size_t own : order) {
+    while (stamps[order[first]] < stamps[own] - window_s) ++first;
+    std::vector<double> near;
+    for (std::size_t n = first; n < order.size() && stamps[order[n]] <= stamps[own] + window_s; ++n)
+      if (std::abs(differences[order[n]] - differences[own]) <= jitter_s)
+        near.push_back(differences[order[n]]);
+    const auto middle = near.begin() + static_cast<std::ptrdiff_t>(near.size() / 2);
+    std::nth_element(near.begin(), middle, near.end());
+    smoothed[own] = *middle;
+  }
+  return smoothed;
+}
+
+}  // namespace
+
 void FrameFolder::add_images(const Listing& color, const Listing& depth) {
   if (depth.names.empty()) throw Error("lists no depth image", {.file = path_.string()});
   std::vector<std::string> color_of_depth(depth.names.size());
   const auto pairs = pair_by_stamp(color.stamps, depth.stamps, options_.pairing_tolerance_s);
-  for (const auto& [i, j] : pairs) color_of_depth[j] = color.names[i];
+  std::vector<double> paired_stamps;
+  std::vector<double> differences;
+  for (const auto& [i, j] : pairs) {
+    color_of_depth[j] = color.names[i];
+    paired_stamps.push_back(depth.stamps[j]);
+    differences.push_back(depth.stamps[j] - color.stamps[i]);
+  }
+  differences = smoothed_differences(paired_stamps, differences);
+  std::vector<double> later_s(depth.names.size(), 0.0);
+  for (std::size_t n = 0; n < pairs.size(); ++n) later_s[pairs[n].second] = differences[n];
   std::vector<std::size_t> order;
   for (std::size_t j = 0; j < depth.names.size(); ++j)
     if (color.names.empty() || !color_of_depth[j].empty()) order.push_back(j);
@@ -340,6 +379,7 @@ void FrameFolder::add_images(const Listing& color, const Listing& depth) {
     Files of_node;
     of_node.color = color_of_depth[j];
     of_node.depth = depth.names[j];
+    of_node.depth_later_s = later_s[j];
     of_node.cameras = {camera};
     files_.emplace(node.id, std::move(of_node));
   }
@@ -432,6 +472,7 @@ RgbdFrame FrameFolder::read_frame(int node, FrameParts parts) const {
   RgbdFrame frame;
   frame.node = node;
   frame.stamp_s = graph_.find_node(node)->stamp_s;
+  frame.depth_later_s = of_node.depth_later_s;
   const auto read = [&](const std::string& name, const char* part, const auto& decode) {
     if (name.empty()) return;
     const std::string field = "node " + std::to_string(node) + ": " + part;

@@ -276,7 +276,7 @@ void apply(RgbdFrame& frame, const CameraFile& calibration, LensRays& rays) {
                  .bound = size_text(known.width, known.height)});
   const Pose base_from_camera = camera.base_from_camera;
   // By the stored camera, as it was estimated.
-  const Pose color_from_depth = calibration.color_from_depth_at(frame.stamp_s);
+  const Pose color_from_depth = calibration.color_from_depth_at(frame.stamp_s, frame.depth_later_s);
   if (!color_from_depth.matrix().isIdentity(0.0))
     frame.depth = registered_depth(frame, color_from_depth, rays);
   camera = known;

@@ -110,6 +110,22 @@ TEST(DepthSurface, CorrectedDepthBendsIt) {
   EXPECT_GT(was.normal.cross(is.normal).norm(), 5e-3);
 }
 
+TEST(DepthSurface, AnotherNoiseScalesThatOfEachElementByItsRange) {
+  DepthSurface surface = ground();
+  const DepthSurface before = surface;
+  const libmap::DepthNoise stereo{0.001, 0.0, 0.01};
+  surface.set_noise({}, stereo);
+  for (const int row : {1, surface.rows() / 2, surface.rows() - 2}) {
+    SurfacePatch was;
+    SurfacePatch is;
+    ASSERT_TRUE(before.at(1, row, was));
+    ASSERT_TRUE(surface.at(1, row, is));
+    EXPECT_EQ(was.point, is.point);
+    EXPECT_NEAR(is.noise_m / was.noise_m,
+                stereo.axial_at(is.point.z()) / libmap::DepthNoise{}.axial_at(is.point.z()), 0.01);
+  }
+}
+
 TEST(DepthSurface, CellsMustFitTheCamera) {
   const DepthSurface surface = ground();
   const DepthSurface same(surface.camera(), surface.step_px(), surface.cells());

@@ -32,6 +32,54 @@ TEST(BundleAdjustment, RecoversAnExactScene) {
   EXPECT_EQ(result.tracks, 150U);
 }
 
+TEST(BundleAdjustment, ImpossibleCamerasExceedTheirBounds) {
+  const libmap::BundleAdjustmentOptions options;
+  const auto exceeds = [&](const libmap::SensorCalibration& calibration) {
+    return libmap::exceeded_bound(calibration, options).has_value();
+  };
+  EXPECT_FALSE(exceeds({}));
+  EXPECT_FALSE(exceeds({.timing = {{-0.02, 0.03}}}));
+  EXPECT_TRUE(exceeds({.timing = {{-0.034, 0.0}}}));
+  EXPECT_TRUE(exceeds({.timing = {{0.0, 0.132}}}));
+  EXPECT_FALSE(exceeds({.intrinsics = {{0.03, -0.03, 8.0, 0.0}}}));
+  EXPECT_TRUE(exceeds({.intrinsics = {{0.09, 0.0, 0.0, 0.0}}}));
+  EXPECT_TRUE(exceeds({.intrinsics = {{0.0, 0.0, 0.0, -33.0}}}));
+  libmap::Pose far = libmap::Pose::Identity();
+  far.translation().x() = 0.09;
+  EXPECT_TRUE(exceeds({.color_from_depth = {far}}));
+  // 10 mm and 2 % of the range, at 1 and 3 m.
+  const auto bent = [](double at_1_m, double at_3_m) {
+    const double step = 0.5 * (at_3_m - at_1_m);
+    libmap::DepthCorrection depth{1.0, 1.0, {}, {}};
+    for (int n = -1; n <= 3; ++n) depth.spline_m.push_back(at_1_m + n * step);
+    return libmap::SensorCalibration{.depth = {depth}};
+  };
+  EXPECT_FALSE(exceeds(bent(0.029, 0.069)));
+  EXPECT_TRUE(exceeds(bent(0.031, 0.0)));
+  EXPECT_TRUE(exceeds(bent(0.0, -0.071)));
+  libmap::SensorCalibration corners = bent(0.0, 0.0);
+  corners.depth[0].radial[0] = 0.04;
+  EXPECT_TRUE(exceeds(corners));
+}
+
+// Few features far away or near determine no correction there: it is constant beyond the others.
+TEST(BundleAdjustment, CorrectionsReachAsFarAsMostDepths) {
+  std::vector<FrameFeatures> frames(1);
+  for (int n = 0; n < 1000; ++n) {
+    libmap::Feature feature;
+    feature.depth_m = n < 3 ? 9.0F : n < 6 ? 0.2F : 1.0F + 0.002F * static_cast<float>(n);
+    frames[0].features.push_back(feature);
+  }
+  libmap::DepthCorrection depth = libmap::corrections_for(frames, 1, 0.2).at(0);
+  EXPECT_NEAR(depth.first_m, 1.02, 0.02);
+  EXPECT_NEAR(depth.last_m(), 2.98, 0.02);
+  std::fill(depth.spline_m.begin(), depth.spline_m.end(), 0.01);
+  depth.spline_m.back() = 0.05;
+  depth.radial = {0.0, 0.0, 0.01};
+  EXPECT_EQ(depth.at(9.0, 1.0), depth.at(depth.last_m(), 1.0));
+  EXPECT_EQ(depth.at(0.2, 1.0), depth.at(depth.first_m, 1.0));
+}
+
 TEST(BundleAdjustment, OptionsOutOfTheirRangesAreNamed) {
   const auto refusal = [](const libmap::BundleAdjustmentOptions& options) {
     return std::string(error_of([&] {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "tests/libmap/optimize/bundle_scenes.h"
@@ -47,12 +48,43 @@ TEST(SensorCalibration, AllFramesHaveMotions) {
   }
 }
 
+// Rows of 60 ms are longer than a frame.
+TEST(SensorCalibration, AModelBeyondItsBoundIsNotAccepted) {
+  const auto points = random_points(200);
+  const Way way = way_with_rows(points, 0.06, 12);
+  std::vector<libmap::FeatureLink> links;
+  for (std::size_t a = 0; a < way.frames.size(); ++a)
+    for (std::size_t b = a + 1; b < std::min(way.frames.size(), a + 4); ++b) {
+      libmap::FeatureLink link;
+      link.frames = {a, b};
+      link.matches = graspmap_test::same_numbers(points.size());
+      for (std::size_t n = 0; n < link.matches.size(); n += 10)
+        link.held_out.push_back(link.matches[n]);
+      links.push_back(link);
+    }
+  libmap::BundleAdjustmentOptions options;
+  options.max_iterations = 100;
+  const libmap::CalibrationChoice choice{.parts = {.timing = true}, .start = {}};
+  for (const double frame_time_s : {0.033, 0.1}) {
+    options.bounds.frame_time_s = frame_time_s;
+    const libmap::CalibrationEstimate estimate = libmap::estimate_calibration(
+        {way.frames, links, way.truth, {}, way.components, options}, choice);
+    if (frame_time_s > 0.06) {
+      EXPECT_TRUE(estimate.impossible.empty());
+    } else {
+      EXPECT_TRUE(estimate.calibration.timing.empty());
+      ASSERT_FALSE(estimate.impossible.empty());
+      EXPECT_EQ(estimate.impossible.front().first, "timing");
+    }
+  }
+}
+
 // A base that goes along x in front of a wall: depth that is late is nearer by the way it went.
 TEST(SensorCalibration, LateDepthIsMovedBack) {
   libmap::SensorCalibration calibration;
   calibration.timing = {{0.05, 0.0}};
   calibration.motion[1] << 0.4, 0.0, 0.0, 0.0, 0.0, 0.0;
-  const FrameFeatures frame = see_points(1, Pose::Identity(), {{1.5, 0.1, 0.1}});
+  FrameFeatures frame = see_points(1, Pose::Identity(), {{1.5, 0.1, 0.1}});
   const Pose pose = libmap::color_from_depth_of(frame, frame.features[0], calibration);
   // Forward is z in the camera: the depth's camera was 2 cm ahead.
   EXPECT_LT((pose.translation() - Eigen::Vector3d(0.0, 0.0, 0.02)).norm(), 1e-12);
@@ -60,6 +92,10 @@ TEST(SensorCalibration, LateDepthIsMovedBack) {
   const double row = libmap::row_share_of(frame.features[0], frame.cameras[0]);
   EXPECT_NEAR(libmap::color_from_depth_of(frame, frame.features[0], calibration).translation().z(),
               0.4 * (0.05 - 0.05 * row), 1e-12);
+  frame.depth_later_s = -0.01;
+  EXPECT_NEAR(libmap::color_from_depth_of(frame, frame.features[0], calibration).translation().z(),
+              0.4 * (0.04 - 0.05 * row), 1e-12)
+      << "stamps of depth that is earlier by 10 ms";
 }
 
 }  // namespace sensor_calibration_test

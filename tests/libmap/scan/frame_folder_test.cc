@@ -196,7 +196,9 @@ TEST_F(TumFolder, PairsListsOfImagesByTime) {
   EXPECT_EQ(read.warnings(),
             (std::vector<std::string>{"1 depth image without a color image within 0.02 s",
                                       "1 color image without a depth image within 0.02 s"}));
+  EXPECT_NEAR(read.read_frame(1).depth_later_s, 1102.160407 - 1102.175304, 1e-6);
   const libmap::RgbdFrame frame = read.read_frame(2);
+  EXPECT_NEAR(frame.depth_later_s, 1102.226738 - 1102.211214, 1e-6);
   EXPECT_TRUE(frame.color == libmap::decode_color(graspmap_test::read_text(folder_ / "rgb/b.png")));
   ASSERT_EQ(frame.cameras.size(), 1U);
   graspmap_test::expect_same_camera(frame.cameras[0], camera_);
@@ -205,6 +207,24 @@ TEST_F(TumFolder, PairsListsOfImagesByTime) {
   EXPECT_EQ(frame.depth.pixels[0], 0.0F);
   for (std::size_t i = 1; i < units.pixels.size(); ++i)
     EXPECT_FLOAT_EQ(frame.depth.pixels[i], static_cast<float>(units.pixels[i]) / 5000.0F);
+}
+
+// The stamps of arrival jitter by 8 ms; the phase of the two cameras is 5 ms, then -16 ms.
+TEST_F(TumFolder, SmoothsTheDelayOfDepthByItsStamps) {
+  write_pair();
+  std::string color;
+  std::string depth;
+  for (int n = 0; n < 40; ++n) {
+    const double phase_s = n < 20 ? 0.005 : -0.016;
+    color += std::to_string(0.07 * n) + " rgb/1.png\n";
+    depth += std::to_string(0.07 * n + phase_s + (n % 3 == 0 ? 0.008 : 0.0)) + " depth/1.png\n";
+  }
+  write_text(folder_ / "rgb.txt", color);
+  write_text(folder_ / "depth.txt", depth);
+  const FrameFolder read(folder_);
+  ASSERT_EQ(read.graph().nodes.size(), 40U);
+  for (int n = 0; n < 40; ++n)
+    EXPECT_NEAR(read.read_frame(n + 1).depth_later_s, n < 20 ? 0.005 : -0.016, 1e-5) << n;
 }
 
 TEST_F(TumFolder, TakesAssociationsInEitherOrder) {

@@ -1,0 +1,73 @@
+#include "libmap/refine/noise_estimate.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+#include <string>
+
+#include "libmap/camera/sensor_model.h"
+#include "tests/support/test_support.h"
+
+namespace noise_estimate_test {
+
+using libmap::DepthNoise;
+using libmap::SurfaceResidual;
+
+// Distances of a camera with the noise `truth`, stated by `assumed`; one in ten is an outlier.
+std::vector<SurfaceResidual> residuals_of(const DepthNoise& truth, const DepthNoise& assumed,
+                                          int count = 20000) {
+  std::vector<SurfaceResidual> residuals;
+  std::mt19937_64& engine = graspmap_test::random_engine();
+  std::normal_distribution<double> normal;
+  for (int n = 0; n < count; ++n) {
+    const double range_m = graspmap_test::uniform(0.6, 4.0);
+    const double share = 1.0 / 6.0;  // a plane averages pixels
+    const double distance_m = share * truth.axial_at(range_m) * normal(engine);
+    residuals.push_back({n % 10 == 0 ? 5.0 * distance_m : distance_m,
+                         share * assumed.axial_at(range_m), range_m});
+    residuals.push_back({.distance_m = std::numeric_limits<double>::quiet_NaN()});
+  }
+  return residuals;
+}
+
+TEST(NoiseEstimate, FindsNoiseThatGrowsWithTheSquareOfTheRange) {
+  const DepthNoise stereo{0.001, 0.0, 0.004, 0.8};
+  const auto found = libmap::estimate_noise(residuals_of(stereo, {}), {});
+  ASSERT_TRUE(found);
+  for (const double range_m : {0.8, 1.5, 2.5, 3.8})
+    EXPECT_NEAR(found->noise.axial_at(range_m) / stereo.axial_at(range_m), 1.1, 0.15) << range_m;
+  EXPECT_GT(found->noise.axial_of_square, 0.003);
+  EXPECT_GT(found->largest_ratio, 2.0);
+  EXPECT_EQ(found->residuals, 20000U);
+}
+
+TEST(NoiseEstimate, AgreesWithTheAssumedNoiseIfThatIsRight) {
+  const auto found = libmap::estimate_noise(residuals_of({}, {}), {});
+  ASSERT_TRUE(found);
+  EXPECT_LT(found->largest_ratio, 1.3);
+  EXPECT_GE(found->noise.axial_of_range, 0.0);
+  EXPECT_GE(found->noise.axial_of_square, 0.0);
+}
+
+TEST(NoiseEstimate, NeedsResiduals) {
+  EXPECT_FALSE(libmap::estimate_noise(residuals_of({}, {}, 500), {}));
+}
+
+TEST(SensorModel, ShippedSensorsAreReadAndUnknownOnesAreNamed) {
+  for (const char* name :
+       {"kinect-v1", "kinect-v2", "realsense-d435", "l515", "azure-kinect", "ipad-lidar"}) {
+    const libmap::SensorModel model = libmap::read_sensor_model(name);
+    EXPECT_GT(model.far_m, model.near_m) << name;
+    EXPECT_LE(model.rolling_shutter_s, model.frame_time_s) << name;
+    EXPECT_LT(model.frame_time_s, 0.05) << name;
+  }
+  EXPECT_GT(libmap::read_sensor_model("kinect-v1").noise_of_square, 0.0);
+  EXPECT_NE(std::string(
+                graspmap_test::error_of([] { libmap::read_sensor_model("kinect-v3"); }).what())
+                .find("kinect-v3"),
+            std::string::npos);
+}
+
+}  // namespace noise_estimate_test
