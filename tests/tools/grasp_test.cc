@@ -92,6 +92,36 @@ TEST(GraspCommand, TableManifestAndEvaluation) {
                                   "graspable_1", "--score", "again_hold_probability"})));
 }
 
+TEST(GraspCommand, FitsPullsAndPlansTheNext) {
+  write_ground();
+  write_text(scratch("pulls.csv"), "ground,tilt_deg,force_n\nlevel,0,9\nlevel,45,8\n");
+  const std::vector<std::string> fit = {"grasp", "level",  "--fit", "pulls.csv",
+                                        "-o",    "f.yaml", "--trials", "4"};
+  ASSERT_TRUE(succeeded(graspmap(fit)));
+  const auto results = json_of("f.yaml.json").at("results");
+  EXPECT_EQ(results.at("pull_tests"), 2);
+  EXPECT_GT(results.at("level_after_median_n"), results.at("level_before_median_n"));
+  EXPECT_LT(results.at("spine_force_limit_n.low"), results.at("spine_force_limit_n.high"));
+  // The file is a gripper of all commands.
+  ASSERT_TRUE(succeeded(graspmap(with({"-o", "fitted.csv", "--gripper", "f.yaml"}))));
+  ASSERT_TRUE(succeeded(graspmap({"grasp", "ground.ply", "--points", "places.csv", "--plan", "2",
+                                  "--gripper", "f.yaml", "-o", "plan.csv", "--trials", "4"})));
+  const libmap::Table plan = libmap::read_csv(scratch("plan.csv"));
+  ASSERT_FALSE(plan.rows.empty());
+  EXPECT_LE(plan.rows.size(), 2U);
+  for (const char* column : {"place", "x", "tilt_deg", "azimuth_deg", "load_n"})
+    EXPECT_TRUE(plan.find_column(column)) << column;
+  const auto refused = [&](const std::string& table, const std::vector<std::string>& parts) {
+    write_text(scratch("bad.csv"), table);
+    return bad_input(graspmap({"grasp", "ground.ply", "--fit", "bad.csv", "-o", "b.yaml"}), parts);
+  };
+  EXPECT_TRUE(refused("x,y,z,force_n\n", {"bad.csv", "rows"}));
+  EXPECT_TRUE(refused("x,y,z,force_n\n0,0,9,3\n", {"bad.csv", "row 1", "0.05 m"}));
+  EXPECT_TRUE(refused("x,y,z,force_n\n0,0,0.05,-3\n", {"bad.csv", "row 1, force_n", "-3"}));
+  EXPECT_TRUE(refused("x,y,z,held\n0,0,0.05,1\n", {"bad.csv", "row 1, load_n"}));
+  EXPECT_FALSE(std::filesystem::exists(scratch("b.yaml")));
+}
+
 TEST(GraspCommand, BadInputIsOneLine) {
   write_ground();
   const auto refused = [](const std::vector<std::string>& words,
