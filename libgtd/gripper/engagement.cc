@@ -1,9 +1,9 @@
-#include "libgtd/gripper/engagement.h"
-
+// The parameters of engagement of gripper.h.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 
+#include "libgtd/gripper/gripper.h"
 #include "libmap/core/error.h"
 #include "libmap/core/random_stream.h"
 

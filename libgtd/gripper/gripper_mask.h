@@ -2,44 +2,19 @@
 // stands in its way (void), as a stack of voxel layers.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "libgtd/gripper/finger_pull.h"
 #include "libgtd/gripper/gripper.h"
 #include "libmap/core/point_cloud.h"
 
 namespace libgtd {
 
-// The way of a closing finger over voxel columns, which method `calibrated` follows on a map:
-// places of the finger's parts relative to the palm. A finger turns from wide open to closed in
-// steps that move its tip by at most half a voxel; its places are the tip, the middle of the distal
-// link and the knuckle, in this order at each step.
-struct ClosingPath {
-  struct Place {
-    double radius_m = 0.0;  // from the palm's axis
-    double depth_m = 0.0;   // below the palm
-    bool has_spines = false;
-  };
-  std::vector<Place> closing;
-  std::vector<Place> open;  // of the open finger, from joint to tip
-  double palm_radius_m = 0.0;
-  double finger_length_m = 0.0;    // both links
-  double load_n = 0.0;             // whose hold probability is asked for
-  std::vector<ParameterSet> sets;  // over which forces are predicted
-  FingerPulls pulls;               // of these
-  FingerPulls reference;           // of the gripper file's own parameters
-
-  double reach_m() const;  // the largest radius
-};
-
-// Throws Error if the gripper has no `fingers`.
-ClosingPath make_closing_path(const Gripper& gripper, double voxel_size_m, double load_n);
+struct ClosingPath;  // closing_path.h
 
 // thesis: the author's program (eq. 3-6..3-16). envelope: its alternative design (5.1), in which
 // what the fingers cannot reach is not counted. climblab: the base of both. corrected: the idea of
@@ -61,8 +36,8 @@ struct GripperMaskOptions {
 // z >= solid_layers are the extra void layers on top. The pivot stands at (pivot_xy, pivot_xy,
 // pivot_z) of the window.
 struct GripperMask {
-  Method method = Method::corrected;   // never calibrated
-  std::optional<ClosingPath> closing;  // of method calibrated
+  Method method = Method::corrected;           // never calibrated
+  std::shared_ptr<const ClosingPath> closing;  // of method calibrated, else null
   // Of `corrected`: what the spines hold falls outward by more than this between these circles.
   double closed_radius_m = 0.0;  // of the closed spines
   double open_radius_m = 0.0;    // of the open fingers

@@ -17,21 +17,10 @@
 
 #include <vector>
 
-#include "libgtd/gripper/gripper_mask.h"
-#include "libgtd/terrain/voxel_grid.h"
+#include "libgtd/gripper/closing_path.h"
+#include "libgtd/score/tiling.h"
 
 namespace libgtd {
-
-// Distribution of the holding force in the weakest direction at a voxel, over trials and parameter
-// sets.
-struct ForceEstimate {
-  float median_n = 0.0F;
-  float low_n = 0.0F;  // quantiles 0.05 and 0.95
-  float high_n = 0.0F;
-  float hold_probability = 0.0F;  // that the force reaches the load
-  float trial_spread = 0.0F;      // standard deviations of ln(force): between trials of one set,
-  float parameter_spread = 0.0F;  // and between the sets
-};
 
 // Number of columns around a voxel on which its force depends.
 int closing_reach_voxels(const ClosingPath& path, double voxel_size_m);

@@ -26,14 +26,17 @@ void bind(libmap::ParameterTable& table, Scenario& scenario) {
             "fewer solid voxels around a pivot lower its score (TSV)");
   table.add("load_n", scenario.load_n, positive,
             "pull in any direction whose hold probability method calibrated predicts, N");
-  table.add("zero_plane_m", scenario.zero_plane_m, libmap::any_number,
-            "height in the terrain frame below which nothing is a target, m; auto: 0, with method "
-            "calibrated none");
+  table.add(
+      "zero_plane_m", scenario.zero_plane_m, libmap::any_number,
+      "height in the terrain frame below which nothing is a target, m; auto: 0; not of method "
+      "calibrated");
   table.add("interpolation", scenario.interpolation, "fill gaps by Delaunay interpolation");
   table.add("interpolation_max_edge_m", scenario.interpolation_max_edge_m, not_negative,
             "longest edge of a triangle that is filled, m; 0 for no limit");
   table.add("graspability_threshold", scenario.graspability_threshold, libmap::zero_to_one,
-            "least score of a graspable voxel; auto: 0.8, with method calibrated 0.5");
+            "least score of a graspable voxel; auto: 0.8; not of method calibrated");
+  table.add("probability_threshold", scenario.probability_threshold, libmap::zero_to_one,
+            "least hold probability of a graspable voxel, of method calibrated");
   table.add("curvature_radius_m", scenario.curvature_radius_m, not_negative,
             "radius in which curvature is measured, m; 0: convexity is not evaluated");
   table.add("intersection_distance_m", scenario.intersection_distance_m, positive,
@@ -51,17 +54,18 @@ void bind(libmap::ParameterTable& table, Scenario& scenario) {
 }
 
 double Scenario::lowest_target_m() const {
-  return zero_plane_m.value_or(
-      method == Method::calibrated ? -std::numeric_limits<double>::infinity() : 0.0);
+  return method == Method::calibrated ? -std::numeric_limits<double>::infinity()
+                                      : zero_plane_m.value_or(0.0);
 }
 
 double Scenario::score_threshold() const {
-  return graspability_threshold.value_or(method == Method::calibrated ? 0.5 : 0.8);
+  return method == Method::calibrated ? probability_threshold
+                                      : graspability_threshold.value_or(0.8);
 }
 
 void Scenario::set_defaults() {
   graspability_threshold = score_threshold();
-  if (method != Method::calibrated) zero_plane_m = lowest_target_m();
+  zero_plane_m = method == Method::calibrated ? std::nullopt : std::optional(lowest_target_m());
 }
 
 GripperMaskOptions mask_options(const Scenario& scenario) {

@@ -24,14 +24,14 @@ struct Scenario {
   int extra_void_layers = 1;        // H_add
   int solid_voxel_threshold = 120;  // TSV
   double load_n = 5.0;              // of method calibrated: the pull whose hold probability counts
-  // Height in the terrain frame; ground below it is no target. Nothing: 0, or with method
-  // calibrated, which has a force for level ground too, no limit.
+  // Height in the terrain frame; ground below it is no target. Nothing: 0. Not of method
+  // calibrated, which has a force for level ground too.
   std::optional<double> zero_plane_m;
   bool interpolation = false;
-  double interpolation_max_edge_m = 0.0;  // 0: no limit
-  // Nothing: 0.8, or 0.5 with method calibrated.
-  std::optional<double> graspability_threshold;
-  double curvature_radius_m = 0.09;  // 0: convexity is not evaluated
+  double interpolation_max_edge_m = 0.0;         // 0: no limit
+  std::optional<double> graspability_threshold;  // nothing: 0.8; not of method calibrated
+  double probability_threshold = 0.5;            // of method calibrated
+  double curvature_radius_m = 0.09;              // 0: convexity is not evaluated
   double intersection_distance_m = 0.01;
   Orientation orientation = Orientation::plane;
   double normal_radius_m = 0.0;  // of the surface's normals; 0: the gripper's palm diameter
@@ -41,9 +41,11 @@ struct Scenario {
   double obstacle_slope_deg = 60.0;  // steeper than this is steep; 0: not evaluated
   double tile_size_m = 1.0;
 
+  // The zero plane (m, -infinity with method calibrated) and the least score of a graspable voxel
+  // that the method uses.
   double lowest_target_m() const;
   double score_threshold() const;
-  // Sets what is nothing where it has a value, so that files of parameters state it.
+  // Sets zero plane and threshold to those that the method uses, so that a manifest states them.
   void set_defaults();
   bool evaluates_obstacles() const { return obstacle_height_m > 0.0 && obstacle_slope_deg > 0.0; }
   bool fits_normals() const { return orientation == Orientation::surface || evaluates_obstacles(); }
@@ -53,6 +55,7 @@ struct Scenario {
   void check() const;
 };
 
+// The options of the gripper mask in a scenario.
 GripperMaskOptions mask_options(const Scenario& scenario);
 
 // The keys of a scenario file, bound to `scenario`; "gripper.KEY" overrides a gripper's measure.

@@ -4,6 +4,7 @@
 #include <map>
 #include <utility>
 
+#include "libgtd/score/closing_force.h"
 #include "libgtd/score/scanned_area.h"
 #include "libgtd/score/voxel_matching.h"
 #include "libmap/core/error.h"

@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "libgtd/score/closing_force.h"
 #include "libgtd/score/scanned_area.h"
 #include "libgtd/score/voxel_matching.h"
 #include "libmap/core/progress.h"
@@ -17,6 +16,17 @@ namespace libgtd {
 // are whole multiples of `tile_voxels` on the lattice, whatever the cloud. Throws Error for more
 // than 2^24 tiles.
 std::vector<TileBounds> make_tiles(const VoxelGrid& grid, int tile_voxels);
+
+// Distribution of the holding force in the weakest direction at a voxel, over trials and parameter
+// sets.
+struct ForceEstimate {
+  float median_n = 0.0F;
+  float low_n = 0.0F;  // quantiles 0.05 and 0.95
+  float high_n = 0.0F;
+  float hold_probability = 0.0F;  // that the force reaches the load
+  float trial_spread = 0.0F;      // standard deviations of ln(force): between trials of one set,
+  float parameter_spread = 0.0F;  // and between the sets
+};
 
 struct ScoredVoxel {
   Voxel voxel;

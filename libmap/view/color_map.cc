@@ -141,7 +141,8 @@ std::string title_of(std::string name, const Coloring& coloring) {
 }
 
 void color_by_score(const ColorSource& source, const Coloring& coloring, ColoredPoints& result) {
-  const bool is_held = coloring.mode == ColorMode::automatic && find_field(source.fields, hold_probability) != nullptr;
+  const bool is_held = coloring.mode == ColorMode::automatic &&
+                       find_field(source.fields, hold_probability) != nullptr;
   const std::string name = !coloring.field.empty() ? coloring.field
                            : is_held               ? hold_probability
                                                    : "score";
@@ -214,7 +215,8 @@ void color_by_flags(const ColorSource& source, const Coloring& coloring, Colored
 ColorMode automatic_mode(const ColorSource& source, const std::string& field) {
   if (!field.empty()) return is_score(field) ? ColorMode::score : ColorMode::field;
   if (find_field(source.fields, "score") != nullptr ||
-      find_field(source.fields, hold_probability) != nullptr) return ColorMode::score;
+      find_field(source.fields, hold_probability) != nullptr)
+    return ColorMode::score;
   const auto& own = source.own_colors;
   const bool varied = std::any_of(own.begin(), own.end(),
                                   [&own](const Color& color) { return color != own.front(); });

@@ -95,7 +95,7 @@ TEST(GraspCommand, TableManifestAndEvaluation) {
 TEST(GraspCommand, FitsPullsAndPlansTheNext) {
   write_ground();
   write_text(scratch("pulls.csv"), "ground,tilt_deg,force_n\nlevel,0,9\nlevel,45,8\n");
-  const std::vector<std::string> fit = {"grasp", "level",  "--fit", "pulls.csv",
+  const std::vector<std::string> fit = {"grasp", "level",  "--fit",    "pulls.csv",
                                         "-o",    "f.yaml", "--trials", "4"};
   ASSERT_TRUE(succeeded(graspmap(fit)));
   const auto results = json_of("f.yaml.json").at("results");
@@ -497,11 +497,11 @@ TEST(GraspCommand, BadMaps) {
   EXPECT_TRUE(bad_input(graspmap(with({"-o", "t.csv", "--tile", "1/2"})), {"--tile", "--map"}));
   EXPECT_TRUE(bad_input(graspmap(map_words("map.pcd")), {"map.pcd"}));
   auto map = libmap::read_cloud(scratch("map.pcd")).cloud;
-  map.add_field("holding_force_n", libmap::ScalarType::float32);
+  map.add_field("grasp_trials", libmap::ScalarType::float32);
   libmap::write_cloud(scratch("taken.pcd"), map);
   auto words = map_words("t.pcd");
   words[3] = "taken.pcd";
-  EXPECT_TRUE(bad_input(graspmap(words), {"taken.pcd", "holding_force_n"}));
+  EXPECT_TRUE(bad_input(graspmap(words), {"taken.pcd", "grasp_trials"}));
   for (Eigen::Vector3d& position : map.positions) position.x() += 7;
   map.fields.pop_back();
   libmap::write_cloud(scratch("far.pcd"), map);

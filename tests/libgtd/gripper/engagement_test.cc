@@ -1,6 +1,4 @@
 // Priors and ensembles of the parameters of engagement, and the sections of gripper files.
-#include "libgtd/gripper/engagement.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>

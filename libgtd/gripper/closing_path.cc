@@ -1,4 +1,4 @@
-#include "libgtd/gripper/finger_pull.h"
+#include "libgtd/gripper/closing_path.h"
 
 #include <algorithm>
 #include <array>
@@ -100,6 +100,51 @@ FingerPulls finger_pulls(const Gripper& gripper, const std::vector<ParameterSet>
     }
   });
   return result;
+}
+
+double ClosingPath::reach_m() const {
+  double reach = palm_radius_m;
+  for (const auto* places : {&closing, &open})
+    for (const Place& place : *places) reach = std::max(reach, place.radius_m);
+  return reach;
+}
+
+ClosingPath make_closing_path(const Gripper& gripper, double voxel_size_m, double load_n) {
+  require_fingers(gripper);
+  ClosingPath path;
+  path.load_n = load_n;
+  path.sets = parameter_sets(gripper);
+  path.pulls = finger_pulls(gripper, path.sets);
+  path.reference = finger_pulls(gripper, {{.weight = 1.0, .values = parameters_of(gripper)}});
+  path.palm_radius_m = 0.0005 * gripper.palm_diameter_mm;
+  const double joint = 0.0005 * gripper.finger_joint_diameter_mm;
+  const double proximal = 0.001 * gripper.finger_length_mm;
+  const double distal = 0.001 * gripper.spine_length_mm;
+  const double curl = gripper.fingers->curl_deg * libmap::radians_per_degree;
+  path.finger_length_m = proximal + distal;
+  const auto place = [&](double angle, double along_proximal, double along_distal) {
+    return ClosingPath::Place{
+        joint + along_proximal * std::sin(angle) + along_distal * std::sin(angle - curl),
+        along_proximal * std::cos(angle) + along_distal * std::cos(angle - curl),
+        along_distal > 0.0};
+  };
+  const double opening = gripper.opening_angle_deg * libmap::radians_per_degree;
+  const double closing = gripper.closing_angle_deg * libmap::radians_per_degree;
+  const int steps =
+      std::max(1, static_cast<int>(std::ceil((opening - closing) * path.finger_length_m /
+                                             (0.5 * voxel_size_m))));
+  for (int n = 0; n <= steps; ++n) {
+    const double angle = opening + (closing - opening) * n / steps;
+    for (const double share : {1.0, 0.5, 0.0})
+      path.closing.push_back(place(angle, proximal, share * distal));
+  }
+  const int parts =
+      std::max(1, static_cast<int>(std::ceil(path.finger_length_m / (0.5 * voxel_size_m))));
+  for (int n = 0; n <= parts; ++n) {
+    const double along = path.finger_length_m * n / parts;
+    path.open.push_back(place(opening, std::min(along, proximal), std::max(0.0, along - proximal)));
+  }
+  return path;
 }
 
 }  // namespace libgtd
