@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "libmap/core/table.h"
+#include "libmap/geometry/normal_sides.h"
 #include "libmap/io/cloud_io.h"
 #include "libmap/io/mesh_io.h"
 #include "libmap/mesh/mesh_parts.h"

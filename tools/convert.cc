@@ -179,7 +179,7 @@ void convert_poses(const ConvertOptions& options, Run& run) {
   const bool named = options.output_poses_format != TrajectoryFormat::automatic;
   if (!named) libmap::require_trajectory_format(options.output);
   const libmap::TrajectoryFile read = libmap::read_trajectory(options.input, options.poses_format);
-  if (!read.images.empty())
+  if (!read.images.empty() || read.of_cameras)
     throw libmap::Error("poses of photographs: only those of the scan know its base (fuse --poses)",
                         {.file = options.input});
   run.add_results({{"poses", read.poses.size()}, {"links", read.links.size()}});

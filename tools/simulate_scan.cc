@@ -101,7 +101,9 @@ libmap::Trajectory given_poses(const SimulateScanOptions& options) {
   refuse_set(path, libmap::bind, reason);
   refuse_given({{"--target", options.target != "auto"}}, reason);
   return in_file(options.trajectory, [&] {
-    return libmap::numbered(libmap::read_trajectory(options.trajectory).poses, frame_interval_s);
+    const libmap::TrajectoryFile file = libmap::read_trajectory(options.trajectory);
+    if (file.of_cameras) throw libmap::Error("poses of cameras, not of the camera's body");
+    return libmap::numbered(file.poses, frame_interval_s);
   });
 }
 

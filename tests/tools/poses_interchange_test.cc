@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "libmap/camera/image_codec.h"
+#include "libmap/core/text.h"
 #include "libmap/poses/colmap_io.h"
 #include "libmap/poses/trajectory_io.h"
 #include "libmap/scan/rtabmap_reader.h"

@@ -183,7 +183,9 @@ void add_poses(py::module_& module) {
     const auto options = options_from<libmap::PoseImportOptions>(values);
     return without_lock([&] {
       if (scan == nullptr)
-        return shared(Poses{libmap::read_trajectory(path, options.format).poses});
+        const libmap::TrajectoryFile file = libmap::read_trajectory(path, options.format);
+      if (file.of_cameras) throw libmap::Error("poses of cameras: give the file to `fuse`");
+      return shared(Poses{file.poses});
       return shared(Poses{libmap::import_poses(path, *scan, options).trajectory.poses});
     });
   });
