@@ -199,6 +199,16 @@ void make_tiles(const FuseOptions& options, const libmap::ScanSource& scan,
   folder->make({names, ".pcd", write, finish});
 }
 
+void tell_consistency(const libmap::ScanSource& scan, const libmap::Trajectory& poses,
+                      const PosesOption& taken, Run& run) {
+  const libmap::PoseConsistency found =
+      run.timed("consistency", [&] { return libmap::check_pose_consistency(scan, poses); });
+  run.detail("{} pairs of frames: {:.1f} % of {} common measurements contradict each other",
+             found.pairs, 100.0 * found.given.contradicted, found.given.measurements);
+  if (const std::string warning = found.warning(); !warning.empty())
+    run.warn("{}: {}", taken.source, warning);
+}
+
 void fuse(FuseOptions options, Run& run) {
   std::vector<std::string> inputs = scan_inputs(options.scan, options.poses);
   inputs.push_back(options.calibration.source);
@@ -223,15 +233,7 @@ void fuse(FuseOptions options, Run& run) {
                    libmap::parse_share(options.tile), run);
     if (folder->is_complete()) return;
   }
-  const libmap::PoseConsistency consistency =
-      run.timed("consistency", [&] { return libmap::check_pose_consistency(*scan, poses); });
-  run.detail(
-      "{} pairs of frames: {} measurements in common, {:.1f} % contradict each other, median "
-      "{:.2f} % of depth",
-      consistency.pairs, consistency.given.measurements, 100 * consistency.given.contradicted,
-      100 * consistency.given.difference);
-  const std::string doubt = consistency.warning();
-  if (!doubt.empty()) run.warn("{}: {}", options.poses.source, doubt);
+  tell_consistency(*scan, poses, options.poses, run);
   in_file(options.scan,
           [&] { make_tiles(options, *scan, poses, folder ? &*folder : nullptr, run); });
 }

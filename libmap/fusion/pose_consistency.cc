@@ -28,7 +28,7 @@ constexpr double min_turn_rad = 8.0 * std::numbers::pi / 180.0;
 constexpr double min_shift_m = 0.1;
 constexpr double max_difference = 0.05;
 constexpr std::size_t min_measurements = 500;
-constexpr double doubtful_share = 0.2;      // contradicted, from which conventions are tried
+constexpr double doubtful_share = 0.2;       // contradicted, from which conventions are tried
 constexpr double contradictory_share = 0.5;  // from which a warning names no convention
 constexpr double min_gain = 3.0;             // of the difference, by another convention
 constexpr double max_fitting_share = 0.5;    // contradicted by a convention that fits
@@ -91,8 +91,8 @@ std::vector<Convention> conventions() {
                    }});
   for (const double factor : {0.2, 5.0, 0.001, 1000.0})
     all.push_back({"with depth times " + to_text(factor) +
-                       " (depth_unit_m of scan.yaml), or positions times " +
-                       to_text(1.0 / factor) + ": --poses-scale " + to_text(1.0 / factor),
+                       " (depth_unit_m of scan.yaml), or positions times " + to_text(1.0 / factor) +
+                       ": --poses-scale " + to_text(1.0 / factor),
                    [](const Pose& pose, const Pose&) { return pose; }, factor});
   return all;
 }
@@ -180,9 +180,11 @@ std::vector<ViewedPair> read_pairs(const ScanSource& scan, const Trajectory& pos
 
 std::string PoseConsistency::warning() const {
   const auto percent = [](double share) { return to_fixed_text(100.0 * share, 0) + " %"; };
-  const std::string found = given.measurements == 0 ? std::to_string(pairs) + " pairs of frames have no depth in common" : percent(given.contradicted) + " of the depth that " +
-                            std::to_string(pairs) +
-                            " pairs of frames have in common contradicts each other";
+  const std::string found = given.measurements == 0
+                                ? std::to_string(pairs) + " pairs of frames have no depth in common"
+                                : percent(given.contradicted) + " of the depth that " +
+                                      std::to_string(pairs) +
+                                      " pairs of frames have in common contradicts each other";
   if (!convention.empty())
     return "the poses fit " + to_fixed_text(given.difference / best.difference, 0) +
            " times better " + convention + "; " + found + ", and " + percent(best.contradicted) +

@@ -23,10 +23,14 @@ constexpr double cost_scale = 9.0;        // a cost is log(1 + chi-square / 9)
 constexpr double clear_deviations = 2.0;
 constexpr double clear_share = 0.005;
 
-using FramePair = std::pair<std::size_t, std::size_t>;
+// A frame and others that it is compared with.
+struct Anchor {
+  std::size_t frame = 0;
+  std::vector<std::size_t> others;
+};
 
-std::vector<FramePair> overlapping_pairs(std::span<const FusionFrame> frames) {
-  std::vector<FramePair> pairs;
+std::vector<Anchor> find_anchors(std::span<const FusionFrame> frames) {
+  std::vector<Anchor> found;
   const std::size_t anchors = std::min(max_anchors, frames.size());
   for (std::size_t n = 0; n < anchors; ++n) {
     const std::size_t a = n * frames.size() / anchors;
@@ -39,13 +43,14 @@ std::vector<FramePair> overlapping_pairs(std::span<const FusionFrame> frames) {
         others.push_back(b);
     }
     RandomStream random(n, a);
+    Anchor& anchor = found.emplace_back(Anchor{a, {}});
     for (std::size_t k = 0; k < partners && !others.empty(); ++k) {
       const auto chosen = others.begin() + static_cast<std::ptrdiff_t>(random.below(others.size()));
-      pairs.emplace_back(a, *chosen);
+      anchor.others.push_back(*chosen);
       others.erase(chosen);
     }
   }
-  return pairs;
+  return found;
 }
 
 struct PairSums {
@@ -120,30 +125,33 @@ bool RegistrationCheck::is_accepted(bool refined_poses) const {
 RegistrationCheck check_registration(FusionFrames& images, std::span<const FusionFrame> before,
                                      std::span<const FusionFrame> after, const DepthSensor& sensor,
                                      double voxel_size_m) {
-  const std::vector<FramePair> pairs = overlapping_pairs(before);
-  std::vector<PairSums> depth(pairs.size());
-  std::vector<PairSums> color(pairs.size());
-  parallel_each(pairs.size(), [&](std::size_t n) {
-    const auto [a, b] = pairs[n];
+  const std::vector<Anchor> anchors = find_anchors(before);
+  std::vector<PairSums> depth(anchors.size() * partners);
+  std::vector<PairSums> color(anchors.size() * partners);
+  const double noise = sensor.noise.axial_of_range + sensor.noise.axial_m;
+  const auto depth_cost = [&](float off) {
+    return std::log1p(off * off / (2.0 * noise * noise) / cost_scale);
+  };
+  const auto color_cost = [](float off) { return static_cast<double>(off); };
+  parallel_each(anchors.size(), [&](std::size_t n) {
+    const std::size_t a = anchors[n].frame;
     const RefinementView first = images.views_of(before[a], 0, true).front();
-    const RefinementView second = images.views_of(before[b], 1, true).front();
-    const Pose given = second.camera_from_grid * first.camera_from_grid.inverse();
-    const Pose moved = second.camera_from_grid * before[b].grid_from_base *
-                       after[b].grid_from_base.inverse() * after[a].grid_from_base *
-                       before[a].grid_from_base.inverse() * first.camera_from_grid.inverse();
-    for (const bool back : {false, true}) {
-      const RefinementView& from = back ? second : first;
-      const RefinementView& onto = back ? first : second;
-      ViewComparison one = compare_views(from, onto, back ? given.inverse() : given, gate);
-      const ViewComparison two = compare_views(from, onto, back ? moved.inverse() : moved, gate);
-      keep_held_out(from, voxel_size_m, one);
-      const double noise = sensor.noise.axial_of_range + sensor.noise.axial_m;
-      add(
-          one.depth, two.depth,
-          [&](float off) { return std::log1p(off * off / (2.0 * noise * noise) / cost_scale); },
-          depth[n]);
-      add(
-          one.color, two.color, [](float off) { return static_cast<double>(off); }, color[n]);
+    for (std::size_t k = 0; k < anchors[n].others.size(); ++k) {
+      const std::size_t b = anchors[n].others[k];
+      const RefinementView second = images.views_of(before[b], 1, true).front();
+      const Pose given = second.camera_from_grid * first.camera_from_grid.inverse();
+      const Pose moved = second.camera_from_grid * before[b].grid_from_base *
+                         after[b].grid_from_base.inverse() * after[a].grid_from_base *
+                         before[a].grid_from_base.inverse() * first.camera_from_grid.inverse();
+      for (const bool back : {false, true}) {
+        const RefinementView& from = back ? second : first;
+        const RefinementView& onto = back ? first : second;
+        ViewComparison one = compare_views(from, onto, back ? given.inverse() : given, gate);
+        const ViewComparison two = compare_views(from, onto, back ? moved.inverse() : moved, gate);
+        keep_held_out(from, voxel_size_m, one);
+        add(one.depth, two.depth, depth_cost, depth[n * partners + k]);
+        add(one.color, two.color, color_cost, color[n * partners + k]);
+      }
     }
   });
   return {costs_of(depth), costs_of(color)};

@@ -1,7 +1,10 @@
 #include <SQLiteCpp/SQLiteCpp.h>
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <cmath>
+#include <fstream>
 #include <sstream>
 
 #include "libmap/io/cloud_io.h"
@@ -49,6 +52,29 @@ TEST(Fuse, TrueAndStoredPosesLieNearTheTrueSurface) {
   // Of the corrected poses; those that are stored are off by 6.8 mm.
   EXPECT_LT(manifest.at("results").at("trajectory_rmse_m"), 0.001);
   EXPECT_TRUE(manifest.at("transforms").contains("ground_truth_from_poses"));
+}
+
+TEST(Fuse, NamesTheQuaternionOrderThatFits) {
+  GRASPMAP_REQUIRE_DATA();
+  const std::string scan = scan_file("site_tiny.db");
+  std::ofstream file(scratch("wxyz.tum"));
+  for (const libmap::TrajectoryPose& pose :
+       libmap::trajectory_of(libmap::open_scan(scan)->graph(), libmap::PoseSource::ground_truth)) {
+    const Eigen::Vector3d p = pose.world_from_base.translation();
+    const Eigen::Quaterniond q(pose.world_from_base.linear());
+    file << fmt::format("{} {} {} {} {} {} {} {} {}\n", pose.stamp_s, p.x(), p.y(), p.z(), q.w(),
+                        q.x(), q.y(), q.z(), pose.node);
+  }
+  file.close();
+  const auto fuse = [&](const Words& more) {
+    Words words = {"fuse", scan, "--poses", "wxyz.tum", "--voxel-size", "0.05", "-o", "cloud.ply"};
+    words.insert(words.end(), more.begin(), more.end());
+    const auto result = graspmap(words);
+    EXPECT_TRUE(succeeded(result));
+    return result.standard_error;
+  };
+  EXPECT_NE(fuse({}).find("--poses-quaternion wxyz"), std::string::npos);
+  EXPECT_EQ(fuse({"--poses-quaternion", "wxyz"}).find("warning"), std::string::npos);
 }
 
 TEST(Fuse, ManifestCountsEveryPixel) {

@@ -373,6 +373,21 @@ TEST_F(TumFolder, NamesWhatIsBroken) {
   }
 }
 
+TEST_F(TumFolder, RefusesDepthOfAnotherAspectRatio) {
+  write_pair();
+  write_text(folder_ / "depth.txt", "3.51 depth/1.png\n");
+  write_text(folder_ / "depth/1.png", libmap::encode_png(libmap::MillimeterImage(30, 40)));
+  const FrameFolder read(folder_);
+  const libmap::Error error = graspmap_test::error_of([&] { read.read_frame(1); });
+  EXPECT_EQ(error.context().file, (folder_ / "depth/1.png").string());
+  EXPECT_EQ(error.context().field, "node 1: depth");
+  EXPECT_EQ(error.context().value, "30 x 40");
+  EXPECT_NE(error.context().bound.find("40 x 30"), std::string::npos);
+  // Another size of the same ratio, but for rounding, is no fault.
+  write_text(folder_ / "depth/1.png", libmap::encode_png(libmap::MillimeterImage(53, 40)));
+  EXPECT_EQ(read.read_frame(1).depth.width, 53);
+}
+
 TEST_F(TumFolder, NamesTheCellThatIsNoNumber) {
   const std::map<std::string, std::string> refusals{
       {"node,stamp_s,baseline_m\n1,5,0.1 x\n", "row 1, column baseline_m is 0.1 x: not a number"},

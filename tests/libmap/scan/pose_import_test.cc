@@ -3,6 +3,8 @@
 
 #include <gmock/gmock.h>
 
+#include <fstream>
+
 #include <filesystem>
 #include <map>
 #include <string>
@@ -201,6 +203,20 @@ TEST(PoseImport, PosesOfTheCameraBecomeThoseOfTheBase) {
   EXPECT_THAT(imported.warnings[0], HasSubstr("node 130"));
   EXPECT_EQ(libmap::import_poses(scratch_folder() / "camera.tum", scan).trajectory.poses.size(),
             4U);
+}
+
+TEST(PoseImport, QuaternionsWithTheirRealPartFirst) {
+  const RigScan scan;
+  const Eigen::Quaterniond rotation(random_pose().linear());
+  std::ofstream(scratch_folder() / "wxyz.tum")
+      << "0 1 2 3 " << rotation.w() << ' ' << rotation.x() << ' ' << rotation.y() << ' '
+      << rotation.z() << " 4\n";
+  const libmap::ImportedPoses imported = libmap::import_poses(
+      scratch_folder() / "wxyz.tum", scan, {.quaternion = libmap::QuaternionOrder::wxyz});
+  ASSERT_THAT(nodes_of(imported), ElementsAre(4));
+  const Pose& pose = imported.trajectory.poses[0].world_from_base;
+  EXPECT_TRUE(pose.linear().isApprox(rotation.toRotationMatrix(), 1e-4));
+  EXPECT_EQ(pose.translation(), Eigen::Vector3d(1, 2, 3));
 }
 
 TEST(PoseImport, EveryFormatGivesTheSamePoses) {
