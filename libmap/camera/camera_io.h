@@ -63,7 +63,8 @@ struct CameraFile {
   Pose color_from_depth = Pose::Identity();
   DepthCorrection depth{};
   // Depth is taken this much after the middle row of the picture, beyond what their stamps say, and
-  // the picture's rows one after the other in this time. The motions are those of the scan that they were estimated from.
+  // the picture's rows one after the other in this time. The motions are those of the scan that
+  // they were estimated from.
   double depth_delay_s = 0.0;
   double rolling_shutter_s = 0.0;
   std::vector<FrameMotion> motions{};   // by ascending stamp

@@ -39,7 +39,8 @@ SensorModel read_sensor_model(const std::string& name) {
   bind(table, model);
   const bool is_short = name == "d435" || name == "ipad";
   const std::string path =
-      find_data_file("sensors", is_short ? (name == "ipad" ? "ipad-lidar" : "realsense-d435") : name)
+      find_data_file("sensors",
+                     is_short ? (name == "ipad" ? "ipad-lidar" : "realsense-d435") : name)
           .string();
   read_yaml(read_whole_file(path, max_bytes), path, [&](const YAML::Node& root) {
     if (!root.IsMap()) throw Error("not a map of keys and values");

@@ -9,7 +9,7 @@ namespace libmap {
 
 // The keys are those of `simulate scan`; keys "refine.KEY" are of refinement alone.
 struct SensorModel {
-  double noise_m = 0.0;  // standard deviation along the optical axis at range 0
+  double noise_m = 0.0;          // standard deviation along the optical axis at range 0
   double noise_of_range = 0.0;   // what it grows by, m a m of range
   double noise_of_square = 0.0;  // ... and by range squared, 1/m
   double near_m = 0.0;           // useful range
@@ -22,8 +22,8 @@ struct SensorModel {
 };
 void bind(ParameterTable& table, SensorModel& model);
 
-// A path, or the name of a file in data/sensors; "d435" and "ipad" will do. Throws Error: unknown name (with the nearest known
-// one), or a file that cannot be read.
+// A path, or the name of a file in data/sensors; "d435" and "ipad" will do. Throws Error: unknown
+// name (with the nearest known one), or a file that cannot be read.
 SensorModel read_sensor_model(const std::string& name);
 
 }  // namespace libmap

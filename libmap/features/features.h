@@ -59,8 +59,8 @@ struct Feature {
 
 struct FrameFeatures {
   int node = 0;
-  double stamp_s = 0.0;        // of the pictures
-  double depth_later_s = 0.0;  // RgbdFrame::depth_later_s
+  double stamp_s = 0.0;         // of the pictures
+  double depth_later_s = 0.0;   // RgbdFrame::depth_later_s
   std::vector<Camera> cameras;  // of the color images
   std::vector<Feature> features;
   FeatureType type = FeatureType::sift;

@@ -8,7 +8,7 @@ namespace libmap {
 
 namespace {
 
-constexpr double plane_radius_px = 3.0;  // of the disc that it is fitted to
+constexpr double plane_radius_px = 3.0;    // of the disc that it is fitted to
 constexpr double unmeasured_share = 0.01;  // of the nearest and of the farthest depths
 
 // The plane of depth that a feature's ray meets if the depth's camera is at `color_from_depth`;
@@ -47,8 +47,8 @@ DepthCorrection correction_for(const std::vector<FrameFeatures>& frames, std::si
   DepthCorrection correction;
   if (depths.empty()) return correction;
   const auto quantile = [&](double share) {
-    const auto at = depths.begin() + static_cast<std::ptrdiff_t>(
-                                         share * static_cast<double>(depths.size() - 1));
+    const auto at = depths.begin() +
+                    static_cast<std::ptrdiff_t>(share * static_cast<double>(depths.size() - 1));
     std::nth_element(depths.begin(), at, depths.end());
     return *at;
   };
@@ -216,9 +216,8 @@ Pose color_from_depth_of(const FrameFeatures& frame, const Feature& feature,
     return pose;
   const Camera& camera = frame.cameras[feature.camera];
   const CameraTiming& timing = calibration.timing[feature.camera];
-  const double later_s =
-      timing.depth_delay_s + frame.depth_later_s -
-      timing.rolling_shutter_s * row_share_of(feature, camera);
+  const double later_s = timing.depth_delay_s + frame.depth_later_s -
+                         timing.rolling_shutter_s * row_share_of(feature, camera);
   return moved(Pose::Identity(), later_s * motion_in_camera(camera, motion->second)) * pose;
 }
 

@@ -24,8 +24,8 @@ struct IntrinsicsStep {
 // When a camera takes what it stores as one frame. Rows of a picture are exposed one after the
 // other, the middle row at the time of the frame's pose; depth is taken at one moment.
 struct CameraTiming {
-  double depth_delay_s = 0.0;      // depth after the picture's middle row, beyond what the stamps of
-                                   // both say (FrameFeatures::depth_later_s)
+  double depth_delay_s = 0.0;  // depth after the picture's middle row, beyond what the stamps of
+                               // both say (FrameFeatures::depth_later_s)
   double rolling_shutter_s = 0.0;  // from the first to the last row of the picture
 };
 

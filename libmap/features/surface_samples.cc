@@ -54,8 +54,8 @@ bool seen_from_base(const FrameFeatures& frame, const Eigen::Vector3d& point_in_
     const Pose& base_from_camera = surface.camera().base_from_camera;
     SurfacePatch seen;
     if (!surface.seen_at(base_from_camera.inverse() * point_in_base, seen)) continue;
-    element = {base_from_camera * seen.point, base_from_camera.linear() * seen.normal,
-               seen.noise_m, seen.point.z()};
+    element = {base_from_camera * seen.point, base_from_camera.linear() * seen.normal, seen.noise_m,
+               seen.point.z()};
     return true;
   }
   return false;

@@ -14,7 +14,9 @@ struct DepthNoise {
   double axial_of_square = 0.0;   // >= 0: what range squared adds, 1/m: stereo, structured light
   double lateral_px = 0.8;        // >= 0
 
-  double axial_at(double z_m) const { return axial_m + (axial_of_range + axial_of_square * z_m) * z_m; }
+  double axial_at(double z_m) const {
+    return axial_m + (axial_of_range + axial_of_square * z_m) * z_m;
+  }
 };
 
 struct DepthSensor {

@@ -250,8 +250,8 @@ void place(const DepthPlaneLoops::Planes& planes, const float* ray_x, const floa
       store(turned(row, px, py, z) + placement.translation[axis], places.place[axis] + x);
       store(turned(row, nx, ny, nz), places.normal[axis] + x);
     }
-    const Floats sigma = placement.axial_m +
-                         (placement.axial_of_range + placement.axial_of_square * depth) * depth;
+    const Floats sigma =
+        placement.axial_m + (placement.axial_of_range + placement.axial_of_square * depth) * depth;
     const Floats support = __builtin_convertvector(
         __builtin_convertvector(load<Bytes>(planes.support + x), Ints), Floats);
     // Front views know lateral places and normals better.

@@ -139,8 +139,8 @@ class Adjustment {
   std::vector<bool> sees_;            // of each camera, anything
   double mean_later_s_ = 0.0;         // of FrameFeatures::depth_later_s
   double later_deviation_s_ = 0.0;
-  std::vector<Eigen::Index> free_;    // numbers
-  std::vector<std::size_t> points_;   // their tracks
+  std::vector<Eigen::Index> free_;   // numbers
+  std::vector<std::size_t> points_;  // their tracks
   JointProblem problem_;
   JointState state_;
 };
@@ -270,10 +270,9 @@ CalibratedObservation Adjustment::calibrated(const Observation& seen) const {
     const CameraTiming& timing = start_.timing[its.camera];
     calibrated.row_share = row_share_of(its, camera);
     calibrated.depth_later_s = frame.depth_later_s;
-    calibrated.known_step =
-        (timing.depth_delay_s + frame.depth_later_s -
-         timing.rolling_shutter_s * calibrated.row_share) *
-        motion_in_camera(camera, start_.motion.at(frame.node));
+    calibrated.known_step = (timing.depth_delay_s + frame.depth_later_s -
+                             timing.rolling_shutter_s * calibrated.row_share) *
+                            motion_in_camera(camera, start_.motion.at(frame.node));
   }
   return calibrated;
 }
@@ -312,8 +311,7 @@ void Adjustment::add_depth_priors(std::size_t camera, Priors& priors) {
   };
   Eigen::VectorXd deviations(3 + knots);
   const double middle_m = 0.5 * (depth.first_m + depth.last_m());
-  deviations.head<3>() =
-      noise_at(middle_m) * Eigen::Vector3d(1.0, 1.0, 1.0 / middle_m);
+  deviations.head<3>() = noise_at(middle_m) * Eigen::Vector3d(1.0, 1.0, 1.0 / middle_m);
   for (Eigen::Index n = 0; n < knots; ++n)
     deviations[3 + n] = noise_at(std::max(depth.first_m, knot_m(n)));
   priors.add_near(radial, Eigen::VectorXd::Zero(3 + knots), options_.depth_prior * deviations);
@@ -366,9 +364,8 @@ SensorCalibration Adjustment::calibration(const JointState& state, double motion
           moved(Pose::Identity(), Eigen::Map<const Vector6d>(own + registration_at)) *
           start_.color_from_depth[n]);
     if (options_.refine_timing)
-      found.timing.push_back(
-          {motion_scale * (own[timing_at] + mean_later_s_) - mean_later_s_,
-           motion_scale * own[timing_at + 1]});
+      found.timing.push_back({motion_scale * (own[timing_at] + mean_later_s_) - mean_later_s_,
+                              motion_scale * own[timing_at + 1]});
     if (options_.refine_depth) {
       found.depth.push_back(corrections_[n]);
       std::copy_n(own + radial_at, 3, found.depth[n].radial.begin());
@@ -487,8 +484,8 @@ std::vector<std::pair<double, double>> largest_bends(const DepthCorrection& dept
   std::vector<std::pair<double, double>> bends;
   if (depth.spline_m.empty()) return bends;
   for (int k = 0; k <= depths; ++k) {
-    auto& [z, bend] = bends.emplace_back(
-        depth.first_m + (depth.last_m() - depth.first_m) * k / depths, 0.0);
+    auto& [z, bend] =
+        bends.emplace_back(depth.first_m + (depth.last_m() - depth.first_m) * k / depths, 0.0);
     for (int n = 0; n <= radii; ++n)
       bend = std::max(bend, std::abs(depth.bend(z, static_cast<double>(n) / radii)));
   }

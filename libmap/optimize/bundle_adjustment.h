@@ -44,8 +44,8 @@ struct BundleAdjustmentOptions {
   // Not bound.
   DepthNoise depth_noise{};
   CameraTiming timing_mean{};  // of the prior; its deviation is the frame time
-  double tolerance = 1e-6;    // steps end when one lowers the cost by less than this share
-  bool hold_cameras = false;  // at the start's calibration: of what is free, motions alone change
+  double tolerance = 1e-6;     // steps end when one lowers the cost by less than this share
+  bool hold_cameras = false;   // at the start's calibration: of what is free, motions alone change
   bool hold_poses = false;
   std::size_t alternatives = 0;  // of the result's calibration
   bool with_information = true;  // of the result

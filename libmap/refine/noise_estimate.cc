@@ -40,7 +40,8 @@ Eigen::Vector3d fit_terms(const std::vector<Eigen::Vector2d>& range_and_noise) {
     if (!(cost < least)) continue;
     least = cost;
     best.setZero();
-    for (std::size_t n = 0; n < used.size(); ++n) best[used[n]] = found[static_cast<Eigen::Index>(n)];
+    for (std::size_t n = 0; n < used.size(); ++n)
+      best[used[n]] = found[static_cast<Eigen::Index>(n)];
   }
   return best;
 }

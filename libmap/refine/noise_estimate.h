@@ -13,7 +13,7 @@ namespace libmap {
 struct NoiseEstimate {
   DepthNoise noise{};
   std::size_t residuals = 0;
-  double nearest_m = 0.0;     // ranges of the residuals
+  double nearest_m = 0.0;  // ranges of the residuals
   double farthest_m = 0.0;
   double largest_ratio = 1.0;  // >= 1: of estimated and assumed noise at a range, or its inverse
 };

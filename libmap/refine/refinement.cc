@@ -6,8 +6,8 @@
 #include <iterator>
 #include <utility>
 
-#include "libmap/core/error.h"
 #include "libmap/camera/sensor_model.h"
+#include "libmap/core/error.h"
 #include "libmap/core/text.h"
 #include "libmap/optimize/graph_covariance.h"
 #include "libmap/refine/noise_estimate.h"
@@ -299,8 +299,8 @@ bool adapt_noise(Run& run) {
     run.result.noise = "depth noise " + describe(state.noise) + " as given";
     return false;
   }
-  const auto found =
-      estimate_noise(surface_residuals(*state.frames, state.feature_links, state.poses), state.noise);
+  const auto found = estimate_noise(
+      surface_residuals(*state.frames, state.feature_links, state.poses), state.noise);
   if (!found) {
     run.result.noise = "depth noise " + describe(state.noise) + " assumed: too few held-out depths";
     return false;
@@ -309,8 +309,8 @@ bool adapt_noise(Run& run) {
   run.result.noise = "depth noise " + describe(found->noise) + " by " +
                      std::to_string(found->residuals) + " held-out depths from " +
                      to_fixed_text(found->nearest_m, 1) + " to " +
-                     to_fixed_text(found->farthest_m, 1) + " m: " +
-                     (is_other ? "replaces " : "agrees with ") + describe(state.noise);
+                     to_fixed_text(found->farthest_m, 1) +
+                     " m: " + (is_other ? "replaces " : "agrees with ") + describe(state.noise);
   if (!is_other) return false;
   for (const SharedFrames& frames : {state.frames, state.stored_frames}) {
     for (FrameFeatures& frame : *frames) set_depth_noise(frame, state.noise, found->noise);
@@ -506,9 +506,10 @@ void bind(ParameterTable& table, RefinementOptions& options) {
   bind(table, options.closures);
   bind(table, options.graph);
   table.add("bundle", options.bundle, "adjust poses and points together");
-  table.add("sensor", options.sensor,
-            "depth camera, a name in data/sensors or a file: noise, useful range, timing and bounds; "
-            "auto: the noise is estimated");
+  table.add(
+      "sensor", options.sensor,
+      "depth camera, a name in data/sensors or a file: noise, useful range, timing and bounds; "
+      "auto: the noise is estimated");
   table.add("intrinsics", options.intrinsics,
             {{"fixed", IntrinsicsMode::fixed},
              {"refined", IntrinsicsMode::refined},

@@ -19,9 +19,11 @@ constexpr double min_rematched_share = 0.9;  // of linked pairs of frames
 // simulated scans.
 constexpr double calibration_deviation_scale = 1.1;
 constexpr double timing_deviation_scale = 1.4;
-// Of stated delays and times of rows: features of one frame err alike, and all motions have a common
-// factor. Measured on the thirds of a real sequence.
+// Of stated delays and times of rows: features of one frame err alike, and all motions have a
+// common factor. Measured on the thirds of a real sequence.
 constexpr double stated_timing_scale = 5.0;
+// Of a delay beyond stamps of arrival: they err by more than their jitter. Measured on the same.
+constexpr double stamp_deviation_s = 0.003;
 // Of a registration's shift along the optical axis, which hardly differs from a scale, beyond what
 // the observations say. Measured on simulated scans.
 constexpr double axial_deviation_m = 4e-4;
@@ -113,8 +115,9 @@ void scale_state(double factor, RefinementState& state) {
 
 CalibrationInput calibration_input(const RefinementInput& input, const RefinementState& state,
                                    const std::vector<GraphLinkResult>& other_links) {
-  CalibrationInput data{*state.stored_frames, state.feature_links,    state.poses,
-                        other_links,          state.graph.components, input.options.bundle_adjustment};
+  CalibrationInput data{
+      *state.stored_frames, state.feature_links,    state.poses,
+      other_links,          state.graph.components, input.options.bundle_adjustment};
   data.options.depth_noise = state.noise;
   return data;
 }
@@ -208,8 +211,12 @@ CalibrationMoves calibration_moves(const RefinementInput& input, const Refinemen
   const double deviation =
       varied.calibration.timing.empty() ? calibration_deviation_scale : timing_deviation_scale;
   deviations = std::move(varied.deviations);
+  const bool by_stamps =
+      std::any_of(state.frames->begin(), state.frames->end(),
+                  [](const FrameFeatures& frame) { return frame.depth_later_s != 0.0; });
   for (CameraTiming& timing : deviations.timing) {
-    timing.depth_delay_s *= stated_timing_scale;
+    timing.depth_delay_s =
+        std::hypot(stated_timing_scale * timing.depth_delay_s, by_stamps ? stamp_deviation_s : 0.0);
     timing.rolling_shutter_s *= stated_timing_scale;
   }
   for (const SensorCalibration& alternative : varied.alternatives) {

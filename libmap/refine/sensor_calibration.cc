@@ -298,9 +298,9 @@ bool ModelSearch::is_timing_enough(const CalibrationParts& others) {
   CalibrationParts all = others;
   all.timing = true;
   if (all == timed_->model) return true;
-  const Candidate candidate = attempt(all, timed_->adjustment.calibration,
-                                      timed_->adjustment.map_from_base, 1);
-  return !is_good(candidate) || !is_needed(timed_->costs, candidate.costs, min_timing_gain);
+  const Candidate candidate =
+      attempt(all, timed_->adjustment.calibration, timed_->adjustment.map_from_base, 1);
+  return !is_good(candidate) || !is_needed(timed_->costs, candidate.costs);
 }
 
 // The motions need more rounds than a comparison.
@@ -333,7 +333,7 @@ CalibrationEstimate ModelSearch::run() {
       best_ = attempt({.intrinsics = true}, {}, part_.poses, 1);
     leave_out();
     if (may_time) try_timing();
-    if (timed_ && (!is_good(best_) || evaluate_held_out(timed_->costs, best_.costs).change() > 0.0))
+    if (timed_ && (!is_good(best_) || is_needed(best_.costs, timed_->costs, min_timing_gain)))
       use_timing_alone();
   }
   if (is_good(best_) && choice_.settle) {
@@ -491,10 +491,11 @@ std::vector<std::string> findings(const SensorCalibration& calibration,
       highest = std::max(highest, depth.bend(z, 0.0));
     }
     const double middle = 0.5 * (depth.first_m + depth.last_m());
-    sentences.push_back(of_camera(n) + "depth bends by " +
-                        to_fixed_text(500.0 * (highest - lowest), 1) + " mm with range and by " +
-                        to_fixed_text(1e3 * std::abs(depth.bend(middle, 1.0) - depth.bend(middle, 0.0)), 1) +
-                        " mm toward the corners: corrected");
+    sentences.push_back(
+        of_camera(n) + "depth bends by " + to_fixed_text(500.0 * (highest - lowest), 1) +
+        " mm with range and by " +
+        to_fixed_text(1e3 * std::abs(depth.bend(middle, 1.0) - depth.bend(middle, 0.0)), 1) +
+        " mm toward the corners: corrected");
   }
   for (std::size_t n = 0; n < std::min(calibration.color_from_depth.size(), cameras.size()); ++n) {
     const Pose& pose = calibration.color_from_depth[n];

@@ -25,8 +25,8 @@ std::vector<SurfaceResidual> residuals_of(const DepthNoise& truth, const DepthNo
     const double range_m = graspmap_test::uniform(0.6, 4.0);
     const double share = 1.0 / 6.0;  // a plane averages pixels
     const double distance_m = share * truth.axial_at(range_m) * normal(engine);
-    residuals.push_back({n % 10 == 0 ? 5.0 * distance_m : distance_m,
-                         share * assumed.axial_at(range_m), range_m});
+    residuals.push_back(
+        {n % 10 == 0 ? 5.0 * distance_m : distance_m, share * assumed.axial_at(range_m), range_m});
     residuals.push_back({.distance_m = std::numeric_limits<double>::quiet_NaN()});
   }
   return residuals;
@@ -64,10 +64,10 @@ TEST(SensorModel, ShippedSensorsAreReadAndUnknownOnesAreNamed) {
     EXPECT_LT(model.frame_time_s, 0.05) << name;
   }
   EXPECT_GT(libmap::read_sensor_model("kinect-v1").noise_of_square, 0.0);
-  EXPECT_NE(std::string(
-                graspmap_test::error_of([] { libmap::read_sensor_model("kinect-v3"); }).what())
-                .find("kinect-v3"),
-            std::string::npos);
+  EXPECT_NE(
+      std::string(graspmap_test::error_of([] { libmap::read_sensor_model("kinect-v3"); }).what())
+          .find("kinect-v3"),
+      std::string::npos);
 }
 
 }  // namespace noise_estimate_test
