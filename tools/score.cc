@@ -158,11 +158,13 @@ class StoreScoring {
            .has_normals = stream_.has_normals() && !frame_.drops_normals()});
       run_.timed("sort points", [&] { fill(points, wanted); });
       run_.timed("tiles", [&] {
-        libgtd::detect_streamed(frame_, points, wanted, options_.detection,
-                                [&](std::vector<libgtd::StreamedTile> tiles) {
-                                  libgtd::add_tiles(write(tiles), plan_.key, journal);
-                                },
-                                run_.progress(), {.max_points = options_.points_at_once});
+        in_file(options_.terrain, [&] {
+          libgtd::detect_streamed(frame_, points, wanted, options_.detection,
+                                  [&](std::vector<libgtd::StreamedTile> tiles) {
+                                    libgtd::add_tiles(write(tiles), plan_.key, journal);
+                                  },
+                                  run_.progress(), {.max_points = options_.points_at_once});
+        });
       });
     }
     finish(wanted.size());
@@ -388,6 +390,7 @@ libmap::PiecesReadResult read_terrain(const std::string& path) {
 void score(ScoreOptions& options, Run& run) {
   libgtd::Scenario& scenario = options.detection.scenario;
   options.detection.share = libmap::parse_share(options.tile);
+  refuse_mesh(options.terrain);
   if (options.up != "auto")
     options.detection.up = parse_vector(options.up, "--up");
   else if (is_dem(options.terrain) && options.detection.plane == libgtd::PlaneSource::fit)
@@ -397,7 +400,6 @@ void score(ScoreOptions& options, Run& run) {
   libmap::ParameterTable in_force;
   bind(in_force, options);
   run.manifest().add_parameters(in_force);
-  refuse_mesh(options.terrain);
   if (options.detection.up && options.detection.plane == libgtd::PlaneSource::none)
     throw libmap::Error("says on which side of the fitted plane up is: with --plane none it is z",
                         {.field = "--up", .value = options.up});

@@ -256,7 +256,7 @@ void require_dense(std::size_t lone, std::size_t voxels, double voxel_size_m,
       "the points are too far apart for these voxels: interpolate (--interpolation), use larger "
       "voxels (--voxel-size), or sample the surface of a mesh (graspmap resample)",
       {.field = "spacing of the points with voxels of " + libmap::to_text(voxel_size_m) + " m",
-       .value = libmap::to_text(static_cast<float>(libmap::median_spacing(points))) + " m; " +
+       .value = libmap::to_fixed_text(1000.0 * libmap::median_spacing(points), 1) + " mm; " +
                 libmap::to_fixed_text(
                     100.0 * static_cast<double>(lone) / static_cast<double>(voxels), 1) +
                 " % of the voxels have no neighbor",

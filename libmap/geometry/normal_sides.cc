@@ -13,8 +13,9 @@ namespace {
 
 constexpr std::size_t max_indexed = 65536;
 constexpr std::size_t max_looked_at = 4000;
-constexpr std::size_t neighbors = 4;  // the point itself is one
-constexpr float min_cosine = 0.7F;    // of neighbors that are not across a crease
+constexpr std::size_t min_pairs = 100;  // fewer say nothing
+constexpr std::size_t neighbors = 4;    // the point itself is one
+constexpr float min_cosine = 0.7F;      // of neighbors that are not across a crease
 
 bool is_direction(const Eigen::Vector3f& normal) {
   return normal.allFinite() && !normal.isZero(0.0F);
@@ -64,7 +65,7 @@ double opposing_share(const std::vector<Eigen::Vector3d>& positions,
       ++pairs;
       opposing += cosine < 0.0F ? 1U : 0U;
     }
-  return pairs == 0 ? 0.0 : static_cast<double>(opposing) / static_cast<double>(pairs);
+  return pairs < min_pairs ? 0.0 : static_cast<double>(opposing) / static_cast<double>(pairs);
 }
 
 std::string disagreement_text(double share, double opposing) {

@@ -389,11 +389,13 @@ std::string recognize_poses(std::string_view text, const std::string& file) {
   if (const std::size_t begin = text.find_first_not_of("\xEF\xBB\xBF \t\r\n");
       begin != std::string_view::npos && text[begin] == '{')
     return ".json";
-  for (const TextLine& line : split_lines(text)) {
+  const std::vector<TextLine> lines = split_lines(text);
+  for (const TextLine& line : lines) {
     // The header of EuRoC names its columns.
     if (is_comment(line) && line.text.find("q_RS_w") < line.text.find("q_RS_x")) return ".euroc";
     if (is_comment(line)) continue;
-    if (line.words.size() == 3) return ".log";
+    if (line.words.size() == 3 && &line != &lines.back() && (&line + 1)->words.size() == 4)
+      return ".log";
     const std::string_view tag = line.words[0];
     for (const char* start : {"VERTEX_", "EDGE_", "PARAMS_", "FIX"})
       if (tag.starts_with(start)) return ".g2o";

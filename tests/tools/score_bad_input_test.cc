@@ -243,12 +243,12 @@ TEST_F(ScoreBadInput, PointsTooFarApartForTheVoxels) {
   for (int i = 0; i < 120; ++i)
     for (int j = 0; j < 120; ++j) points.emplace_back(0.025 * i, 0.025 * j, 0.0);
   const std::string cloud = cloud_of(points);
-  const Words named = {cloud, "0.025 m", "voxels of 0.01 m", "no neighbor"};
+  const Words named = {cloud, "25.0 mm", "voxels of 0.01 m", "no neighbor"};
   EXPECT_TRUE(bad_input(score({cloud, "--voxel-size", "0.01"}), named));
-  EXPECT_TRUE(
-      bad_input(graspmap({"score", cloud, "--voxel-size", "0.01", "-o", "map.tiles"}), named));
-  EXPECT_TRUE(graspmap_test::succeeded(graspmap(
-      {"score", cloud, "--voxel-size", "0.01", "--interpolation", "true", "-o", "out.pcd"})));
+  EXPECT_TRUE(bad_input(
+      graspmap({"score", cloud, "--voxel-size", "0.01", "--quiet", "-o", "map.tiles"}), named));
+  EXPECT_TRUE(graspmap_test::succeeded(
+      graspmap({"score", cloud, "--voxel-size", "0.01", "--interpolation", "-o", "out.pcd"})));
 }
 
 TEST_F(ScoreBadInput, OutputsThatCannotBe) {

@@ -137,9 +137,18 @@ TEST(OpposingShare, SkipsWhatIsNoDirectionAndCreases) {
   for (std::size_t n = 1; n < made.normals.size(); n += 3)
     made.positions[n].x() = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(opposing_share(made.positions, made.normals), 0.0);
-  // Two faces of an edge.
-  EXPECT_EQ(opposing_share({{0, 0, 0}, {0.01, 0, 0}}, {{0, 0, 1}, {0.9F, 0, -0.5F}}), 0.0);
-  EXPECT_EQ(opposing_share({{0, 0, 0}, {0.01, 0, 0}}, {{0, 0, 1}, {0, 0, -1}}), 1.0);
+  // Pairs of points, each far from the others: two faces of an edge, two sides of a sheet.
+  Oriented edges, sheets;
+  for (int n = 0; n < 200; ++n)
+    for (const double beside : {0.0, 0.01}) {
+      edges.positions.emplace_back(n, beside, 0);
+      edges.normals.push_back(beside > 0 ? Vector3f(0.9F, 0, -0.5F) : Vector3f(0, 0, 1));
+      sheets.normals.emplace_back(0, 0, beside > 0 ? -1 : 1);
+    }
+  EXPECT_EQ(opposing_share(edges.positions, edges.normals), 0.0);
+  EXPECT_GT(opposing_share(edges.positions, sheets.normals), 0.3);
+  sheets.normals.resize(20);
+  EXPECT_EQ(opposing_share(edges.positions, sheets.normals), 0.0) << "too few to say";
 }
 
 }  // namespace normal_sides_test
