@@ -182,10 +182,13 @@ void add_poses(py::module_& module) {
                               const py::dict& values) {
     const auto options = options_from<libmap::PoseImportOptions>(values);
     return without_lock([&] {
-      if (scan == nullptr)
+      if (scan == nullptr) {
         const libmap::TrajectoryFile file = libmap::read_trajectory(path, options.format);
-      if (file.of_cameras) throw libmap::Error("poses of cameras: give the file to `fuse`");
-      return shared(Poses{file.poses});
+        if (file.of_cameras)
+          throw libmap::Error("poses of cameras need a scan",
+                              {.file = path.string(), .field = "scan"});
+        return shared(Poses{file.poses});
+      }
       return shared(Poses{libmap::import_poses(path, *scan, options).trajectory.poses});
     });
   });
