@@ -7,8 +7,8 @@
 // element per voxel. The second moves each element along its normal to the weighted mean of what
 // all frames measured within a disc around it (surface_refinement). Both average where the rays
 // meet the surface, not where noise has put the measurements: that is what makes the means free of
-// bias. Memory grows with the occupied voxels of a tile; besides, up to 128 MB of decoded depth is
-// kept for later passes (150 frames of 512 x 424), other frames are decoded once per pass.
+// bias. Memory grows with the occupied voxels of a tile; besides, up to 256 MB of decoded depth is
+// kept for later passes (300 frames of 512 x 424), other frames are decoded once per pass.
 #pragma once
 
 #include <cstddef>

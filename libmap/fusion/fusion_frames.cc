@@ -16,7 +16,7 @@ namespace libmap {
 namespace {
 
 // Of decoded depth that is kept.
-constexpr std::size_t max_kept_bytes = std::size_t{128} << 20;
+constexpr std::size_t max_kept_bytes = std::size_t{256} << 20;
 
 std::size_t bytes_of(const RgbdFrame& frame) { return sizeof(float) * frame.depth.pixels.size(); }
 

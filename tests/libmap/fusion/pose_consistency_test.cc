@@ -23,14 +23,15 @@ using graspmap_test::sphere;
 using ::testing::HasSubstr;
 
 MemoryScan rocky_scan() {
-  const auto ground = nearest_of({plane_z(0), sphere({0.3, 0.1, 0.05}, 0.3),
-                                  sphere({-0.4, 0.3, 0.0}, 0.25),
-                                  box({-0.3, -0.5, 0}, {0.1, -0.2, 0.3})});
+  const auto ground =
+      nearest_of({plane_z(0), sphere({0.3, 0.1, 0.05}, 0.3), sphere({-0.4, 0.3, 0.0}, 0.25),
+                  box({-0.3, -0.5, 0}, {0.1, -0.2, 0.3})});
   MemoryScan scan;
   for (int n = 0; n < 10; ++n) {
     const double angle = 0.25 * n;
-    scan.see(ground, looking({1.2 * std::cos(angle), 1.2 * std::sin(angle), 0.8 + 0.02 * n},
-                             {0, 0.02 * n, 0.05}),
+    scan.see(ground,
+             looking({1.2 * std::cos(angle), 1.2 * std::sin(angle), 0.8 + 0.02 * n},
+                     {0, 0.02 * n, 0.05}),
              small_camera(), {0.002, 0.002}, random_engine());
   }
   return scan;
