@@ -1,5 +1,4 @@
 #include <SQLiteCpp/SQLiteCpp.h>
-#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -7,6 +6,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "libmap/core/text.h"
 #include "libmap/io/cloud_io.h"
 #include "libmap/poses/trajectory_io.h"
 #include "libmap/scan/scan_source.h"
@@ -62,8 +62,10 @@ TEST(Fuse, NamesTheQuaternionOrderThatFits) {
        libmap::trajectory_of(libmap::open_scan(scan)->graph(), libmap::PoseSource::ground_truth)) {
     const Eigen::Vector3d p = pose.world_from_base.translation();
     const Eigen::Quaterniond q(pose.world_from_base.linear());
-    file << fmt::format("{} {} {} {} {} {} {} {} {}\n", pose.stamp_s, p.x(), p.y(), p.z(), q.w(),
-                        q.x(), q.y(), q.z(), pose.node);
+    for (const double value : {pose.stamp_s, p.x(), p.y(), p.z(), q.w(), q.x(), q.y(), q.z(),
+                               static_cast<double>(pose.node)})
+      file << libmap::to_text(value) << ' ';
+    file << '\n';
   }
   file.close();
   const auto fuse = [&](const Words& more) {
