@@ -14,7 +14,7 @@ namespace libgtd {
 
 namespace {
 
-constexpr int draws = 24;
+constexpr int draws = 40;
 constexpr std::size_t step_deg = 3;  // linear between
 
 // Leans of the facets that the spines of one finger meet, rad, the largest first.

@@ -39,20 +39,22 @@ constexpr double max_deviations = 2.0;
 // primitive shapes with the three grippers and 16 parameter sets, by the likelihood that a trial
 // reaches each of seven loads. With the mean c, the mean of ln C and its spread of the columns
 // whose C is above `floor_of_capacity`, and their share p:
-//   P(force > 0) = logistic(0.2 + 2.778 p + 2.892 contact + 0.913 ln(c + floor)),
-//   mean ln(force / closing forces) = 0.257 + 1.097 ln C - 0.556 rise + 1.632 tilt,
-//   ln(spread of ln force) = -1.476 + 1.071 spread(ln C) - 0.123 ln C.
+//   P(force > 0) = logistic(0.152 + 2.947 p + 2.601 contact + 0.884 ln(c + floor)),
+//   mean ln(force / closing forces) = 0.311 + 1.125 ln C - 0.618 rise + 1.702 tilt,
+//   ln(spread of ln force) = -1.483 + 1.021 spread(ln C) - 0.175 ln C.
 // contact: share of the azimuths, on the weakest side, where spines meet the ground; rise of the
 // palm above the voxel and tilt, the imbalance of the contacts' depths, in lengths of a finger.
 constexpr float floor_of_capacity = 0.003F;
 constexpr float largest_capacity = 0.55F;
-// The distribution of ln(force) between trials: beta(2, 2), this many spreads wide to each side.
-constexpr float half_width = 2.2360680F;
+// The distribution of ln(force) between trials: beta(4, 2), which is skewed to small forces; its
+// standard deviation, and its mean from the upper end.
+constexpr float beta_spread = 0.17817416F;
+constexpr float beta_mean = 1.0F / 3.0F;
 // The forces at which the distribution over all sets is computed: from 0.2 N to 1.3 kN, and the
 // load.
-constexpr std::size_t force_steps = 24;
+constexpr std::size_t force_steps = 48;
 constexpr float first_log_force = -1.6F;
-constexpr float log_force_step = 0.4F;
+constexpr float log_force_step = 0.19F;
 
 constexpr std::array<double, 5> dual_steps{0.0, 0.5, 1.0, 2.0, 4.0};  // u
 
@@ -256,9 +258,9 @@ GRASPMAP_CLONED_CHOICE void add_column(const float* __restrict capacities,
   }
 }
 
-// The distribution of a force: with this probability above 0, then beta(2, 2) of its logarithm.
+// The distribution of a force: with this probability above 0, then beta(4, 2) of its logarithm.
 struct SetForces {
-  std::vector<float> probability, log_force, spread, scale;  // scale: 1 / (2 half_width spread)
+  std::vector<float> probability, log_force, spread, scale;  // scale: beta_spread / spread
 };
 
 // exp and ln to 2e-4, of which a loop computes several at once.
@@ -312,14 +314,14 @@ GRASPMAP_CLONED_CHOICE void find_forces(const SetSums& sums, const MeanTerms& me
     const float log = logs[s] / count;
     const float variance = squares[s] / count - log * log;
     const float spread = std::sqrt(variance > 0.0F ? variance : 0.0F);
-    const float logit = 0.2F + 2.778F * count / mean.weights + 2.892F * mean.contact +
-                        0.913F * quick_log(capacities[s] / mean.weights + floor_of_capacity);
+    const float logit = 0.152F + 2.947F * count / mean.weights + 2.601F * mean.contact +
+                        0.884F * quick_log(capacities[s] / mean.weights + floor_of_capacity);
     probability[s] = has_force ? 1.0F / (1.0F + quick_exp(-logit)) : 0.0F;
-    log_force[s] = log_scale[s] + mean.bias + 1.097F * log;
-    const float log_spread = -1.476F + 1.071F * spread - 0.123F * log;
+    log_force[s] = log_scale[s] + mean.bias + 1.125F * log;
+    const float log_spread = -1.483F + 1.021F * spread - 0.175F * log;
     const float low = log_spread > -3.0F ? log_spread : -3.0F;
     spreads[s] = quick_exp(low < 1.0F ? low : 1.0F);
-    scale[s] = 0.5F / (half_width * spreads[s]);
+    scale[s] = beta_spread / spreads[s];
   }
 }
 
@@ -334,12 +336,12 @@ GRASPMAP_CLONED_CHOICE void find_survivals(const float* weights, const SetForces
   for (std::size_t s = 0; s < sets; ++s) {
     const float weight = weights[s] * forces.probability[s];
     const float scale = forces.scale[s];
-    const float start = 0.5F + forces.log_force[s] * scale;
+    const float start = beta_mean + forces.log_force[s] * scale;
     for (std::size_t n = 0; n < force_steps; ++n) {
       const float share = start - at[n] * scale;
       const float below_one = share < 1.0F ? share : 1.0F;
       const float t = below_one > 0.0F ? below_one : 0.0F;
-      sums[n] += weight * t * t * (3.0F - 2.0F * t);
+      sums[n] += weight * t * t * (10.0F + t * (-20.0F + t * (15.0F - 4.0F * t)));
     }
   }
   std::copy(std::begin(sums), std::end(sums), survivals.begin());
@@ -397,7 +399,7 @@ class BlockCloser {
     find_forces(
         sums_,
         {.contact = static_cast<float>(mean.contact / weights),
-         .bias = static_cast<float>(0.257 + (1.632 * mean.tilt - 0.556 * mean.palm) / lengths),
+         .bias = static_cast<float>(0.311 + (1.702 * mean.tilt - 0.618 * mean.palm) / lengths),
          .weights = static_cast<float>(weights)},
         log_scale_.data(), forces_);
     return estimate();

@@ -27,6 +27,12 @@ using libgtd::VoxelGrid;
 
 constexpr double degree = std::numbers::pi / 180;
 
+// Share of beta(4, 2) below so many standard deviations above its mean, of 1 - x.
+double beta_share(double deviations) {
+  const double t = std::clamp(1.0 / 3 + std::sqrt(8.0 / 252) * deviations, 0.0, 1.0);
+  return t * t * (10 - 20 * t + 15 * t * t - 4 * t * t * t);
+}
+
 // One parameter set, known.
 Gripper known(const std::string& name = "scar-e") {
   Gripper gripper = gripper_named(name);
@@ -78,7 +84,8 @@ TEST(FingerPulls, ClosedFormOfOneLean) {
         double expected = limit_n * std::sin(std::min(b, 90 * degree));
         if (b < 90 * degree && c * std::tan(b) < 1)
           expected = std::min(expected, std::tan(b) / (1 - c * std::tan(b)));
-        EXPECT_NEAR(pulls.at(fall)[0], b > 0 ? expected : 0, 1e-5 * (1 + expected))
+        if (b <= 0) expected = 0;
+        EXPECT_NEAR(pulls.at(fall)[0], expected, 1e-5 * (1 + expected))
             << fall << " " << limit_n << " " << holds;
       }
     }
@@ -111,13 +118,11 @@ TEST(ClosingForce, LevelGround) {
   double c = path.pulls.at(0)[0];
   c /= std::sqrt(1 + c * c / (0.55 * 0.55));
   const double probability =
-      1 / (1 + std::exp(-(0.2 + 2.778 + 2.892 + 0.913 * std::log(c + 0.003))));
-  const double log_force = std::log(80.0) + 0.257 + 1.097 * std::log(c) - 0.556 * depth / 0.081;
-  const double spread = std::exp(-1.476 - 0.123 * std::log(c));
+      1 / (1 + std::exp(-(0.152 + 2.947 + 2.601 + 0.884 * std::log(c + 0.003))));
+  const double log_force = std::log(80.0) + 0.311 + 1.125 * std::log(c) - 0.618 * depth / 0.081;
+  const double spread = std::exp(-1.483 - 0.175 * std::log(c));
   const auto survival = [&](double force) {
-    const double t =
-        std::clamp(0.5 + (log_force - std::log(force)) / (2 * 2.2360680 * spread), 0.0, 1.0);
-    return probability * t * t * (3 - 2 * t);
+    return probability * beta_share((log_force - std::log(force)) / spread);
   };
   const auto level = ground([](int, int) { return 4; });
   for (const double load_n : {1.0, 3.0, 5.0})
@@ -357,17 +362,17 @@ SlowForce slow_force(const std::map<std::pair<int, int>, double>& heights, const
   if (with_force == 0) return {};
   const double log = logs / with_force;
   const double variance = std::max(0.0, squares / with_force - log * log);
-  const double logit = 0.2 + 2.778 * with_force / weights + 2.892 * mean.contact / weights +
-                       0.913 * std::log(mean.capacity / weights + 0.003);
+  const double logit = 0.152 + 2.947 * with_force / weights + 2.601 * mean.contact / weights +
+                       0.884 * std::log(mean.capacity / weights + 0.003);
   return {1 / (1 + std::exp(-logit)),
-          std::log(path.pulls.all_fingers[0]) + 0.257 + 1.097 * log - 0.556 * mean.rise / weights +
-              1.632 * mean.tilt / weights,
-          std::exp(std::clamp(-1.476 + 1.071 * std::sqrt(variance) - 0.123 * log, -3.0, 1.0))};
+          std::log(path.pulls.all_fingers[0]) + 0.311 + 1.125 * log - 0.618 * mean.rise / weights +
+              1.702 * mean.tilt / weights,
+          std::exp(std::clamp(-1.483 + 1.021 * std::sqrt(variance) - 0.175 * log, -3.0, 1.0))};
 }
 
 TEST(ClosingForce, AgreesWithItsDefinition) {
   const VoxelGrid grid = grid_of(graspmap_test::random_ground(80, -33, 12));
-  const ClosingPath path = libgtd::make_closing_path(known("limbero"), 0.01, 5);
+  const ClosingPath path = libgtd::make_closing_path(known("limbero"), 0.01, 1);
   std::map<std::pair<int, int>, double> heights;
   for (const Voxel& voxel : grid.voxels) heights[{voxel.i, voxel.j}] = 0.01 * (voxel.k + 0.5);
   for (int round = 0; round < 3; ++round) {
@@ -393,9 +398,8 @@ TEST(ClosingForce, AgreesWithItsDefinition) {
   std::map<std::pair<int, int>, SlowColumn> there;
   for (std::size_t n = 0; n < forces.size(); ++n) {
     const SlowForce slow = slow_force(heights, grid.voxels[n], path, there);
-    const double t = std::clamp(
-        0.5 + (slow.log_force - std::log(5.0)) / (2 * 2.2360680 * slow.spread), 0.0, 1.0);
-    const double expected = slow.probability == 0 ? 0 : slow.probability * t * t * (3 - 2 * t);
+    const double expected =
+        slow.probability == 0 ? 0 : slow.probability * beta_share(slow.log_force / slow.spread);
     held += expected > 0.3 ? 1 : 0;
     // A height on the boundary of a voxel's layer or an angle between two degrees may round either
     // way in single precision.
