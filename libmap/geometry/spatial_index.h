@@ -56,6 +56,7 @@ struct CloudSpacing {
   double nearest_m = 0.0;  // median_spacing
   double by_area_m = 0.0;  // of a square grid with as many points per area
 };
+// Both spacings of a cloud; 0 where there are no two places.
 CloudSpacing point_spacing(const std::vector<Eigen::Vector3d>& points);
 
 // Points in a hashed grid of cubes. nanoflann's tree that grows takes 10 times as long for 74,000

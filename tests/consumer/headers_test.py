@@ -29,7 +29,7 @@ HEADERS = {
     "cstdint": "int8_t int16_t int32_t int64_t uint8_t uint16_t uint32_t uint64_t",
     "cstdlib": "abs",
     "cstring": "memcpy",
-    "algorithm": "copy find_if lower_bound max min nth_element",
+    "algorithm": "clamp copy find_if lower_bound max min nth_element",
     "bit": "bit_cast",
     "exception": "exception",
     "fstream": "ofstream",
