@@ -180,7 +180,11 @@ DetectionResult detect(const PointCloud& terrain, const DetectionOptions& option
   });
   result.occupied_voxels = grid.voxels.size();
   result.lone_voxels = count_lone(grid.voxels);
-  require_dense(result.lone_voxels, result.occupied_voxels, stages.voxel_size_m, surface.positions);
+  // The programs that came before score any cloud, which is what they are here for.
+  const Method method = stages.tiles.graspable.method;
+  if (method == Method::corrected || method == Method::calibrated)
+    require_dense(result.lone_voxels, result.occupied_voxels, stages.voxel_size_m,
+                  surface.positions);
   result.grid_min = grid.min;
   result.grid_max = grid.max;
   result.map.lattice = grid.lattice;
@@ -226,6 +230,11 @@ void describe(libmap::ResultTable& table, const DetectionResult& result) {
       "what determined which side of the plane is up");
   table.add("up_normals_share", result.plane ? result.plane->normals_up : std::nullopt,
             "share of the normals that point up");
+  table.add("opposing_normals",
+            result.plane && result.plane->normals_up
+                ? std::optional(result.plane->opposing_normals)
+                : std::nullopt,
+            "share of neighboring normals on opposite sides");
   table.add("downsampled_points", only_if(result.downsampled_points > 0, result.downsampled_points),
             "points after downsampling");
   table.add("interpolated_points", only_if(has_grid, result.interpolated_points),

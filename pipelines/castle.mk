@@ -32,7 +32,7 @@ $(OUT)/map_from_planes.txt: $(here)castle.py
 
 chain: $(OUT)/map_from_planes.txt
 	@$(MAKE) --no-print-directory -f $(here)scan.mk SCAN=$(OUT)/scan OUT=$(OUT) POSES=refined \
-	  REFINE="$(noise)" FUSE="--voxel-size 0.001 --max-depth 0.6 $(noise)" \
+	  REFINE="$(noise) --frame-time 0.067" FUSE="--voxel-size 0.001 --max-depth 0.6 $(noise)" \
 	  MESH="--cell-size 0.001" CROP="--up=-0.39,0,0.92" RESAMPLE="--radius 0.0012" \
 	  SCORE="--gripper hubrobo --voxel-size 0.001" TITLE="castle"
 

@@ -14,8 +14,8 @@ namespace libgtd {
 
 namespace {
 
-constexpr int draws = 40;
-constexpr std::size_t step_deg = 3;  // linear between
+constexpr int draws = 100;
+constexpr std::size_t step_deg = 5;  // linear between
 
 // Leans of the facets that the spines of one finger meet, rad, the largest first.
 std::vector<double> draw_leans(const Gripper& gripper, double share, std::uint64_t draw) {

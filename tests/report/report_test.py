@@ -169,7 +169,7 @@ def on_a_desk(report):
         browser.drag(at, (0, 0))
         page.settle()
         reading = browser.run(f'return {FIGURE}.querySelector(".reading").textContent')
-        check('probability to hold 10 N' in reading, f'at the pointer: {reading}')
+        check('probability to hold 5 N' in reading, f'at the pointer: {reading}')
         before = page.picture()
         browser.run(f'const slider = {FIGURE}.querySelector("input"); slider.value = "-40";'
                     'slider.dispatchEvent(new Event("input"))')
