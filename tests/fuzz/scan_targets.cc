@@ -272,13 +272,35 @@ bool run_poses(std::string_view bytes) {
   });
 }
 
+// Of formats that are only read.
+std::string foreign_poses(libmap::TrajectoryFormat format) {
+  switch (format) {
+    case libmap::TrajectoryFormat::open3d:
+      return "0 0 1\n1 0 0 0.1\n0 1 0 0.2\n0 0 1 0.3\n0 0 0 1\n";
+    case libmap::TrajectoryFormat::nerfstudio:
+      return R"({"frames": [{"file_path": "images/1.png", "transform_matrix":
+        [[1, 0, 0, 0.1], [0, 1, 0, 0.2], [0, 0, 1, 0.3], [0, 0, 0, 1]]}]})";
+    case libmap::TrajectoryFormat::euroc:
+      return "#timestamp, x, y, z, w, x, y, z\n1000000000,0.1,0.2,0.3,1,0,0,0\n";
+    default:
+      return {};
+  }
+}
+
 Seeds pose_seeds() {
   Seeds seeds;
-  for (std::size_t choice = 0; choice < libmap::trajectory_format_names().size(); ++choice)
+  const auto& formats = libmap::trajectory_format_names();
+  for (std::size_t choice = 0; choice < formats.size(); ++choice) {
+    const std::string foreign = foreign_poses(formats[choice].second);
+    if (!foreign.empty()) {
+      seeds.push_back(with_choice(choice, foreign));
+      continue;
+    }
     for (const std::string& text :
          {libmap::to_tum(small_trajectory()), libmap::to_kitti(small_trajectory()),
           libmap::to_g2o(small_trajectory(), {}), libmap::to_toro(small_trajectory(), {})})
       seeds.push_back(with_choice(choice, text));
+  }
   return seeds;
 }
 

@@ -126,9 +126,8 @@ class Commands(unittest.TestCase):
         best = graspmap.footholds(map_, separation_m=0.3)
         self.assert_same_bytes(self.folder / "footholds.ply", graspmap.write_cloud, best.cloud)
         self.run_command("render", "map.pcd", "--width", 400, "--height", 300, "-o", "map.png")
-        made_with = graspmap.read_manifest(self.folder / "map.pcd")["parameters"]
-        image = graspmap.render(map_, width_px=400, height_px=300, load_n=made_with["load_n"],
-                                zero_plane_m=made_with["zero_plane_m"])
+        load_n = graspmap.read_manifest(self.folder / "map.pcd")["parameters"]["load_n"]
+        image = graspmap.render(map_, width_px=400, height_px=300, load_n=load_n)
         self.assertEqual(image.shape, (300, 400, 3))
         self.assertEqual(graspmap.to_png(image), (self.folder / "map.png").read_bytes())
 
