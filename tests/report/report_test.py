@@ -175,7 +175,7 @@ def on_a_desk(report):
                     'slider.dispatchEvent(new Event("input"))')
         page.settle()
         check(page.picture() != before, 'another load shows the same picture')
-        check(browser.run(f'return {FIGURE}.querySelector(".legend output").textContent') == '1 N',
+        check(browser.run(f'return {FIGURE}.querySelector(".legend output").textContent') == '0.5 N',
               'the legend has another load')
         before = page.picture()
         browser.run('document.querySelector("figure.map canvas").dispatchEvent('

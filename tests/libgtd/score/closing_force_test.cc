@@ -128,9 +128,9 @@ TEST(ClosingForce, LevelGround) {
   for (const double load_n : {1.0, 3.0, 5.0})
     EXPECT_NEAR(force_at_origin(level, gripper, load_n).hold_probability, survival(load_n), 2e-3);
   const ForceEstimate force = force_at_origin(level, gripper);
-  EXPECT_NEAR(survival(force.median_n), 0.5, 0.01);
-  EXPECT_NEAR(survival(force.low_n), 0.95, 0.01);
-  EXPECT_NEAR(survival(force.high_n), 0.05, 0.01);
+  EXPECT_NEAR(survival(force.median_n), 0.5, 0.02);
+  EXPECT_NEAR(survival(force.low_n), 0.95, 0.02);
+  EXPECT_NEAR(survival(force.high_n), 0.05, 0.02);
   EXPECT_NEAR(force.trial_spread, spread, 1e-3);
   EXPECT_NEAR(force.parameter_spread, 0, 1e-3);
 }
