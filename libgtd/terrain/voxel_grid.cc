@@ -251,7 +251,7 @@ std::size_t count_lone(const std::vector<Voxel>& voxels) {
 void require_dense(std::size_t lone, std::size_t voxels, double voxel_size_m,
                    const std::vector<Eigen::Vector3d>& points) {
   constexpr std::size_t min_voxels = 10;
-  if (voxels < min_voxels || 2 * lone <= voxels) return;
+  if (voxels < min_voxels || 5 * lone <= 3 * voxels) return;
   throw libmap::Error(
       "the points are too far apart for these voxels: interpolate (--interpolation), use larger "
       "voxels (--voxel-size), or sample the surface of a mesh (graspmap resample)",
@@ -260,7 +260,7 @@ void require_dense(std::size_t lone, std::size_t voxels, double voxel_size_m,
                 libmap::to_fixed_text(
                     100.0 * static_cast<double>(lone) / static_cast<double>(voxels), 1) +
                 " % of the voxels have no neighbor",
-       .bound = "<= 50 % of the voxels"});
+       .bound = "<= 60 % of the voxels"});
 }
 
 }  // namespace libgtd

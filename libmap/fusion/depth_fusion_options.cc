@@ -81,10 +81,12 @@ void describe(ResultTable& table, const DepthFusionResult& result) {
   table.add("registration_rejected", result.registration_rejected,
             "whether held-out measurements rejected the registration");
   const auto add_check = [&](const std::string& kind, const PairCosts& costs) {
-    if (costs.count == 0) return;
-    table.add("held_out_" + kind + "_before", costs.before,
+    const auto if_measured = [&](double cost) {
+      return costs.count > 0 ? std::optional(cost) : std::nullopt;
+    };
+    table.add("held_out_" + kind + "_before", if_measured(costs.before),
               "mean cost of held-out " + kind + " with the given poses");
-    table.add("held_out_" + kind + "_after", costs.after,
+    table.add("held_out_" + kind + "_after", if_measured(costs.after),
               "mean cost of held-out " + kind + " after the first round of registration");
   };
   add_check("depth", result.registration_check.depth);

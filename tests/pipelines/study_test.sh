@@ -7,7 +7,7 @@ out=$scratch/study
 
 run() {
   make --no-print-directory -f "$source/pipelines/study.mk" OUT="$out" GRASPMAP="$graspmap" \
-    SCENARIOS="3 4" METHODS=thesis STAGES="published grasp report" PLACES=20 TRIALS="--trials 2 --draws 2" INCLINATIONS=25 EDGE=0.03 COUNT=40000 \
+    SCENARIOS="3 4" METHODS=thesis STAGES="published grasp report" PLACES=20 TRIALS="--trials 2 --draws 2" INCLINATIONS=25 EDGE=0.03 COUNT=30000 \
     PANORAMA="--stride 3" "$@"
 }
 # Column $2 of a table by its name, without the head.

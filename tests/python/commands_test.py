@@ -100,7 +100,8 @@ class Commands(unittest.TestCase):
         self.assertEqual(scored.up_source, manifest["results"]["up_source"])
         matrix = np.reshape(manifest["transforms"]["terrain_from_input"], (3, 4))
         np.testing.assert_array_equal(scored.terrain_from_input[:3], matrix)
-        self.assertEqual(scored.zero_plane_m, manifest["parameters"]["zero_plane_m"])
+        self.assertIsNone(scored.zero_plane_m)
+        self.assertEqual(manifest["parameters"]["zero_plane_m"], "auto")
         self.assertIsNone(graspmap.score(terrain, voxel_size_m=0.05).zero_plane_m)
 
     def test_lookup(self):
