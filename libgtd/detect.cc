@@ -231,9 +231,8 @@ void describe(libmap::ResultTable& table, const DetectionResult& result) {
   table.add("up_normals_share", result.plane ? result.plane->normals_up : std::nullopt,
             "share of the normals that point up");
   table.add("opposing_normals",
-            result.plane && result.plane->normals_up
-                ? std::optional(result.plane->opposing_normals)
-                : std::nullopt,
+            result.plane && result.plane->normals_up ? std::optional(result.plane->opposing_normals)
+                                                     : std::nullopt,
             "share of neighboring normals on opposite sides");
   table.add("downsampled_points", only_if(result.downsampled_points > 0, result.downsampled_points),
             "points after downsampling");

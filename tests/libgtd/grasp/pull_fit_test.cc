@@ -43,7 +43,8 @@ std::vector<PullTest> simulated(const libgtd::Ground& ground, const Gripper& tru
     PullTest test;
     test.row = static_cast<std::size_t>(n) + 1;
     test.on_level_ground = n % 2 == 0;
-    if (!test.on_level_ground) test.location = {random.uniform() < 0.5 ? 0.0 : 0.2026834, 0.0, 0.05};
+    if (!test.on_level_ground)
+      test.location = {random.uniform() < 0.5 ? 0.0 : 0.2026834, 0.0, 0.05};
     options.seed = 100 + static_cast<std::uint64_t>(n);
     const libgtd::ClosedPoses poses(test.on_level_ground ? level : ground, truth, test.location,
                                     options);

@@ -61,7 +61,12 @@ Made make_with(InstructionSet instructions, const std::vector<float>& depths,
   const auto finished = loops.finish(middle, fitted, at_rays, count, 0.08F, planes);
   counts.insert(counts.end(), {finished.used, finished.flying, finished.grazing});
   const DepthPlaneLoops::Placement placement{
-      {0.8F, -0.6F, 0.1F, 0.6F, 0.8F, -0.2F, 0.1F, 0.3F, 0.9F}, {1, 2, 3}, 100, 0.002F, 0.005F, 0.001F};
+      {0.8F, -0.6F, 0.1F, 0.6F, 0.8F, -0.2F, 0.1F, 0.3F, 0.9F},
+      {1, 2, 3},
+      100,
+      0.002F,
+      0.005F,
+      0.001F};
   loops.place(planes, at_rays.x, at_rays.y, count, placement,
               {{at(18), at(19), at(20)}, {at(21), at(22), at(23)}, at(24)});
   loops.place_depths(depths.data(), at_rays.x, at_rays.y, count, placement, at(25), at(26));
