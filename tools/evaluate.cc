@@ -125,6 +125,7 @@ void evaluate(EvaluateOptions& options, Run& run) {
 int main(int argc, char** argv) {
   EvaluateOptions options;
   Command command("evaluate");
+  command.former_flag("--hold-model", "not needed: forces need no fit for a gripper");
   command.inputs("TABLE.csv", options.tables,
                  "labels and scores, one row per location; of several the columns that all have");
   command.output(

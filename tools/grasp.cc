@@ -370,6 +370,10 @@ void say_fit(const libgtd::PullFit& fit, std::size_t tests, Run& run) {
         fit.mean_squared_score, fit.chance, rows.empty() ? "" : ", most of all rows " + rows);
   else if (!rows.empty())
     run.warn("tests that the others do not predict: rows {}", rows);
+  constexpr double few_sets = 8.0;
+  if (fit.effective_sets < few_sets)
+    run.warn("the fit rests on {:.1f} effective parameter sets: its ranges are too narrow",
+             fit.effective_sets);
   for (const auto& [name, force] :
        {std::pair{"level_before", &fit.level_before}, {"level_after", &fit.level_after}})
     run.add_results({{std::string(name) + "_low_n", force->low_n},
@@ -494,6 +498,12 @@ int main(int argc, char** argv) {
                  "FOLDER/PLACE.ply, after the column 'place' or the row");
   command.option("--scene-of", "PLACES", options.scenes.places,
                  "the locations to draw; default: all");
+  for (const char* key : {"friction", "asperity-min", "asperity-max", "engagement-rate", "drag"}) {
+    std::string name = key;
+    std::replace(name.begin(), name.end(), '-', '_');
+    name += name.starts_with("asperity") ? "_deg" : name == "drag" ? "_mm" : "";
+    command.former_flag(std::string("--") + key, "--set gripper.engagement." + name + "=VALUE");
+  }
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { grasp(options, run); });
 }

@@ -15,7 +15,9 @@ namespace libgtd {
 
 namespace {
 
-constexpr double least_force_n = 0.05;   // smaller ones count as this
+constexpr double least_force_n = 0.05;  // smaller ones count as this
+constexpr double prior_share = 0.1;     // of the sets of a round
+constexpr int min_rounds = 3;
 constexpr double log_force_range = 9.2;  // of outliers: ln of 0.05 to 500 N
 
 double normal_share(double z) { return 0.5 * std::erfc(-z / std::sqrt(2.0)); }
@@ -190,7 +192,8 @@ ParameterValues weighted_spreads(const std::vector<ParameterValues>& points,
   return spreads;
 }
 
-// A mixture of normal kernels about weighted centers, reflected at the faces of the unit cube.
+// A mixture of normal kernels about weighted centers, reflected at the faces of the unit cube, and
+// of the prior: without it, a set far from all kernels would have an unbounded weight.
 class Proposal {
  public:
   Proposal(const std::vector<ParameterValues>& centers, const std::vector<double>& weights)
@@ -201,6 +204,11 @@ class Proposal {
   }
 
   ParameterValues draw(double share, libmap::RandomStream& random) const {
+    if (random.uniform() < prior_share) {
+      ParameterValues quantiles;
+      for (double& quantile : quantiles) quantile = random.uniform();
+      return quantiles;
+    }
     std::size_t center = 0;
     for (double sum = weights_[0]; share >= sum && center + 1 < weights_.size();)
       sum += weights_[++center];
@@ -226,7 +234,7 @@ class Proposal {
       }
       sum += product;
     }
-    return sum;
+    return prior_share + (1.0 - prior_share) * sum;
   }
 
  private:
@@ -273,7 +281,9 @@ class PullFitting {
         low_discrepancy_quantiles(static_cast<std::size_t>(options_.sets), options_.grasp.seed);
     weigh(population, nullptr);
     progress_.advance(1);
+    const double enough_sets = 0.25 * options_.sets;
     for (int round = 1; round < options_.rounds; ++round) {
+      if (round >= min_rounds && effective_count(population.weights) >= enough_sets) break;
       population = next(population, static_cast<std::uint64_t>(round));
       progress_.advance(1);
     }
@@ -313,8 +323,7 @@ class PullFitting {
     population.weights = normalized(population.log_weights, 1.0);
   }
 
-  // New sets around those that carry the weight. A tenth are draws of the prior, which keeps
-  // weights bounded where the kernels leave a gap.
+  // New sets around those that carry the weight.
   Population next(const Population& before, std::uint64_t round) {
     const double least_effective = 0.1 * static_cast<double>(before.quantiles.size());
     const std::vector<double> weights = tempered(before.log_weights, least_effective);

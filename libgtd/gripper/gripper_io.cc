@@ -142,6 +142,9 @@ Gripper parse_gripper(const std::string& yaml, const std::string& file,
     for (const ParameterSet& set : gripper.ensemble)
       if (gripper.fingers) with_parameters(gripper, set.values).check();
   } catch (const libmap::Error& error) {
+    if (error.context().field.starts_with("hold_model"))
+      throw libmap::Error("is not used any more: forces need no fit. Remove the section",
+                          {.file = file, .field = "hold_model"});
     throw error.in_file(file);
   }
   return gripper;

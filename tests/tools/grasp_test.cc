@@ -134,6 +134,9 @@ TEST(GraspCommand, BadInputIsOneLine) {
     EXPECT_TRUE(bad_input(
         graspmap({"grasp", "ground.ply", "--points", "places.csv", "-o", "t.csv", flag, "0"}),
         {flag, "0"}));
+  const auto former = graspmap(with({"-o", "t.csv", "--asperity-min", "30"}));
+  EXPECT_EQ(former.exit_code, 2);
+  EXPECT_NE(former.standard_error.find("gripper.engagement.asperity_min_deg"), std::string::npos);
   EXPECT_TRUE(refused({"-o", "t.txt"}, {"t.txt", ".csv"}));
   EXPECT_TRUE(refused({"-o", "t.csv", "--set", "gripper.fingers.count=0"}, {"fingers.count"}));
   EXPECT_TRUE(refused({"-o", "t.csv", "--set", "gripper.engagement.friction=-0.1"},

@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <iostream>
+#include <map>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <thread>
@@ -201,6 +202,7 @@ struct Command::Parts {
   // An exit code if there is nothing more to do.
   std::optional<int> parse(int argc, char** argv);
   void work(const std::function<void(Run&)>& body);
+  std::map<std::string, std::string> former_flags;
   std::optional<std::string> unknown_flag(int argc, char** argv) const;
   int usage_error(const std::string& message) const;
 };
@@ -223,6 +225,10 @@ void Command::output(std::string& path, const std::string& description, bool req
   parts_->output_option = parts_->app.add_option("-o,--output", path, description)
                               ->type_name("OUTPUT")
                               ->required(required);
+}
+
+void Command::former_flag(const std::string& name, const std::string& now) {
+  parts_->former_flags[name] = now;
 }
 
 void Command::flag(const std::string& name, bool& value, const std::string& description) {
@@ -332,6 +338,8 @@ std::optional<std::string> Command::Parts::unknown_flag(int argc, char** argv) c
     const std::string word = argv[n];
     if (word == "--") break;
     const std::string flag = word.substr(0, word.find('='));
+    if (const auto former = former_flags.find(flag); former != former_flags.end())
+      return flag + " is now " + former->second;
     if (flag.starts_with("--") && std::find(flags.begin(), flags.end(), flag) == flags.end())
       return "unknown flag " + flag + libmap::did_you_mean(flag, flags);
   }

@@ -50,6 +50,8 @@ class Command {
   void flag(const std::string& name, bool& value, const std::string& description);
   void option(const std::string& name, const std::string& value_name, std::string& value,
               const std::string& description, bool required = false);
+  // A flag of earlier versions: the error of its use names `now` instead.
+  void former_flag(const std::string& name, const std::string& now);
   void option(const std::string& name, const std::string& value_name,
               std::vector<std::string>& values, const std::string& description);
 

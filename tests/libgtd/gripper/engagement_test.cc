@@ -93,6 +93,7 @@ TEST(GripperFile, BadRangesAndSetsAreNamed) {
   EXPECT_EQ(field_of("ensemble:\n  sets: 0 2 10 0.39 0 90 0.6\n"), "ensemble.sets");
   EXPECT_EQ(field_of("ensemble:\n  sets: 1 2 10 -0.39 0 90 0.6\n"), "engagement.friction");
   EXPECT_EQ(field_of("engagement:\n  friction: -1\n"), "engagement.friction");
+  EXPECT_EQ(field_of("hold_model:\n  load_n: 10\n"), "hold_model");
 }
 
 }  // namespace engagement_test
