@@ -147,7 +147,7 @@ void Manifest::add_parameters(const ParameterTable& table) {
     if (const auto number = parse_double(text); type == ParameterType::real && number)
       value = *number;
     const auto known = std::find_if(parameters.begin(), parameters.end(),
-                                    [&](const auto& one) { return one.first == key; });
+                                    [&key = key](const auto& one) { return one.first == key; });
     if (known == parameters.end())
       parameters.emplace_back(key, value);
     else
