@@ -16,6 +16,7 @@ namespace {
 
 constexpr int draws = 100;
 constexpr std::size_t step_deg = 5;  // linear between
+constexpr double max_spread = 4.0;   // of pulls that are nearly always 0
 
 // Leans of the facets that the spines of one finger meet, rad, the largest first.
 std::vector<double> draw_leans(const Gripper& gripper, double share, std::uint64_t draw) {
@@ -56,25 +57,40 @@ double pull_of(const std::vector<double>& leans, double fall, double phi, double
   return most;
 }
 
-// At falls of -90 .. 90 degrees.
-std::array<double, 181> pulls_of(const Gripper& gripper) {
+constexpr std::size_t falls = 181;  // -90 .. 90 degrees
+constexpr std::size_t level = 90;
+
+struct Pulls {
+  std::array<double, falls> means{};
+  double level_spread = 0.0;  // standard deviation over mean between draws, on level ground
+};
+
+Pulls pulls_of(const Gripper& gripper) {
   const GripperFingers& fingers = *gripper.fingers;
   const double share = engagement_share(gripper.engagement, fingers.spine_tip_radius_um);
   const double phi = std::atan(gripper.engagement.friction);
-  std::array<double, 181> sums{};
+  Pulls pulls;
+  std::array<double, falls>& means = pulls.means;
+  double squares = 0.0;
   for (int draw = 0; draw < draws; ++draw) {
     const std::vector<double> leans = draw_leans(gripper, share, static_cast<std::uint64_t>(draw));
-    for (std::size_t n = 0; n < sums.size(); n += step_deg)
-      sums[n] += pull_of(leans, (static_cast<double>(n) - 90.0) * libmap::radians_per_degree, phi,
-                         fingers.spine_force_limit_n / fingers.closing_force_n,
-                         fingers.holds_when_closed) /
-                 draws;
+    for (std::size_t n = 0; n < falls; n += step_deg) {
+      const double pull =
+          pull_of(leans, (static_cast<double>(n) - 90.0) * libmap::radians_per_degree, phi,
+                  fingers.spine_force_limit_n / fingers.closing_force_n, fingers.holds_when_closed);
+      means[n] += pull / draws;
+      if (n == level) squares += pull * pull / draws;
+    }
   }
-  for (std::size_t n = 0; n + step_deg < sums.size(); n += step_deg)
+  const double mean = means[level];
+  pulls.level_spread =
+      mean > 0.0 ? std::min(max_spread, std::sqrt(std::max(0.0, squares - mean * mean)) / mean)
+                 : max_spread;
+  for (std::size_t n = 0; n + step_deg < falls; n += step_deg)
     for (std::size_t step = 1; step < step_deg; ++step)
-      sums[n + step] =
-          sums[n] + (sums[n + step_deg] - sums[n]) * static_cast<double>(step) / step_deg;
-  return sums;
+      means[n + step] =
+          means[n] + (means[n + step_deg] - means[n]) * static_cast<double>(step) / step_deg;
+  return pulls;
 }
 
 }  // namespace
@@ -82,15 +98,17 @@ std::array<double, 181> pulls_of(const Gripper& gripper) {
 FingerPulls finger_pulls(const Gripper& gripper, const std::vector<ParameterSet>& sets) {
   FingerPulls result;
   result.sets = sets.size();
-  result.pulls.resize(181 * sets.size());
+  result.pulls.resize(falls * sets.size());
+  result.spreads.resize(sets.size());
   result.pushes.resize(sets.size());
   result.all_fingers.resize(sets.size());
   libmap::parallel_for(sets.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t s = begin; s < end; ++s) {
       const Gripper its = with_parameters(gripper, sets[s].values);
-      const std::array<double, 181> pulls = pulls_of(its);
-      for (std::size_t n = 0; n < pulls.size(); ++n)
-        result.pulls[n * sets.size() + s] = static_cast<float>(pulls[n]);
+      const Pulls pulls = pulls_of(its);
+      for (std::size_t n = 0; n < falls; ++n)
+        result.pulls[n * sets.size() + s] = static_cast<float>(pulls.means[n]);
+      result.spreads[s] = static_cast<float>(pulls.level_spread);
       const GripperFingers& fingers = *its.fingers;
       result.pushes[s] =
           static_cast<float>(fingers.spines_per_finger *

@@ -17,8 +17,9 @@ namespace libgtd {
 // that falls by g if the drive holds (0 else), as in holding_force.h; the best k counts.
 struct FingerPulls {
   std::size_t sets = 0;
-  std::vector<float> pulls;         // at (fall + 90) * sets + set
-  std::vector<float> pushes;        // of each set: the force that all its engaged spines bear
+  std::vector<float> pulls;    // at (fall + 90) * sets + set
+  std::vector<float> pushes;   // of each set: the force that all its engaged spines bear
+  std::vector<float> spreads;  // of each set: deviation of a pull on level ground over its mean
   std::vector<double> all_fingers;  // of each set: closing force of all fingers, N
 
   const float* at(int fall_deg) const {

@@ -37,14 +37,17 @@ constexpr double max_deviations = 2.0;
 
 // Fitted to trials of the virtual field test (grasp) on simulated rocks, slopes, walls and
 // primitive shapes with the three grippers and 16 parameter sets, by the likelihood that a trial
-// reaches each of seven loads. With the mean c, the mean of ln C and its spread of the columns
-// whose C is above `floor_of_capacity`, and their share p:
-//   P(force > 0) = logistic(0.152 + 2.947 p + 2.601 contact + 0.884 ln(c + floor)),
-//   mean ln(force / closing forces) = 0.311 + 1.125 ln C - 0.618 rise + 1.702 tilt,
-//   ln(spread of ln force) = -1.483 + 1.021 spread(ln C) - 0.175 ln C.
+// reaches each of nine loads. With the mean c, the mean of ln C and its spread of the columns whose
+// C is above `floor_of_capacity`, their share p, and the spread v of a finger's pull on level
+// ground:
+//   P(force > 0) = logistic(1.154 + 1.813 p + 3.586 contact + 0.811 ln(c + offset) - 0.990 v),
+//   mean ln(force / closing forces) = 0.487 + 0.983 ln C - 0.529 rise + 1.305 tilt - 1.067 v,
+//   ln(spread of ln force) = -1.660 + 1.068 spread(ln C) + 1.014 v.
 // contact: share of the azimuths, on the weakest side, where spines meet the ground; rise of the
-// palm above the voxel and tilt, the imbalance of the contacts' depths, in lengths of a finger.
-constexpr float floor_of_capacity = 0.003F;
+// palm above the voxel and tilt, the imbalance of the contacts' depths, in lengths of a finger. The
+// weakest of several random pulls is the smaller, the more they differ: hence v.
+constexpr float floor_of_capacity = 0.0005F;
+constexpr float offset_of_capacity = 0.003F;
 constexpr float largest_capacity = 0.55F;
 // The distribution of ln(force) between trials: beta(4, 2), which is skewed to small forces; its
 // standard deviation, and its mean from the upper end.
@@ -298,7 +301,8 @@ struct MeanTerms {
   float weights = 0.0F;  // of all columns
 };
 GRASPMAP_CLONED_CHOICE void find_forces(const SetSums& sums, const MeanTerms& mean,
-                                        const float* __restrict log_scale, SetForces& forces) {
+                                        const float* __restrict log_scale,
+                                        const float* __restrict pull_spreads, SetForces& forces) {
   const float* __restrict weights = sums.weights.data();
   const float* __restrict logs = sums.logs.data();
   const float* __restrict squares = sums.squares.data();
@@ -314,11 +318,12 @@ GRASPMAP_CLONED_CHOICE void find_forces(const SetSums& sums, const MeanTerms& me
     const float log = logs[s] / count;
     const float variance = squares[s] / count - log * log;
     const float spread = std::sqrt(variance > 0.0F ? variance : 0.0F);
-    const float logit = 0.152F + 2.947F * count / mean.weights + 2.601F * mean.contact +
-                        0.884F * quick_log(capacities[s] / mean.weights + floor_of_capacity);
+    const float logit = 1.154F + 1.813F * count / mean.weights + 3.586F * mean.contact +
+                        0.811F * quick_log(capacities[s] / mean.weights + offset_of_capacity) -
+                        0.990F * pull_spreads[s];
     probability[s] = has_force ? 1.0F / (1.0F + quick_exp(-logit)) : 0.0F;
-    log_force[s] = log_scale[s] + mean.bias + 1.125F * log;
-    const float log_spread = -1.483F + 1.021F * spread - 0.175F * log;
+    log_force[s] = log_scale[s] + mean.bias + 0.983F * log - 1.067F * pull_spreads[s];
+    const float log_spread = -1.660F + 1.068F * spread + 1.014F * pull_spreads[s];
     const float low = log_spread > -3.0F ? log_spread : -3.0F;
     spreads[s] = quick_exp(low < 1.0F ? low : 1.0F);
     scale[s] = beta_spread / spreads[s];
@@ -399,9 +404,9 @@ class BlockCloser {
     find_forces(
         sums_,
         {.contact = static_cast<float>(mean.contact / weights),
-         .bias = static_cast<float>(0.311 + (1.702 * mean.tilt - 0.618 * mean.palm) / lengths),
+         .bias = static_cast<float>(0.487 + (1.305 * mean.tilt - 0.529 * mean.palm) / lengths),
          .weights = static_cast<float>(weights)},
-        log_scale_.data(), forces_);
+        log_scale_.data(), path_.pulls.spreads.data(), forces_);
     return estimate();
   }
 

@@ -11,7 +11,7 @@
 //
 // Means over the columns around the voxel, with normal weights of a standard deviation of a quarter
 // of the finger's length (where the gripper comes to rest is not known better), give for each
-// parameter set the share of trials with a force and the mean and spread of its logarithm, by 11
+// parameter set the share of trials with a force and the mean and spread of its logarithm, by 13
 // coefficients that are fitted once to the virtual field test (closing_force.cc).
 #pragma once
 

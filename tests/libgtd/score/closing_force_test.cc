@@ -76,6 +76,7 @@ TEST(FingerPulls, ClosedFormOfOneLean) {
           libgtd::finger_pulls(gripper, {{1.0, parameters_of(gripper)}});
       EXPECT_NEAR(pulls.pushes[0], 10 * limit_n / 10, 1e-5);
       EXPECT_EQ(pulls.all_fingers[0], 80);
+      EXPECT_NEAR(pulls.spreads[0], 0, 1e-3);
       for (const int fall : {-90, -30, 0, 15, 45, 60}) {  // on the grid of the table
         const double b = (fall + 70 - 90) * degree + std::atan(0.39);
         const double sine = std::sin(fall * degree);
@@ -89,6 +90,19 @@ TEST(FingerPulls, ClosedFormOfOneLean) {
             << fall << " " << limit_n << " " << holds;
       }
     }
+}
+
+// Spines that meet a facet with a chance of 1/2 and bear their limit: a binomial distribution.
+TEST(FingerPulls, SpreadOfSpinesThatEngage) {
+  Gripper gripper = known();
+  gripper.engagement.asperity_min_deg = gripper.engagement.asperity_max_deg = 80;
+  gripper.engagement.engagement_rate = std::log(2.0) / gripper.engagement.drag_mm;
+  gripper.fingers->spine_force_limit_n = 0.1;
+  const auto pulls = libgtd::finger_pulls(gripper, {{1.0, parameters_of(gripper)}});
+  EXPECT_NEAR(pulls.spreads[0], std::sqrt(0.5 / (10 * 0.5)), 0.05);
+  // Without a facet against which a spine can pull, the spread is at its bound.
+  gripper.engagement.asperity_min_deg = gripper.engagement.asperity_max_deg = 10;
+  EXPECT_EQ(libgtd::finger_pulls(gripper, {{1.0, parameters_of(gripper)}}).spreads[0], 4);
 }
 
 TEST(FingerPulls, RiseWithFallFrictionAndLimit) {
@@ -117,10 +131,12 @@ TEST(ClosingForce, LevelGround) {
   EXPECT_NEAR(depth, (40 * std::cos(85 * degree) + 41 * std::cos(65 * degree)) / 1000, 1e-12);
   double c = path.pulls.at(0)[0];
   c /= std::sqrt(1 + c * c / (0.55 * 0.55));
+  const double v = path.pulls.spreads[0];
   const double probability =
-      1 / (1 + std::exp(-(0.152 + 2.947 + 2.601 + 0.884 * std::log(c + 0.003))));
-  const double log_force = std::log(80.0) + 0.311 + 1.125 * std::log(c) - 0.618 * depth / 0.081;
-  const double spread = std::exp(-1.483 - 0.175 * std::log(c));
+      1 / (1 + std::exp(-(1.154 + 1.813 + 3.586 + 0.811 * std::log(c + 0.003) - 0.990 * v)));
+  const double log_force =
+      std::log(80.0) + 0.487 + 0.983 * std::log(c) - 0.529 * depth / 0.081 - 1.067 * v;
+  const double spread = std::exp(-1.660 + 1.014 * v);
   const auto survival = [&](double force) {
     return probability * beta_share((log_force - std::log(force)) / spread);
   };
@@ -354,7 +370,7 @@ SlowForce slow_force(const std::map<std::pair<int, int>, double>& heights, const
       mean.capacity += weight * one.capacity;
       mean.rise += weight * (one.rise + (0.005 - height) / path.finger_length_m);
       mean.tilt += weight * one.tilt;
-      if (one.capacity <= 0.003) continue;
+      if (one.capacity <= 0.0005) continue;
       with_force += weight;
       logs += weight * std::log(one.capacity);
       squares += weight * std::pow(std::log(one.capacity), 2);
@@ -362,12 +378,13 @@ SlowForce slow_force(const std::map<std::pair<int, int>, double>& heights, const
   if (with_force == 0) return {};
   const double log = logs / with_force;
   const double variance = std::max(0.0, squares / with_force - log * log);
-  const double logit = 0.152 + 2.947 * with_force / weights + 2.601 * mean.contact / weights +
-                       0.884 * std::log(mean.capacity / weights + 0.003);
+  const double v = path.pulls.spreads[0];
+  const double logit = 1.154 + 1.813 * with_force / weights + 3.586 * mean.contact / weights +
+                       0.811 * std::log(mean.capacity / weights + 0.003) - 0.990 * v;
   return {1 / (1 + std::exp(-logit)),
-          std::log(path.pulls.all_fingers[0]) + 0.311 + 1.125 * log - 0.618 * mean.rise / weights +
-              1.702 * mean.tilt / weights,
-          std::exp(std::clamp(-1.483 + 1.021 * std::sqrt(variance) - 0.175 * log, -3.0, 1.0))};
+          std::log(path.pulls.all_fingers[0]) + 0.487 + 0.983 * log - 0.529 * mean.rise / weights +
+              1.305 * mean.tilt / weights - 1.067 * v,
+          std::exp(std::clamp(-1.660 + 1.068 * std::sqrt(variance) + 1.014 * v, -3.0, 1.0))};
 }
 
 TEST(ClosingForce, AgreesWithItsDefinition) {
