@@ -15,9 +15,9 @@ namespace libgtd {
 namespace {
 
 constexpr int draws = 100;
-constexpr std::size_t step_deg = 5;  // linear between
+constexpr std::size_t step_deg = 5;  // interpolated linearly
 
-// Leans of the facets that the spines of one finger meet, rad, the largest first.
+// Draws psi of the facets that the spines of one finger meet, rad, descending.
 std::vector<double> draw_leans(const Gripper& gripper, double share, std::uint64_t draw) {
   constexpr std::uint64_t seed = 0x66696e676572;
   libmap::RandomStream random(seed, draw);
@@ -35,7 +35,7 @@ std::vector<double> draw_leans(const Gripper& gripper, double share, std::uint64
   return leans;
 }
 
-// In closing forces; `limit` of one spine too.
+// Pull in closing forces; `limit` of one spine, too.
 double pull_of(const std::vector<double>& leans, double fall, double phi, double limit,
                bool drive_holds) {
   constexpr double right_angle = std::numbers::pi / 2.0;
@@ -56,7 +56,7 @@ double pull_of(const std::vector<double>& leans, double fall, double phi, double
   return most;
 }
 
-// At falls of -90 .. 90 degrees.
+// Mean pulls at falls of -90 .. 90 degrees.
 std::array<double, 181> pulls_of(const Gripper& gripper) {
   const GripperFingers& fingers = *gripper.fingers;
   const double share = engagement_share(gripper.engagement, fingers.spine_tip_radius_um);

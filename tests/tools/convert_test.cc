@@ -111,7 +111,7 @@ TEST(Convert, AMapTakesEveryEncoding) {
   ASSERT_TRUE(succeeded(graspmap({"convert", "map.pcd", "-o", "same.pcd"})));
   EXPECT_EQ(content("same.pcd"), content("map.pcd"));
   EXPECT_TRUE(bad_input(graspmap({"convert", "map.pcd", "same.pcd", "-o", "two.pcd"}),
-                        {"map.pcd", "no share of a map"}));
+                        {"map.pcd", "not a share of a map"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("two.pcd")));
 }
 

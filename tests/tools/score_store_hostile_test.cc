@@ -59,7 +59,7 @@ TEST_F(ScoreStoreHostile, APlanOfOtherTiles) {
     const std::string plan = content("m.tiles/progress/plan.json");
     change_plan([&](nlohmann::json& json) { change(json.at("index")); });
     EXPECT_TRUE(bad_input(
-        score(), {"m.tiles/progress/plan.json: tile_voxels and lattice", "--force starts again"}));
+        score(), {"m.tiles/progress/plan.json: tile_voxels and lattice", "--force"}));
     write_text(scratch("m.tiles/progress/plan.json"), plan);
   };
   expect_refused([](nlohmann::json& index) { index.at("tile_voxels") = 21; });

@@ -352,7 +352,7 @@ TEST_F(ScoreStoreAgain, ForeignFoldersAreNotTouched) {
   fs::create_directories(scratch("m.tiles"));
   graspmap_test::write_text(scratch("m.tiles/diary.txt"), "dear");
   for (const Words& flags : {Words{}, Words{"--force"}})
-    EXPECT_TRUE(bad_input(score("in", "m.tiles", flags), {"m.tiles", "no tile store"}));
+    EXPECT_TRUE(bad_input(score("in", "m.tiles", flags), {"m.tiles", "not a tile store"}));
   EXPECT_EQ(files_in("m.tiles").size(), 1u);
   graspmap_test::write_text(scratch("n.tiles"), "a file");
   EXPECT_TRUE(bad_input(score("in", "n.tiles"), {"n.tiles", "is a file"}));
@@ -391,7 +391,7 @@ TEST_F(ScoreStoreAgain, ReadersSayWhatIsMissing) {
     return std::string(graspmap_test::error_of([&] { index_of(store); }).what());
   };
   EXPECT_NE(error_of_reading("m.tiles").find("16 of 49 tiles"), std::string::npos);
-  EXPECT_NE(error_of_reading("in").find("no tile store"), std::string::npos);
+  EXPECT_NE(error_of_reading("in").find("not a tile store"), std::string::npos);
   EXPECT_NE(error_of_reading("none.tiles").find("no such"), std::string::npos);
   EXPECT_THROW(libgtd::finish_tile_store(scratch("m.tiles")), libmap::Error);
   ASSERT_TRUE(succeeded(score("in", "m.tiles")));
@@ -488,7 +488,7 @@ TEST(ScoreStoreBadInput, LeavesNoFolderBehind) {
   EXPECT_TRUE(graspmap_test::bad_input(score("empty.csv", "m.tiles"), {"empty.csv", "no points"}));
   EXPECT_TRUE(graspmap_test::bad_input(score("bad.pcd", "m.tiles"), {"bad.pcd"}));
   EXPECT_TRUE(
-      bad_input(score("line.csv", "m.tiles"), {"error: line.csv: all points lie on a line"}));
+      bad_input(score("line.csv", "m.tiles"), {"error: line.csv: all points are on a line"}));
   EXPECT_EQ(graspmap_test::names_in_scratch(), before);
 }
 
