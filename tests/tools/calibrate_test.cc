@@ -159,7 +159,7 @@ TEST(Calibrate, BadInputIsOneLineAndLeavesNothing) {
                         {"camera.txt: a camera is written as YAML", "a name.yaml"}));
   // The same picture again and again tells nothing more.
   EXPECT_TRUE(bad_input(run({"shots/00.png", "shots/00.png", "shots/00.png", "shots/00.png"}),
-                        {"pictures is 1", "places of its own"}));
+                        {"pictures is 1", "distinct images"}));
   EXPECT_TRUE(bad_input(graspmap({"calibrate", "shots", "-o", "shots/00.png"}), {"is the input"}));
   EXPECT_FALSE(fs::exists(scratch("camera.yaml")));
 }

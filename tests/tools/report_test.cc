@@ -94,7 +94,7 @@ TEST(Report, WithoutThreeJs) {
 TEST(Report, BadInputIsSaid) {
   EXPECT_TRUE(bad_input(graspmap({"report", "none", "-o", "r.html"}), {"none", "no such folder"}));
   std::filesystem::create_directory(scratch("empty"));
-  EXPECT_TRUE(bad_input(graspmap({"report", "empty"}), {"empty", "nothing that a report could"}));
+  EXPECT_TRUE(bad_input(graspmap({"report", "empty"}), {"empty", "nothing to report"}));
   graspmap_test::write_text(scratch("empty/a.txt"), "text");
   EXPECT_TRUE(bad_input(graspmap({"report", "empty", "-o", "r.pdf"}), {"r.pdf", ".html"}));
   EXPECT_TRUE(bad_input(graspmap({"report", "empty", "--max-size-mb", "0.1"}), {"--max-size-mb"}));

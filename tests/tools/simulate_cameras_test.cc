@@ -139,8 +139,8 @@ TEST(SimulateCamerasCommand, UnitsTooFineForTheRangeAreRefused) {
 
 TEST(SimulateCamerasCommand, BadInputIsOneLine) {
   write_ground();
-  EXPECT_TRUE(
-      bad_input(graspmap(cameras({"-o", "rig", "--x", "9"})), {"ground.ply", "no ground", "9, 0"}));
+  EXPECT_TRUE(bad_input(graspmap(cameras({"-o", "rig", "--x", "9"})),
+                        {"ground.ply", "no surface", "9, 0"}));
   EXPECT_TRUE(bad_input(graspmap(cameras({"-o", "rig", "--rig", "scare"})), {"scar-e"}));
   write_text(scratch("bad.yaml"), "cameras: []\n");
   EXPECT_TRUE(bad_input(graspmap(cameras({"-o", "rig", "--rig", "bad.yaml"})), {"bad.yaml"}));

@@ -195,7 +195,7 @@ TEST(Texture, BadInput) {
   libmap::write_trajectory(scratch("far.tum"), {poses, {}}, true);
   EXPECT_TRUE(refused(graspmap({"texture", "site.ply", "--scan", scan_file(), "--poses", "far.tum",
                                 "-o", "m.obj", "--quiet"}),
-                      {"site.ply", "none of its triangles is seen by any of 3 photographs"}));
+                      {"site.ply", "no triangle is visible in any of the 3 photographs"}));
   EXPECT_EQ(names_in_scratch(), (Words{"far.tum", "site.ply", "six.tum"}));
   ASSERT_TRUE(succeeded(graspmap(texture_words("m.obj") + Words{"--dry-run"})));
   EXPECT_EQ(names_in_scratch(), (Words{"far.tum", "site.ply", "six.tum"}));

@@ -48,7 +48,7 @@ TexturedMesh random_model(bool normals) {
   return model;
 }
 
-// Each triangle of one is one of the other, with the same places, page and colors.
+// Both models have the same triangles, with equal positions, page and colors.
 void expect_same(const TexturedMesh& read, const TexturedMesh& written, double color_tolerance) {
   ASSERT_EQ(read.mesh.triangles.size(), written.mesh.triangles.size());
   ASSERT_EQ(read.mesh.vertices.size(), written.mesh.vertices.size());
