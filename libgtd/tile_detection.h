@@ -23,8 +23,8 @@ namespace libgtd {
 // `envelope`).
 bool follows_thesis(Method method);
 
-// Plane fit of a method: `climblab` uses the least-squares plane of its source, our methods the
-// robust plane.
+// Plane fit of a method: `thesis` and `envelope` as in the author's program, `climblab` by least
+// squares as in its source, the others robust.
 PlaneMethod plane_method(Method method);
 
 // Width of a tile in voxels. Throws Error naming tile_size_m if it is out of range.

@@ -33,12 +33,12 @@ void bind(libmap::ParameterTable& table, EngagementOptions& options);
 enum class SpineSharing { best, equally };
 
 // Convex set of forces that a contact can exert on the gripper; it contains 0. A spine is in the
-// corner between the ground and its facet. Both bear it, each with at most `limit_n` and inside a
-// pyramid of eight edges in Coulomb's cone, exact in the plane of normal and drag. Forces in N.
+// corner between the ground and its facet. Its force is the sum of one force from each of them,
+// both at most `limit_n` and inside a pyramid of eight edges in Coulomb's cone, exact in the plane
+// of normal and drag. Forces in N.
 class BearingContact {
  public:
-  // Law `asperities`: `leans_rad` contains psi of each spine that meets a facet, or a single 0 for
-  // a link.
+  // Law `asperities`: `leans_rad` is psi of each spine that meets a facet, or one 0 for a link.
   BearingContact(const GripContact& contact, std::vector<double> leans_rad, double friction,
                  double limit_n);
   // Law `adhesion`: `limit_n` is the limit of this finger.

@@ -58,8 +58,8 @@ TEST_F(ScoreStoreHostile, APlanOfOtherTiles) {
   const auto expect_refused = [](const std::function<void(nlohmann::json & index)>& change) {
     const std::string plan = content("m.tiles/progress/plan.json");
     change_plan([&](nlohmann::json& json) { change(json.at("index")); });
-    EXPECT_TRUE(bad_input(
-        score(), {"m.tiles/progress/plan.json: tile_voxels and lattice", "--force"}));
+    EXPECT_TRUE(
+        bad_input(score(), {"m.tiles/progress/plan.json: tile_voxels and lattice", "--force"}));
     write_text(scratch("m.tiles/progress/plan.json"), plan);
   };
   expect_refused([](nlohmann::json& index) { index.at("tile_voxels") = 21; });
