@@ -104,7 +104,8 @@ ParameterTable ground_parameters(SiteGround& ground) {
   table.add("size_y_m", ground.size_y_m, ground_size_range, "length along y, m");
   table.add("unevenness_m", ground.unevenness_m, Range{0.0, 1.0},
             "maximum height of random relief, m");
-  table.add("tilt_deg", ground.tilt_deg, Range{0.0, 135.0}, "tilt, degrees; 90: a vertical wall");
+  table.add("tilt_deg", ground.tilt_deg, Range{0.0, 135.0},
+            "tilt of the ground, degrees; 90: a wall");
   table.add("texture", ground.texture,
             {{"soil", GroundTexture::soil},
              {"rock", GroundTexture::rock},
@@ -126,9 +127,9 @@ ParameterTable field_point_parameters(FieldPointOptions& options) {
   ParameterTable table;
   table.add("count", options.count, Range{1.0, 10'000.0}, "number of locations");
   table.add("min_height_m", options.min_height_m, not_negative,
-            "minimum height above the ground, m");
+            "minimum height of locations above the ground, m");
   table.add("radius_m", options.radius_m, Range{0.005, 1.0},
-            "radius of the neighborhood that determines the kind, m");
+            "radius of the neighborhood that determines the kind of a location, m");
   return table;
 }
 

@@ -324,9 +324,9 @@ void describe(ResultTable& table, const TextureReport& report) {
   table.add("skipped_frames", report.skipped.size(), "frames that could not be used");
   describe(table, static_cast<const TextureCounts&>(report));
   table.add("color_spread_before", exposure.spread_before,
-            "spread of a location's colors between photographs");
+            "standard deviation of the log color of a location between photographs");
   table.add("color_spread", exposure.spread,
-            "spread of a location's colors between photographs, exposure corrected");
+            "standard deviation of the log color of a location, exposure corrected");
   table.add("exposure_gains", gains, "gain of red, green and blue of each photograph");
   table.add("vignetting", exposure.vignetting, "coefficients of the vignetting");
 }
