@@ -245,7 +245,7 @@ MatchResidual match_residual(const FrameFeatures& a, const FrameFeatures& b,
                                         in_a.ray.cast<double>(), static_cast<double>(in_a.depth_m));
   result.residual = projection.residual;
   const Eigen::Matrix3d rotation = camera_from_base.linear() * a_from_b.linear();
-  // Noise of b's point: across its ray by the pixel, along it by the depth.
+  // Noise of b's point: pixel noise perpendicular to its ray, depth noise along it.
   const double lateral =
       static_cast<double>(in_b.depth_m) * static_cast<double>(in_b.pixel_noise_px) / camera_b.fx;
   const Eigen::Vector3d ray_in_b = in_b.ray.cast<double>().homogeneous();

@@ -17,7 +17,7 @@ namespace libmap {
 
 // Corners counter-clockwise in the x-y plane, starting at the minimum of x and y. Edge a (y = min)
 // leads from the first to the second corner, b (x = max) to the third, c (y = max) to the fourth,
-// d (x = min) back.
+// d (x = min) to the first.
 struct SiteCorners {
   std::array<Eigen::Vector2d, 4> corners{};
 };

@@ -362,9 +362,9 @@ void bind(ParameterTable& table, MeshCleaningOptions& options) {
   table.add("merge_distance_m", options.merge_distance_m, not_negative,
             "maximum distance of vertices that are merged; 0: 1e-7 of the mesh's size");
   table.add("min_island_area_m2", options.min_island_area_m2, not_negative,
-            "components with a smaller area, m2, are dropped");
+            "minimum area of a component, m2; smaller components are dropped");
   table.add("min_island_share", options.min_island_share, zero_to_one,
-            "components smaller than this share of the largest are dropped");
+            "minimum area of a component relative to the largest; smaller components are dropped");
   table.add("max_hole_m", options.max_hole_m, not_negative,
             "maximum diameter of filled holes; outer boundaries stay open");
   table.add("smoothing_iterations", options.smoothing_iterations, not_negative,

@@ -221,7 +221,7 @@ TEST(Crop, YawTurnsTheLevelFrame) {
 }
 
 TEST(Crop, BorderOfWhiteTriangles) {
-  // A fine floor, painted.
+  // A fine mesh of a floor with painted colors.
   TriangleMesh mesh;
   constexpr std::uint32_t count = 250;
   const Pose map_from_site = make_pose_from_rpy({5, 6, 7}, {3, 5, -30});

@@ -227,7 +227,7 @@ TEST_P(Reconstruction, GapsAreLeftOpen) {
       cloud.normals.push_back(full.normals[n]);
     }
   const TriangleMesh mesh = reconstruct(cloud, cells_of(0.01)).mesh;
-  EXPECT_EQ(cleaned_report(mesh).boundaries.size(), 2U);  // the gap is wider than holes are filled
+  EXPECT_EQ(cleaned_report(mesh).boundaries.size(), 2U);  // the gap is wider than filled holes
   for (const Eigen::Vector3d& vertex : mesh.vertices)
     EXPECT_GT(vertex.head<2>().norm(), 0.1 - 0.025);
 }
