@@ -325,13 +325,13 @@ TEST(BagCommand, BadBagsOfRos2AreOneLine) {
     words.insert(words.begin(), "convert");
     EXPECT_TRUE(bad_input(graspmap(words), parts));
   };
-  says({"map.csv", "-o", "out.db3"}, {"out.db3", "is no format of a bag", ".mcap"});
+  says({"map.csv", "-o", "out.db3"}, {"out.db3", "not a bag format", ".mcap"});
   says({"map.csv", "-o", "out.zip"}, {"out.zip", ".zip"});
   says({"map.csv", "-o", "out", "--cell-size", "1", "--compression", "lz4"},
        {"compression", "must be none"});
   says({"map.csv", "-o", "out.mcap", "--cell-size", "1", "--compression", "bz2"}, {"bz2", "zstd"});
   says({"map.csv", "-o", "out.mcap", "--cell-size", "1", "--stamp", "4000000000"},
-       {"ROS has no such time", "2^31"});
+       {"outside ROS's range of time", "2^31"});
   says({"map.csv", "-o", "out", "--cell-size", "-1"}, {"--cell-size"});
   says({"good.mcap", "-o", "out.mcap"}, {"something else than a bag"});
   says({"good.mcap", "-o", "out"}, {"topics of images is none"});
@@ -343,7 +343,7 @@ TEST(BagCommand, BadBagsOfRos2AreOneLine) {
   write_text(scratch("open/bag_0.db3"), content("good/bag_0.db3").substr(0, 5000));
   EXPECT_TRUE(bad_input(graspmap({"info", "open"}), {"open/bag_0.db3"}));
   write_text(scratch("open/cut.mcap"), content("good.mcap").substr(0, 500));
-  EXPECT_TRUE(bad_input(graspmap({"info", "open/cut.mcap"}), {"open/cut.mcap", "is cut off"}));
+  EXPECT_TRUE(bad_input(graspmap({"info", "open/cut.mcap"}), {"open/cut.mcap", "is truncated"}));
   fs::remove_all(scratch("open"));
   EXPECT_EQ(graspmap_test::names_in_scratch(), before);
 }
@@ -422,7 +422,7 @@ TEST(BagCommand, WhatIsABagIsDecidedByInputAndOutput) {
   }
   // The folder of a rig becomes a bag alone.
   says({"rig", "-o", "out"}, {"rig/rig.yaml", "cameras"});
-  says({"rig", "-o", "out.pcd"}, {"out.pcd", "is no format of a bag"});
+  says({"rig", "-o", "out.pcd"}, {"out.pcd", "not a bag format"});
   // Without an extension: one map becomes a bag; several files and poses do not.
   says({"cloud.csv", "-o", "out"}, {"cloud.csv: score", "an output without an extension is a bag"});
   says({"map.csv", "map.ply", "-o", "out"}, {"error: out: extension is missing"});
@@ -495,7 +495,7 @@ TEST(BagCommand, BadInputIsOneLineAndLeavesNothing) {
   says({"terrain.pcd", "-o", "out.bag"}, {"terrain.pcd: score: no such field"});
   says({"map.csv", "-o", "out.bag", "--footholds", "map.csv"}, {"approach_x"});
   says({"map.csv", "-o", "out.bag", "--footholds", "f.csv"}, {"approach of foothold 1"});
-  says({"map.csv", "-o", "out.bag", "--stamp", "-1"}, {"ROS has no such time"});
+  says({"map.csv", "-o", "out.bag", "--stamp", "-1"}, {"outside ROS's range of time"});
   says({"map.csv", "-o", "out.bag", "--compression", "zip"}, {"zip", "lz4"});
   says({"map.csv", "-o", "out.bag", "--topic", "/a"}, {"--topic", "not for a map"});
   says({"map.csv", "-o", "out.bag", "--rig", "r"}, {"--rig", "not for a map"});
@@ -506,8 +506,8 @@ TEST(BagCommand, BadInputIsOneLineAndLeavesNothing) {
   says({"rig", "-o", "out.bag", "--terrain", "t"}, {"--terrain", "not for a rig's folder"});
   fs::remove(scratch("rig"));
   write_text(scratch("cut.bag"), content("good.bag").substr(0, 5000));
-  says({"cut.bag", "-o", "out"}, {"cut.bag: is broken or cut off"});
-  EXPECT_TRUE(bad_input(graspmap({"info", "cut.bag"}), {"cut.bag: is broken or cut off"}));
+  says({"cut.bag", "-o", "out"}, {"cut.bag: is damaged or truncated"});
+  EXPECT_TRUE(bad_input(graspmap({"info", "cut.bag"}), {"cut.bag: is damaged or truncated"}));
   fs::remove(scratch("cut.bag"));
   EXPECT_EQ(graspmap_test::names_in_scratch(), before);
 }

@@ -101,7 +101,7 @@ TEST(InfoScan, VerifyListsWhatTheGraphLeavesOut) {
   const ProgramResult result = graspmap({"info", "a.db", "--verify"});
   expect_broken(result, "3 parts are broken, in 3 nodes");
   for (const char* line :
-       {"node 1, part Node.pose", "node 2, part Node.env_sensors, reason is a text",
+       {"node 1, part Node.pose", "node 2, part Node.env_sensors, reason is text",
         "node 3, part Data, reason the node has no row"})
     EXPECT_NE(result.standard_output.find(line), std::string::npos) << line;
   // Without --verify such a scan can still be looked at.
@@ -137,7 +137,7 @@ TEST(InfoScan, WhatIsNoScan) {
   write_text(scratch("empty.db"), "");
   EXPECT_TRUE(bad_input(graspmap({"info", "empty.db"}), {"empty.db: is empty: 0 bytes"}));
   write_text(scratch("text.db"), "hello");
-  EXPECT_TRUE(bad_input(graspmap({"info", "text.db"}), {"text.db: is no scan"}));
+  EXPECT_TRUE(bad_input(graspmap({"info", "text.db"}), {"text.db: is not a scan"}));
   execute(scratch("other.db"), "CREATE TABLE T (id INTEGER)");
   EXPECT_TRUE(bad_input(graspmap({"info", "other.db"}), {"other.db", "no table Node"}));
   EXPECT_TRUE(bad_input(graspmap({"info", "none.db"}), {"none.db: no such file"}));

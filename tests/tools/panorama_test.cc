@@ -172,7 +172,7 @@ TEST(PanoramaCommand, BadInputIsOneLineAndLeavesNothing) {
     return graspmap({"fuse", folder, "-o", "cloud.pcd", "--strict"});
   };
   EXPECT_TRUE(bad_input(run("none"), {"none: no such file"}));
-  EXPECT_TRUE(bad_input(run("run/rig.yaml"), {"run/rig.yaml: is no scan"}));
+  EXPECT_TRUE(bad_input(run("run/rig.yaml"), {"run/rig.yaml: is not a scan"}));
   EXPECT_TRUE(bad_input(graspmap({"fuse", "run", "-o", "cloud.xyz"}), {"cloud.xyz"}));
   EXPECT_TRUE(bad_input(graspmap({"fuse", "run", "-o", "c.pcd", "--rig", "no.yaml"}),
                         {"no.yaml: no such file"}));

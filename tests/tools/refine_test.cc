@@ -297,7 +297,7 @@ TEST(RefineCalibration, IsWrittenAndApplied) {
   libmap::write_text(scratch("other.yaml"), libmap::to_yaml({.camera = camera}));
   EXPECT_TRUE(bad_input(
       graspmap({"fuse", "scan.db", "--calibration", "other.yaml", "-o", "c.ply", "--quiet"}),
-      {"camera is 320 x 264: the calibration is of another size (must be 321 x 264)"}));
+      {"camera is 320 x 264: size differs from the calibration (must be 321 x 264)"}));
 }
 
 // One link that cannot be used does not end it, nor does a node without a calibration.

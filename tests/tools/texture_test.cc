@@ -209,8 +209,9 @@ TEST(Texture, PosesThatTheScanLacksAreNamed) {
     return graspmap(Words{"texture", "site.ply", "--scan", "scan.db", "-o", "m.glb"} + more);
   };
   graspmap_test::execute(scan, "UPDATE Node SET ground_truth_pose = NULL WHERE id = 1");
-  EXPECT_TRUE(refused(texture({"--frame", "ground-truth"}),
-                      {"error: scan.db: common poses is 2: too few poses", "(must be >= 3)"}));
+  EXPECT_TRUE(
+      refused(texture({"--frame", "ground-truth"}),
+              {"error: scan.db: common poses is 2: the trajectories have too", "(must be >= 3)"}));
   graspmap_test::execute(scan, "UPDATE Node SET ground_truth_pose = NULL");
   EXPECT_TRUE(refused(texture({"--frame", "ground-truth"}),
                       {"error: scan.db: --frame is ground-truth: the scan has no ground truth"}));

@@ -230,7 +230,7 @@ TEST(TexturedMeshIo, FilesThatAreBroken) {
     graspmap_test::write_text(folder / "forged.glb", forged);
     const libmap::Error error =
         error_of([&] { libmap::read_textured_mesh(folder / "forged.glb"); });
-    EXPECT_TRUE(at == 12U || error.context().field == "length of its text") << error.what();
+    EXPECT_TRUE(at == 12U || error.context().field == "length of the JSON text") << error.what();
   }
   TexturedMesh wrong = model;
   wrong.page_of_triangle[3] = 2;
