@@ -66,7 +66,7 @@ struct GraphNode {
   double stamp_s = 0.0;
   std::string label{};
   std::optional<Pose> odometry_from_base{};
-  std::optional<Pose> truth_from_base{};            // ground truth, in a frame of its own
+  std::optional<Pose> truth_from_base{};            // ground truth, in its own frame
   std::optional<std::array<double, 6>> velocity{};  // m/s and rad/s: x y z roll pitch yaw
   std::optional<GpsFix> gps{};
 };

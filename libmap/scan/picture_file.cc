@@ -42,9 +42,9 @@ std::vector<CameraView> read_pictures(const ScanSource& scan, int node, FramePar
 
 void bind(ParameterTable& table, ViewSelectionOptions& options) {
   table.add("radius_m", options.radius_m, not_negative,
-            "distance within which only one of several similar pictures is kept, m");
+            "distance within which only one of several similar images is kept, m");
   table.add("angle_deg", options.angle_deg, {0.0, 180.0},
-            "maximum angle between the optical axes of similar pictures, degrees");
+            "maximum angle between the optical axes of similar images, degrees");
 }
 
 namespace {

@@ -76,9 +76,9 @@ class TileStore {
 
   // Locks the plan; waits until it is free.
   FileLock lock() const;
-  // Throws Error (failed) if a process works on a share. The caller holds the lock.
+  // Throws Error (failed) if a process works on a share. Call it under lock().
   void require_idle() const;
-  // Removes plan, journals, tiles and index. The caller holds the lock.
+  // Removes plan, journals, tiles and index. Call it under lock().
   void clear() const;
   // Removes the folder if it contains no plan and no tiles.
   void remove_if_bare() const;
