@@ -69,7 +69,7 @@ TEST(InfoScan, Plainly) {
     EXPECT_NE(result.standard_output.find(line), std::string::npos) << line;
 }
 
-// Exit code 3 and one line on stderr; what was found stands on stdout.
+// Exit code 3 and one line on stderr; stdout has the list of faults.
 void expect_broken(const ProgramResult& result, const std::string& what,
                    const std::string& scan = "a.db") {
   EXPECT_EQ(result.exit_code, 3);
@@ -126,7 +126,7 @@ TEST(InfoScan, SessionsAndErrorsOfTheirOdometry) {
           "velocity, NULL, gps, env_sensors, NULL FROM Node");
   const Json json = info("a.db");
   EXPECT_EQ(json.at("sessions").size(), 2U);
-  // The way from one session to the other is none.
+  // The distance between sessions does not count.
   EXPECT_NEAR(json.at("poses").at("odometry").at("path_length_m"), 4 * std::hypot(0.5, 0.125),
               1e-6);
   EXPECT_TRUE(json.at("trajectory_error").contains("odometry 0"));

@@ -1,4 +1,4 @@
-// What `graspmap score` cannot use: exit code 3, one line that names it, no output.
+// Invalid inputs of `graspmap score`: exit code 3, one line that names the input, no output.
 #include <gtest/gtest.h>
 
 #include <cmath>

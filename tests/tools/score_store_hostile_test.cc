@@ -1,4 +1,4 @@
-// What `graspmap score` makes of a store whose plan was changed by hand, and of tiles without end.
+// `graspmap score` with a store whose plan was edited, and with too many tiles.
 #include <gtest/gtest.h>
 
 #include <functional>

@@ -1,5 +1,5 @@
-// A map in tiles is the map in one file, byte for byte, however the terrain is cut into files and
-// tiles, and however often the run was killed.
+// A map in tiles equals the map in one file, byte for byte, for any division of the terrain into
+// files and tiles and any number of killed runs.
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/wait.h>
@@ -94,7 +94,7 @@ std::map<std::string, std::string> files_in(const std::string& folder) {
   return files;
 }
 
-// What a finished store holds for those who read it.
+// Files of a finished store, without those of its progress.
 std::map<std::string, std::string> map_files(const std::string& store) {
   std::map<std::string, std::string> files = files_in(store);
   std::erase_if(files, [](const auto& file) { return file.first.starts_with("progress/"); });
@@ -319,14 +319,14 @@ TEST_F(ScoreStoreAgain, DamagedIndexAndJournalAreMended) {
   const auto files = map_files("m.tiles");
   graspmap_test::write_text(scratch("m.tiles/index.json"), "{\"format\"");
   std::string journal = content("m.tiles/progress/1_of_1.jsonl");
-  // The last line is torn, and one in the middle is not JSON.
+  // The last line is truncated, and one in the middle is not JSON.
   journal.resize(journal.size() - 20);
   journal.replace(journal.find("\"sha256\""), 3, "???");
   graspmap_test::write_text(scratch("m.tiles/progress/1_of_1.jsonl"), journal);
   ASSERT_TRUE(succeeded(score("in", "m.tiles")));
   EXPECT_EQ(map_files("m.tiles"), files);
   EXPECT_EQ(journal_lines("m.tiles"), 51u);
-  // Without the plan nothing says what the tiles are of.
+  // Without the plan the inputs of the tiles are unknown.
   graspmap_test::write_text(scratch("m.tiles/progress/plan.json"), "{}");
   EXPECT_TRUE(bad_input(score("in", "m.tiles"), {"plan.json"}));
   fs::remove_all(scratch("m.tiles/progress"));
@@ -402,8 +402,8 @@ TEST_F(ScoreStoreAgain, ReadersSayWhatIsMissing) {
   EXPECT_EQ(map_files("m.tiles"), files);
 }
 
-// Starts `graspmap score in -o m.tiles` and kills it as soon as `is_time` says so. False if it
-// ended by itself.
+// Starts `graspmap score in -o m.tiles` and kills it when `is_time` returns true. Returns false if
+// it ended before.
 template <typename IsTime>
 bool score_killed(const IsTime& is_time) {
   const std::string program = (graspmap_test::build_folder() / "graspmap").string();
@@ -431,7 +431,7 @@ TEST_F(ScoreStoreAgain, KilledAtAnyMoment) {
   ASSERT_TRUE(succeeded(score("in", "n.tiles", {"--points-at-once", "2500"})));
   const auto files = map_files("n.tiles");
   fs::remove_all(scratch("m.tiles"));
-  // While it plans, then after more and more tiles; each run goes on where the last was killed.
+  // Killed while it plans, then after more and more tiles; each run resumes the last one.
   int killed = 0;
   killed += score_killed([] { return fs::exists(scratch("m.tiles")); }) ? 1 : 0;
   killed += score_killed([] { return fs::exists(scratch("m.tiles/progress/plan.json")); }) ? 1 : 0;
@@ -441,7 +441,7 @@ TEST_F(ScoreStoreAgain, KilledAtAnyMoment) {
   EXPECT_FALSE(fs::exists(scratch("m.tiles/index.json")));
   ASSERT_TRUE(succeeded(score("in", "m.tiles", {"--points-at-once", "2500"})));
   EXPECT_EQ(map_files("m.tiles"), files);
-  // No tile that was done was done again.
+  // No completed tile was made again.
   EXPECT_EQ(journal_lines("m.tiles"), 49u);
 }
 

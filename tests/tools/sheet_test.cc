@@ -1,4 +1,4 @@
-// Sheets of several files, tables of several maps and the sections of mask, as a user calls them.
+// Sheets of several files, tables of several maps, and sections of masks by the commands.
 #include <gtest/gtest.h>
 
 #include "libgtd/gripper/gripper_io.h"
