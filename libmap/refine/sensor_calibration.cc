@@ -516,7 +516,7 @@ std::vector<std::string> findings(const SensorCalibration& calibration,
     sentences.push_back(
         of_camera(n) + "depth taken " + to_fixed_text(std::abs(delay_ms), 1) +
         within(&CameraTiming::depth_delay_s) + " ms " + (delay_ms < 0.0 ? "before" : "after") +
-        " color, rows of a image exposed over " + to_fixed_text(1e3 * timing.rolling_shutter_s, 1) +
+        " color, rows of an image exposed over " + to_fixed_text(1e3 * timing.rolling_shutter_s, 1) +
         within(&CameraTiming::rolling_shutter_s) + " ms: corrected");
   }
   return sentences;

@@ -491,7 +491,7 @@ TEST(BagCommand, BadInputIsOneLineAndLeavesNothing) {
   says({"good.bag", "-o", "out.xyz"}, {"out.xyz"});
   says({"good.bag", "-o", "out.bag"}, {"cannot both be bags"});
   says({"good.bag", "-o", "out", "--stamp", "noon"}, {"noon"});
-  says({"terrain.pcd", "-o", "out"}, {"terrain.pcd: score: no such field", "bag of ROS 2"});
+  says({"terrain.pcd", "-o", "out"}, {"terrain.pcd: score: ", "bag of ROS 2"});
   says({"terrain.pcd", "-o", "out.bag"}, {"terrain.pcd: score: no such field"});
   says({"map.csv", "-o", "out.bag", "--footholds", "map.csv"}, {"approach_x"});
   says({"map.csv", "-o", "out.bag", "--footholds", "f.csv"}, {"approach of foothold 1"});
@@ -499,7 +499,7 @@ TEST(BagCommand, BadInputIsOneLineAndLeavesNothing) {
   says({"map.csv", "-o", "out.bag", "--compression", "zip"}, {"zip", "lz4"});
   says({"map.csv", "-o", "out.bag", "--topic", "/a"}, {"--topic", "with a map"});
   says({"map.csv", "-o", "out.bag", "--rig", "r"}, {"--rig", "with a map"});
-  says({"good.bag", "-o", "out.pcd", "--terrain", "terrain.pcd"}, {"--terrain", "is written"});
+  says({"good.bag", "-o", "out.pcd", "--terrain", "terrain.pcd"}, {"--terrain", "requires a bag"});
   says({"good.bag", "-o", "out.pcd", "--rig", "r"}, {"--rig", "cloud output"});
   fs::create_directory(scratch("rig"));
   says({"rig", "-o", "out.bag", "--stamp", "5"}, {"--stamp", "--stamp-offset"});
