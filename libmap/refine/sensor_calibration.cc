@@ -513,11 +513,12 @@ std::vector<std::string> findings(const SensorCalibration& calibration,
                  ? " +- " + to_fixed_text(1e3 * deviations.timing[n].*time, 1)
                  : std::string();
     };
-    sentences.push_back(
-        of_camera(n) + "depth taken " + to_fixed_text(std::abs(delay_ms), 1) +
-        within(&CameraTiming::depth_delay_s) + " ms " + (delay_ms < 0.0 ? "before" : "after") +
-        " color, rows of an image exposed over " + to_fixed_text(1e3 * timing.rolling_shutter_s, 1) +
-        within(&CameraTiming::rolling_shutter_s) + " ms: corrected");
+    sentences.push_back(of_camera(n) + "depth taken " + to_fixed_text(std::abs(delay_ms), 1) +
+                        within(&CameraTiming::depth_delay_s) + " ms " +
+                        (delay_ms < 0.0 ? "before" : "after") +
+                        " color, rows of an image exposed over " +
+                        to_fixed_text(1e3 * timing.rolling_shutter_s, 1) +
+                        within(&CameraTiming::rolling_shutter_s) + " ms: corrected");
   }
   return sentences;
 }

@@ -246,7 +246,8 @@ TEST(ConvertPoses, RtabmapsFormatsThereAndBack) {
   fs::create_directory(scratch("model"));
   libmap::write_colmap_model(scratch("model"), {.cameras = {{1, {"PINHOLE", 6, 4, {1, 1, 1, 1}}}},
                                                 .images = {{1, {1, "3.jpg"}}}});
-  EXPECT_TRUE(bad_input(graspmap({"convert", "model/images.txt", "-o", "b.tum"}), {"poses of cameras"}));
+  EXPECT_TRUE(
+      bad_input(graspmap({"convert", "model/images.txt", "-o", "b.tum"}), {"poses of cameras"}));
 }
 
 // Each is one line on stderr that names the file and, where there is one, the line.

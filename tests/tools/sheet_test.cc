@@ -53,8 +53,8 @@ TEST(Sheet, BadInputIsOneLine) {
   for (const auto& [flag, name] :
        {std::pair{"--no-legend", "--legend"}, std::pair{"--no-axes", "--axes"},
         std::pair{"--width=300", "--width"}, std::pair{"--camera-target=1,2,3", "--camera-target"}})
-    EXPECT_TRUE(
-        bad_input(graspmap({"render", "a.pcd", "a.pcd", "-o", "s.png", flag}), {name, "a single file"}));
+    EXPECT_TRUE(bad_input(graspmap({"render", "a.pcd", "a.pcd", "-o", "s.png", flag}),
+                          {name, "a single file"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("s.png")));
 }
 
