@@ -22,7 +22,7 @@ std::vector<Eigen::Vector3f> to_float(const std::vector<Eigen::Vector3d>& points
   return floats;
 }
 
-// Positions alone: the program's downsampling drops all else that it does not use later.
+// Downsamples positions only: the author's program drops all other fields here.
 PointCloud downsampled(const PointCloud& cloud, double leaf_m) {
   PointCloud thin;
   thin.viewpoint = cloud.viewpoint;
@@ -35,7 +35,7 @@ PointCloud downsampled(const PointCloud& cloud, double leaf_m) {
 struct DetectionStages {
   int tile_voxels = 0;
   std::optional<double> downsampling_leaf_m;    // only `thesis` downsamples
-  std::optional<RegressionPlaneOptions> plane;  // nothing: the cloud is in the terrain frame
+  std::optional<RegressionPlaneOptions> plane;  // nullopt: the cloud is in the terrain frame
   std::optional<InterpolationOptions> interpolation;
   double voxel_size_m = 0.01;
   bool thesis_lattice = false;
@@ -46,7 +46,7 @@ struct DetectionStages {
 
 std::optional<InterpolationOptions> interpolation_of(const Scenario& scenario) {
   if (!scenario.interpolation) return std::nullopt;
-  // A node in each voxel: below its edge, so that rounding leaves none out.
+  // Spacing below the voxel edge, so that rounding leaves no voxel without a node.
   return InterpolationOptions{.method = follows_thesis(scenario.method)
                                             ? InterpolationMethod::thesis
                                             : InterpolationMethod::corrected,
@@ -58,7 +58,7 @@ DetectionStages stages_of(const DetectionOptions& options, GripperMask mask) {
   const Scenario& scenario = options.scenario;
   const bool thesis = follows_thesis(scenario.method);
   const bool fits_plane = options.plane == PlaneSource::fit;
-  // Obstacles of the whole map only: a face may cross any number of tiles.
+  // Obstacles need the whole map, because a face may cross any number of tiles.
   const bool obstacles = scenario.evaluates_obstacles() && options.share.count == 1;
   return {.tile_voxels = tile_voxels(scenario),
           .downsampling_leaf_m =
@@ -78,16 +78,16 @@ DetectionStages stages_of(const DetectionOptions& options, GripperMask mask) {
           .mask = std::move(mask)};
 }
 
-// The terrain in the terrain frame.
+// Transforms the cloud into the terrain frame.
 PointCloud prepare_terrain(const PointCloud& input, const DetectionStages& stages,
                            DetectionResult& result) {
-  // Normals with random sides are no outside of the surface.
+  // Normals with random sides do not indicate the outside of the surface.
   const auto with_sound_normals = [](PointCloud cloud, const RegressionPlane& plane) {
     if (plane.opposing_normals > libmap::max_opposing_share) cloud.normals.clear();
     return cloud;
   };
   if (!stages.plane)
-    // Points in one place or on a line are no terrain in any frame.
+    // Coincident or collinear points are not a terrain in any frame.
     return with_sound_normals(input,
                               fit_regression_plane(input, {.method = PlaneMethod::corrected}));
   PointCloud cloud = input;
@@ -104,7 +104,7 @@ PointCloud prepare_terrain(const PointCloud& input, const DetectionStages& stage
   });
 }
 
-// The terrain with its gaps filled.
+// Fills the gaps of the terrain.
 PointCloud interpolated_surface(const PointCloud& terrain, const InterpolationOptions& options,
                                 DetectionResult& result) {
   InterpolationResult filled = interpolate(terrain, options);
@@ -112,7 +112,7 @@ PointCloud interpolated_surface(const PointCloud& terrain, const InterpolationOp
   result.interpolated_points = filled.cloud.size();
   PointCloud surface;
   surface.positions = std::move(filled.cloud.positions);
-  // The author's program goes on with the grid alone; measured points are worth keeping.
+  // The author's program continues with the grid only. We keep the measured points.
   if (options.method == InterpolationMethod::thesis) return surface;
   if (terrain.has_normals()) {
     surface.normals.assign(surface.size(), Eigen::Vector3f::Zero());
@@ -123,7 +123,7 @@ PointCloud interpolated_surface(const PointCloud& terrain, const InterpolationOp
   return surface;
 }
 
-// Returns their number.
+// Sets the obstacles of the map and returns the number of obstacle voxels.
 std::size_t evaluate_obstacles(const ObstacleOptions& options, GraspabilityMap& map) {
   std::vector<Voxel> voxels;
   std::vector<float> slopes_deg;
@@ -147,7 +147,7 @@ std::size_t evaluate_obstacles(const ObstacleOptions& options, GraspabilityMap& 
 void bind(libmap::ParameterTable& table, DetectionOptions& options) {
   bind(table, options.scenario);
   table.add("plane", options.plane, {{"fit", PlaneSource::fit}, {"none", PlaneSource::none}},
-            "fit: regression plane; none: the cloud is already in the terrain frame");
+            "fit: fits the regression plane; none: the cloud is in the terrain frame");
 }
 
 Gripper gripper_of(const DetectionOptions& options) {
@@ -161,7 +161,7 @@ DetectionResult detect(const PointCloud& terrain, const DetectionOptions& option
   options.scenario.check();
   if (terrain.empty()) throw libmap::Error("the cloud has no points");
   const Scenario& scenario = options.scenario;
-  // Before any work: a voxel size that does not suit the gripper shows here.
+  // Rejects a voxel size that does not fit the gripper before any work.
   const DetectionStages stages =
       stages_of(options, make_gripper_mask(gripper_of(options), mask_options(scenario)));
   DetectionResult result;
@@ -180,7 +180,7 @@ DetectionResult detect(const PointCloud& terrain, const DetectionOptions& option
   });
   result.occupied_voxels = grid.voxels.size();
   result.lone_voxels = count_lone(grid.voxels);
-  // The programs that came before score any cloud, which is what they are here for.
+  // The earlier methods score any cloud, as their programs do.
   const Method method = stages.tiles.graspable.method;
   if (method == Method::corrected || method == Method::calibrated)
     require_dense(result.lone_voxels, result.occupied_voxels, stages.voxel_size_m,
@@ -220,14 +220,14 @@ void describe(libmap::ResultTable& table, const DetectionResult& result) {
     return is_there ? std::optional(value) : std::nullopt;
   };
   const bool has_grid = result.grid_spacing_m > 0.0;
-  table.add("lattice_origin_m", result.map.lattice.origin_m, "corner of voxel (0, 0, 0)");
-  table.add("input_points", result.points, "points of the terrain");
+  table.add("lattice_origin_m", result.map.lattice.origin_m, "lowest corner of voxel (0, 0, 0)");
+  table.add("input_points", result.points, "points of the input");
   table.add("plane_rmse_m", result.plane ? std::optional(result.plane->rmse_m) : std::nullopt,
             "root mean square distance of the points from the regression plane");
   table.add(
       "up_source",
       result.plane ? std::optional(std::string(to_text(result.plane->up_source))) : std::nullopt,
-      "what determined which side of the plane is up");
+      "criterion for the side of the plane that is up");
   table.add("up_normals_share", result.plane ? result.plane->normals_up : std::nullopt,
             "share of the normals that point up");
   table.add("opposing_normals",
@@ -239,18 +239,18 @@ void describe(libmap::ResultTable& table, const DetectionResult& result) {
   table.add("interpolated_points", only_if(has_grid, result.interpolated_points),
             "points after interpolation");
   table.add("interpolation_grid_m", only_if(has_grid, result.grid_spacing_m),
-            "spacing of the grid of interpolation");
+            "spacing of the interpolation grid");
   table.add("occupied_voxels", result.occupied_voxels, "voxels with points");
   table.add("lone_voxels", result.lone_voxels, "occupied voxels without a neighbor");
   table.add("mask_side_voxels", result.mask.side, "side of the gripper mask");
   table.add("mask_layers", result.mask.layers, "layers of the gripper mask");
-  table.add("tiles", result.tiles, "tiles that were scored");
+  table.add("tiles", result.tiles, "scored tiles");
   table.add("scored_voxels", result.map.voxels.size(), "voxels of the map");
   table.add("border_voxels", result.border_voxels, "scored voxels at the border of the terrain");
   table.add("curvature_points", result.curvature_points, "points with a curvature");
   table.add("convex_points", result.convex_points, "points on convex ground");
-  table.add("graspable_voxels", result.graspable_voxels, "scored voxels that can be grasped");
-  table.add("normal_radius_m", result.normal_radius_m, "radius of the fit of normals");
+  table.add("graspable_voxels", result.graspable_voxels, "scored voxels that are graspable");
+  table.add("normal_radius_m", result.normal_radius_m, "radius of the normal fits");
   table.add("unoriented_voxels", only_if(result.map.content.normals, result.unoriented_voxels),
             "voxels without a normal, scored upright");
   table.add("obstacle_voxels", only_if(result.map.content.obstacles, result.obstacle_voxels),

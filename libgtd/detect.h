@@ -1,4 +1,4 @@
-// The whole detection of graspable targets: terrain in, graspability map out ("Graspable Target
+// Detection of graspable targets: computes a graspability map from a point cloud ("Graspable Target
 // Detection for Hexapod Robots", 2023, chapters 2.5 and 3.2).
 #pragma once
 
@@ -19,52 +19,53 @@
 
 namespace libgtd {
 
-// fit: thin the cloud (`thesis` alone), fit the regression plane and carry the cloud into its
-// frame. none: the cloud is already in the terrain frame and taken as it is.
+// Source of the terrain frame. fit: downsamples the cloud (`thesis` only), fits the regression
+// plane and transforms the cloud into its frame. none: the cloud is in the terrain frame already.
 enum class PlaneSource { fit, none };
 
 struct DetectionOptions {
   Scenario scenario;
-  std::optional<Gripper> gripper;  // default: the one that the scenario names
+  std::optional<Gripper> gripper;  // default: the gripper named by the scenario
   PlaneSource plane = PlaneSource::fit;
-  std::optional<Eigen::Vector3d> up;  // in the cloud's frame: which side of the plane is outside
+  std::optional<Eigen::Vector3d> up;  // points out of the ground, in the cloud's frame
   double max_tilt_deg = 90.0;         // between `up` and the plane's normal
-  libmap::TileShare share;            // score only these tiles
+  libmap::TileShare share;            // tiles to score
 };
-// The keys of the scenario, and `plane`.
+// Binds the keys of the scenario and `plane`.
 void bind(libmap::ParameterTable& table, DetectionOptions& options);
 
 struct DetectionResult {
   GraspabilityMap map;
   GripperMask mask;
   std::optional<RegressionPlane> plane;
-  std::size_t points = 0;              // of the input
-  std::size_t downsampled_points = 0;  // after downsampling, which only `thesis` does
+  std::size_t points = 0;              // input points
+  std::size_t downsampled_points = 0;  // after downsampling (`thesis` only)
   std::size_t interpolated_points = 0;
-  double grid_spacing_m = 0.0;  // of the interpolation
+  double grid_spacing_m = 0.0;  // pitch of the interpolation grid
   std::size_t occupied_voxels = 0;
-  std::size_t lone_voxels = 0;  // without an occupied one among their 26 neighbors
+  std::size_t lone_voxels = 0;  // occupied voxels without an occupied neighbor of 26
   Voxel grid_min;
   Voxel grid_max;
-  std::size_t tiles = 0;             // that were scored
-  std::size_t curvature_points = 0;  // whose curvature was measured
+  std::size_t tiles = 0;             // scored tiles
+  std::size_t curvature_points = 0;  // points with a measured curvature
   std::size_t convex_points = 0;
   std::size_t graspable_voxels = 0;
   std::size_t border_voxels = 0;
-  std::size_t unoriented_voxels = 0;  // orientation surface: without a normal, so evaluated upright
-  std::size_t obstacle_voxels = 0;    // of the whole map alone, not of a share
-  std::optional<double> normal_radius_m;  // of the surface, if normals were fitted
+  std::size_t unoriented_voxels = 0;      // orientation surface: no normal, scored upright
+  std::size_t obstacle_voxels = 0;        // 0 for a share of a map
+  std::optional<double> normal_radius_m;  // nullopt if no surface normals were fitted
   libmap::StageTimings timings_s;         // wall time of each step
 };
-// Names the results of a detection (libmap/core/result_table.h).
+// Binds the names of the results (libmap/core/result_table.h).
 void describe(libmap::ResultTable& table, const DetectionResult& result);
 
-// The gripper of `options`: its own, else the scenario's with its overrides. Throws as
+// Returns options.gripper, or else the gripper of the scenario with its overrides. Throws like
 // find_gripper.
 Gripper gripper_of(const DetectionOptions& options);
 
-// Throws Error for an empty cloud, options out of their bounds, points too far apart for the voxels
-// (voxel_grid.h), and what the steps throw.
+// Detects graspable targets in `terrain` (meters). Throws Error for an empty cloud, options out of
+// range, points too sparse for the voxel size (voxel_grid.h), and all errors of the individual
+// stages.
 DetectionResult detect(const libmap::PointCloud& terrain, const DetectionOptions& options,
                        libmap::Progress& progress = libmap::no_progress());
 

@@ -1,4 +1,4 @@
-// Scenario files: a flat YAML map, see data/README.md.
+// Reads scenario files: flat YAML maps, see data/README.md.
 #pragma once
 
 #include <string>
@@ -7,8 +7,8 @@
 
 namespace libgtd {
 
-// The parameters of a scenario, by its name in data/scenarios or a file, and its gripper. Throws
-// Error naming the file and the field: an unknown key, a value outside its bound.
+// Returns the parameters of a scenario and its gripper. `name` is a scenario in data/scenarios or a
+// file. Throws Error naming the file and the field for an unknown key or a value out of range.
 DetectionOptions read_scenario(const std::string& name);
 
 }  // namespace libgtd

@@ -11,10 +11,11 @@ namespace {
 
 constexpr const char* opposing_normals = "opposing_normals";
 
-// The plan's key fits, but something else was changed.
+// The key of the plan matches, but another part of it does not.
 libmap::Error not_of_this_terrain(const std::filesystem::path& plan_file, const char* field) {
-  return libmap::Error("is not of this terrain and these parameters: --force starts again",
-                       {.file = plan_file.string(), .field = field});
+  return libmap::Error(
+      "does not match this terrain and these parameters; use --force to start again",
+      {.file = plan_file.string(), .field = field});
 }
 
 bool has_tiles_of(const TilePlan& plan, const Scenario& scenario) {
@@ -82,7 +83,7 @@ TerrainFrame frame_of(const TilePlan& plan, const DetectionOptions& detection,
 
 void require_in_frame(const libmap::PointCloud& terrain, const TerrainFrame& frame,
                       const std::filesystem::path& plan_file) {
-  // A voxel more, against rounding.
+  // One voxel of margin for rounding.
   const Eigen::Array3d low(frame.min.i - 1.0, frame.min.j - 1.0, frame.min.k - 1.0);
   const Eigen::Array3d high(frame.max.i + 2.0, frame.max.j + 2.0, frame.max.k + 2.0);
   for (const Eigen::Vector3d& point : terrain.positions) {
@@ -100,29 +101,30 @@ void require_appendable(const TilePlan& earlier, const TilePlan& plan,
   const libmap::Manifest& before = earlier.index.manifest;
   const libmap::Manifest& now = plan.index.manifest;
   if (before.parameters != now.parameters || before.version != now.version)
-    refuse("contains tiles of other parameters: --force starts again");
+    refuse("contains tiles of other parameters; use --force to start again");
   if (before.georeference != now.georeference)
-    refuse("has its offset from another first piece: new pieces need names behind it");
+    refuse("has its offset from a different first file: new files must sort after it");
   auto at = plan.terrain.begin();
   for (const TerrainFile& file : earlier.terrain) {
     at = std::find_if(at, plan.terrain.end(),
                       [&](const TerrainFile& one) { return is_same_file(one, file); });
     if (at == plan.terrain.end())
-      refuse("contains tiles of another terrain or gripper: --force starts again");
+      refuse("contains tiles of another terrain or gripper; use --force to start again");
     ++at;
   }
   if (earlier.terrain.size() == plan.terrain.size())
-    refuse("contains tiles of another gripper file: --force starts again");
+    refuse("contains tiles of another gripper file; use --force to start again");
   if (!append)
     refuse("contains tiles of " + std::to_string(earlier.terrain.size()) + " of these " +
            std::to_string(plan.terrain.size()) +
-           " pieces: --append adds the others, --force starts again");
+           " files; use --append to add the others or --force to start again");
   if (detection.plane != PlaneSource::none)
-    refuse("--append needs --plane none: with a fitted plane every new point moves all tiles");
+    refuse("--append requires --plane none: a new point changes the fitted plane and all tiles");
   const Method method = detection.scenario.method;
   if (method != Method::corrected && method != Method::calibrated)
     refuse(
-        "--append needs --method corrected or calibrated: others leave out the terrain's border");
+        "--append requires --method corrected or calibrated: others leave out the border of the "
+        "terrain");
 }
 
 std::vector<StoredTile> untouched_tiles(const std::map<TileNumber, StoredTile>& done,
@@ -168,7 +170,7 @@ bool touches(const TerrainFile& file, const PointsRectangle& wanted, const Terra
                                    (n & 2) == 0 ? file.box.min.y() : file.box.max.y(),
                                    (n & 4) == 0 ? file.box.min.z() : file.box.max.z());
   const libmap::Bounds3d box = libmap::bounds_of(to_terrain(corners, frame).positions);
-  // A voxel, against rounding.
+  // One voxel of margin for rounding.
   const double margin = frame.lattice.voxel_size_m;
   return (box.min.head<2>().array() - margin <= wanted.high.array()).all() &&
          (box.max.head<2>().array() + margin >= wanted.low.array()).all();

@@ -16,7 +16,7 @@ namespace {
 using libmap::PointCloud;
 
 constexpr std::size_t max_stored_tiles = std::size_t{1} << 20U;
-// However few points they have: each takes some memory while it is worked on.
+// Limit for tiles with few points, because each tile in progress takes some memory.
 constexpr std::size_t max_tiles_at_once = std::size_t{1} << 14U;
 
 TileBounds cut(const TileBounds& a, const TileBounds& b) {
@@ -28,10 +28,10 @@ bool is_empty(const TileBounds& columns) {
   return columns.i_begin >= columns.i_end || columns.j_begin >= columns.j_end;
 }
 
-// Tiles that lie together, worked on at once.
+// Neighboring tiles that are processed at once.
 struct Block {
   std::vector<TileNumber> tiles;
-  TileBounds columns;  // around all of them, cut to the terrain's box
+  TileBounds columns;  // around all tiles, clipped to the box of the terrain
 };
 
 class StreamedDetection {
@@ -46,7 +46,7 @@ class StreamedDetection {
         tile_voxels_(tile_voxels(scenario_)),
         halo_(halo_voxels(mask_, scenario_)) {}
 
-  // As libgtd::require_dense, for tiles spread over the wanted ones.
+  // Like libgtd::require_dense, on a sample of tiles spread over the wanted ones.
   void require_dense(const std::vector<TileNumber>& wanted) const {
     constexpr std::size_t max_tiles = 256, max_points = 1'000'000;
     std::size_t lone = 0, voxels = 0;
@@ -65,7 +65,7 @@ class StreamedDetection {
     libgtd::require_dense(lone, voxels, scenario_.voxel_size_m, points);
   }
 
-  // Halves a run of tiles until each part's points are few enough.
+  // Halves a run of tiles until each part has few enough points.
   void run(std::vector<TileNumber> tiles,
            const std::function<void(std::vector<StreamedTile>)>& visit,
            libmap::Progress& progress) {
@@ -83,7 +83,7 @@ class StreamedDetection {
     std::vector<StreamedTile> done;
     for (auto& [number, tile] : results) {
       const auto is_before = [](const MapVoxel& a, const MapVoxel& b) { return a.voxel < b.voxel; };
-      // Parts of a tile come one after the other.
+      // The parts of a tile are appended one after another.
       if (!std::is_sorted(tile.voxels.begin(), tile.voxels.end(), is_before))
         std::sort(tile.voxels.begin(), tile.voxels.end(), is_before);
       done.push_back(std::move(tile));
@@ -116,7 +116,7 @@ class StreamedDetection {
     return points_.count_in(places.low, places.high) <= max_points_;
   }
 
-  // Cut across the longer side, between tiles.
+  // Splits between tiles, across the longer side.
   static std::pair<std::vector<TileNumber>, std::vector<TileNumber>> halves(const Block& block) {
     const auto by_i = [](const TileNumber& tile) { return tile.i; };
     const auto by_j = [](const TileNumber& tile) { return tile.j; };
@@ -137,7 +137,7 @@ class StreamedDetection {
     return parts;
   }
 
-  // A rectangle with too many points is halved as well, while it is wider than its halo.
+  // Also halves a rectangle with too many points, while it is wider than its halo.
   void detect_columns(const TileBounds& columns, const std::vector<TileNumber>& tiles,
                       std::map<TileNumber, StreamedTile>& results) const {
     const int height = columns.i_end - columns.i_begin;
@@ -193,13 +193,13 @@ bool TerrainFrame::drops_normals() const {
 void require_streamable(const DetectionOptions& options) {
   const Method method = options.scenario.method;
   if (follows_thesis(method))
-    throw libmap::Error("needs the whole cloud in memory: write a map in one file, MAP.pcd",
+    throw libmap::Error("requires the whole cloud in memory: write the map to one file, MAP.pcd",
                         {.field = "method", .value = name_of(method)});
   if (options.scenario.interpolation)
-    throw libmap::Error("needs the whole cloud in memory: write a map in one file, MAP.pcd",
+    throw libmap::Error("requires the whole cloud in memory: write the map to one file, MAP.pcd",
                         {.field = "interpolation", .value = "true"});
   if (options.scenario.evaluates_obstacles())
-    throw libmap::Error("needs the whole map in memory: write a map in one file, MAP.pcd",
+    throw libmap::Error("requires the whole map in memory: write the map to one file, MAP.pcd",
                         {.field = "obstacle_height_m",
                          .value = libmap::to_text(options.scenario.obstacle_height_m)});
 }
@@ -243,7 +243,7 @@ std::vector<TileNumber> tiles_of(const TerrainFrame& frame, int tile_voxels,
   box.voxels = {frame.min, frame.max};
   std::vector<TileNumber> numbers;
   const std::vector<TileBounds> all = make_tiles(box, tile_voxels);
-  // Each is a line of a journal, and a file if it has voxels.
+  // A tile is a line of a journal, and a file if it has voxels.
   if (all.size() > max_stored_tiles)
     throw libmap::Error(
         "too small: the tile store would have " + std::to_string(all.size()) + " tiles",

@@ -1,6 +1,6 @@
-// The detection of a terrain that does not fit into memory: one look at all points for the frame
-// and the box of voxels, then tile by tile with the points nearby. Its voxels are those of detect()
-// on the same points, to the bit.
+// Detection for terrains larger than memory. A first pass over all points determines the frame and
+// the box of voxels; then each tile is scored from the points nearby. The voxels equal those of
+// detect() on the same points to the bit.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,51 +17,54 @@
 
 namespace libgtd {
 
-// What the whole terrain decides for each of its tiles.
+// Frame and box that all tiles of a terrain share.
 struct TerrainFrame {
-  std::optional<RegressionPlane> plane;  // nothing: the points are in the terrain frame
+  std::optional<RegressionPlane> plane;  // nullopt: the points are in the terrain frame
   VoxelLattice lattice;
   Voxel min;  // box of the terrain's voxels
   Voxel max;
 
-  // Normals with random sides are no outside of the surface.
+  // Returns true if the normals have random sides and thus do not indicate the outside.
   bool drops_normals() const;
 };
 
-// Throws Error naming the option that needs the whole cloud in memory: `method` thesis or envelope
-// (their downsampling and lattice), `interpolation`.
+// Throws Error naming the option that needs the whole terrain in memory: `method` thesis or
+// envelope (downsampling and lattice), `interpolation`, or `obstacle_height_m`.
 void require_streamable(const DetectionOptions& options);
 
-// Throws Error for no points, and what the steps throw.
+// Computes the frame and the box in passes over `points`. Throws Error if there are no points, and
+// all errors of the plane fit and the voxel lattice.
 TerrainFrame frame_terrain(const libmap::PointStream& points, const DetectionOptions& options);
+// Transforms a block of points into the terrain frame; normals with random sides are dropped.
 libmap::PointCloud to_terrain(const libmap::PointCloud& block, const TerrainFrame& frame);
 
-// The tiles of the box, ascending, and a share of them. Throws Error naming tile_size_m for more
-// than 2^20 tiles in all.
+// Returns the tiles of the box that belong to the share, ascending. Throws Error naming tile_size_m
+// if the box has more than 2^20 tiles.
 std::vector<TileNumber> tiles_of(const TerrainFrame& frame, int tile_voxels,
                                  const libmap::TileShare& share = {});
 
 struct StreamedTile {
   TileNumber number;
-  std::vector<MapVoxel> voxels;  // ascending; none if nothing is scored there
+  std::vector<MapVoxel> voxels;  // ascending; empty if no voxel is scored
   std::size_t occupied_voxels = 0;
 };
 
 struct StreamingOptions {
-  // Tiles that lie together are worked on at once while there are not more points than this in
-  // them and their halo, and a tile with more is worked on in parts, down to the width of its halo.
+  // Maximum number of points processed at once. Neighboring tiles are combined while they and their
+  // halo have fewer points; a tile with more points is split, down to the width of its halo.
   std::size_t max_points = 1'000'000;
 };
 
-// Rectangle in meters that holds all points on which the tile depends.
+// Rectangle in the x-y plane of the terrain frame, meters.
 struct PointsRectangle {
   Eigen::Vector2d low;
   Eigen::Vector2d high;
 };
+// Returns the rectangle that contains all points on which the columns depend.
 PointsRectangle points_for(const TileBounds& columns, const TerrainFrame& frame, int halo_voxels);
 
-// `points` are in the terrain frame. Calls visit for a few of the tiles `wanted` after the other,
-// each tile once.
+// Scores the tiles `wanted` from `points` in the terrain frame. Calls `visit` with a few tiles at a
+// time, each tile once, from one thread.
 void detect_streamed(const TerrainFrame& frame, const libmap::PointTileStore& points,
                      const std::vector<TileNumber>& wanted, const DetectionOptions& options,
                      const std::function<void(std::vector<StreamedTile> tiles)>& visit,

@@ -19,21 +19,21 @@ namespace {
 
 using libmap::PointCloud;
 
-// How far off the points are that decide on the curvature at a point: PCL's looks at the normals of
-// its neighbors, which have neighbors of their own.
+// Maximum distance of points that affect the curvature at a point. PCL uses the normals of its
+// neighbors, which depend on neighbors of their own.
 double curvature_reach_m(const CurvatureOptions& curvature) {
   const double reach = curvature.radius_m * (1 + 1e-6);
   return curvature.method == CurvatureMethod::thesis ? 2 * reach : reach;
 }
 
-// A voxel that the reach of a tile cuts has another mean: it is farther away than the reach.
+// Margin for voxel means: a voxel cut by the reach of a tile has a different mean.
 constexpr double mean_margin_voxels = 2.0;
 
 double margin_voxels(const ConvexityStage& stage) {
   return stage.of_voxel_means ? mean_margin_voxels : 0.0;
 }
 
-// The columns of each of the tiles grown by `margin_m` and a voxel more.
+// Columns of the tiles, each extended by `margin_m` and one voxel.
 class TilesWithMargin {
  public:
   TilesWithMargin(const VoxelLattice& lattice, const std::vector<TileBounds>& tiles,
@@ -56,7 +56,7 @@ class TilesWithMargin {
     const Eigen::Vector3d cell = lattice_.cell_of(point);
     if (!holds(box_, cell)) return false;
     if (fill_box_) return !tiles_.empty();
-    // Neighboring points lie in the same tile mostly.
+    // Neighboring points are mostly in the same tile.
     if (last_ < tiles_.size() && holds(tiles_[last_], cell)) return true;
     for (last_ = 0; last_ < tiles_.size(); ++last_)
       if (holds(tiles_[last_], cell)) return true;
@@ -72,8 +72,8 @@ class TilesWithMargin {
   const VoxelLattice& lattice_;
   const std::vector<TileBounds>& tiles_;
   double margin_;
-  TileBounds box_;         // around all tiles
-  bool fill_box_ = false;  // whether they leave no gap in it
+  TileBounds box_;         // bounding box of the tiles
+  bool fill_box_ = false;  // the tiles cover the box
   mutable std::size_t last_ = 0;
 };
 
@@ -86,7 +86,7 @@ std::vector<std::size_t> points_within(const PointCloud& cloud, const VoxelLatti
   return within;
 }
 
-// The convex ones of the points `queries`, of all without them.
+// Returns the convex points among the points `queries`, or among all points.
 std::vector<Eigen::Vector3d> convex_among(const PointCloud& cloud,
                                           const std::optional<std::vector<std::size_t>>& queries,
                                           const ConvexityStage& stage,
@@ -150,7 +150,7 @@ std::vector<MapVoxel> map_voxels(const std::vector<ScoredVoxel>& scored,
   return voxels;
 }
 
-// For each scored voxel whether a convex point is near.
+// Returns 1 for each scored voxel near a convex point, else 0.
 std::vector<std::uint8_t> near_convex(const std::vector<ScoredVoxel>& scored,
                                       const TileSurroundings& surroundings,
                                       const std::vector<TileBounds>& tiles,
@@ -200,7 +200,7 @@ int halo_voxels(const GripperMask& mask, const Scenario& scenario) {
   const double voxel_size_m = scenario.voxel_size_m;
   const auto whole = [](double voxels, const char* field, double value) {
     if (voxels > 0x1p28)
-      throw libmap::Error("too large for voxels of this size",
+      throw libmap::Error("too large for this voxel size",
                           {.field = field, .value = libmap::to_text(value)});
     return static_cast<int>(std::ceil(voxels));
   };
@@ -239,7 +239,7 @@ TileDetectionOptions tile_detection_options(const GripperMask& mask, const Scena
                         .solid_voxel_threshold = scenario.solid_voxel_threshold,
                         .score_threshold = scenario.score_threshold(),
                         .zero_plane_m = scenario.lowest_target_m(),
-                        // A probability to hold needs no second opinion of the shape.
+                        // The hold probability includes the shape already.
                         .needs_convexity = scenario.curvature_radius_m > 0.0 &&
                                            scenario.method != Method::calibrated}};
 }

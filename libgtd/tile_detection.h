@@ -1,6 +1,6 @@
-// The part of a detection that is done tile by tile: from points in the terrain frame and their
-// voxels to the map's voxels. A tile needs what lies in it and in a halo around it, no more, and
-// yields the same to the bit whatever else is there.
+// Per-tile part of a detection: computes the voxels of the map from points in the terrain frame and
+// their voxels. A tile depends only on the data inside it and in a halo around it, and its result
+// is the same to the bit whatever else is present.
 #pragma once
 
 #include <cstddef>
@@ -19,35 +19,38 @@
 
 namespace libgtd {
 
-// Whether a method prepares the cloud as the author's program does (`thesis`, `envelope`).
+// Returns true if the method prepares the cloud as the author's program does (`thesis`,
+// `envelope`).
 bool follows_thesis(Method method);
 
-// `climblab` has the least-squares plane of its source, the others of ours the robust one.
+// Plane fit of a method: `thesis` and `envelope` as in the author's program, `climblab` by least
+// squares as in its source, the others robust.
 PlaneMethod plane_method(Method method);
 
-// Width of a tile. Throws Error naming tile_size_m.
+// Width of a tile in voxels. Throws Error naming tile_size_m if it is out of range.
 int tile_voxels(const Scenario& scenario);
 
-// How many columns around a tile its voxels depend on: the mask's window, the closing of the
-// scanned area, the points that decide on convexity with all their neighbors, and those on the
-// surface's normal. Not of interpolation or obstacles, which look at the whole terrain.
+// Width of the halo in voxels: the columns around a tile on which its voxels depend. It covers the
+// mask window, the closing of the scanned area, the points that decide convexity with all their
+// neighbors, and the points of surface normals, but not interpolation and obstacles, which use the
+// whole terrain. Throws Error naming a radius that is too large for the voxel size.
 int halo_voxels(const GripperMask& mask, const Scenario& scenario);
 
-// Radius of the surface's normals that the scenario asks for.
+// Radius of the surface normals that the scenario requests, m.
 double normal_radius_m(const GripperMask& mask, const Scenario& scenario);
 
-// What a detection with these parameters says beside its scores, but for obstacles.
+// Optional fields of the map that a detection with these parameters computes, except obstacles.
 MapContent content_of(const Scenario& scenario);
 
-// Curvature near the scored voxels, and which of them are convex.
+// Options for the curvature near scored voxels and the convexity test.
 struct ConvexityStage {
   CurvatureOptions curvature;
-  bool of_voxel_means = true;  // a dense part of a scan has no more weight than a sparse one
-  double zero_plane_m = 0.0;   // of CurvatureMethod::thesis: convex points are above it
-  double distance_m = 0.01;    // a voxel this close to a convex point counts as convex
+  bool of_voxel_means = true;  // averages points per voxel, so that density has no effect
+  double zero_plane_m = 0.0;   // CurvatureMethod::thesis: lower bound of convex points
+  double distance_m = 0.01;    // maximum distance of a convex voxel from a convex point
 };
 
-// Which scored voxels are graspable.
+// Conditions for a scored voxel to be graspable.
 struct GraspableRule {
   Method method = Method::calibrated;
   int solid_voxel_threshold = 120;
@@ -56,35 +59,34 @@ struct GraspableRule {
   bool needs_convexity = false;
 };
 
-// What the stages of detect_tiles use of a scenario.
+// Options of detect_tiles, resolved from a scenario.
 struct TileDetectionOptions {
-  bool tilts_mask = false;                  // along the surface's normal
-  std::optional<double> normal_radius_m;    // nothing: no normals and slopes are fitted
-  std::optional<ConvexityStage> convexity;  // nothing: not evaluated
+  bool tilts_mask = false;                  // to the surface normal
+  std::optional<double> normal_radius_m;    // nullopt: no normals or slopes
+  std::optional<ConvexityStage> convexity;  // nullopt: not evaluated
   GraspableRule graspable;
 };
 TileDetectionOptions tile_detection_options(const GripperMask& mask, const Scenario& scenario);
 
-// What is known around the tiles: at least what lies in them and their halo.
+// Input of the tiles: it contains at least the data in the tiles and their halo.
 struct TileSurroundings {
-  const libmap::PointCloud& terrain;  // measured points, whose curvature is looked at
-  const libmap::PointCloud& surface;  // the points that made the voxels
-  const VoxelGrid& grid;              // with min and max of the whole terrain
+  const libmap::PointCloud& terrain;  // measured points, for the curvature
+  const libmap::PointCloud& surface;  // points from which the voxels were made
+  const VoxelGrid& grid;              // with the box of the whole terrain
 };
 
 struct TileDetectionResult {
   std::vector<MapVoxel> voxels;       // ascending
-  std::size_t unoriented_voxels = 0;  // with a tilted mask: without a normal, so that it is upright
-  std::size_t curvature_points = 0;   // whose curvature was measured
+  std::size_t unoriented_voxels = 0;  // tilted masks only: no normal, scored upright
+  std::size_t curvature_points = 0;   // points with a measured curvature
   std::size_t convex_points = 0;
   libmap::StageTimings timings_s;  // wall time of each step
 };
 
-// Which points' curvature is measured: those near the tiles, or all, which is the same where the
-// tiles are all there are.
+// Points at which curvature is measured. The result is the same if the tiles cover the terrain.
 enum class CurvatureAt { points_near_tiles, all_points };
 
-// Throws what the steps throw.
+// Scores the voxels of the tiles. Throws all errors of the individual stages.
 TileDetectionResult detect_tiles(const TileSurroundings& surroundings, const GripperMask& mask,
                                  const std::vector<TileBounds>& tiles, CurvatureAt curvature_at,
                                  const TileDetectionOptions& options,

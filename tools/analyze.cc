@@ -1,4 +1,4 @@
-// graspmap analyze: how much of a map can be held, where, what joins it; what differs from another.
+// graspmap analyze: graspable area and regions of a map, and differences between maps.
 #include "libgtd/evaluate/analysis_tables.h"
 #include "libmap/io/cloud_io.h"
 #include "libmap/view/image_io.h"
@@ -21,7 +21,7 @@ constexpr const char* no_start = "largest";
 
 struct AnalyzeOptions {
   std::vector<std::string> maps;
-  std::string map;  // the only one
+  std::string map;  // the single map
   std::string other;
   std::string folder;
   std::string start = no_start;
@@ -36,31 +36,31 @@ struct AnalyzeOptions {
   MapTableOptions table;
 };
 
-// Of one map.
+// Options of the analysis of one map.
 void bind_one(libmap::ParameterTable& table, AnalyzeOptions& options) {
   bind(table, options.analysis);
   bind(table, options.surface);
   bind(table, options.regions);
   bind(table, options.reach);
   table.add("start", options.start,
-            "where the robot stands: X,Y,Z in the frame of --points-frame; largest: on the largest "
+            "position of the robot: X,Y,Z in the frame of --points-frame; largest: on the largest "
             "region");
   bind(table, options.change);
   table.add("transform", options.transform,
-            "carries OTHER's points to MAP's: auto: both were scored from clouds in one frame, or "
-            "cropped from one map; X,Y,Z,ROLL,PITCH,YAW in m and degrees, or a file of it");
+            "transform from OTHER's points to MAP's: X,Y,Z,ROLL,PITCH,YAW in m and degrees, or a "
+            "file; auto: both were scored from clouds in one frame or cropped from one map");
 }
 
 void bind(libmap::ParameterTable& table, AnalyzeOptions& options) {
   bind_one(table, options);
   table.add("points_frame", options.points_frame, point_frame_names(),
-            "frame of the start or of the expected regions: of the cloud that was scored, the "
-            "terrain's, or the map's before it was cropped");
-  table.add("pictures", options.pictures, "draw pictures and charts");
+            "frame of the start or of the expected regions: of the scored cloud, the terrain, or "
+            "the map before it was cropped");
+  table.add("pictures", options.pictures, "draw images and charts");
   bind(table, options.table);
 }
 
-// A map as it was read, and on its lattice.
+// A map as cloud and as voxels of its lattice.
 struct ReadMap {
   libmap::PointCloud cloud;
   std::optional<libmap::Manifest> manifest;
@@ -69,7 +69,7 @@ struct ReadMap {
 
 ReadMap read_map(const std::string& file, Run& run) {
   if (is_tile_store(file))
-    throw libmap::Error("is a tile store: `graspmap convert` makes one map of it first",
+    throw libmap::Error("is a tile store: convert it to one map by `graspmap convert`",
                         {.file = file});
   ReadMap map;
   map.cloud = libmap::read_cloud(file).cloud;
@@ -80,15 +80,15 @@ ReadMap read_map(const std::string& file, Run& run) {
   });
   if (!map.manifest)
     run.warn(file +
-             ": no manifest beside it: its points are taken in the terrain frame, all above the "
+             ": has no manifest; its points are assumed to be in the terrain frame, all above the "
              "zero plane");
   else if (map.manifest->find_parameter("zero_plane_m") == nullptr)
-    run.warn(file + ": its manifest tells no zero plane: all its points are taken to lie above");
+    run.warn(file + ": its manifest has no zero plane; all its points are assumed to be above");
   run.add_input(file);
   return map;
 }
 
-// Carries OTHER's points to the frame of MAP's.
+// Transform from the frame of OTHER's points to that of MAP's.
 libmap::Pose map_from_other(const AnalyzeOptions& options, const ReadMap& map, const ReadMap& other,
                             Run& run) {
   if (options.transform != "auto") return parse_transform(options.transform, "--transform");
@@ -99,8 +99,8 @@ libmap::Pose map_from_other(const AnalyzeOptions& options, const ReadMap& map, c
     return *site_from_map_of(options.map) * site_from_map_of(options.other)->inverse();
   if (has_crop(map) != has_crop(other))
     run.warn("only " + (has_crop(map) ? options.map : options.other) +
-             " was cropped: the frames of the clouds that were scored are taken for one "
-             "(--transform says otherwise)");
+             " was cropped: both scored clouds are assumed to be in one frame (--transform sets "
+             "another)");
   return map_from_input(map.manifest) * map_from_input(other.manifest).inverse();
 }
 
@@ -160,12 +160,12 @@ std::string percent_text(const std::optional<double>& share) {
 
 void say_ground(const Analysis& analysis, const AnalyzeOptions& options, Run& run) {
   const libgtd::MapAnalysis& ground = analysis.ground;
-  run.say("{} of {} voxels evaluated: {:.3f} m2 of ground, {:.4f} m2 ({}) can be held",
+  run.say("{} of {} voxels evaluated: {:.3f} m2 of ground, {:.4f} m2 ({}) graspable",
           ground.ground.voxels, ground.voxels, ground.ground.area_m2,
           ground.ground.graspable_area_m2, percent_text(ground.ground.graspable_share()));
   if (ground.column_coverage < 0.95)
     run.warn(
-        "{}: {:.0f} % of the columns inside the ground have a voxel: regions fall apart "
+        "{}: only {:.0f} % of the columns inside the ground have a voxel, which splits regions "
         "(--adjacency-voxels 2 joins them across one empty voxel)",
         options.map, 100.0 * ground.column_coverage);
   const libgtd::RegionReach& reach = analysis.reach;
@@ -174,10 +174,10 @@ void say_ground(const Analysis& analysis, const AnalyzeOptions& options, Run& ru
     return;
   }
   run.say(
-      "{} regions, the largest {:.4f} m2; strides of {:g} m make {} groups of them, {:.3f} m one",
+      "{} regions, the largest {:.4f} m2; {:g} m strides: {} groups; one group from {:.3f} m on",
       analysis.regions.regions.size(), analysis.regions.regions.front().area_m2,
       options.reach.stride_m, reach.groups, *reach.joining_stride_m);
-  run.say("{} regions ({:.4f} m2) can be reached from {}", reach.reachable_regions,
+  run.say("{} regions ({:.4f} m2) are reachable from {}", reach.reachable_regions,
           reach.reachable_area_m2, options.start == no_start ? "region 1" : options.start);
   if (reach.reachable_regions == 0)
     run.warn("the nearest region, {}, is {:.3f} m from the start", *reach.start_region + 1,
@@ -186,14 +186,14 @@ void say_ground(const Analysis& analysis, const AnalyzeOptions& options, Run& ru
 
 void say_change(const libgtd::MapChange& change, const AnalyzeOptions& options, Run& run) {
   const libgtd::ChangeSummary& evaluated = change.evaluated;
-  run.say("{} voxels in common ({}), {} in MAP alone, {} in OTHER alone", change.pairs.size(),
+  run.say("{} common voxels ({}), {} in MAP only, {} in OTHER only", change.pairs.size(),
           change.matching == libgtd::VoxelMatching::lattice
               ? std::string("same lattice")
               : fmt::format("nearest within {:g} voxels", options.change.match_distance_voxels),
           change.only_map.size(), change.only_other.size());
   run.say(
-      "of {} evaluated in both: kappa {}, accuracy {}; can be held in both {}, in MAP alone {}, in "
-      "OTHER alone {}",
+      "of {} evaluated in both: kappa {}, accuracy {}; graspable in both {}, in MAP only {}, in "
+      "OTHER only {}",
       evaluated.graspable.size(),
       evaluated.kappa ? fmt::format("{:.3f} (standard error {:.3f})", evaluated.kappa->value,
                                     evaluated.kappa->standard_error)
@@ -201,7 +201,7 @@ void say_change(const libgtd::MapChange& change, const AnalyzeOptions& options, 
       percent_text(evaluated.graspable.accuracy().value()), evaluated.graspable.true_positives,
       evaluated.lost(), evaluated.gained());
   if (evaluated.difference.count > 0)
-    run.say("score, OTHER less MAP: mean {:+.3f}, mean absolute {:.3f}, rms {:.3f}",
+    run.say("score, OTHER - MAP: mean {:+.3f}, mean absolute {:.3f}, rms {:.3f}",
             evaluated.difference.mean, evaluated.difference.mean_absolute,
             evaluated.difference.rms);
 }
@@ -233,7 +233,7 @@ const std::vector<std::string> output_names = {
     "regions.csv",   "region_links.csv", "regions.pcd",     "regions.png",   "change.csv",
     "change.pcd",    "change.png",       "change_score.png"};
 
-// With the folder: pipelines name every map alike.
+// Name with the folder, because pipelines use the same file name for all maps.
 std::string short_name(const std::string& file) {
   const fs::path path = fs::path(file).lexically_normal();
   return (path.parent_path().filename() / path.filename()).string();
@@ -299,17 +299,17 @@ void write_tables(const fs::path& folder, const AnalyzeOptions& options, const R
 void analyze(AnalyzeOptions& options, Run& run) {
   if (options.maps.size() > 1 || !options.table.expected.empty()) {
     if (!options.other.empty())
-      throw UsageError("--against is for one MAP without --expected; --pairs compares several");
-    refuse_set(options, bind_one, "is for one map without --expected");
+      throw UsageError("--against requires one MAP without --expected; --pairs compares several");
+    refuse_set(options, bind_one, "requires one map without --expected");
     options.table.points_frame = options.points_frame;
     options.table.pictures = options.pictures;
     return tabulate_maps(options.maps, options.folder, options.table, run);
   }
   refuse_set<MapTableOptions>(options.table, graspmap_tools::bind,
-                              "is for several maps, or with --expected");
+                              "requires several maps or --expected");
   options.map = options.maps.front();
   if (options.other.empty() && options.transform != "auto")
-    throw libmap::Error("is for comparing with OTHER, which is not given",
+    throw libmap::Error("requires --against OTHER",
                         {.field = "--transform", .value = options.transform});
   run.claim_output_tree(options.folder, output_names, {options.map, options.other});
   options.regions.border = options.change.border = options.analysis.border;
@@ -339,16 +339,15 @@ void analyze(AnalyzeOptions& options, Run& run) {
 int main(int argc, char** argv) {
   AnalyzeOptions options;
   Command command("analyze");
-  command.inputs("MAP", options.maps, "graspability map; several give one table");
-  command.option("--against", "OTHER", options.other,
-                 "map of the same ground, with which MAP is compared");
+  command.inputs("MAP", options.maps, "graspability map; several maps are tabulated");
+  command.option("--against", "OTHER", options.other, "map of the same ground to compare MAP with");
   command.option(
       "--expected", "EXPECTED.csv", options.table.expected,
       "regions of expected graspability for the table, e.g. data/expected/primitive_shapes.csv");
   command.output(options.folder,
                  "folder of summary.json, histogram, by_height, by_slope, regions, region_links "
-                 "and, with OTHER, change; of several maps, of maps.csv, histograms.csv and, if "
-                 "asked for, pairs.csv and regions.csv");
+                 "and, with OTHER, change; for several maps, of maps.csv, histograms.csv and, if "
+                 "requested, pairs.csv and regions.csv");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { analyze(options, run); });
 }

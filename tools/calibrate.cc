@@ -1,4 +1,4 @@
-// graspmap calibrate: pictures of a chessboard -> intrinsics and lens distortion of the camera.
+// graspmap calibrate: intrinsics and lens distortion of a camera from images of a chessboard.
 #include "libmap/camera/camera_calibration.h"
 #include "libmap/camera/camera_io.h"
 #include "libmap/camera/image_codec.h"
@@ -18,11 +18,11 @@ using libmap::CameraCalibrationResult;
 using libmap::Chart;
 using libmap::ChartCurve;
 
-// The thesis calls a calibration good below it.
+// Maximum error of a good calibration, by the thesis.
 constexpr double good_error_px = 0.5;
 // Lens terms are of the order of 1.
 constexpr double good_term_deviation = 1.0;
-// Above it a measurement of 1 m is off by 5 mm for the focal length alone.
+// A larger relative error of the focal length causes errors above 5 mm per meter.
 constexpr double good_focal_deviation = 0.005;
 constexpr double good_coverage = 0.6;
 
@@ -40,12 +40,12 @@ struct Picture {
   int width = 0;
   int height = 0;
   std::optional<std::vector<Eigen::Vector2d>> corners{};
-  std::optional<libmap::Error> fault{};  // it cannot be read
+  std::optional<libmap::Error> fault{};  // reason if the image cannot be read
 };
 
 void bind(libmap::ParameterTable& table, CalibrateOptions& options) {
   table.add("board", options.board,
-            "COLUMNSxROWS of inner corners, where four squares meet: 9 x 7 squares are 8x6");
+            "numbers of inner corners, COLUMNSxROWS; a board of 9 x 7 squares is 8x6");
   bind(table, options.calibration);
   table.add("name", options.name, "name of the camera in the file");
 }
@@ -55,7 +55,7 @@ bool has_image_extension(const fs::path& path) {
   return extension == ".png" || extension == ".jpg" || extension == ".jpeg";
 }
 
-// A folder stands for the images in it, by name.
+// Returns the files, and for a folder its images, sorted by name.
 std::vector<std::string> image_files(const std::vector<std::string>& given) {
   std::vector<std::string> files;
   for (const std::string& path : given) {
@@ -74,7 +74,7 @@ std::vector<std::string> image_files(const std::vector<std::string>& given) {
   return files;
 }
 
-// The search takes some 30 bytes per pixel.
+// Limit of the search for a board, which needs about 30 bytes per pixel.
 constexpr std::int64_t max_pixels = std::int64_t{1} << 24;
 
 Picture read_picture(const std::string& file, const libmap::Chessboard& board) {
@@ -82,7 +82,7 @@ Picture read_picture(const std::string& file, const libmap::Chessboard& board) {
     const std::string bytes = libmap::read_whole_file(file);
     const auto info = libmap::read_image_info(bytes);
     if (info && std::int64_t{info->width} * info->height > max_pixels)
-      throw libmap::Error("too large for the search of its board",
+      throw libmap::Error("too large for finding the board",
                           {.field = "image size",
                            .value = fmt::format("{} x {}", info->width, info->height),
                            .bound = fmt::format("<= {} pixels", max_pixels)});
@@ -95,7 +95,7 @@ Picture read_picture(const std::string& file, const libmap::Chessboard& board) {
   }
 }
 
-// Throws the first one's Error if none can be read.
+// Returns the first readable image. Throws the Error of the first image if none is readable.
 const Picture& first_readable(const std::vector<Picture>& pictures) {
   for (const Picture& picture : pictures)
     if (!picture.fault) return picture;
@@ -119,7 +119,7 @@ std::vector<Picture> read_pictures(const std::vector<std::string>& files,
     if (picture.fault)
       run.warn(std::string(picture.fault->what()) + "; it is left out");
     else if (size(picture) != size(first))
-      throw libmap::Error("the images are not of one size",
+      throw libmap::Error("the images differ in size",
                           {.file = picture.name,
                            .field = "size",
                            .value = size(picture),
@@ -137,10 +137,10 @@ std::vector<libmap::BoardPicture> boards_of(const std::vector<Picture>& pictures
     throw libmap::Error("no image shows the whole board",
                         {.field = "--board",
                          .value = options.board,
-                         .bound = "the number of inner corners, one less than of squares"});
+                         .bound = "the number of inner corners, one less than squares"});
   for (const Picture& picture : pictures)
     if (!picture.corners && !picture.fault)
-      run.warn("{}: no board of {} inner corners", picture.name, options.board);
+      run.warn("{}: does not show a board of {} inner corners", picture.name, options.board);
   return boards;
 }
 
@@ -150,7 +150,7 @@ struct Term {
   double deviation = 0.0;
 };
 
-// The intrinsics, from the fifth on those of the lens.
+// Estimated terms: four intrinsics, then the lens terms.
 std::vector<Term> terms_of(const CameraCalibrationResult& result) {
   const libmap::Camera& camera = result.camera;
   std::vector<std::string> names = {"fx", "fy", "cx", "cy"};
@@ -166,7 +166,7 @@ std::vector<Term> terms_of(const CameraCalibrationResult& result) {
   return terms;
 }
 
-// "365.23 +- 0.18", to two digits of the deviation.
+// "365.23 +- 0.18", with two digits of the deviation.
 std::string with_deviation(const Term& term) {
   const double exponent = term.deviation > 0 ? std::floor(std::log10(term.deviation)) : -5.0;
   const int decimals = std::clamp(1 - static_cast<int>(exponent), 0, 12);
@@ -176,7 +176,7 @@ std::string with_deviation(const Term& term) {
 
 std::string summary(const CameraCalibrationResult& result, const CalibrateOptions& options) {
   std::string text = fmt::format(
-      "{} pictures of a board of {} inner corners, squares of {} mm\n"
+      "{} images of a board of {} inner corners, squares of {} mm\n"
       "reprojection error {:.3f} px (root mean square)\n",
       result.pictures.size(), options.board, libmap::to_text(options.calibration.board.square_mm),
       result.rms_px);
@@ -248,7 +248,7 @@ void note_results(const std::vector<Picture>& pictures, const CameraCalibrationR
 
 void warn_of_weaknesses(const CameraCalibrationResult& result, Run& run) {
   for (const std::string& name : result.repeated)
-    run.warn(name + ": left out: an earlier picture shows the board in the same place");
+    run.warn(name + ": left out: an earlier image shows the board in the same pose");
   for (const std::string& name : result.rejected)
     run.warn(name + ": left out for its reprojection error");
   for (const CalibratedPicture& picture : result.pictures)
@@ -257,20 +257,20 @@ void warn_of_weaknesses(const CameraCalibrationResult& result, Run& run) {
                good_error_px);
   if (result.relative_focal_deviation() > good_focal_deviation)
     run.warn(
-        "the focal length is known to {:.1f} % only: more pictures, tilted by 30 degrees and more "
-        "about both axes of the board, would tell it",
+        "the focal length is uncertain by {:.1f} %: add images tilted by 30 degrees and more about "
+        "both axes of the board",
         100 * result.relative_focal_deviation());
   const std::vector<Term> terms = terms_of(result);
   const auto vague = std::find_if(terms.begin() + 4, terms.end(), [](const Term& term) {
     return term.deviation > good_term_deviation;
   });
   if (vague != terms.end())
-    run.warn("the pictures do not tell the lens's {}, {}: a simpler --lens would do", vague->name,
+    run.warn("the images do not determine the lens term {}, {}: use a simpler --lens", vague->name,
              with_deviation(*vague));
   if (std::min(result.corners_width_share, result.corners_height_share) < good_coverage)
     run.warn(
-        "the corners span {:.0f} % of the image's width and {:.0f} % of its height: the distortion "
-        "beyond is a guess",
+        "the corners cover {:.0f} % of the image's width and {:.0f} % of its height; distortion "
+        "beyond is extrapolated",
         100 * result.corners_width_share, 100 * result.corners_height_share);
 }
 
@@ -283,7 +283,7 @@ std::string chart_png(const Chart& chart, int height_px) {
   return libmap::to_png(libmap::draw_chart(chart, {chart_width_px, height_px}));
 }
 
-// The largest of 1, 2, 5, 10, ... that shows the mean residual no longer than 1/40 of the width.
+// The largest of 1, 2, 5, 10, ... that draws the mean residual at most 1/40 of the width long.
 double magnification(const CameraCalibrationResult& result) {
   double sum = 0.0;
   std::size_t count = 0;
@@ -301,7 +301,7 @@ double magnification(const CameraCalibrationResult& result) {
   return scale;
 }
 
-// Where in the image the corners were, each with its residual, magnified.
+// Chart of the corners' image positions with magnified residuals.
 std::string draw_residuals(const CameraCalibrationResult& result) {
   const int width = result.camera.width;
   const int height = result.camera.height;
@@ -311,7 +311,7 @@ std::string draw_residuals(const CameraCalibrationResult& result) {
   chart.x_axis = {"column [px]", std::pair(0.0, static_cast<double>(width))};
   chart.y_axis = {"height above the image's lower edge [px]",
                   std::pair(0.0, static_cast<double>(height))};
-  // Charts have y upwards, images downwards.
+  // The y axis points up in charts and down in images.
   const auto add = [&](ChartCurve& curve, const Eigen::Vector2d& pixel) {
     curve.x.push_back(pixel.x());
     curve.y.push_back(height - 1 - pixel.y());
@@ -336,12 +336,12 @@ std::string draw_residuals(const CameraCalibrationResult& result) {
   return chart_png(chart, std::clamp(height_px, 400, 3000));
 }
 
-// A bar for the error of each picture, and a line at `bound_px`.
+// Chart of the error of each image as a bar, with a line at `bound_px`.
 std::string draw_errors(const CameraCalibrationResult& result, double bound_px) {
   Chart chart;
-  chart.title = "Reprojection error of each picture";
+  chart.title = "Reprojection error of each image";
   const auto count = static_cast<double>(result.pictures.size());
-  chart.x_axis = {"picture", std::pair(0.5, count + 0.5)};
+  chart.x_axis = {"image", std::pair(0.5, count + 0.5)};
   libmap::ChartHistogram bars;
   bars.name = "root mean square";
   bars.first_edge = 0.5;
@@ -408,14 +408,14 @@ int main(int argc, char** argv) {
   std::vector<std::string> words(argv, argv + argc);
   std::vector<char*> arguments;
   for (std::string& word : words) {
-    // Boards are sold by millimeters: the flag may carry its unit.
+    // Boards are specified in millimeters, so the flag may have its unit.
     if (word == "--square-mm" || word.starts_with("--square-mm=")) word.erase(8, 3);
     arguments.push_back(word.data());
   }
   CalibrateOptions options;
   Command command("calibrate");
   command.inputs("IMAGES", options.images, "images, or folders of images (.png, .jpg)");
-  command.output(options.output, "the camera (.yaml)");
+  command.output(options.output, "camera file (.yaml)");
   command.option("--report", "DIR", options.report,
                  "folder of images.csv, residuals.csv, residuals.png and errors.png");
   bind(command.parameters(), options);

@@ -1,4 +1,4 @@
-// graspmap compare: how far one cloud or mesh lies from another.
+// graspmap compare: distances between two clouds or meshes.
 #include <array>
 #include <iostream>
 #include <nlohmann/json.hpp>
@@ -43,23 +43,23 @@ struct CompareOptions {
 
 void bind(libmap::ParameterTable& table, CompareOptions& options) {
   table.add("within_m", options.within_m, libmap::positive,
-            "one covers the other where it is this near");
+            "maximum distance at which one surface covers the other");
   table.add("samples_per_m2", options.samples_per_m2, libmap::positive,
-            "points of a mesh's surface that stand for it");
-  table.add("seed", options.seed, {}, "of those points");
+            "density of the samples of a mesh's surface, per m2");
+  table.add("seed", options.seed, {}, "random seed of the samples");
   table.add("icp", options.icp, "align A with B by point-to-plane ICP first");
   bind(table, options.alignment);
   table.add("picture_range_m", options.picture_range_m, libmap::not_negative,
-            "distance at the end of the picture's colors, m; 0: that of 98 of 100 points");
+            "distance at the end of the image's color scale, m; 0: the 98th percentile");
   table.add("picture_view", options.view.view,
             {{"top", libmap::Viewpoint::top},
              {"oblique", libmap::Viewpoint::oblique},
              {"front", libmap::Viewpoint::front},
              {"side", libmap::Viewpoint::side}},
-            "from where the picture is seen");
+            "viewpoint of the image");
 }
 
-// A cloud, or a mesh and points of its surface.
+// A cloud, or a mesh with samples of its surface.
 struct Shape {
   std::optional<libmap::TriangleMesh> mesh;
   libmap::PointCloud points;
@@ -79,18 +79,18 @@ Shape read_shape(const std::string& file, const CompareOptions& options) {
   return shape;
 }
 
-// Distances to a mesh take the longer the farther a point is from it; a cloud that lies so far off
-// was carried there by a wrong transform.
+// Throws Error for a distant cloud, which indicates a wrong transform: the time of a distance to a
+// mesh grows with the distance.
 void require_nearness(const libmap::ReferenceSurface& surface, const libmap::PointCloud& cloud,
                       const CompareOptions& options) {
   constexpr double max_sizes = 100;
   const libmap::Bounds3d& b = surface.bounds();
   const libmap::Bounds3d a = libmap::bounds_of(cloud.positions);
   const double size = (b.max - b.min).norm();
-  if (size == 0.0) return;  // one place: near and far are the same work
+  if (size == 0.0) return;  // the time does not depend on the distance to a point
   const double apart = ((a.max + a.min) / 2 - (b.max + b.min) / 2).norm();
   if (!(apart <= max_sizes * size))
-    throw libmap::Error("the two are too far apart to be compared",
+    throw libmap::Error("A and B are too far apart to be compared",
                         {.file = options.a,
                          .field = "distance of the centers",
                          .value = libmap::to_text(static_cast<float>(apart)) + " m",
@@ -105,7 +105,7 @@ libmap::ReferenceSurface reference_of(const Shape& shape, const std::string& fil
   });
 }
 
-// `crop`: by the crops that the manifests of A and B tell of.
+// Transform from A to B; `crop`: from the site_from_map of both manifests.
 libmap::Pose b_from_a_of(const CompareOptions& options) {
   if (options.transform != "crop") return parse_transform(options.transform, "--transform");
   const auto a_from_map = site_from_map_of(options.a);
@@ -123,15 +123,15 @@ libmap::Pose b_from_a_of(const CompareOptions& options) {
 struct Comparison {
   libmap::Pose b_from_a = libmap::Pose::Identity();
   std::optional<libmap::SurfaceAlignmentResult> alignment;
-  libmap::PointCloud points;  // of A, in B's frame, in the box
+  libmap::PointCloud points;  // A's points in the box, in B's frame
   libmap::PointDistances distances;
   libmap::DistanceStatistics statistics;
   std::optional<double> bias_m;
   double precision = 0.0;     // share of A near B
   double completeness = 0.0;  // share of B near A
-  // Shares of A within one and two of the deviations that it states (field expected_error).
+  // Shares of A within one and two standard deviations by its field expected_error.
   std::optional<std::array<double, 2>> within_deviations;
-  std::size_t samples = 0;  // of B, in the box
+  std::size_t samples = 0;  // number of B's samples in the box
 };
 
 auto count_within(const std::vector<double>& distances, double bound_m) {
@@ -139,7 +139,7 @@ auto count_within(const std::vector<double>& distances, double bound_m) {
                        [&](double distance) { return distance <= bound_m; });
 }
 
-// 0.68 and 0.95 where stated deviations are right and errors normally distributed.
+// About 0.68 and 0.95 for correct deviations and normally distributed errors.
 std::optional<std::array<double, 2>> share_within_deviations(const Comparison& comparison) {
   const libmap::ScalarField* stated = comparison.points.find_field("expected_error");
   if (stated == nullptr || stated->values.empty()) return std::nullopt;
@@ -154,8 +154,8 @@ std::optional<std::array<double, 2>> share_within_deviations(const Comparison& c
   return within;
 }
 
-// Which points of B, in the box, A comes near to. All of A counts: what lies just outside covers
-// the border.
+// Measures the share of B's samples in the box that are near A. Parts of A outside the box count
+// too, because they may cover samples at its border.
 void measure_completeness(const Shape& a, const Shape& b, const CompareOptions& options,
                           const std::optional<libmap::Bounds3d>& box, Comparison& comparison) {
   const libmap::Pose a_from_b = comparison.b_from_a.inverse();
@@ -168,7 +168,7 @@ void measure_completeness(const Shape& a, const Shape& b, const CompareOptions& 
         libmap::share_of(libmap::covered(samples, a.points.positions, options.within_m));
     return;
   }
-  // What lies outside the mesh's box takes long to measure and is known to be too far.
+  // Samples outside the mesh's enlarged box are too far; measuring them would be slow.
   const libmap::Bounds3d bounds = libmap::bounds_of(a.mesh->vertices);
   const Eigen::Vector3d margin = Eigen::Vector3d::Constant(options.within_m);
   const libmap::Bounds3d near{bounds.min - margin, bounds.max + margin};
@@ -179,7 +179,7 @@ void measure_completeness(const Shape& a, const Shape& b, const CompareOptions& 
                               static_cast<double>(comparison.samples);
 }
 
-// A turned by so many quarter turns about B's z axis, and from there aligned.
+// Aligns A after a number of quarter turns about B's z axis.
 libmap::SurfaceAlignmentResult align_turned(const Shape& a, const libmap::ReferenceSurface& surface,
                                             const CompareOptions& options,
                                             const std::optional<libmap::Bounds3d>& box,
@@ -196,7 +196,7 @@ libmap::SurfaceAlignmentResult align_turned(const Shape& a, const libmap::Refere
   return found;
 }
 
-// True poses may be those of a world whose x axis is another one.
+// Tries other quarter turns, because the world of true poses may have another x axis.
 std::optional<libmap::SurfaceAlignmentResult> align_other_turns(
     const Shape& a, const libmap::ReferenceSurface& surface, const CompareOptions& options,
     const std::optional<libmap::Bounds3d>& box, const libmap::Pose& b_from_a, Run& run) {
@@ -209,11 +209,11 @@ std::optional<libmap::SurfaceAlignmentResult> align_other_turns(
       best = found;
       turns_of_best = turns;
     } catch (const libmap::Error&) {
-      // Too little of it lies over B.
+      // The overlap with B is too small after this turn.
     }
   }
   if (best)
-    run.warn("ICP has converged only after a turn of {} degrees about the z axis",
+    run.warn("ICP converged only after a rotation of {} degrees about the z axis",
              90 * turns_of_best);
   return best;
 }
@@ -234,9 +234,9 @@ void align(const Shape& a, const libmap::ReferenceSurface& surface, const Compar
   }
   const libmap::SurfaceAlignmentResult& found = *comparison.alignment;
   comparison.b_from_a = found.surface_from_points * comparison.b_from_a;
-  if (!found.converged) run.warn("ICP has not converged in {} iterations", found.iterations);
+  if (!found.converged) run.warn("ICP did not converge in {} iterations", found.iterations);
   if (found.free_motions > 0)
-    run.warn("{} of 6 motions are not determined by the surface: ICP left them alone",
+    run.warn("{} of 6 degrees of freedom are not determined by the surface and are unchanged",
              found.free_motions);
 }
 
@@ -268,7 +268,7 @@ double turn_deg(const libmap::Pose& pose) {
   return Eigen::AngleAxisd(pose.linear()).angle() * 180.0 / std::numbers::pi;
 }
 
-// How far ICP moved the middle of A's points.
+// Displacement of the center of A's points by ICP, m.
 double moved_m(const Comparison& comparison) {
   const libmap::Bounds3d bounds = libmap::bounds_of(comparison.points.positions);
   const Eigen::Vector3d middle = (bounds.min + bounds.max) / 2;
@@ -346,7 +346,7 @@ void print(const Comparison& comparison, const Shape& a, const Shape& b,
   if (comparison.bias_m) std::cout << fmt::format("bias: {:+.2f} mm\n", 1e3 * *comparison.bias_m);
   if (const auto& within = comparison.within_deviations)
     std::cout << fmt::format(
-        "points within one and two stated deviations: {:.1f} % and {:.1f} % (normal: 68.3 and "
+        "points within one and two expected errors: {:.1f} % and {:.1f} % (normal: 68.3 and "
         "95.4)\n",
         1e2 * within->at(0), 1e2 * within->at(1));
   const char* of_b = b.mesh ? "surface" : "cloud";
@@ -371,7 +371,7 @@ void add_results(const Comparison& comparison, Run& run) {
                    {"icp_free_motions", found.free_motions}});
 }
 
-// The points of A by their signed distance, in millimeters.
+// Image of A's points, colored by their signed distance in millimeters.
 libmap::ColorImage picture_of(const Comparison& comparison, const CompareOptions& options) {
   const bool has_sides = comparison.bias_m.has_value();
   const std::string name = has_sides ? "signed distance [mm]" : "distance [mm]";
@@ -426,7 +426,7 @@ void compare(const CompareOptions& options, Run& run) {
   }
   if (!options.picture.empty()) {
     if (libmap::format_of(options.picture) != ".png")
-      throw libmap::Error("pictures are written as .png", {.file = options.picture});
+      throw libmap::Error("images are written as .png", {.file = options.picture});
     run.claim_output(options.picture, {options.a, options.b, options.transform});
   }
   const Shape a = run.timed("read", [&] { return read_shape(options.a, options); });
@@ -440,18 +440,18 @@ int compare_surfaces(int argc, char** argv) {
   CompareOptions options;
   Command command("compare");
   command.input("A", options.a, "cloud or mesh (.pcd, .ply, .csv, .obj, .stl, .off, .glb)");
-  command.input("B", options.b, "the surface that A is measured by: a mesh, or a cloud");
+  command.input("B", options.b, "reference surface: a mesh or a cloud");
   command.output(options.output,
                  "A's points in B's frame with the fields distance and signed_distance", false);
   command.option("--picture", "FILE.png", options.picture,
-                 "A's points colored by their signed distance");
+                 "image of A's points, colored by their signed distance");
   command.option("--transform", "X,Y,Z,ROLL,PITCH,YAW|FILE|crop", options.transform,
-                 "b_from_a: meters and degrees about the fixed axes, roll first; a file of four "
-                 "rows of four numbers, as crop writes; crop: A or B was cropped from the other's "
-                 "map, as the manifests say");
+                 "transform from A to B: meters and degrees about the fixed axes, roll first; a "
+                 "file of four rows of four numbers, as crop writes; crop: from the manifests of "
+                 "A and B, one of which was cropped from the other's map");
   command.option("--box", "XMIN,YMIN,ZMIN,XMAX,YMAX,ZMAX", options.box,
-                 "compare only what lies in this box of B's frame");
-  command.flag("--json", options.json, "as JSON");
+                 "box in B's frame; only points in it are compared");
+  command.flag("--json", options.json, "print the results as JSON");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { compare(options, run); });
 }

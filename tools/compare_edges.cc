@@ -26,10 +26,10 @@ using Json = nlohmann::ordered_json;
 constexpr double published_mean_m = 0.040;
 constexpr const char* edge_names[] = {"a", "b", "c", "d"};
 
-// automatic: z = 0 where the manifest says that the site was levelled, else the fitted plane.
+// Reference of heights. automatic: z = 0 for a levelled site (by its manifest), else fit.
 enum class Ground { automatic, zero, fit };
 enum class SiteOutline { axes, turned };
-// Of the true mesh: that of the site, or of the map that the site was cropped from.
+// Frame of the true mesh: that of the site, or of the map that the site was cropped from.
 enum class TruthFrame { site, map };
 
 struct SpotCheckCommandOptions {
@@ -50,18 +50,18 @@ struct SpotCheckCommandOptions {
 void bind(libmap::ParameterTable& table, SpotCheckCommandOptions& options) {
   bind(table, options.check);
   table.add("radius_m", options.radius_m, libmap::positive,
-            "of a cloud: the height is the median of the points this near to the vertical");
+            "for a cloud: a height is the median of the points within this horizontal distance");
   table.add("min_points", options.min_points, {1.0, 1e9},
-            "of a cloud: a place with fewer points has no height");
+            "for a cloud: minimum number of points for a height");
   table.add("outline", options.outline,
             {{"axes", SiteOutline::axes}, {"turned", SiteOutline::turned}},
-            "the site is the least rectangle around it: along the axes, or turned");
+            "site's outline, the smallest rectangle around the data: along the axes, or rotated");
   table.add("ground", options.ground,
             {{"auto", Ground::automatic}, {"zero", Ground::zero}, {"fit", Ground::fit}},
-            "height 0, or a plane fitted to the data; auto: height 0 of a levelled site");
+            "reference of heights: z = 0, or a fitted plane; auto: z = 0 for a levelled site");
   table.add("truth_frame", options.truth_frame,
             {{"site", TruthFrame::site}, {"map", TruthFrame::map}},
-            "frame of --truth: the site's, or that of the map which the site was cropped from");
+            "frame of --truth: that of the site, or of the map that the site was cropped from");
   bind(table, options.plane);
 }
 
@@ -83,11 +83,11 @@ EdgeData read_edge_data(const std::string& file) {
 struct Check {
   libmap::SiteCorners site;
   libmap::SpotCheckResult result;
-  std::string ground;  // what the heights are compared with
+  std::string ground;  // reference of the heights
   std::optional<libmap::GroundPlane> plane{};
 };
 
-// In the frame of the site.
+// Reads the true mesh in the frame of the site.
 libmap::TriangleMesh read_truth(const SpotCheckCommandOptions& options) {
   libmap::TriangleMesh truth = libmap::read_mesh(options.truth).mesh;
   if (options.truth_frame == TruthFrame::site) return truth;
@@ -98,7 +98,7 @@ libmap::TriangleMesh read_truth(const SpotCheckCommandOptions& options) {
   return libmap::transform_mesh(truth, *site_from_map);
 }
 
-// Points spread evenly, as the fit of a plane wants them.
+// Fits the ground plane to evenly distributed points.
 libmap::GroundPlane fit_ground(const EdgeData& shape, libmap::GroundPlaneOptions options) {
   constexpr double samples = 100000;
   const libmap::PointCloud cloud =
@@ -111,7 +111,7 @@ libmap::GroundPlane fit_ground(const EdgeData& shape, libmap::GroundPlaneOptions
   return libmap::find_ground_plane(cloud.positions, options);
 }
 
-// What is known of the ground; a fitted plane becomes z = 0.
+// Returns the reference of heights; the data is transformed so that a fitted plane is z = 0.
 libmap::HeightFunction find_ground(const SpotCheckCommandOptions& options, EdgeData& shape,
                                    Check& check, Run& run) {
   if (!options.truth.empty()) {
@@ -137,7 +137,7 @@ libmap::HeightFunction find_ground(const SpotCheckCommandOptions& options, EdgeD
   return at_zero;
 }
 
-// Of the data in the box, where one is given.
+// Returns the heights of the data, in the box if there is one.
 libmap::HeightFunction heights_in(const std::optional<libmap::Bounds3d>& box, EdgeData& shape,
                                   const SpotCheckCommandOptions& options) {
   if (!shape.mesh) {
@@ -253,7 +253,7 @@ void spot_check(const SpotCheckCommandOptions& options, Run& run) {
     run.claim_output(options.output, {options.file, options.truth});
   }
   if (!options.truth.empty() && options.ground != Ground::automatic)
-    throw libmap::Error("--truth gives the ground already", {.field = "--ground"});
+    throw libmap::Error("cannot be combined with --truth", {.field = "--ground"});
   const Check check = check_site(options, run);
   print_check(check, options);
   if (options.output.empty()) return;
@@ -279,10 +279,10 @@ int graspmap_tools::compare_edges(int argc, char** argv) {
   command.input("SITE", options.file, "cloud or mesh");
   command.output(options.output, "table: edge, e1_m, e2_m, ..., mean_m (.csv)", false);
   command.option("--truth", "MESH", options.truth,
-                 "the true surface (see --truth-frame): the ground is its height at each place");
+                 "true surface as the reference of heights (see --truth-frame)");
   command.option("--box", "XMIN,YMIN,ZMIN,XMAX,YMAX,ZMAX", options.box,
-                 "the site, in place of the rectangle around the data");
-  command.flag("--json", options.json, "as JSON, with each place");
+                 "extent of the site, instead of the rectangle around the data");
+  command.flag("--json", options.json, "print the results as JSON, with each location");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { spot_check(options, run); });
 }

@@ -1,4 +1,4 @@
-// graspmap convert: any format to any other.
+// graspmap convert: conversion of clouds, meshes, poses, maps and DEMs between formats.
 #include <algorithm>
 #include <set>
 
@@ -26,7 +26,7 @@ using libmap::TrajectoryFormat;
 
 struct ConvertOptions {
   std::vector<std::string> inputs;
-  std::string input;  // the only one, or the first of the shares of a map
+  std::string input;  // the single input, or the first of several shares of a map
   std::string output;
   libmap::GeometryWriteOptions writing;
   double pixel_size_m = 0.0;
@@ -54,28 +54,28 @@ libmap::PointCloud vertices_of(const libmap::TriangleMesh& mesh) {
   return cloud;
 }
 
-// The manifest of a converted map still says in which frame it is, and how it was made: its zero
-// plane, lattice and method. Once all is read: what cannot be read need not be hashed.
+// Adds the input and copies its manifest's data on frame, zero plane, lattice and method. Called
+// after reading, so that unreadable files are not hashed.
 void add_input(const ConvertOptions& options, Run& run) {
   run.add_input(options.input);
   if (const auto source = libmap::read_manifest_of(options.input)) carry_facts(*source, run);
   carry_georeference(options.input, run);
 }
 
-// Encodings that a format does not have.
+// Throws Error for options that the output's format does not have.
 void refuse_ignored(const ConvertOptions& options) {
   const std::string format = libmap::format_of(options.output);
   if (options.writing.encoding == FileEncoding::binary_compressed && format != ".pcd")
     throw libmap::Error(
-        "is an encoding of .pcd",
+        "requires a .pcd output",
         {.file = options.output, .field = "--encoding", .value = "binary_compressed"});
   if (options.pixel_size_m > 0.0 && !libmap::is_dem_path(options.output))
-    throw libmap::Error("is for .tif", {.file = options.output, .field = "--pixel-size"});
+    throw libmap::Error("requires .tif", {.file = options.output, .field = "--pixel-size"});
   if (options.writing.big_endian && format != ".ply")
-    throw libmap::Error("is for .ply", {.file = options.output, .field = "--big-endian"});
+    throw libmap::Error("requires .ply", {.file = options.output, .field = "--big-endian"});
 }
 
-// The farthest that single precision moves a coordinate.
+// Maximum error of coordinates in single precision, m.
 double rounding_of(const std::vector<Eigen::Vector3d>& positions) {
   double most = 0.0;
   for (const Eigen::Vector3d& position : positions)
@@ -83,7 +83,7 @@ double rounding_of(const std::vector<Eigen::Vector3d>& positions) {
   return most;
 }
 
-// What the mesh has and the output's format has not.
+// Warns about data of the mesh that the output's format cannot store.
 void tell_losses(const libmap::TriangleMesh& mesh, const std::string& format, Run& run) {
   const bool geometry_alone = format == ".stl" || format == ".off";
   const bool no_fields = geometry_alone || format == ".obj" || format == ".glb";
@@ -92,11 +92,11 @@ void tell_losses(const libmap::TriangleMesh& mesh, const std::string& format, Ru
   if (no_fields)
     for (const auto* fields : {&mesh.vertex_fields, &mesh.face_fields})
       for (const libmap::ScalarField& field : *fields) lost.push_back(field.name);
-  if (!lost.empty()) run.warn("{} has no place for: {}", format, fmt::join(lost, ", "));
+  if (!lost.empty()) run.warn("{} cannot store: {}", format, fmt::join(lost, ", "));
   constexpr double told_m = 1e-5;
   if (const double moved_m = rounding_of(mesh.vertices);
       (format == ".stl" || format == ".glb") && moved_m > told_m)
-    run.warn("{} keeps single precision: coordinates are off by up to {:.3g} mm", format,
+    run.warn("{} stores single precision: coordinates change by up to {:.3g} mm", format,
              1e3 * moved_m);
 }
 
@@ -105,7 +105,7 @@ void convert_cloud(const ConvertOptions& options, Run& run) {
   if (read.dropped_points > 0)
     run.warn("{} points without a position were dropped", read.dropped_points);
   if (holds_meshes_alone(options.output))
-    throw libmap::Error("a cloud has no faces: this format contains meshes alone",
+    throw libmap::Error("this format stores meshes only, and a cloud has no faces",
                         {.file = options.output});
   run.add_results({{"points", read.cloud.size()}});
   add_input(options, run);
@@ -122,7 +122,7 @@ void convert_cloud(const ConvertOptions& options, Run& run) {
   });
 }
 
-// A model whose pictures cannot be read still has its shape.
+// Reads a model; if its texture cannot be read, only its mesh.
 libmap::TexturedMesh read_model(const std::string& file, Run& run) {
   try {
     return libmap::read_textured_mesh(file);
@@ -134,13 +134,13 @@ libmap::TexturedMesh read_model(const std::string& file, Run& run) {
   }
 }
 
-// With its textures, where both formats have them. Whether that was done.
+// Converts with textures if both formats have them. Returns true if it did.
 bool convert_textured(const ConvertOptions& options, Run& run) {
   if (!libmap::is_textured_format(options.input)) return false;
   const libmap::TexturedMesh model = read_model(options.input, run);
   if (model.pages.empty()) return false;
   if (!libmap::is_textured_format(options.output)) {
-    run.warn("the texture is left out: .obj and .glb have a place for it");
+    run.warn("the texture is left out: only .obj and .glb can store it");
     return false;
   }
   const libmap::TexturedMeshWriteOptions writing;
@@ -157,14 +157,14 @@ bool convert_textured(const ConvertOptions& options, Run& run) {
 void convert_mesh(const ConvertOptions& options, Run& run) {
   if (libmap::is_dem_path(options.output))
     throw libmap::Error(
-        "a mesh is no raster: graspmap resample makes a cloud of it, gdal_translate copies a DEM",
+        "a mesh is not a raster: graspmap resample makes a cloud, gdal_translate copies a DEM",
         {.file = options.input});
   if (convert_textured(options, run)) return;
   const libmap::TriangleMesh mesh = libmap::read_mesh(options.input).mesh;
   const std::string format = libmap::format_of(options.output);
   tell_losses(mesh, format, run);
   const bool to_cloud = format == ".pcd" || format == ".csv";
-  if (to_cloud) run.say("the output contains the mesh's vertices alone");
+  if (to_cloud) run.say("the output contains only the mesh's vertices");
   run.add_results({{"vertices", mesh.vertices.size()}, {"triangles", mesh.triangles.size()}});
   add_input(options, run);
   run.write_output(options.output, [&](const auto& temporary) {
@@ -180,7 +180,7 @@ void convert_poses(const ConvertOptions& options, Run& run) {
   if (!named) libmap::require_trajectory_format(options.output);
   const libmap::TrajectoryFile read = libmap::read_trajectory(options.input, options.poses_format);
   if (!read.images.empty() || read.of_cameras)
-    throw libmap::Error("poses of photographs: only those of the scan know its base (fuse --poses)",
+    throw libmap::Error("has poses of cameras, which need the scan for the base (fuse --poses)",
                         {.file = options.input});
   run.add_results({{"poses", read.poses.size()}, {"links", read.links.size()}});
   add_input(options, run);
@@ -191,7 +191,7 @@ void convert_poses(const ConvertOptions& options, Run& run) {
   };
   if (!nodes &&
       (is_output(TrajectoryFormat::g2o, ".g2o") || is_output(TrajectoryFormat::toro, ".toro")))
-    run.warn("the poses have no nodes: vertices 1, 2, ... are their places in the file");
+    run.warn("the poses have no nodes: vertices 1, 2, ... are their indices in the file");
   run.write_output(options.output, [&](const auto& temporary) {
     if (named)
       libmap::write_trajectory_as(options.output_poses_format, temporary, read, nodes);
@@ -200,7 +200,7 @@ void convert_poses(const ConvertOptions& options, Run& run) {
   });
 }
 
-// Points without the triangles between them.
+// Returns true if a DEM is converted to points without triangles.
 bool is_dem_as_cloud(const ConvertOptions& options) {
   const std::string format = libmap::format_of(options.output);
   return libmap::is_dem_path(options.input) && (format == ".pcd" || format == ".csv");
@@ -231,29 +231,28 @@ int convert_file(int argc, char** argv) {
                  "cloud (.pcd .ply .csv), mesh (.ply .obj .stl ...), DEM (.tif), poses (.tum "
                  ".kitti .g2o .toro "
                  "...), tile store (.tiles), or all shares of a map");
-  command.output(
-      options.output,
-      "the same in the format of this extension, .vtp for ParaView, or .tif (GeoTIFF) for "
-      "GIS; of tiles and shares the whole map, the same bytes as in one run");
+  command.output(options.output,
+                 "output in the format of its extension, .vtp for ParaView, or .tif (GeoTIFF) for "
+                 "GIS; for tiles and shares the whole map, the same bytes as in one run");
   command.parameters().add("encoding", options.writing.encoding,
                            {{"ascii", FileEncoding::ascii},
                             {"binary", FileEncoding::binary},
                             {"binary_compressed", FileEncoding::binary_compressed}},
-                           "how numbers are written, where the format has a choice");
+                           "encoding of numbers, if the format has several");
   command.parameters().add("big_endian", options.writing.big_endian,
-                           "binary PLY with the high byte first");
+                           "write binary PLY in big-endian order");
   command.parameters().add("pixel_size_m", options.pixel_size_m, libmap::not_negative,
-                           "of .tif, m; 0: the map's voxel size");
+                           "pixel size of .tif, m; 0: the map's voxel size");
   command.parameters().add("poses_format", options.poses_format, libmap::trajectory_format_names(),
-                           "of poses in IN; auto: by its extension, else by its content");
+                           "format of poses in IN; auto: by its extension, else by its content");
   command.parameters().add(
       "output_poses_format", options.output_poses_format, libmap::trajectory_format_names(),
-      "of poses in OUT; auto: by its extension. RTAB-Map's formats are 0 kitti, 1 "
+      "format of poses in OUT; auto: by its extension. RTAB-Map's formats are 0 kitti, 1 "
       "tum-motion-capture, 2 kitti-optical, 3 toro, 4 g2o, 10 and 11 tum");
   return command.run(argc, argv, [&](Run& run) { convert(options, run); });
 }
 
-// The words of a command line that is not parsed yet: values of options count as inputs.
+// Words of a command line before parsing; values of options count as inputs.
 struct Words {
   std::vector<std::string> inputs;
   std::vector<std::string> options;
@@ -297,9 +296,9 @@ bool has_cloud_extension(const std::string& path) {
          libmap::is_dem_path(path);
 }
 
-// A scan is a database, or a folder of frames; a folder that is converted to a file is another one,
-// such as a model of COLMAP. Of all else a folder without an extension is a bag: of a rig, or of
-// one map; several are the shares of a map, which become a file.
+// Selects the subcommand. A scan is a database or a folder of frames; other folders that are
+// converted to a file are, for example, models of COLMAP. An output without an extension is
+// otherwise a bag, of a rig or of one map; several inputs are shares of a map.
 Usage* usage_of(const Words& words) {
   if (words.any_input([](const std::string& word) { return word.ends_with(".db"); }))
     return convert_scan;

@@ -1,4 +1,4 @@
-// graspmap convert BAG, and ... -o BAG: bags of ROS 1 and ROS 2 in and out, offline.
+// graspmap convert BAG, and ... -o BAG: reads and writes bags of ROS 1 and ROS 2, without ROS.
 #include <variant>
 
 #include "libgtd/shape/convexity.h"
@@ -30,13 +30,13 @@ using libmap::PointCloud;
 struct BagCommandOptions {
   std::string input;
   std::string output;
-  // Out of a bag.
+  // Options for reading a bag.
   std::vector<std::string> topics;
   std::string rig;
   std::string stamp = "auto";
   bool strict = false;
   libmap::BagRigOptions depth;
-  // Into a bag.
+  // Options for writing a bag.
   std::string terrain;
   std::string curvature;
   std::string footholds;
@@ -49,28 +49,28 @@ struct BagCommandOptions {
 
 void bind(libmap::ParameterTable& table, BagCommandOptions& options) {
   table.add("stamp_s", options.stamp,
-            "out of a bag: the moment, or the cloud, nearest to it alone (auto: all moments; the "
-            "cloud of most points); a map into a bag: of all messages (auto: the inputs' own)");
-  table.add("strict", options.strict, "end with an error if an image cannot be used");
+            "stamp, s. From a bag: only the nearest image set or cloud (auto: all sets; the cloud "
+            "with most points). A map to a bag: of all messages (auto: that of the inputs)");
+  table.add("strict", options.strict, "fail if an image cannot be used");
   bind(table, options.depth);
   table.add("frame", options.frame,
-            "frame_id of the map's points in the bag; auto: as their manifest says");
+            "frame_id of the map's points in the bag; auto: by their manifest");
   table.add("stamp_offset_s", options.stamp_offset_s, libmap::any_number,
-            "added to the stamps of a rig's images, s");
+            "offset added to the stamps of a rig's images, s");
   table.add("arrow_m", options.arrow_m, libmap::positive, "length of the footholds' arrows, m");
   table.add("cell_size_m", options.cell_size_m, libmap::not_negative,
-            "cells of the map's grids in a bag of ROS 2, m (0: the map's voxel size)");
+            "cell size of the map's grids in a ROS 2 bag, m; 0: the map's voxel size");
   table.add("compression", options.compression,
             {{"none", libmap::BagCompression::none},
              {"bz2", libmap::BagCompression::bz2},
              {"lz4", libmap::BagCompression::lz4},
              {"zstd", libmap::BagCompression::zstd}},
-            "of the bag written: bz2 or lz4 in .bag, lz4 or zstd in .mcap");
+            "compression of the written bag: bz2 or lz4 in .bag, lz4 or zstd in .mcap");
 }
 
-// --stamp: nothing for auto. Throws Error.
+// Parses --stamp; returns nullopt for auto. Throws Error for another text.
 std::optional<double> bag_stamp(const BagCommandOptions& options) {
-  return parse_number_or("auto", options.stamp, "no such time", "--stamp",
+  return parse_number_or("auto", options.stamp, "not a time", "--stamp",
                          "a number of seconds, or auto");
 }
 
@@ -81,7 +81,7 @@ libmap::CameraRig read_named_rig(const std::string& name, Run& run) {
   return rig;
 }
 
-// ------------------------------------------------------------------------------------ out of a bag
+// ------------------------------------------------------------------------------------ reading bags
 
 void add_bag_input(const BagCommandOptions& options, Run& run) {
   for (const fs::path& file : libmap::files_of_bag(options.input)) run.add_input(file);
@@ -94,7 +94,7 @@ void report(const libmap::BagRigPlan& plan, const libmap::BagRigExport& result,
     run.warn(options.input + ": " + warning);
   }
   if (result.pixels_beyond > 0)
-    run.warn("{}: {} pixels are deeper than 16 bits can represent and are left out (--depth-scale)",
+    run.warn("{}: {} pixels exceed the 16-bit depth range and are left out (--depth-scale)",
              options.input, result.pixels_beyond);
   std::size_t fullest = 0;
   for (const libmap::SynchronizedSet& set : result.sets) fullest = std::max(fullest, set.seen());
@@ -110,13 +110,13 @@ void report(const libmap::BagRigPlan& plan, const libmap::BagRigExport& result,
     run.add_results({{camera.name + ".topic", plan.topics[n]}});
     run.manifest().transforms.emplace_back("robot_from_" + camera.name,
                                            camera.camera.base_from_camera);
-    if (plan.topics[n].empty()) run.warn(camera.name + ": no topic of its images");
+    if (plan.topics[n].empty()) run.warn(camera.name + ": there is no topic of its images");
   }
-  run.say("{} images of {} cameras, {} of {} moments, {} cameras at the fullest", result.images,
+  run.say("{} images of {} cameras, {} of {} image sets, at most {} cameras per set", result.images,
           plan.rig.cameras.size(), result.sets.size(), plan.all_sets, fullest);
 }
 
-// A rig's folder out of a bag.
+// Writes a rig's folder from a bag.
 void read_bag_into_folder(const BagCommandOptions& options, Run& run) {
   libmap::BagRigOptions depth = options.depth;
   depth.topics = options.topics;
@@ -135,7 +135,7 @@ void read_bag_into_folder(const BagCommandOptions& options, Run& run) {
 
 void read_bag_into_cloud(const BagCommandOptions& options, Run& run) {
   if (options.topics.size() > 1)
-    throw libmap::Error("a cloud comes from one topic", {.field = "--topic"});
+    throw libmap::Error("a cloud output requires a single topic", {.field = "--topic"});
   run.claim_output(options.output, {options.input});
   const libmap::BagCloudResult result = run.timed("read", [&] {
     return libmap::read_bag_cloud(options.input,
@@ -158,9 +158,9 @@ void read_bag_into_cloud(const BagCommandOptions& options, Run& run) {
   });
 }
 
-// -------------------------------------------------------------------------------------- into a bag
+// ------------------------------------------------------------------------------------ writing bags
 
-// A cloud's file and what its manifest says.
+// A cloud file with its manifest.
 struct CloudFile {
   std::string path;
   PointCloud cloud;
@@ -175,7 +175,7 @@ CloudFile read(const std::string& path, Run& run) {
   return file;
 }
 
-// ROS's name (REP-105) of a frame; `input` for those of the cloud that was scored.
+// ROS name (REP-105) of a frame; `input` for the frame of the scored cloud.
 std::string frame_id(const std::string& frame, const std::string& input) {
   if (frame == "robot") return "base_link";
   if (frame == "input") return input;
@@ -188,7 +188,7 @@ double radius_of(const std::optional<Manifest>& manifest) {
   return radius && *radius > 0 ? *radius : libgtd::CurvatureOptions{}.radius_m;
 }
 
-// The map with the curvatures at its voxels, colored by convexity as `render --color flags`.
+// Cloud of the map with curvatures at its voxels, colored by convexity like `render --color flags`.
 PointCloud curvature_map(const CloudFile& map) {
   const libgtd::CurvatureOptions options{.radius_m = radius_of(map.manifest),
                                          .up = up_of_map(map.manifest)};
@@ -218,7 +218,7 @@ libmap::BagPlaces places_of(const CloudFile& footholds, double arrow_m) {
   const auto field = [&](const char* name) -> const std::vector<double>& {
     const libmap::ScalarField* found = footholds.cloud.find_field(name);
     if (found) return found->values;
-    throw libmap::Error("no such field: are these footholds?",
+    throw libmap::Error("is missing: the file does not contain footholds",
                         {.file = footholds.path, .field = name});
   };
   const std::vector<double>& x = field("approach_x");
@@ -233,7 +233,7 @@ libmap::BagPlaces places_of(const CloudFile& footholds, double arrow_m) {
     const Eigen::Vector3d approach(x[n], y[n], z[n]);
     if (!approach.allFinite() || approach.norm() < 1e-9)
       throw libmap::Error(
-          "is no direction",
+          "is not a direction",
           {.file = footholds.path, .field = fmt::format("approach of foothold {}", n + 1)});
     places.places.push_back({footholds.cloud.positions[n], approach, libmap::score_color(score[n]),
                              fmt::format("{}: {:.2f}", n + 1, score[n])});
@@ -241,7 +241,7 @@ libmap::BagPlaces places_of(const CloudFile& footholds, double arrow_m) {
   return places;
 }
 
-// The inputs' own stamp: that of the panorama.
+// Stamp of the messages: --stamp, else the panorama's stamp in the inputs' manifests.
 double stamp_of(const BagCommandOptions& options, const std::vector<const CloudFile*>& files) {
   if (const std::optional<double> stamp = bag_stamp(options)) return *stamp;
   for (const CloudFile* file : files) {
@@ -252,7 +252,7 @@ double stamp_of(const BagCommandOptions& options, const std::vector<const CloudF
   return libmap::BagContent{}.stamp_s;
 }
 
-// RViz shows clouds of several frames together only if it is told how they lie.
+// Adds the transform between map and terrain, which RViz needs to show both frames together.
 void add_transform(const CloudFile& map, const std::string& map_frame,
                    const std::string& terrain_frame, libmap::BagContent& content, Run& run) {
   if (map_frame == terrain_frame) return;
@@ -260,10 +260,10 @@ void add_transform(const CloudFile& map, const std::string& map_frame,
   if (pose && map.frame() == "terrain")
     content.transforms.push_back({map_frame, terrain_frame, *pose});
   else
-    run.warn("no transform from {} to {} is known", terrain_frame, map_frame);
+    run.warn("the transform from {} to {} is unknown", terrain_frame, map_frame);
 }
 
-// The map seen from above: each cell has what its topmost voxel has.
+// Grid of the map from above: each cell has the values of its topmost voxel.
 libmap::BagGrid grid_of(const CloudFile& map, double cell_m) {
   libmap::BagGrid grid;
   grid.grid_map_topic = "/graspability_grid";
@@ -271,15 +271,15 @@ libmap::BagGrid grid_of(const CloudFile& map, double cell_m) {
   grid.cell_m = cell_m;
   const std::vector<Eigen::Vector3d>& points = map.cloud.positions;
   const libmap::Bounds3d bounds = libmap::bounds_of(points);
-  // Voxels have their centers in the middle of cells.
+  // Cells are centered on voxels.
   grid.corner_m = bounds.min.head<2>().array() - cell_m / 2;
   const Eigen::Array2d cells = (bounds.max - bounds.min).head<2>().array() / cell_m + 1.5;
   constexpr double max_cells = 1 << 26;
   if (!(cells.prod() <= max_cells))
-    throw libmap::Error("makes too many cells for a message", {.file = map.path,
-                                                               .field = "cell_size_m",
-                                                               .value = libmap::to_text(cell_m),
-                                                               .bound = "<= 2^26 cells"});
+    throw libmap::Error("too many cells for a message", {.file = map.path,
+                                                         .field = "cell_size_m",
+                                                         .value = libmap::to_text(cell_m),
+                                                         .bound = "<= 2^26 cells"});
   grid.columns = static_cast<std::size_t>(cells.x());
   grid.rows = static_cast<std::size_t>(cells.y());
   std::vector<std::size_t> top(grid.columns * grid.rows, points.size());
@@ -313,7 +313,7 @@ void add_grid(const CloudFile& map, const std::string& frame, const BagCommandOp
   }
   if (!(cell_m > 0) || map.cloud.empty())
     return run.warn("{}: {}, so the bag has no grids", map.path,
-                    map.cloud.empty() ? "no points" : "no voxel size is known (--cell-size)");
+                    map.cloud.empty() ? "has no points" : "has no voxel size (--cell-size)");
   content.grids.push_back(grid_of(map, cell_m));
   content.grids.back().frame = frame;
 }
@@ -325,7 +325,7 @@ void claim_bag(const BagCommandOptions& options, const std::vector<std::string>&
     run.claim_output(options.output, inputs);
 }
 
-// write(path, format) makes the bag.
+// Writes a claimed bag by write(path, format).
 template <typename Write>
 void write_claimed_bag(const BagCommandOptions& options, Run& run, const Write& write) {
   const libmap::BagFormat format = libmap::bag_format_of(options.output);
@@ -354,9 +354,9 @@ void write_map_bag(const BagCommandOptions& options, Run& run) {
   const CloudFile map = read(options.input, run);
   if (!map.cloud.find_field("score"))
     throw libmap::Error(fs::path(options.output).has_extension()
-                            ? "no such field: is this a map?"
-                            : "no such field: an output without an extension is a bag of ROS 2, "
-                              "which is made of a map",
+                            ? "is missing: the input is not a map"
+                            : "is missing: an output without an extension is a bag of ROS 2, "
+                              "which requires a map",
                         {.file = options.input, .field = "score"});
   std::optional<CloudFile> terrain;
   if (!options.terrain.empty()) terrain = read(options.terrain, run);
@@ -422,16 +422,16 @@ void refuse_map_options(const BagCommandOptions& options, const std::string& rea
 void write_bag(const BagCommandOptions& options, Run& run) {
   const bool rig = fs::is_directory(options.input);
   refuse_given({{"--topic", !options.topics.empty()}},
-               rig ? "is not for a rig's folder" : "is not for a map");
+               rig ? "cannot be used with a rig's folder" : "cannot be used with a map");
   if (rig) {
-    refuse_map_options(options, "is not for a rig's folder");
+    refuse_map_options(options, "cannot be used with a rig's folder");
     refuse_given({{"--stamp", options.stamp != "auto"}},
-                 "is not for a rig's folder: --stamp-offset moves its stamps");
+                 "cannot be used with a rig's folder: use --stamp-offset");
     if (options.rig.empty() && !fs::exists(fs::path(options.input) / libmap::rig_file_name))
-      throw libmap::Error("a bag is made of a map's file, or of a folder with rig.yaml (--rig)",
+      throw libmap::Error("is neither a map's file nor a folder with rig.yaml (--rig)",
                           {.file = options.input});
   } else {
-    refuse_given({{"--rig", !options.rig.empty()}}, "is not for a map");
+    refuse_given({{"--rig", !options.rig.empty()}}, "cannot be used with a map");
     libmap::require_readable_file(options.input);
   }
   libmap::bag_format_of(options.output);  // throws Error
@@ -442,13 +442,13 @@ void write_bag(const BagCommandOptions& options, Run& run) {
   }
 }
 
-// A folder may be a bag or a rig and a scan at once, such as a data set beside its recording.
+// Throws Error for a folder that is both a scan and a bag or rig, such as a recorded data set.
 void require_no_scan(const fs::path& input) {
   namespace files = libmap::frame_folder_files;
   for (const char* name : {files::nodes, files::associations, files::depth_list})
     if (fs::exists(input / name))
       throw libmap::Error(
-          fmt::format("is a scan by its {}, but also the folder of a rig or a bag", name),
+          fmt::format("contains {} of a scan, and also files of a rig or a bag", name),
           {.file = input.string()});
 }
 
@@ -456,12 +456,11 @@ void run_bag(const BagCommandOptions& options, Run& run) {
   require_no_scan(options.input);
   if (!libmap::is_bag_path(options.input)) return write_bag(options, run);
   if (libmap::has_bag_extension(options.output))
-    throw libmap::Error("one of the two must be something else than a bag",
-                        {.file = options.input});
-  refuse_map_options(options, "is for a bag that is written");
+    throw libmap::Error("input and output cannot both be bags", {.file = options.input});
+  refuse_map_options(options, "requires a bag as output");
   if (fs::path(options.output).has_extension()) {
     libmap::require_cloud_format(options.output);
-    refuse_given({{"--rig", !options.rig.empty()}}, "is not for a cloud");
+    refuse_given({{"--rig", !options.rig.empty()}}, "cannot be used with a cloud output");
     return read_bag_into_cloud(options, run);
   }
   read_bag_into_folder(options, run);
@@ -472,26 +471,26 @@ void run_bag(const BagCommandOptions& options, Run& run) {
 int graspmap_tools::convert_bag(int argc, char** argv) {
   BagCommandOptions options;
   Command command("convert",
-                  "With a ROS bag: depth images or a cloud out of it, or a map or a rig's images "
-                  "into it.");
+                  "With a ROS bag: extracts depth images or a cloud, or writes a map or a rig's "
+                  "images.");
   command.input(
       "IN", options.input,
-      "out of a bag: .bag (ROS 1), .mcap, .db3 or its folder (ROS 2); into one: a map (.pcd, "
-      ".ply, .csv, .tif), or a rig's folder as `fuse` reads it");
+      "bag to read: .bag (ROS 1), .mcap, .db3 or its folder (ROS 2); for writing a bag: a map "
+      "(.pcd, .ply, .csv, .tif), or a rig's folder in the format of `fuse`");
   command.output(
       options.output,
-      "out of a bag: a rig's folder (no extension) of its depth images, or one of its "
-      "clouds (.pcd, .ply, .vtp, .csv); into one: OUT.bag (ROS 1), OUT.mcap, or a folder (no "
+      "output of a bag: a rig's folder (no extension) of its depth images, or one of its "
+      "clouds (.pcd, .ply, .vtp, .csv); bag to write: OUT.bag (ROS 1), OUT.mcap, or a folder (no "
       "extension) of .db3 (ROS 2)");
   command.option("--topic", "[NAME=]TOPIC", options.topics,
-                 "topics of depth images, or of the cloud (repeatable); else all that are found");
+                 "topics of depth images, or of the cloud (repeatable); default: all");
   command.option("--rig", "FILE|NAME", options.rig,
-                 "the rig, instead of the bag's camera infos and transforms, or of DIR/rig.yaml");
-  command.option("--terrain", "CLOUD", options.terrain, "cloud for /merged_pcd");
+                 "rig; default: from the bag's camera infos and transforms, or DIR/rig.yaml");
+  command.option("--terrain", "CLOUD", options.terrain, "terrain cloud, written to /merged_pcd");
   command.option("--curvature", "CLOUD", options.curvature,
-                 "cloud for /curvature_map, instead of the map with its own curvatures");
+                 "cloud for /curvature_map, instead of the map with its curvatures");
   command.option("--footholds", "FOOTHOLDS", options.footholds,
-                 "footholds of the map for /footholds and /foothold_poses");
+                 "footholds of the map, written to /footholds and /foothold_poses");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { run_bag(options, run); });
 }

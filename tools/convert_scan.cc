@@ -1,5 +1,5 @@
-// graspmap convert SCAN -o FOLDER: a scan as plain files; --bundler and --colmap: the pictures of a
-// scan and their cameras, for MeshLab and for COLMAP.
+// graspmap convert SCAN -o FOLDER: writes a scan as plain files; --bundler and --colmap: writes its
+// images and cameras for MeshLab and for COLMAP.
 #include "libmap/bag/bag_reader.h"
 #include "libmap/camera/color_image.h"
 #include "libmap/camera/depth_codec.h"
@@ -24,11 +24,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Which of the pictures that resemble each other is kept.
+// Choice among similar images.
 enum class PicturePreference { sharpest, first };
 
 struct PictureOptions {
-  std::string bundler;  // folders; empty: not wanted
+  std::string bundler;  // output folders; empty: not written
   std::string colmap;
   PosesOption poses;
   std::string transform;
@@ -39,7 +39,7 @@ struct PictureOptions {
   bool wanted() const { return !bundler.empty() || !colmap.empty(); }
 };
 
-// So many frames are in memory at a time.
+// Number of frames in memory at a time.
 constexpr std::size_t batch_size = 8;
 
 const std::vector<std::string> bundler_names = {"bundle.out", "images", "list.txt"};
@@ -65,7 +65,7 @@ FrameResult find_pictures(const libmap::ScanSource& scan, const libmap::Trajecto
     const std::vector<libmap::CameraView> views =
         libmap::read_pictures(scan, pose.node, {.color = true, .depth = false});
     for (std::size_t c = 0; c < views.size(); ++c) {
-      // These throw where there is no such camera.
+      // Both throw for an unsupported camera.
       if (!options.bundler.empty()) libmap::centered_pinhole(views[c].color_camera);
       if (!options.colmap.empty()) libmap::to_colmap(views[c].color_camera);
       result.pictures.push_back(
@@ -92,7 +92,7 @@ std::vector<Picture> find_pictures(const libmap::ScanSource& scan, const libmap:
     });
     for (const FrameResult& result : batch) {
       if (result.error && strict) throw libmap::Error(*result.error);
-      if (result.error) run.warn(std::string(result.error->what()) + "; its picture is left out");
+      if (result.error) run.warn(std::string(result.error->what()) + "; its image is left out");
       pictures.insert(pictures.end(), result.pictures.begin(), result.pictures.end());
     }
     run.progress().advance(batch.size());
@@ -134,7 +134,7 @@ libmap::BundlerView write_picture(const libmap::ScanSource& scan, const Picture&
 void write_bundler(const PictureOptions& options, const std::vector<Picture>& all,
                    const libmap::ScanSource& scan, Run& run) {
   const std::vector<Picture> kept = selected(all, options);
-  run.say("{} of {} pictures kept", kept.size(), all.size());
+  run.say("{} of {} images kept", kept.size(), all.size());
   run.add_results({{"kept_pictures", kept.size()}});
   run.write_output_tree(options.bundler, bundler_names, [&](const fs::path& folder) {
     if (!folder.empty()) fs::create_directory(folder / "images");
@@ -152,7 +152,7 @@ struct ColmapPicture {
   std::string name{};
 };
 
-// Reads the picture with its depth; writes the image, unless `folder` is empty.
+// Reads the image with its depth; writes the image, unless `folder` is empty.
 ColmapPicture copy_picture(const libmap::ScanSource& scan, const Picture& picture,
                            const fs::path& folder) {
   std::vector<libmap::CameraView> views = libmap::read_pictures(scan, picture.node, {});
@@ -180,7 +180,7 @@ void write_colmap(const PictureOptions& options, const std::vector<Picture>& pic
     const libmap::ColmapModel& model = builder.model();
     std::size_t observations = 0;
     for (const auto& [id, image] : model.images) observations += image.observations.size();
-    run.say("{} pictures of {} cameras, {} points, {} times observed", model.images.size(),
+    run.say("{} images of {} cameras, {} points, {} observations", model.images.size(),
             model.cameras.size(), model.points.size(), observations);
     run.add_results({{"cameras", model.cameras.size()},
                      {"points", model.points.size()},
@@ -191,24 +191,24 @@ void write_colmap(const PictureOptions& options, const std::vector<Picture>& pic
 
 void add_options(Command& command, PictureOptions& options) {
   command.option("--bundler", "DIR", options.bundler,
-                 "write cameras and pictures as Bundler v0.3 for MeshLab's registered rasters: "
+                 "folder for cameras and images as Bundler v0.3 for MeshLab's registered rasters: "
                  "bundle.out, list.txt, images");
   command.option("--colmap", "DIR", options.colmap,
-                 "write cameras, all pictures and points as a model of COLMAP: sparse/cameras.txt, "
-                 "images.txt, points3D.txt; images");
+                 "folder for cameras, all images and points as a model of COLMAP: "
+                 "sparse/cameras.txt, images.txt, points3D.txt; images");
   add_poses_option(command, options.poses);
   command.option("--transform", "X,Y,Z,ROLL,PITCH,YAW|FILE", options.transform,
-                 "with --bundler, --colmap: carries the poses into the frame of a mesh, e.g. what "
-                 "crop wrote as *.site_from_map.txt");
+                 "with --bundler, --colmap: transform of the poses to the frame of a mesh, e.g. "
+                 "the file *.site_from_map.txt of crop");
   bind(command.parameters(), options.selection);
   command.parameters().add(
       "keep", options.keep,
       {{"sharpest", PicturePreference::sharpest}, {"first", PicturePreference::first}},
-      "with --bundler: which one of pictures that look the same way from one place is kept");
+      "with --bundler: choice among images with similar poses");
   bind(command.parameters(), options.points);
 }
 
-// Claims the folders; before the work.
+// Claims the folders before the work.
 void claim_picture_folders(const PictureOptions& options, const std::string& scan, Run& run) {
   parse_transform(options.transform, "--transform");
   std::vector<std::string> inputs = scan_inputs(scan, options.poses);
@@ -217,9 +217,9 @@ void claim_picture_folders(const PictureOptions& options, const std::string& sca
   if (!options.colmap.empty()) run.claim_output_tree(options.colmap, colmap_names, inputs);
 }
 
-// Bundler: bundle.out, list.txt and images, resampled, of the views that are selected. COLMAP:
-// sparse/cameras.txt, images.txt, points3D.txt and images, all of them and as they are stored.
-// Frames that are broken are left out with a warning, with `strict` an Error.
+// Writes, for Bundler, bundle.out, list.txt and resampled images of selected views; for COLMAP,
+// sparse/cameras.txt, images.txt, points3D.txt and all images as stored. Broken frames are left out
+// with a warning. Throws Error for them if `strict`.
 void write_picture_folders(PictureOptions& options, const libmap::ScanSource& scan, bool strict,
                            Run& run) {
   const libmap::Trajectory poses = find_poses(scan, options.poses, strict, run);
@@ -232,7 +232,7 @@ void write_picture_folders(PictureOptions& options, const libmap::ScanSource& sc
   manifest.transforms.emplace_back("world_from_map", world_from_map);
   run.add_results({{"pictures", pictures.size()}});
   const libmap::Manifest start = manifest;
-  // First: it needs the depth as well, so that what is broken shows before anything is written.
+  // COLMAP is first, because it also reads the depth and so finds all broken frames.
   if (!options.colmap.empty()) write_colmap(options, pictures, scan, run);
   manifest = start;
   if (!options.bundler.empty()) write_bundler(options, pictures, scan, run);
@@ -255,12 +255,12 @@ struct Counts {
 struct NodeImages {
   libmap::RgbdFrame frame;
   libmap::StoredImages stored;
-  bool is_rounded = false;            // depth, to millimeters
-  std::size_t lost_depth_pixels = 0;  // beyond what millimeters of 16 bits hold
+  bool is_rounded = false;            // depth is rounded to millimeters
+  std::size_t lost_depth_pixels = 0;  // depth beyond the range of 16-bit millimeters
   std::optional<libmap::Error> error{};
 };
 
-// The image files of a database as they are stored.
+// Copies the image files of a database as stored.
 void keep_files(const libmap::RtabmapDatabase& database, NodeImages& images) {
   libmap::FrameBlobs blobs = database.read_blobs(images.frame.node);
   images.stored.color = std::move(blobs.image);
@@ -274,7 +274,7 @@ void keep_files(const libmap::RtabmapDatabase& database, NodeImages& images) {
     images.stored.depth = std::move(blobs.depth);
 }
 
-// Floats, or 16 bits of another unit.
+// Rounds depth in floats or in another 16-bit unit to millimeters.
 void round_depth(NodeImages& images) {
   constexpr double told_m = 1e-5;
   const libmap::MillimeterImage rounded = libmap::to_millimeters(images.frame.depth);
@@ -291,7 +291,7 @@ void round_depth(NodeImages& images) {
 NodeImages read_images(const libmap::ScanSource& scan, int node) {
   NodeImages images;
   try {
-    // Decoded even where it is copied as it is: what cannot be decoded is not handed on.
+    // Copied files are decoded too, so that broken images are not copied.
     images.frame = scan.read_frame(node);
     if (const auto* database = dynamic_cast<const libmap::RtabmapDatabase*>(&scan))
       keep_files(*database, images);
@@ -302,7 +302,7 @@ NodeImages read_images(const libmap::ScanSource& scan, int node) {
   return images;
 }
 
-// Nothing is written without a writer.
+// Extracts all frames; nothing is written without a writer.
 Counts extract_frames(const libmap::ScanSource& scan, libmap::FrameFolderWriter* writer,
                       const ExtractOptions& options, Run& run) {
   const std::vector<libmap::GraphNode>& nodes = scan.graph().nodes;
@@ -311,7 +311,7 @@ Counts extract_frames(const libmap::ScanSource& scan, libmap::FrameFolderWriter*
   std::vector<NodeImages> batch(1);
   std::size_t max_pixels = 0;
   for (std::size_t first = 0; first < nodes.size(); first += batch.size()) {
-    // The first by itself: it tells how large they are.
+    // The first frame is read alone to determine the size of images.
     const std::size_t count = first == 0 ? 1 : libmap::frames_in_batch(max_pixels);
     batch = std::vector<NodeImages>(std::min(count, nodes.size() - first));
     libmap::parallel_each(
@@ -377,7 +377,7 @@ void write_folder(const ExtractOptions& options, const libmap::ScanSource& scan,
 
 void extract(ExtractOptions& options, Run& run) {
   if (libmap::has_bag_extension(options.output))
-    throw libmap::Error("a bag is made of a map or of the folder of a camera rig, not of a scan",
+    throw libmap::Error("a bag requires a map or the folder of a camera rig as input, not a scan",
                         {.file = options.output});
   const bool pictures = options.pictures.wanted();
   const PictureOptions unset;
@@ -385,9 +385,9 @@ void extract(ExtractOptions& options, Run& run) {
     refuse_given({{"--poses", options.pictures.poses.source != unset.poses.source},
                   {"--transform", options.pictures.transform != unset.transform},
                   {"--keep", options.pictures.keep != unset.keep}},
-                 "is for --bundler and --colmap: a folder keeps the scan's own poses");
+                 "requires --bundler or --colmap: a folder contains the scan's own poses");
   if (options.output.empty() && !pictures)
-    throw UsageError("nothing to write: -o, --bundler or --colmap names a folder");
+    throw UsageError("no output: -o, --bundler or --colmap is required");
   if (!options.output.empty())
     run.claim_output_tree(options.output, libmap::frame_folder_names(),
                           {options.scan, options.calibration.source});
@@ -396,9 +396,9 @@ void extract(ExtractOptions& options, Run& run) {
       open_scan(options.scan, options.strict, run,
                 known_camera(options.calibration, options.scan, options.pictures.poses, run));
   if (fs::is_regular_file(options.scan)) run.add_input(options.scan);
-  // Each folder's manifest holds what was done for it alone.
+  // Each folder has its own manifest.
   const libmap::Manifest start = run.manifest();
-  // First: whether there are poses for them shows before anything is written.
+  // Images are first, because missing poses are found before anything is written.
   if (pictures) write_picture_folders(options.pictures, *scan, options.strict, run);
   run.manifest() = start;
   if (!options.output.empty()) write_folder(options, *scan, run);
@@ -418,8 +418,8 @@ int graspmap_tools::convert_scan(int argc, char** argv) {
       "convert",
       "With a scan: the scan as plain files, for MeshLab (--bundler) or COLMAP (--colmap).");
   command.input("SCAN", options.scan, "RTAB-Map database, or a folder of frames");
-  command.output(options.output, "folder of the whole scan, replaced as a whole", false);
-  command.flag("--strict", options.strict, "end at a frame that is broken");
+  command.output(options.output, "folder for the whole scan; replaced if it exists", false);
+  command.flag("--strict", options.strict, "fail at a broken frame");
   add_calibration_option(command, options.calibration);
   add_options(command, options.pictures);
   return command.run(argc, argv, [&](Run& run) { extract(options, run); });

@@ -1,4 +1,4 @@
-// graspmap crop: a map levelled and cut to the test site.
+// graspmap crop: levels a map and crops it to the test site.
 #include "libmap/site/crop.h"
 
 #include <limits>
@@ -35,14 +35,14 @@ struct CropCommandOptions {
 
 void bind(libmap::ParameterTable& table, CropCommandOptions& options) {
   table.add("level", options.level, {{"auto", true}, {"none", false}},
-            "auto: the ground becomes z = 0; none: the map's own z stays");
-  table.add("up", options.up, "which way is up: auto, or a direction X,Y,Z in the map");
+            "levelling; auto: the ground becomes z = 0; none: the map's z is unchanged");
+  table.add("up", options.up, "up direction: auto, or X,Y,Z in the map");
   table.add("frame", options.crop.frame,
             {{"level", libmap::CropFrame::level}, {"map", libmap::CropFrame::map}},
-            "frame of --box and --polygon: levelled and turned, or as the map came");
+            "frame of --box and --polygon: levelled and rotated, or that of the input map");
   table.add("yaw_deg", options.yaw,
-            "turn about z, degrees; auto: with --size and --border, so that the sides lie along x "
-            "and y, else none");
+            "rotation about z, degrees; auto: with --size and --border, sides parallel to x and y, "
+            "else none");
   bind(table, options.crop);
 }
 
@@ -54,7 +54,7 @@ libmap::Bounds3d box_of(const std::string& text) {
   libmap::Bounds3d box = n.size() == 6 ? libmap::Bounds3d{{n[0], n[1], n[2]}, {n[3], n[4], n[5]}}
                                        : libmap::Bounds3d{{n[0], n[1], -open}, {n[2], n[3], open}};
   if (!(box.min.array() < box.max.array()).all())
-    throw libmap::Error("the box is inside out or empty",
+    throw libmap::Error("a minimum of the box is not below its maximum",
                         {.field = "--box", .value = text, .bound = bound});
   return box;
 }
@@ -62,7 +62,7 @@ libmap::Bounds3d box_of(const std::string& text) {
 Eigen::Vector2d size_of(const std::string& text, const std::string& field) {
   if (const auto size = split_size(text)) return *size;
   throw libmap::Error(
-      "no such size",
+      "not a size",
       {.field = field, .value = text, .bound = "WIDTHxHEIGHT in meters, each > 0, e.g. 3x3"});
 }
 
@@ -82,7 +82,7 @@ void read_region(CropCommandOptions& options) {
   if (is_given(options.box) + is_given(options.polygon) + is_given(options.size) +
           (options.border ? 1 : 0) >
       1)
-    throw libmap::Error("the cut is given in more than one way",
+    throw libmap::Error("several regions are given",
                         {.bound = "one of --box, --polygon, --size and --border"});
   if (!options.box.empty()) {
     crop.region = CropRegion::box;
@@ -99,18 +99,18 @@ void read_region(CropCommandOptions& options) {
   if (!options.border_size.empty()) {
     if (!options.border)
       throw libmap::Error(
-          "is the size of a border, which is not looked for",
+          "requires --border",
           {.field = "--border-size", .value = options.border_size, .bound = "only with --border"});
     crop.border_size_m = size_of(options.border_size, "--border-size");
   }
   crop.level = options.level;
   if (options.up != "auto" && !crop.level)
-    throw libmap::Error("is for levelling, which --level none leaves out",
+    throw libmap::Error("cannot be combined with --level none",
                         {.field = "--up", .value = options.up});
   if (options.up != "auto") crop.up = parse_vector(options.up, "--up");
   crop.yaw_deg = parse_number_or("auto", options.yaw, "not an angle", "--yaw", "auto or degrees");
   if (crop.region == CropRegion::whole && !crop.level && !crop.yaw_deg && !crop.center)
-    throw libmap::Error("there is nothing to do: neither level nor cut",
+    throw libmap::Error("there is nothing to do: no levelling and no region",
                         {.field = "--level", .value = "none"});
 }
 
@@ -120,7 +120,7 @@ fs::path transform_path(const std::string& output) {
   return path.replace_extension(".site_from_map.txt");
 }
 
-// The rows of the matrix, as CloudCompare and PCL read it.
+// Rows of the matrix in the format of CloudCompare and PCL.
 std::string matrix_text(const libmap::Pose& pose) {
   std::string text;
   for (Eigen::Index row = 0; row < 4; ++row)
@@ -147,7 +147,7 @@ void tell_ground(const std::string& input, const libmap::CropReport& report, Run
     run.warn("{}: {}: up is the map's z; --up X,Y,Z sets it", input,
              libmap::disagreement_text(by_normals.share, by_normals.opposing));
   else if (tilt > 45.0)
-    run.warn("the map's z lies {:.0f} deg from up as its normals say; --up 0,0,1 takes the map's z",
+    run.warn("up by the normals is {:.0f} deg from the map's z; --up 0,0,1 selects the map's z",
              tilt);
 }
 
@@ -157,8 +157,8 @@ void tell_scale(const libmap::BorderBand& band, const libmap::BorderScale& scale
        {"border_scale", scale.factor},
        {"border_scale_deviation", scale.deviation}});
   run.say(
-      "border: sides of {:.4f} m give the scale x {:.5f} +- {:.5f}, which refine --scale {:.5f} "
-      "applies to poses and depth",
+      "border: sides of {:.4f} m determine the scale x {:.5f} +- {:.5f}; refine --scale {:.5f} "
+      "applies it to poses and depth",
       fmt::join(band.sides_m, ", "), scale.factor, scale.deviation, scale.factor);
 }
 
@@ -168,12 +168,12 @@ void tell_site(const libmap::CropReport& report, const libmap::Bounds3d& bounds,
   if (report.rectangle) {
     run.add_results({{"site_yaw_deg", report.rectangle->yaw_deg},
                      {"site_clearance_m", report.rectangle->clearance_m}});
-    run.say("site: turned by {:.2f} deg, {:.2f} m of data around it", report.rectangle->yaw_deg,
+    run.say("site: rotated by {:.2f} deg, {:.2f} m of data around it", report.rectangle->yaw_deg,
             report.rectangle->clearance_m);
   }
   if (report.band) {
     run.add_results({{"band_seen", report.band->seen}, {"white_level", report.band->white_level}});
-    run.say("border: white (>= {:.0f}) along {:.0f} % of the least seen side",
+    run.say("border: white (>= {:.0f}) along {:.0f} % of the least visible side",
             report.band->white_level, 1e2 * report.band->seen);
   }
   if (report.border_scale) tell_scale(*report.band, *report.border_scale, run);
@@ -191,7 +191,7 @@ void tell(const CropCommandOptions& options, const libmap::CropReport& report,
           const libmap::Bounds3d& bounds, Run& run) {
   run.add_input(options.input);
   if (!options.polygon.empty()) run.add_input(options.polygon);
-  // The input's own site_from_map, if it was cropped before, stands behind the new one.
+  // The new site_from_map includes that of an input that was cropped before.
   const libmap::Pose before = site_from_map_of(options.input).value_or(libmap::Pose::Identity());
   run.manifest().transforms.emplace_back(site_from_map_name, report.site_from_map * before);
   carry_truth_transform(options.input, run);
@@ -233,7 +233,7 @@ void crop_mesh(const CropCommandOptions& options, Run& run) {
   write_site(options, run, [&](const fs::path& to) { libmap::write_mesh(to, result.mesh); });
 }
 
-// Each piece is read, cut, written and forgotten.
+// Reads, crops and writes the tiles one by one.
 void crop_pieces(const CropCommandOptions& options, const std::vector<fs::path>& pieces,
                  const fs::path& folder, Run& run) {
   std::size_t next = 0;
@@ -256,8 +256,8 @@ void crop_pieces(const CropCommandOptions& options, const std::vector<fs::path>&
       run.timed("crop", [&] { return libmap::crop_mesh_pieces(each, options.crop, write); });
   tell(options, report, {box.min(), box.max()}, run);
   run.add_results({{"pieces", written}, {"surface_area_m2", area_m2}, {"triangles", triangles}});
-  run.say("{} triangles in {} of {} pieces, {:.3f} m2 of surface", triangles, written,
-          pieces.size(), area_m2);
+  run.say("{} triangles in {} of {} tiles, {:.3f} m2 of surface", triangles, written, pieces.size(),
+          area_m2);
 }
 
 void crop_folder(const CropCommandOptions& options, Run& run) {
@@ -303,19 +303,19 @@ void crop(CropCommandOptions& options, Run& run) {
 int main(int argc, char** argv) {
   CropCommandOptions options;
   Command command("crop");
-  command.input(
-      "MAP", options.input,
-      "mesh (.ply .obj .stl .tif ...), a folder of its pieces, or cloud (.pcd .ply .csv)");
+  command.input("MAP", options.input,
+                "mesh (.ply .obj .stl .tif ...), a folder of its tiles, or cloud (.pcd .ply .csv)");
   command.output(options.output,
-                 "the site, of the same kind; OUTPUT's stem + .site_from_map.txt is the transform");
-  command.option("--box", "XMIN,YMIN[,ZMIN],XMAX,YMAX[,ZMAX]", options.box, "keep what is in it");
+                 "cropped mesh or cloud; its transform is OUTPUT's stem + .site_from_map.txt");
+  command.option("--box", "XMIN,YMIN[,ZMIN],XMAX,YMAX[,ZMAX]", options.box,
+                 "box to keep, m, in the frame of --frame");
   command.option("--polygon", "FILE.csv", options.polygon,
-                 "keep what stands on it: columns x, y, in order round it, convex or not");
+                 "area to keep: corners in order, columns x, y; convex or not");
   command.option("--size", "WIDTHxHEIGHT", options.size,
-                 "keep the rectangle of this size that lies best centered in the data, m");
-  command.flag("--border", options.border, "keep what a white band on the ground frames");
+                 "size of the rectangle to keep, m, which is centered in the data");
+  command.flag("--border", options.border, "keep the area inside a white band on the ground");
   command.option("--border-size", "WIDTHxHEIGHT", options.border_size,
-                 "true size of the area inside the band, m: determines the map's scale");
+                 "true size of the area inside the band, m; determines the map's scale");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { crop(options, run); });
 }

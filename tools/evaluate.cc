@@ -1,5 +1,4 @@
-// graspmap evaluate: ROC curve, areas under it and rates of the scores in a table, against the
-// labels in it.
+// graspmap evaluate: ROC curves, AUC and rates of scores against labels in a table.
 #include <algorithm>
 #include <utility>
 
@@ -19,7 +18,7 @@ using libgtd::TableEvaluation;
 struct EvaluateOptions {
   std::vector<std::string> tables;
   std::string folder;
-  std::string scores;  // names with commas between
+  std::string scores;  // names, separated by commas
   std::string title = "ROC";
   libgtd::TableEvaluationOptions evaluation;
 };
@@ -27,8 +26,8 @@ struct EvaluateOptions {
 void bind(libmap::ParameterTable& parameters, EvaluateOptions& options) {
   bind(parameters, options.evaluation);
   parameters.add("score", options.scores,
-                 "columns of scores, with commas between; none: every numeric column that is no "
-                 "identity, position or length");
+                 "columns of scores, separated by commas; none: every numeric column that is not "
+                 "an identity, position or length");
   parameters.add("title", options.title, "title of the plot and of the summary");
 }
 
@@ -88,7 +87,7 @@ void write_results(const EvaluateOptions& options, const TableEvaluation& evalua
                            {"roc.png", text(libmap::to_png(picture))}});
 }
 
-// The rows of all tables, of the columns that all have.
+// Joins the rows of all tables, with the columns that all tables have.
 libmap::Table join_tables(std::vector<libmap::Table> tables) {
   if (tables.size() == 1) return std::move(tables.front());
   libmap::Table joined;
@@ -127,7 +126,7 @@ int main(int argc, char** argv) {
   Command command("evaluate");
   command.former_flag("--hold-model", "not needed: forces need no fit for a gripper");
   command.inputs("TABLE.csv", options.tables,
-                 "labels and scores, one row per location; of several the columns that all have");
+                 "labels and scores, one row per location; of several tables, common columns");
   command.output(
       options.folder,
       "folder of roc.csv, rates.csv, accuracy.csv, summary.json, summary.md, roc.png and roc.svg");

@@ -1,4 +1,4 @@
-// graspmap footholds: the best places of a map, for a planner of steps.
+// graspmap footholds: the best footholds of a map for a step planner.
 #include "libgtd/score/footholds.h"
 
 #include <algorithm>
@@ -26,7 +26,7 @@ using namespace graspmap_tools;
 
 namespace {
 
-// Fewer draws than `grasp` makes at listed locations, and the limits of all directions.
+// Options with fewer draws than `grasp` at listed locations, and with limits of all directions.
 libgtd::GraspOptions foothold_grasp_options() {
   libgtd::GraspOptions options;
   options.draws = 8;
@@ -36,8 +36,8 @@ libgtd::GraspOptions foothold_grasp_options() {
 }
 
 struct FootholdTrialsOptions {
-  std::string mesh;     // of the terrain; empty: no test. Not bound
-  std::string gripper;  // name or file; empty: that of the map's manifest, else scar-e
+  std::string mesh;     // mesh of the terrain; empty: no test. Not bound
+  std::string gripper;  // name or file; empty: from the map's manifest, else scar-e
   double min_probability = 0.5;
   libgtd::GraspOptions grasp = foothold_grasp_options();
 };
@@ -50,7 +50,7 @@ std::string gripper_of(const FootholdTrialsOptions& options,
   return name != nullptr ? *name : "scar-e";
 }
 
-// Drops the footholds that are not on the mesh, and returns where the others are in its frame.
+// Drops footholds that are not on the mesh. Returns the positions of the others in its frame.
 std::vector<Eigen::Vector3d> places_on(const libgtd::Ground& ground,
                                        const libmap::Pose& mesh_from_map,
                                        const libmap::PointCloud& map, double max_distance_m,
@@ -67,16 +67,16 @@ std::vector<Eigen::Vector3d> places_on(const libgtd::Ground& ground,
 
 void bind(libmap::ParameterTable& table, FootholdTrialsOptions& options) {
   table.add("gripper", options.gripper,
-            "of the test: scar-e, hubrobo, limbero or a gripper file; default: that of the map");
+            "gripper of the test: scar-e, hubrobo, limbero or a file; default: that of the map");
   table.add("min_probability", options.min_probability, libmap::zero_to_one,
-            "least hold_probability of a foothold");
+            "minimum hold_probability of a foothold");
   bind(table, options.grasp);
 }
 
-// Tests the footholds, leaves those in `result` that hold with min_probability, the one with the
-// largest hold_probability first, of equal ones that with the largest holding_force_n, at most
-// `max_count` (0: all), and returns their results in this order. Footholds that are not on the mesh
-// are left out with a warning. Throws Error: mesh, gripper or map (none of it on the mesh).
+// Tests the footholds. Keeps at most `max_count` (0: all) of those in `result` with at least
+// min_probability, sorted by hold_probability, then by holding_force_n, and returns their results
+// in this order. Footholds that are not on the mesh are dropped with a warning. Throws Error for an
+// invalid mesh or gripper, or if no foothold is on the mesh.
 std::vector<libgtd::LocationResult> test_footholds(const FootholdTrialsOptions& options,
                                                    int max_count,
                                                    const std::optional<libmap::Manifest>& manifest,
@@ -128,9 +128,9 @@ std::vector<libgtd::LocationResult> test_footholds(const FootholdTrialsOptions& 
 }
 
 // Adds hold_probability, hold_low, hold_high, holding_force_n, holding_force_low_n and
-// holding_force_high_n (quantiles 0.5, 0.05 and 0.95 of the force that the trials' weakest
-// direction holds), trial_spread, parameter_spread, and for each direction pull_away_n,
-// pull_45_0_n, ..., pull_90_315_n (what nine of ten trials hold in it). Nothing without results.
+// holding_force_high_n (quantiles 0.5, 0.05 and 0.95 of the force in the trials' weakest
+// direction), trial_spread, parameter_spread, and for each direction pull_away_n, pull_45_0_n, ...,
+// pull_90_315_n (force that nine of ten trials hold). Adds nothing without results.
 void add_trial_fields(const std::vector<libgtd::LocationResult>& trials,
                       libmap::PointCloud& footholds) {
   if (trials.empty()) return;
@@ -172,7 +172,7 @@ void bind(libmap::ParameterTable& table, FootholdsCommandOptions& options) {
 libgtd::FootholdResult search(const FootholdsCommandOptions& options, const libmap::PointCloud& map,
                               const std::optional<libmap::Manifest>& manifest, Run& run) {
   libgtd::FootholdOptions wanted = options.footholds;
-  // Some of the best do not hold.
+  // All footholds are tested, because some of the best may not hold.
   if (!options.trials.mesh.empty()) wanted.max_count = 0;
   return in_file(options.map, [&] {
     return run.timed("footholds", [&] {
@@ -182,7 +182,7 @@ libgtd::FootholdResult search(const FootholdsCommandOptions& options, const libm
 }
 
 void find_footholds(const FootholdsCommandOptions& options, Run& run) {
-  if (options.trials.mesh.empty()) refuse_set(options.trials, &bind, "is for --mesh");
+  if (options.trials.mesh.empty()) refuse_set(options.trials, &bind, "requires --mesh");
   libmap::require_cloud_format(options.output);
   run.claim_output(options.output, {options.map, options.trials.mesh});
   const libmap::PointCloud map = libmap::read_cloud(options.map).cloud;
@@ -192,7 +192,7 @@ void find_footholds(const FootholdsCommandOptions& options, Run& run) {
     run.manifest().frame = manifest->frame;
     run.manifest().transforms = manifest->transforms;
   } else {
-    run.warn(options.map + ": no manifest beside it: the z axis is taken as up");
+    run.warn(options.map + ": has no manifest; up is assumed to be the z axis");
   }
   run.add_input(options.map);
   run.add_results(libmap::described(result));
@@ -201,10 +201,9 @@ void find_footholds(const FootholdsCommandOptions& options, Run& run) {
     trials =
         test_footholds(options.trials, options.footholds.max_count, manifest, map, result, run);
   run.add_results({{"footholds", result.footholds.size()}});
-  run.say("{} footholds among {} voxels that may be one", result.footholds.size(),
-          result.candidates);
+  run.say("{} footholds of {} candidate voxels", result.footholds.size(), result.candidates);
   if (result.candidates == 0)
-    run.warn("{}: no voxel may be a foothold{}", options.map,
+    run.warn("{}: no voxel is a candidate{}", options.map,
              result.at_border == 0
                  ? ""
                  : fmt::format("; {} at the border of the scan are left out (--border)",
@@ -222,11 +221,11 @@ int main(int argc, char** argv) {
   Command command("footholds");
   command.input("MAP", options.map, "graspability map");
   command.output(options.output,
-                 "the footholds, best first, with normals and directions of approach (.csv, .vtp, "
+                 "footholds, best first, with normals and directions of approach (.csv, .vtp, "
                  ".pcd, .ply)");
   command.option("--mesh", "MESH", options.trials.mesh,
-                 "mesh of the terrain: each foothold is tested as by `graspmap grasp`, and those "
-                 "that do not hold are left out");
+                 "mesh of the terrain, on which each foothold is tested as by `graspmap grasp`; "
+                 "footholds that do not hold are dropped");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { find_footholds(options, run); });
 }

@@ -1,4 +1,4 @@
-// graspmap fuse: the depth images of a scan -> one oriented, colored cloud.
+// graspmap fuse: fuses the depth images of a scan into one oriented, colored cloud.
 #include "libmap/fusion/depth_fusion.h"
 #include "libmap/fusion/pose_consistency.h"
 #include "libmap/io/cloud_io.h"
@@ -12,7 +12,7 @@
 #include "tools/support/tile_folder.h"
 #include "tools/support/usages.h"
 
-// The plan that shares and resumed runs have in common, bit for bit.
+// JSON of the survey, which shares and resumed runs read bit for bit.
 namespace libmap {
 
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FusionFrame, node, grid_from_base, image_pixels, reach,
@@ -31,7 +31,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Frame of the cloud: that of the poses, or ground truth's.
+// Frame of the cloud: that of the poses or of the true poses.
 enum class CloudFrame { poses, ground_truth };
 
 struct FuseOptions {
@@ -47,15 +47,15 @@ struct FuseOptions {
   std::string tile = whole_share;
 };
 
-// On scans where nothing moves 2 to 4 % are dropped, at the edges of surfaces.
+// Warns if more points are dropped than the 2 to 4 % at edges of static scans.
 void tell_contradictions(const libmap::DepthFusionResult& result, Run& run) {
   constexpr double usual_share = 0.06;
   const libmap::SurfacePointCounts& points = result.points;
   const auto dropped = static_cast<double>(points.seen_through + points.missed + points.beside);
   if (dropped < usual_share * (dropped + static_cast<double>(result.points_made))) return;
   run.say(
-      "{} places left out because frames contradict each other, as where something has moved: "
-      "others see through {}, measure nothing at {}, and {} hang together with these",
+      "{} points dropped because frames contradict each other, for example after a motion: {} seen "
+      "through, {} missed, {} connected to those",
       dropped, points.seen_through, points.missed, points.beside);
 }
 
@@ -64,14 +64,14 @@ void tell_registration(const libmap::DepthFusionResult& result, Run& run) {
   const libmap::PairCosts& depth = result.registration_check.depth;
   const libmap::PairCosts& shown = color.count > 0 ? color : depth;
   if (result.registration_rounds > 0)
-    run.say("poses corrected so that frames agree: by {:.1f} mm and {:.2f} deg (RMS)",
+    run.say("poses corrected by registration: {:.1f} mm and {:.2f} deg (RMS)",
             1e3 * result.registration_shift_m, result.registration_turn_deg);
   else if (result.registration_rejected && shown.count > 0)
-    run.say(
-        "poses not corrected: held-out {} does not fit better by registration, {:.4f} -> {:.4f}",
-        color.count > 0 ? "color" : "depth", shown.before, shown.after);
+    run.say("poses not corrected: registration does not improve held-out {}, {:.4f} -> {:.4f}",
+            color.count > 0 ? "color" : "depth", shown.before, shown.after);
   else if (result.registration_rejected)
-    run.say("poses not corrected: they are refined and there is no color to validate it by");
+    run.say(
+        "poses not corrected: they are refined, and there is no color to validate registration");
 }
 
 void tell_results(const libmap::DepthFusionResult& result, const FuseOptions& options, Run& run) {
@@ -88,19 +88,19 @@ void tell_results(const libmap::DepthFusionResult& result, const FuseOptions& op
   tell_registration(result, run);
   tell_contradictions(result, run);
   if (result.redundant_frames > 0)
-    run.say("{} frames left out: earlier frames have measured their surface (enough_views)",
+    run.say("{} frames skipped: earlier frames measured their surface (enough_views)",
             result.redundant_frames);
   run.say("{} frames, {} measurements -> {} points", result.frames, pixels.used,
           result.points_made);
   if (result.points_made > 0) return;
   if (result.points.unconfirmed > 0)
-    run.warn("--min-views {} leaves no point: the cloud is empty; {} frames see one at most",
+    run.warn("--min-views {} leaves no points; at most {} frames measured one point",
              options.fusion.points.min_views, result.points.max_views);
   else
-    run.warn("nothing was measured within the limits: the cloud is empty");
+    run.warn("the cloud is empty: there are no measurements within the limits");
 }
 
-// Of several shares the last one claims them, when it writes them.
+// Returns true for one of several shares, the last of which claims the outputs.
 bool is_share(const FuseOptions& options) { return libmap::parse_share(options.tile).count > 1; }
 
 void claim_poses(const FuseOptions& options, const std::vector<std::string>& inputs, Run& run) {
@@ -112,7 +112,7 @@ void claim_poses(const FuseOptions& options, const std::vector<std::string>& inp
   if (!is_share(options)) run.claim_output(options.corrected_poses, inputs);
 }
 
-// What carries the cloud into the frame that is wanted, by the poses that it is made with.
+// Transform of the cloud from the frame of `poses` to the requested frame.
 libmap::Pose wanted_from_cloud(const FuseOptions& options, const libmap::ScanSource& scan,
                                const libmap::Trajectory& poses,
                                const libmap::DepthFusionResult& result, Run& run) {
@@ -140,7 +140,7 @@ void write_poses(const FuseOptions& options, const libmap::DepthFusionResult& re
   run.manifest().results = results;
 }
 
-// Each tile is made, written and forgotten; a cloud in one file is one tile.
+// Makes and writes the tiles one by one; a cloud in one file is one tile.
 void make_tiles(const FuseOptions& options, const libmap::ScanSource& scan,
                 const libmap::Trajectory& poses, TileFolder* folder, Run& run) {
   std::optional<libmap::TileFusion> fusion;
@@ -203,7 +203,7 @@ void tell_consistency(const libmap::ScanSource& scan, const libmap::Trajectory& 
                       const PosesOption& taken, Run& run) {
   const libmap::PoseConsistency found =
       run.timed("consistency", [&] { return libmap::check_pose_consistency(scan, poses); });
-  run.detail("{} pairs of frames: {:.1f} % of {} common measurements contradict each other",
+  run.detail("{} pairs of frames: {:.1f} % of {} common measurements are contradictory",
              found.pairs, 100.0 * found.given.contradicted, found.given.measurements);
   if (const std::string warning = found.warning(); !warning.empty())
     run.warn("{}: {}", taken.source, warning);
@@ -238,7 +238,7 @@ void fuse(FuseOptions options, Run& run) {
           [&] { make_tiles(options, *scan, poses, folder ? &*folder : nullptr, run); });
 }
 
-// A folder of a camera rig, or --rig, which names the rig.
+// Returns true if an argument is a folder of a camera rig or --rig.
 bool names_rig(int argc, char** argv) {
   return std::any_of(argv + 1, argv + argc, [](const std::string& word) {
     std::error_code code;
@@ -256,14 +256,14 @@ int fuse_scan(int argc, char** argv) {
   add_poses_option(command, options.poses);
   add_calibration_option(command, options.calibration);
   command.option("--corrected-poses", "FILE", options.corrected_poses,
-                 "also write the poses that the frames were fused by (.tum, .kitti, .g2o, .toro), "
-                 "in the frame of --poses");
+                 "output for the registered poses (.tum, .kitti, .g2o, .toro), in the frame of "
+                 "--poses");
   command.parameters().add(
       "frame", options.frame,
       {{"poses", CloudFrame::poses}, {"ground-truth", CloudFrame::ground_truth}},
-      "frame of the cloud; ground-truth: carried there by aligning the poses with the true ones");
+      "frame of the cloud; ground-truth: by alignment of the poses with the true poses");
   command.parameters().add("tile_size_m", options.tile_m, libmap::positive,
-                           "side of a piece, m, where the output is a folder");
+                           "side of a tile if the output is a folder, m");
   libmap::bind(command.parameters(), options.fusion);
   return command.run(argc, argv, [&](Run& run) {
     require_folder_of_share(options.output, options.tile);

@@ -1,4 +1,4 @@
-// graspmap fuse RIG_FOLDER: one cloud in the robot's frame.
+// graspmap fuse RIG_FOLDER: fuses the images of a camera rig into one cloud in the robot's frame.
 #include "libmap/core/data_folder.h"
 #include "libmap/fusion/panorama.h"
 #include "libmap/io/cloud_io.h"
@@ -28,17 +28,16 @@ struct PanoramaCommandOptions {
 
 void bind(libmap::ParameterTable& table, PanoramaCommandOptions& options) {
   table.add("stamp_s", options.stamp,
-            "the moment to show; fullest: the one at which most cameras saw something");
+            "stamp of the image set, s; fullest: the set with most cameras");
   table.add("tolerance_s", options.tolerance_s, libmap::not_negative,
-            "images further from the moment are left out");
-  table.add("strict", options.strict,
-            "end with an error if a camera's image is late, missing or broken");
+            "maximum difference of an image's stamp from that of the set");
+  table.add("strict", options.strict, "fail if a camera's image is late, missing or broken");
   bind(table, options.panorama);
 }
 
-// One line on a camera that is left out.
+// Message about a camera without an image in the set.
 std::string absence(const std::string& name, const SynchronizedSet::Camera& camera) {
-  if (camera.state == State::missing) return name + ": no image";
+  if (camera.state == State::missing) return name + ": has no image";
   return fmt::format("{}: its nearest image is {:.1f} ms {}", name, std::abs(camera.offset_s) * 1e3,
                      camera.offset_s > 0 ? "late" : "early");
 }
@@ -46,7 +45,7 @@ std::string absence(const std::string& name, const SynchronizedSet::Camera& came
 void report_absent(const libmap::CameraRig& rig, const SynchronizedSet& set,
                    const PanoramaCommandOptions& options, Run& run) {
   if (set.seen() == 0)
-    throw libmap::Error("no camera saw anything at that time",
+    throw libmap::Error("no camera has an image at this time",
                         {.file = options.folder,
                          .field = "--stamp",
                          .value = libmap::to_text(set.stamp_s),
@@ -97,7 +96,7 @@ std::vector<libmap::PanoramaView> read_views(const libmap::CameraRig& rig,
     try {
       depth = libmap::read_rig_depth(image, camera);
     } catch (const libmap::Error& error) {
-      // A broken image costs its camera, not the panorama.
+      // Only the camera of a broken image is left out.
       if (strict) throw;
       run.warn(std::string(error.what()) + "; " + camera.name + " is left out");
       continue;
@@ -110,7 +109,7 @@ std::vector<libmap::PanoramaView> read_views(const libmap::CameraRig& rig,
 }
 
 void panorama(PanoramaCommandOptions& options, Run& run) {
-  const std::optional<double> stamp = parse_number_or("fullest", options.stamp, "no such time",
+  const std::optional<double> stamp = parse_number_or("fullest", options.stamp, "not a time",
                                                       "--stamp", "a number of seconds, or fullest");
   libmap::require_cloud_format(options.output);
   run.claim_output(options.output);
@@ -118,7 +117,7 @@ void panorama(PanoramaCommandOptions& options, Run& run) {
                             : fs::exists(options.rig) ? fs::path(options.rig)
                                                       : libmap::find_data_file("rigs", options.rig);
   if (!fs::is_directory(options.folder))
-    throw libmap::Error(fs::exists(options.folder) ? "is no folder" : "no such folder",
+    throw libmap::Error(fs::exists(options.folder) ? "is not a folder" : "no such folder",
                         {.file = options.folder});
   const libmap::CameraRig rig = libmap::read_rig(rig_file);
   run.add_input(rig_file);
@@ -133,8 +132,8 @@ void panorama(PanoramaCommandOptions& options, Run& run) {
   const libmap::PanoramaResult result =
       run.timed("project", [&] { return libmap::make_panorama(views, options.panorama); });
   if (views.empty())
-    throw libmap::Error("no image of that time can be read", {.file = options.folder});
-  if (result.cloud.empty()) run.warn("no camera measured anything within its limits");
+    throw libmap::Error("no image of this time can be read", {.file = options.folder});
+  if (result.cloud.empty()) run.warn("no camera has measurements within its limits");
   add_rig_results(rig, set, result, views, run);
   carry_transforms(options.folder, run);
   run.say("{} points from {} of {} cameras at {} s", result.cloud.size(), views.size(), cameras,
@@ -149,14 +148,13 @@ void panorama(PanoramaCommandOptions& options, Run& run) {
 int graspmap_tools::fuse_rig(int argc, char** argv) {
   PanoramaCommandOptions options;
   Command command("fuse",
-                  "With the folder of a camera rig: one cloud in the robot's frame from the depth "
-                  "images that its cameras took at one time.");
+                  "With the folder of a camera rig: one cloud in the robot's frame from depth "
+                  "images of the same time.");
   command.input("RIG_FOLDER", options.folder,
                 "folder of rig.yaml and CAMERA/STAMP.png (or images.csv)");
   command.output(options.output, "cloud (.pcd, .ply, .vtp, .csv)");
   command.option("--rig", "FILE|NAME", options.rig,
-                 "the rig, if it is not RIG_FOLDER/rig.yaml: a file, or one of the toolkit's own, "
-                 "e.g. scar-e");
+                 "rig file, or a rig of the toolkit, e.g. scar-e; default: RIG_FOLDER/rig.yaml");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { panorama(options, run); });
 }

@@ -1,4 +1,4 @@
-// graspmap grasp: the virtual field test of a gripper at listed locations of a mesh.
+// graspmap grasp: virtual field test of a gripper at listed locations or map voxels of a mesh.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -33,13 +33,13 @@ using namespace graspmap_tools;
 namespace {
 
 struct GraspScenesOptions {
-  std::string folder;               // empty: no pictures
-  std::vector<std::string> places;  // none: all
+  std::string folder;               // empty: no scenes
+  std::vector<std::string> places;  // empty: all locations
 };
 
 struct GraspScene {
-  std::size_t row = 0;  // of the locations
-  std::string file;     // PLACE.ply
+  std::size_t row = 0;  // row of the location
+  std::string file;     // name of the scene, PLACE.ply
 };
 
 struct GraspScenesInput {
@@ -52,7 +52,7 @@ struct GraspScenesInput {
 
 constexpr std::size_t max_unlisted_scenes = 100;
 
-// As a file's name: what a shell or a file system could take for anything else becomes '_'.
+// File name of a location: special characters become '_'.
 std::string file_of(const std::string& place) {
   std::string name = place.substr(0, 100);
   for (char& letter : name) {
@@ -79,7 +79,7 @@ std::vector<std::size_t> rows_of(const libmap::Table& locations,
   for (const std::string& place : listed) {
     const auto found = std::find(places.begin(), places.end(), place);
     if (found == places.end())
-      throw libmap::Error("is no place of the locations" + libmap::did_you_mean(place, places),
+      throw libmap::Error("is not a listed location" + libmap::did_you_mean(place, places),
                           {.file = locations.file, .field = "--scene-of", .value = place});
     const auto row = static_cast<std::size_t>(found - places.begin());
     if (std::find(rows.begin(), rows.end(), row) == rows.end()) rows.push_back(row);
@@ -96,11 +96,11 @@ std::string name_of(libgtd::TrialEnd end) {
 std::string description(const libgtd::LocationResult& result, const libgtd::Trial& trial,
                         double load_n) {
   const std::string verdict =
-      fmt::format("{} (probability {:.2f}); the trial shown ",
+      fmt::format("{} (probability {:.2f}); the shown trial ",
                   result.holds() ? "holds" : "does not hold", result.hold_probability);
   const std::string direction = libgtd::pull_directions()[trial.direction].name();
   if (trial.end == libgtd::TrialEnd::holds)
-    return verdict + fmt::format("bears {:.1f} N in its weakest direction, {}; the load is {} N",
+    return verdict + fmt::format("holds {:.1f} N in its weakest direction, {}; the load is {} N",
                                  trial.force_n, direction, libmap::to_text(load_n));
   const std::string failure = "fails by " + name_of(trial.end);
   if (trial.gripper.approach != libgtd::ApproachEnd::on_ground) return verdict + failure;
@@ -109,14 +109,14 @@ std::string description(const libgtd::LocationResult& result, const libgtd::Tria
                      direction, libmap::to_text(load_n));
 }
 
-// Before the work. Throws Error: a folder that is no output of this command, or places without it.
+// Claims the folder. Throws Error if another command wrote it, or for locations without a folder.
 void claim_scenes(const GraspScenesOptions& options, Run& run) {
   if (!options.folder.empty()) return run.claim_output_folder(options.folder);
-  if (!options.places.empty())
-    throw libmap::Error("is for --scenes, which is not given", {.field = "--scene-of"});
+  if (!options.places.empty()) throw libmap::Error("requires --scenes", {.field = "--scene-of"});
 }
 
-// Throws Error: a place that is not in the table, two with one name, or too many without a list.
+// Returns the scenes to write. Throws Error for a location that is not in the table, two with the
+// same file name, or too many without a list.
 std::vector<GraspScene> scenes_of(const libmap::Table& locations,
                                   const GraspScenesOptions& options) {
   if (options.folder.empty()) return {};
@@ -124,7 +124,7 @@ std::vector<GraspScene> scenes_of(const libmap::Table& locations,
   std::vector<std::size_t> rows = rows_of(locations, options.places);
   if (options.places.empty()) {
     if (places.size() > max_unlisted_scenes)
-      throw libmap::Error("too many locations for a picture of each: list some with --scene-of",
+      throw libmap::Error("too many locations for one scene each: select some with --scene-of",
                           {.file = locations.file,
                            .field = "locations",
                            .value = std::to_string(places.size()),
@@ -137,14 +137,14 @@ std::vector<GraspScene> scenes_of(const libmap::Table& locations,
     for (const GraspScene& other : scenes)
       if (other.file == file)
         throw libmap::Error(
-            fmt::format("the pictures of rows {} and {} have one name", other.row + 1, row + 1),
+            fmt::format("the scenes of rows {} and {} have the same name", other.row + 1, row + 1),
             {.file = locations.file, .field = "place", .value = "'" + places[row] + "'"});
     scenes.push_back({row, file});
   }
   return scenes;
 }
 
-// Also a result of the run for each: FILE, what its location and the trial that it shows came to.
+// Writes the scenes and adds one result per scene to the manifest, the text of its trial.
 void write_scenes(const GraspScenesOptions& options, const std::vector<GraspScene>& scenes,
                   const GraspScenesInput& input, Run& run) {
   if (options.folder.empty()) return;
@@ -189,21 +189,21 @@ void bind(libmap::ParameterTable& table, GraspCommandOptions& options) {
   table.add_overrides("gripper", options.overrides);
   bind(table, options.grasp);
   table.add("surface_error", options.surface_error,
-            "of the mesh: none; mesh, the field expected_error of its vertices; or a standard "
-            "deviation, m");
+            "error of the mesh: none; mesh: the field expected_error of its vertices; or a "
+            "standard deviation, m");
   table.add("sequential", options.sequential,
             {{"auto", SequentialTest::automatic},
              {"on", SequentialTest::on},
              {"off", SequentialTest::off}},
-            "a location's test ends as soon as its verdict is clear; auto: with --map");
+            "end the test of a location as soon as its verdict is certain; auto: with --map");
   table.add("map_draws", options.map_draws, {1, 100000},
-            "with --map: the draws of each pose, instead of 'draws'");
+            "with --map: number of draws per pose, instead of 'draws'");
   table.add("more_loads", options.more_loads,
-            "further loads with a verdict each, N, with commas between");
-  table.add("prefix", options.prefix, "before the name of each column of the results");
+            "additional loads with their own verdicts, N, separated by commas");
+  table.add("prefix", options.prefix, "prefix of the names of result columns");
 }
 
-// Of all that the results depend on but mesh, locations and seed.
+// Hash of all that affects the results, except mesh, locations and seed.
 std::string parameters_hash(const libgtd::Gripper& gripper, const GraspCommandOptions& command) {
   libgtd::GraspOptions options = command.grasp;
   options.seed = 0;
@@ -239,7 +239,7 @@ libgtd::Gripper read_with_fingers(const std::filesystem::path& file,
   return gripper;
 }
 
-// Of a location of a pull: the fit repeats them for each of its parameter sets.
+// Limits per location of a pull, because the fit repeats the trials for each parameter set.
 constexpr int max_pull_poses = 12;
 constexpr int max_pull_draws = 2;
 constexpr const char* level_mesh = "level";
@@ -256,7 +256,7 @@ libgtd::Ground ground_of(const libmap::TriangleMesh& mesh, const GraspCommandOpt
       return libgtd::Ground(mesh, libgtd::errors_of(mesh, bounds));
     const auto error_m = libmap::parse_double(options.surface_error);
     if (!error_m || !(*error_m >= 0.0 && *error_m <= bounds.max_error_m))
-      throw libmap::Error("no error of a surface",
+      throw libmap::Error("is not an error of a surface",
                           {.field = "--surface-error",
                            .value = options.surface_error,
                            .bound = "none, mesh, or 0 to --max-surface-error, m"});
@@ -269,7 +269,7 @@ void grasp_voxels(GraspCommandOptions& options, Run& run) {
                 {"--scene-of", !options.scenes.places.empty()},
                 {"--more-loads", !options.more_loads.empty()},
                 {"--prefix", !options.prefix.empty()}},
-               "is for --points");
+               "requires --points");
   GraspMapInput input{.mesh_file = options.mesh,
                       .map_file = options.map,
                       .output = options.output,
@@ -293,14 +293,15 @@ void grasp_voxels(GraspCommandOptions& options, Run& run) {
 }
 
 void grasp_places(GraspCommandOptions& options, Run& run) {
-  refuse_given({{"--tile", options.tile != GraspCommandOptions{}.tile}}, "is for --map");
+  refuse_given({{"--tile", options.tile != GraspCommandOptions{}.tile}}, "requires --map");
   if (libmap::format_of(options.output) != ".csv")
     throw libmap::Error("results are written as .csv", {.file = options.output});
   run.claim_output(options.output, {options.mesh, options.points});
   for (const std::string& text : libmap::split_list(options.more_loads)) {
     const auto load = libmap::parse_double(text);
     if (!load || !(*load > 0.0))
-      throw libmap::Error("is no load", {.field = "--more-loads", .value = text, .bound = "> 0"});
+      throw libmap::Error("is not a load",
+                          {.field = "--more-loads", .value = text, .bound = "> 0"});
     options.grasp.more_loads_n.push_back(*load);
   }
   claim_scenes(options.scenes, run);
@@ -328,7 +329,7 @@ void grasp_places(GraspCommandOptions& options, Run& run) {
   for (const std::string& name : libgtd::grasp_columns(options.grasp.more_loads_n)) {
     const std::string column = options.prefix + name;
     if (table.find_column(column))
-      throw libmap::Error("the locations have this column already",
+      throw libmap::Error("the locations already have this column",
                           {.file = options.points, .field = column});
     table.columns.push_back(column);
   }
@@ -365,14 +366,14 @@ void say_fit(const libgtd::PullFit& fit, std::size_t tests, Run& run) {
     rows += (rows.empty() ? "" : ", ") + std::to_string(row);
   if (!fit.explains_tests())
     run.warn(
-        "the model does not explain the tests: each predicted from the others has a mean squared "
-        "score of {:.2f} instead of 1 (probability {:.1g}){}; the ranges are too narrow",
-        fit.mean_squared_score, fit.chance, rows.empty() ? "" : ", most of all rows " + rows);
+        "the model does not explain the tests: their mean squared score is {:.2f} instead of 1, "
+        "each predicted from the others (probability {:.1g}){}; the ranges are too narrow",
+        fit.mean_squared_score, fit.chance, rows.empty() ? "" : ", worst rows " + rows);
   else if (!rows.empty())
-    run.warn("tests that the others do not predict: rows {}", rows);
+    run.warn("the other tests do not predict the tests of rows {}", rows);
   constexpr double few_sets = 8.0;
   if (fit.effective_sets < few_sets)
-    run.warn("the fit rests on {:.1f} effective parameter sets: its ranges are too narrow",
+    run.warn("the fit has only {:.1f} effective parameter sets: its ranges are too narrow",
              fit.effective_sets);
   for (const auto& [name, force] :
        {std::pair{"level_before", &fit.level_before}, {"level_after", &fit.level_after}})
@@ -415,7 +416,7 @@ void fit_gripper(const GraspCommandOptions& options, Run& run) {
 void plan_next_pulls(const GraspCommandOptions& options, Run& run) {
   const auto count = libmap::parse_integer(options.plan);
   if (!count || *count < 1)
-    throw libmap::Error("is no number of pulls",
+    throw libmap::Error("is not a number of pulls",
                         {.field = "--plan", .value = options.plan, .bound = ">= 1"});
   run.claim_output(options.output, {options.mesh, options.points});
   const auto file = libmap::find_data_file("grippers", options.gripper);
@@ -430,7 +431,7 @@ void plan_next_pulls(const GraspCommandOptions& options, Run& run) {
     return libgtd::plan_pulls(ground, gripper, locations, static_cast<std::size_t>(*count),
                               pull_options(options), run.progress());
   });
-  if (plans.empty()) throw libmap::Error("no pull there tells anything", {.file = options.points});
+  if (plans.empty()) throw libmap::Error("no pull is informative", {.file = options.points});
   libmap::Table planned;
   planned.columns = {"place",    "x",           "y",      "z",
                      "tilt_deg", "azimuth_deg", "load_n", "information_bits"};
@@ -444,7 +445,7 @@ void plan_next_pulls(const GraspCommandOptions& options, Run& run) {
     row.push_back(fmt::format("{:.3f}", plan.information_bits));
     planned.rows.push_back(std::move(row));
   }
-  run.say("{} pulls; the first tells {:.2f} bits", plans.size(), plans.front().information_bits);
+  run.say("{} pulls; the first: {:.2f} bits", plans.size(), plans.front().information_bits);
   run.write_text(options.output, libmap::to_csv(planned));
 }
 
@@ -453,15 +454,15 @@ void grasp(GraspCommandOptions& options, Run& run) {
     refuse_given({{"--points", !options.points.empty()},
                   {"--map", !options.map.empty()},
                   {"--plan", !options.plan.empty()}},
-                 "excludes --fit");
+                 "cannot be combined with --fit");
     return fit_gripper(options, run);
   }
   if (options.points.empty() == options.map.empty())
     throw UsageError(options.map.empty()
                          ? "--points LOCATIONS.csv, --map MAP or --fit PULLS.csv is missing"
-                         : "--points and --map exclude each other");
+                         : "--points and --map cannot be combined");
   if (!options.plan.empty()) {
-    refuse_given({{"--map", !options.map.empty()}}, "excludes --plan");
+    refuse_given({{"--map", !options.map.empty()}}, "cannot be combined with --plan");
     return plan_next_pulls(options, run);
   }
   options.map.empty() ? grasp_places(options, run) : grasp_voxels(options, run);
@@ -475,29 +476,29 @@ int main(int argc, char** argv) {
   command.input("MESH", options.mesh,
                 "mesh or DEM (.tif) of the terrain, z up; level: level ground, for --fit");
   command.option("--points", "LOCATIONS.csv", options.points,
-                 "CSV with the columns x, y, z in meters in the mesh's frame, and any others");
+                 "locations: CSV with columns x, y, z in the mesh's frame, m, and any others");
   command.option(
       "--map", "MAP", options.map,
-      "instead of it: a graspability map of the mesh (.pcd, .ply, .csv, .tiles), each of whose "
-      "voxels is a location");
+      "graspability map of the mesh (.pcd, .ply, .csv, .tiles), whose voxels are the locations; "
+      "instead of --points");
   command.output(
       options.output,
-      "with --points a CSV: the locations, each with the results of its trials; with "
-      "--map the map with more fields (.pcd, .ply, .vtp, .csv), or a tile store (.tiles); with "
-      "--fit a gripper file (.yaml) with the fitted ensemble; with --plan a CSV of pulls");
+      "with --points: CSV of the locations with the results of their trials; with --map: the map "
+      "with added fields (.pcd, .ply, .vtp, .csv), or a tile store (.tiles); with --fit: a "
+      "gripper file (.yaml) with the fitted ensemble; with --plan: CSV of pulls");
   command.option("--fit", "PULLS.csv", options.pulls,
-                 "fit the gripper's parameters to pull tests: rows of x, y, z or ground = level, "
+                 "pull tests for fitting the gripper's parameters: x, y, z or ground = level, "
                  "tilt_deg, azimuth_deg, and force_n at slip, or load_n and held (0 or 1)");
   command.option("--plan", "N", options.plan,
-                 "with --points: the N pulls at these locations that would tell most about the "
+                 "with --points: number of pulls to plan, those with most information about the "
                  "parameters");
   command.option("--tile", "K/N", options.tile,
                  "with --map: test only share K of N of the tiles, into a tile store");
   command.option("--scenes", "FOLDER", options.scenes.folder,
-                 "pictures of one trial of each location, its force nearest to the median: "
-                 "FOLDER/PLACE.ply, after the column 'place' or the row");
+                 "folder for scenes of one trial per location, with nearly the median force: "
+                 "FOLDER/PLACE.ply, by the column 'place' or the row");
   command.option("--scene-of", "PLACES", options.scenes.places,
-                 "the locations to draw; default: all");
+                 "locations of the scenes; default: all");
   for (const char* key : {"friction", "asperity-min", "asperity-max", "engagement-rate", "drag"}) {
     std::string name = key;
     std::replace(name.begin(), name.end(), '-', '_');

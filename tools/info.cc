@@ -1,4 +1,4 @@
-// graspmap info: what a scan, a cloud, a mesh, a map or a bag holds.
+// graspmap info: describes the content of a scan, cloud, mesh, map or bag.
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -27,7 +27,7 @@ struct InfoOptions {
   bool quick = false;
 };
 
-// Of a mesh that has more, the longest.
+// Maximum number of listed boundaries of a mesh, the longest first.
 constexpr std::size_t listed_boundaries = 10;
 
 Json range_of(const std::vector<double>& values) {
@@ -154,7 +154,7 @@ std::string plain(const Json& value) {
   if (value.is_string()) return value.get<std::string>();
   if (value.is_boolean()) return value.get<bool>() ? "yes" : "no";
   if (value.is_number_float()) {
-    // Stamps need more digits than a float has.
+    // Stamps need more digits than single precision has.
     const auto number = value.get<double>();
     return std::abs(number) < 1e6 ? libmap::to_text(static_cast<float>(number))
                                   : libmap::to_fixed_text(number, 3);
@@ -165,7 +165,7 @@ std::string plain(const Json& value) {
   return text.empty() ? "none" : text;
 }
 
-// One object of a list in one line.
+// An object of a list as one line.
 std::string line_of(const Json& object) {
   if (object.contains("type") && object.contains("range"))
     return fmt::format("{:<12} {:<8} {}", plain(object.at("name")), plain(object.at("type")),
@@ -195,9 +195,9 @@ void print_plainly(const Json& json, const std::string& indent) {
   }
 }
 
-// How far the terrain frame of a scored map leans, by its manifest: against the cloud that was
-// scored and, where it is known, against the map before it was cropped or a simulated robot stood
-// in it. For clouds whose z is up, the second is how far the regression plane misses the ground.
+// Tilt of a map's terrain frame, by its manifest: relative to the scored cloud and, if known, to
+// the map before `crop` or the map of a simulated robot. If z is up in that map, the latter is the
+// error of the regression plane.
 Json plane_json(const libmap::Manifest& manifest) {
   const libmap::Pose* terrain_from_input = manifest.find_transform("terrain_from_input");
   if (terrain_from_input == nullptr) return nullptr;
@@ -211,13 +211,13 @@ Json plane_json(const libmap::Manifest& manifest) {
   return json;
 }
 
-// What --verify finds.
+// Faults found by --verify.
 struct Faults {
   std::vector<libmap::ScanFault> scan;
   std::vector<std::string> tiles;
 };
 
-// Reads every tile; why those that cannot be used cannot, in their order.
+// Reads every tile. Returns the reasons of unusable tiles, in their order.
 std::vector<std::string> broken_tiles(const MapTiles& tiles, libmap::Progress& progress) {
   std::vector<std::string> reasons(tiles.index().tiles.size());
   progress.begin("verify", reasons.size());
@@ -272,15 +272,14 @@ Json content_json(const InfoOptions& options, Run& run, Faults& faults) {
     return std::move(scan.json);
   }
   if (options.verify)
-    throw libmap::Error("only scans and tile stores are verified",
+    throw libmap::Error("requires a scan or a tile store",
                         {.file = options.file, .field = "--verify"});
   if (is_bag) return bag_json(options.file);
   return libmap::file_kind(options.file) == libmap::FileKind::mesh ? mesh_json(options)
                                                                    : cloud_json(options.file);
 }
 
-// Of a scan or a tile store that was verified: what is broken, in one line; the list stands on
-// stdout.
+// Throws Error with the number of faults of a verified scan or tile store; stdout has the list.
 void require_sound(const std::string& file, const Faults& found) {
   if (!found.tiles.empty())
     throw libmap::Error(fmt::format("{} {} broken", found.tiles.size(),
@@ -323,9 +322,9 @@ int main(int argc, char** argv) {
   Command command("info");
   command.input("FILE", options.file,
                 "scan, camera (.yaml), cloud, mesh, map, tile store (.tiles) or bag of ROS");
-  command.flag("--json", options.json, "as JSON");
+  command.flag("--json", options.json, "print the description as JSON");
   command.flag("--verify", options.verify,
-               "read all that a scan or a tile store contains and list what is broken");
-  command.flag("--quick", options.quick, "do not look for self-intersections of a mesh");
+               "read the whole content of a scan or a tile store and list broken parts");
+  command.flag("--quick", options.quick, "skip the test for self-intersections of a mesh");
   return command.run(argc, argv, [&](Run& run) { info(options, run); });
 }

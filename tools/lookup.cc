@@ -1,4 +1,4 @@
-// graspmap lookup: the map's values at listed locations.
+// graspmap lookup: looks up a map's values at listed locations.
 #include <ostream>
 
 #include "libgtd/evaluate/lookup.h"
@@ -27,30 +27,29 @@ struct LookupCommandOptions {
 void bind(libmap::ParameterTable& table, LookupCommandOptions& options) {
   bind(table, options.lookup);
   table.add("points_frame", options.points_frame, listed_point_frame_names(),
-            "frame of the points: of the cloud that was scored, the terrain's, or the map's before "
-            "it was cropped or a simulated robot stood in it; auto: as the manifest of POINTS "
-            "says, else input");
+            "frame of the points: input: the scored cloud; terrain; map: the map before it was "
+            "cropped, or that of a simulated robot; auto: by the manifest of POINTS, else input");
   table.add("column", options.columns,
-            "what is added, with commas between: NAME=FIELD, or NAME=FIELD>=VALUE for 1 or 0; "
+            "columns to add, separated by commas: NAME=FIELD, or NAME=FIELD>=VALUE for 1 or 0; "
             "none: found, distance_m and every field of the map");
   table.add("visible_radius_m", options.visible_radius_m, libmap::positive,
-            "with --visible: how near a measured point must be, m");
+            "with --visible: maximum distance of the nearest measured point, m");
 }
 
-// Appends a column; one that the points already have (a verdict named "graspable") keeps its name.
+// Appends a column, with the prefix map_ if the points already have one of this name.
 void add_column(libmap::Table& table, std::string name) {
   while (table.find_column(name)) name.insert(0, "map_");
   table.columns.push_back(std::move(name));
 }
 
-// One that is added to the table of points.
+// A column that is added to the table of points.
 struct AddedColumn {
   std::string name;
-  std::string field;             // of the map, or found, or distance_m
-  std::optional<double> cutoff;  // 1 where the field reaches it, 0 where not
+  std::string field;             // field of the map, found or distance_m
+  std::optional<double> cutoff;  // the value is 1 if the field reaches the cutoff, else 0
 };
 
-// NAME=FIELD or NAME=FIELD>=VALUE, with commas between.
+// Parses NAME=FIELD or NAME=FIELD>=VALUE, separated by commas.
 std::vector<AddedColumn> parse_columns(const std::string& text) {
   std::vector<AddedColumn> columns;
   for (const std::string& part : libmap::split_list(text)) {
@@ -66,7 +65,7 @@ std::vector<AddedColumn> parse_columns(const std::string& text) {
     if (column.name.empty() || column.name.ends_with('>') || column.field.empty() ||
         (comparison != std::string_view::npos && !column.cutoff))
       throw libmap::Error(
-          "names no column",
+          "is not a column",
           {.field = "--column", .value = part, .bound = "NAME=FIELD or NAME=FIELD>=VALUE"});
     columns.push_back(std::move(column));
   }
@@ -74,8 +73,8 @@ std::vector<AddedColumn> parse_columns(const std::string& text) {
 }
 
 struct MapAnswers {
-  std::vector<std::string> fields;         // of the map
-  std::vector<Eigen::Vector3d> positions;  // of the points, in the frame of the map's points
+  std::vector<std::string> fields;         // fields of the map
+  std::vector<Eigen::Vector3d> positions;  // listed points in the frame of the map's points
   std::vector<libgtd::LookupAnswer> answers;
 };
 
@@ -85,7 +84,7 @@ std::vector<std::string> field_names(const libmap::PointCloud& map) {
   return names;
 }
 
-// To the frame of the map's points.
+// Transforms positions to the frame of the map's points.
 std::vector<Eigen::Vector3d> carried(const LookupCommandOptions& options,
                                      std::vector<Eigen::Vector3d> positions, Run& run) {
   const libmap::Pose transform = map_from_points(options.map, options.points_frame, run);
@@ -121,8 +120,8 @@ MapAnswers ask_tiles(const LookupCommandOptions& options, std::vector<Eigen::Vec
   });
 }
 
-// Places with no point of the cloud near them were not seen: the map has no answer for them, what
-// interpolation may have put there notwithstanding.
+// Removes the answers at locations without a near point of the --visible cloud, where the map has
+// only interpolated values. Returns their number.
 std::int64_t hide_unseen(const LookupCommandOptions& options, MapAnswers& map, Run& run) {
   const libmap::PointCloud seen = libmap::read_cloud(options.visible).cloud;
   if (seen.empty()) throw libmap::Error("the cloud has no points", {.file = options.visible});
@@ -142,7 +141,7 @@ std::int64_t hide_unseen(const LookupCommandOptions& options, MapAnswers& map, R
   return visible;
 }
 
-// What a row of the output takes of an answer; fields by their number, after found and distance_m.
+// A cell of an output row: found, distance_m or a field by index, optionally with a cutoff.
 struct Cell {
   std::size_t field;
   std::optional<double> cutoff;
@@ -164,7 +163,7 @@ std::vector<Cell> add_columns(libmap::Table& table, const std::vector<AddedColum
       throw libmap::Error("the map has no such field" + libmap::did_you_mean(column.field, fields),
                           {.file = map_file, .field = "--column", .value = column.field});
     if (table.find_column(column.name))
-      throw libmap::Error("the points have this column already",
+      throw libmap::Error("the points already have this column",
                           {.file = table.file, .field = "--column", .value = column.name});
     cells.push_back({static_cast<std::size_t>(field - fields.begin()), column.cutoff});
     table.columns.push_back(column.name);
@@ -178,11 +177,11 @@ std::string text_of(const libgtd::LookupAnswer& answer, const Cell& cell) {
                        : cell.field == 1 ? answer.distance_m
                                          : answer.values[cell.field - 2];
   if (cell.cutoff) return libgtd::reaches_cutoff(value, *cell.cutoff) ? "1" : "0";
-  // Shortest text of single precision: the map's files hold no more.
+  // Shortest text of single precision, which is that of the map's files.
   return libmap::to_text(static_cast<float>(value));
 }
 
-// The points, each with its answer; row by row, so that a million of them are never text at once.
+// Writes the points with their answers row by row, which limits the memory for text.
 void write_answers(std::ostream& out, libmap::Table& table, const std::vector<Cell>& cells,
                    const MapAnswers& map) {
   out << libmap::csv_line(table.columns);
@@ -224,10 +223,10 @@ int main(int argc, char** argv) {
   Command command("lookup");
   command.input("MAP", options.map, "graspability map, or a tile store (.tiles)");
   command.input("POINTS", options.points, "CSV with the columns x, y, z in meters, and any others");
-  command.output(options.output, "CSV: the points, each with the map's values there");
+  command.output(options.output, "CSV of the points with the map's values");
   command.option("--visible", "CLOUD", options.visible,
-                 "what was measured, in the frame of the cloud that was scored (usually that "
-                 "cloud): places with none of its points near them get no values");
+                 "measured cloud in the frame of the scored cloud (usually the scored cloud); "
+                 "locations without a near point of it get no values");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { lookup(options, run); });
 }

@@ -1,4 +1,4 @@
-// `graspmap COMMAND ...` starts the program of that command with the rest of the line.
+// `graspmap COMMAND ...` starts the program of the command with the remaining arguments.
 #include <unistd.h>
 
 #include <CGAL/version.h>
@@ -58,7 +58,7 @@ int unknown_command(const std::string& name) {
   return 2;
 }
 
-// Beside this program in the build folder, in ../libexec when installed.
+// Path of a command's program: next to this program in the build folder, else in ../libexec.
 fs::path find_program(const std::string& command) {
   std::error_code code;
   const fs::path folder = fs::read_symlink("/proc/self/exe", code).parent_path();
@@ -76,8 +76,8 @@ std::string dotted(int major, int minor, int patch) {
   return std::to_string(major) + "." + std::to_string(minor) + "." + std::to_string(patch);
 }
 
-// "graspmap VERSION", then a line each for the commit, the compiler and every library with the
-// version it was built against.
+// "graspmap VERSION", then one line each for the commit, the compiler and every library with its
+// version at build time.
 std::string version_text() {
   std::string text = "graspmap " GRASPMAP_VERSION "\ncommit: " GRASPMAP_COMMIT
                      "\ncompiler: " GRASPMAP_COMPILER "\n";

@@ -1,4 +1,4 @@
-// graspmap mask: a gripper's mask as text, cloud or picture.
+// graspmap mask: writes a gripper's mask as text, cloud or image.
 #include <array>
 #include <set>
 
@@ -27,22 +27,22 @@ struct MaskOptions {
   int cell_width_px = 640;  // of a section
 };
 
-// Of sections alone.
+// Options of sections only.
 void bind_sections(libmap::ParameterTable& table, MaskOptions& options) {
   table.add("section_layer", options.section_layer, {0, 1e6},
             "layer of the lower horizontal section; 0 is the lowest");
-  table.add("cell_width_px", options.cell_width_px, {64, 5000}, "width of a section, pixels");
+  table.add("cell_width_px", options.cell_width_px, {64, 5000}, "width of a section's image");
 }
 
 void bind(libmap::ParameterTable& table, MaskOptions& options) {
   table.add("gripper", options.gripper, "scar-e, hubrobo, limbero, or a gripper file");
   table.add_overrides("gripper", options.overrides);
-  table.add("method", options.mask.method, libgtd::method_names(), "whose design");
-  table.add("voxel_size_m", options.mask.voxel_size_m, libmap::positive, "edge of a voxel, m");
+  table.add("method", options.mask.method, libgtd::method_names(), "design of the mask");
+  table.add("voxel_size_m", options.mask.voxel_size_m, libmap::positive, "edge length of a voxel");
   table.add("extra_void_layers", options.mask.extra_void_layers, {0, 10000},
-            "void layers on top (H_add), voxels");
-  table.add("view", options.view, libmap::viewpoint_names(), "from where a picture is taken");
-  table.add("sections", options.sections, "three sections of the mask in place of a view of it");
+            "number of void layers on top (H_add)");
+  table.add("view", options.view, libmap::viewpoint_names(), "viewpoint of the image");
+  table.add("sections", options.sections, "draw three sections of the mask instead of a view");
   bind_sections(table, options);
 }
 
@@ -51,7 +51,7 @@ std::string title_of(const GripperMask& mask, const MaskOptions& options) {
                      libmap::to_text(static_cast<float>(mask.voxel_size_m * 1000.0)));
 }
 
-// Of a voxel in a section; what is not counted enters neither SSV nor GSV.
+// Kind of a voxel in a section; voxels that are not counted affect neither SSV nor GSV.
 enum class MaskVoxel { solid, void_space, solid_not_counted, void_not_counted, pivot };
 
 struct KindLook {
@@ -75,10 +75,10 @@ MaskVoxel kind_of(const GripperMask& mask, const Eigen::Vector3i& at) {
   return mask.is_solid(x, y, z) ? MaskVoxel::solid_not_counted : MaskVoxel::void_not_counted;
 }
 
-constexpr double square_share = 0.94;  // of a voxel's side: lines show between them
-constexpr double offset_share = 0.1;   // of the mask's side: measures lie as far outside
+constexpr double square_share = 0.94;  // drawn share of a voxel's side, which leaves lines between
+constexpr double offset_share = 0.1;   // distance of dimension lines, as a share of the mask's side
 
-// A place in the mask by the two directions of a section.
+// Index of a voxel by its two coordinates in a section.
 using PlaceInMask = std::function<Eigen::Vector3i(int, int)>;
 
 Eigen::Vector3d center_of(const GripperMask& mask, const Eigen::Vector3i& voxel) {
@@ -109,7 +109,7 @@ libmap::Scene scene_of(const GripperMask& mask, const PlaceInMask& place, int wi
   return scene;
 }
 
-// A measure along a direction of the section, over `count` voxels from `first` on, moved aside.
+// Dimension line over `count` voxels from `first` in a direction of the section, with an offset.
 libmap::DimensionLine measure(const GripperMask& mask, const Eigen::Vector3i& first,
                               const Eigen::Vector3i& along, int count, const Eigen::Vector3d& aside,
                               const std::string& name) {
@@ -120,8 +120,8 @@ libmap::DimensionLine measure(const GripperMask& mask, const Eigen::Vector3i& fi
           fmt::format("{}{}{:.4g} mm", name, name.empty() ? "" : " ", 1000.0 * length_m)};
 }
 
-// The voxels with the pivot's column among them, along x through the axis, that are all solid or
-// all void: first and number.
+// Run of equal voxels (solid or void) along x through the axis that contains the pivot's column:
+// first index and number.
 std::pair<int, int> run_through_axis(const GripperMask& mask, int z) {
   const int y = mask.pivot_xy;
   const bool solid = mask.is_solid(mask.pivot_xy, y, z);
@@ -155,7 +155,7 @@ libmap::SheetCell vertical(const GripperMask& mask) {
   if (mask.layers > mask.solid_layers)
     scene.dimension_lines.push_back(measure(mask, {mask.side - 1, y, mask.solid_layers}, z_axis,
                                             mask.layers - mask.solid_layers, right, "+"));
-  // Room for the texts beside the lines that stand: nothing is drawn of a line without length.
+  // A line without length is not drawn, but reserves space for the texts of vertical lines.
   const Eigen::Vector3d corner = center_of(mask, {mask.side - 1, y, 0}) + 3.0 * right;
   scene.dimension_lines.push_back({corner, corner, ""});
   return cell_of("x-z through the pivot", std::move(scene), libmap::Viewpoint::front);
@@ -175,10 +175,10 @@ libmap::SheetCell horizontal(const GripperMask& mask, int z, const std::string& 
                  std::move(scene), libmap::Viewpoint::top);
 }
 
-// The mask cut in three, as the thesis draws it (figures 3-11 and 5-1): the vertical section
-// through the pivot (x to the right, z up), the horizontal ones of the top solid layer and of
-// `lower_layer` (x to the right, y up), one square per voxel at its place from the pivot, with
-// measures in millimeters as they are in voxels.
+// Three sections of the mask like those of the thesis (figures 3-11 and 5-1): the vertical section
+// through the pivot (x to the right, z up), and horizontal sections of the top solid layer and of
+// `lower_layer` (x to the right, y up). Each voxel is a square at its position relative to the
+// pivot; dimensions are in millimeters.
 std::vector<libmap::SheetCell> mask_sections(const GripperMask& mask, int lower_layer) {
   if (lower_layer < 0 || lower_layer >= mask.layers)
     throw libmap::Error("the mask has no such layer",
@@ -190,7 +190,7 @@ std::vector<libmap::SheetCell> mask_sections(const GripperMask& mask, int lower_
                      lower_layer == 0 ? "lowest layer" : fmt::format("layer {}", lower_layer))};
 }
 
-// Of the kinds of voxels that the mask has.
+// Legend of the kinds of voxels in the mask.
 libmap::Legend mask_legend(const GripperMask& mask) {
   libmap::Legend legend;
   legend.title = "voxels";
@@ -235,9 +235,9 @@ void mask(const MaskOptions& options, Run& run) {
   if (extension != ".txt" && extension != ".png") libmap::require_cloud_format(options.output);
   if (options.sections && extension != ".png")
     throw libmap::Error("sections are drawn as .png", {.file = options.output});
-  if (!options.sections) refuse_set(options, bind_sections, "is for --sections");
+  if (!options.sections) refuse_set(options, bind_sections, "requires --sections");
   if (options.view != MaskOptions{}.view && (options.sections || extension != ".png"))
-    throw libmap::Error("is for a picture (.png) without --sections", {.field = "--view"});
+    throw libmap::Error("requires an image (.png) without --sections", {.field = "--view"});
   run.claim_output(options.output);
   const auto file = libmap::find_data_file("grippers", options.gripper);
   const libgtd::Gripper gripper = libgtd::read_gripper(file, options.overrides);

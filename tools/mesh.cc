@@ -1,4 +1,4 @@
-// graspmap mesh: a cloud of points -> a clean surface.
+// graspmap mesh: reconstructs a clean surface from a cloud.
 #include <iostream>
 #include <nlohmann/json.hpp>
 
@@ -26,7 +26,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-// Whose normals the surface is made from.
+// Source of the normals for the reconstruction.
 enum class NormalSource { automatic, cloud, estimate };
 
 struct MeshOptions {
@@ -45,14 +45,14 @@ void bind(libmap::ParameterTable& table, MeshOptions& options) {
             {{"auto", NormalSource::automatic},
              {"cloud", NormalSource::cloud},
              {"estimate", NormalSource::estimate}},
-            "auto: the cloud's, estimated if it has none, oriented if neighbors face opposite "
-            "sides; cloud: as stored, an error if it has none; "
-            "estimate: always estimated");
+            "source of normals; auto: the cloud's, estimated if it has none, oriented if neighbors "
+            "face opposite sides; cloud: as stored, an error if it has none; estimate: always "
+            "estimated");
   libmap::bind(table, options.estimation);
   libmap::bind(table, options.surface.reconstruction);
   libmap::bind(table, options.surface.cleaning);
   table.add("tile_size_m", options.surface.tile_m, libmap::positive,
-            "side of a piece, m, where the output is a folder");
+            "side of a tile if the output is a folder, m");
 }
 
 void check_points(const std::string& input, std::size_t points, std::size_t dropped, Run& run) {
@@ -66,7 +66,7 @@ libmap::PointCloud read_points(const std::string& input, Run& run) {
   return std::move(read.cloud);
 }
 
-// Chooses sides for normals that have none, as Open3D, PCL and a PCA leave them.
+// Orients normals without a consistent orientation, such as those from Open3D, PCL or a PCA.
 void orient_if_mixed(const MeshOptions& options, libmap::PointCloud& cloud, Run& run) {
   const double share = libmap::opposing_share(cloud.positions, cloud.normals);
   run.add_results({{"opposing_normals", share}});
@@ -75,7 +75,7 @@ void orient_if_mixed(const MeshOptions& options, libmap::PointCloud& cloud, Run&
       run.timed("normals", [&] { return libmap::orient_normals(cloud); });
   cloud.normals = oriented.normals;
   const std::string way(to_text(oriented.orientation));
-  run.warn("{}: {:.1f} % of neighboring normals face opposite sides: their sides are chosen by {}",
+  run.warn("{}: {:.1f} % of neighboring normals face opposite sides: all are oriented by {}",
            options.cloud, 100.0 * share, way);
   run.add_results({{"normals_oriented_by", way}});
 }
@@ -86,9 +86,8 @@ void prepare_normals(const MeshOptions& options, libmap::PointCloud& cloud, Run&
       [](const Eigen::Vector3f& normal) { return normal.allFinite() && !normal.isZero(0.0F); });
   if (options.normals != NormalSource::estimate && cloud.has_normals()) {
     if (has_any) return orient_if_mixed(options, cloud, run);
-    throw libmap::Error(
-        "none of the cloud's normals says a direction; --normals estimate makes others",
-        {.file = options.cloud, .field = "normals", .value = "all zero or NaN"});
+    throw libmap::Error("all normals are zero or NaN; use --normals estimate",
+                        {.file = options.cloud, .field = "normals", .value = "all zero or NaN"});
   }
   if (options.normals == NormalSource::cloud)
     throw libmap::Error("the cloud has no normals", {.file = options.cloud,
@@ -99,19 +98,18 @@ void prepare_normals(const MeshOptions& options, libmap::PointCloud& cloud, Run&
       run.timed("normals", [&] { return libmap::estimate_normals(cloud, options.estimation); });
   cloud.normals = estimated.normals;
   const std::string way(to_text(estimated.orientation));
-  run.say("normals estimated{}, their sides chosen by {}",
-          options.normals == NormalSource::automatic ? ", since the cloud has none" : "", way);
+  run.say("normals estimated{}, oriented by {}",
+          options.normals == NormalSource::automatic ? ", because the cloud has none" : "", way);
   run.add_results({{"normals_oriented_by", way}, {"normals_undefined", estimated.undefined}});
 }
 
-// Large work, before it begins.
+// Reports the expected size, memory and time of large surfaces before the work.
 void announce(const libmap::SurfaceWork& work, Run& run) {
   if (work.triangles < 2e6) return;
   run.say("about {:.1f} million triangles: {:.1f} GB of memory, {:.0f} s on one thread",
           1e-6 * work.triangles, 1e-9 * work.bytes, work.seconds);
   if (work.bytes > static_cast<double>(libmap::machine_memory()))
-    run.warn(
-        "more than the machine's memory: a larger --cell-size or a folder of tiles takes less");
+    run.warn("this exceeds the machine's memory: use a larger --cell-size or a folder of tiles");
 }
 
 libmap::TriangleMesh reconstructed(const MeshOptions& options, const libmap::PointCloud& cloud,
@@ -128,10 +126,10 @@ libmap::TriangleMesh reconstructed(const MeshOptions& options, const libmap::Poi
           made.mesh.triangles.size());
   if (!made.mesh.triangles.empty()) return std::move(made.mesh);
   if (made.trimmed_triangles == 0)
-    throw libmap::Error("no surface was found: the points are too few, or their normals cancel",
+    throw libmap::Error("no surface was found: there are too few points, or their normals cancel",
                         {.file = options.cloud});
   throw libmap::Error(
-      "no surface is so near the points",
+      "trimming removed the entire surface",
       {.file = options.cloud,
        .field = "trim_distance_cells",
        .value = libmap::to_text(options.surface.reconstruction.trim_distance_cells)});
@@ -205,7 +203,7 @@ TileFolder::Facts facts_of(const libmap::SurfaceTile& made) {
           {"seams", made.seams}};
 }
 
-// Of the pieces that are written.
+// Totals of the written tiles.
 struct Totals {
   std::int64_t pieces = 0;
   std::int64_t vertices = 0;
@@ -226,7 +224,7 @@ struct Totals {
   }
 };
 
-// The pieces that are done, without islands that go across them.
+// File name of a tile, without extension.
 std::string name_of(const libmap::XyTile& tile) { return libmap::tile_file_name(tile, ""); }
 
 Totals put_together(const MeshOptions& options, const TileFolder& output,
@@ -256,7 +254,7 @@ Totals put_together(const MeshOptions& options, const TileFolder& output,
     }
   }
   if (totals.triangles == 0)
-    throw libmap::Error("no surface was found: the points are too few, or their normals cancel",
+    throw libmap::Error("no surface was found: there are too few points, or their normals cancel",
                         {.file = options.cloud});
   run.add_results({{"pieces", totals.pieces},
                    {"islands_across_tiles", islands.islands()},
@@ -266,7 +264,7 @@ Totals put_together(const MeshOptions& options, const TileFolder& output,
   return totals;
 }
 
-// Each tile is made, written and forgotten.
+// Makes and writes the tiles one by one.
 void make_tiles(const MeshOptions& options, TileFolder& output, Run& run) {
   libmap::SurfaceSurvey survey;
   std::map<libmap::XyTile, std::size_t> points_in_tiles;
@@ -300,7 +298,7 @@ void make_tiles(const MeshOptions& options, TileFolder& output, Run& run) {
   };
   const auto finish = [&](const fs::path& folder) {
     const Totals totals = put_together(options, output, tiles, folder, run);
-    run.say("{} points -> {} triangles in {} pieces", index.points(), totals.triangles,
+    run.say("{} points -> {} triangles in {} tiles", index.points(), totals.triangles,
             totals.pieces);
   };
   output.make({names, ".ply", make, finish});
@@ -308,10 +306,10 @@ void make_tiles(const MeshOptions& options, TileFolder& output, Run& run) {
 
 void mesh_in_tiles(const MeshOptions& options, Run& run) {
   if (options.report || options.json)
-    throw libmap::Error("is for one mesh, not for a folder of pieces",
+    throw libmap::Error("requires one mesh as output, not a folder of tiles",
                         {.field = options.json ? "--json" : "--report"});
   if (options.normals == NormalSource::estimate)
-    throw libmap::Error("sides are chosen over the whole cloud: not in pieces",
+    throw libmap::Error("cannot be used with tiles, because orientation needs the whole cloud",
                         {.field = "--normals", .value = "estimate", .bound = "auto or cloud"});
   options.surface.check();
   in_file(options.cloud, [&] {
@@ -328,13 +326,13 @@ void mesh_in_tiles(const MeshOptions& options, Run& run) {
 int main(int argc, char** argv) {
   MeshOptions options;
   Command command("mesh");
-  command.input("CLOUD", options.cloud, "cloud (.pcd, .ply, .csv), or a folder of pieces");
+  command.input("CLOUD", options.cloud, "cloud (.pcd, .ply, .csv), or a folder of its tiles");
   command.output(options.output,
                  std::string("mesh (.ply, .vtp, .obj, .stl, .off, .glb)") + or_tile_folder);
   add_share_option(command, options.tile);
   command.flag("--report", options.report,
-               "print what the mesh is as a surface, and how far the points lie from it");
-  command.flag("--json", options.json, "that report as JSON");
+               "print properties of the surface, and the distances of the points from it");
+  command.flag("--json", options.json, "print the report as JSON");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) {
     if (is_tile_folder(options.output)) return mesh_in_tiles(options, run);

@@ -1,4 +1,4 @@
-// graspmap refine: poses of a scan by loop closures, pose graph, bundle adjustment and depth.
+// graspmap refine: refines poses by loop closures, pose graph, bundle adjustment and depth.
 #include "libmap/poses/trajectory_io.h"
 #include "libmap/refine/refinement.h"
 #include "libmap/scan/colmap_builder.h"
@@ -43,7 +43,7 @@ void say_stage(const libmap::StageReport& stage, Run& run) {
   add_cost("surfaces", stage.held_out.surfaces);
   if (stage.rejected)
     text += stage.held_out.is_worse() ? ", rejected (validation got worse)"
-                                      : ", which is no better: rejected";
+                                      : ", rejected (no improvement)";
   if (stage.error)
     text += fmt::format("; error {:.2f} mm, {:.3f} deg", 1e3 * stage.error->absolute.rmse_m,
                         stage.error->absolute.mean_rotation_deg);
@@ -51,7 +51,7 @@ void say_stage(const libmap::StageReport& stage, Run& run) {
   for (const std::string& warning : stage.warnings) run.say("{}: {}", stage.name, warning);
   run.detail("{}: {:.2f} s", stage.name, stage.seconds);
   if (stage.rejected_error)
-    run.detail("  given up: {:.2f} mm, {:.3f} deg", 1e3 * stage.rejected_error->absolute.rmse_m,
+    run.detail("  rejected: {:.2f} mm, {:.3f} deg", 1e3 * stage.rejected_error->absolute.rmse_m,
                stage.rejected_error->absolute.mean_rotation_deg);
   for (const auto& [name, value] : stage.figures) run.detail("  {} {:.6g}", name, value);
   for (const auto& [name, group] : stage.groups)
@@ -95,13 +95,13 @@ void warn_of_lost_nodes(const std::string& path, const libmap::Trajectory& poses
   const std::size_t nodes = count_valid_nodes(graph);
   if (fs::path(path).extension() != ".kitti" || poses.size() == nodes) return;
   run.warn(
-      "{}: its lines name no nodes, and {} of {} nodes have a pose: only a file .tum, .g2o or "
-      ".toro can be bound to the scan again",
+      "{}: this format has no nodes, and only {} of {} nodes have a pose: use .tum, .g2o or .toro "
+      "for a file that can be assigned to the scan again",
       path, poses.size(), nodes);
 }
 
-// In the format that the name says: .tum, .kitti, .g2o, .toro, or NAME.colmap, a folder with a
-// model of COLMAP that has no points. Before the work.
+// Claims the output before the work: a file .tum, .kitti, .g2o or .toro, or NAME.colmap, a folder
+// with a model of COLMAP without points.
 void claim_poses_output(const std::string& path, const std::vector<std::string>& inputs, Run& run) {
   if (is_model(path)) return run.claim_output_tree(path, model_names, inputs);
   if (!libmap::is_trajectory_path(path))
@@ -113,8 +113,8 @@ void claim_poses_output(const std::string& path, const std::vector<std::string>&
   run.claim_output(path, inputs);
 }
 
-// A model of COLMAP has the scan's calibrations and names its images as `convert --colmap` does;
-// frames without a photograph or a calibration are left out with a warning.
+// Writes the poses. A model of COLMAP has the scan's calibrations and the image names of `convert
+// --colmap`; frames without an image or a calibration are left out with a warning.
 void write_poses_output(const std::string& path, const libmap::TrajectoryFile& poses,
                         const libmap::ScanSource& scan, bool nodes, Run& run) {
   if (is_model(path))
@@ -130,7 +130,7 @@ void write_poses_output(const std::string& path, const libmap::TrajectoryFile& p
 void write_outputs(const RefineOptions& options, const libmap::RefinementResult& result,
                    const libmap::ScanSource& scan, const std::optional<libmap::CameraFile>& known,
                    Run& run) {
-  // First: a database whose rest is broken cannot be copied.
+  // The database is first, because copying may fail for a broken one.
   if (!options.database.empty())
     run.write_output(options.database, [&](const auto& temporary) {
       std::map<int, libmap::Pose> poses;
@@ -158,7 +158,7 @@ void write_outputs(const RefineOptions& options, const libmap::RefinementResult&
   write_poses_output(options.output, {result.poses, result.links}, scan, options.nodes, run);
 }
 
-// Beside the output, unless another folder or none is asked for.
+// Feature cache: OUTPUT.features, or another folder or none by --feature-cache.
 libmap::FeatureCache feature_cache_of(const RefineOptions& options, const Run& run) {
   if (options.feature_cache == "off" || run.options().dry_run) return {};
   return libmap::FeatureCache(options.feature_cache.empty() ? options.output + ".features"
@@ -179,13 +179,13 @@ std::map<fs::path, ScanCounts> count_by_scan(const libmap::Trajectory& poses,
   return counts;
 }
 
-// Of several scans.
+// Reports the number of poses of each of several scans.
 void say_scans(const libmap::RefinementResult& result, const libmap::ScanSource& scan, Run& run) {
   const auto counts = count_by_scan(result.poses, scan);
   if (counts.size() < 2) return;
   for (const auto& [path, count] : counts) {
     if (count.poses == 0)
-      run.warn("{}: nothing joins it to the others: it gets no poses", path.string());
+      run.warn("{}: gets no poses, because no link joins it to the other scans", path.string());
     else
       run.say("{}: {} of {} nodes have a pose", path.string(), count.poses, count.nodes);
   }
@@ -207,14 +207,14 @@ void claim_database(const RefineOptions& options, Run& run) {
   const std::string& first = options.scans.front();
   const bool is_file = options.scans.size() == 1 && fs::is_regular_file(first);
   if (!is_file && fs::exists(first))
-    throw libmap::Error("a copy of a database, which the scan is not",
+    throw libmap::Error("requires a single database as SCAN",
                         {.field = "--write-database",
                          .value = options.database,
-                         .bound = "left out where SCAN is a folder or several"});
+                         .bound = "omitted for a folder or several scans"});
   run.claim_output(options.database, options.scans);
 }
 
-// Claims the outputs before the work. Returns the camera that --calibration names.
+// Claims the outputs before the work. Returns the camera of --calibration.
 std::optional<libmap::CameraFile> claim_outputs(const RefineOptions& options, Run& run) {
   claim_poses_output(options.output, options.scans, run);
   if (!options.links.empty()) claim_text("--links", "links", options.links, {".g2o"}, options, run);
@@ -227,7 +227,7 @@ std::optional<libmap::CameraFile> claim_outputs(const RefineOptions& options, Ru
   if (camera)
     refuse_given({{"--write-calibration", !options.new_calibration.empty()},
                   {"--write-database", !options.database.empty()}},
-                 "starts from the stored camera, not from --calibration");
+                 "cannot be combined with --calibration: it starts from the stored camera");
   if (!options.database.empty()) claim_database(options, run);
   for (const std::string& report : options.reports)
     claim_text("--report", "reports", report, {".json", ".txt"}, options, run);
@@ -238,16 +238,16 @@ void say_result(const RefineOptions& options, const libmap::RefinementResult& re
                 bool with_known_camera, Run& run) {
   const std::string& first = options.scans.front();
   for (const auto& [node, fault] : result.skipped)
-    run.warn("no features: node {}: {}", node, fault.what());
+    run.warn("node {} has no features: {}", node, fault.what());
   for (const std::string& warning : result.warnings) run.warn(first + ": " + warning);
   for (const libmap::StageReport& stage : result.stages) say_stage(stage, run);
   for (const std::string& finding : result.findings) run.say(finding);
   if (!result.noise.empty()) run.detail("{}", result.noise);
   if (!result.calibration.empty() && (with_known_camera || result.cameras.size() > 1) &&
       options.database.empty())
-    run.warn("{}: what was corrected is in the poses alone: {}", first,
-             with_known_camera ? "begin with the stored camera"
-                               : "--write-database keeps it of several cameras");
+    run.warn("{}: the correction of the camera is not written: {}", first,
+             with_known_camera ? "start from the stored camera"
+                               : "--write-database stores it for several cameras");
   const bool is_depth_scale = options.refinement.known_lengths.empty() &&
                               !options.refinement.board && options.refinement.scale == 1.0 &&
                               options.refinement.scale_from == libmap::ScaleSource::depth;
@@ -283,36 +283,36 @@ int main(int argc, char** argv) {
   RefineOptions options;
   Command command("refine");
   command.inputs("SCAN", options.scans,
-                 "scan: a database of RTAB-Map, or a folder of images; several, or a folder of "
-                 "databases: scans of overlapping ground, which are joined");
+                 "scan: an RTAB-Map database, or a folder of images; several scans of overlapping "
+                 "ground, or a folder of databases, are joined");
   command.output(options.output, "poses (.tum, .kitti, .g2o, .toro, or a folder .colmap)");
-  command.option("--links", "LINKS.g2o", options.links, "poses and links as a pose graph");
+  command.option("--links", "LINKS.g2o", options.links, "output for poses and links as a graph");
   command.option(
       "--write-database", "OUT.db", options.database,
-      "a copy of the database with the refined poses, the links that were found, and the camera "
-      "and depth as they were corrected");
+      "output for a copy of the database with refined poses, found links, and corrected camera "
+      "and depth");
   add_calibration_option(command, options.calibration);
   command.option("--write-calibration", "OUT.yaml", options.new_calibration,
-                 "the camera as it was estimated, for --calibration of other commands and scans");
+                 "output for the estimated camera, for --calibration of other commands and scans");
   command.option("--known-length", "NODE:X:Y-NODE:X:Y=METERS", options.known_lengths,
-                 "measured distance between what two pixels of pictures show; repeatable; "
+                 "measured distance between two points, given as pixels of images; repeatable; "
                  "determines the scale");
   command.option("--board", "COLUMNSxROWS:METERS", options.board,
-                 "inner corners, and side of a square, of a chessboard that lies still in the "
+                 "numbers of inner corners and side of a square of a static chessboard in the "
                  "scene; determines the scale");
   command.option("--report", "FILE.json|FILE.txt", options.reports,
-                 "what each stage did, and how certain the poses are");
+                 "output for a report on each stage and the deviations of the poses");
   command.option("--feature-cache", "FOLDER|off", options.feature_cache,
-                 "where features of frames are kept for the next run; else OUTPUT.features");
+                 "folder for features of frames for later runs; default: OUTPUT.features");
   command.flag("--nodes", options.nodes, "write the node's id as a ninth column of .tum");
   libmap::bind(command.parameters(), options.refinement);
   command.parameters().add("strict", options.strict,
-                           "what the scan's file lacks is an error, not a warning");
+                           "fail for missing parts of the scan's file instead of a warning");
   return command.run(argc, argv, [&](Run& run) {
     for (const std::string& text : options.known_lengths)
       options.refinement.known_lengths.push_back(libmap::parse_known_length(text));
     if (!options.board.empty()) options.refinement.board = libmap::parse_known_board(options.board);
-    // Of a folder .colmap, beside which other files lie.
+    // A folder .colmap may be given with a slash.
     options.output = without_trailing_slash(options.output);
     refine(options, run);
   });

@@ -1,4 +1,4 @@
-// graspmap render: a picture of a cloud, a mesh or a map.
+// graspmap render: draws clouds, meshes and maps.
 #include <Eigen/Geometry>
 #include <limits>
 #include <variant>
@@ -24,27 +24,27 @@ using namespace graspmap_tools;
 
 namespace {
 
-// How a map lies in the picture. terrain: as in its terrain frame. input: turned about z and moved
-// level, so that x and y are those of the cloud that was scored; heights stay the terrain's.
-// automatic: terrain for one file, input for several.
+// Horizontal frame of a map in the image. terrain: the terrain frame. input: rotated about z and
+// shifted horizontally, so that x and y are those of the scored cloud; heights are those of the
+// terrain frame. automatic: terrain for one file, input for several.
 enum class MapHeading { automatic, terrain, input };
 
-// One file as a scene, with listed places on it.
+// One file as a scene, with markers at listed locations.
 struct SceneFileOptions {
-  std::string points;  // CSV of marked places; empty: none
+  std::string points;  // CSV of marked locations; empty: none
   std::string label = "auto";
   std::string verdict;
   std::string zero_plane = "auto";
   PointFrame points_frame = PointFrame::automatic;
-  std::string box;  // of the plan that is shown
+  std::string box;  // shown rectangle of the x-y plane
   std::uint64_t max_points = 1'000'000;
-  libmap::SceneLayer layer;  // its shape is the file's
+  libmap::SceneLayer layer;  // its shape is that of the file
   MapHeading heading = MapHeading::automatic;
 };
 
 struct SceneFile {
   libmap::Scene scene;
-  int columns_per_point = 0;  // of a tile store: side of the squares that became one point; else 0
+  int columns_per_point = 0;  // side of the squares that became one point of a tile store; else 0
 };
 
 libmap::Verdict verdict_of(const libmap::Table& table, std::size_t row, std::size_t column) {
@@ -52,15 +52,15 @@ libmap::Verdict verdict_of(const libmap::Table& table, std::size_t row, std::siz
   if (libmap::trim(cell).empty()) return libmap::Verdict::none;
   const auto verdict = libmap::parse_bool(cell);
   if (!verdict)
-    throw libmap::Error("not a verdict", {.file = table.file,
-                                          .field = "row " + std::to_string(row + 1) + ", column '" +
-                                                   table.columns[column] + "'",
-                                          .value = "'" + cell + "'",
-                                          .bound = "1, 0 or empty"});
+    throw libmap::Error("is not a verdict", {.file = table.file,
+                                             .field = "row " + std::to_string(row + 1) +
+                                                      ", column '" + table.columns[column] + "'",
+                                             .value = "'" + cell + "'",
+                                             .bound = "1, 0 or empty"});
   return *verdict ? libmap::Verdict::pass : libmap::Verdict::fail;
 }
 
-// In the frame in which they are listed.
+// Reads markers in the frame of the list.
 std::vector<libmap::Marker> read_markers(const SceneFileOptions& options) {
   const libmap::Table table = libmap::read_csv(options.points);
   const std::vector<Eigen::Vector3d> positions = positions_of(table);
@@ -94,7 +94,7 @@ double zero_plane_of(const SceneFileOptions& options, const libmap::Manifest* ma
   return libmap::number_of(manifest->find_parameter("zero_plane_m")).value_or(none);
 }
 
-// About z and along x and y alone: the input's x axis comes to lie above x, its origin above 0.
+// Rotation about z and horizontal shift that align the input's x axis and origin horizontally.
 libmap::Pose turned_back(const libmap::Pose& terrain_from_input) {
   const Eigen::Vector3d x_axis = terrain_from_input.linear().col(0);
   const Eigen::Vector3d origin = terrain_from_input.translation();
@@ -104,7 +104,7 @@ libmap::Pose turned_back(const libmap::Pose& terrain_from_input) {
   return pose;
 }
 
-// A tile that the window shows, and how much of its plan lies in it.
+// A tile that the window shows, and the share of its area in the window.
 struct SeenTile {
   std::size_t tile = 0;
   double share = 1.0;
@@ -134,11 +134,11 @@ int columns_per_point(const MapTiles& tiles, const std::vector<SeenTile>& seen,
   for (const SeenTile& one : seen)
     points += one.share * static_cast<double>(tiles.index().tiles[one.tile].voxels);
   const double columns = std::ceil(std::sqrt(points / static_cast<double>(max_points)));
-  // The counts are the index's word; no map has more points than 2^40.
+  // Limited, because the counts are read from the index; no map has more than 2^40 points.
   return columns >= 1.0 ? static_cast<int>(std::min(columns, 0x1p20)) : 1;
 }
 
-// "X0,Y0,X1,Y1" in meters, or nothing for an empty text. Throws Error naming --box.
+// Parses "X0,Y0,X1,Y1" in meters; returns nullopt for an empty text. Throws Error naming --box.
 std::optional<Eigen::AlignedBox2d> parse_rectangle(const std::string& text) {
   if (text.empty()) return std::nullopt;
   const auto n = split_numbers(text, 4);
@@ -149,7 +149,7 @@ std::optional<Eigen::AlignedBox2d> parse_rectangle(const std::string& text) {
       {.field = "--box", .value = text, .bound = "X0,Y0,X1,Y1 with X0 < X1 and Y0 < Y1"});
 }
 
-// The points within the box, level, in the cloud's own frame.
+// Returns the points in the box in the x-y plane of the cloud's frame.
 libmap::PointCloud points_in_box(const libmap::PointCloud& cloud, const Eigen::AlignedBox2d& box) {
   std::vector<std::size_t> inside;
   for (std::size_t n = 0; n < cloud.size(); ++n)
@@ -162,9 +162,9 @@ struct MapWindow {
   int columns_per_point = 1;  // width of the squares of columns that became one point
 };
 
-// Loads the tiles that the box touches, a few at a time. Where they hold more than about
-// `max_points`, squares of columns become one point each (downsample_map). Throws Error if nothing
-// is in the box.
+// Loads the tiles that the box touches, a few at a time. If they have more than about `max_points`
+// points, squares of columns become one point each (downsample_map). Throws Error if the box is
+// empty.
 MapWindow read_window(const MapTiles& tiles, const std::optional<Eigen::AlignedBox2d>& box,
                       std::uint64_t max_points) {
   const std::vector<SeenTile> seen = seen_tiles(tiles, box);
@@ -178,8 +178,7 @@ MapWindow read_window(const MapTiles& tiles, const std::optional<Eigen::AlignedB
       parts[n] = libgtd::downsample_map(parts[n], window.columns_per_point);
   });
   if (!parts.empty()) window.cloud = libgtd::merge_map_clouds(parts);
-  if (window.cloud.empty())
-    throw libmap::Error("nothing of the map lies in it", {.field = "--box"});
+  if (window.cloud.empty()) throw libmap::Error("contains no part of the map", {.field = "--box"});
   if (window.columns_per_point > 1) {
     window.cloud = libgtd::downsample_map(window.cloud, window.columns_per_point);
     libgtd::center_in_squares(tiles.index(), window.columns_per_point, window.cloud);
@@ -187,7 +186,7 @@ MapWindow read_window(const MapTiles& tiles, const std::optional<Eigen::AlignedB
   return window;
 }
 
-// The files of a folder of textured pieces; none if it is another one, or a file.
+// Returns the files of a folder of textured tiles; empty for any other path.
 std::vector<std::filesystem::path> models_in(const std::string& file) {
   std::vector<std::filesystem::path> models;
   for (const std::string& name : libmap::tile_file_names(file))
@@ -221,7 +220,7 @@ SceneFile scene_of(const std::string& file, const SceneFileOptions& options, Run
   if (auto* cloud = std::get_if<libmap::PointCloud>(&layer.shape); box && cloud != nullptr)
     *cloud = points_in_box(*cloud, *box);
   else if (box)
-    throw libmap::Error("only clouds and maps are cut", {.file = file, .field = "--box"});
+    throw libmap::Error("requires a cloud or a map", {.file = file, .field = "--box"});
   if (const auto* cloud = std::get_if<libmap::PointCloud>(&layer.shape);
       cloud != nullptr && cloud->empty())
     throw libmap::Error("there is nothing to draw: no point with finite coordinates",
@@ -250,39 +249,38 @@ SceneFile scene_of(const std::string& file, const SceneFileOptions& options, Run
   return read;
 }
 
-// Of marked places alone.
+// Options of marked locations only.
 void bind_points(libmap::ParameterTable& table, SceneFileOptions& options) {
   table.add("label", options.label,
             "column of the marked points' names; auto: the first column, unless it is x, y or z; "
             "none: no names");
-  table.add("verdict", options.verdict, "column of their verdict: 1 green, 0 red, empty neutral");
+  table.add("verdict", options.verdict,
+            "column of the marked points' verdicts: 1 green, 0 red, empty neutral");
   table.add("points_frame", options.points_frame, listed_point_frame_names(),
-            "frame of the marked points: of the cloud that was scored, the terrain's, or the map's "
-            "before it was cropped; auto: as their manifest says, else input");
+            "frame of the marked points: input: the scored cloud; terrain; map: the map before it "
+            "was cropped; auto: by their manifest, else input");
 }
 
-// All but `points`, which is an option of its own.
+// Binds all options except `points`, which is a separate option.
 void bind(libmap::ParameterTable& table, SceneFileOptions& options) {
   bind(table, options.layer);
   table.add(
       "zero_plane", options.zero_plane,
       "height in the terrain frame below which ground is white, m; auto: the map's own, none");
-  table.add("box", options.box,
-            "show this rectangle of a cloud or map alone: X0,Y0,X1,Y1 in its frame, m");
+  table.add("box", options.box, "rectangle of a cloud or map to show: X0,Y0,X1,Y1 in its frame, m");
   table.add("max_points", options.max_points, libmap::Range{1'000.0, 1e9},
-            "of a tile store: larger parts are downsampled to about so many points");
+            "approximate number of points to which larger parts of a tile store are downsampled");
   bind_points(table, options);
   table.add("heading", options.heading,
             {{"auto", MapHeading::automatic},
              {"terrain", MapHeading::terrain},
              {"input", MapHeading::input}},
-            "which way a map lies: as in its terrain frame, or with the x and y of its input");
+            "horizontal frame of a map: the terrain frame, or the x and y of its input");
 }
 
-// A cloud, a mesh, a graspability map or a tile store. Throws Error naming the file.
+// Reads a cloud, mesh, graspability map or tile store. Throws Error naming the file.
 SceneFile read_scene(const std::string& file, const SceneFileOptions& options, Run& run) {
-  if (options.points.empty())
-    refuse_set(options, bind_points, "is for --points, which is not given");
+  if (options.points.empty()) refuse_set(options, bind_points, "requires --points");
   try {
     return scene_of(file, options, run);
   } catch (const libmap::Error& error) {
@@ -290,7 +288,7 @@ SceneFile read_scene(const std::string& file, const SceneFileOptions& options, R
   }
 }
 
-// The file that stands for it in a manifest: of a tile store its index.
+// Path of a scene file in manifests: for a tile store its index.
 std::filesystem::path scene_input(const std::string& file) {
   return is_tile_store(file) ? store_index_path(file) : std::filesystem::path(file);
 }
@@ -302,38 +300,39 @@ struct RenderOptions {
   std::string camera_target;
   SceneFileOptions scene;
   libmap::SceneViewOptions view;
-  // Of a page of several files; texts with '|' between.
+  // Texts on a page of several files, separated by '|'.
   std::string captions;
   std::string column_titles;
   std::string row_titles;
   libmap::PictureSheetOptions sheet;
 };
 
-// Of a picture of one file.
+// Options of an image of one file.
 void bind_one(libmap::ParameterTable& table, RenderOptions& options) {
   libmap::bind_single(table, options.view);
-  table.add("camera_position", options.camera_position, "X,Y,Z with view: camera");
-  table.add("camera_target", options.camera_target, "X,Y,Z with view: camera");
+  table.add("camera_position", options.camera_position, "position X,Y,Z for view: camera");
+  table.add("camera_target", options.camera_target, "target X,Y,Z for view: camera");
 }
 
-// Of a page of several files.
+// Options of a page of several files.
 void bind_page(libmap::ParameterTable& table, RenderOptions& options) {
   libmap::PictureSheetOptions& sheet = options.sheet;
   table.add("columns", sheet.columns, libmap::Range{0, 1000},
-            "of several files: columns of cells; 0: as many as make the page about square");
+            "for several files: number of columns of cells; 0: for an approximately square page");
   table.add("cell_width_px", sheet.cell_width_px, libmap::Range{16, 16384},
-            "of several files: width of a cell, pixels");
+            "for several files: width of a cell, pixels");
   table.add("cell_height_px", sheet.cell_height_px, libmap::Range{0, 16384},
-            "of several files: height of a cell, pixels; 0: from what the cells show");
+            "for several files: height of a cell, pixels; 0: by the content of the cells");
   table.add("captions", options.captions,
-            "of several files: texts below the cells, with | between; default: the files' names "
+            "for several files: texts below the cells, separated by |; default: the files' names "
             "without extension");
   table.add("column_titles", options.column_titles,
-            "of several files: above the columns, with | between");
-  table.add("row_titles", options.row_titles, "of several files: before the rows, with | between");
+            "for several files: titles of the columns, separated by |");
+  table.add("row_titles", options.row_titles,
+            "for several files: titles of the rows, separated by |");
   table.add("shared_view", sheet.shared_view,
             {{"sheet", libmap::SharedView::sheet}, {"row", libmap::SharedView::row}},
-            "of several files: which maps share scale and extent: all, or those of a row");
+            "for several files: maps with common scale and extent: all, or those of a row");
 }
 
 void bind(libmap::ParameterTable& table, RenderOptions& options) {
@@ -362,7 +361,7 @@ libmap::ColorImage draw_one(RenderOptions& options, Run& run) {
   if (shown.columns_per_point > 0)
     run.add_results({{"columns_per_point", shown.columns_per_point}});
   if (shown.columns_per_point > 1)
-    run.say("one point for {0} x {0} columns: --box shows a part in full", shown.columns_per_point);
+    run.say("one point per {0} x {0} columns: --box shows a part in full", shown.columns_per_point);
   return image;
 }
 
@@ -393,9 +392,9 @@ std::vector<libmap::SheetCell> read_cells(const RenderOptions& options, Run& run
 
 libmap::ColorImage draw_several(RenderOptions& options, Run& run) {
   if (options.view.view == libmap::Viewpoint::camera)
-    throw libmap::Error("is for one file", {.field = "--view", .value = "camera"});
-  refuse_set(options, bind_one, "is for one file");
-  // Maps of one cloud are shown alike.
+    throw libmap::Error("requires a single file", {.field = "--view", .value = "camera"});
+  refuse_set(options, bind_one, "requires a single file");
+  // Maps of one cloud have the same orientation in the image.
   if (options.scene.heading == MapHeading::automatic) options.scene.heading = MapHeading::input;
   options.sheet.column_titles = split_texts(options.column_titles);
   options.sheet.row_titles = split_texts(options.row_titles);
@@ -412,12 +411,12 @@ libmap::ColorImage draw_several(RenderOptions& options, Run& run) {
 
 void render(RenderOptions& options, Run& run) {
   if (libmap::format_of(options.output) != ".png")
-    throw libmap::Error("pictures are written as .png", {.file = options.output});
+    throw libmap::Error("images are written as .png", {.file = options.output});
   for (std::string& file : options.files) file = without_trailing_slash(file);
   std::vector<std::string> inputs = options.files;
   inputs.push_back(options.scene.points);
   run.claim_output(options.output, inputs);
-  // A page of several files, or of one with what only a page has, such as a caption.
+  // A page has several files, or one file with an option of pages, such as a caption.
   const bool several = options.files.size() > 1 || libmap::changed_key(options, bind_page);
   const libmap::ColorImage image = several ? draw_several(options, run) : draw_one(options, run);
   for (const std::string& file : options.files) run.add_input(scene_input(file));
@@ -431,11 +430,11 @@ int main(int argc, char** argv) {
   RenderOptions options;
   Command command("render");
   command.inputs("FILE", options.files,
-                 "cloud, mesh, graspability map or tile store (.tiles); several, also pictures "
+                 "cloud, mesh, graspability map or tile store (.tiles); several files, also images "
                  "(.png), are drawn side by side with one legend");
-  command.output(options.output, "picture (.png)");
+  command.output(options.output, "image (.png)");
   command.option("--points", "POINTS.csv", options.scene.points,
-                 "places to mark: CSV with the columns x, y, z in meters");
+                 "locations to mark: CSV with the columns x, y, z in meters");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { render(options, run); });
 }

@@ -1,4 +1,4 @@
-// graspmap report: one HTML file of a whole run.
+// graspmap report: writes one HTML report of a whole run.
 #include <system_error>
 
 #include "libgtd/evaluate/voxel_map.h"
@@ -37,14 +37,15 @@ struct ReportCommandOptions {
 void bind(libmap::ParameterTable& table, ReportCommandOptions& options) {
   table.add("title", options.title, "heading of the report; empty: the name of the folder");
   table.add("max_size_mb", options.max_size_mb, libmap::Range{1.0, 1000.0},
-            "size of the file, million bytes: pictures and maps are made smaller until they fit");
+            "maximum size of the file, MB; images and maps are reduced until they fit");
   table.add("max_cells", options.max_cells, libmap::Range{100.0, 10'000'000.0},
-            "cells of a map's 3-D view: of larger maps cubes of voxels become one");
+            "maximum number of cells in a map's 3-D view; cubes of voxels of larger maps become "
+            "one cell");
 }
 
-// Bytes of a cell in the page: eleven at most, in base64.
+// Bytes per cell in the page: at most eleven, in base64.
 constexpr double bytes_a_cell = 44.0 / 3.0;
-// The share of the page that maps may take, and that scenes may.
+// Maximum shares of the page for maps and for scenes.
 constexpr double maps_share = 0.4;
 constexpr double scenes_share = 0.4;
 
@@ -74,8 +75,7 @@ libmap::PageAssets read_assets(const ReportCommandOptions& options, bool with_vi
     std::error_code code;
     if (!fs::is_regular_file(path, code))
       throw libmap::Error(
-          "no such file: install the Debian package libjs-three, or leave the 3-D views out with "
-          "--no-3d",
+          "no such file: install the Debian package libjs-three, or omit the 3-D views by --no-3d",
           {.file = path.string()});
     run.add_input(path);
     assets.libraries.push_back(libmap::read_whole_file(path));
@@ -86,7 +86,7 @@ libmap::PageAssets read_assets(const ReportCommandOptions& options, bool with_vi
 
 struct DownsampledMap {
   libmap::PointCloud points;  // in the terrain frame
-  std::uint64_t voxels = 0;   // of the whole map
+  std::uint64_t voxels = 0;   // number of voxels of the whole map
   libmap::MapViewOptions options;
 };
 
@@ -95,7 +95,7 @@ void set_parameters(const libmap::Manifest& manifest, libmap::MapViewOptions& op
   options.load_n = libmap::number_of(manifest.find_parameter("load_n"));
 }
 
-// Of cubes, for a map of that many voxels if it is even ground.
+// Initial width of cubes, exact for a flat map with this number of voxels.
 int first_width(std::uint64_t voxels, std::size_t max_cells) {
   return std::max(
       1, static_cast<int>(std::sqrt(static_cast<double>(voxels) / static_cast<double>(max_cells))));
@@ -121,17 +121,17 @@ DownsampledMap read_cloud_map(const fs::path& path, std::size_t max_cells) {
   return map;
 }
 
-// The tiles' points that stay at that width.
+// Points of the tiles, downsampled by cubes of this width.
 libmap::PointCloud thin_tiles(const MapTiles& tiles, int width) {
   std::vector<libmap::PointCloud> parts(tiles.index().tiles.size());
   libmap::parallel_each(parts.size(), [&](std::size_t n) {
     parts[n] = libgtd::thin_map_in_cubes(tiles.load(n), width);
   });
-  // Cubes that two tiles share have a point of each.
+  // Cubes shared by two tiles have one point from each tile.
   return libgtd::thin_map_in_cubes(libgtd::merge_map_clouds(parts), width);
 }
 
-// The same cells, but downsampled tile by tile: a store is never whole in memory.
+// Downsamples a tile store to the same cells tile by tile, because it may exceed the memory.
 DownsampledMap read_store_map(const fs::path& path, std::size_t max_cells) {
   const MapTiles tiles(path.string());
   DownsampledMap map;
@@ -149,8 +149,8 @@ DownsampledMap read_store_map(const fs::path& path, std::size_t max_cells) {
   return map;
 }
 
-// A map or tile store, downsampled to at most `max_cells` cells, in its terrain frame. With
-// `lookup`, a CSV file as `lookup` writes it, the view has a marker for each of its rows.
+// Loads a map or tile store, downsampled to at most `max_cells` cells, in its terrain frame. With
+// `lookup`, a CSV file of `graspmap lookup`, the view has one marker per row.
 libmap::MapView load_map_view(const fs::path& path, const std::optional<fs::path>& lookup,
                               std::size_t max_cells, Run& run) {
   const bool store = is_tile_store(path.string());
@@ -169,13 +169,14 @@ libmap::MapView load_map_view(const fs::path& path, const std::optional<fs::path
   return view;
 }
 
-// A trial of the virtual field test. Subtracts its size from `bytes_left`.
+// Loads a scene of the virtual field test and subtracts its size from `bytes_left`. Throws Error if
+// it does not fit.
 libmap::ReportScene load_report_scene(const fs::path& path, double& bytes_left) {
   libmap::ReportScene scene;
   scene.mesh = libmap::read_mesh(path).mesh;
   const auto bytes = static_cast<double>(libmap::scene_bytes(scene.mesh));
   if (bytes > bytes_left)
-    throw libmap::Error("the report has no room for it: --max-size-mb gives more");
+    throw libmap::Error("does not fit into the report: increase --max-size-mb");
   bytes_left -= bytes;
   for (const libgtd::ScenePartStyle& part : libgtd::shown_parts(scene.mesh))
     scene.legend.emplace_back(part.color, part.text);
@@ -185,7 +186,7 @@ libmap::ReportScene load_report_scene(const fs::path& path, double& bytes_left) 
 void make_report(ReportCommandOptions& options, Run& run) {
   if (!options.outline.empty())
     throw UsageError(
-        "--outline was removed: a report shows what its folder contains, in the order of the "
+        "--outline was removed: a report shows the content of its folder in the order of the "
         "names");
   libmap::PlannedSection plan = libmap::plan_report(options.folder);
   if (!options.title.empty()) plan.heading = options.title;
@@ -217,10 +218,9 @@ void make_report(ReportCommandOptions& options, Run& run) {
   run.add_results({{"files", read.files.size()},
                    {"bytes", page.html.size()},
                    {"pictures_made_smaller", page.changed_pictures}});
-  run.say("{} files, {:.1f} MB{}", read.files.size(), static_cast<double>(page.html.size()) / 1e6,
-          page.changed_pictures == 0
-              ? ""
-              : fmt::format(", {} pictures made smaller", page.changed_pictures));
+  run.say(
+      "{} files, {:.1f} MB{}", read.files.size(), static_cast<double>(page.html.size()) / 1e6,
+      page.changed_pictures == 0 ? "" : fmt::format(", {} images reduced", page.changed_pictures));
   run.write_text(options.output, page.html);
 }
 
@@ -232,9 +232,9 @@ int main(int argc, char** argv) {
   command.input("DIR", options.folder, "folder of the run");
   command.output(options.output, "report (.html); default: report.html in DIR", false);
   command.option("--outline", "OUTLINE", options.outline,
-                 "removed: a report shows what DIR contains, in the order of the names");
-  command.flag("--no-3d", options.no_views, "leave the 3-D views out");
-  command.option("--three", "FOLDER", options.three, "where three.js lies");
+                 "removed: a report shows the content of DIR in the order of the names");
+  command.flag("--no-3d", options.no_views, "omit the 3-D views");
+  command.option("--three", "FOLDER", options.three, "folder of three.js");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { make_report(options, run); });
 }

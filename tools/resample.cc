@@ -1,4 +1,4 @@
-// graspmap resample: Poisson-disk samples of a surface.
+// graspmap resample: samples a surface by Poisson disks.
 #include <limits>
 
 #include "libmap/io/cloud_io.h"
@@ -27,15 +27,14 @@ void tell_results(const libmap::PoissonDiskResult& result, std::uint64_t wanted,
   run.say("{:.2f} m2 -> {} points, radius {:.4g} mm, relative radius {:.3f}", result.area_m2,
           result.cloud.size(), 1e3 * result.radius_m, result.relative_radius);
   if (!result.count_reached)
-    run.warn("no radius was found that yields {} points; {} are the nearest", wanted,
+    run.warn("no radius was found for {} points; the nearest number is {}", wanted,
              result.cloud.size());
 }
 
 void require_one_of_radius_and_count(const libmap::PoissonDiskOptions& sampling) {
   if (sampling.count > 0 && sampling.radius_m != libmap::PoissonDiskOptions().radius_m)
-    throw libmap::Error(
-        "the number of samples follows from their radius: one of --radius and --count",
-        {.field = "count", .value = std::to_string(sampling.count)});
+    throw libmap::Error("cannot be combined with --radius, which determines the number of samples",
+                        {.field = "count", .value = std::to_string(sampling.count)});
 }
 
 void resample(const ResampleOptions& options, Run& run) {
@@ -54,7 +53,7 @@ void resample(const ResampleOptions& options, Run& run) {
                    [&](const auto& temporary) { libmap::write_cloud(temporary, result.cloud); });
 }
 
-// Piece by piece of the mesh.
+// Samples and writes the mesh tile by tile.
 void write_pieces(const std::vector<fs::path>& pieces, libmap::PieceSampler& sampler,
                   const fs::path& folder, Run& run) {
   std::size_t points = 0;
@@ -76,7 +75,7 @@ void write_pieces(const std::vector<fs::path>& pieces, libmap::PieceSampler& sam
                    {"points", points},
                    {"area_m2", area_m2},
                    {"smallest_distance_m", smallest_m}});
-  run.say("{:.2f} m2 in {} pieces -> {} points", area_m2, pieces.size(), points);
+  run.say("{:.2f} m2 in {} tiles -> {} points", area_m2, pieces.size(), points);
 }
 
 void resample_pieces(const ResampleOptions& options, Run& run) {
@@ -101,7 +100,7 @@ int main(int argc, char** argv) {
   ResampleOptions options;
   Command command("resample");
   command.input("MESH", options.mesh,
-                "surface (.ply, .obj, .stl, .off, .glb), or a folder of pieces");
+                "surface (.ply, .obj, .stl, .off, .glb), or a folder of its tiles");
   command.output(options.output,
                  std::string("cloud with normals (.pcd, .ply, .vtp, .csv)") + or_tile_folder);
   libmap::bind(command.parameters(), options.sampling);

@@ -1,4 +1,4 @@
-// graspmap score: graspability map of a terrain, tile by tile.
+// graspmap score: computes the graspability map of a terrain, tile by tile.
 #include "libgtd/detect.h"
 #include "libgtd/gripper/gripper_io.h"
 #include "libgtd/gripper/gripper_mask.h"
@@ -25,8 +25,8 @@ using libgtd::StoredTile;
 using libgtd::TerrainFile;
 using libgtd::TileNumber;
 
-// Third standardized moment of the heights. Rocks and holds on their ground have +0.5 to +3, the
-// same upside down as much below 0; rolling ground has about 0.
+// Maximum skewness of heights for a warning. It is +0.5 to +3 for rocks and holds on ground, -0.5
+// to -3 if they are upside down, and about 0 for rolling ground.
 constexpr double upside_down_skewness = -1.0;
 
 std::string_view name_of(libgtd::UpSource source) {
@@ -35,35 +35,35 @@ std::string_view name_of(libgtd::UpSource source) {
   return to_text(source);
 }
 
-// Reports what decided which side of the plane is up, unless it was given. Warns if the normals do
-// not agree, and if the relief contradicts the frame's z axis (as for a cloud in a camera's frame,
-// whose z axis points into the ground) or normals that face against it.
+// Reports the source of the up direction, unless it was given. Warns if the normals do not agree,
+// and if the relief contradicts the frame's z axis (for example a cloud in a camera's frame, whose
+// z axis points into the ground) or normals opposite to it.
 void report_plane(const libgtd::RegressionPlane& plane, const std::string& terrain, Run& run) {
   if (plane.up_source == libgtd::UpSource::direction) return;
   const bool by_normals = plane.up_source == libgtd::UpSource::normals;
   run.say("up from the {}{}", name_of(plane.up_source),
           by_normals ? fmt::format(": {:.1f} % agree", 100.0 * *plane.normals_up) : "");
   if (!by_normals && plane.up_source != libgtd::UpSource::viewpoint && plane.normals_up)
-    run.warn("{}: {}: up is taken from the {}; --up X,Y,Z sets it", terrain,
+    run.warn("{}: {}: up is from the {}; --up X,Y,Z sets it", terrain,
              libmap::disagreement_text(std::max(*plane.normals_up, 1.0 - *plane.normals_up),
                                        plane.opposing_normals),
              name_of(plane.up_source));
-  // The viewpoint and normals that agree with z saw the outside; the relief agrees with itself.
+  // A viewpoint, or normals that agree with z, determine the outside reliably.
   const bool doubtful = by_normals ? plane.terrain_from_input.linear()(2, 2) < 0.0
                                    : plane.up_source == libgtd::UpSource::frame_z;
   if (doubtful && plane.relief_skewness < upside_down_skewness)
     run.warn(
-        "{}: its relief hangs below the plane: if this is upside down, give --up (--up=0,0,-1 for "
-        "a cloud in a camera's frame)",
+        "{}: its relief is below the plane: if it is upside down, set --up (--up=0,0,-1 for a "
+        "cloud in a camera's frame)",
         terrain);
 }
 
-// Heights above a plane, or a folder of such pieces: z is up.
+// Returns true for a DEM or a folder of DEM tiles, whose z is up.
 bool is_dem(const std::string& terrain) {
   return fs::exists(terrain) && libmap::is_dem_path(libmap::cloud_pieces(terrain).front());
 }
 
-// Throws Error for a mesh: its vertices alone are no surface.
+// Throws Error for a mesh, whose vertices do not sample its surface.
 void refuse_mesh(const std::string& terrain) {
   if (!fs::exists(terrain)) return;
   fs::path first = terrain;
@@ -72,11 +72,11 @@ void refuse_mesh(const std::string& terrain) {
   if (format == ".obj" || format == ".stl" || format == ".off" || format == ".glb" ||
       (format == ".ply" && libmap::read_cloud_info(first).faces > 0))
     throw libmap::Error(
-        "is a mesh: `graspmap resample MESH --radius M -o CLOUD.pcd` samples its surface",
+        "is a mesh: sample its surface by `graspmap resample MESH --radius M -o CLOUD.pcd`",
         {.file = first.string()});
 }
 
-// Throws Error if no point is left, warns of those that were dropped.
+// Throws Error if there are no points; warns about dropped points.
 void require_points(std::size_t points, std::size_t dropped, const std::string& terrain, Run& run) {
   if (points == 0)
     throw libmap::Error(dropped == 0 ? "the cloud has no points"
@@ -93,7 +93,7 @@ std::int64_t modified_ns(const fs::path& path) {
       .count();
 }
 
-// Facts of an earlier run on each file with the same name, size and time; other files are read.
+// Surveys the files. Data of an earlier run is used for files with the same name, size and time.
 std::vector<TerrainFile> survey(const std::vector<fs::path>& paths,
                                 const std::vector<TerrainFile>& known,
                                 const std::optional<libmap::Georeference>& georeference) {
@@ -121,13 +121,13 @@ std::vector<TerrainFile> survey(const std::vector<fs::path>& paths,
 }
 
 struct ScoreStoreOptions {
-  std::string terrain;  // a cloud file or a folder of such
+  std::string terrain;  // a cloud file or a folder of clouds
   std::string store;
   std::filesystem::path gripper_file;
   libgtd::MapFrame frame = libgtd::MapFrame::terrain;
   bool append = false;
   std::size_t points_at_once = 1'000'000;
-  libgtd::DetectionOptions detection;  // with the share
+  libgtd::DetectionOptions detection;  // includes the share
 };
 
 class StoreScoring {
@@ -140,7 +140,7 @@ class StoreScoring {
         tiling_(options.detection) {
     if (fs::is_directory(options.store) && fs::is_directory(options.terrain) &&
         fs::equivalent(options.store, options.terrain))
-      throw libmap::Error("is the input: the output needs another name", {.file = options.store});
+      throw libmap::Error("is the input: choose another output name", {.file = options.store});
   }
 
   void score() {
@@ -171,8 +171,8 @@ class StoreScoring {
   }
 
  private:
-  // The earlier plan, if it is of the same parameters and inputs; else a new one. The caller holds
-  // the lock.
+  // Resumes the earlier plan if its parameters and inputs are the same, else writes a new one. The
+  // caller must have locked the store.
   void agree_on_plan() {
     const auto earlier = run_.options().force ? std::nullopt : store_.plan();
     if (!earlier && !run_.options().force) require_no_index(store_);
@@ -182,7 +182,7 @@ class StoreScoring {
     plan_.index.manifest = make_manifest();
     plan_.key = libmap::key_of(plan_.index.manifest);
     if (earlier && earlier->key == plan_.key) {
-      // The same files may have another folder or time by now.
+      // Equal files may now have another folder or time.
       std::vector<TerrainFile> terrain = std::move(plan_.terrain);
       plan_ = *earlier;
       plan_.terrain = std::move(terrain);
@@ -205,7 +205,7 @@ class StoreScoring {
     remove_stale_index();
   }
 
-  // Parameters and inputs, and what `score` says beside any map.
+  // Manifest with parameters and inputs, as for a map in one file.
   libmap::Manifest make_manifest() {
     libmap::Manifest& manifest = run_.manifest();
     carry_transforms(options_.terrain, run_);
@@ -227,7 +227,7 @@ class StoreScoring {
     require_points(points, dropped, options_.terrain, run_);
     in_file(options_.terrain, [&] {
       frame_ = libgtd::frame_terrain(stream_, options_.detection);
-      libgtd::tiles_of(frame_, tiling_.tile_voxels);  // too many show before anything is kept
+      libgtd::tiles_of(frame_, tiling_.tile_voxels);  // throws for too many tiles
     });
     libgtd::set_frame(frame_, tiling_, plan_);
     if (frame_.plane) report_plane(*frame_.plane, options_.terrain, run_);
@@ -238,19 +238,19 @@ class StoreScoring {
     try {
       if (libgtd::read_tile_store(store_.folder()).key == plan_.key) return;
     } catch (const libmap::Error&) {
-      // Broken: it is written again.
+      // A broken index is written again.
     }
     fs::remove(store_.index_path());
   }
 
-  // Small against the tiles that are worked on at once, not small against their halo.
+  // Side of the tiles of points: small compared to the tiles in work, but not to their halo.
   double point_tile_m() const {
     return std::max(1.0 + tiling_.halo_voxels,
                     std::min<double>(tiling_.tile_voxels, 4.0 * tiling_.halo_voxels)) *
            options_.detection.scenario.voxel_size_m;
   }
 
-  // The points on which the wanted tiles depend.
+  // Reads the points that the wanted tiles depend on.
   void fill(libmap::PointTileStore& points, const std::vector<TileNumber>& wanted) const {
     const libgtd::PointsRectangle rectangle = libgtd::points_for(wanted, frame_, tiling_);
     std::vector<fs::path> files;
@@ -289,17 +289,17 @@ class StoreScoring {
     return stored;
   }
 
-  // The last run writes the index.
+  // The last share writes the index.
   void finish(std::size_t scored) {
     const libmap::FileLock lock = store_.lock();
     const libgtd::MapTileStore::Completion completion = store_.complete(plan_);
     if (!completion.index) {
-      run_.say("{} tiles scored; {} of {} are there", scored, completion.done, completion.tiles);
+      run_.say("{} tiles scored; {} of {} are complete", scored, completion.done, completion.tiles);
       return;
     }
     const libgtd::TileStoreIndex& index = *completion.index;
     store_.write_index(index, run_.manifest());
-    run_.say("{} of {} tiles scored, all are there: {} voxels, {} graspable", scored,
+    run_.say("{} of {} tiles scored; all are complete: {} voxels, {} graspable", scored,
              completion.tiles, index.voxels(), index.graspable_voxels());
     if (index.voxels() == 0)
       run_.warn("the terrain is smaller than the gripper mask: nothing was scored");
@@ -314,11 +314,11 @@ class StoreScoring {
   libgtd::TerrainFrame frame_;
 };
 
-// Scores the missing tiles of the share in the store, which is made if there is none.
+// Scores the missing tiles of the share in the store, which is created if it is missing.
 void score_into_store(const ScoreStoreOptions& options, Run& run) {
   libgtd::require_streamable(options.detection);
   if (run.options().force && options.detection.share.count > 1)
-    throw libmap::Error("removes the tiles of all shares: use it without --tile",
+    throw libmap::Error("deletes the tiles of all shares and cannot be combined with --tile",
                         {.field = "--force"});
   StoreScoring(options, run).score();
 }
@@ -337,7 +337,7 @@ struct ScoreOptions {
 void bind(libmap::ParameterTable& table, ScoreOptions& options) {
   bind(table, options.detection);
   table.add("up", options.up,
-            "which side of the plane is outside: auto, or a direction X,Y,Z in the cloud's frame");
+            "up direction, on the outer side of the plane: auto, or X,Y,Z in the cloud's frame");
   table.add("frame", options.frame, libgtd::map_frame_names(), "frame of the map's points");
 }
 
@@ -363,24 +363,24 @@ void say_result(const libgtd::DetectionResult& result, const ScoreOptions& optio
           result.occupied_voxels, result.map.voxels.size(), result.tiles, result.graspable_voxels);
   if (10 * result.lone_voxels > result.occupied_voxels && result.occupied_voxels >= 10)
     run.warn(
-        "{}: {:.1f} % of the voxels have no neighbor: the points are too far apart for voxels of "
-        "{:g} m (--interpolation, --voxel-size, or resample a mesh)",
+        "{}: {:.1f} % of the voxels have no neighbor: the points are too sparse for voxels of {:g} "
+        "m (--interpolation, --voxel-size, or resample a mesh)",
         options.terrain,
         100.0 * static_cast<double>(result.lone_voxels) /
             static_cast<double>(result.occupied_voxels),
         options.detection.scenario.voxel_size_m);
   if (result.map.content.normals)
-    run.say("mask tilted to the surface's normal within {:g} m, {} voxels without one",
+    run.say("mask tilted to the surface's normal within {:g} m; {} voxels without a normal",
             *result.normal_radius_m, result.unoriented_voxels);
   if (result.map.content.obstacles)
     run.say("{} voxels are obstacles", result.obstacle_voxels);
   else if (result.map.content.slopes)
-    run.say("obstacles are evaluated when `graspmap convert` merges the shares");
+    run.say("obstacles are determined when `graspmap convert` merges the shares");
   if (result.map.voxels.empty() && options.detection.share.count == 1)
     run.warn("the terrain is smaller than the gripper mask: nothing was scored");
 }
 
-// A cloud file, or the pieces of a folder one after the other.
+// Reads a cloud file, or the tiles of a folder one by one.
 libmap::PiecesReadResult read_terrain(const std::string& path) {
   if (std::filesystem::is_directory(path)) return libmap::read_pieces(libmap::cloud_pieces(path));
   libmap::CloudReadResult read = libmap::read_cloud(path);
@@ -401,10 +401,10 @@ void score(ScoreOptions& options, Run& run) {
   bind(in_force, options);
   run.manifest().add_parameters(in_force);
   if (options.detection.up && options.detection.plane == libgtd::PlaneSource::none)
-    throw libmap::Error("says on which side of the fitted plane up is: with --plane none it is z",
+    throw libmap::Error("requires a fitted plane; with --plane none, up is z",
                         {.field = "--up", .value = options.up});
   const auto gripper_file = libmap::find_data_file("grippers", scenario.gripper);
-  // Before any work: a voxel size that does not suit the gripper shows here.
+  // Throws for a voxel size that does not fit the gripper, before the work.
   const libgtd::Gripper gripper = libgtd::gripper_of(options.detection);
   if (scenario.method == libgtd::Method::calibrated)
     in_file(gripper_file.string(), [&] { libgtd::require_fingers(gripper); });
@@ -420,9 +420,10 @@ void score(ScoreOptions& options, Run& run) {
                      run);
     return;
   }
-  if (options.append) throw libmap::Error("adds to a tile store, MAP.tiles", {.field = "--append"});
+  if (options.append)
+    throw libmap::Error("requires a tile store, MAP.tiles", {.field = "--append"});
   if (options.points_at_once != ScoreOptions{}.points_at_once)
-    throw libmap::Error("is for a tile store, MAP.tiles", {.field = "--points-at-once"});
+    throw libmap::Error("requires a tile store, MAP.tiles", {.field = "--points-at-once"});
   libmap::require_cloud_format(options.output);
   run.claim_output(options.output, {options.terrain});
   const libmap::PiecesReadResult read =
@@ -430,8 +431,8 @@ void score(ScoreOptions& options, Run& run) {
   require_points(read.cloud.size(), read.dropped_points, options.terrain, run);
   if (scenario.orientation == libgtd::Orientation::surface && !read.cloud.has_normals())
     run.warn(
-        "{}: has no normals: the outside is where the terrain's z points, and the sides of walls "
-        "are guessed",
+        "{}: has no normals: the terrain's z is assumed to point outwards, and the outer sides of "
+        "walls are uncertain",
         options.terrain);
   const libgtd::DetectionResult result = in_file(options.terrain, [&] {
     return libgtd::detect(read.cloud, options.detection, run.progress());
@@ -453,16 +454,16 @@ int main(int argc, char** argv) {
   ScoreOptions options;
   Command command("score");
   command.input("TERRAIN", options.terrain,
-                "cloud of the terrain (.pcd, .ply, .csv) or DEM (.tif), or a folder of its pieces");
+                "cloud of the terrain (.pcd, .ply, .csv) or DEM (.tif), or a folder of its tiles");
   command.output(options.output,
                  "graspability map (.pcd, .ply, .vtp, .csv), or tile store (.tiles)");
   command.option("--tile", "K/N", options.tile,
                  "score only share K of N of the tiles; `graspmap convert` merges the shares");
   command.option("--points-at-once", "N", options.points_at_once,
-                 "into a tile store: how many points are in memory at once, about 250 bytes each; "
-                 "the map is the same");
+                 "for a tile store: maximum number of points in memory, about 250 bytes each; the "
+                 "map does not depend on it");
   command.flag("--append", options.append,
-               "the terrain has more pieces than the tile store: score the tiles that they touch");
+               "score the tiles affected by files that were added to the terrain's folder");
   bind(command.parameters(), options);
   command.config_resolver(
       [](const std::string& name) { return libmap::find_data_file("scenarios", name); });

@@ -1,4 +1,4 @@
-// graspmap simulate WHAT: terrains and recordings whose truth is known.
+// graspmap simulate WHAT: simulates terrains and recordings with known truth.
 #include "tools/support/usages.h"
 
 #include <iostream>
@@ -17,18 +17,16 @@ struct Entry {
 };
 
 constexpr Entry entries[] = {
-    {"cameras", "what the depth cameras of a robot see on a mesh",
-     graspmap_tools::simulate_cameras},
+    {"cameras", "depth images of a robot's cameras on a mesh", graspmap_tools::simulate_cameras},
     {"scan", "a scan of a mesh as a scan database", graspmap_tools::simulate_scan},
     {"scene", "a scene of primitive shapes as cloud or mesh", graspmap_tools::simulate_scene},
     {"site", "rocks, slopes or a climbing wall: true mesh and field points",
      graspmap_tools::simulate_site},
-    {"terrain", "rocky ground of any size, as a folder of clouds",
-     graspmap_tools::simulate_terrain},
+    {"terrain", "rocky ground of any size as a folder of clouds", graspmap_tools::simulate_terrain},
 };
 
 void print_help() {
-  std::cout << "Terrains and recordings whose truth is known.\n\n"
+  std::cout << "Terrains and recordings with known truth.\n\n"
                "Usage: graspmap simulate WHAT ... -o OUTPUT [options]\n\nWHAT:\n";
   for (const Entry& entry : entries) {
     std::string name = entry.name;
@@ -52,8 +50,8 @@ int main(int argc, char** argv) {
     names.emplace_back(entry.name);
   }
   std::cerr << "graspmap simulate: error: "
-            << (what.empty() ? "nothing named to simulate"
+            << (what.empty() ? "WHAT is missing"
                              : "unknown " + what + libmap::did_you_mean(what, names))
-            << "; graspmap simulate --help lists what there is\n";
+            << "; graspmap simulate --help lists all\n";
   return 2;
 }

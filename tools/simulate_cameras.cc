@@ -1,4 +1,4 @@
-// graspmap simulate cameras: what the depth cameras of a robot see from one place.
+// graspmap simulate cameras: depth images of a robot's cameras at one pose.
 #include "libmap/camera/image_codec.h"
 #include "libmap/core/data_folder.h"
 #include "libmap/io/mesh_io.h"
@@ -19,7 +19,7 @@ struct SimulateCamerasOptions {
   std::string output;
   std::string rig = "scar-e";
   double depth_scale_m = 0.0;
-  // Of the body in the mesh's frame.
+  // Pose of the body in the mesh's frame.
   double x_m = 0.0;
   double y_m = 0.0;
   double z_m = 0.25;
@@ -34,14 +34,14 @@ void bind(libmap::ParameterTable& table, SimulateCamerasOptions& options) {
   using libmap::any_number;
   table.add("rig", options.rig, "robot of the toolkit, or a rig file (.yaml)");
   table.add("depth_scale_m", options.depth_scale_m, libmap::not_negative,
-            "meters a unit of the images; 0: the rig's own");
-  table.add("x_m", options.x_m, any_number, "place of the robot's body in the mesh's frame, m");
-  table.add("y_m", options.y_m, any_number, "place of the robot's body in the mesh's frame, m");
-  table.add("z_m", options.z_m, any_number, "height of the body above the ground beneath it, m");
-  table.add("absolute_z", options.absolute_z, "z is that of the mesh's frame");
-  table.add("roll_deg", options.roll_deg, any_number, "the body's turn about its x axis, degrees");
-  table.add("pitch_deg", options.pitch_deg, any_number, "about y, degrees; positive: nose down");
-  table.add("yaw_deg", options.yaw_deg, any_number, "about z, degrees");
+            "meters per unit of the images; 0: as in the rig file");
+  table.add("x_m", options.x_m, any_number, "x of the robot's body in the mesh's frame, m");
+  table.add("y_m", options.y_m, any_number, "y of the robot's body in the mesh's frame, m");
+  table.add("z_m", options.z_m, any_number, "height of the body above the ground, m");
+  table.add("absolute_z", options.absolute_z, "z is in the mesh's frame, not above the ground");
+  table.add("roll_deg", options.roll_deg, any_number, "rotation of the body about its x axis");
+  table.add("pitch_deg", options.pitch_deg, any_number, "rotation about y; positive: nose down");
+  table.add("yaw_deg", options.yaw_deg, any_number, "rotation of the body about z");
   bind(table, options.cameras);
 }
 
@@ -52,10 +52,10 @@ libmap::CameraRig load_rig(const SimulateCamerasOptions& options, Run& run) {
   if (options.depth_scale_m > 0)
     for (libmap::RigCamera& camera : rig.cameras) camera.depth_scale_m = options.depth_scale_m;
   for (const libmap::RigCamera& camera : rig.cameras) {
-    // 16 bits hold no more; 65535 stands for saturated pixels.
+    // Maximum 16-bit value, because 65535 marks saturated pixels.
     constexpr double largest = 65534;
     if (std::round(camera.far_m / camera.depth_scale_m) > largest)
-      throw libmap::Error("16-bit images cannot represent what camera " + camera.name + " measures",
+      throw libmap::Error("16-bit images cannot represent the range of camera " + camera.name,
                           {.file = options.depth_scale_m > 0 ? "" : file.string(),
                            .field = "depth_scale_m",
                            .value = libmap::to_text(camera.depth_scale_m),
@@ -72,7 +72,7 @@ libmap::Pose body_pose(const libmap::TriangleMesh& mesh, const SimulateCamerasOp
                                     {options.roll_deg, options.pitch_deg, options.yaw_deg});
 }
 
-// One file per camera, whatever its stamp, so that a second run leaves none of the first.
+// One file per camera, independent of the stamp, so that later runs replace all files.
 std::string image_name(const libmap::RigCamera& camera) { return camera.name + ".png"; }
 
 std::string images_table(const libmap::CameraRig& rig,
@@ -102,7 +102,7 @@ void add_results(const libmap::CameraRig& rig, const std::vector<libmap::RobotCa
     pixels += images[i].depth.pixels.size();
     measured += images[i].measurement.measured;
     if (images[i].measurement.measured == 0)
-      run.warn("{}: nothing within its range", rig.cameras[i].name);
+      run.warn("{}: has no measurements within its range", rig.cameras[i].name);
   }
   run.add_results({{"cameras", images.size()}, {"pixels", pixels}, {"measured_pixels", measured}});
   run.say("{} cameras, {:.0f} % of the pixels measured", images.size(),
@@ -119,8 +119,8 @@ void simulate(const SimulateCamerasOptions& options, Run& run) {
   in_file(options.mesh, [&] {
     const libmap::Pose mesh_from_robot = body_pose(mesh, options);
     run.manifest().transforms.emplace_back("mesh_from_robot", mesh_from_robot);
-    // So that places listed in the mesh's frame, or in that of the map before it was cropped, are
-    // found on maps of these images.
+    // Allows looking up locations in the mesh's frame, or in that of the map before it was cropped,
+    // on maps of these images.
     const libmap::Pose mesh_from_map =
         site_from_map_of(options.mesh).value_or(libmap::Pose::Identity());
     run.manifest().transforms.emplace_back(site_from_map_name,
@@ -137,8 +137,8 @@ void simulate(const SimulateCamerasOptions& options, Run& run) {
 
 int graspmap_tools::simulate_cameras(int argc, char** argv) {
   SimulateCamerasOptions options;
-  Command command("simulate cameras", "What the depth cameras of a robot see from one place.");
-  command.input("MESH", options.mesh, "where the robot stands (.ply, .obj, .stl, .off, .glb)");
+  Command command("simulate cameras", "Depth images of a robot's cameras at one pose.");
+  command.input("MESH", options.mesh, "mesh of the terrain (.ply, .obj, .stl, .off, .glb)");
   command.output(options.output, "folder of 16-bit depth images and their rig file");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { simulate(options, run); });

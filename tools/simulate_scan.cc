@@ -1,4 +1,4 @@
-// graspmap simulate scan: a scan of a mesh or a large terrain by a depth camera carried by hand.
+// graspmap simulate scan: simulates a handheld scan of a mesh or a large terrain.
 #include "libmap/camera/camera_io.h"
 #include "libmap/core/data_folder.h"
 #include "libmap/io/cloud_io.h"
@@ -36,17 +36,17 @@ void bind(libmap::ParameterTable& table, SimulateScanOptions& options) {
             "calibration file of the camera (.yaml), or one of the toolkit's: realsense-d435, "
             "ipad-lidar; empty: a Kinect v2, 512 x 424 pixels");
   table.add("trajectory", options.trajectory,
-            "poses of what carries the camera (.tum, .kitti, .g2o, .toro), in the frame of what is "
-            "scanned, one per frame; empty: a path of the options below");
+            "file of poses of the camera's body (.tum, .kitti, .g2o, .toro), one per frame, in the "
+            "scene's frame; empty: a path by the options below");
   bind(table, simulation.trajectory);
   table.add("target", options.target,
-            "what is looked at, X,Y,Z in the mesh's frame; auto: the site's center");
+            "target of the camera, X,Y,Z in the mesh's frame; auto: the site's center");
   bind(table, simulation.depth);
   table.add("texture", simulation.texture,
             {{"auto", libmap::TextureSource::automatic},
              {"mesh", libmap::TextureSource::mesh},
              {"rock", libmap::TextureSource::rock}},
-            "the mesh's own colors, or rock; auto: rock where the mesh has but one color");
+            "colors: the mesh's own, or rock; auto: rock for a mesh of a single color");
   bind(table, simulation.photo);
   bind(table, simulation.faults);
   bind(table, simulation.events);
@@ -56,13 +56,13 @@ void bind(libmap::ParameterTable& table, SimulateScanOptions& options) {
             {{"rvl", libmap::DepthFormat::rvl},
              {"png", libmap::DepthFormat::png16},
              {"float", libmap::DepthFormat::float_png}},
-            "how depth is stored; float keeps fractions of a millimeter");
+            "format of depth images; float keeps fractions of a millimeter");
   table.add("color_format", options.writer.color,
             {{"jpeg", libmap::ImageFormat::jpeg}, {"png", libmap::ImageFormat::png}},
-            "how color is stored");
-  table.add("seed", simulation.seed, libmap::not_negative, "of all that is random");
+            "format of color images");
+  table.add("seed", simulation.seed, libmap::not_negative, "random seed");
   table.add("rock_seed", simulation.rock_seed, libmap::not_negative,
-            "of the rock's colors, which scans of the same ground share; 0: that of seed");
+            "random seed of the rock's colors, for several scans of one ground; 0: that of seed");
 }
 
 void add_results(const libmap::ScanSimulationResult& result, Run& run) {
@@ -89,7 +89,7 @@ void add_results(const libmap::ScanSimulationResult& result, Run& run) {
           result.graph.nodes.size(), result.path_length_m,
           100.0 * static_cast<double>(result.measured_pixels) / static_cast<double>(result.pixels),
           closures, drift);
-  if (result.empty_frames > 0) run.warn("{} frames see nothing within range", result.empty_frames);
+  if (result.empty_frames > 0) run.warn("{} frames have no depth in range", result.empty_frames);
 }
 
 libmap::Trajectory given_poses(const SimulateScanOptions& options) {
@@ -97,12 +97,12 @@ libmap::Trajectory given_poses(const SimulateScanOptions& options) {
   const double frame_interval_s = options.simulation.trajectory.frame_interval_s;
   libmap::CameraTrajectoryOptions path = options.simulation.trajectory;
   path.frame_interval_s = libmap::CameraTrajectoryOptions{}.frame_interval_s;
-  const std::string reason = "is not for --trajectory, which says where the camera is";
+  const std::string reason = "cannot be combined with --trajectory, which has the camera's poses";
   refuse_set(path, libmap::bind, reason);
   refuse_given({{"--target", options.target != "auto"}}, reason);
   return in_file(options.trajectory, [&] {
     const libmap::TrajectoryFile file = libmap::read_trajectory(options.trajectory);
-    if (file.of_cameras) throw libmap::Error("poses of cameras, not of the camera's body");
+    if (file.of_cameras) throw libmap::Error("has poses of cameras, not of the camera's body");
     return libmap::numbered(file.poses, frame_interval_s);
   });
 }
@@ -141,21 +141,21 @@ void scan_mesh(const SimulateScanOptions& options, const libmap::Trajectory& pos
   });
 }
 
-// Its points are in a file of the output's folder that has no name: memory does not grow with the
-// terrain.
+// Scans a terrain. Its points are in an unnamed file in the output's folder, so that memory does
+// not depend on the size of the terrain.
 void scan_terrain(const SimulateScanOptions& options, const libmap::Trajectory& poses, Run& run) {
   if (options.simulation.texture == libmap::TextureSource::mesh)
-    throw libmap::Error("clouds have no surface colors",
+    throw libmap::Error("requires a mesh, because clouds have no surface colors",
                         {.field = "--texture", .value = "mesh", .bound = "auto or rock"});
   if (poses.empty() && options.simulation.trajectory.path == libmap::CameraPath::loops)
-    throw libmap::Error("loops are around a mesh",
+    throw libmap::Error("requires a mesh",
                         {.field = "--path", .value = "loops", .bound = "auto or serpentine"});
   const libmap::ScanEvents& events = options.simulation.events;
   refuse_given({{"--walker-first-frame", events.walker_first_frame > 0},
                 {"--stone-moved-frame", events.stone_moved_frame > 0},
                 {"--ceiling-first-frame", events.ceiling_first_frame > 0},
                 {"--multipath", options.simulation.faults.depth.multipath > 0.0}},
-               "is for the scan of a mesh");
+               "requires a mesh as scene");
   const libmap::PieceStream stream(libmap::cloud_pieces(options.scene));
   add_inputs(stream.pieces(), options, run);
   run.manifest().frame = "terrain";
@@ -183,7 +183,7 @@ void scan_terrain(const SimulateScanOptions& options, const libmap::Trajectory& 
       write_scan(libmap::scene_of(terrain, ground, options.simulation, poses), options, temporary,
                  run);
     });
-    run.detail("{} squares of the terrain were triangulated", terrain.squares_made());
+    run.detail("{} tiles of the terrain were triangulated", terrain.squares_made());
   });
 }
 
@@ -212,10 +212,9 @@ void simulate(SimulateScanOptions& options, Run& run) {
 
 int graspmap_tools::simulate_scan(int argc, char** argv) {
   SimulateScanOptions options;
-  Command command("simulate scan",
-                  "A scan of a mesh or a terrain by a depth camera carried by hand.");
+  Command command("simulate scan", "A scan of a mesh or a terrain by a handheld depth camera.");
   command.input("SCENE", options.scene,
-                "what is scanned: a mesh (.ply, .obj, .stl, .off, .glb), or a height field as a "
+                "scene to scan: a mesh (.ply, .obj, .stl, .off, .glb), or a height field as a "
                 "cloud or a folder of clouds of any size (.pcd, .ply, .csv)");
   command.output(options.output, "RTAB-Map database with true poses (.db)");
   bind(command.parameters(), options);

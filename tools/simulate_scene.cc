@@ -1,4 +1,4 @@
-// graspmap simulate scene: scenes of primitive shapes with their closed-form truth.
+// graspmap simulate scene: samples scenes of primitive shapes with closed-form truth.
 #include "libmap/core/data_folder.h"
 #include "libmap/core/file_output.h"
 #include "libmap/core/yaml_document.h"
@@ -28,24 +28,24 @@ using libmap::positive;
 void bind_cloud(libmap::ParameterTable& table, SimulateOptions& options) {
   table.add("spacing_m", options.sampling.spacing_m, positive, "mean distance of the samples, m");
   table.add("count", options.sampling.count, not_negative,
-            "number of samples (2 %) in place of a spacing; 0: by spacing");
+            "number of samples (within 2 %) instead of a spacing; 0: by spacing");
   table.add("jitter", options.sampling.jitter, libmap::zero_to_one,
-            "how far samples leave their grid: 0 regular, 1 a whole cell");
+            "random offset of samples from their grid: 0 none, 1 a whole cell");
   table.add("noise_m", options.sampling.noise_m, not_negative,
             "standard deviation of the noise along the normal, m");
-  table.add("seed", options.sampling.seed, not_negative, "of jitter and noise");
+  table.add("seed", options.sampling.seed, not_negative, "random seed of jitter and noise");
 }
 
 void bind_mesh(libmap::ParameterTable& table, SimulateOptions& options) {
   table.add("edge_length_m", options.meshing.edge_length_m, positive,
-            "longest edge of the mesh, m");
+            "maximum edge length of the mesh, m");
   table.add("chord_error_m", options.meshing.chord_error_m, positive,
-            "largest distance of the mesh from a round shape, m");
+            "maximum distance of the mesh from a round shape, m");
 }
 
 void bind(libmap::ParameterTable& table, SimulateOptions& options) {
   table.add("scene", options.scene, "scene of the toolkit, or a scene file");
-  table.add("mesh", options.mesh, "the surface as a mesh, not as a cloud");
+  table.add("mesh", options.mesh, "write a mesh instead of a cloud");
   bind_cloud(table, options);
   bind_mesh(table, options);
 }
@@ -71,7 +71,7 @@ void write_surface(const libmap::PrimitiveScene& scene, const SimulateOptions& o
 
 void simulate(const SimulateOptions& options, Run& run) {
   refuse_set(options, options.mesh ? bind_cloud : bind_mesh,
-             options.mesh ? "is for a cloud, not with --mesh" : "is for --mesh");
+             options.mesh ? "cannot be combined with --mesh" : "requires --mesh");
   if (options.mesh)
     libmap::require_mesh_format(options.output);
   else
@@ -92,7 +92,7 @@ void simulate(const SimulateOptions& options, Run& run) {
 
 int graspmap_tools::simulate_scene(int argc, char** argv) {
   SimulateOptions options;
-  Command command("simulate scene", "Terrains of primitive shapes that are known exactly.");
+  Command command("simulate scene", "Terrains of primitive shapes with exact truth.");
   command.output(options.output, "cloud with true normals and curvatures, or mesh");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { simulate(options, run); });

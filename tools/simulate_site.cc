@@ -1,4 +1,4 @@
-// graspmap simulate site: test sites with their true mesh and places for a field test.
+// graspmap simulate site: makes test sites with a true mesh and locations for a field test.
 #include "libmap/core/data_folder.h"
 #include "libmap/core/file_output.h"
 #include "libmap/core/yaml_document.h"
@@ -24,13 +24,13 @@ struct SimulateSiteOptions {
 void bind(libmap::ParameterTable& table, SimulateSiteOptions& options) {
   using libmap::not_negative;
   table.add("site", options.site, "site of the toolkit, or a site file");
-  table.add("seed", options.seed, not_negative, "another site of the kind; 0: the site file's own");
+  table.add("seed", options.seed, not_negative, "random seed of the site; 0: as in the site file");
   table.add("edge_length_m", options.meshing.edge_length_m, libmap::positive,
-            "of the mesh, about, m");
+            "approximate edge length of the mesh, m");
   table.add("closed", options.meshing.closed,
-            "with the sides and base of the ground: a solid's whole surface");
+            "add the sides and base of the ground, so that the mesh is closed");
   table.add("places", options.places, libmap::Range{0.0, 10'000.0},
-            "number of field points; 0: as the site file has it");
+            "number of field points; 0: as in the site file");
 }
 
 libmap::RockSite load(const SimulateSiteOptions& options, const std::filesystem::path& file) {
@@ -49,7 +49,7 @@ void simulate(const SimulateSiteOptions& options, Run& run) {
   const std::string extension = std::filesystem::path(options.output).extension().string();
   if (extension == ".ply" || extension == ".obj" || extension == ".csv" || extension == ".yaml")
     throw libmap::Error(
-        "names a file; a site is a folder with mesh.ply, field_points.csv, site.yaml",
+        "is a file name; the output is a folder with mesh.ply, field_points.csv, site.yaml",
         {.file = options.output});
   run.claim_output_folder(options.output);
   const auto file = libmap::find_data_file("sites", options.site);
@@ -69,10 +69,10 @@ void simulate(const SimulateSiteOptions& options, Run& run) {
   run.say("{} rocks, {} triangles, {} field points", site.rocks.size(), mesh.triangles.size(),
           points.size());
   const std::string table =
-      "# Places chosen by the form of the rocks alone: no field test was made at them.\n" +
+      "# Locations selected by the shape of the rocks only; no field test was made at them.\n" +
       libmap::to_csv(libmap::field_point_table(site, points));
   const std::string yaml =
-      "# The site with all that was drawn: graspmap simulate site --site THIS makes it again.\n" +
+      "# The site with all random values: graspmap simulate site --site THIS reproduces it.\n" +
       libmap::to_yaml(site);
   run.write_output_folder(
       options.output,

@@ -1,4 +1,4 @@
-// graspmap simulate terrain: rocky ground of any size, as a folder of pieces.
+// graspmap simulate terrain: makes rocky ground of any size as a folder of tiles.
 #include "libmap/core/parallel.h"
 #include "libmap/io/cloud_io.h"
 #include "libmap/simulate/terrain_pieces.h"
@@ -19,7 +19,7 @@ struct SimulateTerrainOptions {
   libmap::TerrainPiecesOptions pieces;
 };
 
-// Each piece is made, written and forgotten. Returns the number of points.
+// Makes and writes the tiles one by one. Returns the number of points.
 std::size_t write_pieces(const SimulateTerrainOptions& options,
                          const std::vector<libmap::XyTile>& pieces, const fs::path& folder,
                          Run& run) {
@@ -52,7 +52,7 @@ void simulate(SimulateTerrainOptions& options, Run& run) {
     if (folder.empty()) return;  // --dry-run
     const std::size_t points = write_pieces(options, pieces, folder, run);
     run.add_results({{"pieces", pieces.size()}, {"points", points}});
-    run.say("{} points in {} pieces", points, pieces.size());
+    run.say("{} points in {} tiles", points, pieces.size());
   });
 }
 
@@ -60,9 +60,9 @@ void simulate(SimulateTerrainOptions& options, Run& run) {
 
 int graspmap_tools::simulate_terrain(int argc, char** argv) {
   SimulateTerrainOptions options;
-  Command command("simulate terrain", "Rocky ground of any size, as a folder of clouds.");
-  command.output(options.output, "folder: piece_I_J.pcd, one a square of the plan");
-  command.parameters().add("size", options.size, "of the whole: M or XxY, m");
+  Command command("simulate terrain", "Rocky ground of any size as a folder of clouds.");
+  command.output(options.output, "folder: piece_I_J.pcd, one per tile of the x-y plane");
+  command.parameters().add("size", options.size, "size of the terrain: M or XxY, m");
   bind(command.parameters(), options.pieces);
   return command.run(argc, argv, [&](Run& run) { simulate(options, run); });
 }

@@ -1,4 +1,4 @@
-// graspmap texture: a mesh and the photographs of a scan -> a textured mesh.
+// graspmap texture: textures a mesh with the images of its scan.
 #include <malloc.h>
 
 #include "libmap/io/mesh_io.h"
@@ -12,7 +12,7 @@
 #include "tools/support/scan_poses.h"
 #include "tools/support/tile_folder.h"
 
-// The plan that shares and resumed runs have in common, bit for bit.
+// JSON of the exposure, which shares and resumed runs read bit for bit.
 namespace libmap {
 
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(TextureExposure, gains, vignetting, observations, spread_before,
@@ -26,9 +26,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* model_extension = ".glb";  // of pieces
+constexpr const char* model_extension = ".glb";  // of tiles
 
-// Frame of the mesh: as its manifest says, that of the poses, or ground truth's.
+// Frame of the mesh: by its manifest, that of the poses, or of the true poses.
 enum class MeshFrame { automatic, poses, ground_truth };
 
 struct TextureCommandOptions {
@@ -49,15 +49,15 @@ void bind(libmap::ParameterTable& table, TextureCommandOptions& options) {
             {{"auto", MeshFrame::automatic},
              {"poses", MeshFrame::poses},
              {"ground-truth", MeshFrame::ground_truth}},
-            "frame of the mesh; ground-truth: poses are aligned with the true ones; auto: as the "
-            "mesh's manifest says, else poses");
+            "frame of the mesh; ground-truth: poses are aligned with the true ones; auto: by the "
+            "mesh's manifest, else poses");
   libmap::bind(table, options.texture);
   table.add("margin_m", options.margin_m, libmap::not_negative,
-            "where the output is a folder: what is further from a piece does not hide it, m");
+            "for an output folder: maximum distance of occluding parts from a tile, m");
   table.add("image_format", options.writing.image_format,
             {{"png", libmap::ImageFormat::png}, {"jpeg", libmap::ImageFormat::jpeg}},
-            "of the texture's pages");
-  table.add("jpeg_quality", options.writing.jpeg_quality, {1.0, 100.0}, "with image_format: jpeg");
+            "image format of the texture's pages");
+  table.add("jpeg_quality", options.writing.jpeg_quality, {1.0, 100.0}, "JPEG quality of pages");
 }
 
 bool in_true_frame(const TextureCommandOptions& options) {
@@ -65,7 +65,7 @@ bool in_true_frame(const TextureCommandOptions& options) {
   return is_from_true_frame(options.mesh);
 }
 
-// The poses in the frame of the mesh.
+// Opens the scan.
 std::unique_ptr<libmap::ScanSource> scan_of(const TextureCommandOptions& options, Run& run) {
   return open_scan(options.scan, options.texture.strict, run,
                    known_camera(options.calibration, options.scan, options.poses, run));
@@ -82,7 +82,7 @@ libmap::Trajectory poses_of(TextureCommandOptions& options, const libmap::ScanSo
     mesh_from_poses = *site_from_map * mesh_from_poses;
     run.manifest().frame = "site";
     run.manifest().transforms.emplace_back(site_from_map_name, *site_from_map);
-    run.say("poses are carried into the site's frame");
+    run.say("poses are transformed to the site's frame");
   }
   for (libmap::TrajectoryPose& pose : poses)
     pose.world_from_base = mesh_from_poses * pose.world_from_base;
@@ -104,23 +104,23 @@ void say_result(const libmap::TextureReport& result, Run& run) {
     run.warn(std::string("skipped: ") + fault.what());
   run.add_timings(result.timings_s);
   run.say(
-      "{} photographs, {} charts on {} page{}, texels of {:.1f} mm; {} of {} triangles ({:.3f} m2) "
-      "are seen by none and gray",
+      "{} images, {} charts on {} page{}, texels of {:.1f} mm; {} of {} triangles ({:.3f} m2) are "
+      "not visible and gray",
       result.photos, result.charts, result.pages, result.pages == 1 ? "" : "s",
       1e3 * result.texel_size_m(), result.unseen_triangles, triangles, result.unseen_m2);
-  // More than what lies behind the rocks: the poses are of another frame, or see another part.
+  // A larger share than that behind rocks indicates a wrong frame or other poses.
   if (5 * result.unseen_triangles > triangles)
-    run.warn("a fifth of the triangles or more is seen by no photograph: see --frame and --poses");
+    run.warn("20 % of the triangles or more are visible in no image: check --frame and --poses");
   if (result.split_charts > 0)
     run.say("{} charts larger than a page were cut", result.split_charts);
   if (result.shrunk_charts > 0)
     run.warn("{} triangles larger than a page have fewer texels", result.shrunk_charts);
   if (result.atlas_scale < 1.0)
-    run.warn("texels are {:.2f} times as large as wanted, for the number of pages",
+    run.warn("texels are {:.2f} times as large as requested, to limit the number of pages",
              1.0 / result.atlas_scale);
 }
 
-// Pages of an earlier run that this one has not written anew.
+// Removes pages of an earlier run that this run did not write.
 void remove_old_pages(const std::vector<fs::path>& old_pages,
                       const std::vector<libmap::ModelFile>& files) {
   for (const fs::path& page : old_pages) {
@@ -132,7 +132,7 @@ void remove_old_pages(const std::vector<fs::path>& old_pages,
   }
 }
 
-// What an earlier run of this command wrote beside its model.
+// Texture pages that an earlier run of this command wrote with its model.
 std::vector<fs::path> pages_of_earlier_run(const fs::path& output) {
   std::vector<fs::path> pages;
   const auto manifest = libmap::read_manifest_of(output);
@@ -190,16 +190,16 @@ std::vector<std::string> stems_of(const std::vector<fs::path>& pieces) {
   const auto twice = std::adjacent_find(stems.begin(), stems.end());
   if (twice != stems.end())
     throw libmap::Error(
-        "two pieces have this name",
+        "two tiles have this name",
         {.file = pieces.front().parent_path().string(), .field = "name", .value = *twice});
   return stems;
 }
 
-// Each piece's model is made, written and forgotten.
+// Makes and writes the models of the tiles one by one.
 void make_models(const TextureCommandOptions& options, const libmap::ScanSource& scan,
                  const libmap::Trajectory& poses, const std::vector<fs::path>& pieces,
                  TileFolder& output, Run& run) {
-  // Arrays of a piece go back to the system: the heap would keep what the next does not fit into.
+  // Large arrays are returned to the system after each tile, because the heap would fragment.
   mallopt(M_MMAP_THRESHOLD, 1 << 20);
   const std::vector<std::string> names = stems_of(pieces);
   libmap::MeshPieceIndex index(pieces);
@@ -247,14 +247,14 @@ int main(int argc, char** argv) {
   TextureCommandOptions options;
   Command command("texture");
   command.input("MESH", options.mesh,
-                "mesh in the frame of the poses (.ply, .obj, ...), or a folder of its pieces");
+                "mesh in the frame of the poses (.ply, .obj, ...), or a folder of its tiles");
   command.output(
       options.output,
-      std::string("textured mesh (.glb; .obj: with STEM.mtl and a picture per page, STEM_0.png "
+      std::string("textured mesh (.glb; .obj: with STEM.mtl and one image per page, STEM_0.png "
                   "...)") +
           or_tile_folder);
   command.option("--scan", "SCAN", options.scan,
-                 "scan with the photographs: a database of RTAB-Map, or a folder of images", true);
+                 "scan with the images: an RTAB-Map database, or a folder of images", true);
   add_share_option(command, options.tile);
   add_poses_option(command, options.poses);
   add_calibration_option(command, options.calibration);

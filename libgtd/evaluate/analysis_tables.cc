@@ -16,7 +16,7 @@ using libmap::Table;
 
 std::string text(std::size_t value) { return std::to_string(value); }
 
-// Areas are sums of single-precision numbers: more digits say nothing.
+// Areas are sums of single-precision numbers; more digits are not significant.
 std::string text(double value) {
   return std::isfinite(value) ? libmap::to_text(static_cast<float>(value)) : std::string();
 }
@@ -24,7 +24,7 @@ std::string text(double value) {
 std::string text(std::optional<double> value) { return value ? text(*value) : std::string(); }
 
 void add_place(const Eigen::Vector3d& place, std::vector<std::string>& row) {
-  // To the micrometer: in single precision a place in UTM coordinates would be off by decimeters.
+  // Rounds to micrometers. Single precision would round UTM coordinates to decimeters.
   constexpr double steps_a_m = 1e6;
   for (const double coordinate : place)
     row.push_back(std::isfinite(coordinate)
@@ -204,7 +204,7 @@ Table regions_table(const VoxelMap& map, const MapRegionResult& regions, const R
   for (std::size_t r = 0; r < regions.regions.size(); ++r) {
     const MapRegion& region = regions.regions[r];
     const RegionAccess& access = reach.access[r];
-    // Voxels, not only their centers.
+    // The box of the voxels, not only of their centers.
     const Eigen::Vector3d size = (region.max - region.min).array() + map.lattice.voxel_size_m;
     std::vector<std::string> row = {text(r + 1), text(region.voxels.size()), text(region.area_m2),
                                     text(region.plan_area_m2)};

@@ -1,4 +1,4 @@
-// Analyses of maps as tables and JSON. Regions are numbered from 1 on, as in the clouds.
+// Writes map analyses as tables and JSON. Regions are numbered from 1, as in the clouds.
 #pragma once
 
 #include <string>
@@ -12,29 +12,31 @@
 
 namespace libgtd {
 
-// One row a bin; column `bins` is "class" for those of the legend, "width" for the finer ones.
+// Returns one row per bin; the column `bins` is "class" for bins of the legend and "width" for the
+// finer bins.
 libmap::Table histogram_table(const MapAnalysis& analysis);
 
-// One row a bin; `unit` is that of its bounds, "m" or "deg".
+// Returns one row per bin; `unit` is the unit of its bounds, "m" or "deg".
 libmap::Table ground_table(const std::vector<GroundBin>& bins, const std::string& unit);
 
-// One row a region; places in the frame of the map's points.
+// Returns one row per region; positions are in the frame of the map's points.
 libmap::Table regions_table(const VoxelMap& map, const MapRegionResult& regions,
                             const RegionReach& reach);
 
-// One row a pair of regions that the stride or the spanning tree joins.
+// Returns one row per pair of regions that is linked within the stride or by the spanning tree.
 libmap::Table region_links_table(const VoxelMap& map, const RegionReach& reach);
 
-// Rows: all voxels in common, those evaluated, and these by height and by slope.
+// Returns a row for all common voxels, a row for the evaluated ones, and rows for these by height
+// and by slope.
 libmap::Table change_table(const MapChange& change);
 
-// Counts, areas, regions and reach; `change` may be null.
+// Returns counts, areas, regions and reach as JSON; `change` may be null.
 std::string analysis_json(const MapAnalysis& analysis, const MapSurface& surface,
                           const MapRegionResult& regions, const RegionReachOptions& reach_options,
                           const RegionReach& reach, const MapChange* change);
 
-// The map's points with the fields region (0: none), reachable, slope_deg and area_m2, in the order
-// of `cloud`, without the others' fields but score and graspable.
+// Returns the points of `cloud`, the map, in their order with the fields region (0: none),
+// reachable, slope_deg and area_m2. Of the other fields, only score and graspable are kept.
 libmap::PointCloud regions_cloud(const libmap::PointCloud& cloud, const VoxelMap& map,
                                  const MapSurface& surface, const MapRegionResult& regions,
                                  const RegionReach& reach);

@@ -24,7 +24,7 @@ constexpr std::array<std::string_view, 10> column_names = {
 
 Kernel::Point_3 point_of(const Eigen::Vector3d& p) { return {p.x(), p.y(), p.z()}; }
 
-// Where both ends are one, CGAL has no segment.
+// CGAL has no segment with equal ends.
 double distance(const ExpectedRegion& a, const ExpectedRegion& b) {
   const bool ball_a = a.from == a.to;
   const bool ball_b = b.from == b.to;
@@ -44,7 +44,7 @@ void check_region(const ExpectedRegion& region) {
         "out of range",
         {.field = field + ", radius", .value = libmap::to_text(region.radius_m), .bound = "> 0"});
   if (!region.from.allFinite() || !region.to.allFinite())
-    throw libmap::Error("not a place", {.field = field, .bound = "finite coordinates"});
+    throw libmap::Error("not finite", {.field = field, .bound = "finite coordinates"});
 }
 
 void check_columns(const libmap::Table& table) {
@@ -64,7 +64,7 @@ Eigen::Vector3d read_from(const libmap::Table& table, std::size_t row) {
           table.number(row, table.column("z"))};
 }
 
-// The other end: all of its three cells, or none.
+// Reads the other end: all three cells or none.
 Eigen::Vector3d read_to(const libmap::Table& table, std::size_t row, const Eigen::Vector3d& from) {
   Eigen::Vector3d to = from;
   int given = 0;
@@ -77,14 +77,14 @@ Eigen::Vector3d read_to(const libmap::Table& table, std::size_t row, const Eigen
     ++given;
   }
   if (given != 0 && given != 3)
-    throw libmap::Error("half an end",
+    throw libmap::Error("incomplete end of a segment",
                         {.file = table.file,
                          .field = "row " + std::to_string(row + 1) + ", columns to_x, to_y, to_z",
                          .bound = "all three, or none for a ball"});
   return to;
 }
 
-// Which regions hold a voxel: undecided ones, or else decided ones.
+// Regions that contain a voxel: the undecided ones, or else the decided ones.
 struct Membership {
   std::vector<std::size_t> regions;
   bool undecided = false;
@@ -104,7 +104,7 @@ Membership regions_at(const ExpectedMap& expected, const Eigen::Vector3d& point)
 
 void set_scores(std::vector<double> scores, RegionResult& region) {
   if (scores.empty()) return;
-  // In one order, so that the sum does not depend on that of the map.
+  // Sorted, so that the sum does not depend on the order of the map.
   std::sort(scores.begin(), scores.end());
   double sum = 0.0;
   for (const double score : scores) sum += score;
@@ -144,7 +144,7 @@ void ExpectedMap::check() const {
       const ExpectedRegion& other = regions[j];
       if (!region.graspable || !other.graspable || *region.graspable == *other.graspable) continue;
       if (distance(region, other) <= region.radius_m + other.radius_m)
-        throw libmap::Error("one is expected to be graspable and the other not, and they overlap",
+        throw libmap::Error("overlap, but only one of them is expected to be graspable",
                             {.field = "regions '" + other.name + "' and '" + region.name + "'"});
     }
   }

@@ -17,16 +17,16 @@ namespace {
 constexpr std::size_t points_at_once = std::size_t{1} << 16U;
 // Files contain positions to 1e-5 m.
 constexpr double rounding_m = 4e-5;
-// Far more than any lattice, and no overflow.
+// Limit of cell indices, larger than any lattice and without overflow.
 constexpr double farthest_cell = 1e9;
 
-// Order of the map's points: by voxel across tiles, by index within a cloud.
+// Order of the points of a map: by voxel across tiles, by index within a cloud.
 using MapOrder = std::pair<Voxel, std::size_t>;
 
-// A map, or one of its tiles, with a search tree. The cloud outlives it.
+// Map or tile with a search tree. The cloud must outlive it.
 class MapPart {
  public:
-  // `voxels` of a tile's points; none for a whole map.
+  // `voxels` are those of the points of a tile; empty for a whole map.
   explicit MapPart(const libmap::PointCloud& cloud, std::vector<Voxel> voxels = {})
       : cloud_(cloud), voxels_(std::move(voxels)), tree_(cloud.positions) {}
 
@@ -51,7 +51,7 @@ std::vector<Voxel> voxels_of_tile(const libmap::PointCloud& tile) {
   if (voxels.empty()) throw libmap::Error("a tile has no points");
   const auto is_not_before = [](const Voxel& a, const Voxel& b) { return !(a < b); };
   if (std::adjacent_find(voxels.begin(), voxels.end(), is_not_before) != voxels.end())
-    throw libmap::Error("a tile's points are not in order");
+    throw libmap::Error("the points of a tile are not in order");
   return voxels;
 }
 
@@ -60,13 +60,13 @@ struct Place {
   Eigen::Vector3d in_terrain;
 };
 
-// Points near a position, of one part of the map or of all parts so far.
+// Points found near a position, in one part of the map or in all parts so far.
 struct Finding {
   std::pair<double, MapOrder> nearest{HUGE_VAL, {}};                  // squared distance
   std::tuple<double, double, MapOrder> best{HUGE_VAL, HUGE_VAL, {}};  // -score, squared distance
-  std::vector<double> values;                                 // of the nearest, or of the best
-  std::size_t members = 0;                                    // within the radius
-  std::vector<std::pair<MapOrder, std::vector<double>>> all;  // of the members, for their mean
+  std::vector<double> values;                                 // values of the nearest or best point
+  std::size_t members = 0;                                    // number within the radius
+  std::vector<std::pair<MapOrder, std::vector<double>>> all;  // members, for their mean
 };
 
 Finding ask(const MapPart& part, const Eigen::Vector3d& at, const LookupOptions& options) {
@@ -102,7 +102,7 @@ void join(Finding& sum, Finding&& other, LookupMode mode) {
   std::move(other.all.begin(), other.all.end(), std::back_inserter(sum.all));
 }
 
-// The mean of each field, summed in the map's order.
+// Mean of each field, summed in the order of the map.
 std::vector<double> mean_of(std::vector<std::pair<MapOrder, std::vector<double>>> all) {
   std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   std::vector<double> sums(all.front().second.size(), 0.0);
@@ -136,7 +136,7 @@ Voxel voxel_near(const VoxelLattice& lattice, const Eigen::Vector3d& point_in_te
   return {floor_to<int>(cell.x()), floor_to<int>(cell.y()), floor_to<int>(cell.z())};
 }
 
-// Which tiles lie within a distance of a point.
+// Finds the tiles within a distance of a point.
 class TileFinder {
  public:
   explicit TileFinder(const TileStoreIndex& index) : index_(index) {
@@ -153,7 +153,7 @@ class TileFinder {
     return boxes_[tile].exteriorDistance(point_in_terrain);
   }
 
-  // Any tile, a near one where that is easy.
+  // Returns any tile, preferably a near one.
   std::size_t guess(const Eigen::Vector3d& point_in_terrain) const {
     const TileNumber own = number_of(point_in_terrain);
     if (const StoredTile* tile =
@@ -165,7 +165,7 @@ class TileFinder {
     return nearest;
   }
 
-  // Ascending.
+  // Returns tiles within a distance, ascending.
   std::vector<std::size_t> within(const Eigen::Vector3d& point_in_terrain, double reach_m) const {
     std::vector<std::size_t> tiles;
     const auto add = [&](std::size_t tile) {
@@ -198,7 +198,7 @@ class TileFinder {
   }
 
   const TileStoreIndex& index_;
-  std::vector<Eigen::AlignedBox3d> boxes_;  // in the terrain frame
+  std::vector<Eigen::AlignedBox3d> boxes_;  // boxes in the terrain frame
   TileNumber low_;
   TileNumber high_;
 };
@@ -211,7 +211,7 @@ class TileLookup {
     if (options.mode != LookupMode::nearest) reach_m_ = std::max(reach_m_, options.radius_m);
   }
 
-  // Tiles that hold what is near first; then those that may hold something nearer.
+  // First the tiles of the nearest points, then tiles that may contain nearer points.
   std::vector<Finding> find(const std::vector<Place>& places) const {
     std::vector<Finding> findings(places.size());
     std::vector<Visit> visits;
@@ -248,7 +248,7 @@ class TileLookup {
   void make(std::vector<Visit> visits, const std::vector<Place>& places,
             std::vector<Finding>& findings) const {
     std::sort(visits.begin(), visits.end());
-    std::vector<std::size_t> starts;  // of each tile's visits
+    std::vector<std::size_t> starts;  // first visit of each tile
     for (std::size_t v = 0; v < visits.size(); ++v)
       if (v == 0 || visits[v].tile != visits[v - 1].tile) starts.push_back(v);
     starts.push_back(visits.size());
@@ -279,10 +279,10 @@ std::vector<std::pair<std::string, LookupMode>> lookup_mode_names() {
 
 void bind(libmap::ParameterTable& table, LookupOptions& options) {
   table.add("mode", options.mode, lookup_mode_names(),
-            "which map points answer: the closest, the best or all within the radius");
-  table.add("radius_m", options.radius_m, libmap::positive, "radius of maximum and mean, m");
+            "map points to use: the closest, the best or all within the radius");
+  table.add("radius_m", options.radius_m, libmap::positive, "radius for maximum and mean, m");
   table.add("max_distance_m", options.max_distance_m, libmap::positive,
-            "nearest: farther off there is nothing, m");
+            "maximum distance for nearest, m");
 }
 
 std::vector<LookupAnswer> look_up(const libmap::PointCloud& map,
@@ -310,7 +310,7 @@ std::vector<LookupAnswer> look_up_tiles(const TileStoreIndex& index, const TileL
                                             : libmap::Pose(libmap::Pose::Identity());
   const TileLookup lookup(index, load, options);
   std::vector<LookupAnswer> answers(points.size());
-  std::vector<std::pair<TileNumber, std::size_t>> order;  // of the points, by their tiles
+  std::vector<std::pair<TileNumber, std::size_t>> order;  // points, by tile
   for (std::size_t n = 0; n < points.size(); ++n) {
     answers[n].distance_m = HUGE_VAL;
     const Place place{points[n], terrain_from_map * points[n]};

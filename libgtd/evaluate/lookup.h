@@ -1,4 +1,4 @@
-// A map's values at listed locations, of a whole map or of one in tiles that are loaded one by one.
+// Values of a map at given locations, for a map in memory or in tiles that are loaded one by one.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,41 +15,41 @@
 
 namespace libgtd {
 
-// nearest: the values of the closest map point. maximum: those of the point with the largest score
-// within the radius (the closest of equals). mean: the mean of each field within the radius. Of map
-// points that are equally good, the first in the map.
+// nearest: values of the closest map point. maximum: values of the point with the largest score
+// within the radius (the closest of equal ones). mean: mean of each field within the radius. Of
+// points that are still equal, the first in the map is used.
 enum class LookupMode { nearest, maximum, mean };
 std::vector<std::pair<std::string, LookupMode>> lookup_mode_names();
 
 struct LookupOptions {
   LookupMode mode = LookupMode::nearest;
-  double radius_m = 0.02;        // of maximum and mean
-  double max_distance_m = 0.05;  // of nearest: farther off there is nothing
+  double radius_m = 0.02;        // for maximum and mean
+  double max_distance_m = 0.05;  // for nearest: maximum distance of the point
 };
 void bind(libmap::ParameterTable& table, LookupOptions& options);
 
 struct LookupAnswer {
   bool found = false;
-  double distance_m = 0.0;     // to the nearest map point, found or not
-  std::size_t map_point = 0;   // that the values are of; with mean the nearest
-  std::size_t map_points = 0;  // that took part
-  std::vector<double> values;  // one a field of the map; empty where nothing was found
+  double distance_m = 0.0;     // to the nearest map point, even if not found
+  std::size_t map_point = 0;   // source of the values; with mean the nearest point
+  std::size_t map_points = 0;  // number of points that contributed
+  std::vector<double> values;  // one per field of the map; empty if not found
 };
 
-// One answer for each of `points`, which are in the map's frame. Throws Error for an empty map, a
-// map without the field "score" where the mode needs it, and options out of their bounds.
+// Returns one answer per point; `points` are in the frame of the map. Throws Error for an empty
+// map, a map without the field "score" if the mode needs it, and options out of range.
 std::vector<LookupAnswer> look_up(const libmap::PointCloud& map,
                                   const std::vector<Eigen::Vector3d>& points,
                                   const LookupOptions& options = {});
 
-// The points of index.tiles[tile], in the frame of index.frame, as to_cloud orders them. Called
-// from several threads at once.
+// Loads the points of index.tiles[tile] in the frame of index.frame, as ordered by to_cloud. Must
+// be thread-safe.
 using TileLoader = std::function<libmap::PointCloud(std::size_t tile)>;
 
-// The answers of look_up over the whole map; `map_point` counts within its tile. Points are taken
-// by their tiles, some 10^5 at a time, so that no tile is loaded that no point needs, few twice,
-// and memory holds a tile a thread besides the answers. Throws Error as look_up does, and what
-// `load` throws.
+// Returns the answers of look_up over the whole map, except that `map_point` is an index within a
+// tile. Points are sorted by tile, some 10^5 at a time: only required tiles are loaded, few of them
+// twice, and memory contains one tile per thread besides the answers. Throws like look_up, and all
+// errors of `load`.
 std::vector<LookupAnswer> look_up_tiles(const TileStoreIndex& index, const TileLoader& load,
                                         const std::vector<Eigen::Vector3d>& points,
                                         const LookupOptions& options = {},

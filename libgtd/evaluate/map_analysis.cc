@@ -13,7 +13,7 @@ namespace libgtd {
 namespace {
 
 constexpr double score_tolerance = 1e-6;  // as in score_color.h
-constexpr int largest_gap = 6;            // of empty columns inside the ground
+constexpr int largest_gap = 6;            // maximum number of empty columns inside the ground
 
 template <typename Bin>
 std::vector<Bin> empty_bins(const ValueBins& bins) {
@@ -118,7 +118,7 @@ class MapCounter {
     bin.graspable_area_m2 += area_m2;
   }
 
-  // Voxels of one column follow each other, and columns along y.
+  // Voxels of a column are adjacent, and columns are adjacent along y.
   void count_columns() {
     std::size_t columns = 0;
     std::size_t gaps = 0;
@@ -155,18 +155,17 @@ class MapCounter {
 };
 
 constexpr double max_bins = 100'000.0;
-constexpr double rounding = 1e-9;  // of a bin's width
+constexpr double rounding = 1e-9;  // relative to the bin width
 
 }  // namespace
 
 void bind(libmap::ParameterTable& table, MapAnalysisOptions& options) {
   table.add("score_bin", options.score_bin, libmap::Range{0.0, 1.0, true, false},
-            "width of the histogram's bins of score");
-  table.add("height_bin_m", options.height_bin_m, libmap::positive, "width of bins of height, m");
+            "width of score bins");
+  table.add("height_bin_m", options.height_bin_m, libmap::positive, "width of height bins, m");
   table.add("slope_bin_deg", options.slope_bin_deg, libmap::Range{0.0, 90.0, true, false},
-            "width of bins of slope, degrees");
-  table.add("border", options.border,
-            "also count voxels whose mask's window leaves the scanned area");
+            "width of slope bins, degrees");
+  table.add("border", options.border, "includes voxels whose mask window leaves the scanned area");
 }
 
 std::optional<double> GroundBin::graspable_share() const {
@@ -186,7 +185,7 @@ MapAnalysis analyze_map(const VoxelMap& map, const MapSurface& surface,
                         const MapAnalysisOptions& options) {
   libmap::check_parameters(options);
   if (surface.slope_deg.size() != map.size() || surface.area_m2.size() != map.size())
-    throw libmap::Error("the surface is of another map", {.field = "slope_deg"});
+    throw libmap::Error("the surface does not match the map", {.field = "slope_deg"});
   return MapCounter(map, surface, options).run();
 }
 
@@ -197,7 +196,7 @@ std::size_t ValueBins::bin_of(double value) const {
 
 ValueBins bins_over(double low, double high, double width, const char* field) {
   if (!(width > 0.0))
-    throw libmap::Error("no width of a bin",
+    throw libmap::Error("out of range",
                         {.field = field, .value = libmap::to_text(width), .bound = "> 0"});
   const double first = std::floor(low / width + rounding);
   const double count = std::max(1.0, std::ceil(high / width - rounding) - first);

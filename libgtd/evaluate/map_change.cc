@@ -18,7 +18,7 @@ constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
 constexpr double lattice_tolerance_voxels = 0.01;
 constexpr std::size_t places_per_chunk = 1 << 14;
 
-// What is added to the indices of OTHER's voxels to get those of MAP's, where the lattices are one.
+// Offset from the voxel indices of OTHER to those of MAP, if the lattices coincide.
 std::optional<Voxel> lattice_offset(const VoxelMap& map, const VoxelMap& other,
                                     const libmap::Pose& map_from_other) {
   Eigen::Vector3d low = other.center_in_terrain(0);
@@ -59,7 +59,7 @@ std::vector<VoxelPair> pairs_by_index(const VoxelMap& map, const VoxelMap& other
   return pairs;
 }
 
-// For each of `places` the nearest of `points` at most `reach_m` away, of equals the first.
+// Nearest of `points` at most `reach_m` from each of `places`, the first of equally near ones.
 std::vector<std::uint32_t> nearest_points(const std::vector<Eigen::Vector3d>& points,
                                           const std::vector<Eigen::Vector3d>& places,
                                           double reach_m) {
@@ -110,7 +110,8 @@ ScoreDifference difference_of(const VoxelMap& map, const VoxelMap& other,
   result.mean_absolute /= n;
   result.rms = std::sqrt(result.rms / n);
   std::sort(differences.begin(), differences.end());
-  // All three turn their signs, and low and high are exchanged, with the values' signs.
+  // If the signs of the values change, all three change their signs, and low and high are
+  // exchanged.
   const std::size_t last = result.count - 1;
   result.low_5 = differences[nearest_rank(result.count, 0.05)];
   result.median = (differences[last / 2] + differences[result.count / 2]) / 2.0;
@@ -142,7 +143,7 @@ ChangeSummary summarize(const VoxelMap& map, const MapSurface& surface, const Vo
   return summary;
 }
 
-// The pairs in bins of `value` of MAP's voxel; those where it is NaN are left out.
+// Statistics of pairs in bins of `value` of the voxel of MAP; pairs with NaN are left out.
 template <typename Value>
 std::vector<ChangeSummary> summarize_bins(const VoxelMap& map, const MapSurface& surface,
                                           const VoxelMap& other,
@@ -204,7 +205,7 @@ void find_unpaired(const VoxelMap& map, const VoxelMap& other, MapChange& change
 void bind(libmap::ParameterTable& table, MapChangeOptions& options) {
   table.add("match_distance_voxels", options.match_distance_voxels,
             libmap::Range{0.0, 10.0, true, false},
-            "of OTHER on another lattice: voxels match at most so many voxel edges apart");
+            "maximum distance of matching voxels on different lattices, voxel edges");
 }
 
 std::string_view to_text(VoxelMatching matching) {
@@ -222,7 +223,7 @@ MapChange compare_maps(const VoxelMap& map, const MapSurface& surface, const Vox
                        const MapChangeOptions& options) {
   libmap::check_parameters(options);
   if (surface.area_m2.size() != map.size())
-    throw libmap::Error("the surface is of another map", {.field = "area_m2"});
+    throw libmap::Error("the surface does not match the map", {.field = "area_m2"});
   MapChange change;
   const double size_m = std::max(map.lattice.voxel_size_m, other.lattice.voxel_size_m);
   if (const auto offset = lattice_offset(map, other, map_terrain_from_other_terrain)) {
@@ -234,7 +235,7 @@ MapChange compare_maps(const VoxelMap& map, const MapSurface& surface, const Vox
                                      options.match_distance_voxels * size_m);
   }
   if (change.pairs.empty())
-    throw libmap::Error("the maps have no voxel in common: they lie apart, or in other frames");
+    throw libmap::Error("the maps have no voxel in common: check their area and frames");
   find_unpaired(map, other, change);
   change.common = summarize(map, surface, other, change.pairs);
   summarize_evaluated(map, surface, other, options, change);

@@ -1,4 +1,4 @@
-// What differs between two maps of one ground, voxel by voxel.
+// Compares two maps of the same ground voxel by voxel.
 #pragma once
 
 #include <cstddef>
@@ -16,54 +16,55 @@
 namespace libgtd {
 
 struct MapChangeOptions {
-  // Where the lattices differ: voxels are of one place if each is the other's nearest and their
-  // centers lie at most so many edges of a voxel apart. Half a diagonal: no place is farther from
-  // the nearest center of a lattice.
+  // Maximum distance of corresponding voxel centers, in voxel edges, if the lattices differ.
+  // Corresponding voxels are mutual nearest neighbors. The default is half a diagonal, the maximum
+  // distance of a point from the nearest center of a lattice.
   double match_distance_voxels = 0.87;
   double height_bin_m = 0.05;
   double slope_bin_deg = 5.0;
-  bool border = false;  // voxels whose mask's window leaves the scanned area count too
+  bool border = false;  // includes voxels at the border of the scanned area
 };
 void bind(libmap::ParameterTable& table, MapChangeOptions& options);
 
-// lattice: both maps lie on one lattice, voxels with the same indices are of one place.
+// Correspondence of voxels. lattice: same indices on a common lattice. nearest: mutual nearest
+// neighbors.
 enum class VoxelMatching { lattice, nearest };
 std::string_view to_text(VoxelMatching matching);
 
-// Whether a place can be held: in neither map, in both, in OTHER alone, in MAP alone; or the place
-// is in one map alone.
+// Graspability of a voxel in two maps: in neither, in both, gained (only in OTHER), lost (only in
+// MAP); or the voxel is only in one map.
 enum class ChangeClass : std::uint8_t { neither, both, gained, lost, only_map, only_other };
 
 struct VoxelPair {
-  std::uint32_t map = 0;  // entries of the two maps
+  std::uint32_t map = 0;  // indices of the voxels in the two maps
   std::uint32_t other = 0;
 };
 
-// Of a pair of voxels by whether each can be held.
+// Returns the class of a pair of voxels.
 ChangeClass class_of(const VoxelMap& map, const VoxelMap& other, const VoxelPair& pair);
 
-// Of the scores of OTHER less those of MAP, over pairs that both have a score.
+// Statistics of the score differences OTHER - MAP over pairs with both scores.
 struct ScoreDifference {
   std::size_t count = 0;
   double mean = 0.0;
   double mean_absolute = 0.0;
   double rms = 0.0;
-  double low_5 = 0.0;   // 5th and 95th percentile by nearest rank, each from its own end
-  double median = 0.0;  // of an even number of values, the mean of the two in the middle
+  double low_5 = 0.0;   // 5th and 95th percentile, nearest rank from each end
+  double median = 0.0;  // mean of the two middle values of an even number
   double high_95 = 0.0;
   double min = 0.0;
   double max = 0.0;
-  std::optional<double> correlation;  // Pearson's; nothing where one of them is constant
+  std::optional<double> correlation;  // Pearson; nullopt if one map is constant
 };
 
-// Of a set of pairs.
+// Statistics of a set of pairs.
 struct ChangeSummary {
-  double low = 0.0;  // of a bin
+  double low = 0.0;  // bounds of the bin
   double high = 0.0;
-  Confusion graspable;  // MAP evaluates, OTHER is the reference
+  Confusion graspable;  // MAP is the prediction, OTHER the reference
   std::optional<Kappa> kappa;
   ScoreDifference difference;
-  double both_area_m2 = 0.0;  // of MAP's surface
+  double both_area_m2 = 0.0;  // areas on MAP's surface
   double gained_area_m2 = 0.0;
   double lost_area_m2 = 0.0;
 
@@ -73,27 +74,27 @@ struct ChangeSummary {
 
 struct MapChange {
   VoxelMatching matching = VoxelMatching::lattice;
-  std::vector<VoxelPair> pairs;         // ascending by MAP's voxel
+  std::vector<VoxelPair> pairs;         // ascending by the voxel of MAP
   std::vector<std::uint32_t> only_map;  // ascending
   std::vector<std::uint32_t> only_other;
   std::size_t only_map_graspable = 0;
   std::size_t only_other_graspable = 0;
   ChangeSummary common;                  // all pairs
-  ChangeSummary evaluated;               // those evaluated in both maps (VoxelMap::evaluated)
-  std::vector<ChangeSummary> by_height;  // of those evaluated, in MAP's terrain frame
-  std::vector<ChangeSummary> by_slope;   // of MAP's surface; without those of unknown slope
+  ChangeSummary evaluated;               // pairs evaluated in both maps (VoxelMap::evaluated)
+  std::vector<ChangeSummary> by_height;  // evaluated pairs by height in MAP's terrain frame
+  std::vector<ChangeSummary> by_slope;   // evaluated pairs by slope of MAP, if known
 };
 
-// `map_terrain_from_other_terrain` carries OTHER's terrain frame to MAP's. Exchanging the maps
-// transposes the counts and turns the signs of the differences. Throws Error: options out of their
-// bounds, no voxel in common.
+// Compares two maps. `map_terrain_from_other_terrain` transforms OTHER's terrain frame to MAP's.
+// Exchanging the maps transposes the counts and negates the differences. Throws Error for options
+// out of range, maps without a common voxel and a surface of a different size than the map.
 MapChange compare_maps(const VoxelMap& map, const MapSurface& surface, const VoxelMap& other,
                        const libmap::Pose& map_terrain_from_other_terrain,
                        const MapChangeOptions& options = {});
 
-// A point for each pair and for each voxel that is in one map alone, at its place in the frame of
-// MAP's points (of pairs MAP's voxel), with the fields score_map, score_other, difference (NaN
-// where there is none), graspable_map, graspable_other, evaluated and change (ChangeClass).
+// Returns one point per pair (at the voxel of MAP) and per voxel that is only in one map, in the
+// frame of MAP's points, with the fields score_map, score_other, difference (NaN if undefined),
+// graspable_map, graspable_other, evaluated and change (value of ChangeClass).
 libmap::PointCloud to_cloud(const MapChange& change, const VoxelMap& map, const VoxelMap& other,
                             const libmap::Pose& map_terrain_from_other_terrain, bool border);
 

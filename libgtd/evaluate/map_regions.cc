@@ -28,7 +28,7 @@ std::vector<std::uint32_t> graspable_voxels(const VoxelMap& map, bool border) {
   return graspable;
 }
 
-// Lists of voxels, one per set of neighbors, each ascending, in the order of their first voxels.
+// Sets of connected voxels, each ascending, in the order of their first voxels.
 std::vector<std::vector<std::uint32_t>> connected(const VoxelMap& map,
                                                   const std::vector<std::uint32_t>& graspable,
                                                   int reach) {
@@ -39,7 +39,7 @@ std::vector<std::vector<std::uint32_t>> connected(const VoxelMap& map,
   visit_pairs(voxels, reach, [&](std::size_t n, std::size_t m) {
     sets.join(static_cast<std::uint32_t>(n), static_cast<std::uint32_t>(m));
   });
-  std::vector<std::size_t> number(voxels.size());  // of the set, at its first voxel
+  std::vector<std::size_t> number(voxels.size());  // number of the set, stored at its first voxel
   std::vector<std::vector<std::uint32_t>> members;
   for (std::uint32_t n = 0; n < voxels.size(); ++n) {
     const std::uint32_t first = sets.find(n);
@@ -81,17 +81,18 @@ using Graph = boost::adjacency_list<boost::vecS, boost::vecS, boost::undirectedS
                                     boost::no_property, RegionLink>;
 
 constexpr std::size_t max_links = 10'000'000;
-// Distances of voxels are multiples of their size: rounding shall not part them from the stride.
+// Distances of voxels are multiples of their size. The tolerance prevents rounding from excluding
+// the stride itself.
 constexpr double reach_tolerance = 1.0 + 1e-9;
 constexpr double farthest_m = std::numeric_limits<double>::max();
 
 void check(const RegionReachOptions& options) {
   libmap::check_parameters(options);
   if (options.start && !options.start->allFinite())
-    throw libmap::Error("not a place", {.field = "start"});
+    throw libmap::Error("not finite", {.field = "start"});
 }
 
-// Regions that belong together, as points.
+// Connected regions, as points.
 struct PointSet {
   std::vector<std::uint32_t> voxels;
   libmap::PointCloud points;
@@ -146,7 +147,7 @@ class NearestPairs {
       smaller[s] = smaller_neighbors(s);
       pairs += smaller[s].size();
       if (pairs > max_links)
-        throw libmap::Error("joins more than 10 million pairs of regions",
+        throw libmap::Error("links more than 10 million pairs of regions",
                             {.field = "stride_m", .value = libmap::to_text(given_reach_m_)});
     }
     libmap::parallel_each(sets_.size(), 8, [&](std::size_t s) {
@@ -162,7 +163,7 @@ class NearestPairs {
   }
 
  private:
-  // Of each pair the larger set is searched, for the points of the smaller one.
+  // Searches the larger set of each pair for the points of the smaller one.
   std::vector<std::uint32_t> smaller_neighbors(std::uint32_t set) const {
     const auto rank = [&](std::uint32_t s) { return std::pair(sets_[s].voxels.size(), s); };
     std::vector<std::uint32_t> near;
@@ -235,7 +236,7 @@ Components components_of(const Graph& graph) {
   return components;
 }
 
-// A minimum spanning tree of each component, the shortest link first.
+// Minimum spanning tree of each component, shortest link first.
 std::vector<RegionLink> spanning_links(const Graph& graph) {
   std::vector<Graph::edge_descriptor> kept;
   boost::kruskal_minimum_spanning_tree(
@@ -262,8 +263,9 @@ std::vector<PointSet> joined(const VoxelMap& map, const std::vector<PointSet>& s
   return larger;
 }
 
-// Of all regions: links within a reach join them to fewer sets, then those within twice the reach,
-// and so on, until one is left. No link is passed over: what lies apart by less was joined before.
+// Spanning tree of all regions. Links within a reach merge sets, then links within twice this
+// reach, until one set is left. No shorter link is missed, because sets at smaller distances are
+// merged already.
 std::vector<RegionLink> spanning_tree(const VoxelMap& map, const MapRegionResult& regions,
                                       std::vector<PointSet> sets, std::vector<RegionLink> links,
                                       double reach_m) {
@@ -282,7 +284,7 @@ std::vector<RegionLink> spanning_tree(const VoxelMap& map, const MapRegionResult
     const Components components = components_of(graph);
     if (components.count == sets.size() && !(reach_m < farthest_m))
       throw libmap::Error(
-          "the regions are too far apart: their distances are no numbers",
+          "the regions are too far apart: their distances are not finite",
           {.field = "voxel_size_m", .value = libmap::to_text(map.lattice.voxel_size_m)});
     if (components.count < sets.size()) sets = joined(map, sets, components);
     reach_m = std::max(2.0 * reach_m, map.lattice.voxel_size_m);
@@ -291,15 +293,15 @@ std::vector<RegionLink> spanning_tree(const VoxelMap& map, const MapRegionResult
   return tree;
 }
 
-// Summed as PointTree sums (nanoflann's L2_Simple_Adaptor): a place at a voxel's distance gets the
-// same distance from both.
+// Summed in the order of PointTree (nanoflann's L2_Simple_Adaptor), so that both compute the same
+// distance.
 double distance_of(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   double sum = 0.0;
   for (Eigen::Index axis = 0; axis < 3; ++axis) sum += (a[axis] - b[axis]) * (a[axis] - b[axis]);
   return std::sqrt(sum);
 }
 
-// Distance from a place to the nearest voxel of each region.
+// Distance from a position to the nearest voxel of each region.
 std::vector<double> distances_from(const Eigen::Vector3d& place,
                                    const std::vector<PointSet>& sets) {
   std::vector<double> distances(sets.size(), std::numeric_limits<double>::infinity());
@@ -309,7 +311,7 @@ std::vector<double> distances_from(const Eigen::Vector3d& place,
   return distances;
 }
 
-// From node `start` along the links; `lengthen` says how a link adds to a way's length.
+// Shortest paths from node `start` along the links; `lengthen` adds a link to the length of a path.
 template <typename Lengthen>
 std::vector<double> lengths_from(std::uint32_t start, const Graph& graph,
                                  const Lengthen& lengthen) {
@@ -324,7 +326,7 @@ std::vector<double> lengths_from(std::uint32_t start, const Graph& graph,
   return lengths;
 }
 
-// The start is one more node. Without a place of its own it lies on its region, at no distance.
+// Adds the start as a node. Without a position, it is at distance 0 from its region.
 std::vector<RegionLink> with_start(std::vector<RegionLink> links,
                                    const std::vector<double>& start_distances, double max_m) {
   const auto start = static_cast<std::uint32_t>(start_distances.size());
@@ -360,16 +362,16 @@ void describe_access(const MapRegionResult& regions, const std::vector<double>& 
 
 void bind(libmap::ParameterTable& table, MapRegionOptions& options) {
   table.add("adjacency_voxels", options.adjacency_voxels, libmap::Range{1.0, 100.0},
-            "voxels of one region differ by at most so much in each index; 1: 26 neighbors");
+            "maximum index difference of neighbors in a region; 1: 26 neighbors");
   table.add("min_voxels", options.min_voxels, libmap::Range{1.0, 1e9},
-            "smaller regions are left out, voxels");
+            "minimum size of a region, voxels");
 }
 
 MapRegionResult find_regions(const VoxelMap& map, const MapSurface& surface,
                              const MapRegionOptions& options) {
   libmap::check_parameters(options);
   if (surface.area_m2.size() != map.size())
-    throw libmap::Error("the surface is of another map", {.field = "area_m2"});
+    throw libmap::Error("the surface does not match the map", {.field = "area_m2"});
   const std::vector<std::uint32_t> graspable = graspable_voxels(map, options.border);
   MapRegionResult result;
   for (std::vector<std::uint32_t>& voxels : connected(map, graspable, options.adjacency_voxels)) {
@@ -392,7 +394,7 @@ MapRegionResult find_regions(const VoxelMap& map, const MapSurface& surface,
 
 void bind(libmap::ParameterTable& table, RegionReachOptions& options) {
   table.add("stride_m", options.stride_m, libmap::positive,
-            "the robot's longest step, from region to region, m");
+            "maximum step of the robot between regions, m");
 }
 
 RegionReach find_reach(const VoxelMap& map, const MapRegionResult& regions,
@@ -413,7 +415,7 @@ RegionReach find_reach(const VoxelMap& map, const MapRegionResult& regions,
   const auto nearest = std::min_element(start_distances.begin(), start_distances.end());
   reach.start_region = static_cast<std::uint32_t>(nearest - start_distances.begin());
   reach.start_distance_m = *nearest;
-  // Who stands on a region needs no step to get there.
+  // A robot on a region reaches it without a step.
   for (double& distance : start_distances)
     if (distance <= map.lattice.voxel_size_m) distance = 0.0;
   reach.tree = spanning_tree(map, regions, std::move(sets), reach.links, options.stride_m);

@@ -13,7 +13,7 @@
 namespace libgtd {
 namespace {
 
-// Values of one row, with the columns' names.
+// Values of one row with the names of the columns.
 struct Row {
   NamedCells cells;
 
@@ -21,7 +21,7 @@ struct Row {
     cells.emplace_back(std::move(name), std::move(cell));
   }
   void add(std::string name, std::size_t count) { add(std::move(name), std::to_string(count)); }
-  // Six decimals: no map has more voxels than they tell apart.
+  // Six decimals are enough to distinguish the shares of all map sizes.
   void add(std::string name, std::optional<double> value) {
     add(std::move(name), value ? libmap::to_fixed_text(*value, 6) : std::string());
   }
@@ -80,7 +80,7 @@ void add_confusion(const std::string& prefix, const Confusion& counts, Row& row)
 void add_expected(const ExpectedMapResult& expected, Row& row) {
   add_confusion("voxel", expected.voxels_by_score, row);
   row.add("voxel_auc", expected.area ? std::optional(expected.area->trapezoid) : std::nullopt);
-  // Without the map's flag, no rates.
+  // No rates without the flag of the map.
   add_confusion("flag", expected.voxels_by_flag.value_or(Confusion{}), row);
   add_confusion("place", expected.places, row);
 }
@@ -115,7 +115,7 @@ std::string yes_no(std::optional<bool> value) {
   return *value ? "1" : "0";
 }
 
-// For counts that need neither slopes nor areas.
+// Surface without slopes and areas, for counts that do not need them.
 MapSurface unmeasured(const VoxelMap& map) {
   MapSurface surface;
   surface.slope_deg.assign(map.size(), std::numeric_limits<float>::quiet_NaN());

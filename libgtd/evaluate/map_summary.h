@@ -1,5 +1,5 @@
-// Maps in one line each: what was asked of the detection, how its scores spread, and how well it
-// does where expectations are known.
+// Summarizes maps in one row each: parameters of the detection, distribution of scores, and
+// agreement with expectations, if known.
 #pragma once
 
 #include <array>
@@ -20,20 +20,20 @@ namespace libgtd {
 
 inline constexpr std::array<double, 5> summary_quantiles{0.05, 0.25, 0.5, 0.75, 0.95};
 
-// Of the evaluated voxels (VoxelMap::evaluated): above the zero plane, and with all of the mask's
-// window in the scanned area.
+// Statistics of the evaluated voxels (VoxelMap::evaluated): above the zero plane, with the whole
+// window of the mask in the scanned area.
 struct MapSummary {
-  std::size_t voxels = 0;  // of the whole map
+  std::size_t voxels = 0;  // all voxels of the map
   std::size_t evaluated = 0;
-  std::size_t reached = 0;    // with a score that reaches the threshold
-  std::size_t graspable = 0;  // with the map's flag
-  // With fewer solid voxels than the threshold TSV: no other score depends on it. Nothing where
-  // TSV or SSV is not known.
+  std::size_t reached = 0;    // voxels whose score reaches the threshold
+  std::size_t graspable = 0;  // voxels with the flag of the map
+  // Voxels with fewer solid voxels than the threshold TSV, which affects only their scores. nullopt
+  // if TSV or SSV is unknown.
   std::optional<std::size_t> few_solid;
-  // By nearest rank, at summary_quantiles; empty where nothing was evaluated.
+  // Quantiles summary_quantiles by nearest rank; empty if no voxel was evaluated.
   std::vector<double> scores;
-  std::vector<double> solid_voxels;  // SSV; empty too where it is not known
-  std::vector<ScoreBin> score_bins;  // without areas
+  std::vector<double> solid_voxels;  // quantiles of SSV; empty if unknown
+  std::vector<ScoreBin> score_bins;  // areas are not set
 };
 
 struct MapSummaryOptions {
@@ -41,48 +41,49 @@ struct MapSummaryOptions {
   std::optional<double> solid_voxel_threshold{};
 };
 
-// `voxels` is voxel_map_of(map).
+// Summarizes a map; `voxels` must be voxel_map_of(map).
 MapSummary summarize_map(const libmap::PointCloud& map, const VoxelMap& voxels,
                          const MapSummaryOptions& options = {});
 
-// Both thresholds as the manifest of a map names them, where it does.
+// Returns the thresholds in the manifest of a map, or else the defaults.
 MapSummaryOptions summary_options(const libmap::Manifest& manifest);
 
 struct SummarizedMap {
   std::string name;
-  libmap::Manifest manifest{};  // empty: its parameters are empty cells
+  libmap::Manifest manifest{};  // empty: parameters are empty cells
   double cutoff = 0.8;
   MapSummary summary{};
   std::optional<ExpectedMapResult> expected{};
 };
 
-// One row per map: name, parameters of the detection, counts, shares, quantiles; if one of them has
-// an expectation also sensitivity and specificity, of voxels and of places, with Wilson 95 %
-// intervals, Youden's index and the area under the curve. Undefined values are empty cells.
+// Returns one row per map: name, parameters of the detection, counts, fractions, quantiles. If one
+// of the maps has an expectation, also sensitivity and specificity of voxels and of places with
+// Wilson 95 % intervals, Youden's index and the area under the curve. Undefined values are empty
+// cells.
 libmap::Table summary_table(const std::vector<SummarizedMap>& maps);
 
-// One row per map and region of `expected`.
+// Returns one row per map and region of `expected`.
 libmap::Table region_table(const std::vector<SummarizedMap>& maps, const ExpectedMap& expected);
 
-// Columns map, score (the middle of a bin), voxels, share (of the evaluated).
+// Returns the columns map, score (the middle of a bin), voxels, share (of the evaluated voxels).
 libmap::Table histogram_table(const std::vector<SummarizedMap>& maps);
 
-// How two maps of one cloud agree, over the voxels that are evaluated in both.
+// Agreement of two maps of one cloud over the voxels that are evaluated in both.
 struct MapPair {
-  std::size_t first = 0;  // of the list of maps
+  std::size_t first = 0;  // index in the list of maps
   std::size_t second = 0;
   VoxelMatching matching = VoxelMatching::lattice;
-  std::size_t common = 0;     // voxels of one place, evaluated or not
-  ChangeSummary evaluated{};  // the first is MAP, the second OTHER; without areas
+  std::size_t common = 0;     // corresponding voxels, evaluated or not
+  ChangeSummary evaluated{};  // first is MAP, second is OTHER; areas are not set
 };
 
-// Of maps scored from one cloud, `first_terrain_from_second_terrain` between their frames. Throws
-// Error as compare_maps does.
+// Compares maps scored from one cloud; `first_terrain_from_second_terrain` is the transform between
+// their frames. Throws like compare_maps.
 MapPair compare_pair(const VoxelMap& first, const VoxelMap& second,
                      const libmap::Pose& first_terrain_from_second_terrain);
 
-// One row a pair: how many voxels both, one of them or none says can be held, accuracy, Cohen's
-// kappa, and the differences of the scores (the second's less the first's).
+// Returns one row per pair: numbers of voxels that both, one or none of the maps marks graspable,
+// accuracy, Cohen's kappa, and the differences of the scores (second - first).
 libmap::Table pair_table(const std::vector<SummarizedMap>& maps, const std::vector<MapPair>& pairs);
 
 }  // namespace libgtd

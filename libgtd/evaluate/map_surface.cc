@@ -20,12 +20,12 @@ using std::numbers::pi;
 constexpr double default_radius_voxels = 6.0;
 constexpr std::size_t map_voxels_per_chunk = 1 << 12;
 
-// Only the line of a normal counts here. A direction that no lattice plane contains sees a side of
-// every surface that voxels make, walls along z too.
+// The sign of a normal does not matter here. This direction is in no lattice plane, so that it is
+// on one side of every surface of voxels, including walls along z.
 Vector3d any_outside() { return {0.2718281828, 0.1414213562, 0.9518901214}; }
 
-// The share of the kernel's mass on this side of a straight edge at a distance of `edge` radii from
-// the middle, -1..1: across the edge's direction the kernel sums up to 4/3 (1 - x^2)^(3/2).
+// Fraction of the kernel mass on this side of a straight edge at a distance of `edge` radii from
+// the middle, -1..1. Across the direction of the edge, the kernel sums up to 4/3 (1 - x^2)^(3/2).
 double mass_within(double edge) {
   const double root = std::sqrt(1.0 - edge * edge);
   const double integral =
@@ -33,17 +33,17 @@ double mass_within(double edge) {
   return 0.5 + 8.0 / (3.0 * pi) * integral;
 }
 
-// How far, in radii, the mean of that mass lies from the middle.
+// Distance of the mean of this mass from the middle, in radii.
 double offset_within(double edge) {
   return 8.0 / (15.0 * pi) * std::pow(1.0 - edge * edge, 2.5) / mass_within(edge);
 }
 
-// The share of mass that belongs to a mean `offset` radii from the middle.
+// Inverse of offset_within: fraction of the mass for a mean `offset` radii from the middle.
 class MassOfOffset {
  public:
   MassOfOffset() {
     for (std::size_t n = 0; n < masses_.size(); ++n) {
-      // The offset falls with the edge's distance; by bisection.
+      // The offset decreases with the distance of the edge; solved by bisection.
       double near = -0.99;
       double far = 1.0;
       for (int step = 0; step < 60; ++step) {
@@ -104,7 +104,7 @@ class AreaCounter {
 
 void bind(libmap::ParameterTable& table, MapSurfaceOptions& options) {
   table.add("surface_radius_m", options.surface_radius_m, libmap::not_negative,
-            "radius in which the surface's slope and area are measured, m; 0: six voxels");
+            "radius of the slope and area estimates, m; 0: six voxels");
 }
 
 double MapSurface::plan_area_m2(std::size_t n) const {

@@ -1,4 +1,4 @@
-// How a map's ground lies: its slope, and the area of surface that each voxel stands for.
+// Slope and surface area of each voxel of a map.
 #pragma once
 
 #include <cstddef>
@@ -10,30 +10,30 @@
 namespace libgtd {
 
 struct MapSurfaceOptions {
-  // The surface's normal is fitted, and its voxels are counted, within; 0: six voxels.
+  // Radius of the normal fits and of the density of voxels; 0: six voxels.
   double surface_radius_m = 0.0;
 };
 void bind(libmap::ParameterTable& table, MapSurfaceOptions& options);
 
-// One entry per voxel of the map.
+// Surface of a map, one entry per voxel.
 struct MapSurface {
-  double radius_m = 0.0;         // that was used
-  std::vector<float> slope_deg;  // between the surface and the level, 0..90; NaN: not known
-  std::vector<float> area_m2;    // of the surface
+  double radius_m = 0.0;         // radius used
+  std::vector<float> slope_deg;  // angle of the surface to the horizontal, 0..90; NaN: unknown
+  std::vector<float> area_m2;    // area of the surface
 
-  // The area seen from above; of a surface whose slope is not known, the whole.
+  // Returns the area in plan view, or the whole area if the slope is unknown.
   double plan_area_m2(std::size_t n) const;
 };
 
-// Normals are those of quadrics fitted to the voxels' centers (curvature.h). The area that a voxel
-// stands for is one over the density of voxels on the surface there: the sum of 1 - d^2 / r^2 over
-// the voxels at distances d < r (Epanechnikov's kernel), by the kernel's whole mass pi r^2 / 2. So
-// it depends neither on how many voxels a slope has more than its plan, nor on a cloud that has
-// fewer points than voxels. Where the mean of the weights lies to one side, the ground ends at a
-// straight edge on the other, at the distance that makes this mean, and the mass is that of the
-// disc's rest: corners come out up to a fifth too large. Of distances across the surface half a
-// voxel is left out. A voxel with too few others around it for a normal counts as one level face.
-// Throws Error for a negative radius.
+// Measures slope and area. Normals are those of quadrics fitted to the voxel centers (curvature.h).
+// The area of a voxel is the inverse of the density of surface voxels: the sum of 1 - d^2 / r^2
+// over the voxels at distances d < r (Epanechnikov kernel), divided by the mass of the kernel pi
+// r^2 / 2. It is independent of the larger number of voxels on slopes, and of gaps in clouds with
+// fewer points than voxels. At a border, the mean of the weights is off-center. The surface is then
+// assumed to end at a straight edge at the distance that explains this mean, and the mass is that
+// of the remaining part of the disc; areas at corners are up to a fifth too large. Distances across
+// the surface are reduced by half a voxel. A voxel with too few neighbors for a normal counts as
+// one horizontal face. Throws Error for a negative radius.
 MapSurface measure_surface(const VoxelMap& map, const MapSurfaceOptions& options = {});
 
 }  // namespace libgtd

@@ -1,5 +1,5 @@
-// Rows of a table written together with the names of their columns, and rates as JSON; for the
-// sources of this folder that make tables.
+// Table rows with named columns, and rates as JSON. Used only by the sources of this folder that
+// make tables.
 #pragma once
 
 #include <nlohmann/json.hpp>

@@ -70,9 +70,9 @@ std::vector<RocPoint> points_at_scores(const Sample& sample) {
   return points;
 }
 
-// Pairs of a positive and a negative, counted twice where the positive scores higher and once
-// where both score the same (Mann and Whitney 1947): whole numbers, so that no order of summation
-// shows in the result.
+// Number of pairs of a positive and a negative, counted twice if the positive scores higher and
+// once for equal scores (Mann and Whitney 1947). Integers, so that the order of summation has no
+// effect.
 class PairCount {
  public:
   void add(std::uint64_t positives, std::uint64_t negatives) {
@@ -156,7 +156,7 @@ class Bootstrap {
     }
   }
 
-  // Each replicate has a stream of its own: the order in which they are made does not matter.
+  // Each replicate has its own random stream, so that their order does not matter.
   double replicate(std::uint64_t seed, std::uint64_t index) const {
     libmap::RandomStream random(seed, index);
     const auto positives = draw(random, group_of_positive_);
@@ -209,18 +209,18 @@ void RocOptions::check() const {
   if (cutoffs.empty()) throw libmap::Error("no cutoffs", {.field = "cutoffs"});
   for (std::size_t k = 0; k < cutoffs.size(); ++k) {
     if (!std::isfinite(cutoffs[k]) || (k > 0 && !(cutoffs[k] > cutoffs[k - 1])))
-      throw libmap::Error("cutoffs are not in order", {.field = "cutoffs",
-                                                       .value = libmap::to_text(cutoffs[k]),
-                                                       .bound = "finite and ascending"});
+      throw libmap::Error("cutoffs do not ascend", {.field = "cutoffs",
+                                                    .value = libmap::to_text(cutoffs[k]),
+                                                    .bound = "finite and ascending"});
   }
   if (!std::isfinite(rate_cutoff))
-    throw libmap::Error("no cutoff", {.field = "rate_cutoff",
-                                      .value = libmap::to_text(rate_cutoff),
-                                      .bound = "a finite number"});
+    throw libmap::Error("not finite", {.field = "rate_cutoff",
+                                       .value = libmap::to_text(rate_cutoff),
+                                       .bound = "a finite number"});
   if (bootstrap_replicates < 0)
-    throw libmap::Error("no number of replicates", {.field = "bootstrap_replicates",
-                                                    .value = std::to_string(bootstrap_replicates),
-                                                    .bound = ">= 0"});
+    throw libmap::Error("out of range", {.field = "bootstrap_replicates",
+                                         .value = std::to_string(bootstrap_replicates),
+                                         .bound = ">= 0"});
 }
 
 std::optional<double> Rate::value() const {
@@ -230,13 +230,13 @@ std::optional<double> Rate::value() const {
 
 std::optional<Interval> Rate::wilson_95() const {
   if (total == 0) return std::nullopt;
-  constexpr double z = 1.959963984540054;  // the normal distribution's 0.975 quantile
+  constexpr double z = 1.959963984540054;  // 0.975 quantile of the normal distribution
   const double n = static_cast<double>(total);
   const double p = static_cast<double>(count) / n;
   const double denominator = 1.0 + z * z / n;
   const double center = (p + z * z / (2.0 * n)) / denominator;
   const double half = z * std::sqrt(p * (1.0 - p) / n + z * z / (4.0 * n * n)) / denominator;
-  // At the ends the interval reaches them exactly; rounding must not carry it past or short.
+  // The interval includes the ends 0 and 1 exactly, without rounding errors.
   return Interval{count == 0 ? 0.0 : std::max(0.0, center - half),
                   count == total ? 1.0 : std::min(1.0, center + half)};
 }
@@ -246,7 +246,7 @@ RocResult evaluate_roc(const std::vector<std::optional<bool>>& labels,
                        const RocOptions& options) {
   options.check();
   if (labels.size() != scores.size())
-    throw libmap::Error("labels and scores differ in number",
+    throw libmap::Error("number of scores differs from number of labels",
                         {.field = "scores",
                          .value = std::to_string(scores.size()),
                          .bound = std::to_string(labels.size())});
@@ -303,7 +303,7 @@ std::optional<Kappa> cohens_kappa(const Confusion& counts) {
       sum += p[i][j] * (i == j ? squared((1.0 - pe) - (reference[i] + evaluated[i]) * (1.0 - po))
                                : squared((1.0 - po) * (reference[i] + evaluated[j])));
   Kappa kappa;
-  // Where the result is known, rounding shall not blur it.
+  // Exact results are returned without rounding errors.
   if (counts.false_positives + counts.false_negatives == 0) {
     kappa.value = 1.0;
   } else if (!says_one_thing(evaluated_yes) && !says_one_thing(reference_yes)) {

@@ -1,11 +1,10 @@
-// How well a score tells graspable places from others, against what a field test found: ROC curve,
-// rates at one cutoff with their intervals, and the area under the curve.
+// Evaluates scores against the results of a field test: ROC curve, rates at a cutoff with their
+// intervals, and the area under the curve.
 //
-// A location counts as predicted positive where score >= cutoff. Floating error cannot tip a score
-// that is the cutoff: a score at most one part in 2^24 below a given cutoff (the largest rounding
-// of single precision) counts as having reached it, so 0.8 reaches 0.8 however it was stored or
-// computed. Between scores themselves, and so in the curve at every distinct score and in the
-// trapezoid, doubles are compared as they are.
+// A location is predicted positive if score >= cutoff. A tolerance absorbs rounding: a score at
+// most one part in 2^24 below a given cutoff (the largest rounding of single precision) reaches it,
+// so that 0.8 reaches 0.8 in any representation. Scores are compared with each other exactly, as in
+// the curve at every distinct score and in the trapezoid area.
 #pragma once
 
 #include <cstddef>
@@ -17,16 +16,17 @@
 namespace libgtd {
 
 struct RocOptions {
-  // Of the ROC table and of the upper sum; the thesis's, tab. 5-1 to 5-3. Finite, ascending.
+  // Cutoffs of the ROC table and the upper sum, finite and ascending; the default is that of tab.
+  // 5-1 to 5-3 of the thesis.
   std::vector<double> cutoffs = {0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0};
-  double rate_cutoff = 0.8;          // of the rates
+  double rate_cutoff = 0.8;          // cutoff of the rates
   int bootstrap_replicates = 10000;  // 0: no interval
   std::uint64_t bootstrap_seed = 1;
 
-  void check() const;  // throws libmap::Error naming field, value and bound
+  void check() const;  // throws Error naming field, value and bound
 };
 
-// Whether a score counts as having reached a cutoff, as said above.
+// Returns true if a score reaches a cutoff within the tolerance above.
 bool reaches_cutoff(double score, double cutoff);
 
 struct Interval {
@@ -34,14 +34,13 @@ struct Interval {
   double high = 0.0;
 };
 
-// `count` out of `total`. Out of nothing there is neither value nor interval.
+// Proportion `count` / `total`; value and interval are nullopt if `total` is 0.
 struct Rate {
   std::size_t count = 0;
   std::size_t total = 0;
 
-  std::optional<double> value() const;        // count / total; nothing where total is 0
-  std::optional<Interval> wilson_95() const;  // score interval without continuity correction
-                                              // (Wilson 1927)
+  std::optional<double> value() const;
+  std::optional<Interval> wilson_95() const;  // Wilson 1927, no continuity correction
 };
 
 struct Confusion {
@@ -75,17 +74,17 @@ struct RocPoint {
 };
 
 struct AreaUnderCurve {
-  // Of the curve through every distinct score: the Mann-Whitney statistic, ties counting 1/2.
+  // Area under the curve through every distinct score: the Mann-Whitney statistic, ties count 1/2.
   double trapezoid = 0.0;
-  // The thesis's: sum over its cutoffs of (FPR_k - FPR_k+1) * TPR_k; the last has no share. It is
-  // never less than the trapezoids over the same cutoffs, and never less than `trapezoid` where
-  // `upper_sum_width` is 1; negatives below the first cutoff or at the last have no part in it.
+  // Area of the thesis: sum over its cutoffs of (FPR_k - FPR_k+1) * TPR_k, without the last cutoff.
+  // It is at least the trapezoid area over the same cutoffs, and at least `trapezoid` if
+  // `upper_sum_width` is 1. Negatives below the first cutoff or at the last do not contribute.
   double upper_sum = 0.0;
-  std::vector<double> upper_sum_shares;  // one a cutoff
-  double upper_sum_width = 0.0;          // FPR at the first cutoff less FPR at the last
-  // 95 % percentile bootstrap of `trapezoid`, stratified: positives and negatives are drawn with
-  // replacement each among themselves, so every replicate has both classes. Nothing if no
-  // replicates were asked for. (1, 1) after a perfect separation: not a proof of one.
+  std::vector<double> upper_sum_shares;  // terms of the sum, one per cutoff
+  double upper_sum_width = 0.0;          // FPR at the first cutoff - FPR at the last
+  // Bootstrap interval of `trapezoid` (95 %, percentile), stratified: positives and negatives are
+  // resampled separately, so that every replicate has both classes. nullopt without replicates. (1,
+  // 1) after a perfect separation, which does not prove one.
   std::optional<Interval> trapezoid_bootstrap_95;
 };
 
@@ -93,40 +92,40 @@ struct RocResult {
   std::vector<RocPoint> at_cutoffs;  // ascending, as given
   std::vector<RocPoint> at_scores;   // every distinct score, ascending
   RocPoint at_rate_cutoff;
-  std::optional<AreaUnderCurve> area;  // nothing unless both classes are there
-  std::string area_note;               // why there is none
-  // Positives among the highest scores that reach half of all positives, ties counting in full.
+  std::optional<AreaUnderCurve> area;  // nullopt unless both classes exist
+  std::string area_note;               // reason for a missing area
+  // Precision at the cutoff where recall reaches 1/2; ties count in full.
   std::optional<double> precision_at_half_recall;
-  // If all scores are in 0..1: the mean over the locations of |share of positives - mean score| of
-  // their tenth of that range (Naeini et al. 2015, expected calibration error).
+  // Expected calibration error (Naeini et al. 2015), if all scores are in 0..1: mean over the
+  // locations of |fraction of positives - mean score| of their bin of width 0.1.
   std::optional<double> calibration_error;
-  std::size_t left_out_unscored = 0;   // no score: not visible
-  std::size_t left_out_unlabeled = 0;  // a score and no label
+  std::size_t left_out_unscored = 0;   // locations without a score: not visible
+  std::size_t left_out_unlabeled = 0;  // locations with a score but no label
 };
 
-// One label and one score per location; a location without either, or whose score is NaN, is left
-// out. Throws libmap::Error if the two differ in length. The same for any number of threads.
+// Evaluates one label and one score per location. A location without one of them, or with a score
+// of NaN, is left out. The result does not depend on the number of threads. Throws Error if the
+// lengths differ.
 RocResult evaluate_roc(const std::vector<std::optional<bool>>& labels,
                        const std::vector<std::optional<double>>& scores,
                        const RocOptions& options = {});
 
-// Cohen's kappa: 1 all agree, 0 as many as chance gives, negative fewer.
+// Cohen's kappa: 1 full agreement, 0 agreement expected by chance, below 0 less than by chance.
 struct Kappa {
   double value = 0.0;
-  // Of the estimate, for large samples; 0 where all agree or one says the same everywhere. It takes
-  // places for independent: neighboring voxels of a map are not, and their kappa is less certain
-  // than it says.
+  // Standard error for large samples; 0 if all agree or one rater is constant. Samples are assumed
+  // to be independent. Neighboring voxels of a map are not, so that the real error is larger.
   double standard_error = 0.0;
   Interval normal_95;  // value -+ 1.96 standard errors, within -1..1
 };
 
-// (po - pe) / (1 - pe), po the share that agrees and pe the one expected of independent
-// evaluations with the same shares of yes (Cohen 1960, eq. 1). Its variance (Fleiss, Cohen and
-// Everitt 1969, without weights), p_ij the shares of the table, p_i. and p_.j the sums of its rows
-// and columns:
+// Computes kappa = (po - pe) / (1 - pe), with the observed agreement po and the agreement pe
+// expected of independent ratings with the same marginals (Cohen 1960, eq. 1). The variance
+// (Fleiss, Cohen and Everitt 1969, without weights), with the table p_ij and its marginals p_i. and
+// p_.j, is
 //   n (1 - pe)^4 var = sum_i p_ii ((1 - pe) - (p_.i + p_i.) (1 - po))^2
 //                      + (1 - po)^2 sum_(i != j) p_ij (p_.i + p_j.)^2 - (po pe - 2 pe + po)^2.
-// Nothing where pe is 1 (nothing was evaluated, or both say one and the same everywhere).
+// Returns nullopt if pe is 1 (no samples, or both ratings are constant and equal).
 std::optional<Kappa> cohens_kappa(const Confusion& counts);
 
 }  // namespace libgtd

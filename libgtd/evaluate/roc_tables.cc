@@ -189,7 +189,7 @@ std::string notes_markdown(const TableEvaluation& evaluation) {
               ": some locations that are not graspable score below the first cutoff or reach the "
               "last one; the upper sum covers only " +
               to_fixed_text(result.area->upper_sum_width, 3) +
-              " of the false positive rate and can lie below the trapezoid.\n";
+              " of the false positive rate and can be below the trapezoid.\n";
   }
   return text.empty() ? text : text + "\n";
 }
@@ -243,12 +243,13 @@ std::vector<std::string> default_score_columns(const Table& table, std::string_v
 
 void bind(libmap::ParameterTable& table, TableEvaluationOptions& options) {
   table.add("label", options.label_column,
-            "column of the truth: 1/0, true/false, yes/no, graspable/not graspable");
+            "column of labels: 1/0, true/false, yes/no, graspable/not graspable");
   table.add("cutoff", options.roc.rate_cutoff, libmap::any_number,
-            "a place whose score reaches it is predicted graspable: for the rates");
+            "minimum score of a location that is predicted graspable, for the rates");
   table.add("bootstrap", options.roc.bootstrap_replicates, libmap::Range{0, 1e7},
-            "replicates for the interval of the area; 0: no interval");
-  table.add("seed", options.roc.bootstrap_seed, libmap::not_negative, "of the bootstrap");
+            "bootstrap replicates for the interval of the area; 0: no interval");
+  table.add("seed", options.roc.bootstrap_seed, libmap::not_negative,
+            "random seed of the bootstrap");
 }
 
 TableEvaluation evaluate_table(const Table& table, const TableEvaluationOptions& options) {
@@ -259,8 +260,7 @@ TableEvaluation evaluate_table(const Table& table, const TableEvaluationOptions&
   const std::vector<std::optional<bool>> labels = read_labels(table, options.label_column);
   std::vector<std::string>& names = evaluation.options.score_columns;
   if (names.empty()) names = default_score_columns(table, options.label_column);
-  if (names.empty())
-    throw libmap::Error("no column of scores beside the label", {.file = table.file});
+  if (names.empty()) throw libmap::Error("no score column", {.file = table.file});
   for (std::size_t n = 0; n < names.size(); ++n) {
     if (std::find(names.begin(), names.begin() + static_cast<std::ptrdiff_t>(n), names[n]) !=
         names.begin() + static_cast<std::ptrdiff_t>(n))
@@ -327,7 +327,7 @@ std::string to_json(const TableEvaluation& evaluation) {
   json["label_column"] = options.label_column;
   json["cutoff"] = options.roc.rate_cutoff;
   json["upper_sum_cutoffs"] = options.roc.cutoffs;
-  json["bootstrap"] = {{"method", "percentile, positives and negatives drawn apart"},
+  json["bootstrap"] = {{"method", "percentile, positives and negatives resampled separately"},
                        {"replicates", options.roc.bootstrap_replicates},
                        {"seed", options.roc.bootstrap_seed}};
   Json scores = Json::array();
@@ -355,17 +355,17 @@ std::string to_markdown(const TableEvaluation& evaluation, const std::string& ti
     text += "; in brackets its 95 % percentile interval of " +
             std::to_string(roc.bootstrap_replicates) + " bootstrap replicates (seed " +
             std::to_string(roc.bootstrap_seed) +
-            ", graspable and other places drawn apart, so that each replicate has both)";
+            ", graspable and other places resampled separately, so that each replicate has both)";
   text +=
       ". The AUC that the thesis published (0.84, 0.75, 0.72) is the upper sum over its ten "
       "cutoffs, the sum of (FPR_k - FPR_k+1) * TPR_k, and not the trapezoid (0.745, 0.642, 0.650 "
-      "on the same scores). Where the cutoffs span the scores of all places that are not "
-      "graspable, the upper sum is never less than the trapezoid: it is no measure to compare "
+      "on the same scores). If the cutoffs span the scores of all places that are not "
+      "graspable, the upper sum is never less than the trapezoid. Do not use it for comparison "
       "with other work.\n\n";
   text += notes_markdown(evaluation);
   text += "## Rates at cutoff " + libmap::to_text(roc.rate_cutoff) + "\n\n" +
           rates_markdown(evaluation) +
-          "\nA place is predicted graspable where its score reaches the cutoff. In brackets the "
+          "\nA place is predicted graspable if its score reaches the cutoff. In brackets the "
           "Wilson 95 % interval.\n";
   return text;
 }

@@ -1,4 +1,4 @@
-// ROC evaluation of the columns of a table, and its results as tables, JSON and Markdown.
+// ROC evaluation of table columns, and its results as tables, JSON and Markdown.
 #pragma once
 
 #include <optional>
@@ -14,11 +14,11 @@ namespace libgtd {
 
 struct TableEvaluationOptions {
   std::string label_column = "graspable";
-  // Empty: default_score_columns().
+  // Score columns; empty: default_score_columns().
   std::vector<std::string> score_columns;
   RocOptions roc;
 };
-// All but the columns of scores, which are a list.
+// Binds all fields except score_columns.
 void bind(libmap::ParameterTable& table, TableEvaluationOptions& options);
 
 struct ColumnEvaluation {
@@ -27,44 +27,44 @@ struct ColumnEvaluation {
 };
 
 struct TableEvaluation {
-  TableEvaluationOptions options;  // the score columns are filled in
+  TableEvaluationOptions options;  // score_columns is never empty
   std::size_t rows = 0;
   std::vector<ColumnEvaluation> columns;
 };
 
-// true/false, yes/no, on/off, 1/0 (also 1.0, 0.0), graspable/not graspable (also non-, un-, with
-// '-', '_' or a space). Nothing for any other text.
+// Parses a label: true/false, yes/no, on/off, 1/0 (also 1.0, 0.0), graspable/not graspable (also
+// non-, un-, with '-', '_' or a space). Returns nullopt for any other text.
 std::optional<bool> parse_label(std::string_view text);
 
-// The label in a cell; nothing for an empty one. Throws libmap::Error naming file, row and column.
+// Returns the label in a cell; nullopt for an empty cell. Throws Error naming file, row and column.
 std::optional<bool> label_at(const libmap::Table& table, std::size_t row, std::size_t column);
 
-// All columns that hold numbers and empty cells alone, at least one number, and are neither the
-// label, nor an identity (id, point, hold, i, j, k), nor a position or distance (x, y, z, or a
-// name that ends with a unit of length such as "_m"), nor a look-up's flags found and edge.
+// Returns all columns that contain only numbers and empty cells, with at least one number, except
+// the label, identities (id, point, hold, i, j, k), positions and distances (x, y, z, or a name
+// that ends with a unit of length such as "_m"), and the look-up flags found and edge.
 std::vector<std::string> default_score_columns(const libmap::Table& table,
                                                std::string_view label_column);
 
-// Empty cells are left out: a label that is not known, a location that is not visible. Throws
-// libmap::Error naming file, row and column: no such column, a cell that is no label or number, no
-// column to evaluate.
+// Evaluates the score columns of a table. Empty cells are left out: unknown labels and locations
+// that are not visible. Throws Error naming file, row and column for a missing column, a cell that
+// is no label or number, and a table without score columns.
 TableEvaluation evaluate_table(const libmap::Table& table, const TableEvaluationOptions& options);
 
-// One row a column of scores and cutoff; `at` is "cutoff" for the given cutoffs, with the cutoff's
-// share of the upper sum, or "score" for the distinct scores. Undefined rates are empty cells.
+// Returns one row per score column and cutoff. `at` is "cutoff" for given cutoffs, with their terms
+// of the upper sum, or "score" for distinct scores. Undefined rates are empty cells.
 libmap::Table roc_table(const TableEvaluation& evaluation);
 
-// One row a column of scores and rate: count, total, value, and the Wilson 95 % interval.
+// Returns one row per score column and rate: count, total, value, and the Wilson 95 % interval.
 libmap::Table rates_table(const TableEvaluation& evaluation);
 
-// One row a column of scores: case, locations, cutoff, and the same rates with four decimals, as
-// the thesis's tables 5-4 and 5-5.
+// Returns one row per score column: case, locations, cutoff, and the same rates with four decimals,
+// as in tables 5-4 and 5-5 of the thesis.
 libmap::Table accuracy_table(const TableEvaluation& evaluation);
 
-// Everything but the ROC points. Undefined values are null.
+// Returns all results except the ROC points. Undefined values are null.
 std::string to_json(const TableEvaluation& evaluation);
 
-// The summary as a page: areas with their intervals, rates at the cutoff, and what was left out.
+// Returns a summary page: areas with intervals, rates at the cutoff, and numbers of omitted rows.
 std::string to_markdown(const TableEvaluation& evaluation, const std::string& title);
 
 }  // namespace libgtd

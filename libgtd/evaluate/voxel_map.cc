@@ -16,7 +16,7 @@ namespace {
 using libmap::PointCloud;
 using libmap::ScalarField;
 
-// Of a voxel's edge: positions in files are rounded to single precision.
+// Maximum offset of a point, in voxel edges. Positions in files are rounded to single precision.
 constexpr double max_offset = 0.25;
 constexpr std::size_t voxels_per_chunk = 1 << 16;
 
@@ -25,7 +25,7 @@ const std::vector<double>* optional_values(const PointCloud& map, const char* na
   return field == nullptr ? nullptr : &field->values;
 }
 
-// Of the points `kept`, by the fields i, j and k.
+// Voxels of the points `kept`, from the fields i, j and k.
 std::vector<Voxel> voxels_of_fields(const PointCloud& map, const std::vector<std::uint32_t>& kept) {
   const VoxelFields fields(map);
   std::vector<Voxel> voxels;
@@ -38,8 +38,7 @@ Eigen::Vector3d vector_of(const Voxel& voxel) {
   return {static_cast<double>(voxel.i), static_cast<double>(voxel.j), static_cast<double>(voxel.k)};
 }
 
-// The lattice in the terrain frame on which the voxels come nearest to their points, by least
-// squares.
+// Least-squares fit of the lattice in the terrain frame to the points of the voxels.
 VoxelLattice fitted_lattice(const PointCloud& map, const libmap::Pose& terrain_from_map,
                             const std::vector<std::uint32_t>& kept,
                             const std::vector<Voxel>& voxels) {
@@ -60,13 +59,13 @@ VoxelLattice fitted_lattice(const PointCloud& map, const libmap::Pose& terrain_f
   }
   if (!(products > 0.0))
     throw libmap::Error(
-        "neither a manifest nor the fields i, j and k say how large the map's voxels are",
+        "unknown voxel size: the map has neither a manifest nor the fields i, j and k",
         {.field = "voxel_size_m"});
   const double size_m = products / squares;
   return {mean_point - size_m * (mean_voxel.array() + 0.5).matrix(), size_m};
 }
 
-// Squares of distances on the lattice are numbers.
+// Throws Error unless squared distances on the lattice are finite.
 void require_measurable(const VoxelLattice& lattice) {
   constexpr double min_m = 1e-100;
   constexpr double max_m = 1e100;
@@ -90,7 +89,7 @@ void require_on_lattice(const PointCloud& map, const VoxelMap& result,
     const Eigen::Vector3d point = result.terrain_from_map * map.positions[kept[n]];
     if (!((point - center).cwiseAbs().array() <= bound_m).all())
       throw libmap::Error(
-          "points do not lie at the centers of the map's voxels",
+          "points are not at the centers of the map's voxels",
           {.field = "point " + std::to_string(kept[n] + 1),
            .value = libmap::to_text(static_cast<float>((point - center).cwiseAbs().maxCoeff())) +
                     " m off",
@@ -125,7 +124,7 @@ void fill_values(const PointCloud& map, VoxelMap& result) {
   const std::vector<double>& score = values_of(map, "score");
   const std::vector<double>& graspable = values_of(map, "graspable");
   const std::vector<double>* border = optional_values(map, "border");
-  if (border == nullptr) border = optional_values(map, "edge");  // of earlier versions
+  if (border == nullptr) border = optional_values(map, "edge");  // name in earlier versions
   const std::vector<double>* obstacle = optional_values(map, "obstacle");
   const std::size_t count = result.voxels.size();
   result.scores.resize(count);
@@ -190,7 +189,7 @@ VoxelMap voxel_map_of(const PointCloud& map, const MapFacts& facts) {
       const Eigen::Vector3d cell =
           result.lattice.cell_of(result.terrain_from_map * map.positions[n]);
       if (!(cell.cwiseAbs().array() <= max_voxel_index).all())
-        throw libmap::Error("a point lies too far off for voxels of this size",
+        throw libmap::Error("a point is too far from the origin for this voxel size",
                             {.field = "point " + std::to_string(n + 1)});
       voxels.push_back(result.lattice.voxel_of(result.terrain_from_map * map.positions[n]));
     }

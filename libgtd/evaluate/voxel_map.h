@@ -1,4 +1,4 @@
-// A map as arrays on its lattice, for what counts, joins or compares its voxels.
+// Map as arrays on its lattice, for statistics and comparisons of voxels.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,44 +15,45 @@
 
 namespace libgtd {
 
-// What is known of a map beside its points.
+// Properties of a map in addition to its points.
 struct MapFacts {
-  std::optional<VoxelLattice> lattice{};                           // in the terrain frame
-  libmap::Pose terrain_from_map = libmap::Pose::Identity();        // of the map's points
+  std::optional<VoxelLattice> lattice{};  // in the terrain frame; nullopt: unknown
+  libmap::Pose terrain_from_map = libmap::Pose::Identity();        // from the frame of the points
   double zero_plane_m = -std::numeric_limits<double>::infinity();  // in the terrain frame
 };
 
-// As `graspmap score` writes it down: parameters, frame, transforms and the lattice's origin.
+// Reads these properties from a manifest of `graspmap score`: parameters, frame, transforms and the
+// origin of the lattice.
 MapFacts facts_of(const libmap::Manifest& manifest);
 
-// One entry per voxel in each array, ascending by voxel, whatever the order of the map's points.
+// Arrays with one entry per voxel, ascending by voxel, for any order of the map's points.
 struct VoxelMap {
   VoxelLattice lattice;                                      // in the terrain frame
-  libmap::Pose terrain_from_map = libmap::Pose::Identity();  // of the map's points
+  libmap::Pose terrain_from_map = libmap::Pose::Identity();  // from the frame of the points
   double zero_plane_m = -std::numeric_limits<double>::infinity();
   std::vector<Voxel> voxels;
-  std::vector<float> scores;              // NaN: none
-  std::vector<std::uint8_t> graspable;    // and scored, and no obstacle
-  std::vector<std::uint8_t> border;       // 0 where the map has no such field
-  std::vector<std::uint8_t> obstacle;     // the same
-  std::vector<std::uint32_t> map_points;  // index among the map's points
+  std::vector<float> scores;              // NaN: no score
+  std::vector<std::uint8_t> graspable;    // flag of the map, with a score and no obstacle
+  std::vector<std::uint8_t> border;       // 0 if the map has no such field
+  std::vector<std::uint8_t> obstacle;     // 0 if the map has no such field
+  std::vector<std::uint32_t> map_points;  // index of the point in the map
 
   std::size_t size() const { return voxels.size(); }
   Eigen::Vector3d center_in_terrain(std::size_t n) const { return lattice.center_of(voxels[n]); }
   bool above_zero_plane(std::size_t n) const {
     return !(lattice.center_of(voxels[n]).z() < zero_plane_m);
   }
-  // A voxel whose score counts: it has one, and lies above the zero plane; one whose mask's window
-  // leaves the scanned area only if `with_border`.
+  // Returns true if the voxel has a score, is above the zero plane and, unless `with_border`, the
+  // window of its mask is inside the scanned area.
   bool evaluated(std::size_t n, bool with_border) const {
     return scores[n] == scores[n] && above_zero_plane(n) && (with_border || border[n] == 0);
   }
 };
 
-// Needs the fields "score" and "graspable", and voxels: the fields i, j and k, or a known lattice.
-// With the fields alone, the lattice is fitted to the points, carried to the terrain frame.
-// Points without a position are left out. Throws Error: no points, a field that is missing or holds
-// no voxel, points that do not lie at their voxels, two points of one voxel.
+// Converts a map with the fields "score" and "graspable" and voxel indices: the fields i, j and k,
+// or a known lattice. With the fields only, the lattice is fitted to the points in the terrain
+// frame. Points without a position are left out. Throws Error for a map without points, a missing
+// or invalid field, points that are not at their voxels, and two points of one voxel.
 VoxelMap voxel_map_of(const libmap::PointCloud& map, const MapFacts& facts = {});
 
 }  // namespace libgtd

@@ -16,14 +16,14 @@ namespace {
 
 constexpr std::size_t chunk = 12;  // facets at once
 
-// The friction pyramids that a force along `local` (normal, drag, lateral) is multiplied with.
+// Friction pyramids and the force direction `local` (normal, drag, lateral) of a product.
 struct FacetLoop {
   double x, y, z;
   double friction;
   double slant;
 };
 
-// Products with the best of the eight edges of the friction pyramids on the facets of a chunk.
+// Products with the best of the eight edges of the friction pyramid on each facet of a chunk.
 GRASPMAP_CLONED void best_edge_products(const double* cosines, const double* sines,
                                         const FacetLoop& loop, double* products) {
   constexpr double diagonal = std::numbers::sqrt2 / 2.0;
@@ -38,7 +38,8 @@ GRASPMAP_CLONED void best_edge_products(const double* cosines, const double* sin
   }
 }
 
-// The largest of these products, each times the spines that share the force; 0 if none is positive.
+// Maximum of these products, each times the number of spines that share the force; 0 if none is
+// positive.
 GRASPMAP_CLONED double max_shared_product(const double* cosines, const double* sines,
                                           const double* counts, std::size_t padded,
                                           const FacetLoop& loop) {
@@ -58,7 +59,7 @@ GRASPMAP_CLONED double max_shared_product(const double* cosines, const double* s
           counts[begin + n] * (slant * (cosine * x - sine * y + friction * slope));
       most[n] = most[n] < product ? product : most[n];
     }
-  // Halves, so that the loops are of several numbers at once.
+  // Halves, so that the loops are vectorized.
   for (std::size_t n = 0; n < 4; ++n) {
     most[n] = most[n] < most[n + 4] ? most[n + 4] : most[n];
     most[n] = most[n] < most[n + 8] ? most[n + 8] : most[n];
@@ -67,7 +68,7 @@ GRASPMAP_CLONED double max_shared_product(const double* cosines, const double* s
 }
 static_assert(chunk == 12);
 
-// The same on the ground itself.
+// Best product on the ground itself.
 double best_level_product(const FacetLoop& loop) {
   const double along = std::abs(loop.y);
   const double beside = std::abs(loop.z);
@@ -86,16 +87,16 @@ const std::vector<std::pair<std::string, EngagementLaw>>& engagement_law_names()
 void bind(libmap::ParameterTable& table, EngagementOptions& options) {
   using libmap::positive;
   constexpr libmap::Range cone{0.0, 89.0};
-  table.add("law", options.law, engagement_law_names(), "of the engagement of spines");
+  table.add("law", options.law, engagement_law_names(), "law of spine engagement");
   table.add("adhesion_limit_n", options.adhesion_limit_n, positive,
-            "law adhesion: largest tension of all fingers, N");
+            "law adhesion: maximum tension of all fingers, N");
   table.add("adhesion_lateral_deg", options.adhesion_lateral_deg, cone,
-            "law adhesion: largest angle of the lateral force to the tension");
+            "law adhesion: maximum angle of the lateral force to the tension");
   table.add("adhesion_pull_deg", options.adhesion_pull_deg, cone,
-            "law adhesion: largest angle of the pull-off to the tension");
+            "law adhesion: maximum angle of the pull-off to the tension");
 }
 
-// An edge of a pyramid: its product with `worth`, and the edge in normal, drag and lateral.
+// Edge of a pyramid: its product with `worth`, and the edge in normal, drag and lateral.
 struct BearingContact::Edge {
   double product = 0.0;
   Eigen::Vector3d local = Eigen::Vector3d::Zero();
@@ -115,7 +116,7 @@ BearingContact::BearingContact(const GripContact& contact, std::vector<double> l
       limit_n_(limit_n) {
   std::sort(leans_rad.begin(), leans_rad.end(), std::greater<>());
   spines_ = leans_rad.size();
-  // Whole chunks.
+  // Padded to whole chunks.
   cosines_.assign((spines_ + chunk - 1) / chunk * chunk, 0.0);
   counts_ = sines_ = cosines_;
   for (std::size_t n = 0; n < spines_; ++n) {
@@ -133,11 +134,11 @@ BearingContact::BearingContact(const GripContact& contact, const EngagementOptio
   adhesion_ = {{1.0, 0.0, 0.0}, {-pull, -1.0, side}, {-pull, -1.0, -side}};
 }
 
-// The best of the eight edges of the friction pyramid on a facet.
+// Best of the eight edges of the friction pyramid on a facet.
 BearingContact::Edge BearingContact::best_edge(double cosine, double sine,
                                                const Eigen::Vector3d& local) const {
   const double axis = cosine * local.x() - sine * local.y();
-  // Along the facet, out of the corner; and lateral.
+  // Components along the facet, out of the corner, and lateral.
   const double out = -sine * local.x() - cosine * local.y();
   const double along = std::abs(out);
   const double beside = std::abs(local.z());

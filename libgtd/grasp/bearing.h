@@ -1,5 +1,4 @@
-// What a contact of the gripper can bear: the forces that its spines take, by one of two published
-// laws of engagement.
+// Forces that a contact of the gripper can bear, by one of two published laws of spine engagement.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,33 +14,34 @@
 
 namespace libgtd {
 
-// asperities: as the section `engagement` of the gripper says. adhesion: a
-// finger bears a tension T along its drag up to a limit, and in proportion to T lateral force and
-// pull-off (LORIS).
+// asperities: by the section `engagement` of the gripper. adhesion: a finger bears a tension T
+// along its drag up to a limit, and lateral force and pull-off in proportion to T (LORIS).
 enum class EngagementLaw { asperities, adhesion };
 const std::vector<std::pair<std::string, EngagementLaw>>& engagement_law_names();
 
 struct EngagementOptions {
   EngagementLaw law = EngagementLaw::asperities;
-  double adhesion_limit_n = 20.0;      // T of all fingers of the gripper
-  double adhesion_lateral_deg = 45.0;  // lateral force: at most T tan of it
-  double adhesion_pull_deg = 20.0;     // pull-off: at most T tan of it
+  double adhesion_limit_n = 20.0;      // maximum T, sum over all fingers
+  double adhesion_lateral_deg = 45.0;  // maximum lateral force: T tan(adhesion_lateral_deg)
+  double adhesion_pull_deg = 20.0;     // maximum pull-off: T tan(adhesion_pull_deg)
 };
 void bind(libmap::ParameterTable& table, EngagementOptions& options);
 
-// How the spines of a contact share its force. best: as is best for each. equally: in equal parts;
-// a spine that slips drops out, and those on steeper facets take over its part.
+// Distribution of a contact's force over its spines. best: the distribution with the largest force.
+// equally: equal parts; a spine that slips drops out, and spines on steeper facets take over its
+// part.
 enum class SpineSharing { best, equally };
 
-// A contact's forces on the gripper are a convex set that holds 0. A spine sits in the corner
-// between the ground and its facet; it bears what both bear, each at most `limit_n` and in a
-// pyramid of eight edges inside Coulomb's cone, exact in the plane of normal and drag. Forces in N.
+// Convex set of forces that a contact can exert on the gripper; it contains 0. A spine is in the
+// corner between the ground and its facet. Its force is the sum of one force from each of them,
+// both at most `limit_n` and inside a pyramid of eight edges in Coulomb's cone, exact in the plane
+// of normal and drag. Forces in N.
 class BearingContact {
  public:
-  // Asperities: `leans_rad` are the psi of the spines that meet a facet; a link has one of 0.
+  // Law `asperities`: `leans_rad` is psi of each spine that meets a facet, or one 0 for a link.
   BearingContact(const GripContact& contact, std::vector<double> leans_rad, double friction,
                  double limit_n);
-  // Adhesion: `limit_n` of this finger.
+  // Law `adhesion`: `limit_n` is the limit of this finger.
   BearingContact(const GripContact& contact, const EngagementOptions& options, double friction,
                  double limit_n);
 
@@ -52,22 +52,22 @@ class BearingContact {
   bool is_link() const { return is_link_; }
   std::size_t spines() const { return spines_; }
 
-  // A force of the set with the largest product with `worth`.
+  // Returns a force of the set with the maximum product with `worth`.
   Eigen::Vector3d best_force(const Eigen::Vector3d& worth, SpineSharing sharing) const {
     return best_local_force(frame().transpose() * worth, sharing);
   }
-  // The columns are normal, drag and lateral.
+  // Contact frame; the columns are normal, drag and lateral.
   Eigen::Matrix3d frame() const {
     Eigen::Matrix3d frame;
     frame << normal_, drag_, lateral_;
     return frame;
   }
-  // The largest product, and a force that has it, of a worth's products with the columns of
-  // `frame`.
+  // Maximum product of a force with `local`, a vector in the contact frame, and a force that
+  // attains it.
   double max_local_product(const Eigen::Vector3d& local, SpineSharing sharing) const;
   Eigen::Vector3d best_local_force(const Eigen::Vector3d& local, SpineSharing sharing) const;
-  // For pictures: the edges of the forces on the steepest facet (adhesion: of all forces), unit
-  // vectors in turn about it.
+  // Edges of the cone of forces on the steepest facet (adhesion: of all forces), as unit vectors in
+  // order around it; for images.
   std::vector<Eigen::Vector3d> cone() const;
 
  private:
@@ -82,17 +82,17 @@ class BearingContact {
   std::size_t finger_ = 0;
   bool is_link_ = false;
   double friction_ = 0.0;
-  double slant_ = 1.0;  // cosine of the friction's angle
+  double slant_ = 1.0;  // cosine of the friction angle
   double limit_n_ = 0.0;
   std::size_t spines_ = 0;
-  std::vector<double> cosines_;  // of the leans, the largest lean first; padded with 0
+  std::vector<double> cosines_;  // cosines of the leans, descending; padded with 0
   std::vector<double> sines_;
-  std::vector<double> counts_;             // of the leans up to each; padded with 0
-  std::vector<Eigen::Vector3d> adhesion_;  // edges for `limit_n_`; not empty: the law is adhesion
+  std::vector<double> counts_;             // number of leans up to each; padded with 0
+  std::vector<Eigen::Vector3d> adhesion_;  // edges for `limit_n_`; empty for asperities
 };
 
-// The contacts of a closed gripper with spines drawn at random. Contacts on which no spine engages
-// are left out. Law `adhesion` draws nothing.
+// Draws the spines of the contacts of a closed gripper at random. Contacts without an engaged spine
+// are left out. Law `adhesion` draws no random numbers.
 std::vector<BearingContact> draw_bearing(const std::vector<GripContact>& contacts,
                                          const Gripper& gripper, const EngagementOptions& options,
                                          libmap::RandomStream& random);

@@ -14,15 +14,15 @@ namespace {
 
 Eigen::Vector2d direction(double angle) { return {std::sin(angle), -std::cos(angle)}; }
 
-// A link that turns about a pivot: it begins at the distance `base` from it, at the angle of the
-// pivot's turn, and is bent inward by `bend` against the line from the pivot.
+// Link that rotates about a pivot. It starts at the distance `base` from the pivot, at the angle of
+// the rotation, and is bent inward by `bend` from the line through the pivot.
 struct TurningLink {
   Eigen::Vector2d pivot;
   double base = 0.0;
   double length = 0.0;
   double bend = 0.0;
 
-  // Angle of the point `along` of the link behind that of the turn.
+  // Angle of the point at `along` on the link, behind the rotation.
   double lag(double along) const {
     return std::atan2(along * std::sin(bend), base + along * std::cos(bend));
   }
@@ -32,17 +32,17 @@ struct TurningLink {
 };
 
 struct LinkContact {
-  double angle = -10.0;  // of the turn
-  double along = 0.0;    // m from the link's beginning
+  double angle = -10.0;  // rotation
+  double along = 0.0;    // m from the start of the link
   Eigen::Vector2d point{0.0, 0.0};
 };
 
-// The contact at the largest angle between `last` and `first`, the turn going from `first` down.
+// Contact at the largest angle between `last` and `first`; the rotation descends from `first`.
 class FirstContact {
  public:
   FirstContact(const TurningLink& link, double first, double last)
       : link_(link), first_(first), last_(last), reach_(link.radius(link.length)) {
-    // A bent link comes nearest to its pivot at the foot of the perpendicular.
+    // A bent link is nearest to its pivot at the foot of the perpendicular.
     const double foot = std::clamp(-link.base * std::cos(link.bend), 0.0, link.length);
     nearest_ = std::min({link.base, reach_, link.radius(foot)});
   }
@@ -67,10 +67,10 @@ class FirstContact {
 
   static double angle_of(const Eigen::Vector2d& v) { return std::atan2(v.x(), -v.y()); }
 
-  // The link's inside meets a corner of the profile.
+  // Contact of the inside of the link with a corner of the profile.
   void meet_point(const Eigen::Vector2d& corner) {
     const double radius = corner.norm();
-    // The pivot itself does not turn.
+    // The pivot itself does not move.
     if (radius > std::max(reach_, link_.base) || radius < nearest_ || radius < 1e-9) return;
     const double half = link_.base * std::cos(link_.bend);
     const double root = half * half - link_.base * link_.base + radius * radius;
@@ -80,7 +80,7 @@ class FirstContact {
       if (along >= 0.0 && along <= link_.length) offer(angle + link_.lag(along), along, corner);
   }
 
-  // The link's end meets the inside of a segment.
+  // Contact of the end of the link with the inside of a segment.
   void meet_end(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
     const Eigen::Vector2d d = b - a;
     const double dd = d.squaredNorm();
@@ -141,7 +141,7 @@ Eigen::Vector2d FingerGeometry::tip(double proximal_rad, double curl) const {
 
 FingerGeometry finger_geometry(const Gripper& gripper) {
   if (!gripper.fingers)
-    throw libmap::Error("missing: a gripper is closed by its fingers", {.field = "fingers"});
+    throw libmap::Error("missing: required for closing the gripper", {.field = "fingers"});
   constexpr double radians = libmap::radians_per_degree;
   FingerGeometry finger;
   finger.joint_radius_m = 0.0005 * gripper.finger_joint_diameter_mm;
@@ -164,7 +164,7 @@ FingerClosing close_finger(const FingerGeometry& finger, std::span<const GroundS
   closing.curl_rad = finger.curl_rad;
   if (!on_proximal && !on_distal) return closing;
   const double outer_half = 0.5 * finger.distal_m;
-  // A contact at the knuckle is one of both links: the proximal link is stopped by it.
+  // A contact at the knuckle belongs to both links and stops the proximal link.
   if (on_distal && (!on_proximal || on_distal->angle > on_proximal->angle)) {
     closing.proximal_rad = on_distal->angle;
     const bool by_spines = on_distal->along >= outer_half;

@@ -1,7 +1,6 @@
-// One finger of two links closes in its plane on the profile of the ground there. The plane holds
-// the palm's axis; its coordinates are (r, z) in meters: r away from the axis, z away from the
-// ground, the palm at z = 0. The first contact is computed in closed form, so that no ridge is
-// skipped.
+// Closes a finger of two links in its plane on the profile of the ground. The plane contains the
+// palm's axis; its coordinates (r, z) are in meters: r away from the axis, z away from the ground,
+// palm at z = 0. The first contact is computed in closed form, so that no ridge is skipped.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,8 +12,9 @@
 
 namespace libgtd {
 
-// Meters and radians. At the proximal angle t, measured at the joint (joint_radius_m, 0) from the
-// palm's axis, and the curl c, the links point along (sin t, -cos t) and (sin(t - c), -cos(t - c)).
+// Dimensions in meters and radians. The proximal angle t is measured at the joint (joint_radius_m,
+// 0) from the palm's axis. With the curl c, the links point along (sin t, -cos t) and (sin(t - c),
+// -cos(t - c)).
 struct FingerGeometry {
   double joint_radius_m = 0.0;
   double proximal_m = 0.0;
@@ -24,16 +24,16 @@ struct FingerGeometry {
   double curl_rad = 0.0;
   double curl_limit_rad = 0.0;
 
-  // Places (r, z), m.
+  // Positions (r, z), m.
   Eigen::Vector2d joint() const { return {joint_radius_m, 0.0}; }
   Eigen::Vector2d knuckle(double proximal_rad) const;
   Eigen::Vector2d tip(double proximal_rad, double curl) const;
 };
 
-// Of a gripper that has `fingers`; throws Error naming them if it has none.
+// Returns the geometry of a finger. Throws Error if the gripper has no `fingers`.
 FingerGeometry finger_geometry(const Gripper& gripper);
 
-// A piece of the ground's profile and the triangle that it is cut from.
+// Segment of the ground profile and the triangle that it is cut from.
 struct GroundSegment {
   Eigen::Vector2d a;
   Eigen::Vector2d b;
@@ -41,26 +41,27 @@ struct GroundSegment {
   bool faces_palm = true;  // the triangle's front faces the palm
 };
 
-// spines: the outer half of the distal link or its tip touches. link: only another part does.
-// end_stop: nothing does.
+// Contact at the end of closing. spines: the outer half of the distal link or its tip touches.
+// link: only another part touches. end_stop: no part touches.
 enum class FingerEnd { spines, link, end_stop };
 
 struct FingerClosing {
   FingerEnd end = FingerEnd::end_stop;
   double proximal_rad = 0.0;
   double curl_rad = 0.0;
-  // Where the profile is touched.
+  // Contact points on the profile; nullopt without contact.
   std::optional<Eigen::Vector2d> spines;
   std::optional<Eigen::Vector2d> link;  // on the proximal link or the inner half of the distal one
 };
 
-// From the open finger, which touches nothing. The proximal link turns inward with the distal one
-// at the free curl. If the proximal link is stopped, the distal one goes on alone up to the limit
-// of the curl.
+// Closes a finger that is open and does not touch the profile. The proximal link turns inward with
+// the distal link at the free curl. If the proximal link is stopped, the distal link continues
+// alone up to the limit of the curl.
 FingerClosing close_finger(const FingerGeometry& finger, std::span<const GroundSegment> profile);
 
-// The least height of the palm at which the open finger passes above the whole profile; nothing if
-// no part of the profile is below the finger. `profile` is relative to the palm at z = 0.
+// Returns the minimum height of the palm at which the open finger is above the whole profile;
+// nullopt if no part of the profile is below the finger. `profile` is relative to the palm at z =
+// 0.
 std::optional<double> open_finger_height(const FingerGeometry& finger,
                                          std::span<const GroundSegment> profile);
 

@@ -1,4 +1,4 @@
-// The results of the virtual field test as columns of a table.
+// Results of the virtual field test as columns of a table.
 #pragma once
 
 #include <string>
@@ -8,12 +8,11 @@
 
 namespace libgtd {
 
-// graspable: 1 or 0, the verdict as `evaluate` takes it; then probability, forces, contacts and
-// failures.
-// For each further load L: graspable_L and hold_probability_L.
+// Returns the names of the columns: graspable (1 or 0, the verdict for `evaluate`), probability,
+// forces, contacts and failures, then graspable_L and hold_probability_L for each further load L.
 std::vector<std::string> grasp_columns(const std::vector<double>& more_loads_n = {});
 
-// One cell for each of them.
+// Returns the cells of one location, one per column.
 std::vector<std::string> grasp_cells(const LocationResult& result);
 
 }  // namespace libgtd

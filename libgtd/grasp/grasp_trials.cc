@@ -19,7 +19,7 @@ namespace libgtd {
 
 namespace {
 
-// The same for the same place, wherever it is in a list.
+// Random key of a location, independent of its position in a list.
 std::uint64_t key_of(const Eigen::Vector3d& location) {
   std::uint64_t key = 0;
   for (const double coordinate : location)
@@ -31,7 +31,7 @@ Eigen::Vector3d away_from(const Ground& ground, const Gripper& gripper,
                           const Eigen::Vector3d& location, ApproachDirection approach) {
   const Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
   if (approach == ApproachDirection::up) return up;
-  // As far as a location may be from the ground, and farther until there is some.
+  // Starts with the radius of the palm and doubles it until there is ground.
   for (double radius = 0.0005 * gripper.palm_diameter_mm; radius < 1.0; radius *= 2.0) {
     const auto normal =
         ground.patch(location, up, radius, radius).normal_at(Eigen::Vector3d::Zero(), radius);
@@ -52,7 +52,7 @@ ApproachPose draw_pose(std::uint64_t key, const Gripper& gripper, const GraspOpt
   return pose;
 }
 
-// The parameter sets of the trials, each with a gripper of these parameters.
+// Parameter sets of the trials, each with its gripper.
 struct TrialParameters {
   std::vector<ParameterSet> sets;
   std::vector<Gripper> grippers;
@@ -63,8 +63,8 @@ struct TrialParameters {
     for (const ParameterSet& set : sets) grippers.push_back(with_parameters(gripper, set.values));
   }
 
-  // The same for the same trial, whatever trials are made: two steps of Roberts' sequence of two
-  // dimensions, in proportion to the weights.
+  // Set of a trial, independent of the other trials: two steps of Roberts' two-dimensional
+  // sequence, in proportion to the weights.
   std::size_t set_of(std::uint64_t key, int pose, int draw) const {
     const double at =
         libmap::unit_noise(key, 5) + 0.7548776662466927 * pose + 0.5698402909980532 * draw;
@@ -72,7 +72,7 @@ struct TrialParameters {
   }
 };
 
-// What all trials of one location share: poses, and the ground around it that these may meet.
+// Data shared by all trials of a location: poses, and the ground that they may touch.
 class Site {
  public:
   Site(const Ground& ground, const Gripper& gripper, const Eigen::Vector3d& location,
@@ -103,7 +103,7 @@ class Site {
                        offset_m_ + 4.0 * ground_.largest_error_m(), tilt_rad_, options_.closing);
   }
 
-  // Of a drawn pose.
+  // Closes the gripper at a drawn pose.
   ClosedGripper close(std::size_t pose) const {
     if (patch_.vertex_errors_m.empty())
       return close_gripper(patch_, gripper_, poses_[pose], options_.closing);
@@ -121,7 +121,7 @@ class Site {
   const std::uint64_t key_;
   const Eigen::Vector3d away_;
   std::vector<ApproachPose> poses_;
-  double offset_m_ = 0.0;  // largest ones of the poses
+  double offset_m_ = 0.0;  // maximum over the poses
   double tilt_rad_ = 0.0;
   GroundPatch patch_;
 };
@@ -156,7 +156,7 @@ TrialEnd end_of(const ClosedGripper& closed, std::size_t bearing, double force_n
   return force_n > 0.0 ? TrialEnd::load : TrialEnd::engagement;
 }
 
-// Of sorted values; the lower one of two.
+// Quantile of sorted values; the lower of two.
 double sorted_quantile(const std::vector<double>& sorted, double share) {
   if (sorted.empty()) return 0.0;
   return sorted[static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1))];
@@ -167,7 +167,7 @@ std::array<double, 3> quantiles(std::vector<double> values) {
   return {sorted_quantile(values, 0.1), sorted_quantile(values, 0.5), sorted_quantile(values, 0.9)};
 }
 
-// Adds the means of a pose.
+// Adds a pose to the means.
 void count_pose(const ClosedGripper& closed, double weight, LocationResult& result) {
   std::vector<bool> touches(closed.fingers.size(), false);
   std::vector<bool> by_spines(closed.fingers.size(), false);
@@ -184,14 +184,14 @@ void count_pose(const ClosedGripper& closed, double weight, LocationResult& resu
   result.clearance_m += weight * closed.patch_from_gripper.translation().z();
 }
 
-// Of one pose: the closed gripper and the trials that were made with it.
+// Closed gripper of one pose and its trials.
 struct PoseTrials {
   ClosedGripper closed;
-  std::size_t guess = 0;  // of the direction that is the weakest in the next draw
+  std::size_t guess = 0;  // weakest direction of the next draw
   std::vector<double> forces;
 };
 
-// All trials of one location, made in rounds.
+// All trials of one location, in rounds.
 class LocationTrials {
  public:
   LocationTrials(const Ground& ground, const Gripper& gripper, const TrialParameters& parameters,
@@ -200,7 +200,7 @@ class LocationTrials {
     result_.location = location;
   }
 
-  // Goes on to so many poses with so many draws each.
+  // Continues to the numbers of poses and draws of a round.
   void go_on(const SequentialRound& round) {
     const auto poses = static_cast<std::size_t>(round.poses);
     site_.draw_poses(poses);
@@ -211,7 +211,7 @@ class LocationTrials {
   bool is_clear() const {
     const auto poses = static_cast<double>(poses_.size());
     double trials = 0.0;
-    double variance = 0.0;  // of the sum over the poses of their shares after all draws
+    double variance = 0.0;  // of the sum of the final shares of the poses
     for (const PoseTrials& pose : poses_) {
       trials += static_cast<double>(pose.forces.size());
       variance += variance_to_come(pose);
@@ -227,8 +227,8 @@ class LocationTrials {
   LocationResult result() &&;
 
  private:
-  // Of the share of a pose's draws that hold, once all are made: k of n hold so far, and Jeffreys'
-  // prior of the probability of the others makes it beta distributed.
+  // Variance of the final share of holding draws of a pose. k of n hold so far; with Jeffreys'
+  // prior for the probability of the others it is beta distributed.
   double variance_to_come(const PoseTrials& pose) const {
     const auto made = static_cast<double>(pose.forces.size());
     const double to_come = options_.draws - made;
@@ -279,17 +279,17 @@ class LocationTrials {
   LocationResult result_;
   std::vector<PoseTrials> poses_;
   std::vector<double> best_forces_;
-  std::vector<std::vector<double>> log_forces_{parameters_.sets.size()};  // by set; of forces > 0
+  std::vector<std::vector<double>> log_forces_{parameters_.sets.size()};  // per set, forces > 0
   std::vector<std::size_t> limiting_ = std::vector<std::size_t>(pull_directions().size(), 0);
-  std::vector<std::vector<double>> pulls_{pull_directions().size()};  // of all trials
+  std::vector<std::vector<double>> pulls_{pull_directions().size()};  // per direction, all trials
 };
 
-// Analysis of variance of one factor, groups of unlike sizes.
+// One-way analysis of variance, groups of different sizes.
 void find_spreads(const std::vector<std::vector<double>>& groups, LocationResult& result) {
   double count = 0.0;
   double sum = 0.0;
   double within = 0.0;
-  double squares = 0.0;  // of the groups' sizes
+  double squares = 0.0;  // of the group sizes
   double groups_used = 0.0;
   double between = 0.0;
   for (const std::vector<double>& group : groups) {
@@ -297,7 +297,7 @@ void find_spreads(const std::vector<std::vector<double>>& groups, LocationResult
     const auto size = static_cast<double>(group.size());
     const double mean = std::accumulate(group.begin(), group.end(), 0.0) / size;
     for (const double value : group) within += (value - mean) * (value - mean);
-    // The mean of all so far moves by this group (Chan et al. 1979).
+    // Updates the mean by this group (Chan et al. 1979).
     if (count > 0.0)
       between += (mean - sum / count) * (mean - sum / count) * count * size / (count + size);
     count += size;
@@ -392,22 +392,23 @@ void bind(libmap::ParameterTable& table, GraspOptions& options) {
   using libmap::not_negative;
   using libmap::positive;
   table.add("load_n", options.load_n, positive, "pull that the gripper must hold, N");
-  table.add("safety", options.safety, positive, "factor of the load");
+  table.add("safety", options.safety, positive, "safety factor of the load");
   table.add("approach", options.approach,
             {{"up", ApproachDirection::up}, {"normal", ApproachDirection::normal}},
-            "direction that the palm comes from: z, or the ground's normal");
+            "approach from z (up), or along the normal of the ground");
   table.add("trials", options.poses, {1, 100000}, "poses of the gripper at each location");
   table.add("draws", options.draws, {1, 100000}, "draws of asperities at each pose");
   table.add("best_draws", options.best_draws, {0, 100000},
-            "draws of a pose for which the force with the best sharing is computed too");
-  table.add("seed", options.seed, not_negative, "of all draws");
-  table.add("offset_m", options.offset_m, {0.0, 1.0}, "standard deviation of the palm's place, m");
-  table.add("tilt_deg", options.tilt_deg, {0.0, 15.0}, "standard deviation of the palm's tilt");
+            "draws per pose with a computed force for the best load sharing");
+  table.add("seed", options.seed, not_negative, "random seed");
+  table.add("offset_m", options.offset_m, {0.0, 1.0}, "standard deviation of the palm position, m");
+  table.add("tilt_deg", options.tilt_deg, {0.0, 15.0},
+            "standard deviation of the palm tilt, degrees");
   table.add("max_distance_m", options.max_distance_m, positive,
-            "largest distance of a location from the mesh, m");
-  table.add("ensemble", options.ensemble,
-            "trials take turns over the parameter sets of the gripper; else all have its middle "
-            "parameters");
+            "maximum distance of a location from the mesh, m");
+  table.add(
+      "ensemble", options.ensemble,
+      "trials cycle through the parameter sets of the gripper; else all use its own parameters");
   bind(table, options.closing);
   bind(table, options.engagement);
   bind(table, options.surface);

@@ -53,11 +53,11 @@ void GripCandidates::lay_out(const libmap::TriangleMesh& mesh, double cell_m) {
 
 std::int64_t GripCandidates::cell(double coordinate, std::size_t side) const {
   const double number = (coordinate - low_[static_cast<Eigen::Index>(side)]) / cell_m_;
-  if (!(number > 0.0)) return 0;  // also of coordinates whose difference is not finite
+  if (!(number > 0.0)) return 0;  // also if the difference is not finite
   return static_cast<std::int64_t>(std::min(number, static_cast<double>(cells_[side] - 1)));
 }
 
-// The columns of the corners, and those whose middle is on the triangle.
+// Raises the columns of the corners and those whose center is on the triangle.
 void GripCandidates::raise(const std::array<Eigen::Vector3d, 3>& corners) {
   const auto raise_to = [&](std::int64_t i, std::int64_t j, double z) {
     float& top = tops_[static_cast<std::size_t>(i * cells_[1] + j)];

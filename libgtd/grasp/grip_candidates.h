@@ -1,5 +1,5 @@
-// Which locations a gripper that comes from above can be closed at: a cheap look at the highest
-// ground around each, before any trial.
+// Fast test whether a gripper that approaches from above can close at a location, from the highest
+// ground around it.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,23 +13,24 @@
 namespace libgtd {
 
 struct CandidateOptions {
-  double cell_m = 0.01;          // of the columns
-  double start_height_m = 0.15;  // as ClosingOptions
-  // At most this share of the columns under the open gripper rises above the start of its way: each
-  // may belong to a finger that begins inside the ground.
+  double cell_m = 0.01;          // width of the columns
+  double start_height_m = 0.15;  // see ClosingOptions
+  // Maximum fraction of the columns below the open gripper that rise above the start of the
+  // approach, so that a finger may start inside the ground.
   double max_blocked = 0.15;
 };
 
-// Of the voxels that hold in 32 x 8 trials, 99.8 % and more are candidates: 1500 voxels of each of
-// three simulated sites, one of which the bounds were not chosen on.
+// Heights of the ground in columns. At least 99.8 % of the voxels that hold in 32 x 8 trials are
+// candidates (1500 voxels of each of three simulated sites; the bounds were not chosen on one of
+// them).
 class GripCandidates {
  public:
-  // Throws Error: the gripper has no `fingers`.
+  // Throws Error if the gripper has no `fingers`.
   GripCandidates(const libmap::TriangleMesh& mesh, const Gripper& gripper,
                  const CandidateOptions& options);
 
-  // False: the top of the location's own column is above the start of the way, so that the location
-  // is not reached from above, or too many of the columns around it are. Of approach `up`.
+  // Returns false if the top of the location's own column, or of too many columns around it, is
+  // above the start of the approach. For approach `up`.
   bool may_hold(const Eigen::Vector3d& location) const;
 
  private:
@@ -41,7 +42,7 @@ class GripCandidates {
   Eigen::Vector2d low_ = Eigen::Vector2d::Zero();
   double cell_m_ = 0.01;
   std::array<std::int64_t, 2> cells_{0, 0};
-  std::vector<float> tops_;  // of the columns; -infinity without ground
+  std::vector<float> tops_;  // heights of the columns; -infinity without ground
   double start_height_m_ = 0.0;
   std::size_t most_blocked_ = 0;
   std::vector<std::array<std::int64_t, 2>> reach_;  // columns under the open gripper

@@ -14,11 +14,10 @@ namespace libgtd {
 
 namespace {
 
-// The open gripper comes to rest this far above the ground, so that a closing finger meets the
-// ground from outside.
+// Clearance of the open gripper at rest, so that a closing finger meets the ground from outside.
 constexpr double clearance_m = 1e-5;
 
-// Sets bit `finger` of each vertex that is not on the right of a finger's plane.
+// Sets bit `finger` of each vertex that is not to the right of the plane of a finger.
 GRASPMAP_CLONED_CHOICE void mark_left(const double* xs, const double* ys,
                                       const Eigen::Vector2d& along, std::size_t finger,
                                       std::uint64_t* is_left, std::size_t size) {
@@ -28,13 +27,13 @@ GRASPMAP_CLONED_CHOICE void mark_left(const double* xs, const double* ys,
     is_left[v] |= static_cast<std::uint64_t>(x * ys[v] - y * xs[v] >= 0.0) << finger;
 }
 
-// The patch's vertices in a gripper's frame, on which side of the planes of all fingers they are,
-// and beyond which side of the palm's square. Most triangles cross no plane and are not under the
-// palm: a look at three numbers says so for all fingers at once.
+// Vertices of the patch in the frame of a gripper, with their side of the planes of all fingers and
+// of the sides of the palm's square. Most triangles do not intersect a plane and are not below the
+// palm; three numbers show this for all fingers at once.
 struct CarriedVertices {
   std::vector<double> x, y, z;
-  std::vector<std::uint64_t> is_left;  // a bit for each finger
-  std::vector<std::uint8_t> beyond;    // a bit for each side
+  std::vector<std::uint64_t> is_left;  // one bit per finger
+  std::vector<std::uint8_t> beyond;    // one bit per side
 
   CarriedVertices(const GroundPatch& patch, const Eigen::Isometry3d& gripper_from_patch,
                   const std::vector<Eigen::Vector2d>& along, double palm_radius)
@@ -56,8 +55,8 @@ struct CarriedVertices {
   Eigen::Vector3d operator[](std::size_t v) const { return {x[v], y[v], z[v]}; }
 };
 
-// Adds the cut of triangle t with the half plane of a finger, which begins a little behind the
-// palm's axis. The triangle has vertices on both sides of the plane.
+// Adds the intersection of triangle t with the half plane of a finger, which starts slightly behind
+// the palm's axis. The triangle must have vertices on both sides of the plane.
 void add_cut(const GroundPatch& patch, const CarriedVertices& vertices, const Eigen::Vector3d& axis,
              const Eigen::Vector2d& along, const FingerGeometry& finger, std::uint32_t t,
              std::vector<GroundSegment>& profile) {
@@ -83,7 +82,7 @@ void add_cut(const GroundPatch& patch, const CarriedVertices& vertices, const Ei
   if (low <= farthest && high >= -finger.distal_m) profile.push_back(segment);
 }
 
-// Height of the highest point of a triangle above the disc of this radius about the origin, if any.
+// Height of the highest point of a triangle over the disc of this radius around the origin, if any.
 std::optional<double> height_over_disc(const std::array<Eigen::Vector3d, 3>& corners,
                                        double radius) {
   std::optional<double> height;
@@ -102,7 +101,7 @@ std::optional<double> height_over_disc(const std::array<Eigen::Vector3d, 3>& cor
     for (const double share : {-half - std::sqrt(root), -half + std::sqrt(root)})
       if (share >= 0.0 && share <= 1.0) offer(p.z() + share * edge.z());
   }
-  // The circle's highest point on the triangle's plane, where that is on the triangle.
+  // Highest point of the circle on the plane of the triangle, if it is on the triangle.
   const Eigen::Vector3d normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
   const double slope = normal.head<2>().norm();
   if (normal.z() == 0.0) return height;
@@ -121,10 +120,10 @@ std::optional<double> height_over_disc(const std::array<Eigen::Vector3d, 3>& cor
   return height;
 }
 
-// What the palm and the fingers may meet of the ground.
+// Ground that the palm and the fingers may touch.
 struct GroundCuts {
-  std::optional<double> palm_m;  // height at which the palm's disc meets it, from below the start
-  std::vector<std::vector<GroundSegment>> profiles;  // of the fingers
+  std::optional<double> palm_m;  // contact height of the palm's disc, below the start
+  std::vector<std::vector<GroundSegment>> profiles;  // one per finger
 };
 
 GroundCuts cuts_of(const GroundPatch& patch, const CarriedVertices& vertices,
@@ -149,8 +148,8 @@ GroundCuts cuts_of(const GroundPatch& patch, const CarriedVertices& vertices,
   return cuts;
 }
 
-// Whether ground that faces the palm is above `start_m` without a ceiling between: the finger would
-// begin its way inside the ground. Takes segments above `start_m` out of the profile.
+// Returns true if ground that faces the palm is above `start_m` without a ceiling between, so that
+// the finger starts inside the ground. Removes segments above `start_m` from the profile.
 bool is_blocked(std::vector<GroundSegment>& profile, const FingerGeometry& finger, double start_m) {
   const auto is_above = [&](const GroundSegment& segment) {
     return std::min(segment.a.y(), segment.b.y()) > start_m;
@@ -173,7 +172,7 @@ bool is_blocked(std::vector<GroundSegment>& profile, const FingerGeometry& finge
   return blocked;
 }
 
-// ClosedFinger::unseen: by the union of what the profile covers.
+// Computes ClosedFinger::unseen from the union of the segments of the profile.
 double unseen_share(const GroundPatch& patch, const std::vector<GroundSegment>& profile,
                     double tip_radius) {
   std::vector<std::pair<double, double>> spans;
@@ -227,8 +226,8 @@ void add_contacts(const GroundPatch& patch, std::size_t number, const ClosingOpt
     if (!normal) continue;
     contact.normal = *normal;
     contact.outward = rotation * outward;
-    // The normal in the finger's plane, a quarter turn inward; of ground that faces sideways,
-    // inward.
+    // Normal in the plane of the finger, a quarter turn inward; inward for ground that faces
+    // sideways.
     const Eigen::Vector3d axis = rotation.col(2);
     const Eigen::Vector3d drag =
         contact.normal.dot(contact.outward) * axis - contact.normal.dot(axis) * contact.outward;
@@ -241,11 +240,11 @@ void add_contacts(const GroundPatch& patch, std::size_t number, const ClosingOpt
 
 void bind(libmap::ParameterTable& table, ClosingOptions& options) {
   table.add("start_height_m", options.start_height_m, {0.0, 10.0, true, false},
-            "height above the location at which the gripper's way begins, m");
+            "start height of the approach above the location, m");
   table.add("normal_radius_m", options.normal_radius_m, {1e-5, 0.1},
-            "a contact's normal is the mean of the ground within this radius, m");
+            "radius of the mean ground normal at a contact, m");
   table.add("max_unseen", options.max_unseen, libmap::zero_to_one,
-            "a finger with a larger share of its strip unseen gets no contact");
+            "maximum unseen share of the strip of a finger with contacts");
 }
 
 GroundPatch patch_around(const Ground& ground, const Eigen::Vector3d& location,
@@ -266,7 +265,7 @@ ClosedGripper close_gripper(const GroundPatch& patch, const Gripper& gripper,
   ClosedGripper closed;
   closed.patch_from_gripper = patch_from_palm(pose);
   const Eigen::Vector3d axis = closed.patch_from_gripper.linear().col(2);
-  std::vector<Eigen::Vector2d> along;  // of the fingers' planes
+  std::vector<Eigen::Vector2d> along;  // directions of the planes of the fingers
   for (int n = 0; n < count; ++n) {
     const double azimuth = 2.0 * std::numbers::pi * n / count;
     along.emplace_back(std::cos(azimuth), std::sin(azimuth));

@@ -15,8 +15,8 @@ namespace {
 
 using Corners = std::array<Eigen::Vector3d, 3>;
 
-// Square of the distance from a point to a triangle (Ericson 2005, 5.1.5: by the region that the
-// point projects to).
+// Squared distance from a point to a triangle (Ericson 2005, 5.1.5, by the region of the projected
+// point).
 double square_distance(const Eigen::Vector3d& p, const Corners& corners) {
   const auto& [a, b, c] = corners;
   const auto to_edge = [&](const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
@@ -48,7 +48,7 @@ double radius_about(const Eigen::Vector3d& center, const Corners& corners) {
   return std::sqrt(square);
 }
 
-// Triangles up to this size are in the grid, larger ones are looked at one by one.
+// Maximum radius of triangles in the grid; larger ones are tested one by one.
 constexpr double small_radius_m = 0.02;
 
 }  // namespace
@@ -94,8 +94,8 @@ Eigen::Isometry3d patch_frame(const Eigen::Vector3d& location, const Eigen::Vect
   return frame;
 }
 
-// A grid over the two longest sides of the mesh's box. Searched by cells, it needs neither the
-// nearest first nor a sort, which took most of the time that a patch took.
+// Grid over the two longest sides of the bounding box. A search by cells needs no nearest-first
+// order and no sort, which took most of the time of a patch.
 struct Ground::Index {
   struct Entry {
     Eigen::Vector3d center;
@@ -112,13 +112,13 @@ struct Ground::Index {
   std::array<Eigen::Index, 2> axes{0, 1};
   double cell_m = 1.0;
   std::array<std::int64_t, 2> cells{1, 1};
-  std::vector<std::size_t> first;  // entry of each cell, and the end
-  std::vector<Entry> entries;      // of small triangles
+  std::vector<std::size_t> first;  // first entry of each cell, and the end
+  std::vector<Entry> entries;      // small triangles
   std::vector<Entry> large;
 
   std::int64_t cell_along(std::size_t side, double coordinate) const {
     const double cell = (coordinate - box.min()[axes[side]]) / cell_m;
-    if (!(cell > 0.0)) return 0;  // also of coordinates whose difference is not finite
+    if (!(cell > 0.0)) return 0;  // also if the difference is not finite
     return static_cast<std::int64_t>(std::min(cell, static_cast<double>(cells[side] - 1)));
   }
   std::size_t cell_of(const Eigen::Vector3d& point) const {
@@ -126,7 +126,7 @@ struct Ground::Index {
                                     cell_along(1, point[axes[1]]));
   }
 
-  // Means of the triangles around, weighted by their areas.
+  // Area-weighted means of the adjacent triangles.
   void find_vertex_normals() {
     vertex_normals.assign(mesh.vertices.size(), Eigen::Vector3d::Zero());
     for (const libmap::Triangle& triangle : mesh.triangles) {
@@ -142,7 +142,7 @@ struct Ground::Index {
     Eigen::Index shortest = 0;
     sides.minCoeff(&shortest);
     axes = {shortest == 0 ? 1 : 0, shortest == 2 ? 1 : 2};
-    // Not many more cells than triangles.
+    // Limits the number of cells to about that of triangles.
     cell_m = std::max(
         {small_radius_m, sides.maxCoeff() * 1e-4,
          std::sqrt(sides[axes[0]] * sides[axes[1]] / static_cast<double>(mesh.triangles.size()))});
@@ -164,7 +164,7 @@ struct Ground::Index {
     for (const Entry& entry : small) entries[next[cell_of(entry.center)]++] = entry;
   }
 
-  // Calls use(entry) for the triangles that come into the box, and some others.
+  // Calls use(entry) for the triangles that intersect the box, and some others.
   template <typename Use>
   void visit(const Eigen::AlignedBox3d& around, const Use& use) const {
     for (const Entry& entry : large) use(entry);
@@ -180,7 +180,7 @@ struct Ground::Index {
     }
   }
 
-  // By a bit for each number where they lie close together.
+  // Uses a bit per number if the numbers are dense.
   static void sort(std::vector<std::uint32_t>& numbers) {
     if (numbers.empty()) return;
     const auto [low, high] = std::minmax_element(numbers.begin(), numbers.end());
@@ -201,12 +201,12 @@ struct Ground::Index {
 
 namespace {
 
-// The vertices of a patch by their numbers in the mesh: a table with open addressing.
+// Maps vertices of the mesh to vertices of a patch: a hash table with open addressing.
 class PatchVertices {
  public:
   explicit PatchVertices(std::size_t most) : slots_(std::bit_ceil(2 * most + 1)) {}
 
-  // Of the patch; `none` if the vertex is new.
+  // Returns the number in the patch; `none` if the vertex is new.
   std::uint32_t& number_of(std::uint32_t vertex) {
     std::size_t at = (vertex * std::uint64_t{0x9e3779b97f4a7c15} >> 32U) & (slots_.size() - 1);
     while (slots_[at].vertex != vertex && slots_[at].vertex != none)
@@ -240,7 +240,7 @@ Ground::Ground(const libmap::TriangleMesh& mesh, GroundErrors errors)
   if (index_->errors.vertex_errors_m.empty()) return;
   if (index_->errors.vertex_errors_m.size() != mesh.vertices.size() ||
       index_->errors.is_unsure.size() != mesh.triangles.size())
-    throw libmap::Error("the errors are not of this mesh");
+    throw libmap::Error("the number of errors does not match the mesh");
   index_->find_vertex_normals();
 }
 

@@ -14,17 +14,17 @@ namespace libgtd {
 
 namespace {
 
-// Moments are divided by this length, so that all rows are forces of one size.
+// Scale of moments, so that all rows are forces of similar size.
 constexpr double wrench_length_m = 0.1;
 
 double small_value(Eigen::Index row) {
   return 1e-10 * (1.0 + libmap::unit_noise(static_cast<std::uint64_t>(row), 7));
 }
 
-// Columns are padded to whole groups of this many rows, which a loop handles at once.
+// Columns are padded to multiples of this number of rows, which a loop processes at once.
 constexpr std::ptrdiff_t group = 4;
 
-// result = matrix * vector, of which many entries are 0
+// result = matrix * vector, for vectors with many zeros
 GRASPMAP_CLONED void multiply(const double* matrix, const double* vector, double* result,
                               std::ptrdiff_t size, std::ptrdiff_t stride) {
   for (std::ptrdiff_t row = 0; row < stride; ++row) result[row] = 0.0;
@@ -37,8 +37,8 @@ GRASPMAP_CLONED void multiply(const double* matrix, const double* vector, double
   }
 }
 
-// Of each column of a square matrix: its entry in the row `leaving` divided by the pivot, and
-// `change` times that subtracted from the other entries; change[leaving] is 0.
+// For each column of a square matrix, divides its entry in the row `leaving` by the pivot and
+// subtracts `change` times this entry from the others; change[leaving] must be 0.
 GRASPMAP_CLONED void exchange(double* matrix, const double* change, double pivot,
                               std::ptrdiff_t leaving, std::ptrdiff_t size, std::ptrdiff_t stride) {
   for (std::ptrdiff_t n = 0; n < size; ++n) {
@@ -52,7 +52,7 @@ GRASPMAP_CLONED void exchange(double* matrix, const double* change, double pivot
   }
 }
 
-// How far each value may go before it is 0: infinitely far where it does not fall.
+// Step after which each value is 0; infinite for values that do not decrease.
 GRASPMAP_CLONED_CHOICE void find_bounds(const double* values, const double* change,
                                         const double* smallest, double* bounds,
                                         std::ptrdiff_t stride) {
@@ -64,10 +64,10 @@ GRASPMAP_CLONED_CHOICE void find_bounds(const double* values, const double* chan
     }
 }
 
-// The primal simplex method (Dantzig 1963) with the inverse of the basis. A contact's force is a
-// combination of vertices of its set, weights up to 1 in sum; a vertex is made only when it is the
-// best one to enter (Dantzig and Wolfe 1960). Rows: six of the equilibrium, one for each contact,
-// one for each finger's drive. On the right 0 for the equilibrium, else 1.
+// Primal simplex method (Dantzig 1963) with the inverse of the basis. The force of a contact is a
+// combination of vertices of its set with weights of sum at most 1; a vertex is created only when
+// it is the best to enter (Dantzig and Wolfe 1960). Rows: six of the equilibrium, one per contact,
+// one per drive of a finger. Right sides: 0 for the equilibrium, else 1.
 class EquilibriumProgram {
  public:
   EquilibriumProgram(const std::vector<BearingContact>& contacts, const HoldingOptions& options)
@@ -96,14 +96,14 @@ class EquilibriumProgram {
     std::fill_n(kinds_.begin(), 6, Kind::artificial);
   }
 
-  // The basis of the direction before, if any, is the start: first the new pull takes the place of
-  // the former one, as part of the same program.
+  // Starts from the basis of the previous direction, if any: the new pull first replaces the
+  // previous pull, as part of the same program.
   double max_pull(const Eigen::Vector3d& direction, double enough) {
     if (pull_ >= 0) formers_.push_back(std::exchange(pull_, -1));
     direction_ = direction;
     make_pull();
     if (!enter(Kind::pull)) return 0.0;
-    // What the former pull costs, relative to the new one: a small cost leads to it on the way.
+    // Cost of the previous pull relative to the new one; a small cost leads to it on the way.
     double cost = 0.1;
     constexpr double max_cost = 1e9;
     constexpr int max_pivots = 2000;
@@ -129,15 +129,15 @@ class EquilibriumProgram {
  private:
   enum class Kind : std::uint8_t { slack, artificial, pull, contact };
 
-  // What a force of a contact is worth along its normal, drag and lateral, by the prices of the
-  // equilibrium's rows and of its drive's row.
+  // Prices of a contact force along normal, drag and lateral, from the rows of the equilibrium and
+  // of the drive.
   struct ContactPrices {
     Eigen::Matrix3d by_force;
     Eigen::Matrix3d by_moment;
     Eigen::Vector3d by_drive;
   };
 
-  // Of the fingers with contacts alone.
+  // Numbers the drives of fingers with contacts.
   void number_drives() {
     std::vector<Eigen::Index> row_of_finger;
     rows_ = static_cast<Eigen::Index>(6 + contacts_.size());
@@ -151,7 +151,7 @@ class EquilibriumProgram {
       drive_rows_.push_back(row);
     }
   }
-  // Of a rigid finger: c_k / m.
+  // Returns c_k / m of a rigid finger.
   double reaction_of(const BearingContact& contact) const {
     const double sine = contact.normal().dot(contact.outward());
     const double cosine = contact.normal().dot(options_.axis);
@@ -166,7 +166,7 @@ class EquilibriumProgram {
       share = std::min(share, -reaction_of(contacts_[n]) / options_.closing_force_n);
     }
   }
-  // Of a basic variable, without the perturbation.
+  // Value of a basic variable without the perturbation.
   double true_value(Eigen::Index row) const {
     return inverse_.row(row).segment(6, rows_ - 6).sum();
   }
@@ -176,7 +176,7 @@ class EquilibriumProgram {
                        [&](Eigen::Index row) { return true_value(row) <= negligible_n; });
   }
 
-  // Makes the column with the largest gain, which it returns.
+  // Creates the column with the largest gain, and returns the gain.
   double price(bool with_pull) {
     const Eigen::Vector3d force_price = prices_.head<3>();
     const Eigen::Vector3d moment_price = prices_.segment<3>(3);
@@ -224,10 +224,10 @@ class EquilibriumProgram {
     return most;
   }
 
-  // Lets `column_` enter the basis; false if nothing bounds it.
+  // Lets `column_` enter the basis; returns false if the step is unbounded.
   bool enter(Kind kind) {
     multiply(inverse_.data(), column_.data(), change_.data(), rows_, stride_);
-    // Smaller changes are rounding errors; dividing by one would spoil the inverse.
+    // Smaller changes are rounding errors. Division by one would damage the inverse.
     const double smallest = 1e-9 * change_.cwiseAbs().maxCoeff();
     Eigen::Index leaving = changing_artificial(smallest);
     double step = 0.0;
@@ -249,7 +249,7 @@ class EquilibriumProgram {
     return true;
   }
 
-  // Artificial variables are 0 and must stay so: they leave as soon as they would change.
+  // Artificial variables must stay 0: they leave as soon as they would change.
   Eigen::Index changing_artificial(double smallest) const {
     Eigen::Index found = -1;
     double largest = smallest;
@@ -262,7 +262,7 @@ class EquilibriumProgram {
     return found;
   }
 
-  // The value that is 0 first as the column enters, after `step`.
+  // Row of the first value that becomes 0 as the column enters, after `step`.
   Eigen::Index first_at_zero(double smallest, double& step) {
     smallest_.setConstant(smallest);
     for (Eigen::Index row = 0; artificials_ > 0 && row < rows_; ++row)
@@ -279,8 +279,8 @@ class EquilibriumProgram {
     return first;
   }
 
-  // Many basic variables are 0 at first. Small different values instead keep the method from going
-  // round in circles; results are computed without them.
+  // Many basic variables are 0 initially. Small different values prevent cycling; results are
+  // computed without them.
   void perturb() {
     if (is_perturbed_) return;
     is_perturbed_ = true;
@@ -293,20 +293,20 @@ class EquilibriumProgram {
   const HoldingOptions& options_;
   std::vector<ContactPrices> prices_of_;
   std::vector<Eigen::Vector3d> arms_;
-  std::vector<Eigen::Index> drive_rows_;  // of the contacts
-  std::ptrdiff_t fingers_ = 0;            // with contacts
+  std::vector<Eigen::Index> drive_rows_;  // per contact
+  std::ptrdiff_t fingers_ = 0;            // number with contacts
   Eigen::Index rows_ = 0;
-  Eigen::Index stride_ = 0;  // of the columns
+  Eigen::Index stride_ = 0;  // stride of the columns
   Eigen::MatrixXd inverse_;
   Eigen::VectorXd values_;
-  Eigen::Vector3d direction_;  // of the pull
-  Eigen::VectorXd column_;     // that enters
-  Eigen::VectorXd change_;     // of the values by it
+  Eigen::Vector3d direction_;  // direction of the pull
+  Eigen::VectorXd column_;     // entering column
+  Eigen::VectorXd change_;     // change of the values per step
   Eigen::VectorXd smallest_;
   Eigen::VectorXd bounds_;
-  Eigen::RowVectorXd prices_;  // of the rows: how much the pull grows with their right side
+  Eigen::RowVectorXd prices_;  // per row: derivative of the pull by its right side
   std::vector<Kind> kinds_;
-  Eigen::Index pull_ = -1;  // its row; -1: not in the basis
+  Eigen::Index pull_ = -1;  // row of the pull; -1: not in the basis
   std::vector<Eigen::Index> formers_;
   int artificials_ = 6;
   Kind entering_ = Kind::slack;
@@ -317,7 +317,7 @@ class EquilibriumProgram {
 
 double holding_force(const std::vector<BearingContact>& contacts, const Eigen::Vector3d& direction,
                      const HoldingOptions& options, double enough) {
-  if (contacts.size() < 2) return 0.0;  // one point balances no pull beside it
+  if (contacts.size() < 2) return 0.0;  // one contact cannot balance moments
   return EquilibriumProgram(contacts, options).max_pull(direction, enough);
 }
 
@@ -328,7 +328,7 @@ LeastForce least_holding_force(const std::vector<BearingContact>& contacts,
   EquilibriumProgram program(contacts, options);
   constexpr double all = std::numeric_limits<double>::infinity();
   LeastForce least{program.max_pull(directions[first].vector, all), first};
-  // Each beside the one before: few contacts change their forces.
+  // Each direction is adjacent to its predecessor, so that few contacts change their forces.
   constexpr std::size_t ways[] = {0, 1, 9, 10, 2, 3, 11, 12, 4, 5, 13, 14, 6, 7, 15, 16, 8};
   for (const std::size_t n : ways) {
     if (n == first) continue;

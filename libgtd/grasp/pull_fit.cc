@@ -15,10 +15,10 @@ namespace libgtd {
 
 namespace {
 
-constexpr double least_force_n = 0.05;  // smaller ones count as this
-constexpr double prior_share = 0.1;     // of the sets of a round
+constexpr double least_force_n = 0.05;  // lower limit of forces
+constexpr double prior_share = 0.1;     // fraction of the sets of a round drawn from the prior
 constexpr int min_rounds = 3;
-constexpr double log_force_range = 9.2;  // of outliers: ln of 0.05 to 500 N
+constexpr double log_force_range = 9.2;  // range of outliers: ln of 0.05 to 500 N
 
 double normal_share(double z) { return 0.5 * std::erfc(-z / std::sqrt(2.0)); }
 
@@ -64,7 +64,7 @@ class PullReader {
       throw wrong_row(table_, row, "force_n", "", "no result", "force_n, or load_n and held");
     if (!load || !(*load > 0.0))
       throw wrong_row(table_, row, "load_n", load ? libmap::to_text(*load) : "",
-                      "a verdict needs its load", "> 0");
+                      "a verdict requires a load", "> 0");
     test.load_n = *load;
     test.held = *held >= 0.5;
     return test;
@@ -75,7 +75,7 @@ class PullReader {
     const auto column = table_.find_column("ground");
     const std::string text = column ? table_.rows[row][*column] : "";
     if (text.empty() || text == "level") return text == "level";
-    throw wrong_row(table_, row, "ground", text, "is no ground", "level, or empty");
+    throw wrong_row(table_, row, "ground", text, "unknown", "level, or empty");
   }
   std::optional<double> within(std::size_t row, const char* name, double low, double high) const {
     const auto column = table_.find_column(name);
@@ -94,23 +94,23 @@ class PullReader {
   const libmap::Table& table_;
 };
 
-// A test with its gripper closed, to be pulled with any parameters.
+// Test with its closed gripper, to be pulled with any parameters.
 struct ClosedTest {
   const PullTest* test;
   ClosedPoses poses;
 };
 
-// ln of the forces of all trials, small ones cut.
+// ln of the forces of all trials, with the lower limit.
 std::vector<double> log_forces(const ClosedTest& closed, const Gripper& gripper, int draws) {
   std::vector<double> forces = closed.poses.pull_forces(gripper, direction_of(*closed.test), draws);
   for (double& force : forces) force = std::log(std::max(force, least_force_n));
   return forces;
 }
 
-// How the trials of one parameter set predict the outcome of a test.
+// Prediction of the outcome of a test by the trials of one parameter set.
 struct Prediction {
   double likelihood = 0.0;
-  double below = 0.0;  // probability of a smaller force, or of a slip where it held
+  double below = 0.0;  // probability of a smaller force, or of a slip if it held
 };
 
 Prediction predict(const PullTest& test, const std::vector<double>& log_forces,
@@ -145,9 +145,9 @@ Prediction predict(const PullTest& test, const std::vector<double>& log_forces,
 // Parameter sets as points in the unit cube of the prior's quantiles, where the prior is uniform.
 struct Population {
   std::vector<ParameterValues> quantiles;
-  std::vector<std::vector<Prediction>> predictions;  // of each set: of the tests
+  std::vector<std::vector<Prediction>> predictions;  // [set][test]
   std::vector<double> log_weights;                   // likelihood divided by the proposal
-  std::vector<double> weights;                       // 1 in sum
+  std::vector<double> weights;                       // sum 1
 };
 
 std::vector<double> normalized(const std::vector<double>& log_weights, double power) {
@@ -163,7 +163,7 @@ double effective_count(const std::vector<double>& weights) {
   return 1.0 / std::inner_product(weights.begin(), weights.end(), weights.begin(), 0.0);
 }
 
-// Weights with the likelihood raised to the largest power (1 at most) that leaves so many sets.
+// Weights with the likelihood raised to the largest power <= 1 that keeps `least_effective` sets.
 std::vector<double> tempered(const std::vector<double>& log_weights, double least_effective) {
   double low = 0.0;
   double high = 1.0;
@@ -192,8 +192,8 @@ ParameterValues weighted_spreads(const std::vector<ParameterValues>& points,
   return spreads;
 }
 
-// A mixture of normal kernels about weighted centers, reflected at the faces of the unit cube, and
-// of the prior: without it, a set far from all kernels would have an unbounded weight.
+// Mixture of the prior and normal kernels around weighted centers, reflected at the faces of the
+// unit cube. Without the prior, a set far from all kernels would have an unbounded weight.
 class Proposal {
  public:
   Proposal(const std::vector<ParameterValues>& centers, const std::vector<double>& weights)
@@ -257,7 +257,7 @@ class PullFitting {
       const std::string row = "row " + std::to_string(test.row);
       const Ground* under = test.on_level_ground ? &level_ : ground;
       if (under == nullptr)
-        throw libmap::Error("needs a mesh", {.field = row, .bound = "ground = level"});
+        throw libmap::Error("requires a mesh", {.field = row, .bound = "ground = level"});
       const Eigen::Vector3d at = test.on_level_ground ? Eigen::Vector3d::Zero() : test.location;
       if (!under->distance(at, options.grasp.max_distance_m))
         throw libmap::Error(
@@ -268,9 +268,8 @@ class PullFitting {
              .bound = "within " + libmap::to_text(options.grasp.max_distance_m) + " m of it"});
       tests_.push_back({&test, ClosedPoses(*under, gripper, at, options.grasp)});
       if (!tests_.back().poses.touch_ground())
-        throw libmap::Error(
-            "the closed gripper has no two contacts there, so that it cannot be pulled",
-            {.field = row});
+        throw libmap::Error("the closed gripper has fewer than two contacts and cannot be pulled",
+                            {.field = row});
     }
   }
 
@@ -301,7 +300,7 @@ class PullFitting {
   }
 
  private:
-  // Without a proposal the sets are draws of the prior.
+  // Weighs the sets; without a proposal they are draws of the prior.
   void weigh(Population& population, const Proposal* proposal) {
     const std::size_t count = population.quantiles.size();
     population.predictions.assign(count, {});
@@ -323,7 +322,7 @@ class PullFitting {
     population.weights = normalized(population.log_weights, 1.0);
   }
 
-  // New sets around those that carry the weight.
+  // Draws new sets around the sets with large weights.
   Population next(const Population& before, std::uint64_t round) {
     const double least_effective = 0.1 * static_cast<double>(before.quantiles.size());
     const std::vector<double> weights = tempered(before.log_weights, least_effective);
@@ -339,7 +338,7 @@ class PullFitting {
     return population;
   }
 
-  // Equal weights of 64 sets by systematic resampling; a set that is drawn twice weighs twice.
+  // 64 equally weighted sets by systematic resampling; duplicates are merged with double weight.
   std::vector<ParameterSet> resampled(const Population& population) const {
     constexpr std::size_t count = 64;
     std::vector<ParameterSet> sets;
@@ -384,8 +383,8 @@ class PullFitting {
     }
   }
 
-  // Each test from the others: its own likelihood is divided out of the weights (Gelfand et al.
-  // 1992).
+  // Predicts each test from the others: its own likelihood is divided out of the weights (Gelfand
+  // et al. 1992).
   void check_predictions(const Population& population, PullFit& result) const {
     for (std::size_t t = 0; t < tests_.size(); ++t) {
       std::vector<double> logs = population.log_weights;
@@ -416,7 +415,7 @@ class PullFitting {
     result.chance = 1.0 - normal_share(z);
   }
 
-  // Of the normal distribution, at a share of it; at most 3.5^2.
+  // Squared normal score of a probability, at most 3.5^2.
   static double squared_normal_score(double share) {
     double low = 0.0;
     double high = 3.5;
@@ -453,7 +452,7 @@ double entropy(double share) {
   return -share * std::log2(share) - (1.0 - share) * std::log2(1.0 - share);
 }
 
-// The load that about half of the sets hold, and what its verdict tells.
+// Pull with the load that about half of the sets hold, and the information of its verdict.
 PlannedPull informative_pull(const std::vector<std::vector<double>>& forces_of_sets,
                              const std::vector<ParameterSet>& sets) {
   std::vector<double> medians;
@@ -517,7 +516,7 @@ PullFit fit_pulls(const Ground* ground, const Gripper& gripper, const std::vecto
   require_fingers(gripper);
   if (std::none_of(gripper.ranges.begin(), gripper.ranges.end(),
                    [](const auto& range) { return range.has_value(); }))
-    throw libmap::Error("missing: a fit needs parameters with a range", {.field = "ranges"});
+    throw libmap::Error("missing: a fit requires parameters with a range", {.field = "ranges"});
   return PullFitting(ground, gripper, tests, options, progress).fit();
 }
 

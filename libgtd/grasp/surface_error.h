@@ -1,4 +1,4 @@
-// Ground that is known with an error: how far it may lie off, and draws of what it may be.
+// Ground with errors: reads standard deviations of the surface, and draws random surfaces.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,28 +12,30 @@
 namespace libgtd {
 
 struct SurfaceErrorOptions {
-  // Of the ground's displacement: along an axis 0.285 at this distance and 0 from twice it on.
+  // Correlation length of the displacement: along an axis, the correlation is 0.285 at this
+  // distance and 0 from twice this distance.
   double correlation_m = 0.025;
-  // Ground whose error is larger counts as unseen, and is displaced as with this error.
+  // Maximum error of seen ground. Ground with a larger error counts as unseen and is displaced with
+  // this error.
   double max_error_m = 0.005;
 };
 void bind(libmap::ParameterTable& table, SurfaceErrorOptions& options);
 
-// The vertex field `expected_error` of a mesh, as `graspmap fuse` and `mesh` write it (m, one
-// standard deviation along the normal). Unsure are triangles with a vertex whose error is larger
-// than the bound or not finite, and those that the face field `filled` marks: they close holes of
-// the scan. Throws Error: the mesh has no such field, or a negative error.
+// Reads the vertex field `expected_error` of a mesh as written by `graspmap fuse` and `mesh` (m,
+// one standard deviation along the normal). A triangle is unsure if the error of a vertex exceeds
+// the bound or is not finite, or if the face field `filled` marks it as closing a hole of the scan.
+// Throws Error if the field is missing or an error is negative.
 GroundErrors errors_of(const libmap::TriangleMesh& mesh, const SurfaceErrorOptions& options);
-// The same error everywhere.
+// Returns the same error for all vertices.
 GroundErrors constant_error(const libmap::TriangleMesh& mesh, double error_m,
                             const SurfaceErrorOptions& options);
 
-// A random number at each place: normally distributed with mean 0 and standard deviation 1, cut off
-// at 4, continuous. Numbers at the nodes of a lattice of this length, which lies at random, are
-// weighted by nearness (trilinear) and divided by the root of the sum of the squared weights.
+// Continuous random field: normally distributed with mean 0 and standard deviation 1, truncated at
+// 4. Random numbers at the nodes of a randomly shifted lattice of edge `length_m` are weighted by
+// nearness (trilinear) and divided by the root of the sum of the squared weights.
 class RandomField {
  public:
-  // Places in the box are quick.
+  // Nodes in `box` are cached, so that positions inside it are fast.
   RandomField(double length_m, std::uint64_t seed, std::uint64_t key,
               const Eigen::AlignedBox3d& box);
   double at(const Eigen::Vector3d& place);
@@ -46,11 +48,11 @@ class RandomField {
   Eigen::Array3d shift_;
   Eigen::Array3i low_;
   Eigen::Array3i sides_;
-  std::vector<double> nodes_;  // of the box; NaN: not drawn yet
+  std::vector<double> nodes_;  // nodes in the box; NaN: not drawn yet
 };
 
-// The patch with its vertices moved along their normals by their errors times a random field. A
-// patch without errors as it is.
+// Returns the patch with its vertices displaced along their normals by their errors times a random
+// field. A patch without errors is returned unchanged.
 GroundPatch displaced(const GroundPatch& patch, double correlation_m, std::uint64_t seed,
                       std::uint64_t key);
 

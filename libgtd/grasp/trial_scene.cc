@@ -20,15 +20,15 @@ constexpr int round_sides = 12;
 constexpr int thin_sides = 3;
 constexpr double most_loads = 3.0;
 
-// In the patch's frame.
+// Point in the frame of the patch.
 struct ScenePoint {
   Eigen::Vector3d position;
   Eigen::Vector3d color;
 };
 using ScenePolygon = std::vector<ScenePoint>;
 
-// The part of a polygon where `height` is not negative (Sutherland and Hodgman 1974). Both
-// triangles of a cut edge get the same point.
+// Clips a polygon to `height` >= 0 (Sutherland and Hodgman 1974). Both triangles of a cut edge get
+// the same point.
 template <typename Height>
 ScenePolygon clipped(const ScenePolygon& polygon, const Height& height) {
   ScenePolygon kept;
@@ -76,8 +76,8 @@ class SceneBuilder {
     }
   }
 
-  // Rings about an axis, each {distance from `origin`, radius}, and the surface between each and
-  // the next; its front is away from the axis where the distance grows. Edges at rings are sharp
+  // Rings around an axis, {distance from `origin`, radius} each, and the surface between adjacent
+  // rings; its front faces away from the axis if the distance increases. Edges at rings are sharp
   // unless `round`.
   using Rings = std::vector<std::array<double, 2>>;
   void add_rings(ScenePart part, const Eigen::Vector3d& origin, const Eigen::Vector3d& axis,
@@ -108,7 +108,7 @@ class SceneBuilder {
     }
   }
 
-  // Open at its ends.
+  // Adds a rod with open ends.
   void add_rod(ScenePart part, const Eigen::Vector3d& from, const Eigen::Vector3d& to,
                double from_radius, double to_radius, int sides = round_sides) {
     const double length = (to - from).norm();
@@ -161,7 +161,7 @@ class SceneBuilder {
   std::map<std::array<double, 3>, std::uint32_t> ground_;  // vertices by position
 };
 
-// The lengths of a scene, m.
+// Dimensions of a scene, m.
 struct SceneMeasures {
   explicit SceneMeasures(const Gripper& gripper)
       : finger(finger_geometry(gripper)),
@@ -178,7 +178,7 @@ struct SceneMeasures {
 void add_gripper(const SceneMeasures& measures, const Trial& trial, SceneBuilder& builder) {
   const Eigen::Isometry3d& pose = trial.gripper.patch_from_gripper;
   const double height = 1.5 * measures.link;
-  // A ring, so that what is below the palm is seen.
+  // A ring, so that the ground below the palm is visible.
   const double inner = 0.7 * measures.palm;
   builder.add_rings(
       ScenePart::gripper, pose.translation(), pose.linear().col(2),
@@ -280,7 +280,7 @@ libmap::TriangleMesh trial_scene(const libmap::TriangleMesh& mesh, const Gripper
                                  const Trial& trial, double load_n) {
   const SceneMeasures measures(gripper);
   SceneBuilder builder(trial);
-  // Down to a little below the lowest that a finger reaches.
+  // Down to slightly below the lowest position of a finger.
   const double half = 1.15 * measures.reach;
   const double low = trial.gripper.patch_from_gripper.translation().z() - measures.reach;
   builder.add_ground(mesh, Eigen::AlignedBox3d(Eigen::Vector3d(-half, -half, low),

@@ -1,5 +1,4 @@
-// A picture of one trial: the ground around it, the closed gripper, its contacts and forces as one
-// colored mesh.
+// Scene of one trial for images: ground, closed gripper, contacts and forces as one colored mesh.
 #pragma once
 
 #include <cstddef>
@@ -12,31 +11,31 @@
 
 namespace libgtd {
 
-// What a vertex of the picture is of: the values of its field `scene_part`. idle: a finger that
-// bears nothing. cone: the forces of a contact's steepest facet. pull: the limiting direction.
+// Part of the scene, value of the vertex field `scene_part`. idle: a finger that bears no force.
+// cone: forces of the steepest facet of a contact. pull: the limiting direction.
 enum class ScenePart { ground, gripper, engaged, link, idle, cone, pull, load };
 
 struct ScenePartStyle {
   ScenePart part;
   libmap::Color color;
-  std::string text;  // for a legend; empty: not in one
+  std::string text;  // label in a legend; empty: not in the legend
 };
 
-// One for each part, in their order. The ground has this color unless the mesh has its own.
+// Returns one style per part, in order. The ground has this color if the mesh has none.
 const std::vector<ScenePartStyle>& scene_parts();
 
-// In the mesh's frame, with vertex colors and the vertex field `scene_part`. A sphere for each
-// contact that bears, and one at the tip of each finger that bears nothing; at the location if the
-// gripper does not come to the ground. The pull begins where it acts, in the palm's middle; its
-// length is in proportion to the force, up to three times that of `load_n`, which a disc across it
-// marks.
+// Returns the scene in the frame of the mesh, with vertex colors and the vertex field `scene_part`.
+// There is a sphere at each contact that bears a force and at the tip of each finger that does not,
+// or one at the location if the gripper does not reach the ground. The arrow of the pull starts at
+// the middle of the palm. Its length is proportional to the force, up to three times that of
+// `load_n`, which a disc marks.
 libmap::TriangleMesh trial_scene(const libmap::TriangleMesh& mesh, const Gripper& gripper,
                                  const Trial& trial, double load_n);
 
-// The parts of a scene with a text, those that occur in it; none of a mesh that is no scene.
+// Returns the labeled parts that occur in a scene; empty if the mesh is not a scene.
 std::vector<ScenePartStyle> shown_parts(const libmap::TriangleMesh& scene);
 
-// Vertices of a sphere of a scene.
+// Number of vertices of a sphere in a scene.
 constexpr std::size_t scene_sphere_vertices = 84;  // seven rings of twelve
 
 }  // namespace libgtd

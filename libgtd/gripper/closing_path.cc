@@ -14,14 +14,15 @@ namespace libgtd {
 
 namespace {
 
-// A lattice of good points (Korobov 1959) with a random shift: powers of `generator` modulo the
-// prime `draws`. Its means are as exact as those of some 3,000 independent draws.
+// Number of draws: a shifted lattice of powers of `generator` modulo a prime (Korobov 1959). The
+// mean pull on level ground is 1 % off in the root mean square of 16 parameter sets, that of 100
+// independent draws 5 %.
 constexpr std::uint64_t draws = 199;
 constexpr std::uint64_t generator = 184;
-constexpr std::size_t step_deg = 5;  // linear between
+constexpr std::size_t step_deg = 5;  // interpolated linearly
 constexpr double max_spread = 4.0;   // of pulls that are nearly always 0
 
-// Leans of the facets that the spines of one finger meet, rad, the largest first.
+// Draws psi of the facets that the spines of one finger meet, rad, descending.
 std::vector<double> draw_leans(const Gripper& gripper, double share, std::uint64_t draw) {
   constexpr std::uint64_t seed = 0x66696e676572;
   libmap::RandomStream shifts(seed, 0);
@@ -45,7 +46,7 @@ std::vector<double> draw_leans(const Gripper& gripper, double share, std::uint64
   return leans;
 }
 
-// In closing forces; `limit` of one spine too.
+// Pull in closing forces; `limit` of one spine, too.
 double pull_of(const std::vector<double>& leans, double fall, double phi, double limit,
                bool drive_holds) {
   constexpr double right_angle = std::numbers::pi / 2.0;
@@ -71,9 +72,10 @@ constexpr std::size_t level = 90;
 
 struct Pulls {
   std::array<double, falls> means{};
-  double level_spread = 0.0;  // standard deviation over mean between draws, on level ground
+  double level_spread = 0.0;  // standard deviation between draws over the mean, on level ground
 };
 
+// Mean pulls at falls of -90 .. 90 degrees.
 Pulls pulls_of(const Gripper& gripper) {
   const GripperFingers& fingers = *gripper.fingers;
   const double share = engagement_share(gripper.engagement, fingers.spine_tip_radius_um);

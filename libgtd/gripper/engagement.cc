@@ -1,4 +1,4 @@
-// The parameters of engagement of gripper.h.
+// Engagement and uncertain parameters of gripper.h.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -11,7 +11,7 @@ namespace libgtd {
 
 namespace {
 
-// Chen et al. 2024: share of a concrete's asperities that a spine tip can use.
+// Fraction of a concrete's asperities that a spine tip can use (Chen et al. 2024).
 double usable_asperities(double tip_radius_um) {
   return std::max(0.0, 2.49 * std::pow(tip_radius_um + 39.44, -0.7116) - 0.01212);
 }
@@ -28,7 +28,7 @@ double between(double low, double high, double share, bool logarithmic) {
 void Engagement::check() const {
   libmap::check_parameters(*this);
   if (asperity_min_deg > asperity_max_deg)
-    throw libmap::Error("is beyond the largest lean",
+    throw libmap::Error("exceeds the maximum inclination",
                         {.field = "engagement.asperity_min_deg",
                          .value = libmap::to_text(asperity_min_deg),
                          .bound = "<= asperity_max_deg, " + libmap::to_text(asperity_max_deg)});
@@ -39,9 +39,9 @@ void bind(libmap::ParameterTable& table, Engagement& engagement) {
   table.add("engagement.friction", engagement.friction, libmap::not_negative,
             "coefficient of Coulomb friction of spines and links");
   table.add("engagement.asperity_min_deg", engagement.asperity_min_deg, lean,
-            "smallest lean of a facet against the drag, degrees");
+            "minimum inclination of a facet against the drag, degrees");
   table.add("engagement.asperity_max_deg", engagement.asperity_max_deg, lean,
-            "largest lean of a facet against the drag, degrees");
+            "maximum inclination of a facet against the drag, degrees");
   table.add("engagement.engagement_rate", engagement.engagement_rate, libmap::not_negative,
             "rate at which a dragged spine meets facets, 1/mm");
   table.add("engagement.drag_mm", engagement.drag_mm, libmap::not_negative,
@@ -78,7 +78,7 @@ ParameterValues prior_values(const ParameterRanges& ranges, const ParameterValue
 }
 
 std::vector<ParameterValues> low_discrepancy_quantiles(std::size_t count, std::uint64_t seed) {
-  // The real root of x^7 = x + 1.
+  // Real root of x^7 = x + 1.
   double root = 1.1;
   for (int step = 0; step < 60; ++step) root = std::pow(1.0 + root, 1.0 / 7.0);
   std::vector<ParameterValues> quantiles(count);

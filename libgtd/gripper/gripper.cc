@@ -27,13 +27,13 @@ void bind(libmap::ParameterTable& table, Gripper& gripper) {
   table.add("spine_depth_mm", gripper.spine_depth_mm, not_negative,
             "depth of a spine in the ground");
   table.add("opening_angle_deg", gripper.opening_angle_deg, {0.0, 90.0, true, false},
-            "angle of a finger to the palm's axis, wide open");
+            "angle of a finger to the palm's axis, open");
   table.add("closing_angle_deg", gripper.closing_angle_deg, angle,
             "angle of a finger to the palm's axis, closed");
   table.add("opening_spine_radius_mm", gripper.opening_spine_radius_mm, positive,
-            "radius of the circle of the spine tips, wide open");
+            "radius of the circle of spine tips, open");
   table.add("opening_spine_depth_mm", gripper.opening_spine_depth_mm, not_negative,
-            "depth of the spine tips below the palm, wide open");
+            "depth of the spine tips below the palm, open");
   table.add("closing_height_mm", gripper.closing_height_mm, positive,
             "height of the palm above the spine tips, closed");
   table.add("top_solid_margin_mm", gripper.top_solid_margin_mm, not_negative,
@@ -47,7 +47,7 @@ void Gripper::check() const {
   if (fingers) fingers->check();
   engagement.check();
   if (closing_angle_deg >= opening_angle_deg)
-    throw libmap::Error("the fingers close inward",
+    throw libmap::Error("fingers must close inward",
                         {.field = "closing_angle_deg",
                          .value = libmap::to_text(closing_angle_deg),
                          .bound = "< opening_angle_deg, " + libmap::to_text(opening_angle_deg)});
@@ -57,15 +57,15 @@ void bind(libmap::ParameterTable& table, GripperFingers& fingers) {
   using libmap::positive;
   table.add("fingers.count", fingers.count, {1, 64}, "number of fingers");
   table.add("fingers.curl_deg", fingers.curl_deg, {0.0, 90.0},
-            "angle of the distal link to the proximal one, inward, of a free finger");
+            "inward angle of the distal link to the proximal link, free finger, degrees");
   table.add("fingers.curl_limit_deg", fingers.curl_limit_deg, {0.0, 170.0},
-            "the same at most, once the proximal link is stopped");
+            "maximum inward angle of the distal link, proximal link stopped, degrees");
   table.add("fingers.spines_per_finger", fingers.spines_per_finger, {1, 1000},
-            "spines of one finger");
+            "number of spines per finger");
   table.add("fingers.spine_tip_radius_um", fingers.spine_tip_radius_um, {0.0, 1000.0, true, false},
             "radius of a spine's tip, micrometers");
   table.add("fingers.spine_force_limit_n", fingers.spine_force_limit_n, positive,
-            "largest force on one spine, N");
+            "maximum force on one spine, N");
   table.add("fingers.closing_force_n", fingers.closing_force_n, positive,
             "force of one finger toward the palm's axis, N");
   table.add("fingers.holds_when_closed", fingers.holds_when_closed,
@@ -75,7 +75,7 @@ void bind(libmap::ParameterTable& table, GripperFingers& fingers) {
 void GripperFingers::check() const {
   libmap::check_parameters(*this);
   if (curl_limit_deg < curl_deg)
-    throw libmap::Error("a stopped finger curls further than a free one",
+    throw libmap::Error("less than the curl of a free finger",
                         {.field = "fingers.curl_limit_deg",
                          .value = libmap::to_text(curl_limit_deg),
                          .bound = ">= fingers.curl_deg, " + libmap::to_text(curl_deg)});
@@ -83,7 +83,8 @@ void GripperFingers::check() const {
 
 void require_fingers(const Gripper& gripper) {
   if (!gripper.fingers)
-    throw libmap::Error("missing: forces need it, method corrected does not", {.field = "fingers"});
+    throw libmap::Error("missing: required for forces, not for method corrected",
+                        {.field = "fingers"});
 }
 
 ParameterValues parameters_of(const Gripper& gripper) {

@@ -14,14 +14,15 @@ namespace libgtd {
 
 namespace {
 
-// A measure that a file left out is still 0 and would be reported as a bad value: say what it is.
+// A value missing in a file is still 0 and would be reported as out of range. Reports it as missing
+// instead.
 void require_all_keys(const libmap::ParameterTable& table, const std::vector<std::string>& given) {
   for (const std::string& key : table.keys())
     if (std::find(given.begin(), given.end(), key) == given.end())
       throw libmap::Error("missing", {.field = key});
 }
 
-// The keys of all sections.
+// Keys of all sections.
 struct GripperKeys {
   Gripper gripper;
   GripperFingers fingers;
@@ -42,9 +43,9 @@ struct GripperKeys {
     bind(table, gripper.engagement);
     for (std::size_t n = 0; n < uncertain_parameters; ++n)
       table.add("ranges." + uncertain_parameter_names()[n], ranges[n],
-                "bounds of the parameter's prior: LOW, HIGH");
+                "bounds of the prior of the parameter: LOW, HIGH");
     table.add("ensemble.sets", sets,
-              "parameter sets, a line each: weight and the uncertain parameters");
+              "parameter sets, one per line: weight and uncertain parameters");
   }
 };
 
@@ -57,7 +58,7 @@ std::optional<ParameterRange> parse_range(const std::string& name, const std::st
   if (parts.size() == 2 && low && high && *low <= *high && (is_angle ? *low >= 0.0 : *low > 0.0) &&
       (!is_angle || *high <= 90.0))
     return ParameterRange{*low, *high};
-  throw libmap::Error("is no range", {.field = "ranges." + name,
+  throw libmap::Error("not a range", {.field = "ranges." + name,
                                       .value = text,
                                       .bound = is_angle ? "LOW, HIGH within 0 and 90 degrees"
                                                         : "LOW, HIGH above 0"});
@@ -75,13 +76,14 @@ std::vector<ParameterSet> parse_sets(const std::string& text) {
     const bool is_whole = !cells.fail() && (cells >> std::ws).eof();
     if (!is_whole || !(set.weight >= 0.0))
       throw libmap::Error(
-          "is no parameter set",
+          "not a parameter set",
           {.field = "ensemble.sets", .value = line, .bound = "a weight >= 0 and six values"});
     sum += set.weight;
     sets.push_back(set);
   }
   if (!sets.empty() && !(sum > 0.0))
-    throw libmap::Error("has no weight", {.field = "ensemble.sets", .bound = "> 0 in sum"});
+    throw libmap::Error("has no positive weight",
+                        {.field = "ensemble.sets", .bound = "> 0 in sum"});
   for (ParameterSet& set : sets) set.weight /= sum;
   return sets;
 }
@@ -95,7 +97,8 @@ std::filesystem::path urdf_path(const UrdfMapping& urdf, const std::string& grip
   return std::filesystem::path(gripper_file).parent_path() / urdf.file;
 }
 
-// What the file does not say and its URDF does. Keys of fingers only if the file has some.
+// Adds values that are missing in the file from its URDF. Keys of fingers are added only if the
+// file has some.
 void add_measures_of_urdf(const libmap::ParameterTable& table, const UrdfMapping& mapping,
                           const std::string& file, std::vector<std::string>& given) {
   libmap::ParameterTable section;
@@ -143,7 +146,7 @@ Gripper parse_gripper(const std::string& yaml, const std::string& file,
       if (gripper.fingers) with_parameters(gripper, set.values).check();
   } catch (const libmap::Error& error) {
     if (error.context().field.starts_with("hold_model"))
-      throw libmap::Error("is not used any more: forces need no fit. Remove the section",
+      throw libmap::Error("is obsolete: forces need no fit; remove the section",
                           {.file = file, .field = "hold_model"});
     throw error.in_file(file);
   }

@@ -19,18 +19,18 @@ float distance(double center, int x, int y) {
   return static_cast<float>(std::hypot(center - x, center - y));
 }
 
-// A byte each for `solid` and `counted`.
+// Limit of memory: one byte each for `solid` and `counted`.
 constexpr double max_mask_voxels = 0x1p28;
 
 libmap::Error too_small(double voxel_size_m, double mask_voxels) {
   const double gigabytes = 2.0 * mask_voxels / 0x1p30;
-  return libmap::Error("too small for this gripper: its mask alone would take " +
+  return libmap::Error("too small for this gripper: its mask would take " +
                            libmap::to_text(static_cast<float>(gigabytes)) + " GiB, more than " +
                            libmap::to_text(2.0 * max_mask_voxels / 0x1p30) + " GiB",
                        {.field = "voxel_size_m", .value = libmap::to_text(voxel_size_m)});
 }
 
-// A number of voxels along one side. Measures far apart make masks that are thin and endless.
+// Number of voxels along one side. Limits thin and very wide masks of extreme gripper dimensions.
 int whole_voxels(double voxels, const GripperMaskOptions& options) {
   if (voxels >= 0.0 && voxels <= 0x1p20) return static_cast<int>(voxels);
   throw libmap::Error("the gripper's mask would be " + libmap::to_text(static_cast<float>(voxels)) +
@@ -41,8 +41,8 @@ int whole_voxels(double voxels, const GripperMaskOptions& options) {
 void allocate(GripperMask& mask) {
   const double voxels = static_cast<double>(mask.side) * mask.side * mask.layers;
   if (mask.side < 3 || mask.solid_layers < 2)
-    throw libmap::Error("the gripper is not larger than a voxel or two: its mask would have " +
-                            std::to_string(mask.side) + " voxels a side and " +
+    throw libmap::Error("too large for this gripper: its mask would have " +
+                            std::to_string(mask.side) + " voxels per side and " +
                             std::to_string(mask.solid_layers) + " layers",
                         {.field = "voxel_size_m", .value = libmap::to_text(mask.voxel_size_m)});
   if (voxels > max_mask_voxels) throw too_small(mask.voxel_size_m, voxels);
@@ -50,7 +50,7 @@ void allocate(GripperMask& mask) {
   mask.counted.assign(static_cast<std::size_t>(voxels), 1);
 }
 
-// Calls solid(x, y, s) for each voxel of the solid layers, s = 1 on top, and keeps the answer.
+// Sets each voxel of the solid layers to solid(x, y, s), with s = 1 for the top layer.
 template <typename Solid>
 void fill(GripperMask& mask, const Solid& solid) {
   for (int s = 1; s <= mask.solid_layers; ++s)
@@ -59,9 +59,9 @@ void fill(GripperMask& mask, const Solid& solid) {
         mask.solid[mask.index(x, y, mask.solid_layers - s)] = solid(x, y, s) ? 1 : 0;
 }
 
-// The measures in voxels as `thesis` and `envelope` round them (eq. 3-6..3-12).
+// Dimensions in voxels, rounded as by `thesis` and `envelope` (eq. 3-6..3-12).
 struct VoxelMeasures {
-  float ratio = 0.0F;  // voxels a millimeter
+  float ratio = 0.0F;  // voxels per millimeter
   double half = 0.0;
   int H = 0;
   double RT = 0.0;
@@ -121,14 +121,14 @@ GripperMask make_thesis(const Gripper& gripper, const GripperMaskOptions& option
   return mask;
 }
 
-// Eq. 5-1, 5-2 and the counted volume of 5.1.2.
+// Eq. 5-1, 5-2, and the counted volume of 5.1.2.
 GripperMask make_envelope(const Gripper& gripper, const GripperMaskOptions& options) {
   const VoxelMeasures m = measure(gripper, options);
   GripperMask mask = empty_mask(options, 2.0 * m.half, m.H);
   const double cone = tan_deg(90.0 - gripper.opening_angle_deg);
   const double cos_closed = cos_deg(gripper.closing_angle_deg);
   // As in `thesis`, the ring has two parts, below Hcl and below H - RB: with RB > H (HubRobo) the
-  // second begins above the cone's end.
+  // second starts above the end of the cone.
   const double ring_top = std::min(m.Hcl, m.H - m.RB);
   fill(mask, [&](int x, int y, int s) {
     const float d = distance(m.half, x, y);
@@ -152,12 +152,12 @@ GripperMask make_envelope(const Gripper& gripper, const GripperMaskOptions& opti
   return mask;
 }
 
-// ClimbLab v3: an odd side about the true center, no void layers, the pivot on top.
+// ClimbLab v3: odd side around the exact center, no void layers, pivot on top.
 GripperMask make_climblab(const Gripper& gripper, GripperMaskOptions options) {
   options.extra_void_layers = 0;
   const VoxelMeasures m = measure(gripper, options);
   GripperMask mask = empty_mask(options, std::floor(2.0 * m.half) + 1.0, m.H);
-  // One beyond the center: MATLAB's index (L + 1) / 2 counts from 1, the window from 0.
+  // One after the center: the index (L + 1) / 2 starts at 1 in MATLAB, at 0 here.
   mask.pivot_xy = (mask.side + 1) / 2;
   mask.pivot_z = m.H - 1;
   const double ROS = std::round(m.in_voxels(gripper.opening_spine_radius_mm));
@@ -175,13 +175,13 @@ GripperMask make_climblab(const Gripper& gripper, GripperMaskOptions options) {
   return mask;
 }
 
-// The radii of `thesis` in millimeters decide for the center of each voxel; the pivot is the
+// Evaluates the radii of `thesis` in millimeters at the center of each voxel. The pivot is the
 // center of the top solid layer (fig. 3-11).
 GripperMask make_corrected(const Gripper& gripper, const GripperMaskOptions& options) {
   const double voxel_mm = options.voxel_size_m * 1000.0;
   const double half =
       gripper.finger_joint_diameter_mm / 2.0 + gripper.finger_length_mm + gripper.spine_length_mm;
-  // A hair less, so that a length of whole voxels does not depend on the last bit of a quotient.
+  // Slack, so that a length of whole voxels does not depend on rounding of a quotient.
   const double slack = 1e-9;
   const double rings = std::floor(half / voxel_mm + slack);
   const double depth_layers = std::ceil(gripper.closing_height_mm / voxel_mm - slack);
@@ -195,9 +195,9 @@ GripperMask make_corrected(const Gripper& gripper, const GripperMaskOptions& opt
                     gripper.bottom_void_margin_mm;
   mask.closed_radius_m = 0.001 * RB;
   mask.open_radius_m = 0.001 * half;
-  // More than the spines' depth and than one voxel, which may be rounding: in the middle between
-  // two falls that heights in whole voxels can have, and a hair more, since filled gaps have half
-  // ones.
+  // More than the spine depth and than one voxel, which may be rounding. The value is midway
+  // between two possible falls of heights in whole voxels, plus slack, because filled gaps have
+  // half voxels.
   const double voxels = std::floor(std::max(1.0, gripper.spine_depth_mm / voxel_mm) + slack);
   mask.min_fall_m = options.voxel_size_m * (voxels + 0.5 + 1e-6);
   fill(mask, [&](int x, int y, int s) {
@@ -263,7 +263,7 @@ GripperMask make_gripper_mask(const Gripper& gripper, const GripperMaskOptions& 
     throw libmap::Error("out of range", {.field = "extra_void_layers",
                                          .value = std::to_string(options.extra_void_layers),
                                          .bound = ">= 0 and <= 10000"});
-  // Before the measures in voxels, which might not fit their integers.
+  // Checked before the dimensions in voxels, which might overflow their integers.
   const double half_m = (gripper.finger_joint_diameter_mm / 2.0 + gripper.finger_length_mm +
                          gripper.spine_length_mm) /
                         1000.0;

@@ -1,5 +1,5 @@
-// The gripper mask: the volume around a pivot voxel in which ground helps the gripper (solid) or
-// stands in its way (void), as a stack of voxel layers.
+// Gripper mask: a stack of voxel layers around a pivot voxel that marks where ground supports the
+// gripper (solid) and where it obstructs it (void).
 #pragma once
 
 #include <cstddef>
@@ -16,41 +16,43 @@ namespace libgtd {
 
 struct ClosingPath;  // closing_path.h
 
-// thesis: the author's program (eq. 3-6..3-16). envelope: its alternative design (5.1), in which
-// what the fingers cannot reach is not counted. climblab: the base of both. corrected: the idea of
-// `thesis` with an odd side, centered on the pivot's voxel, radii not rounded. calibrated: the mask
-// of `corrected`, and a score that is the probability to hold the load (closing_force.h).
+// thesis: the author's program (eq. 3-6..3-16). envelope: its alternative design (5.1), which does
+// not count voxels outside the reach of the fingers. climblab: the common base of both. corrected:
+// as thesis, with an odd side centered on the pivot voxel and radii that are not rounded.
+// calibrated: the mask of `corrected`; the score is the probability of holding the load
+// (closing_force.h).
 enum class Method { thesis, envelope, climblab, corrected, calibrated };
 
 const std::vector<std::pair<std::string, Method>>& method_names();
-std::string name_of(Method method);  // its name, as flags and files have it
+std::string name_of(Method method);  // as in flags and files
 
 struct GripperMaskOptions {
   Method method = Method::corrected;
   double voxel_size_m = 0.01;
-  int extra_void_layers = 1;  // H_add; ClimbLab's mask has none
-  double load_n = 5.0;        // of method calibrated
+  int extra_void_layers = 1;  // H_add; not used by climblab
+  double load_n = 5.0;        // calibrated only
 };
 
-// side x side x layers voxels. z = 0 is the lowest layer, farthest from the palm; the layers with
-// z >= solid_layers are the extra void layers on top. The pivot stands at (pivot_xy, pivot_xy,
-// pivot_z) of the window.
+// Mask of side x side x layers voxels. z = 0 is the lowest layer, farthest from the palm; layers
+// with z >= solid_layers are the extra void layers on top. The pivot is at (pivot_xy, pivot_xy,
+// pivot_z).
 struct GripperMask {
   Method method = Method::corrected;           // never calibrated
-  std::shared_ptr<const ClosingPath> closing;  // of method calibrated, else null
-  // Of `corrected`: what the spines hold falls outward by more than this between these circles.
-  double closed_radius_m = 0.0;  // of the closed spines
-  double open_radius_m = 0.0;    // of the open fingers
+  std::shared_ptr<const ClosingPath> closing;  // calibrated only, else null
+  // corrected only: ground that the spines hold falls outward by more than this between the two
+  // circles.
+  double closed_radius_m = 0.0;  // circle of the closed spines
+  double open_radius_m = 0.0;    // circle of the open fingers
   double min_fall_m = 0.0;
   double voxel_size_m = 0.01;
-  double palm_diameter_m = 0.0;  // of the gripper
+  double palm_diameter_m = 0.0;  // diameter of the gripper's palm
   int side = 0;
   int layers = 0;
   int solid_layers = 0;
   int pivot_xy = 0;
   int pivot_z = 0;
   std::vector<std::uint8_t> solid;    // M, at index(x, y, z)
-  std::vector<std::uint8_t> counted;  // V: voxels that enter SSV and GSV
+  std::vector<std::uint8_t> counted;  // V: voxels counted in SSV and GSV
 
   std::size_t index(int x, int y, int z) const {
     return (static_cast<std::size_t>(z) * static_cast<std::size_t>(side) +
@@ -62,17 +64,17 @@ struct GripperMask {
   bool is_counted(int x, int y, int z) const { return counted[index(x, y, z)] != 0; }
 };
 
-// Throws Error if the gripper breaks a bound, or if the voxel size gives a mask without a layer or
-// without a ring around its center, or one of more than 2^28 voxels (it says how much memory
-// it would take).
+// Makes the mask of a gripper. Throws Error for a gripper value out of range, and for a voxel size
+// whose mask has no layer, no ring around its center or more than 2^28 voxels; the message then
+// contains its memory.
 GripperMask make_gripper_mask(const Gripper& gripper, const GripperMaskOptions& options);
 
-// The mask as text, layer by layer from the lowest: "z 0", then `side` lines (x) of `side`
+// Returns the mask as text, from the lowest layer: "z 0", then `side` lines (x) of `side`
 // characters (y), '1' for solid.
 std::string to_text(const GripperMask& mask);
 
-// A point at the center of each solid voxel, meters, the pivot in the origin, z toward the palm;
-// fields `layer` (0 is the lowest) and `counted`.
+// Returns a point at the center of each solid voxel in meters, pivot at the origin, z toward the
+// palm, with the fields `layer` (0 is the lowest) and `counted`.
 libmap::PointCloud to_cloud(const GripperMask& mask);
 
 }  // namespace libgtd

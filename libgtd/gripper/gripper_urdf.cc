@@ -29,11 +29,11 @@ constexpr double max_length_m = 1.0;
 constexpr double tolerance = 0.1;  // mm or degrees, between fingers
 constexpr double max_spacing_error_deg = 1.0;
 constexpr double min_tangential_cosine = 0.999;  // 2.6 degrees
-constexpr double max_beside_share = 0.05;        // of the distance from the joint
+constexpr double max_beside_share = 0.05;        // fraction of the distance from the joint
 
 double degrees(double radians) { return radians / libmap::radians_per_degree; }
 
-// What urdfdom says of a broken file.
+// Collects the error messages of urdfdom.
 class LastMessage : public console_bridge::OutputHandler {
  public:
   LastMessage() { console_bridge::useOutputHandler(this); }
@@ -66,7 +66,7 @@ Error wrong_joint(const std::string& name, const std::string& reason) {
   return Error(reason, {.field = "joint " + name});
 }
 
-// An angle as a function of that of a joint that mimics none.
+// Angle as a linear function of the angle of a joint that does not mimic another.
 struct Drive {
   std::string joint;
   double multiplier = 1.0;
@@ -79,12 +79,12 @@ class Robot {
     const LastMessage message;
     model_ = urdf::parseURDF(xml);
     if (!model_)
-      throw Error("is no URDF" + (message.first().empty() ? "" : ": " + message.first()));
+      throw Error("is not a URDF" + (message.first().empty() ? "" : ": " + message.first()));
     for (const auto& [name, joint] : model_->joints_) {
       const auto [other, is_new] = parent_of_.emplace(joint->child_link_name, joint.get());
       if (!is_new)
-        throw wrong_joint(name, "its child " + joint->child_link_name + " is also that of joint " +
-                                    other->second->name);
+        throw wrong_joint(name, "its child " + joint->child_link_name +
+                                    " is also the child of joint " + other->second->name);
     }
   }
 
@@ -98,7 +98,7 @@ class Robot {
     if (found == model_->joints_.end()) throw missing(key, name, names_of(model_->joints_));
     return *found->second;
   }
-  // Through all joints that mimic each other.
+  // Follows all joints that mimic each other.
   Drive drive_of(const urdf::Joint& joint) const {
     Drive drive;
     const urdf::Joint* at = &joint;
@@ -115,14 +115,14 @@ class Robot {
   bool has_link(const std::string& name) const { return model_->links_.contains(name); }
   std::vector<std::string> joint_names() const { return names_of(model_->joints_); }
 
-  // The frame of link `from` to that of `link`, which fixed joints connect.
+  // Pose of link `link` in the frame of link `from`, connected by fixed joints.
   Pose fixed_pose(const std::string& from, const std::string& link) const {
     Pose pose = Pose::Identity();
     std::string at = link;
     for (std::size_t step = 0; at != from; ++step) {
       const auto found = parent_of_.find(at);
       if (found == parent_of_.end() || step > parent_of_.size())
-        throw Error("no chain of joints leads to it from link " + from, {.field = "link " + link});
+        throw Error("is not connected by joints to link " + from, {.field = "link " + link});
       const urdf::Joint& joint = *found->second;
       if (joint.type != urdf::Joint::FIXED)
         throw wrong_joint(joint.name, "moves between links " + from + " and " + link +
@@ -147,7 +147,7 @@ class Robot {
   }
 
   urdf::ModelInterfaceSharedPtr model_;
-  std::map<std::string, const urdf::Joint*> parent_of_;  // by the child link
+  std::map<std::string, const urdf::Joint*> parent_of_;  // key: child link
 };
 
 struct FingerNames {
@@ -162,8 +162,8 @@ std::string with_star(const std::string& pattern, const std::string& text) {
                                    : pattern.substr(0, star) + text + pattern.substr(star + 1);
 }
 
-// The joints that fit the pattern and have a spine joint or a tip of the same text:
-// "finger_1_tip_joint" fits "finger_*_joint" too.
+// Joints that match the pattern and have a spine joint or tip with the same text for '*':
+// "finger_1_tip_joint" matches "finger_*_joint", too.
 std::vector<FingerNames> matching_fingers(const UrdfMapping& mapping, const Robot& robot) {
   const std::string& pattern = mapping.finger_joint;
   const std::size_t star = pattern.find('*');
@@ -180,7 +180,7 @@ std::vector<FingerNames> matching_fingers(const UrdfMapping& mapping, const Robo
       fingers.push_back(finger);
   }
   if (fingers.empty())
-    throw Error("no joint of the URDF has such a name, and a spine joint or tip of the same",
+    throw Error("no joint of the URDF has a matching name and a spine joint or tip for it",
                 {.field = "urdf.finger_joint", .value = pattern});
   return fingers;
 }
@@ -193,14 +193,14 @@ std::vector<FingerNames> finger_names(const UrdfMapping& mapping, const Robot& r
   const auto spines = libmap::split_list(mapping.spine_joint);
   const auto tips = libmap::split_list(mapping.tip_link);
   if (joints.empty() || joints.size() != spines.size() || joints.size() != tips.size())
-    throw Error("urdf.finger_joint, urdf.spine_joint and urdf.tip_link list as many names each",
+    throw Error("urdf.finger_joint, urdf.spine_joint and urdf.tip_link differ in number of names",
                 {.field = "urdf.finger_joint", .value = pattern});
   for (std::size_t n = 0; n < joints.size(); ++n)
     fingers.push_back({joints[n], spines[n], tips[n]});
   return fingers;
 }
 
-// One finger in the palm's frame, turned so that the palm's axis is z: toward the ground.
+// One finger in the frame of the palm, rotated so that z is the palm's axis toward the ground.
 class Finger {
  public:
   Finger(const Robot& robot, const UrdfMapping& mapping, const FingerNames& names,
@@ -254,27 +254,27 @@ class Finger {
  private:
   static void require_limits(const urdf::Joint& joint) {
     if (joint.type != urdf::Joint::REVOLUTE || !joint.limits)
-      throw wrong_joint(joint.name, "is not revolute with limits: they are wide open and closed");
+      throw wrong_joint(joint.name, "is not revolute with limits (open and closed finger)");
     for (const double limit : {joint.limits->lower, joint.limits->upper})
       if (!(std::abs(limit) <= 2.0 * std::numbers::pi))
-        throw Error("a URDF is in radians", {.field = "limit of joint " + joint.name,
-                                             .value = libmap::to_text(limit),
-                                             .bound = ">= -2 pi and <= 2 pi"});
+        throw Error("expected radians", {.field = "limit of joint " + joint.name,
+                                         .value = libmap::to_text(limit),
+                                         .bound = ">= -2 pi and <= 2 pi"});
     if (!(joint.limits->lower < joint.limits->upper))
-      throw Error("no range to move in", {.field = "upper limit of joint " + joint.name,
-                                          .value = libmap::to_text(joint.limits->upper),
-                                          .bound = "> " + libmap::to_text(joint.limits->lower)});
+      throw Error("no range of motion", {.field = "upper limit of joint " + joint.name,
+                                         .value = libmap::to_text(joint.limits->upper),
+                                         .bound = "> " + libmap::to_text(joint.limits->lower)});
   }
   void require_length(const std::string& what, double length_m) const {
     if (!(length_m > 0.0 && length_m <= max_length_m))
-      throw Error("a URDF is in meters", {.field = what + " of joint " + joint_.name,
-                                          .value = libmap::to_text(length_m),
-                                          .bound = "> 0 and <= 1 m"});
+      throw Error("expected meters", {.field = what + " of joint " + joint_.name,
+                                      .value = libmap::to_text(length_m),
+                                      .bound = "> 0 and <= 1 m"});
   }
   void require_tangential(const urdf::Joint& joint, const Eigen::Vector3d& axis) const {
     const double cosine = std::abs(axis.dot(tangent()));
     if (!(cosine >= min_tangential_cosine))
-      throw Error("the finger must turn in the plane of the palm's axis",
+      throw Error("the finger must rotate in the plane of the palm's axis",
                   {.field = "axis of joint " + joint.name,
                    .value = libmap::to_fixed_text(degrees(std::acos(std::min(1.0, cosine))), 1) +
                             " deg from tangential",
@@ -294,16 +294,17 @@ class Finger {
       spine = spine * Eigen::AngleAxisd(spine_angle, axis_of(spine_));
     return spine * tip_pose_.translation();
   }
-  // Outward, and toward the ground. Throws Error for what is beside the finger's plane.
+  // Coordinates outward and toward the ground. Throws Error for a vector outside the plane of the
+  // finger.
   Eigen::Vector2d in_plane(const Eigen::Vector3d& vector) const {
     const double beside_m = std::abs(vector.dot(tangent()));
     if (beside_m > max_beside_share * vector.norm())
       throw wrong_joint(joint_.name, "its finger is " +
                                          libmap::to_fixed_text(1000.0 * beside_m, 1) +
-                                         " mm beside the plane of the palm's axis");
+                                         " mm outside the plane of the palm's axis");
     return {vector.head<2>().dot(outward_), vector.z()};
   }
-  // From the palm's axis, outward.
+  // Angle from the palm's axis, outward.
   double angle_of(const Eigen::Vector3d& vector) const {
     const Eigen::Vector2d flat = in_plane(vector);
     return std::atan2(flat.x(), flat.y());
@@ -315,17 +316,17 @@ class Finger {
     const double inward = finger_angle(angle) - angle_of(tip(angle, spine_angle) - carrier(angle));
     return std::remainder(inward, 2.0 * std::numbers::pi);
   }
-  // Of the spine joint, when nothing touches the finger.
+  // Angle of the spine joint without contact.
   double rest(double angle) const {
     if (spine_.mimic) return coupling_ * angle + coupling_offset_;
     if (spine_.type != urdf::Joint::REVOLUTE) return 0.0;
     return std::clamp(0.0, spine_.limits->lower, spine_.limits->upper);
   }
 
-  // The spine's angle as a function of the finger's, if one motor drives both.
+  // Angle of the spine as a function of the finger's, if one motor drives both.
   void couple(const Drive& spine, const Drive& finger) {
     if (spine.joint != finger.joint || finger.multiplier == 0.0)
-      throw wrong_joint(spine_.name, "mimics another joint than " + joint_.name);
+      throw wrong_joint(spine_.name, "mimics a joint other than " + joint_.name);
     coupling_ = spine.multiplier / finger.multiplier;
     coupling_offset_ = spine.offset - coupling_ * finger.offset;
   }
@@ -341,12 +342,12 @@ class Finger {
   const urdf::Joint& joint_;
   const urdf::Joint& spine_;
   Pose joint_pose_ = Pose::Identity();
-  Pose spine_pose_ = Pose::Identity();  // in the finger's link
-  Pose tip_pose_ = Pose::Identity();    // in the carrier's link
+  Pose spine_pose_ = Pose::Identity();  // in the frame of the finger's link
+  Pose tip_pose_ = Pose::Identity();    // in the frame of the carrier's link
   Eigen::Vector2d outward_ = Eigen::Vector2d::Zero();
   double open_ = 0.0;
   double closed_ = 0.0;
-  double coupling_ = 0.0;  // of a spine joint that mimics
+  double coupling_ = 0.0;  // factor of a spine joint that mimics
   double coupling_offset_ = 0.0;
 };
 
@@ -356,7 +357,7 @@ Eigen::Matrix3d axis_from_palm(const UrdfMapping& mapping) {
   for (Eigen::Index n = 0; n < 3 && words.size() == 3; ++n)
     axis[n] = libmap::parse_double(words[static_cast<std::size_t>(n)]).value_or(0.0);
   if (!axis.allFinite() || !(axis.norm() > 0.0))
-    throw Error("is no direction",
+    throw Error("not a direction",
                 {.field = "urdf.palm_axis", .value = mapping.palm_axis, .bound = "X,Y,Z"});
   return Eigen::Quaterniond::FromTwoVectors(axis, Eigen::Vector3d::UnitZ()).toRotationMatrix();
 }
@@ -378,7 +379,7 @@ void require_even(const std::vector<Finger>& fingers) {
   azimuths.push_back(azimuths.front() + 360.0);
   for (std::size_t n = 1; n < azimuths.size(); ++n)
     if (!(std::abs(azimuths[n] - azimuths[n - 1] - step) <= max_spacing_error_deg))
-      throw Error("fingers are spaced evenly around the palm",
+      throw Error("fingers must be evenly spaced around the palm",
                   {.field = "angle between finger joints",
                    .value = libmap::to_fixed_text(azimuths[n] - azimuths[n - 1], 1) + " deg",
                    .bound = libmap::to_fixed_text(step, 1) + " +- 1 deg"});
@@ -395,15 +396,15 @@ Measures derive(const Robot& robot, const UrdfMapping& mapping) {
     for (const auto& [key, value] : fingers[n].measures())
       if (!(std::abs(value - values.at(key)) <= tolerance))
         throw wrong_joint(names[n].finger_joint,
-                          "its finger has another " + key + " than that of joint " +
-                              names.front().finger_joint + ": " + libmap::to_fixed_text(value, 2) +
-                              ", not " + libmap::to_fixed_text(values.at(key), 2));
+                          "its finger differs from that of joint " + names.front().finger_joint +
+                              " in " + key + ": " + libmap::to_fixed_text(value, 2) + ", not " +
+                              libmap::to_fixed_text(values.at(key), 2));
   require_even(fingers);
   values["fingers.count"] = static_cast<double>(fingers.size());
   if (const auto diameter_m = palm_diameter_m(palm))
     values["palm_diameter_mm"] = 1000.0 * *diameter_m;
   Measures measures;
-  // URDFs have radians with some digits: 75, not 74.99999999.
+  // Rounds, because URDFs contain radians with few digits: 75, not 74.99999999.
   for (const auto& [key, value] : values)
     measures.emplace_back(key, libmap::to_text(std::round(value * 1e4) / 1e4));
   return measures;
@@ -414,17 +415,17 @@ Measures derive(const Robot& robot, const UrdfMapping& mapping) {
 void bind(libmap::ParameterTable& table, UrdfMapping& mapping) {
   table.add("urdf.file", mapping.file, "URDF, relative to the gripper file");
   table.add("urdf.palm_link", mapping.palm_link,
-            "link whose origin is the center of the palm's face");
+            "link with its origin at the center of the palm's face");
   table.add("urdf.palm_axis", mapping.palm_axis,
-            "X,Y,Z in the palm link's frame, from the palm toward the ground");
+            "X,Y,Z in the frame of the palm link, from the palm toward the ground");
   table.add("urdf.finger_joint", mapping.finger_joint, "revolute joint between palm and finger");
   table.add("urdf.spine_joint", mapping.spine_joint, "joint between finger and spine carrier");
-  table.add("urdf.tip_link", mapping.tip_link, "link whose origin is the spine's tip");
+  table.add("urdf.tip_link", mapping.tip_link, "link with its origin at the spine tip");
 }
 
 Measures measures_of_urdf(const std::string& xml, const UrdfMapping& mapping) {
   return libmap::run_guarded<Measures>(
-      max_data_bytes, "is broken: urdfdom crashed on it",
+      max_data_bytes, "is damaged: urdfdom crashed on it",
       [&] { return derive(Robot(xml), mapping); },
       [](auto& pipe, Measures& measures) {
         pipe.size(measures);

@@ -25,43 +25,44 @@ namespace {
 constexpr int azimuths = 16;
 constexpr int gap_columns = 3;
 constexpr int closing_block_columns = 64;
-// The open finger rests on the ground: only what rises more than rounding into its way is met.
+// The open finger rests on the ground. Only ground that is higher by more than rounding is in its
+// way.
 constexpr double palm_clearance_m = 1e-5;
 constexpr double unknown = -std::numeric_limits<double>::infinity();
-// Of where the gripper comes to rest, in lengths of a finger: the standard deviation of a normal
-// distribution that is cut at twice of it. Pose and tilt of the palm, the azimuths of its fingers
-// and the width of a column all blur what it meets; this value makes the verdicts of the virtual
-// field test on the fitted sites nearly as likely as any larger one.
+// Standard deviation of the resting position, in finger lengths, of a normal distribution truncated
+// at twice this value. It covers pose and tilt of the palm, azimuths of the fingers and width of a
+// column. With this value the verdicts of the virtual field test on the fitted sites are nearly as
+// likely as with any larger one.
 constexpr double spread = 0.25;
 constexpr double max_deviations = 2.0;
 
-// Fitted to trials of the virtual field test (grasp) on simulated rocks, slopes, walls and
-// primitive shapes with the three grippers and 16 parameter sets, by the likelihood that a trial
-// reaches each of nine loads. With the mean c, the mean of ln C and its spread of the columns whose
-// C is above `floor_of_capacity`, their share p, and the spread v of a finger's pull on level
-// ground:
+// Coefficients fitted to trials of the virtual field test (grasp) on simulated rocks, slopes, walls
+// and shapes with the three grippers and 16 parameter sets of each, by the likelihood that a trial
+// reaches each of nine loads. With the mean c of C, of the columns whose C is above
+// `floor_of_capacity` the mean of ln C, its spread and their fraction p, and the spread v of a
+// finger's pull on level ground (FingerPulls::spreads):
 //   P(force > 0) = logistic(1.154 + 1.813 p + 3.586 contact + 0.811 ln(c + offset) - 0.990 v),
 //   mean ln(force / closing forces) = 0.487 + 0.983 ln C - 0.529 rise + 1.305 tilt - 1.067 v,
 //   ln(spread of ln force) = -1.660 + 1.068 spread(ln C) + 1.014 v.
-// contact: share of the azimuths, on the weakest side, where spines meet the ground; rise of the
-// palm above the voxel and tilt, the imbalance of the contacts' depths, in lengths of a finger. The
-// weakest of several random pulls is the smaller, the more they differ: hence v.
+// contact: fraction of the azimuths with spine contact on the weakest side; rise of the palm above
+// the voxel; tilt: imbalance of the depths of the contacts. Both in finger lengths. The weakest of
+// several random pulls decreases with their spread, hence v.
 constexpr float floor_of_capacity = 0.0005F;
 constexpr float offset_of_capacity = 0.003F;
 constexpr float largest_capacity = 0.55F;
-// The distribution of ln(force) between trials: beta(4, 2), which is skewed to small forces; its
-// standard deviation, and its mean from the upper end.
+// Distribution of ln(force) between trials: beta(4, 2), skewed to small forces. Its standard
+// deviation, and its mean from the upper end.
 constexpr float beta_spread = 0.17817416F;
 constexpr float beta_mean = 1.0F / 3.0F;
-// The forces at which the distribution over all sets is computed: from 0.2 N to 1.3 kN, and the
-// load.
+// Number of forces at which the distribution over all sets is computed: from 0.2 N to 1.3 kN, and
+// the load.
 constexpr std::size_t force_steps = 48;
 constexpr float first_log_force = -1.6F;
 constexpr float log_force_step = 0.19F;
 
 constexpr std::array<double, 5> dual_steps{0.0, 0.5, 1.0, 2.0, 4.0};  // u
 
-// Places around a pivot as columns, for one azimuth.
+// Position relative to a pivot as a column, for one azimuth.
 struct RayCell {
   int i = 0;
   int j = 0;
@@ -75,20 +76,20 @@ struct Rest {
 };
 
 struct Rays {
-  std::vector<Rest> rests;    // where the gripper may come to rest
+  std::vector<Rest> rests;    // possible resting columns
   std::vector<RayCell> palm;  // depth 0
-  std::vector<RayCell> open;  // of all azimuths
+  std::vector<RayCell> open;  // all azimuths
   std::array<std::vector<RayCell>, azimuths> closing;
   std::array<Eigen::Vector2d, azimuths> outward;
-  // Weights of an azimuth for each side: of a half, 1 in sum over the azimuths; and of the duals,
-  // of pulls and of pushes.
+  // Weights per side and azimuth: of the half plane (sum 1), of the duals, of pulls and of pushes.
   using BySide = std::array<float, azimuths>;
   std::array<BySide, azimuths> half{};
   std::array<std::array<BySide, azimuths>, dual_steps.size()> pull{};
   std::array<std::array<BySide, azimuths>, dual_steps.size()> push{};
 };
 
-// Whether a place in this column has not been as deep before: else it would have met the ground.
+// Returns true if no earlier position in this column is as deep. Otherwise that position would have
+// met the ground.
 bool is_new(const std::vector<RayCell>& cells, const RayCell& next) {
   return std::none_of(cells.begin(), cells.end(), [&](const RayCell& cell) {
     return cell.i == next.i && cell.j == next.j && cell.depth >= next.depth;
@@ -105,7 +106,7 @@ Rays make_rays(const ClosingPath& path, double voxel_size_m) {
   const int farthest = rest_columns(path, voxel_size_m);
   for (int i = -farthest; i <= farthest; ++i)
     for (int j = -farthest; j <= farthest; ++j)
-      // Every second column: neighbors are alike.
+      // Every second column, because neighbors are similar.
       if (const double distance = std::hypot(i, j) / sigma;
           distance <= max_deviations && (i + j) % 2 == 0)
         rays.rests.push_back({{i, j}, std::exp(-0.5 * distance * distance)});
@@ -126,7 +127,7 @@ Rays make_rays(const ClosingPath& path, double voxel_size_m) {
       if (const RayCell next = cell(place); is_new(rays.closing[static_cast<std::size_t>(a)], next))
         rays.closing[static_cast<std::size_t>(a)].push_back(next);
   }
-  double sum = 0.0;  // of a half
+  double sum = 0.0;  // of a half plane
   for (int a = 0; a < azimuths; ++a)
     sum += std::max(0.0, std::cos(2.0 * std::numbers::pi * a / azimuths));
   for (std::size_t a = 0; a < azimuths; ++a)
@@ -143,7 +144,7 @@ Rays make_rays(const ClosingPath& path, double voxel_size_m) {
   return rays;
 }
 
-// The heights of a rectangle of columns, and how they fall.
+// Heights and gradients of a rectangle of columns.
 class Heights {
  public:
   Heights(const VoxelGrid& grid, const TileBounds& bounds)
@@ -151,7 +152,7 @@ class Heights {
     const auto size =
         static_cast<std::size_t>(bounds.i_end - bounds.i_begin) * static_cast<std::size_t>(width_);
     heights_.assign(size, unknown);
-    // In voxels of the lattice, from its origin; ascending, so that the highest of a column is
+    // In voxels from the origin of the lattice. Voxels ascend, so that the highest of a column is
     // last.
     visit_columns(grid, bounds, [&](std::size_t at) {
       const Voxel& voxel = grid.voxels[at];
@@ -170,7 +171,7 @@ class Heights {
   }
   std::size_t size() const { return heights_.size(); }
   double height(std::size_t at) const { return heights_[at]; }
-  // From the first of the cells around a column that has ground to the lowest one.
+  // Fall from the first cell with ground around a column to the lowest cell.
   double fall(std::size_t at, const std::vector<RayCell>& cells) const {
     double first = unknown;
     double lowest = std::numeric_limits<double>::infinity();
@@ -233,8 +234,8 @@ GRASPMAP_CLONED void add_scaled(const float* __restrict values, float weight,
   for (std::size_t n = 0; n < count; ++n) sums[n] += weight * values[n];
 }
 
-// Sums over columns of each parameter set: of the weights of those with a capacity, of ln C and its
-// square there, and of C.
+// Sums over columns per parameter set: weights, ln C and its square of columns with a capacity, and
+// C of all columns.
 struct SetSums {
   std::vector<float> weights, logs, squares, capacities;
 
@@ -245,7 +246,7 @@ struct SetSums {
   }
 };
 
-// `logs` is 0 where a capacity is not above the floor.
+// Adds a column. `logs` is 0 if a capacity is not above the floor.
 GRASPMAP_CLONED_CHOICE void add_column(const float* __restrict capacities,
                                        const float* __restrict logs, float weight, SetSums& sums) {
   float* __restrict weights = sums.weights.data();
@@ -261,14 +262,14 @@ GRASPMAP_CLONED_CHOICE void add_column(const float* __restrict capacities,
   }
 }
 
-// The distribution of a force: with this probability above 0, then beta(4, 2) of its logarithm.
+// Distribution of a force: > 0 with this probability, its logarithm then beta(4, 2).
 struct SetForces {
   std::vector<float> probability, log_force, spread, scale;  // scale: beta_spread / spread
 };
 
-// exp and ln to 2e-4, of which a loop computes several at once.
+// exp and ln with error 2e-4, vectorizable.
 [[gnu::always_inline]] inline float quick_exp(float x) {
-  const float power = x * 1.44269504F + 127.0F;  // of 2, biased
+  const float power = x * 1.44269504F + 127.0F;  // power of 2, biased
   const auto whole = static_cast<std::int32_t>(power);
   const float part = power - static_cast<float>(whole);
   const float scale = std::bit_cast<float>(whole << 23);
@@ -283,7 +284,8 @@ struct SetForces {
                  part * (-0.49190F + part * (0.28947F + part * (-0.13606F + part * 0.03215F))));
 }
 
-// Capacities with the bound of lateral pulls, and their logarithms, 0 up to the floor.
+// Applies the bound of lateral pulls to capacities and computes their logarithms, 0 up to the
+// floor.
 GRASPMAP_CLONED_CHOICE void bound_capacities(float* __restrict capacities, float* __restrict logs,
                                              std::size_t sets) {
   for (std::size_t s = 0; s < sets; ++s) {
@@ -294,11 +296,11 @@ GRASPMAP_CLONED_CHOICE void bound_capacities(float* __restrict capacities, float
   }
 }
 
-// The distribution of each set's force by the coefficients; `mean` in lengths of a finger.
+// Computes the distribution of the force of each set by the coefficients; `mean` in finger lengths.
 struct MeanTerms {
   float contact = 0.0F;
-  float bias = 0.0F;     // of ln(force) by rise and tilt
-  float weights = 0.0F;  // of all columns
+  float bias = 0.0F;     // terms of rise and tilt in ln(force)
+  float weights = 0.0F;  // sum over all columns
 };
 GRASPMAP_CLONED_CHOICE void find_forces(const SetSums& sums, const MeanTerms& mean,
                                         const float* __restrict log_scale,
@@ -385,7 +387,7 @@ class BlockCloser {
     for (const ParameterSet& set : path.sets) weights_.push_back(static_cast<float>(set.weight));
   }
 
-  // The pivot's column must have ground.
+  // Requires ground in the column of the pivot.
   ForceEstimate force(std::size_t pivot, double pivot_height) {
     Met mean;
     double weights = 0.0;
@@ -411,15 +413,15 @@ class BlockCloser {
   }
 
  private:
-  // The state of a gripper that comes to rest on a column.
+  // State of a gripper at rest on a column.
   struct Met {
     double contact = 0.0;
     double palm = 0.0;   // height, m
     double tilt = 0.0;   // m
-    std::size_t at = 0;  // of its capacities and their logarithms
+    std::size_t at = 0;  // offset of its capacities and their logarithms
   };
   struct Contacts {
-    SideValues are_there{};  // 1, else 0
+    SideValues are_there{};  // 1 with contact, else 0
     std::array<int, azimuths> fall_deg{};
     SideValues upright{};  // cosine of the fall
   };
@@ -461,7 +463,8 @@ class BlockCloser {
     return met;
   }
 
-  // The side is that of the gripper file's own parameters: pulls rise with the fall for all sets.
+  // Weakest side for the parameters of the gripper file. It is used for all sets, because pulls of
+  // all sets increase with the fall.
   std::size_t weakest_side(const Contacts& contacts) const {
     SideValues pulls{};
     SideValues pushes{};
@@ -567,10 +570,10 @@ class BlockCloser {
   std::vector<std::ptrdiff_t> palm_;
   std::vector<std::ptrdiff_t> open_;
   std::array<std::vector<std::ptrdiff_t>, azimuths> closing_;
-  std::vector<std::optional<Met>> met_;  // of each column, once it is needed
-  std::vector<float> capacities_;        // of the columns met, in closing forces of all fingers
+  std::vector<std::optional<Met>> met_;  // per column, computed on demand
+  std::vector<float> capacities_;        // per computed column, in closing forces of all fingers
   std::vector<float> logs_;
-  std::vector<float> weights_;    // of the sets
+  std::vector<float> weights_;    // of the parameter sets
   ForceGrid log_forces_{};        // a grid, then the load
   std::vector<float> log_scale_;  // ln of the closing force of all fingers, N
   SetSums sums_;
@@ -578,7 +581,7 @@ class BlockCloser {
   std::vector<float> scratch_;
 };
 
-// From the circle of the closed spines outward, as columns around a pivot.
+// Columns around a pivot from the circle of the closed spines outward.
 std::vector<RayCell> outward_cells(const GripperMask& mask, double angle) {
   std::vector<RayCell> cells;
   const auto first = static_cast<int>(mask.closed_radius_m / mask.voxel_size_m);
@@ -593,8 +596,8 @@ std::vector<RayCell> outward_cells(const GripperMask& mask, double angle) {
   return cells;
 }
 
-// Calls use(members, heights) for each block of pivots, which are numbers in `pivots`, with the
-// heights of all columns within `reach` of them; in parallel.
+// Calls use(members, heights) in parallel for each block of pivots. `members` are indices in
+// `pivots`; `heights` covers all columns within `reach` of them.
 template <typename Use>
 void for_each_block(const VoxelGrid& grid, const std::vector<std::size_t>& pivots, int reach,
                     const Use& use) {
@@ -621,7 +624,8 @@ void for_each_block(const VoxelGrid& grid, const std::vector<std::size_t>& pivot
 }  // namespace
 
 int closing_reach_voxels(const ClosingPath& path, double voxel_size_m) {
-  // A place may be rounded half a column outward; its fall looks one farther, and gaps are filled.
+  // A position may be rounded half a column outward, its fall uses one more column, and gaps are
+  // filled.
   return static_cast<int>(std::ceil(path.reach_m() / voxel_size_m + 0.5)) + 1 + gap_columns +
          rest_columns(path, voxel_size_m);
 }

@@ -24,10 +24,11 @@ constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 void check(const FootholdOptions& options, const FootholdFrame& frame) {
   libmap::check_parameters(options);
   if (!(frame.up.norm() > 0.0) || !frame.up.allFinite())
-    throw libmap::Error("has no length", {.field = "up"});
+    throw libmap::Error("has length zero or is not finite", {.field = "up"});
 }
 
-// Calls use(index) for the points within `radius_m` of `place`, which is at most a cell's edge.
+// Calls use(index) for the points within `radius_m` of `place`; `radius_m` is at most the edge of a
+// cell.
 template <typename Use>
 void for_each_near(const PointGrid& grid, const std::vector<Eigen::Vector3d>& positions,
                    const Eigen::Vector3d& place, double radius_m,
@@ -80,7 +81,7 @@ class FootholdSearch {
     return map.find_field("hold_probability") != nullptr;
   }
 
-  // For each point, 1 or 0; empty if the map does not say and the options do not ask.
+  // Returns 1 or 0 per point; empty if the map has no such field and the options do not need it.
   std::vector<double> graspable_points() const {
     if (is_tested(map_)) {
       std::vector<double> graspable;
@@ -94,7 +95,7 @@ class FootholdSearch {
   std::vector<Foothold> find_candidates(std::size_t& at_border) const {
     const std::vector<double> graspable = graspable_points();
     const ScalarField* force = is_tested(map_) ? map_.find_field("holding_force_n") : nullptr;
-    // Maps of earlier versions call it edge.
+    // The field is called edge in maps of earlier versions.
     const char* name = map_.find_field("edge") != nullptr ? "edge" : "border";
     const std::vector<double>* border = options_.border ? nullptr : &values_of(map_, name);
     std::vector<Foothold> candidates;
@@ -113,7 +114,7 @@ class FootholdSearch {
       candidate.force_n = force != nullptr ? force->values[n] : 0.0;
       candidate.approach = approach_at(n);
     }
-    // Those in one place follow each other and have the same surroundings, however many they are.
+    // Coincident points are adjacent and share their surroundings.
     std::vector<std::size_t> order(candidates.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
     const auto is_before = [&](std::size_t a, std::size_t b) {
@@ -140,7 +141,7 @@ class FootholdSearch {
     return map_.positions[foothold.map_point];
   }
 
-  // Against the axis of the mask that was matched. From zero, so that no component is -0.
+  // Opposite to the axis of the matched mask. Subtracted from zero, so that no component is -0.
   Eigen::Vector3d approach_at(std::size_t point) const {
     const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
     if (!map_.has_normals()) return zero - up_;
@@ -161,7 +162,7 @@ class FootholdSearch {
       weights += 1.0 - share;
       if (!graspable.empty() && graspable[point] != 0.0) ++foothold.graspable_points;
     });
-    // A separation whose square is nothing weighs no point.
+    // If the square of the separation underflows, no point has a weight.
     foothold.mean_score = weights > 0.0 ? sum / weights : foothold.score;
   }
 
@@ -169,7 +170,7 @@ class FootholdSearch {
     std::vector<std::size_t> places;
     places.reserve(footholds.size());
     for (const Foothold& foothold : footholds) places.push_back(foothold.map_point);
-    PointCloud surface;  // without what the map may hold else
+    PointCloud surface;  // positions and normals only
     surface.positions = map_.positions;
     surface.normals = map_.normals;
     const CurvatureResult shape = estimate_curvature(
@@ -198,15 +199,15 @@ class FootholdSearch {
 
 void bind(libmap::ParameterTable& table, FootholdOptions& options) {
   table.add("separation_m", options.separation_m, libmap::positive,
-            "no two footholds lie nearer to each other, m");
-  table.add("min_score", options.min_score, libmap::zero_to_one, "least score of a foothold");
+            "minimum distance between footholds, m");
+  table.add("min_score", options.min_score, libmap::zero_to_one, "minimum score of a foothold");
   table.add("graspable_only", options.graspable_only,
-            "only voxels that are graspable, or whose hold_probability is at least one half");
-  table.add("border", options.border, "also where the mask's window leaves the scanned area");
+            "only voxels that are graspable or have a hold_probability of at least 0.5");
+  table.add("border", options.border, "includes voxels whose mask window leaves the scanned area");
   table.add("surface_radius_m", options.surface_radius_m, libmap::positive,
-            "radius in which the surface's normal and curvatures are fitted, m");
+            "radius of the normal and curvature fits, m");
   table.add("max_count", options.max_count, libmap::not_negative,
-            "the best footholds alone; 0 for all");
+            "maximum number of footholds; 0: no limit");
 }
 
 FootholdResult find_footholds(const PointCloud& map, const FootholdOptions& options,
@@ -240,7 +241,7 @@ PointCloud to_cloud(const FootholdResult& result, const PointCloud& map) {
 }
 
 void describe(libmap::ResultTable& table, const FootholdResult& result) {
-  table.add("candidates", result.candidates, "map points that may be a foothold");
+  table.add("candidates", result.candidates, "map points that meet the options");
   table.add("candidates_at_border", result.at_border,
             "candidates left out at the border of the scan");
 }

@@ -1,4 +1,4 @@
-// The best places of a map, for a planner of steps.
+// Selects the best positions of a map as footholds for a step planner.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,60 +12,61 @@
 namespace libgtd {
 
 struct FootholdOptions {
-  double separation_m = 0.1;  // > 0: no two footholds lie nearer to each other
-  double min_score = 0.0;     // of a foothold
-  // Where the map has hold_probability: at least one half. Else where it is `graspable`.
+  double separation_m = 0.1;  // minimum distance between footholds, > 0
+  double min_score = 0.0;     // minimum score of a foothold
+  // Only graspable points: hold_probability of at least one half, or `graspable` if the map has no
+  // hold_probability.
   bool graspable_only = true;
-  bool border = false;             // also where the mask's window leaves the scanned area
-  double surface_radius_m = 0.05;  // > 0: the surface's normal and curvatures are fitted within
-  int max_count = 0;               // the best ones alone; 0: all
+  bool border = false;             // includes points at the border of the scanned area
+  double surface_radius_m = 0.05;  // radius of the normal and curvature fits, > 0
+  int max_count = 0;               // maximum number of footholds; 0: no limit
 };
 void bind(libmap::ParameterTable& table, FootholdOptions& options);
 
-// What is known of the frame of the map's points.
+// Frame of the map's points.
 struct FootholdFrame {
-  Eigen::Vector3d up = Eigen::Vector3d::UnitZ();  // outside of the regression plane
+  Eigen::Vector3d up = Eigen::Vector3d::UnitZ();  // outward normal of the regression plane
 };
 
 struct Foothold {
-  std::size_t map_point = 0;
-  double score = 0.0;    // the map's hold_probability if it has this field, else its score
-  double force_n = 0.0;  // the map's holding_force_n, else 0: orders equal scores
-  // Mean score of the map points within half of the separation, weighted by Epanechnikov's kernel:
-  // of equal scores and forces the one with the larger mean comes first, the middle of a plateau
-  // rather than its border.
+  std::size_t map_point = 0;  // index in the map
+  double score = 0.0;         // hold_probability if the map has this field, else the score
+  double force_n = 0.0;       // holding_force_n of the map, else 0; orders equal scores
+  // Mean score of the map points within half of the separation, weighted by the Epanechnikov
+  // kernel. It orders footholds of equal score and force: the middle of a plateau precedes its
+  // border.
   double mean_score = 0.0;
-  std::size_t graspable_points = 0;  // within half of the separation
-  // Of the surface: unit normal outward (where the map's normals face, else up), principal
-  // curvatures in 1/m as in curvature.h, angle between normal and up. NaN where they could not be
-  // fitted.
+  std::size_t graspable_points = 0;  // graspable points within half of the separation
+  // Unit surface normal, outward (the side of the map's normals, or else up), principal curvatures
+  // in 1/m as in curvature.h, and the angle between normal and up. NaN if the fit failed.
   Eigen::Vector3f normal = Eigen::Vector3f::Zero();
   float k1 = 0.0F;
   float k2 = 0.0F;
   double slope_deg = 0.0;
-  // Unit vector along which the gripper comes, against the axis of the mask that was matched: the
-  // map's normal if it has normals, else up.
+  // Unit direction of the approach, opposite to the axis of the matched mask. The axis is the
+  // normal of the map, or up if the map has no normals.
   Eigen::Vector3d approach = Eigen::Vector3d::Zero();
 };
 
 struct FootholdResult {
   std::vector<Foothold> footholds;  // best first
-  std::size_t candidates = 0;       // map points that may be one
-  std::size_t at_border = 0;        // would be candidates, but for the option `edges`
+  std::size_t candidates = 0;       // map points that meet the options
+  std::size_t at_border = 0;        // points excluded only because of the border
 };
-// Names the results of a search (libmap/core/result_table.h).
+// Binds the names of the results (libmap/core/result_table.h).
 void describe(libmap::ResultTable& table, const FootholdResult& result);
 
-// Local maxima of the score by non-maximum suppression: the best candidate is a foothold, those
-// nearer to it than the separation are none, and so on. Of equals, the order of the map's points
-// decides. Throws Error: an empty map, one without a field that the options need ("score",
-// "graspable", "border"), options out of their bounds, an `up` of no length.
+// Finds local maxima of the score by non-maximum suppression: the best candidate becomes a
+// foothold, and candidates closer to it than the separation are dropped; this repeats. Points that
+// are equal in all criteria keep the order of the map. Throws Error for an empty map, a missing
+// field that the options need ("score", "graspable", "border"), options out of range, and an `up`
+// of length zero.
 FootholdResult find_footholds(const libmap::PointCloud& map, const FootholdOptions& options = {},
                               const FootholdFrame& frame = {});
 
-// A point for each: its place, normal and color; the map's own fields, but for slope_deg, which is
-// that of this normal; mean_score, graspable_points, approach_x, approach_y, approach_z, slope_deg,
-// k1, k2.
+// Returns one point per foothold with position, normal, color and the fields of the map, followed
+// by mean_score, graspable_points, approach_x, approach_y, approach_z, slope_deg, k1, k2. slope_deg
+// is that of the fitted normal and replaces the map's field.
 libmap::PointCloud to_cloud(const FootholdResult& result, const libmap::PointCloud& map);
 
 }  // namespace libgtd

@@ -34,7 +34,7 @@ void append(PointCloud& whole, const PointCloud& part) {
     const ScalarField* other = part.find_field(field.name);
     if (other == nullptr || part.fields.size() != whole.fields.size())
       throw libmap::Error("the parts have different fields", {.field = field.name});
-    // Text files do not say their types: a part of whole numbers alone is read as int32.
+    // Text files have no types: a part that contains only integers is read as int32.
     if (field.type != other->type) field.type = ScalarType::float64;
     add(field.values, other->values);
   }
@@ -104,7 +104,7 @@ PointCloud to_cloud(const GraspabilityMap& map, MapFrame frame) {
 std::size_t add_obstacles(PointCloud& map, double voxel_size_m, const ObstacleOptions& options) {
   const ScalarField* slopes = map.find_field(slope_field);
   if (slopes == nullptr)
-    throw libmap::Error("not a map with slopes: it has no such field", {.field = slope_field});
+    throw libmap::Error("the map has no slopes: the field is missing", {.field = slope_field});
   const std::vector<Obstacle> obstacles = find_obstacles(
       VoxelFields(map).all(), std::vector<float>(slopes->values.begin(), slopes->values.end()),
       voxel_size_m, options);

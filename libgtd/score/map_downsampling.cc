@@ -11,12 +11,13 @@ namespace libgtd {
 
 namespace {
 
-// Twice the distance of a column from its square's middle, along one axis.
+// Twice the distance of a column from the middle of its square, along one axis.
 std::int64_t off_middle(int column, int square, int width) {
   return std::abs(2 * (column - std::int64_t{square} * width) - (width - 1));
 }
 
-// The point nearest the middle of each square of columns, or of each cube, the highest of equals.
+// Keeps the point nearest to the middle of each square of columns or cube, the highest of equally
+// near ones.
 libmap::PointCloud thin(const libmap::PointCloud& map, int width, bool by_layers) {
   const VoxelFields voxels(map);
   struct Candidate {

@@ -1,4 +1,5 @@
-// Fewer points of a map for pictures of large ones.
+// Downsamples large maps for images. Maps are clouds made by to_cloud. All functions throw Error
+// for a map without the fields i, j, k.
 #pragma once
 
 #include "libgtd/score/tile_store.h"
@@ -6,18 +7,18 @@
 
 namespace libgtd {
 
-// One point for each square of `width` x `width` columns of the lattice that holds any: the
-// uppermost of the column nearest to the square's middle, with its own values, so that each value
-// is about as frequent as among all points. Ascending by square. Downsampling parts and then their
-// union gives what downsampling the union at once gives. `map` is made by to_cloud.
+// Keeps one point for each square of `width` x `width` columns that contains any: the uppermost
+// point of the column nearest to the middle of the square. Its values are unchanged, so that the
+// distribution of each value is about that of all points. Ascending by square. Downsampling parts
+// and then their union gives the same result as downsampling the union.
 libmap::PointCloud downsample_map(const libmap::PointCloud& map, int width);
 
-// One point for each cube of `width`^3 voxels of the lattice that holds any: that of the voxel
-// nearest to the cube's middle, of several as near the uppermost. Steep faces keep their points.
-// Ascending by cube. `map` is made by to_cloud.
+// Keeps one point for each cube of `width`^3 voxels that contains any: the voxel nearest to the
+// middle of the cube, and the uppermost of equally near ones. Steep faces keep their points.
+// Ascending by cube.
 libmap::PointCloud thin_map_in_cubes(const libmap::PointCloud& map, int width);
 
-// Moves each point, level, to the middle of its square: to a lattice again.
+// Moves each point horizontally to the middle of its square, so that the points form a lattice.
 void center_in_squares(const TileStoreIndex& index, int width, libmap::PointCloud& map);
 
 }  // namespace libgtd

@@ -13,7 +13,7 @@ namespace {
 
 using libmap::Manifest;
 
-// The first parameter of `one` that `other` does not have with the same value.
+// Returns the first parameter of `one` that `other` lacks or has with another value.
 std::optional<std::string> differing_parameter(const Manifest& one, const Manifest& other) {
   for (const auto& [key, value] : one.parameters) {
     if (key == "tile") continue;
@@ -25,15 +25,15 @@ std::optional<std::string> differing_parameter(const Manifest& one, const Manife
 
 void require_same_map(const Manifest& first, const Manifest& other, const std::string& first_name,
                       const std::string& name) {
-  // Another version may score the same points otherwise.
+  // Other versions may score the same points differently.
   if (other.version != first.version)
     throw libmap::Error(
         "was scored by another version than " + first_name,
         {.file = name, .field = "version", .value = other.version, .bound = first.version});
   std::optional<std::string> key = differing_parameter(first, other);
-  if (!key) key = differing_parameter(other, first);  // one that only the other has
+  if (!key) key = differing_parameter(other, first);  // parameters that only the other has
   if (key) throw libmap::Error("differs from that of " + first_name, {.file = name, .field = *key});
-  // The terrain and the gripper file.
+  // Inputs are the terrain and the gripper file.
   const auto same = [](const libmap::ManifestInput& a, const libmap::ManifestInput& b) {
     return a.sha256 == b.sha256;
   };
@@ -42,13 +42,13 @@ void require_same_map(const Manifest& first, const Manifest& other, const std::s
     throw libmap::Error("was scored from other inputs than " + first_name, {.file = name});
 }
 
-// "K/N"; empty if it is none.
+// Returns "K/N", or an empty text if the manifest is not that of a share.
 std::string share_text(const Manifest& manifest) {
   const auto* share = std::get_if<std::string>(manifest.find_parameter("tile"));
   return share == nullptr ? std::string() : *share;
 }
 
-// The shares K/N are 1 to N, each once.
+// Throws Error unless each of the shares 1/N to N/N is given once.
 void require_all_shares(const std::vector<Manifest>& manifests,
                         const std::vector<std::string>& files) {
   std::set<std::string> shares;
@@ -80,7 +80,7 @@ void require_shares_of_one_map(const std::vector<Manifest>& manifests,
                                const std::vector<std::string>& files) {
   for (std::size_t n = 0; n < manifests.size(); ++n) {
     if (!is_map_share(manifests[n]))
-      throw libmap::Error("is no share of a map, and only shares are merged", {.file = files[n]});
+      throw libmap::Error("is not a share of a map; only shares can be merged", {.file = files[n]});
     require_same_map(manifests.front(), manifests[n], files.front(), files[n]);
   }
   require_all_shares(manifests, files);

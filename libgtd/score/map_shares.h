@@ -1,4 +1,4 @@
-// Shares of a map in files of their own, as `graspmap score --tile K/N` writes them.
+// Joins shares of a map that `graspmap score --tile K/N` wrote into separate files.
 #pragma once
 
 #include <cstddef>
@@ -11,20 +11,22 @@
 
 namespace libgtd {
 
-// Whether the manifest is that of one of several shares.
+// Returns true if the manifest describes one of several shares.
 bool is_map_share(const libmap::Manifest& manifest);
 
-// Throws Error naming one of `files`, unless they are all shares of one map, each once.
+// Throws Error naming one of `files` unless they are all shares of one map, each exactly once.
 void require_shares_of_one_map(const std::vector<libmap::Manifest>& manifests,
                                const std::vector<std::string>& files);
 
-// Parameters, frame, transforms and those results of a share or tile that the whole map has, too.
+// Copies parameters, frame, transforms and those results of a share or tile that are valid for the
+// whole map.
 void copy_common_facts(const libmap::Manifest& part, libmap::Manifest& whole);
 
-// Adds obstacles with the parameters of a share, and returns their number.
+// Adds obstacles with the parameters of a share and returns the number of obstacle points. Throws
+// like add_obstacles.
 std::size_t add_obstacles_of(const libmap::Manifest& part, libmap::PointCloud& whole);
 
-// Points whose flag is set.
+// Returns the number of points whose field `flag` is 1; 0 if the map has no such field.
 std::int64_t count_set(const libmap::PointCloud& map, const char* flag);
 
 }  // namespace libgtd

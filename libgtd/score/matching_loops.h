@@ -1,6 +1,6 @@
-// The innermost loops of voxel matching, upright and tilted, each for several instruction sets,
-// with the same bits from each. Plain pointers only: sources that are compiled for more than the
-// base instruction set must see no type whose inline functions other sources compile too.
+// Inner loops of upright and tilted voxel matching, compiled for several instruction sets with
+// identical results. The interface uses plain pointers only: sources compiled for more than the
+// base instruction set must not see types with inline functions that other sources compile, too.
 #pragma once
 
 #include <cstddef>
@@ -10,20 +10,21 @@
 
 namespace libgtd {
 
-// 64 bytes of a mask: the bits of up to 32 neighboring columns, 16 layers each.
+// 64 bytes of a mask: bits of up to 32 neighboring columns, 16 layers each.
 struct MaskChunk {
   static constexpr std::size_t columns = 32;
   alignas(64) std::uint16_t bits[columns];
 };
 
-// From the terrain's lattice, in voxels, into a pivot's own, whose cell 0, 0, 0 is the pivot's.
+// Transform from the lattice of the terrain, in voxels, to the lattice of a pivot, whose cell (0,
+// 0, 0) contains the pivot.
 struct TiltedLattice {
-  double origin[3];   // center of that cell
-  double axes[3][3];  // one after the other
+  double origin[3];   // center of cell (0, 0, 0)
+  double axes[3][3];  // axes[n] is axis n
 };
 
-// A box of tilted voxels, from `low` on, and the numbers that they go by; a layer's stride of 0
-// gives a column's voxels one number.
+// Box of tilted voxels that starts at `low`, and the strides of their numbers. A stride of 0 for
+// layers gives all voxels of a column the same number.
 struct TiltedBox {
   int low[3];
   int size[3];
@@ -31,36 +32,37 @@ struct TiltedBox {
 };
 
 struct MatchingLoops {
-  // find_cells works on so many points at once.
+  // Number of points that find_cells processes at once.
   static constexpr std::size_t lanes = 8;
 
-  // For each origin the sum over all chunks of popcount(window[origin + offset ...] & chunk), where
-  // origins and offsets count 16-bit words. Reads 64 bytes at each of them.
+  // For each origin, computes the sum over all chunks of popcount(window[origin + offset ...] &
+  // chunk). Origins and offsets are in 16-bit words. Reads 64 bytes at each of them.
   void (*count)(const std::uint16_t* window, const std::uint32_t* origins, std::size_t origin_count,
                 const MaskChunk* chunks, const std::uint32_t* offsets, std::size_t chunk_count,
                 std::uint32_t* counts);
-  // Moves the bits of each column down by 1 <= distance < 16 layers; `planes` arrays of `columns`
-  // words one after the other hold layers 0..15, 16..31, ... Zeros come in at the top.
+  // Moves the bits of each column down by 1 <= distance < 16 layers and fills with zeros. `planes`
+  // contains layers 0..15, 16..31, ... as consecutive arrays of `columns` words.
   void (*lower)(std::uint16_t* planes, std::size_t plane_count, std::size_t columns,
                 unsigned distance);
   // sums[n] += entering[n] - leaving[n].
   void (*slide)(std::uint16_t* sums, const std::uint16_t* entering, const std::uint16_t* leaving,
                 std::size_t count);
-  // For each place the sum of `length` values of `sums` from there on. Reads up to 64 bytes beyond.
+  // For each index in `places`, computes the sum of `length` values of `sums` from there. Reads up
+  // to 64 bytes beyond.
   void (*add_runs)(const std::uint16_t* sums, const std::uint32_t* places, std::size_t place_count,
                    std::size_t length, std::uint32_t* totals);
 
-  // Writes the number of the voxel of each point that lies in the box, in the points' order, and
-  // returns how many do. `points` are coordinates one axis after the other; they are read, and as
-  // many cells may be written, up to a full set of lanes beyond `count`: of those too, so that some
-  // points may come twice.
+  // Writes the voxel number of each point inside the box, in the order of the points, and returns
+  // the number of values. `points` are coordinates, one array per axis. Up to a full set of lanes
+  // beyond `count` is read and included in the result, so that some points may occur twice; `cells`
+  // needs the same room.
   std::size_t (*find_cells)(const double* const points[3], std::size_t count,
                             const TiltedLattice& lattice, const TiltedBox& box, int* cells);
-  // How many bits two sets have in common.
+  // Returns the number of common bits of two sets.
   std::uint32_t (*count_common)(const std::uint64_t* a, const std::uint64_t* b, std::size_t words);
 };
 
-// Of instructions that the processor has.
+// Returns the loops for an instruction set, which the processor must support.
 const MatchingLoops& matching_loops_of(libmap::InstructionSet instructions);
 
 }  // namespace libgtd

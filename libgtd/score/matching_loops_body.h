@@ -1,10 +1,11 @@
-// The functions of matching_loops.h but for their instruction set; for matching_loops.cc alone.
+// Bodies of the functions of matching_loops.h, compiled once per instruction set by
+// matching_loops.cc.
 
 using Words [[gnu::vector_size(GRASPMAP_REGISTER)]] = std::uint64_t;
 using Numbers [[gnu::vector_size(GRASPMAP_REGISTER)]] = std::uint32_t;
 
-// add_bits adds the population counts of words, or of bytes, of at most 8 each; of max_added
-// registers; widen makes those of words.
+// add_bits adds the population counts of words, or of bytes, of at most 8 each. At most max_added
+// registers are summed before widen converts the counts to words.
 #if GRASPMAP_REGISTER == 64
 
 constexpr std::size_t max_added = std::size_t{1} << 32;
@@ -15,7 +16,7 @@ inline void widen(Words&) {}
 
 #elif GRASPMAP_REGISTER == 32
 
-// By a table of nibbles (Mula, Kurz, Lemire 2018, section 3.1).
+// Table of nibbles (Mula, Kurz, Lemire 2018, section 3.1).
 constexpr std::size_t max_added = 31;
 inline void add_bits(const Words& v, Words& counts) {
   const __m256i table = _mm256_setr_epi8(0, 1, 1, 2, 1, 2, 2, 3, 1, 2, 2, 3, 2, 3, 3, 4,  //
@@ -30,7 +31,7 @@ inline void widen(Words& counts) {
 
 #else
 
-// Of pairs of bits, then of nibbles (Warren, Hacker's Delight, 5-1).
+// Counts pairs of bits, then nibbles (Warren, Hacker's Delight, 5-1).
 constexpr std::size_t max_added = 31;
 inline void add_bits(const Words& v, Words& counts) {
   const Words pairs = v - ((v >> 1) & 0x5555555555555555U);
@@ -44,7 +45,7 @@ inline void widen(Words& counts) {
 
 #endif
 
-// For `group` pivots at once, which share the loads of the mask.
+// Counts `group` pivots at once, which share the loads of the mask.
 template <std::size_t group>
 inline void count_group(const std::uint16_t* window, const std::uint32_t* origins,
                         const MaskChunk* chunks, const std::uint32_t* offsets,
@@ -107,13 +108,13 @@ void slide(std::uint16_t* sums, const std::uint16_t* entering, const std::uint16
     sums[n] = static_cast<std::uint16_t>(sums[n] + entering[n] - leaving[n]);
 }
 
-// The sums of two neighbors.
+// Sums of pairs of neighbors.
 inline Numbers pairs_of(const Numbers& sums) { return (sums & 0xffff) + (sums >> 16); }
 
 void add_runs(const std::uint16_t* sums, const std::uint32_t* places, std::size_t place_count,
               std::size_t length, std::uint32_t* totals) {
   constexpr std::size_t step = sizeof(Numbers) / sizeof(std::uint16_t);
-  std::uint16_t kept[step] = {};  // of the last register
+  std::uint16_t kept[step] = {};  // values of the last register
   for (std::size_t y = 0; y < length % step; ++y) kept[y] = 0xffff;
   Numbers last, loaded;
   __builtin_memcpy(&last, kept, sizeof(Numbers));
@@ -163,7 +164,7 @@ std::size_t find_cells(const double* const points[3], std::size_t count,
       __builtin_memcpy(&loaded, points[a] + k, sizeof(Lanes));
       offset[a] = loaded - lattice.origin[a];
     }
-    Lanes cell = {};  // whole numbers
+    Lanes cell = {};  // integers
     Marks is_inside = {};
     is_inside -= 1;
 #pragma GCC unroll 3
@@ -172,7 +173,7 @@ std::size_t find_cells(const double* const points[3], std::size_t count,
       const Lanes place = axis[0] * offset[0] + axis[1] * offset[1] + axis[2] * offset[2] + 0.5;
       const double begin = box.low[a];
       const double end = begin + box.size[a];
-      is_inside &= (place >= begin) & (place < end);  // false for what is not a number
+      is_inside &= (place >= begin) & (place < end);  // false for NaN
       cell += (floor_of(is_inside ? place : Lanes{}) - begin) * box.stride[a];
     }
 #if GRASPMAP_REGISTER == 64

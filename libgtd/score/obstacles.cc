@@ -14,7 +14,7 @@ namespace libgtd {
 
 namespace {
 
-// The most that two voxels are apart along an axis.
+// Maximum index difference of two voxels along an axis.
 int extent_of(const std::vector<Voxel>& voxels) {
   if (voxels.empty()) return 0;
   Voxel low = voxels.front();
@@ -26,7 +26,7 @@ int extent_of(const std::vector<Voxel>& voxels) {
   return std::max({high.i - low.i, high.j - low.j, high.k - low.k});
 }
 
-// Of voxels; each goes by its first one.
+// Sets of voxels, identified by their first voxel.
 using VoxelSets = libmap::DisjointSets<std::size_t>;
 
 struct Rise {
@@ -40,7 +40,7 @@ struct Rise {
 
 void check(const std::vector<Voxel>& voxels, const std::vector<float>& slopes_deg) {
   if (voxels.size() != slopes_deg.size())
-    throw libmap::Error("not as many as there are voxels",
+    throw libmap::Error("number of slopes differs from number of voxels",
                         {.field = "slopes_deg",
                          .value = std::to_string(slopes_deg.size()),
                          .bound = std::to_string(voxels.size())});
@@ -52,7 +52,7 @@ void check(const std::vector<Voxel>& voxels, const std::vector<float>& slopes_de
 void check(double voxel_size_m, const ObstacleOptions& options) {
   const auto require = [](bool sound, const char* name, double value, const char* bound) {
     if (!sound || !std::isfinite(value))
-      throw libmap::Error("obstacles cannot be evaluated by it",
+      throw libmap::Error("out of range",
                           {.field = name, .value = libmap::to_text(value), .bound = bound});
   };
   require(voxel_size_m > 0.0, "voxel_size_m", voxel_size_m, "> 0");
@@ -60,7 +60,7 @@ void check(double voxel_size_m, const ObstacleOptions& options) {
   require(options.normal_radius_m >= 0.0, "normal_radius_m", options.normal_radius_m, ">= 0");
 }
 
-// The foot and top of each face, at its first voxel.
+// Foot and top of each face, stored at its first voxel.
 std::vector<Rise> measure_faces(const std::vector<Voxel>& voxels,
                                 const std::vector<std::uint8_t>& is_steep, VoxelSets& faces,
                                 double radius_voxels) {
@@ -68,7 +68,7 @@ std::vector<Rise> measure_faces(const std::vector<Voxel>& voxels,
   for (std::size_t n = 0; n < voxels.size(); ++n)
     if (is_steep[n] != 0) rises[faces.find(n)].hold(voxels[n].k);
   const double square = radius_voxels * radius_voxels;
-  // No further than any two voxels are apart: a radius may be larger than an int can be.
+  // Limited by the extent of the voxels: a larger radius might overflow an int.
   const double reach = std::min(radius_voxels, static_cast<double>(extent_of(voxels)));
   constexpr double max_reach = 1e5;
   if (reach > max_reach)
@@ -86,7 +86,7 @@ std::vector<Rise> measure_faces(const std::vector<Voxel>& voxels,
   return rises;
 }
 
-// The region with the most voxels, by its first one; voxels.size() if there is none.
+// Returns the first voxel of the region with the most voxels, or voxels.size() if there is none.
 std::size_t find_ground(const std::vector<Obstacle>& obstacles, VoxelSets& regions) {
   std::vector<std::size_t> counts(obstacles.size(), 0);
   std::size_t ground = obstacles.size();
@@ -104,7 +104,7 @@ std::vector<Obstacle> find_obstacles(const std::vector<Voxel>& voxels,
                                      const ObstacleOptions& options) {
   check(voxels, slopes_deg);
   check(voxel_size_m, options);
-  // A hair less, so that a rise of exactly the limit does not depend on the last bit.
+  // Slack, so that a rise of exactly the limit does not depend on rounding.
   const double limit = options.height_m / voxel_size_m * (1.0 + 1e-9);
   std::vector<std::uint8_t> is_steep(voxels.size(), 0);
   for (std::size_t n = 0; n < voxels.size(); ++n)

@@ -1,5 +1,4 @@
-// Which columns of voxels were scanned: those with voxels, closed over the gaps that a cloud has
-// between its points.
+// Scanned columns of voxels: the occupied columns, closed over the gaps between points.
 #pragma once
 
 #include <cstddef>
@@ -10,19 +9,19 @@
 
 namespace libgtd {
 
-// Gaps of up to twice this are closed.
+// Half of the maximum width of gaps that are closed.
 inline constexpr int scan_gap_voxels = 3;
 
-// Columns as a summed-area table (Crow 1984): how many columns of a rectangle are set.
+// Set of columns as a summed-area table (Crow 1984), for counting the set columns of a rectangle.
 class ColumnSums {
  public:
   explicit ColumnSums(const TileBounds& bounds);  // no column is set
 
   const TileBounds& bounds() const { return bounds_; }
   void set(int i, int j) { sums_[at(i + 1, j + 1)] = 1; }
-  // After the last set().
+  // Builds the table. Must be called once, after the last set() and before count().
   void accumulate();
-  // Of the rectangle, cut to the table.
+  // Returns the number of set columns in the rectangle, clipped to the table.
   std::uint32_t count(TileBounds part) const;
 
  private:
@@ -36,13 +35,14 @@ class ColumnSums {
   std::vector<std::uint32_t> sums_;
 };
 
-// The rectangle with `below` columns more at its low sides and `above` at its high ones.
+// Returns the rectangle extended by `below` columns at its low sides and `above` at its high sides.
 TileBounds grown(const TileBounds& bounds, int below, int above);
-// The columns from i - below to i + above, and the same of j.
+// Returns the columns from i - below to i + above, and the same range around j.
 TileBounds columns_around(int i, int j, int below, int above);
 
-// The columns of `bounds` that are not in the closing (morphological, by a square of
-// scan_gap_voxels to each side) of the occupied ones, which are known twice that far beyond.
+// Returns the columns of `bounds` that are not in the morphological closing (by a square of
+// scan_gap_voxels to each side) of the occupied columns. `occupied` must cover twice that distance
+// beyond `bounds`.
 ColumnSums unscanned_columns(const ColumnSums& occupied, const TileBounds& bounds);
 ColumnSums unscanned_columns(const VoxelGrid& grid, const TileBounds& bounds);
 

@@ -15,40 +15,38 @@ const std::vector<std::pair<std::string, Orientation>>& orientation_names() {
 void bind(libmap::ParameterTable& table, Scenario& scenario) {
   using libmap::not_negative;
   using libmap::positive;
-  table.add(
-      "method", scenario.method, method_names(),
-      "calibrated: the probability to hold; corrected: the shape alone; or a program before it");
+  table.add("method", scenario.method, method_names(),
+            "calibrated: hold probability; corrected: shape only; others: earlier programs");
   table.add("gripper", scenario.gripper, "scar-e, hubrobo, limbero, or a gripper file");
   table.add("voxel_size_m", scenario.voxel_size_m, positive, "edge of a voxel, m");
   table.add("extra_void_layers", scenario.extra_void_layers, {0, 10000},
             "void layers on top of the gripper mask (H_add), voxels");
   table.add("solid_voxel_threshold", scenario.solid_voxel_threshold, {1, 2147483647},
-            "fewer solid voxels around a pivot lower its score (TSV)");
+            "number of solid voxels below which the score is reduced (TSV)");
   table.add("load_n", scenario.load_n, positive,
-            "pull in any direction whose hold probability method calibrated predicts, N");
+            "pull for which method calibrated predicts the hold probability, N");
   table.add(
       "zero_plane_m", scenario.zero_plane_m, libmap::any_number,
-      "height in the terrain frame below which nothing is a target, m; auto: 0; not of method "
-      "calibrated");
-  table.add("interpolation", scenario.interpolation, "fill gaps by Delaunay interpolation");
+      "minimum height of a target in the terrain frame, m; auto: 0; not used by method calibrated");
+  table.add("interpolation", scenario.interpolation, "fills gaps by Delaunay interpolation");
   table.add("interpolation_max_edge_m", scenario.interpolation_max_edge_m, not_negative,
-            "longest edge of a triangle that is filled, m; 0 for no limit");
+            "maximum edge of an interpolated triangle, m; 0: no limit");
   table.add("graspability_threshold", scenario.graspability_threshold, libmap::zero_to_one,
-            "least score of a graspable voxel; auto: 0.8; not of method calibrated");
+            "minimum score of a graspable voxel; auto: 0.8; not used by method calibrated");
   table.add("probability_threshold", scenario.probability_threshold, libmap::zero_to_one,
-            "least hold probability of a graspable voxel, of method calibrated");
+            "minimum hold probability of a graspable voxel, method calibrated");
   table.add("curvature_radius_m", scenario.curvature_radius_m, not_negative,
-            "radius in which curvature is measured, m; 0: convexity is not evaluated");
+            "radius of the curvature fits, m; 0: convexity is not evaluated");
   table.add("intersection_distance_m", scenario.intersection_distance_m, positive,
-            "a voxel this close to a convex point counts as convex, m");
+            "maximum distance of a convex voxel from a convex point, m");
   table.add("orientation", scenario.orientation, orientation_names(),
-            "plane: the mask stands upright; surface: along the surface's normal at each voxel");
+            "axis of the mask: normal of the plane, or of the surface at each voxel");
   table.add("normal_radius_m", scenario.normal_radius_m, not_negative,
-            "radius in which the surface's normal is fitted, m; 0: the gripper's palm diameter");
+            "radius of the surface normal fits, m; 0: palm diameter of the gripper");
   table.add("obstacle_height_m", scenario.obstacle_height_m, not_negative,
-            "steep faces that rise more than this are obstacles, m; 0: not evaluated");
+            "minimum rise of a steep face that is an obstacle, m; 0: not evaluated");
   table.add("obstacle_slope_deg", scenario.obstacle_slope_deg, {0.0, 180.0},
-            "slope beyond which a face is steep, degrees; 0: not evaluated");
+            "minimum slope of a steep face, degrees; 0: not evaluated");
   table.add("tile_size_m", scenario.tile_size_m, positive, "edge of a tile, m");
   table.add_overrides("gripper", scenario.gripper_overrides);
 }
@@ -79,7 +77,7 @@ void Scenario::check() const {
   libmap::check_parameters(*this);
   if (orientation == Orientation::surface &&
       (method == Method::thesis || method == Method::envelope || method == Method::calibrated))
-    throw libmap::Error("not with method " + name_of(method) + ", which knows no tilted mask",
+    throw libmap::Error("not supported by method " + name_of(method),
                         {.field = "orientation",
                          .value = "surface",
                          .bound = "plane, or method corrected or climblab"});

@@ -38,7 +38,7 @@ void require_room(const Voxel& voxel, const char* field) {
             "within +-2^29");
 }
 
-// Far more than memory holds, and sums over tiles do not overflow.
+// Rejects counts larger than any memory, so that sums over tiles do not overflow.
 std::uint64_t voxel_count_at(const Json& json, const char* key) {
   const auto count = libmap::integer_at<std::uint64_t>(json, key);
   require(count <= std::uint64_t{1} << 36U, key, std::to_string(count), "<= 2^36");
@@ -86,7 +86,7 @@ StoredTile tile_from(const Json& json, const TileStoreIndex& index) {
   tile.max = voxel_from(json.at("max"));
   tile.voxels = voxel_count_at(json, "voxels");
   tile.occupied_voxels = voxel_count_at(json, "occupied_voxels");
-  // Stores of earlier versions call it edge_voxels.
+  // The key is called edge_voxels in stores of earlier versions.
   tile.border_voxels =
       voxel_count_at(json, json.contains("edge_voxels") ? "edge_voxels" : "border_voxels");
   tile.graspable_voxels = voxel_count_at(json, "graspable_voxels");
@@ -102,7 +102,7 @@ StoredTile tile_from(const Json& json, const TileStoreIndex& index) {
     require(tile.file.empty(), "file of tile " + name, tile.file, "empty: it has no voxels");
     return tile;
   }
-  // 64 bits: the numbers may be anything.
+  // 64 bits, because the numbers are not checked yet.
   const auto is_between = [&](std::int64_t first, std::int64_t low, std::int64_t high) {
     return low >= first * tile_voxels && high < (first + 1) * tile_voxels && low <= high;
   };
@@ -167,17 +167,18 @@ TileStoreIndex index_from(const Json& json, const std::string& file) {
   return index;
 }
 
-// Parses `text` and calls read(json); whatever goes wrong is an Error naming `file`.
+// Parses `text` and calls read(json); converts all errors to Error naming `file`.
 template <typename Read>
 auto read_json(const std::string& text, const std::string& file, const char* what,
                const Read& read) {
   try {
     return read(libmap::parse_json<Json>(text));
   } catch (const nlohmann::json::exception& error) {
-    // "[json.exception.KIND.NUMBER] REASON"
+    // Format: "[json.exception.KIND.NUMBER] REASON"
     const std::string reason = error.what();
-    throw libmap::Error(std::string("is no ") + what + ": " + reason.substr(reason.find("] ") + 2),
-                        {.file = file});
+    throw libmap::Error(
+        std::string("is not a valid ") + what + ": " + reason.substr(reason.find("] ") + 2),
+        {.file = file});
   } catch (const libmap::Error& error) {
     throw error.in_file(file);
   }
@@ -194,23 +195,23 @@ fs::path require_store(const fs::path& store) {
   return store / "index.json";
 }
 
-// The state of a run that has not ended.
+// Error with the progress of an unfinished run.
 libmap::Error not_complete(const fs::path& folder) {
   const MapTileStore store(folder);
   const auto plan = store.plan();
   if (!plan)
-    return libmap::Error("is no tile store: it has no index.json", {.file = folder.string()});
+    return libmap::Error("is not a tile store: it has no index.json", {.file = folder.string()});
   const MapTileStore::Completion completion = store.complete(*plan);
   if (completion.index)
-    return libmap::Error("has all its tiles but no index.json yet: scoring again writes it",
+    return libmap::Error("has all tiles but no index.json; score again to write it",
                          {.file = folder.string()});
   return libmap::Error("is not complete: " + std::to_string(completion.done) + " of " +
                            std::to_string(completion.tiles) +
-                           " tiles are there; scoring again adds the others",
+                           " tiles are done; score again to add the others",
                        {.file = folder.string()});
 }
 
-// A plan lists tiles without voxels, an index does not: they have no file.
+// Removes tiles without voxels, which have no file: a plan lists them, an index does not.
 TileStoreIndex listed(TileStoreIndex index) {
   for (const StoredTile& tile : index.tiles)
     if (tile.voxels == 0)
@@ -245,7 +246,7 @@ TerrainFile terrain_file_from(const Json& json) {
   file.box.min = vector_from(json.at("min"));
   file.box.max = vector_from(json.at("max"));
   if (file.points > 0 && !(file.box.min.array() <= file.box.max.array()).all())
-    throw libmap::Error("is no box",
+    throw libmap::Error("not a box",
                         {.field = "min and max of piece " + file.input.path,
                          .value = Json(json.at("min")).dump() + ", " + Json(json.at("max")).dump(),
                          .bound = "min <= max"});
@@ -275,7 +276,8 @@ std::size_t count_tiles(const TileStoreIndex& index) {
          static_cast<std::size_t>(1 + last.j - first.j);
 }
 
-// Counts of all tiles, including those without a scored voxel. Results that are already set stay.
+// Adds the counts of all tiles, including those without a scored voxel. Results that are already
+// set are kept.
 void add_totals(const std::map<TileNumber, StoredTile>& tiles, TileStoreIndex& index) {
   std::uint64_t occupied = 0, border = 0, graspable = 0;
   for (const auto& [number, tile] : tiles) {
@@ -296,7 +298,7 @@ void add_totals(const std::map<TileNumber, StoredTile>& tiles, TileStoreIndex& i
 
 libmap::Error not_the_tile(const fs::path& path, libmap::ErrorContext context) {
   context.file = path.string();
-  return libmap::Error("is not the tile that the index lists: scoring once more makes it again",
+  return libmap::Error("differs from the tile in the index; score again to replace it",
                        std::move(context));
 }
 

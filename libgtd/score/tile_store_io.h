@@ -1,8 +1,8 @@
-// Maps in tile stores on disk, in libmap's layout (libmap/tiles/tile_store_io.h):
+// Reads and writes maps in tile stores, in the layout of libmap (libmap/tiles/tile_store_io.h):
 //
-//   NAME.tiles/index.json        facts of the whole map and the list of its tiles; written once all
-//                                tiles are done
-//   NAME.tiles/tiles/I_J.pcd     tile (I, J): points and fields as of any map, binary
+//   NAME.tiles/index.json        properties of the map and list of its tiles; written after the
+//                                last tile
+//   NAME.tiles/tiles/I_J.pcd     tile (I, J): points and fields as in any map, binary
 //   NAME.tiles/progress/...      plan and journals
 //
 // libgtd/score/README.md defines each key of the JSON files.
@@ -22,24 +22,26 @@
 
 namespace libgtd {
 
-// Whether the name ends in ".tiles", with or without a '/' after it.
+// Returns true if the name ends with ".tiles" or ".tiles/".
 bool is_tile_store_name(const std::filesystem::path& path);
 
-// Throws Error naming the file: no store, no index (it says how many tiles are done where a run
-// has not ended yet), no index of this format and version, or one whose parts do not fit.
+// Reads the index. Throws Error naming the file if there is no store, no index (the message
+// contains the number of finished tiles of an unfinished run), or an index of another format or
+// version or with inconsistent content.
 TileStoreIndex read_tile_store(const std::filesystem::path& store);
 
-// The same. If all tiles are done and only the index is missing, as after shares that ended at the
-// same time, the index is written first.
+// Reads the index. If it is missing although all tiles are done, as after shares that ended at the
+// same time, it is written first. Throws like read_tile_store.
 TileStoreIndex finish_tile_store(const std::filesystem::path& store);
 
-// The tile's file. Throws Error naming it if it is missing or its size differs from the index.
+// Returns the path of a tile file. Throws Error naming the file if it is missing or its size
+// differs from the index.
 std::filesystem::path tile_path(const std::filesystem::path& store, const StoredTile& tile);
 
-// The same; its SHA-256 must be that of the index, too.
+// Also throws Error if the SHA-256 of the file differs from the index.
 std::filesystem::path checked_tile_path(const std::filesystem::path& store, const StoredTile& tile);
 
-// A file of the terrain. Its size and time identify it without reading it.
+// Input file of the terrain. Size and modification time identify it without reading it.
 struct TerrainFile {
   libmap::ManifestInput input;
   std::int64_t modified_ns = 0;
@@ -49,40 +51,40 @@ struct TerrainFile {
 };
 
 struct TilePlan {
-  std::string key;                                     // of parameters and inputs: key_of
+  std::string key;                                     // hash of parameters and inputs: key_of
   TileStoreIndex index;                                // without tiles and their counts
-  Eigen::Vector3d centroid = Eigen::Vector3d::Zero();  // of the fitted plane
+  Eigen::Vector3d centroid = Eigen::Vector3d::Zero();  // centroid of the fitted plane
   bool has_plane = false;
   std::vector<TerrainFile> terrain;
-  std::vector<StoredTile> kept;  // tiles that are done already
+  std::vector<StoredTile> kept;  // finished tiles of an earlier plan
 };
 
 class MapTileStore : public libmap::TileStore {
  public:
   using TileStore::TileStore;
 
-  // Nothing if there is none. Throws Error naming the file if it is broken.
+  // Returns nullopt if there is no plan. Throws Error naming the file if it is damaged.
   std::optional<TilePlan> plan() const;
   void set_plan(const TilePlan& plan) const;
 
-  // All finished tiles, of any share.
+  // Returns the finished tiles of all shares.
   std::map<TileNumber, StoredTile> done(const TilePlan& plan) const;
-  // Those of `tiles` that are not done or whose file has changed since.
+  // Returns the tiles that are not finished or whose file has changed since.
   std::vector<TileNumber> missing(const TilePlan& plan, const std::vector<TileNumber>& tiles) const;
 
   struct Completion {
-    std::optional<TileStoreIndex> index;  // if all tiles are done
+    std::optional<TileStoreIndex> index;  // nullopt unless all tiles are done
     std::size_t done = 0;
     std::size_t tiles = 0;
   };
-  // Counts the finished tiles of the plan; lists them if all are done.
+  // Counts the finished tiles of the plan; if all are finished, makes the index.
   Completion complete(const TilePlan& plan) const;
-  // Writes the index unless it exists, and before it a manifest beside the store: that of the index
-  // with times and threads of `run`.
+  // Writes the index and, before it, a manifest beside the store: that of the index with times and
+  // threads of `run`. Does nothing if the index exists.
   void write_index(const TileStoreIndex& index, const libmap::Manifest& run = {}) const;
 };
 
-// Lists tiles as done whose files are in place.
+// Adds tiles whose files exist to the journal of finished tiles.
 void add_tiles(const std::vector<StoredTile>& tiles, const std::string& key,
                libmap::TileJournal& journal);
 

@@ -20,11 +20,11 @@ constexpr std::size_t pivots_per_chunk = 4096;
 constexpr std::uint8_t is_pivot = 1;
 constexpr std::uint8_t is_border = 2;
 
-// Of each of the grid's voxels, whether it is a pivot of the tiles, and one at an edge.
+// Flags per voxel of the grid: pivot of the tiles, and pivot at an edge.
 std::vector<std::uint8_t> find_pivots(const VoxelGrid& grid, const GripperMask& mask,
                                       const std::vector<TileBounds>& tiles) {
   std::vector<std::uint8_t> flags(grid.voxels.size(), 0);
-  // The other methods do not score the border at all.
+  // The other methods do not score the border.
   const bool flag_edges = mask.method == Method::corrected;
   libmap::parallel_for(tiles.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t) {
@@ -39,8 +39,8 @@ std::vector<std::uint8_t> find_pivots(const VoxelGrid& grid, const GripperMask& 
   return flags;
 }
 
-// Positions in `pivots`, ascending, of those that lie in one block of columns. A wide tile with few
-// voxels takes memory where they are, not for its whole width.
+// Groups indices in `pivots` by block of columns, ascending. The memory of a wide tile with few
+// voxels is proportional to its voxels, not to its width.
 std::vector<std::vector<std::size_t>> blocks_of(const VoxelGrid& grid, const TileBounds& tile,
                                                 const std::vector<std::size_t>& pivots) {
   constexpr int block_columns = 1024;
@@ -73,7 +73,7 @@ std::vector<TileBounds> make_tiles(const VoxelGrid& grid, int tile_voxels) {
   tiles.reserve(static_cast<std::size_t>(count));
   for (int i = i_first; i <= i_last; ++i)
     for (int j = j_first; j <= j_last; ++j)
-      // Cut to the grid: a tile takes no more memory than the grid's columns do.
+      // Clipped to the grid, so that a tile takes no more memory than the columns of the grid.
       tiles.push_back(
           {std::max(i * tile_voxels, grid.min.i), std::min((i + 1) * tile_voxels, grid.max.i + 1),
            std::max(j * tile_voxels, grid.min.j), std::min((j + 1) * tile_voxels, grid.max.j + 1)});
@@ -114,7 +114,7 @@ std::vector<ScoredVoxel> score_tiles(const VoxelGrid& grid, const GripperMask& m
   const std::vector<VoxelCounts> counts =
       match_voxels(grid, mask, pivots, options.instructions, progress);
   std::vector<ForceEstimate> forces;
-  std::vector<double> shares;  // of method corrected
+  std::vector<double> shares;  // corrected only
   if (mask.closing)
     forces = closing_forces(grid, *mask.closing, pivots);
   else if (mask.method == Method::corrected)

@@ -15,21 +15,21 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// Distance from the pivot's center to the farthest corner of a window, in voxels.
+// Distance from the center of the pivot to the farthest corner of a window, in voxels.
 double matched_reach(const GripperMask& mask) {
   const double across = 0.5 + std::max(mask.pivot_xy, mask.side - mask.pivot_xy - 1);
   const double along = 0.5 + std::max(mask.pivot_z, mask.layers - mask.pivot_z - 1);
   return std::sqrt(2.0 * across * across + along * along);
 }
 
-// The same of the cube in which find_edges looks.
+// Half the side of the cube that find_edges searches, in voxels.
 int edge_half_side(const GripperMask& mask) {
   return std::max(mask.pivot_xy, mask.side - mask.pivot_xy - 1) + 2 * scan_gap_voxels;
 }
 double edge_reach(const GripperMask& mask) { return std::sqrt(3.0) * (edge_half_side(mask) + 0.5); }
 
 double grid_cell_m(const VoxelLattice& lattice, const GripperMask& mask) {
-  // A quarter of the reach, a little more against rounding at the cells' borders.
+  // A quarter of the reach, slightly enlarged for rounding at the cell borders.
   return lattice.voxel_size_m * matched_reach(mask) * (0.25 + 1e-6);
 }
 
@@ -46,15 +46,15 @@ TiltedLattice lattice_of(const TiltedPivot& pivot, const VoxelLattice& terrain) 
 
 constexpr std::size_t tilted_pivots_per_chunk = 4096;
 
-// What the points in each voxel know of the surface in it.
+// Surface data of the points in each voxel.
 struct VoxelPoints {
-  // Mean of the points in the voxel, meters; the voxel's center where there is none.
+  // Mean of the points in the voxel, meters; center of the voxel without points.
   std::vector<Eigen::Vector3d> centroids;
-  // Sum of their normals, each of unit length; zero where none is known.
+  // Sum of their unit normals; zero without normals.
   std::vector<Eigen::Vector3f> outsides;
 };
 
-// For each point the place of its voxel in the list, or voxels.size().
+// Index of the voxel of each point in the list, or voxels.size().
 std::vector<std::size_t> find_voxels(const libmap::PointCloud& terrain, const VoxelLattice& lattice,
                                      const std::vector<Voxel>& voxels) {
   std::vector<std::size_t> places(terrain.size(), voxels.size());
@@ -70,7 +70,8 @@ std::vector<std::size_t> find_voxels(const libmap::PointCloud& terrain, const Vo
   return places;
 }
 
-// Of each of `voxels`, which ascend. Depends on the points in a voxel and their order alone.
+// Computes the data of `voxels`, which ascend. They depend only on the points in a voxel and their
+// order.
 VoxelPoints points_of_voxels(const libmap::PointCloud& terrain, const VoxelLattice& lattice,
                              const std::vector<Voxel>& voxels) {
   const std::vector<std::size_t> places = find_voxels(terrain, lattice, voxels);
@@ -81,7 +82,7 @@ VoxelPoints points_of_voxels(const libmap::PointCloud& terrain, const VoxelLatti
   for (std::size_t n = 0; n < terrain.size(); ++n) {
     const std::size_t at = places[n];
     if (at == voxels.size()) continue;
-    // Relative to the voxel, so that a point far from the origin is as exact as one near it.
+    // Relative to the voxel, so that precision does not depend on the distance from the origin.
     offsets[at] += terrain.positions[n] - lattice.center_of(voxels[at]);
     counts[at] += 1.0;
     if (!terrain.has_normals()) continue;
@@ -111,7 +112,7 @@ std::vector<TiltedPivot> tilt(const std::vector<Voxel>& voxels,
   return pivots;
 }
 
-// Tile by tile, since only the scanned columns nearby are known of one.
+// Tile by tile, because the scanned columns are known only near each tile.
 std::vector<std::uint8_t> find_tilted_edges(const std::vector<Voxel>& voxels,
                                             const std::vector<TiltedPivot>& pivots,
                                             const TiltedTerrain& terrain, const VoxelGrid& grid,
@@ -119,7 +120,7 @@ std::vector<std::uint8_t> find_tilted_edges(const std::vector<Voxel>& voxels,
                                             const std::vector<TileBounds>& tiles) {
   std::vector<std::uint8_t> edges(voxels.size(), 0);
   const int reach = tilted_reach_voxels(mask);
-  VoxelGrid places;  // the pivots, to be cut by tiles
+  VoxelGrid places;  // the pivots, to be split by tiles
   places.voxels = voxels;
   libmap::parallel_for(tiles.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t) {
@@ -141,7 +142,7 @@ std::vector<std::uint8_t> find_tilted_edges(const std::vector<Voxel>& voxels,
 }  // namespace
 
 Matrix3d tilted_axes(const Vector3d& normal) {
-  // The axis of the turn is (-y, x, 0), its angle's cosine z; 1 / (1 + z) = (1 - z) / (x^2 + y^2).
+  // Rotation about (-y, x, 0) by the angle with cosine z; 1 / (1 + z) = (1 - z) / (x^2 + y^2).
   const double x = normal.x(), y = normal.y(), z = normal.z();
   const double square = x * x + y * y;
   Matrix3d axes;
@@ -157,7 +158,7 @@ Matrix3d tilted_axes(const Vector3d& normal) {
 }
 
 int tilted_reach_voxels(const GripperMask& mask) {
-  // The anchor lies in the pivot's voxel or above or below it on the surface's normal.
+  // The anchor is in the voxel of the pivot, or above or below it on the surface normal.
   return static_cast<int>(std::ceil(std::max(matched_reach(mask), edge_reach(mask)) + 2.0));
 }
 
@@ -168,7 +169,7 @@ TiltedTerrain::TiltedTerrain(const std::vector<Vector3d>& points, const VoxelLat
   for (const std::uint32_t n : grid_.order()) cells_.push_back(lattice.cell_of(points[n]));
 }
 
-// The tilted voxels around pivots of one cell of the grid after the other.
+// Tilted voxels around the pivots of one grid cell after another.
 class TiltedTerrain::Window {
  public:
   Window(const TiltedTerrain& terrain, const TiltedBox& box, double reach)
@@ -197,7 +198,7 @@ class TiltedTerrain::Window {
     }
   }
 
-  // Calls visit(number) for the voxel of each point in the box; for some points twice.
+  // Calls visit(number) for the voxel of each point in the box, twice for some points.
   template <typename Visit>
   void visit_cells(const TiltedPivot& pivot, const Visit& visit) {
     const TiltedLattice lattice = lattice_of(pivot, lattice_);
@@ -213,7 +214,7 @@ class TiltedTerrain::Window {
   }
 
  private:
-  // Points of one column of the grid's cells, and the box around them.
+  // Points of one column of grid cells, and their bounding box.
   struct Run {
     std::size_t first;
     std::size_t last;
@@ -221,7 +222,7 @@ class TiltedTerrain::Window {
     double half[3];
   };
 
-  // False if the run's box lies beyond one of the tilted box's faces, as most do.
+  // Returns false if the box of the run is outside a face of the tilted box, as is most frequent.
   bool may_touch(const Run& run, const TiltedLattice& lattice) const {
     for (int a = 0; a < 3; ++a) {
       double place = 0.5;
@@ -253,7 +254,7 @@ std::vector<Vector3d> anchors_of(const std::vector<TiltedPivot>& pivots) {
   return anchors;
 }
 
-// Which voxels of the mask's window are occupied, a bit each, and how many of them count.
+// Bits of the occupied voxels in the window of the mask, and the counts of a pivot.
 class OccupiedBits {
  public:
   explicit OccupiedBits(const GripperMask& mask)
@@ -314,7 +315,7 @@ std::vector<VoxelCounts> TiltedTerrain::match(const std::vector<TiltedPivot>& pi
 
 namespace {
 
-// Looks at the mask's square on the tangent plane, place by place.
+// Searches the square of the mask on the tangent plane, position by position.
 class EdgeSearch {
  public:
   EdgeSearch(const GripperMask& mask, const VoxelLattice& lattice, const ColumnSums& unscanned)
@@ -324,13 +325,13 @@ class EdgeSearch {
                 mask.side - mask.pivot_xy},
         half_(edge_half_side(mask)) {}
 
-  // The columns of a cube.
+  // Columns of a cube.
   TiltedBox box() const {
     const int side = 2 * half_ + 1;
     return {.low = {-half_, -half_, -half_}, .size = {side, side, side}, .stride = {side, 1, 0}};
   }
 
-  // Whether any column below the square was not scanned: decides on most pivots.
+  // Returns true if a column below the square was not scanned. Decides most pivots quickly.
   bool may_be_edge(const TiltedPivot& pivot) const {
     const Matrix3d axes = tilted_axes(pivot.normal);
     const Vector3d origin = lattice_.cell_of(pivot.anchor_m);
@@ -346,7 +347,7 @@ class EdgeSearch {
     return unscanned_.count(below) != 0;
   }
 
-  // `window` looks at box().
+  // Requires `window` to contain box().
   template <typename Window>
   bool is_edge(const TiltedPivot& pivot, Window& window) const {
     ColumnSums occupied({-half_, half_ + 1, -half_, half_ + 1});
@@ -438,7 +439,7 @@ std::vector<ScoredVoxel> score_on_surface(const std::vector<Voxel>& voxels,
   const TiltedTerrain terrain(surface.positions, grid.lattice, mask);
   const std::vector<VoxelCounts> counts = terrain.match(pivots, progress);
   std::vector<std::uint8_t> edges(voxels.size(), 0);
-  // The other methods do not score the border at all.
+  // The other methods do not score the border.
   if (mask.method == Method::corrected)
     edges = find_tilted_edges(voxels, pivots, terrain, grid, mask, tiles);
   std::vector<ScoredVoxel> scored(voxels.size());

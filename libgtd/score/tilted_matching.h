@@ -1,5 +1,5 @@
-// Scoring with the mask tilted to the surface: around each pivot the terrain's points are
-// put into voxels of a lattice of its own, whose third axis is the surface's normal.
+// Scores voxels with the mask tilted to the surface. Around each pivot, the points of the terrain
+// are voxelized on a separate lattice whose third axis is the surface normal.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,35 +16,35 @@ namespace libgtd {
 
 struct TiltedPivot {
   Eigen::Vector3d anchor_m = Eigen::Vector3d::Zero();  // center of the pivot's tilted voxel
-  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();   // of unit length: the mask's axis, outward
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();   // axis of the mask: unit length, outward
 };
 
-// Columns: the axes of the lattice tilted to `normal`, in the terrain frame: the terrain's own,
-// turned the shortest way that brings z to the normal (Moeller and Hughes 1999); for a normal
-// straight down, half a turn about x.
+// Returns the axes of the tilted lattice as columns, in the terrain frame: the terrain axes,
+// rotated by the shortest rotation of z to the normal (Moeller and Hughes 1999). For a normal of
+// -z, half a turn about x.
 Eigen::Matrix3d tilted_axes(const Eigen::Vector3d& normal);
 
-// How many voxels from the pivot's voxel the points may lie that decide on its counts and edge.
+// Returns the maximum distance, in voxels, of points that affect the counts and edge of a pivot.
 int tilted_reach_voxels(const GripperMask& mask);
 
 // Points in the terrain frame, sorted for searches.
 class TiltedTerrain {
  public:
-  // What is given outlives this.
+  // All arguments must outlive this object.
   TiltedTerrain(const std::vector<Eigen::Vector3d>& points, const VoxelLattice& lattice,
                 const GripperMask& mask);
 
-  // Counts of each pivot: a tilted voxel is occupied if a point lies in it, so that a surface
-  // weighs the same whichever way it faces. They depend on nothing else than the points within
-  // reach, not on their order.
+  // Returns the counts of each pivot. A tilted voxel is occupied if it contains a point, so that a
+  // surface counts the same in any orientation. Counts depend only on the points within reach, not
+  // on their order.
   std::vector<VoxelCounts> match(const std::vector<TiltedPivot>& pivots,
                                  libmap::Progress& progress = libmap::no_progress()) const;
 
-  // For each pivot whether the mask leaves the scanned area: a place of its square on the tangent
-  // plane has nothing above or below it along the mask's axis (within half the square and the gaps
-  // that are closed, and closed over gaps as scanned columns are), and lies over a column that was
-  // not scanned. So what is looked past, the air beside a rock, is no edge. `unscanned` holds the
-  // columns within tilted_reach_voxels.
+  // Returns 1 for each pivot whose mask leaves the scanned area, else 0: a position of its square
+  // on the tangent plane has no points above or below it along the axis of the mask (within half
+  // the square plus the closed gaps, and closed over gaps like scanned columns) and is over a
+  // column that was not scanned. Empty space beside a rock is therefore not an edge. `unscanned`
+  // must contain the columns within tilted_reach_voxels.
   std::vector<std::uint8_t> find_edges(const std::vector<TiltedPivot>& pivots,
                                        const ColumnSums& unscanned) const;
 
@@ -54,24 +54,25 @@ class TiltedTerrain {
   const VoxelLattice& lattice_;
   const GripperMask& mask_;
   PointGrid grid_;
-  std::vector<Eigen::Vector3d> cells_;  // of the points, in voxels, in the order of the grid
+  std::vector<Eigen::Vector3d> cells_;  // points in voxels, in the order of the grid
 };
 
-// The pivots of the tiles, ascending, each once.
+// Returns the pivots of the tiles, ascending, each once.
 std::vector<Voxel> pivots_of(const VoxelGrid& grid, const GripperMask& mask,
                              const std::vector<TileBounds>& tiles);
 
-// The surface at the center of each voxel, facing where the normals of the voxel's own points do,
-// or +z where they have none.
+// Returns the surface normal at the center of each voxel, on the side of the normals of the points
+// in the voxel, or of +z if they have none.
 std::vector<SurfaceNormal> normals_at(const std::vector<Voxel>& voxels,
                                       const libmap::PointCloud& surface,
                                       const VoxelLattice& lattice, double radius_m);
 
-// Scores the pivots `voxels` with the mask along `normals`, along +z where there is none. The
-// pivot's tilted voxel has its center where the normal through the voxel's center meets the height
-// of the voxel's points along it: the mask's top layer holds a flat surface whole, whichever way it
-// faces and wherever it cuts through the terrain's voxels. Without a normal it is the voxel itself,
-// so that its counts are those of the upright mask. `surface` are the points that made the voxels.
+// Scores the pivots `voxels` with the mask along `normals`, or along +z for a voxel without a
+// normal. The center of the tilted voxel is on the normal through the center of the voxel, at the
+// mean height of the points of the voxel along the normal. The top layer of the mask thus contains
+// a flat surface completely, in any orientation and position relative to the voxels. Without a
+// normal, the pivot is the voxel itself and has the counts of the upright mask. `surface` contains
+// the points from which the voxels were made.
 std::vector<ScoredVoxel> score_on_surface(const std::vector<Voxel>& voxels,
                                           const std::vector<SurfaceNormal>& normals,
                                           const libmap::PointCloud& surface, const VoxelGrid& grid,

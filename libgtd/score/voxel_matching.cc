@@ -10,8 +10,8 @@ namespace libgtd {
 
 namespace {
 
-// Which bits of a window count, cut into chunks of 32 columns by 16 layers. Chunks that hold no bit
-// are left out, and rows are cut to the columns that do.
+// Counted bits of a window in chunks of 32 columns by 16 layers. Chunks without bits are left out,
+// and rows are clipped to columns with bits.
 struct ChunkedMask {
   struct Place {
     std::size_t plane = 0;  // layers 16 * plane ...
@@ -19,22 +19,22 @@ struct ChunkedMask {
     std::size_t y = 0;
   };
   std::vector<MaskChunk> chunks;
-  std::vector<Place> places;  // of each chunk's first bit
+  std::vector<Place> places;  // position of the first bit of each chunk
 };
 
-// What the loops need of a gripper mask, whatever the block.
+// Data of a gripper mask that are common to all blocks.
 struct MatchingPlan {
   std::size_t side = 0;
   int pivot_xy = 0;
   int pivot_z = 0;
   int layers = 0;
-  int bit_layers = 0;      // layers from the lowest on that hold a bit of a chunk
-  bool counts_all = true;  // V = 1: SSV is a sum over boxes of columns, without a mask
+  int bit_layers = 0;      // layers from the lowest to the highest with a bit
+  bool counts_all = true;  // V = 1 everywhere: SSV is a box sum over columns
   ChunkedMask solid;       // V and M
   ChunkedMask counted;     // V, unless counts_all
 };
 
-// Numbers of 16 bits that begin at a cache line and may be read up to 64 bytes beyond their end.
+// 16-bit numbers, aligned to a cache line and readable up to 64 bytes beyond the end.
 class Lanes {
  public:
   void assign_zeros(std::size_t count) {
@@ -46,31 +46,31 @@ class Lanes {
   std::vector<MaskChunk> lines_;
 };
 
-// Scores blocks one after the other; keeps its memory for the next one. The ground around the
-// pivots of one block of columns is kept as bits that follow the pivots upward level by level.
+// Scores one block after another and reuses its memory. The ground around the pivots of a block of
+// columns is stored as bits that are shifted as the pivots ascend level by level.
 class BlockMatcher {
  public:
   BlockMatcher(const VoxelGrid& grid, const MatchingPlan& plan, libmap::InstructionSet instructions)
       : grid_(grid), plan_(plan), loops_(matching_loops_of(instructions)) {}
 
-  // A run of neighboring pivots: the places first .. last - 1 of `pivots`.
+  // Run of neighboring pivots: pivots[first .. last - 1].
   struct Run {
     std::size_t first = 0;
     std::size_t last = 0;
   };
-  // Writes counts[n] for each place n in the runs of `pivots`, positions in grid.voxels.
+  // Writes counts[n] for each index n in the runs. `pivots` are indices in grid.voxels.
   void match(const std::vector<std::size_t>& pivots, const Run* runs, std::size_t run_count,
              VoxelCounts* counts);
 
  private:
-  // `column` counts from the window's first one.
+  // `column` is relative to the first column of the window.
   struct Ground {
     int k = 0;
     std::uint32_t column = 0;
   };
   struct Pivot {
     int k = 0;
-    std::uint32_t column = 0;  // the first of the pivot's own window
+    std::uint32_t column = 0;  // first column of the window of this pivot
     std::size_t place = 0;
   };
   void gather(const std::vector<std::size_t>& pivots, const Run* runs, std::size_t run_count);
@@ -82,24 +82,24 @@ class BlockMatcher {
   const VoxelGrid& grid_;
   const MatchingPlan& plan_;
   const MatchingLoops& loops_;
-  TileBounds columns_;  // of the window
+  TileBounds columns_;  // columns of the window
   std::size_t width_ = 0;
   std::size_t size_ = 0;  // columns in the window
   std::size_t planes_ = 0;
-  int low_ = 0;                                            // the window's lowest layer
-  std::size_t entered_bits_ = 0, entered_ = 0, left_ = 0;  // how many of ground_ so far
+  int low_ = 0;                                            // lowest layer of the window
+  std::size_t entered_bits_ = 0, entered_ = 0, left_ = 0;  // entries of ground_ done
   std::vector<Pivot> pivots_, pivots_scratch_;             // ascending by k
   std::vector<Ground> ground_, ground_scratch_;
-  Lanes bits_;      // planes of 16 layers of the window's columns
-  Lanes heights_;   // how many voxels of each column are in the window; a row of zeros follows
-  Lanes row_sums_;  // of the columns, over `side` rows of heights
+  Lanes bits_;      // planes of 16 layers of the columns of the window
+  Lanes heights_;   // voxels per column in the window; a row of zeros follows
+  Lanes row_sums_;  // per column: sums of `side` rows of heights
   std::vector<std::uint32_t> origins_, totals_;
   std::vector<std::uint32_t> solid_offsets_, counted_offsets_;
 };
 
 constexpr int layers_per_plane = 16;
 
-// The chunks of the bits that wanted(x, y, z) names.
+// Returns the chunks of the bits for which wanted(x, y, z) is true.
 template <typename Wanted>
 ChunkedMask cut_into_chunks(const GripperMask& mask, const Wanted& wanted) {
   ChunkedMask cut;
@@ -135,8 +135,8 @@ int layers_of(const GripperMask& mask, const std::vector<std::uint8_t>& flags) {
   return layers;
 }
 
-// Stable; all of k_begin .. k_begin + levels - 1. Levels that lie close together, as a terrain's
-// do, are sorted by counting.
+// Stable sort by k, all in k_begin .. k_begin + levels - 1. Uses counting if the levels are dense,
+// as those of a terrain are.
 template <typename Entry>
 void sort_by_level(int k_begin, std::size_t levels, std::vector<Entry>& entries,
                    std::vector<Entry>& scratch) {
@@ -160,7 +160,7 @@ MatchingPlan plan_matching(const GripperMask& mask) {
   plan.pivot_xy = mask.pivot_xy;
   plan.pivot_z = mask.pivot_z;
   plan.layers = mask.layers;
-  // The sum over a row of columns must fit 16 bits.
+  // Sums over a row of columns must fit 16 bits.
   plan.counts_all = static_cast<double>(mask.layers) * mask.side <= 0xffff &&
                     std::all_of(mask.counted.begin(), mask.counted.end(),
                                 [](std::uint8_t flag) { return flag != 0; });
@@ -174,7 +174,8 @@ MatchingPlan plan_matching(const GripperMask& mask) {
   return plan;
 }
 
-// Sets the window's columns and collects the block's pivots and the ground of their windows.
+// Sets the columns of the window and collects the pivots of the block and the ground of their
+// windows.
 void BlockMatcher::gather(const std::vector<std::size_t>& pivots, const Run* runs,
                           std::size_t run_count) {
   const auto voxel_at = [&](std::size_t n) { return grid_.voxels[pivots[n]]; };
@@ -228,7 +229,7 @@ void BlockMatcher::make_offsets(const ChunkedMask& mask,
     offsets.push_back(static_cast<std::uint32_t>(place.plane * size_ + place.x * width_ + place.y));
 }
 
-// Moves the window up to the layer `low`: what falls out below goes, what comes in above enters.
+// Moves the window up to the layer `low`: removes voxels below and adds voxels above.
 void BlockMatcher::raise_to(int low) {
   int distance = low - low_;
   low_ = low;
@@ -258,8 +259,8 @@ void BlockMatcher::raise_to(int low) {
     --heights[ground_[left_].column];
 }
 
-// SSV of the pivots begin .. end - 1, ascending by row: sums over side x side columns, by a row of
-// running sums over `side` rows.
+// SSV of the pivots begin .. end - 1, ascending by row: sums over side x side columns, from a row
+// of running sums over `side` rows.
 void BlockMatcher::sum_boxes(std::size_t begin, std::size_t end, VoxelCounts* counts) {
   const std::uint16_t* const heights = heights_.data();
   const std::uint16_t* const none = heights + size_;  // a row of zeros
@@ -281,7 +282,7 @@ void BlockMatcher::sum_boxes(std::size_t begin, std::size_t end, VoxelCounts* co
   }
 }
 
-// The pivots begin .. end - 1, which share a level.
+// Counts the pivots begin .. end - 1, which share a level.
 void BlockMatcher::count_level(std::size_t begin, std::size_t end, VoxelCounts* counts) {
   raise_to(pivots_[begin].k - plan_.pivot_z);
   if (plan_.counts_all) sum_boxes(begin, end, counts);
@@ -317,17 +318,17 @@ void BlockMatcher::match(const std::vector<std::size_t>& pivots, const Run* runs
   }
 }
 
-// Side of a block of pivots, in columns: its window stays in the first two caches for the masks
-// that are in use, and is not all halo.
+// Side of a block of pivots, in columns. Its window fits the first two caches for typical masks,
+// and is not mainly halo.
 constexpr int block_columns = 80;
 
 struct Blocks {
   std::vector<BlockMatcher::Run> runs;      // block after block
-  std::vector<std::size_t> first_of_block;  // in runs; one more for the end
+  std::vector<std::size_t> first_of_block;  // index in runs; with a sentinel at the end
 };
 
-// Blocks lie on a lattice of their own. Pivots ascend, so that those of a row and a block follow
-// each other; nothing is made for blocks without pivots.
+// Blocks are on a lattice of their own. Pivots ascend, so that those of a row and a block are
+// adjacent. Blocks without pivots are not created.
 Blocks cut_into_blocks(const VoxelGrid& grid, const std::vector<std::size_t>& pivots) {
   struct Piece {
     int row, column;  // of the block

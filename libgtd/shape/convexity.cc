@@ -30,7 +30,7 @@ void check_bound(const char* field, double value) {
   if (std::isnan(value)) throw libmap::Error("not a number", {.field = field, .value = "nan"});
 }
 
-// Whether places are near to one of the points; neighboring places share a search.
+// Searches for points near given positions; neighboring positions share a search.
 class NearSearch {
  public:
   NearSearch(const std::vector<Eigen::Vector3d>& points, const PointGrid& grid, double distance)
@@ -63,7 +63,7 @@ std::vector<std::uint8_t> find_convex(const CurvatureResult& curvature,
                                       const std::vector<Eigen::Vector3d>& positions,
                                       const ConvexityOptions& options) {
   if (positions.size() != curvature.points.size())
-    throw libmap::Error("not as many as there are curvatures",
+    throw libmap::Error("number of positions differs from number of curvatures",
                         {.field = "positions",
                          .value = std::to_string(positions.size()),
                          .bound = std::to_string(curvature.points.size())});
@@ -81,9 +81,9 @@ std::vector<std::uint8_t> mark_near_convex(const std::vector<Eigen::Vector3d>& p
                                            double distance_m) {
   if (!(distance_m > 0) || std::isinf(distance_m))
     throw libmap::Error(
-        "not a distance",
+        "out of range",
         {.field = "distance_m", .value = libmap::to_text(distance_m), .bound = "> 0 and finite"});
-  // Cells a little wider than the distance, against rounding at their borders.
+  // Cells slightly wider than the distance, because of rounding at their borders.
   const PointGrid grid(convex_points, distance_m * (1 + 1e-6));
   std::vector<std::uint8_t> near(positions.size(), 0);
   if (grid.cells().empty()) return near;

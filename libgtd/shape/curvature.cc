@@ -26,11 +26,11 @@ using Matrix6d = Eigen::Matrix<double, 6, 6>;
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
 constexpr std::size_t min_neighbors = 6;  // a quadric has six coefficients
-// What must be left of a column of the normal equations after the ones before it are taken out.
+// Minimum remainder of a column of the normal equations after elimination of the columns before it.
 constexpr double min_pivot = 1e-6;
 
-// Columns u, v, w: the neighborhood's widest, second and thinnest direction. False if it is a line
-// or a lump.
+// Sets the columns u, v, w: widest, second and thinnest direction of the neighborhood. Returns
+// false if the points do not determine a plane.
 bool tangent_frame(const Matrix3d& covariance, Matrix3d& frame) {
   Eigen::SelfAdjointEigenSolver<Matrix3d> solver;
   solver.computeDirect(covariance);
@@ -42,7 +42,7 @@ bool tangent_frame(const Matrix3d& covariance, Matrix3d& frame) {
   return frame.allFinite();
 }
 
-// The normal equations of w = f + d u + e v + a u^2 + b u v + c v^2.
+// Normal equations of w = f + d u + e v + a u^2 + b u v + c v^2.
 void normal_equations(const NeighborLoops& loops, const NeighborLoops::Places& neighbors,
                       std::size_t count, const Matrix3d& frame, Matrix6d& matrix, Vector6d& right) {
   std::array<double, NeighborLoops::quadric_sums> m;
@@ -56,7 +56,7 @@ void normal_equations(const NeighborLoops& loops, const NeighborLoops::Places& n
   right << m[14], m[15], m[16], m[17], m[18], m[19];
 }
 
-// Solves by L D L^T; false where the columns are not independent.
+// Solves by L D L^T; returns false if the columns are not independent.
 bool solve(const Matrix6d& matrix, const Vector6d& right, Vector6d& solution) {
   Matrix6d l = Matrix6d::Identity();
   Vector6d d;
@@ -77,8 +77,8 @@ bool solve(const Matrix6d& matrix, const Vector6d& right, Vector6d& solution) {
   return solution.allFinite();
 }
 
-// The eigenvalues of the Weingarten map of that quadric at u = v = 0, larger first; positive where
-// the surface bends towards +w (do Carmo, Differential Geometry of Curves and Surfaces, 3.3).
+// Eigenvalues of the Weingarten map of this quadric at u = v = 0, larger first; positive if the
+// surface bends towards +w (do Carmo, Differential Geometry of Curves and Surfaces, 3.3).
 std::array<double, 2> bending(const Vector6d& quadric) {
   const double d = quadric[1], e = quadric[2];
   const double stretch = std::sqrt(1 + d * d + e * e);
@@ -101,14 +101,14 @@ class QuadricFitter {
                 const std::vector<Vector3d>& in_order, double radius, const Vector3d& up)
       : cloud_(cloud), candidates_(grid, in_order), radius_(radius), up_(up.normalized()) {}
 
-  // For the points of a cell, which are fitted after it.
+  // Gathers the surroundings of a cell for fit().
   void enter(const PointGrid::Cell& cell) {
     candidates_.enter(cell, 2);
     neighbors_.make_room(candidates_.count());
     is_fitted_ = false;
   }
 
-  // At a point of the cell that was entered last.
+  // Fits at a point of the cell entered last.
   Curvature fit(std::size_t point) {
     const Vector3d& place = cloud_.positions[point];
     if (!is_fitted_ || !is_same_place(place, place_)) {
@@ -133,7 +133,7 @@ class QuadricFitter {
   }
 
  private:
-  // As the neighbors tell it, before it is known which side is outside.
+  // Fitted surface before the outside is known.
   struct Surface {
     Vector3d normal;
     std::array<double, 2> bending;
@@ -160,17 +160,17 @@ class QuadricFitter {
   Vector3d up_;
   const NeighborLoops& loops_ = neighbor_loops_of(libmap::best_instruction_set());
   CoordinateRows neighbors_;
-  // The last fit: points in one place share it, however many there are.
+  // Last fit, shared by coincident points.
   bool is_fitted_ = false;
   Vector3d place_ = Vector3d::Zero();
   std::optional<Surface> surface_;
 };
 
-// The queries of each cell of the grid, so that a cell's surroundings are gathered once; those in
-// one place follow each other.
+// Queries by cell of the grid, so that the surroundings of a cell are gathered once; coincident
+// points are adjacent.
 struct QueriesByCell {
-  std::vector<std::size_t> queries;  // positions in the list of queries, cell after cell
-  std::vector<std::size_t> begins;   // of each cell, and the end
+  std::vector<std::size_t> queries;  // indices in the list of queries, by cell
+  std::vector<std::size_t> begins;   // first query of each cell, and the end
 };
 
 QueriesByCell queries_by_cell(const PointGrid& grid, const std::vector<Vector3d>& positions,
@@ -201,7 +201,7 @@ QueriesByCell queries_by_cell(const PointGrid& grid, const std::vector<Vector3d>
 std::vector<Curvature> fit_quadrics(const libmap::PointCloud& cloud,
                                     const CurvatureOptions& options,
                                     const std::vector<std::size_t>& queries) {
-  // Half the radius, a little more against rounding at the cells' borders.
+  // Half the radius, slightly enlarged for rounding at the cell borders.
   const PointGrid grid(cloud.positions, options.radius_m * (0.5 + 1e-6));
   const std::vector<Vector3d> in_order = in_order_of(grid, cloud.positions);
   const QueriesByCell groups = queries_by_cell(grid, cloud.positions, queries);
@@ -236,11 +236,11 @@ CurvatureResult estimate_curvature(const libmap::PointCloud& cloud, const Curvat
                                    const std::optional<std::vector<std::size_t>>& queries) {
   cloud.check();
   if (!(options.radius_m > 0) || std::isinf(options.radius_m))
-    throw libmap::Error("not a radius", {.field = "radius_m",
+    throw libmap::Error("out of range", {.field = "radius_m",
                                          .value = libmap::to_text(options.radius_m),
                                          .bound = "> 0 and finite"});
   if (!options.up.allFinite() || !(options.up.norm() > 0))
-    throw libmap::Error("not a direction", {.field = "up"});
+    throw libmap::Error("has length zero or is not finite", {.field = "up"});
   const std::vector<std::size_t> indices = checked_queries(queries, cloud.size());
   CurvatureResult result;
   result.method = options.method;

@@ -1,4 +1,5 @@
-// The functions of neighbor_loops.h but for their instruction set; for neighbor_loops.cc alone.
+// Bodies of the functions of neighbor_loops.h, compiled once per instruction set by
+// neighbor_loops.cc.
 
 using Register [[gnu::vector_size(GRASPMAP_REGISTER)]] = double;
 

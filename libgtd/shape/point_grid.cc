@@ -15,7 +15,7 @@ namespace libgtd {
 PointGrid::PointGrid(const std::vector<Eigen::Vector3d>& points, double cell_size_m)
     : cell_size_m_(cell_size_m) {
   if (!(cell_size_m > 0) || std::isinf(cell_size_m))
-    throw libmap::Error("not a length",
+    throw libmap::Error("out of range",
                         {.value = libmap::to_text(cell_size_m), .bound = "> 0 and finite"});
   if (points.size() > std::numeric_limits<std::uint32_t>::max())
     throw libmap::Error("too many points for one search grid");
@@ -99,7 +99,7 @@ void PointGrid::find_near(const Cell& cell, std::int64_t reach, std::vector<Rang
     auto column = std::lower_bound(at(row->first_column), last_column, cell[1] - reach,
                                    [](const Column& one, std::int64_t y) { return one.y < y; });
     for (; column != last_column && column->y <= cell[1] + reach; ++column) {
-      // Of the cells of a column, those from z on.
+      // First of the cells of a column from z on.
       const auto first_from = [&](std::int64_t z) {
         const auto begin = cells_.begin();
         return static_cast<std::size_t>(

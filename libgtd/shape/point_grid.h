@@ -1,9 +1,9 @@
-// Points sorted into cubic cells: whoever asks for all points near a place walks few cells and
-// always meets them in the same order, so that sums over neighbors are the same to the bit. The
-// cells lie on the lattice through the frame's origin, so that this order does not depend on what
-// else is in the cloud: a tile with its surroundings yields what the whole cloud yields there. A
-// libmap::PointTree meets them in an order that depends on all points, and takes 8 times as long
-// for the 27 neighbors of each of 200,000 points, 12 times for 165.
+// Points sorted into cubic cells for radius searches. A search visits few cells, always in the same
+// order, so that sums over neighbors are reproducible to the bit. The cells are on the lattice
+// through the origin of the frame, so that this order does not depend on the rest of the cloud: a
+// tile with its surroundings has the same results as the whole cloud. In a libmap::PointTree the
+// order depends on all points, and a search takes 8 times as long for the 27 neighbors of each of
+// 200,000 points, 12 times for 165.
 #pragma once
 
 #include <Eigen/Core>
@@ -21,30 +21,31 @@ class PointGrid {
  public:
   using Cell = std::array<std::int64_t, 3>;
 
-  // Points that are not finite are left out. Throws Error where `cell_size_m` is not a positive
-  // length, or so small that a point lies more than 2^40 cells from the frame's origin.
+  // Leaves out points that are not finite. Throws Error if `cell_size_m` is not positive, or if a
+  // point is more than 2^40 cells from the origin of the frame.
   PointGrid(const std::vector<Eigen::Vector3d>& points, double cell_size_m);
 
-  // Whether a place is finite and at most one cell away from the box around the points.
+  // Returns true if a position is finite and at most one cell away from the bounding box of the
+  // points.
   bool reaches(const Eigen::Vector3d& place) const;
-  // The cell of a place that the grid reaches.
+  // Returns the cell of a position for which reaches() is true.
   Cell cell_of(const Eigen::Vector3d& place) const;
 
-  // The points' indices sorted by cell, and by index within one; a cell's are first..last - 1.
+  // Indices of the points, sorted by cell, then by index. The points of a cell are first..last - 1.
   const std::vector<std::uint32_t>& order() const { return order_; }
   struct Range {
     std::uint32_t first = 0;
     std::uint32_t last = 0;
   };
-  // The runs of order() that hold the points of all cells at most `reach` away along each axis,
-  // ascending and not empty: a column of cells is one run.
+  // Sets `runs` to the ranges of order() with the points of all cells at most `reach` cells away
+  // along each axis, ascending and not empty. A column of cells is one run.
   void find_near(const Cell& cell, std::int64_t reach, std::vector<Range>& runs) const;
-  // Those that hold points, in the order of order().
+  // The cells that contain points, and their ranges, in the sequence of order().
   const std::vector<Cell>& cells() const { return cells_; }
   const std::vector<Range>& ranges() const { return ranges_; }
 
  private:
-  // Cells of the same first, and of the same first two numbers, follow each other.
+  // First cell of each sequence of cells with the same x, and with the same x and y.
   struct Row {
     std::int64_t x = 0;
     std::size_t first_column = 0;
@@ -55,18 +56,18 @@ class PointGrid {
   };
   void sort_by_cell(const std::vector<Eigen::Vector3d>& points);
 
-  Eigen::Vector3d low_;  // the box's corners
+  Eigen::Vector3d low_;  // corners of the bounding box
   Eigen::Vector3d high_;
   double cell_size_m_;
   std::vector<std::uint32_t> order_;
   std::vector<Cell> cells_;
   std::vector<Range> ranges_;
-  std::vector<Row> rows_;        // and one more for the end
-  std::vector<Column> columns_;  // the same
+  std::vector<Row> rows_;        // with a sentinel at the end
+  std::vector<Column> columns_;  // with a sentinel at the end
 };
 
-// Points in one place, to the bit: what their neighbors say of one holds for all of them. A zero of
-// the other sign is another place: sums of differences may tell them apart.
+// Bits of a position. Points with the same bits have the same neighborhood results. Zeros of
+// different sign differ, because sums of differences may depend on the sign.
 inline std::array<std::uint64_t, 3> place_bits(const Eigen::Vector3d& place) {
   return {std::bit_cast<std::uint64_t>(place.x()), std::bit_cast<std::uint64_t>(place.y()),
           std::bit_cast<std::uint64_t>(place.z())};
@@ -76,15 +77,15 @@ inline bool is_same_place(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return place_bits(a) == place_bits(b);
 }
 
-// Some order, in which points in one place follow each other.
+// Total order in which points of the same bits are adjacent.
 inline bool is_place_before(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return place_bits(a) < place_bits(b);
 }
 
-// Coordinates one axis after the other, with room for a full set of lanes beyond the last.
+// Coordinates, one array per axis, with room for a full set of lanes at the end of each.
 class CoordinateRows {
  public:
-  // Keeps no values.
+  // Resizes for `count` points; discards the values.
   void make_room(std::size_t count);
   NeighborLoops::Places places() {
     return {values_.data(), values_.data() + stride_, values_.data() + 2 * stride_};
@@ -95,27 +96,28 @@ class CoordinateRows {
   std::vector<double> values_;
 };
 
-// The points of a grid in its order, as what reads them cell after cell wants them.
+// Returns the points in the order of the grid, for access by cells.
 std::vector<Eigen::Vector3d> in_order_of(const PointGrid& grid,
                                          const std::vector<Eigen::Vector3d>& points);
 
-// Of `count` neighbors, in the unit of their coordinates.
+// Returns the covariance of `count` neighbors, in the squared unit of their coordinates.
 Eigen::Matrix3d covariance_of(const NeighborLoops& loops, const NeighborLoops::Places& neighbors,
                               std::size_t count);
 
-// The points around one cell of a grid after the other, gathered once for all places in the cell.
+// Points around a cell of a grid, gathered once for all queries in this cell.
 class CellSurroundings {
  public:
-  // `in_order` are the grid's points in its order, in any frame and unit; both outlive this.
+  // `in_order` are the points in the order of the grid, in any frame and unit. Both arguments must
+  // outlive this object.
   CellSurroundings(const PointGrid& grid, const std::vector<Eigen::Vector3d>& in_order)
       : grid_(grid), in_order_(in_order) {}
 
-  // Gathers the points of all cells at most `reach` away along each axis, in the grid's order;
-  // infinite ones follow up to a full set of lanes.
+  // Gathers the points of all cells at most `reach` cells away along each axis, in the order of the
+  // grid; infinite points follow up to a full set of lanes.
   void enter(const PointGrid::Cell& cell, std::int64_t reach);
   NeighborLoops::Places places() { return rows_.places(); }
   std::size_t count() const { return count_; }
-  // Where in them a run of one column of cells ends and the next one begins.
+  // Index after the last gathered point of each run (one column of cells).
   const std::vector<std::size_t>& run_ends() const { return run_ends_; }
 
  private:

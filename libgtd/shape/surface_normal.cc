@@ -39,7 +39,7 @@ class PlaneFitter {
     neighbors_.make_room(candidates_.count());
   }
 
-  // At a place in the cell that was entered last.
+  // Fits at a position in the cell entered last.
   SurfaceNormal fit(const Vector3d& place, const Vector3d& outside) {
     const NeighborLoops::Places neighbors = neighbors_.places();
     const std::size_t count =
@@ -74,17 +74,17 @@ std::vector<SurfaceNormal> fit_surface_normals(const libmap::PointCloud& cloud,
                                                const std::vector<Eigen::Vector3f>& outsides,
                                                const SurfaceNormalOptions& options) {
   if (!(options.radius_m > 0) || std::isinf(options.radius_m))
-    throw libmap::Error("not a radius", {.field = "radius_m",
+    throw libmap::Error("out of range", {.field = "radius_m",
                                          .value = libmap::to_text(options.radius_m),
                                          .bound = "> 0 and finite"});
   if (!options.up.allFinite() || !(options.up.norm() > 0))
-    throw libmap::Error("not a direction", {.field = "up"});
+    throw libmap::Error("has length zero or is not finite", {.field = "up"});
   if (!outsides.empty() && outsides.size() != places.size())
-    throw libmap::Error("not as many as there are places",
+    throw libmap::Error("number of outsides differs from number of places",
                         {.field = "outsides",
                          .value = std::to_string(outsides.size()),
                          .bound = std::to_string(places.size())});
-  // Half the radius, a little more against rounding at the cells' borders.
+  // Half the radius, slightly enlarged for rounding at the cell borders.
   const double cell_m = options.radius_m * (0.5 + 1e-6);
   const PointGrid grid(cloud.positions, cell_m);
   const PointGrid groups(places, cell_m);

@@ -25,18 +25,18 @@ using Eigen::Matrix3f;
 using Eigen::Vector3f;
 
 constexpr std::size_t cells_at_once = 16;
-constexpr std::uint32_t max_inserted = 32;  // of a bucket that insertion sorts
-// Neighbors are found once and kept for the second pass while there is room for them.
+constexpr std::uint32_t max_inserted = 32;  // maximum bucket size for insertion sort
+// Maximum number of neighbors that are stored for the second pass; others are searched again.
 constexpr std::size_t max_kept_neighbors = std::size_t{1} << 26;
 
-// Three numbers side by side, and a fourth for the register.
+// Three numbers, padded to a register.
 using Quad [[gnu::vector_size(16)]] = float;
 
 Quad quad(float x, float y, float z) { return Quad{x, y, z, 0.0F}; }
-// y, z, x: beside the numbers themselves, those that they are multiplied with for xy, yz, zx.
+// Rotates to y, z, x, for the products xy, yz, zx.
 Quad turned(const Quad& q) { return __builtin_shufflevector(q, q, 1, 2, 0, 3); }
 
-// Sums of x, y, z, of their squares and of xy, yz, zx, each in the order in which it is added to.
+// Sums of x, y, z, their squares, and xy, yz, zx, each in the order of the additions.
 struct Sums {
   Quad of{}, squares{}, products{};
 
@@ -50,16 +50,15 @@ struct Sums {
   }
 };
 
-using Numbers = std::vector<std::uint32_t>;  // of candidates
+using Numbers = std::vector<std::uint32_t>;  // numbers of candidates
 
-// The points near one cell of the grid, of which each point of the cell takes its neighbors: the
-// candidates, by number.
+// Candidates near a cell of the grid, from which the neighbors of its points are selected.
 class NeighborSearch {
  public:
   NeighborSearch(const std::vector<Quad>& places, const PointGrid& grid, double radius)
       : places_(places), grid_(grid), limit_(static_cast<float>(radius * radius)) {}
 
-  // The points of a cell's surroundings by number.
+  // Lists the points around a cell by number.
   void list(const PointGrid::Cell& cell) {
     grid_.find_near(cell, 2, runs_);
     candidates_.clear();
@@ -69,7 +68,7 @@ class NeighborSearch {
   }
   const std::vector<std::uint32_t>& candidates() const { return candidates_; }
 
-  // The same, and makes ready for find().
+  // Also prepares find().
   void enter(const PointGrid::Cell& cell) {
     list(cell);
     const std::size_t count = candidates_.size();
@@ -86,11 +85,10 @@ class NeighborSearch {
     keys_.resize(room);
     sorted_.resize(room);
   }
-  // The candidates' places.
+  // Positions of the candidates.
   const std::vector<Quad>& near() const { return near_; }
 
-  // Keys of the neighbors of a point of that cell, among them itself, by distance, then by the
-  // point's index.
+  // Keys of the neighbors of a point of this cell, including itself, by distance, then by index.
   std::span<const std::uint64_t> find(const Quad& at) {
     const float center[3] = {at[0], at[1], at[2]};
     const std::size_t count = loops_.rank(x_.data(), y_.data(), z_.data(), candidates_.size(),
@@ -105,8 +103,8 @@ class NeighborSearch {
     return static_cast<std::uint32_t>(key >> 32);
   }
 
-  // Squared distances to points of a surface are spread evenly: buckets leave little to sort. Where
-  // a radius is far larger than the cloud, one bucket holds them all.
+  // Bucket sort: squared distances to points of a surface are uniformly distributed. If the radius
+  // is far larger than the cloud, one bucket contains all.
   void sort(std::size_t count) {
     constexpr std::size_t buckets = 256;
     std::uint32_t begin_of[buckets + 1] = {};
@@ -153,7 +151,7 @@ Matrix3f symmetric(float xx, float xy, float xz, float yy, float yz, float zz) {
   return matrix;
 }
 
-// Sums relative to the first point, as computeMeanAndCovarianceMatrix.
+// Sums relative to the first point, as in computeMeanAndCovarianceMatrix.
 Matrix3f covariance_of(const std::vector<Quad>& near, const Numbers& neighbors) {
   const Quad origin = near[neighbors.front()];
   Sums sums;
@@ -165,22 +163,22 @@ Matrix3f covariance_of(const std::vector<Quad>& near, const Numbers& neighbors) 
   return symmetric(squares[0], products[0], products[2], squares[1], products[1], squares[2]);
 }
 
-// Toward the frame's origin, as computePointNormal and flipNormalTowardsViewpoint.
+// Normal toward the origin, as in computePointNormal and flipNormalTowardsViewpoint.
 Vector3f normal_of(const std::vector<Quad>& near, const Quad& at, const Numbers& neighbors) {
   if (neighbors.size() < 3) return Vector3f::Constant(Curvature::nan);
   float smallest = 0;
   Vector3f normal;
   pcl::eigen33(covariance_of(near, neighbors), smallest, normal);
-  // Of four components, whose products are added in another order than those of three.
+  // Four components, because their products are added in a different order than those of three.
   const Eigen::Vector4f to_origin(0.0F - at[0], 0.0F - at[1], 0.0F - at[2], 0.0F);
   const Eigen::Vector4f plane(normal[0], normal[1], normal[2], 0.0F);
   if (to_origin.dot(plane) < 0) normal *= -1;
   return normal;
 }
 
-// The covariance of the neighbors' normals in the tangent plane, as
-// computePointPrincipalCurvatures. One neighbor without a normal spoils the sum, as in PCL.
-// `normals` are the candidates'.
+// Covariance of the neighbors' normals in the tangent plane, as in computePointPrincipalCurvatures.
+// As in PCL, one neighbor without a normal invalidates the sum. `normals` are those of the
+// candidates.
 Curvature curvature_of(const Vector3f& normal, const std::vector<Quad>& normals,
                        const Numbers& neighbors, std::vector<Quad>& projected) {
   const Matrix3f to_tangent = Matrix3f::Identity() - normal * normal.transpose();
@@ -192,7 +190,7 @@ Curvature curvature_of(const Vector3f& normal, const std::vector<Quad>& normals,
   projected.resize(neighbors.size());
   for (std::size_t n = 0; n < neighbors.size(); ++n) {
     const Quad& one = normals[neighbors[n]];
-    // In the order of Eigen's product of a matrix and a vector of three.
+    // In the order of additions of Eigen's 3x3 matrix-vector product.
     projected[n] = a * one[0] + (b * one[1] + c * one[2]);
     mean += projected[n];
   }
@@ -213,7 +211,7 @@ Curvature curvature_of(const Vector3f& normal, const std::vector<Quad>& normals,
   return result.valid ? result : Curvature{};
 }
 
-// The neighbors of the places of a run of cells, one list after the other.
+// Neighbors of the points of a run of cells, as consecutive lists.
 struct KeptNeighbors {
   bool complete = false;
   Numbers lists;
@@ -242,7 +240,7 @@ class CurvatureEstimation {
   }
 
  private:
-  // Cells begin .. end - 1, and what is kept of them.
+  // Cells begin .. end - 1, and their stored neighbors.
   struct Run {
     std::size_t begin = 0;
     std::size_t end = 0;
@@ -282,8 +280,8 @@ class CurvatureEstimation {
             std::bit_cast<std::uint32_t>(at[2])};
   }
 
-  // Calls visit(point, twin): points in one place follow each other, and `twin` says whether this
-  // one lies where the last one did, so that it has the same neighbors.
+  // Calls visit(point, twin); `twin` is true if the point coincides with the previous one and thus
+  // has the same neighbors.
   template <typename Visit>
   void for_each_point(std::size_t cell, const Visit& visit) const {
     const PointGrid::Range range = grid_.ranges()[cell];

@@ -27,9 +27,9 @@ using Point = Kernel::Point_2;
 using Eigen::Vector3d;
 
 constexpr std::size_t triangles_per_chunk = 4096;
-constexpr std::size_t columns_at_once = 16;  // of the grid that one thread fills
+constexpr std::size_t columns_at_once = 16;  // grid columns per task of a thread
 
-// Where the grid's nodes stand along one axis, in increasing order.
+// Coordinates of grid nodes along one axis, ascending.
 using Axis = std::vector<double>;
 
 struct Box {
@@ -44,7 +44,7 @@ struct Triangle {
 
 using Corners = std::array<std::uint32_t, 3>;
 
-// The columns of the grid, first .. last - 1, that may cross a triangle.
+// Grid columns first .. last - 1 that may intersect a triangle.
 struct Placement {
   std::uint32_t first = 0;
   std::uint32_t last = 0;
@@ -77,7 +77,7 @@ double area_of_cells(const std::vector<Vector3d>& points, const Box& box, double
   const double column = std::floor(box.min_x / cell), row = std::floor(box.min_y / cell);
   const double columns = std::floor(box.max_x / cell) - column + 1;
   const double rows = std::floor(box.max_y / cell) - row + 1;
-  if (!(columns * rows < 0x1p52)) {  // more than whole numbers tell apart
+  if (!(columns * rows < 0x1p52)) {  // limit of exact integers
     std::vector<std::pair<double, double>> cells;
     cells.reserve(points.size());
     for (const Vector3d& p : points)
@@ -104,7 +104,7 @@ double occupied_area(const std::vector<Vector3d>& points, const Box& box, double
   return std::min(box.area(), area_of_cells(points, box, cell));
 }
 
-// The program's form of eq. 3-5: its 5/3 is a division of integers, so 1.
+// Eq. 3-5 as in the author's program: its 5/3 is an integer division with result 1.
 double thesis_spacing(std::size_t count, const Box& box) {
   const double density =
       static_cast<double>(count) / ((box.max_x - box.min_x) * (box.max_y - box.min_y));
@@ -131,7 +131,7 @@ void check_grid(const Box& box, double spacing, std::size_t max_nodes) {
   const double farthest = std::max(
       {std::abs(box.min_x), std::abs(box.max_x), std::abs(box.min_y), std::abs(box.max_y)});
   if (!(spacing > farthest * 0x1.0p-50))
-    throw libmap::Error("the points lie too far from the origin for this grid spacing",
+    throw libmap::Error("the points are too far from the origin for this grid spacing",
                         {.field = "grid spacing", .value = libmap::to_text(spacing) + " m"});
 }
 
@@ -147,7 +147,7 @@ Axis lattice(double min, double max, double spacing) {
   return axis;
 }
 
-// The first node of `axis` at or after `at`; all but its neighbors are passed over by the spacing.
+// Returns the first node of `axis` at or after `at`; the spacing gives a first guess.
 std::size_t first_node(const Axis& axis, double at, double spacing) {
   const double index = (at - axis.front()) / spacing - 1;
   std::size_t i = !(index > 0)                               ? 0
@@ -158,7 +158,7 @@ std::size_t first_node(const Axis& axis, double at, double spacing) {
   return i;
 }
 
-// Between which y the vertical line at `x` crosses the triangle, a little widened.
+// Range of y in which the vertical line at `x` intersects the triangle, slightly widened.
 std::pair<double, double> crossing(const Triangle& t, double x) {
   double low = std::numeric_limits<double>::infinity();
   double high = -low;
@@ -186,7 +186,7 @@ bool covers(const Triangle& t, const Point& node) {
          CGAL::orientation(t.at[2], t.at[0], node) != CGAL::RIGHT_TURN;
 }
 
-// From the plane's equation n . (r - r0) = 0, in the order of operations of the program.
+// Height by n . (r - r0) = 0, in the order of operations of the author's program.
 double plane_height(const Triangle& t, double x, double y) {
   const Vector3d origin(t.at[0].x(), t.at[0].y(), t.z[0]);
   const Vector3d b = Vector3d(t.at[1].x(), t.at[1].y(), t.z[1]) - origin;
@@ -196,8 +196,8 @@ double plane_height(const Triangle& t, double x, double y) {
          n.z();
 }
 
-// From coordinates relative to a corner, so that a far origin does no harm; within the corners'
-// heights even where the triangle is too thin for its area to be computed well.
+// Height from coordinates relative to a corner, so that a distant origin does no harm. Clamped to
+// the heights of the corners, for triangles too thin for an accurate area.
 double barycentric_height(const Triangle& t, double x, double y) {
   const double bx = t.at[1].x() - t.at[0].x(), by = t.at[1].y() - t.at[0].y();
   const double cx = t.at[2].x() - t.at[0].x(), cy = t.at[2].y() - t.at[0].y();
@@ -216,8 +216,8 @@ bool longer_than(const Triangle& t, double limit) {
   return false;
 }
 
-// Heights at the grid's nodes; NaN where no triangle covers them. A node on an edge takes the lower
-// of its triangles' heights, which differ by rounding: none depends on the triangles' order.
+// Heights at the grid nodes; NaN without a triangle. A node on an edge takes the lower height of
+// its triangles, which differ by rounding, so that the order of the triangles has no effect.
 class HeightGrid {
  public:
   HeightGrid(Axis xs, Axis ys, double spacing)
@@ -261,10 +261,10 @@ class HeightGrid {
   }
 
  private:
-  // The triangles that may cross each strip, strip after strip.
+  // Triangles that may intersect each strip, strip by strip.
   struct StripLists {
     std::vector<std::uint32_t> triangles;
-    std::vector<std::size_t> begins;  // of each strip, and the end
+    std::vector<std::size_t> begins;  // first entry of each strip, and the end
   };
   StripLists list_by_strip(const std::vector<Placement>& placements) const {
     StripLists lists;
@@ -309,7 +309,7 @@ void check_options(const InterpolationOptions& options) {
   const auto check = [](const char* field, double value) {
     if (!(value >= 0) || std::isinf(value))
       throw libmap::Error(
-          "not a length",
+          "out of range",
           {.field = field, .value = libmap::to_text(value), .bound = ">= 0 and finite"});
   };
   check("max_edge_m", options.max_edge_m);
@@ -372,12 +372,12 @@ InterpolationResult interpolate(const libmap::PointCloud& cloud,
   const std::vector<Vector3d> points = finite_points(cloud, options.method);
   if (points.size() < 3)
     throw libmap::Error(
-        "too few finite points to interpolate between",
+        "too few finite points for interpolation",
         {.field = "points", .value = std::to_string(points.size()), .bound = ">= 3"});
   const Box box = box_of(points);
   const PlanarTriangulation triangulation = triangulate_in_plane(points);
   if (triangulation.triangles.empty())
-    throw libmap::Error("the points' x and y all lie on a line: nothing to interpolate between");
+    throw libmap::Error("the points' x and y are on a line: interpolation is impossible");
   InterpolationResult result;
   result.skipped_points = cloud.size() - triangulation.vertices;
   HeightGrid grid = make_grid(points, box, options, result);

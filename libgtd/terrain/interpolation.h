@@ -1,5 +1,6 @@
-// Fills a terrain's gaps: the points' heights, linear on their Delaunay triangulation, at the nodes
-// of a regular grid ("Graspable Target Detection for Hexapod Robots", 2023, eq. 3-5, listing A.3).
+// Fills gaps of a terrain: interpolates heights linearly on the Delaunay triangulation of the
+// points, at the nodes of a regular grid ("Graspable Target Detection for Hexapod Robots", 2023,
+// eq. 3-5, listing A.3).
 #pragma once
 
 #include <cstddef>
@@ -8,45 +9,45 @@
 
 namespace libgtd {
 
-// thesis: the grid begins at the points' least x and y, its pitch is that of the author's program,
-// nodes of height exactly 0 are dropped, and coordinates are rounded to single precision.
-// corrected: the pitch of eq. 3-5 as printed; nodes are whole multiples of it in the input's frame.
+// thesis: the grid starts at the minimum x and y of the points, has the pitch of the author's
+// program, drops nodes of height exactly 0 and rounds coordinates to single precision. corrected:
+// the pitch follows eq. 3-5 as printed, and nodes are whole multiples of it in the input frame.
 enum class InterpolationMethod { thesis, corrected };
 
 struct InterpolationOptions {
   InterpolationMethod method = InterpolationMethod::corrected;
-  // Triangles with an edge longer than this in the x-y plane are refused; 0 sets no limit. Not in
-  // space: a cliff has long edges where the points are dense all the same.
+  // Maximum edge length of a triangle in the x-y plane; 0: no limit. Edges are not measured in 3D,
+  // because cliffs have long edges even between dense points.
   double max_edge_m = 0;
-  // Pitch of the grid with `corrected`; 0 takes it from eq. 3-5. Tiles that shall agree share one.
+  // Pitch of the grid for `corrected`; 0: from eq. 3-5. Tiles of one terrain need a common pitch.
   double grid_spacing_m = 0;
-  // Upper bound of the pitch that eq. 3-5 gives, 0 for none: nodes farther apart than the voxels
-  // that they shall fill leave rows of them empty. Corrected only.
+  // Maximum pitch from eq. 3-5 for `corrected`; 0: no limit. If nodes are farther apart than the
+  // voxels to be filled, rows of voxels remain empty.
   double max_grid_spacing_m = 0;
-  // Side of the square cells whose number measures the area A of eq. 3-5 with `corrected`; 0 takes
-  // 4 times the mean spacing of as many points in the bounding box, whose area bounds A then.
+  // Side of the square cells whose count measures the area A of eq. 3-5 for `corrected`. 0: 4 times
+  // the mean spacing of as many points in the bounding box, whose area then bounds A.
   double area_cell_m = 0;
-  // More nodes than this are an error: a pitch or a stray point that is wrong, not a terrain.
+  // Maximum number of nodes. More nodes indicate a wrong pitch or a stray point.
   std::size_t max_nodes = 100'000'000;
-  // So are more than this for each finite point, beyond the first million: a few points that lie
-  // far apart are none either.
+  // Maximum number of nodes per finite point, beyond the first million nodes. More nodes indicate a
+  // few points that are far apart.
   std::size_t max_nodes_a_point = 100;
 };
 
 struct InterpolationResult {
-  libmap::PointCloud cloud;  // x outer, y inner; positions alone, and the input's viewpoint
+  libmap::PointCloud cloud;  // x outer, y inner; positions and the input's viewpoint
   double grid_spacing_m = 0;
-  double area_m2 = 0;                 // thesis: of the bounding box; corrected: of occupied cells
-  std::size_t triangles = 0;          // of the triangulation
-  std::size_t refused_triangles = 0;  // longer than max_edge_m
-  std::size_t nodes = 0;              // of the grid
-  std::size_t outside_nodes = 0;      // outside the hull or in refused triangles
-  std::size_t zero_nodes = 0;         // dropped by `thesis` for a height of exactly 0
-  std::size_t skipped_points = 0;     // not finite, or under another point of the same x and y
+  double area_m2 = 0;                 // thesis: bounding box; corrected: occupied cells
+  std::size_t triangles = 0;          // before refusal
+  std::size_t refused_triangles = 0;  // with an edge longer than max_edge_m
+  std::size_t nodes = 0;              // grid nodes
+  std::size_t outside_nodes = 0;      // outside the hull or inside refused triangles
+  std::size_t zero_nodes = 0;         // `thesis`: dropped because of a height of exactly 0
+  std::size_t skipped_points = 0;     // not finite, or below a point of the same x and y
 };
 
-// The cloud's frame is the terrain frame, z up. Throws Error for an option out of its range, for
-// fewer than 3 finite points, and for points whose x and y all lie on one line.
+// Interpolates `cloud`, which is in the terrain frame (z up, meters). Throws Error for an option
+// out of range, fewer than 3 finite points, collinear x and y, or too many nodes.
 InterpolationResult interpolate(const libmap::PointCloud& cloud,
                                 const InterpolationOptions& options = {});
 

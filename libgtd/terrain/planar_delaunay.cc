@@ -21,7 +21,7 @@ using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 
 enum class Fate : std::uint8_t { unknown, kept, dropped };
 
-using VertexBase = CGAL::Triangulation_vertex_base_with_info_2<std::uint32_t, Kernel>;  // the point
+using VertexBase = CGAL::Triangulation_vertex_base_with_info_2<std::uint32_t, Kernel>;  // index
 using FaceBase = CGAL::Triangulation_face_base_with_info_2<Fate, Kernel>;
 using Triangulation =
     CGAL::Delaunay_triangulation_2<Kernel,
@@ -30,18 +30,18 @@ using Face = Triangulation::Face_handle;
 using Points = std::vector<Eigen::Vector3d>;
 using Indices = std::vector<std::uint32_t>;
 
-constexpr std::uint32_t hilbert_cells = 4096;  // a side
+constexpr std::uint32_t hilbert_cells = 4096;  // cells per side
 constexpr unsigned hilbert_bits = 24;
 
-// The place of a cell of a square of 4096 x 4096 on Hilbert's curve (Hilbert 1891).
+// Index of a cell of a 4096 x 4096 square on the Hilbert curve (Hilbert 1891).
 std::uint32_t hilbert_place(std::uint32_t x, std::uint32_t y) {
   std::uint32_t place = 0;
   for (std::uint32_t bit = hilbert_cells / 2; bit > 0; bit /= 2) {
     const std::uint32_t right = (x & bit) != 0 ? 1 : 0;
     const std::uint32_t up = (y & bit) != 0 ? 1 : 0;
     place = place << 2 | ((3 * right) ^ up);
-    // In the lower quadrants the curve runs transposed, in the right one of them mirrored as well:
-    // without branches, which could not be foretold.
+    // The curve is transposed in the lower quadrants, and mirrored, too, in the lower right one.
+    // Computed without branches, which would be unpredictable.
     const std::uint32_t transposed = up - 1;
     const std::uint32_t mirrored = transposed & (0U - right);
     x ^= mirrored;
@@ -53,9 +53,9 @@ std::uint32_t hilbert_place(std::uint32_t x, std::uint32_t y) {
   return place;
 }
 
-// Along Hilbert's curve neighbors follow each other, so that each is found within a few triangles
-// of the one before. For a strip of 16,384 points this order takes 0.9 ms, CGAL's spatial_sort 3.0,
-// the triangulation 10.4 ms with both.
+// Neighbors on the Hilbert curve are close in the plane, so that each point is located within a few
+// triangles of its predecessor. For a strip of 16,384 points this order takes 0.9 ms, CGAL's
+// spatial_sort 3.0; the triangulation takes 10.4 ms with either.
 void sort_along_hilbert(const Points& points, Indices& members) {
   struct Item {
     std::uint32_t place;
@@ -81,9 +81,8 @@ void sort_along_hilbert(const Points& points, Indices& members) {
   for (std::size_t n = 0; n < items.size(); ++n) members[n] = items[n].index;
 }
 
-// In rounds, each with four times as many points as the one before: later points fall among
-// earlier ones, not beside them, where long thin triangles would stand for a while (Amenta, Choi,
-// Rote 2003).
+// Inserts in rounds of four times as many points as before (Amenta, Choi, Rote 2003): later points
+// are then among earlier ones, where fewer long thin triangles arise.
 Indices in_rounds(const Indices& members) {
   Indices rounds;
   rounds.reserve(members.size());
@@ -95,11 +94,11 @@ Indices in_rounds(const Indices& members) {
   return rounds;
 }
 
-// Of points with the same x and y the highest stays, whatever their order.
+// Keeps the highest of points with the same x and y, in any order.
 Triangulation triangulate(const Points& points, Indices members) {
   sort_along_hilbert(points, members);
   members = in_rounds(members);
-  // Fetched together, not one by one between insertions.
+  // Fetched at once and not one by one between insertions, for the cache.
   std::vector<Kernel::Point_2> places;
   places.reserve(members.size());
   for (const std::uint32_t i : members) places.emplace_back(points[i].x(), points[i].y());
@@ -127,20 +126,20 @@ std::array<std::uint32_t, 3> corners_of(const Face& face) {
   return {corner(least), corner(least + 1), corner(least + 2)};
 }
 
-// Points between two lines along y, [low, high) in x, and what their own triangulation yields.
+// Points between two lines parallel to y, [low, high) in x, and their triangulation.
 struct Strip {
   double low = -std::numeric_limits<double>::infinity();
   double high = std::numeric_limits<double>::infinity();
   Indices members;
   std::vector<std::array<std::uint32_t, 3>> final_triangles;
-  std::vector<std::array<std::uint32_t, 2>> rims;  // edges of these with the final side to the left
-  Indices open;                                    // corners of what is not final, and of the hull
+  std::vector<std::array<std::uint32_t, 2>> rims;  // edges with a final triangle to the left
+  Indices open;                                    // corners of the hull and of others
   std::size_t vertices = 0;
 };
 
-// Whether a triangle's circumcircle lies within the strip for certain: then no point beyond touches
-// it. Margins of a thousandth of its radius are wide against rounding, which reaches 1e-5 of it for
-// the thinnest triangles that are evaluated at all.
+// Returns true if the circumcircle of a triangle is certainly inside the strip, so that no point
+// outside touches it. The margin of a thousandth of its radius covers rounding, which reaches 1e-5
+// of the radius for the thinnest triangles evaluated.
 bool is_final(const Face& face, const Strip& strip) {
   const auto &a = face->vertex(0)->point(), &b = face->vertex(1)->point(),
              &c = face->vertex(2)->point();
@@ -153,7 +152,7 @@ bool is_final(const Face& face, const Strip& strip) {
   return a.x() + x - reach > strip.low && a.x() + x + reach < strip.high;
 }
 
-// The vertices at the ends of edge `n`, with the face to its left.
+// Vertices of edge `n`, with the face to its left.
 std::array<std::uint32_t, 2> edge_of(const Face& face, int n) {
   return {face->vertex(Triangulation::ccw(n))->info(), face->vertex(Triangulation::cw(n))->info()};
 }
@@ -188,7 +187,7 @@ std::vector<Strip> cut_into_strips(const Points& points, std::size_t points_a_st
   std::vector<Strip> strips(std::max<std::size_t>(1, points.size() / points_a_strip));
   std::vector<double> lines;
   if (strips.size() > 1) {
-    // A sample says well enough where the lines are to stand.
+    // A sample is sufficient to place the lines.
     std::vector<double> xs;
     for (std::size_t n = 0; n < points.size(); n += 16) xs.push_back(points[n].x());
     std::sort(xs.begin(), xs.end());
@@ -205,7 +204,7 @@ std::vector<Strip> cut_into_strips(const Points& points, std::size_t points_a_st
   return strips;
 }
 
-// Edges between two points, in either direction.
+// Set of edges between two points, in either direction.
 class Edges {
  public:
   explicit Edges(const std::vector<Strip>& strips) {
@@ -213,7 +212,7 @@ class Edges {
       for (const auto& [from, to] : strip.rims) of_pair_[key_of(from, to)] = from < to;
   }
   bool empty() const { return of_pair_.empty(); }
-  // What a face to the left of an edge is to become, or unknown if that is no rim.
+  // Fate of a face to the left of an edge; unknown if the edge is not a rim.
   Fate fate_beside(const std::array<std::uint32_t, 2>& edge) const {
     const auto found = of_pair_.find(key_of(edge[0], edge[1]));
     if (found == of_pair_.end()) return Fate::unknown;
@@ -224,12 +223,12 @@ class Edges {
   static std::uint64_t key_of(std::uint32_t a, std::uint32_t b) {
     return std::uint64_t{std::min(a, b)} << 32 | std::max(a, b);
   }
-  std::unordered_map<std::uint64_t, bool> of_pair_;  // whether the final side is left of a rim
+  std::unordered_map<std::uint64_t, bool> of_pair_;  // true: the final side is to the left
 };
 
-// The triangles between the strips' final ones. Every triangle of the whole that is not final has
-// its corners among the open points, and no other point in its circumcircle: so it is one of
-// theirs. The rims part these triangles from those that only stand where final ones are.
+// Triangles between the final ones of the strips. Every triangle that is not final has its corners
+// among the open points and no other point in its circumcircle, so that it is in the triangulation
+// of the open points. The rims separate these triangles from those in the area of final ones.
 void triangulate_between(const Points& points, const std::vector<Strip>& strips,
                          PlanarTriangulation& whole) {
   Indices open;
@@ -251,7 +250,7 @@ void triangulate_between(const Points& points, const std::vector<Strip>& strips,
     for (int n = 0; n < 3; ++n) {
       const Face& next = face->neighbor(n);
       if (triangulation.is_infinite(next) || next->info() != Fate::unknown) continue;
-      // A face beside a rim knows its fate already: none is crossed.
+      // The fate of a face beside a rim is known already, so that no rim is crossed.
       next->info() = face->info();
       reached.push_back(next);
     }

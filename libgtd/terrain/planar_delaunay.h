@@ -1,4 +1,4 @@
-// The Delaunay triangulation of a terrain's points in the plane; for interpolation.cc alone.
+// Delaunay triangulation of a terrain's points in the x-y plane. Used only by interpolation.cc.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,17 +10,17 @@
 namespace libgtd {
 
 struct PlanarTriangulation {
-  // Positions in the list of points, counterclockwise, the corner of least x (then y) first.
+  // Indices of points, counterclockwise, starting at the corner of minimum x (then y).
   std::vector<std::array<std::uint32_t, 3>> triangles;
   std::size_t vertices = 0;
 };
 
-// Of the points' x and y; of points that share both, one of greatest z is a corner. Which triangles
-// there are does not depend on the points' order or on `points_a_strip`, not even where four lie on
-// one circle: CGAL decides those by a symbolic perturbation of the points. No triangles if all
-// points lie on a line. Strips of about so many points are triangulated in parallel: triangles
-// whose circumcircle stays within its strip are final, and what is left between them is
-// triangulated once more.
+// Triangulates the x and y of the points. Of points with the same x and y, one of maximum z is a
+// vertex. Returns no triangles if the points are collinear. The set of triangles does not depend on
+// the order of the points or on `points_a_strip`, even if four points are cocircular: CGAL decides
+// these cases by symbolic perturbation. Strips of about `points_a_strip` points are triangulated in
+// parallel. Triangles whose circumcircle is inside their strip are final; the remaining gaps are
+// triangulated again.
 PlanarTriangulation triangulate_in_plane(const std::vector<Eigen::Vector3d>& points,
                                          std::size_t points_a_strip = 16384);
 

@@ -30,9 +30,9 @@ using libmap::PointCloud;
 using libmap::PointStream;
 
 constexpr std::size_t points_per_chunk = 8192;
-// The input's z axis decides only where it is within 75 deg of the normal.
+// Minimum cosine between the z axis of the input and the normal for UpSource::frame_z (75 deg).
 constexpr double min_cosine_of_frame_z = 0.2588190451025207;
-// Below these sines two directions count as parallel.
+// Directions with a smaller sine are parallel.
 constexpr double parallel_sine = 1e-6;
 constexpr double in_plane_cosine = 1e-9;
 
@@ -47,8 +47,8 @@ struct Moments {
   libmap::NormalVotes normals{};
 };
 
-// Chunk by chunk in the points' order, so that blocks of whole chunks give the sum of all points
-// at once.
+// Sums chunk by chunk in the order of the points, so that blocks of whole chunks have the same sum
+// as all points at once.
 template <typename T, typename Add>
 void add_block(const PointCloud& block, const T& zero, const Add& add, T& total) {
   static_assert(PointStream::block_points % points_per_chunk == 0);
@@ -101,12 +101,12 @@ Vector3d mean_about(const Vector3d& origin, const Sum& sum) {
   return sum.count == 0 ? origin : origin + sum.of / static_cast<double>(sum.count);
 }
 
-// What a first look at the points tells.
+// Results of the first pass over the points.
 struct Facts {
-  std::size_t points = 0;         // finite or not
-  std::optional<Vector3d> first;  // finite one
-  Sum offsets;                    // of the finite points from the first
-  double opposing_normals = 0;    // of the first block
+  std::size_t points = 0;         // including points that are not finite
+  std::optional<Vector3d> first;  // first finite point
+  Sum offsets;                    // sum of offsets of finite points from `first`
+  double opposing_normals = 0;    // share in the first block
   libmap::Pose viewpoint = libmap::Pose::Identity();
 };
 
@@ -125,7 +125,7 @@ Facts facts_of(const PointStream& points) {
   return facts;
 }
 
-// Eq. 2-13. The second pass takes away the rounding that a far origin leaves in the first.
+// Eq. 2-13. The second pass removes the rounding of the first for points far from the origin.
 Vector3d centroid_of(const PointStream& points, const Facts& facts) {
   const Vector3d near = mean_about(facts.first.value_or(Vector3d::Zero()), facts.offsets);
   Sum offsets;
@@ -134,7 +134,7 @@ Vector3d centroid_of(const PointStream& points, const Facts& facts) {
   return mean_about(near, offsets);
 }
 
-// Eq. 2-14, 2-15: the normal without its sign, and the three variances in increasing order.
+// Eq. 2-14, 2-15: normal without its sign, and the three variances, ascending.
 Matrix3d principal_axes(const PointStream& points, const Vector3d& centroid, std::size_t count,
                         Vector3d& variances) {
   Matrix3d covariance = sum_over(points, Matrix3d(Matrix3d::Zero()),
@@ -143,7 +143,7 @@ Matrix3d principal_axes(const PointStream& points, const Vector3d& centroid, std
                                    s += d * d.transpose();
                                  });
   covariance /= static_cast<double>(count);
-  // Scaled, so that neither tiny nor huge clouds leave the numbers' range.
+  // Scaled, so that tiny and huge clouds stay in the range of numbers.
   const double scale = covariance.trace();
   if (scale > 0) covariance /= scale;
   const libmap::SymmetricEigen<3> eigen = libmap::symmetric_eigen(covariance);
@@ -157,13 +157,14 @@ void check_spread(const Vector3d& variances, const Vector3d& centroid, std::size
                         {.field = "points", .value = std::to_string(count), .bound = ">= 3"});
   const double size = std::sqrt(variances[2]);
   const double rounding = 1e-15 * centroid.norm();
-  if (!(size > 4 * rounding)) throw libmap::Error("all points lie in one place: no plane fits");
-  // Single-precision coordinates leave about 1e-7 of the offset as noise across a true line.
+  if (!(size > 4 * rounding))
+    throw libmap::Error("all points are in one place: no plane can be fitted");
+  // Single-precision coordinates have noise of about 1e-7 of the offset across an exact line.
   if (!(std::sqrt(variances[1]) > 1e-6 * size + 4 * rounding))
-    throw libmap::Error("all points lie on a line: no plane fits");
+    throw libmap::Error("all points are on a line: no plane can be fitted");
 }
 
-// Moments of the heights, and the normals' votes on the side of `normal`.
+// Moments of the heights, and votes of the normals for the side of `normal`.
 Moments height_moments(const PointStream& points, const Vector3d& centroid,
                        const Vector3d& normal) {
   Moments total;
@@ -181,7 +182,7 @@ Moments height_moments(const PointStream& points, const Vector3d& centroid,
   return total;
 }
 
-// The cosine between both; 0 if `direction` is unknown or within the plane.
+// Cosine between normal and direction; 0 if `direction` is unknown or within the plane.
 double side_of(const Vector3d& normal, const Vector3d& direction) {
   const double length = direction.stableNorm();
   if (!(length > 0) || !std::isfinite(length)) return 0;
@@ -189,7 +190,7 @@ double side_of(const Vector3d& normal, const Vector3d& direction) {
   return std::abs(cosine) > in_plane_cosine ? cosine : 0;
 }
 
-// The least-squares plane of the points.
+// Least-squares plane of the points.
 struct FittedPlane {
   Vector3d centroid;      // m
   Matrix3d axes;          // columns: unit normal, then two unit vectors in the plane
@@ -198,9 +199,10 @@ struct FittedPlane {
 
 constexpr double cells_per_extent = 70.0;
 constexpr std::size_t cells_per_chunk = 4096;
-// The ground is a plane if half of the surface is so much nearer to it than to the start.
+// The terrain has level ground if the ratio of the median distances of the plane found and the
+// start is at most this.
 constexpr double max_median_ratio = 0.5;
-constexpr double min_cosine = 0.7071067811865476;  // to the start's normal: 45 degrees
+constexpr double min_cosine = 0.7071067811865476;  // to the start's normal: 45 deg
 constexpr int hypotheses = 500;
 constexpr std::size_t max_looked_at = 4000;
 constexpr int max_steps = 200;
@@ -211,10 +213,11 @@ struct Mean {
   double count = 0.0;
 };
 
-// Along the start's axes from its centroid, in its extents, in the order of the cells.
+// Means of the points in each cell, along the axes of the start from its centroid, in units of its
+// extent, in the order of the cells.
 std::vector<Vector3d> cell_means(const libmap::PointStream& points, const FittedPlane& start) {
   libmap::VoxelIndex cells;
-  std::vector<Mean> sums;  // of the cells
+  std::vector<Mean> sums;  // one per cell
   points.for_each_block(libmap::PointStream::Need::positions, [&](const libmap::PointCloud& block) {
     for (const Vector3d& position : block.positions) {
       if (!position.allFinite()) continue;
@@ -238,7 +241,7 @@ std::vector<Vector3d> cell_means(const libmap::PointStream& points, const Fitted
   return means;
 }
 
-// Through places in the start's axes; at first the start itself.
+// Plane in the coordinates of cell_means; the default is the start.
 struct Plane {
   Vector3d normal = Vector3d::UnitX();
   double offset = 0.0;
@@ -259,7 +262,7 @@ Plane weighted_fit(const std::vector<Vector3d>& places, const Plane& last, doubl
   return plane;
 }
 
-// Of the absolute heights.
+// Median of the absolute heights.
 double median_height(const std::vector<Vector3d>& places, const Plane& plane) {
   std::vector<double> heights;
   heights.reserve(places.size());
@@ -267,8 +270,8 @@ double median_height(const std::vector<Vector3d>& places, const Plane& plane) {
   return libmap::median(std::move(heights));
 }
 
-// Least median of squares (Rousseeuw 1984): of planes through three places, the one with the least
-// median of the absolute heights. Every so many-th place is looked at.
+// Least median of squares (Rousseeuw 1984): of planes through three positions, the plane with the
+// minimum median of the absolute heights, on a subsample of positions.
 Plane least_median(const std::vector<Vector3d>& places, const Plane& start) {
   std::vector<Vector3d> looked_at;
   const std::size_t step = places.size() / max_looked_at + 1;
@@ -295,20 +298,20 @@ Plane least_median(const std::vector<Vector3d>& places, const Plane& start) {
   return best;
 }
 
-// Unit normal of the plane that most of the surface follows, on the side of the start's normal, at
-// most 45 degrees from it: the least-squares plane is tilted toward rocks. The points are replaced
-// by one mean per cube of extent_m / 70 (about 1/250 of the terrain's width), so that parts of the
-// surface that were scanned more densely have no more weight. The least median of squares of 500
-// planes (Rousseeuw 1984) is refined by reweighted least squares with Tukey's biweight. Equals the
-// start's normal if its median distance is not at least twice that of the plane found: such a
-// terrain has no level ground. The same for points in one or in many blocks, to the bit.
+// Unit normal of the ground, on the side of the start's normal and at most 45 degrees from it. The
+// least-squares plane is tilted by rocks; this normal is that of the plane that most of the surface
+// follows. The points are replaced by one mean per cube of extent_m / 70 (about 1/250 of the width
+// of the terrain), so that scan density has no effect. The least median of squares of 500 planes
+// (Rousseeuw 1984) is refined by reweighted least squares with Tukey's biweight. Returns the normal
+// of the start if its median distance is less than twice that of the plane found, because such a
+// terrain has no level ground. The result is the same to the bit for points in one or many blocks.
 Vector3d ground_normal(const libmap::PointStream& points, const FittedPlane& start) {
   const std::vector<Vector3d> places = cell_means(points, start);
   const Plane squares;
   const Plane found = least_median(places, squares);
   const double median = median_height(places, found);
   if (!(median < max_median_ratio * median_height(places, squares))) return start.axes.col(0);
-  // Below this, heights are rounding.
+  // Smaller heights are rounding errors.
   constexpr double min_limit = 1e-6;
   const double limit = std::max(libmap::tukey_width_of(median), min_limit);
   Plane plane = found;
@@ -321,7 +324,7 @@ Vector3d ground_normal(const libmap::PointStream& points, const FittedPlane& sta
   return start.axes * plane.normal;
 }
 
-// A fitted plane whose normal may still face either side.
+// Fitted plane without the sign of its normal.
 struct Fit {
   Vector3d centroid;
   Vector3d normal;
@@ -330,7 +333,7 @@ struct Fit {
   libmap::NormalVotes normals{};
 };
 
-// The sign of the normal: which of the two sides is up, and who said so.
+// Returns the sign of the normal, and sets the criterion that decided it.
 double choose_up(const Facts& facts, const RegressionPlaneOptions& options, const Fit& fit,
                  UpSource& source) {
   if (options.up) {
@@ -338,14 +341,14 @@ double choose_up(const Facts& facts, const RegressionPlaneOptions& options, cons
     const double side = side_of(fit.normal, *options.up);
     if (side == 0)
       throw libmap::Error(
-          "this direction does not say which side of the plane is up: it has no "
-          "length or lies in the plane",
+          "this direction does not determine which side of the plane is up: it has length zero or "
+          "is in the plane",
           {.field = "up"});
     const double tilt_deg = std::acos(std::min(1.0, std::abs(side))) * 180.0 / std::numbers::pi;
     if (tilt_deg > options.max_tilt_deg)
       throw libmap::Error(
-          "the plane that fits the heights is too steep: if heights such as 0 or -9999 mean that "
-          "there is none, gdal_translate -a_nodata declares it",
+          "the fitted plane is too steep: if heights such as 0 or -9999 mark missing data, declare "
+          "them with gdal_translate -a_nodata",
           {.field = "tilt of the plane, deg",
            .value = libmap::to_fixed_text(tilt_deg, 1),
            .bound = "<= " + libmap::to_text(options.max_tilt_deg)});
@@ -374,8 +377,8 @@ Matrix3d thesis_axes(const Vector3d& centroid, const Vector3d& normal) {
   const Vector3d across = centroid.cross(normal);
   if (!(across.norm() > parallel_sine * centroid.norm()) || centroid.norm() == 0)
     throw libmap::Error(
-        "the centroid lies on the plane's normal through the origin, so eq. 2-17 gives no heading "
-        "(method thesis); use method corrected");
+        "the centroid is on the plane's normal through the origin, so that eq. 2-17 defines no "
+        "heading (method thesis); use method corrected");
   const Vector3d y = across.normalized();
   Matrix3d axes;
   axes << normal.cross(y), -y, normal;
@@ -454,7 +457,7 @@ libmap::PointCloud transform_to_terrain(const libmap::PointCloud& cloud,
     for (std::size_t i = 0; i < cloud.size(); ++i)
       moved.positions[i] = (turn * cloud.positions[i].cast<float>() - shift).eval().cast<double>();
   } else {
-    // About the centroid: a far origin would cancel out of R^T p - R^T c.
+    // Relative to the centroid: R^T p - R^T c would lose digits far from the origin.
     for (std::size_t i = 0; i < cloud.size(); ++i)
       moved.positions[i] = rotation * (cloud.positions[i] - plane.centroid);
   }

@@ -21,7 +21,7 @@ void require_voxel_size(double voxel_size_m) {
       {.field = "voxel_size_m", .value = libmap::to_text(voxel_size_m), .bound = "> 0"});
 }
 
-// Indices must leave room for windows around them, and their differences must fit an int.
+// Checks that windows around indices and differences of indices fit an int.
 template <typename Vector>
 void require_room(const Vector& extent_in_voxels, double voxel_size_m) {
   const Eigen::Vector3d extent = extent_in_voxels.template cast<double>();
@@ -29,7 +29,7 @@ void require_room(const Vector& extent_in_voxels, double voxel_size_m) {
   const double gigabytes = (extent.cwiseAbs().array() + 1.0).prod() / 8.0 / 0x1p30;
   throw libmap::Error("too small for this cloud: the grid would take " +
                           libmap::to_text(static_cast<float>(gigabytes)) +
-                          " GiB at a bit per voxel",
+                          " GiB at one bit per voxel",
                       {.field = "voxel_size_m", .value = libmap::to_text(voxel_size_m)});
 }
 
@@ -81,10 +81,10 @@ void sort_and_unite(std::vector<Voxel>& voxels) {
   }
 }
 
-// The points of each cell side by side, cells ascending, points within one in their own order.
+// Points sorted by cell, cells ascending, points within a cell in their original order.
 struct SortedCells {
   std::vector<std::uint32_t> order;
-  std::vector<std::size_t> begins;  // of each cell in `order`, and the end
+  std::vector<std::size_t> begins;  // first entry of each cell in `order`, and the end
 };
 
 SortedCells sort_by_cell(const std::vector<Cell>& cells) {
@@ -227,9 +227,9 @@ VoxelFields::VoxelFields(const libmap::PointCloud& map) {
 int VoxelFields::index(std::size_t axis, std::size_t n) const {
   const double value = (*values_[axis])[n];
   if (!(std::abs(value) <= max_voxel_index) || value != std::floor(value))
-    throw libmap::Error("no index of a voxel", {.field = names[axis],
-                                                .value = libmap::to_text(value),
-                                                .bound = "a whole number within +-2^29"});
+    throw libmap::Error("not a voxel index", {.field = names[axis],
+                                              .value = libmap::to_text(value),
+                                              .bound = "an integer within +-2^29"});
   return static_cast<int>(value);
 }
 
@@ -253,7 +253,7 @@ void require_dense(std::size_t lone, std::size_t voxels, double voxel_size_m,
   constexpr std::size_t min_voxels = 10;
   if (voxels < min_voxels || 5 * lone <= 3 * voxels) return;
   throw libmap::Error(
-      "the points are too far apart for these voxels: interpolate (--interpolation), use larger "
+      "the points are too sparse for this voxel size: interpolate (--interpolation), use larger "
       "voxels (--voxel-size), or sample the surface of a mesh (graspmap resample)",
       {.field = "spacing of the points with voxels of " + libmap::to_text(voxel_size_m) + " m",
        .value = libmap::to_fixed_text(1000.0 * libmap::median_spacing(points), 1) + " mm; " +

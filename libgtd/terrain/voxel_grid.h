@@ -1,4 +1,4 @@
-// The terrain as a sparse set of occupied voxels.
+// Sparse set of the occupied voxels of a terrain.
 #pragma once
 
 #include <Eigen/Core>
@@ -18,11 +18,11 @@ namespace libgtd {
 struct VoxelGrid {
   VoxelLattice lattice;
   std::vector<Voxel> voxels;  // occupied, ascending, each once
-  Voxel min;                  // of the box of the grid; may be larger than that of the voxels
+  Voxel min;                  // box of the grid; may be larger than the box of the voxels
   Voxel max;
 };
 
-// A rectangle of voxel columns, [begin, end) in i and j.
+// Rectangle of voxel columns, [begin, end) in i and j.
 struct TileBounds {
   int i_begin = 0;
   int i_end = 0;
@@ -30,8 +30,8 @@ struct TileBounds {
   int j_end = 0;
 };
 
-// The first of `at` .. `end` that is not below `voxel`, in steps that double: near `at` it takes
-// few.
+// Returns the first iterator in at..end whose voxel is not below `voxel` (exponential search, fast
+// if the result is near `at`).
 template <typename Iterator>
 Iterator first_not_below(Iterator at, Iterator end, const Voxel& voxel) {
   auto step = typename std::iterator_traits<Iterator>::difference_type{1};
@@ -42,12 +42,12 @@ Iterator first_not_below(Iterator at, Iterator end, const Voxel& voxel) {
   return std::lower_bound(at, step < end - at ? at + step : end, voxel);
 }
 
-// Calls visit(n, m) for each two of the ascending voxels, n < m, at most `reach` apart along each
-// axis.
+// Calls visit(n, m), n < m, for each pair of the ascending voxels that are at most `reach` apart
+// along each axis.
 template <typename Visit>
 void visit_pairs(const std::vector<Voxel>& voxels, int reach, const Visit& visit) {
-  // In each of the rows i .. i + reach the first voxel of the columns j - reach .. j + reach: it
-  // moves on as the voxels do.
+  // For each row i .. i + reach, the first voxel of the columns j - reach .. j + reach. It only
+  // advances.
   std::vector<std::vector<Voxel>::const_iterator> firsts(static_cast<std::size_t>(reach) + 1,
                                                          voxels.begin());
   constexpr int lowest = std::numeric_limits<int>::min();
@@ -65,16 +65,16 @@ void visit_pairs(const std::vector<Voxel>& voxels, int reach, const Visit& visit
   }
 }
 
-// Number of voxels without an occupied one among their 26 neighbors.
+// Returns the number of voxels without an occupied one among their 26 neighbors.
 std::size_t count_lone(const std::vector<Voxel>& voxels);
 
-// Throws Error naming the spacing of the points if more than half of the voxels are lone: such
-// points are no surface of these voxels.
+// Throws Error naming the spacing of the points if more than 60 % of the voxels are lone: such
+// points do not form a surface at this voxel size.
 void require_dense(std::size_t lone, std::size_t voxels, double voxel_size_m,
                    const std::vector<Eigen::Vector3d>& points);
 
-// Calls visit(first, last) for each row of voxels of one i in the columns, ascending: positions
-// first .. last - 1 in grid.voxels.
+// Calls visit(first, last) for each row (one i) of voxels in the columns, ascending. The row is
+// grid.voxels[first .. last - 1].
 template <typename Visit>
 void visit_rows(const VoxelGrid& grid, const TileBounds& columns, const Visit& visit) {
   const auto begin = grid.voxels.begin();
@@ -91,7 +91,7 @@ void visit_rows(const VoxelGrid& grid, const TileBounds& columns, const Visit& v
   }
 }
 
-// Calls visit(position in grid.voxels) for each voxel of the columns, ascending.
+// Calls visit(index in grid.voxels) for each voxel of the columns, ascending.
 template <typename Visit>
 void visit_columns(const VoxelGrid& grid, const TileBounds& columns, const Visit& visit) {
   visit_rows(grid, columns, [&](std::size_t first, std::size_t last) {
@@ -99,37 +99,39 @@ void visit_columns(const VoxelGrid& grid, const TileBounds& columns, const Visit
   });
 }
 
-// `corrected`: index = floor(p / voxel_size_m) on the lattice through the frame's origin, so that a
-// point lies in the same voxel whatever else is in the cloud. Throws Error naming voxel_size_m if
-// an index would leave +-2^29 (it says how much memory a bit per voxel would take).
+// Voxelizes points (terrain frame, m) for `corrected`: index = floor(p / voxel_size_m) on the
+// lattice through the origin, independent of the rest of the cloud. Throws Error naming
+// voxel_size_m if an index is outside +-2^29.
 VoxelGrid voxelize(const std::vector<Eigen::Vector3d>& points_in_terrain, double voxel_size_m);
 
-// The mean of the points in each voxel of the same lattice, voxels ascending, with the sum of their
-// normals if they have normals: where a scan is denser, its points have no more weight. Throws as
-// `voxelize`.
+// Returns the mean of the points in each voxel of that lattice, in ascending order, with the sum of
+// their normals if the cloud has normals. This removes the effect of scan density. Throws like
+// voxelize.
 libmap::PointCloud voxel_means(const libmap::PointCloud& terrain, double voxel_size_m);
 
-// `thesis` (listing A.4), in single precision: the centroid of each cell of one lattice, put into
-// the cells of a second one that begins at the smallest coordinates of the points.
+// Voxelizes points for `thesis` (listing A.4), in single precision: the centroids of the cells of
+// one lattice are put into the cells of a second lattice that starts at their minimum coordinates.
 VoxelGrid voxelize_thesis(const std::vector<Eigen::Vector3f>& points_in_terrain,
                           double voxel_size_m);
 
-// The centroid of the points in each cell floor(p * (1 / leaf_m)) in single precision, cells in
-// ascending order of z, y, x (what the author's program does before and in the voxelization).
+// Returns the centroid of the points in each cell floor(p * (1 / leaf_m)) in single precision, in
+// ascending order of z, y, x, as the author's program does before and during voxelization.
 std::vector<Eigen::Vector3f> thin_to_centroids(const std::vector<Eigen::Vector3f>& points,
                                                double leaf_m);
 
-// Throws Error naming the field if it is missing.
+// Returns the values of a field. Throws Error naming the field if it is missing.
 const std::vector<double>& values_of(const libmap::PointCloud& map, const char* name);
 
+// Voxel indices of map points, from the fields i, j and k.
 class VoxelFields {
  public:
-  // Throws Error naming the field that is missing. The map outlives it and keeps its fields.
+  // Throws Error naming a missing field. The map and its fields must outlive this object.
   explicit VoxelFields(const libmap::PointCloud& map);
 
-  // Of point n. Throws Error naming the field whose value is no whole number within +-2^29.
+  // Returns the voxel of point n. Throws Error naming the field if a value is not an integer within
+  // +-2^29.
   Voxel at(std::size_t n) const;
-  // Of all points.
+  // Returns the voxels of all points. Throws like at().
   std::vector<Voxel> all() const;
 
  private:

@@ -1,4 +1,4 @@
-// All arithmetic between points and voxels. Points are in the terrain frame, in meters.
+// Conversions between points and voxels. Points are in the terrain frame, in meters.
 #pragma once
 
 #include <Eigen/Core>
@@ -6,17 +6,17 @@
 
 namespace libgtd {
 
-// std::floor of a number in the integer's range, without a call into the mathematics library.
+// std::floor for values within the range of Integer, without a library call.
 template <typename Integer, typename Real>
 constexpr Integer floor_to(Real value) {
   const auto whole = static_cast<Integer>(value);
   return static_cast<Real>(whole) > value ? whole - 1 : whole;
 }
 
-// Indices of voxels are within +-2^29: windows around them and differences fit an int.
+// Bound of voxel indices (+-2^29), so that windows around them and differences fit an int.
 inline constexpr double max_voxel_index = 0x1p29;
 
-// Ordered by i, then j, then k: the order of every list of voxels and of every map.
+// Voxel index. The order by i, then j, then k is that of all lists of voxels and all maps.
 struct Voxel {
   int i = 0;
   int j = 0;
@@ -24,13 +24,13 @@ struct Voxel {
   auto operator<=>(const Voxel&) const = default;
 };
 
-// Cubes of the edge voxel_size_m, voxel (0, 0, 0) with its lowest corner at `origin_m`. A point on
-// a face belongs to the voxel above it.
+// Lattice of cubes with edge voxel_size_m; `origin_m` is the lowest corner of voxel (0, 0, 0). A
+// point on a face belongs to the voxel above it.
 struct VoxelLattice {
   Eigen::Vector3d origin_m = Eigen::Vector3d::Zero();
   double voxel_size_m = 0.01;
 
-  // In voxels from the lattice's origin, not cut to whole ones.
+  // Returns the position in voxels from the origin, not rounded.
   Eigen::Vector3d cell_of(const Eigen::Vector3d& point_in_terrain) const {
     return (point_in_terrain - origin_m) / voxel_size_m;
   }
@@ -44,9 +44,9 @@ struct VoxelLattice {
   }
 };
 
-// The same in single precision, as the author's program does it (spec of method `thesis`): voxels
-// count from the cloud's smallest coordinates, and a quarter of the voxel size, in meters, is added
-// to an index before it is cut off.
+// Lattice of method `thesis`, in single precision as in the author's program: indices start at the
+// minimum coordinates of the cloud, and a quarter of the voxel size in meters is added to an index
+// before truncation.
 struct ThesisLattice {
   Eigen::Vector3f min_m = Eigen::Vector3f::Zero();
   float voxel_size_m = 0.01F;
@@ -63,7 +63,7 @@ struct ThesisLattice {
   VoxelLattice lattice() const { return {min_m.cast<double>(), static_cast<double>(voxel_size_m)}; }
 };
 
-// Rounds toward minus infinity, unlike '/'.
+// Integer division that rounds toward minus infinity, unlike '/'.
 constexpr int floor_divide(int dividend, int divisor) {
   const int quotient = dividend / divisor;
   return dividend % divisor != 0 && (dividend < 0) != (divisor < 0) ? quotient - 1 : quotient;

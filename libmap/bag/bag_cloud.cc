@@ -40,7 +40,7 @@ StoredType type_of(const PointField& field) {
                                .bound = "1 to 8"});
 }
 
-// Each ScalarType is among them.
+// Returns the number of a type; all types have one.
 std::uint8_t number_of(ScalarType type) {
   return std::find_if(std::begin(field_types), std::end(field_types),
                       [&](const auto& known) { return known.second == stored_as(type); })
@@ -49,23 +49,23 @@ std::uint8_t number_of(ScalarType type) {
 
 Error does_not_fit(const std::string& field, std::uint64_t value, std::uint64_t least) {
   return Error(
-      "shorter than what it is to contain",
+      "too small for its content",
       {.field = field, .value = std::to_string(value), .bound = ">= " + std::to_string(least)});
 }
 
-// Throws Error unless the data hold what the sizes say.
+// Throws Error if the data are smaller than the declared sizes.
 void check_sizes(const PointCloud2& message) {
   const std::uint64_t row = std::uint64_t{message.width} * message.point_step;
   if (message.width == 0 || message.height == 0) return;
   if (message.point_step == 0) throw does_not_fit("point_step", 0, 12);
-  // Some programs leave row_step of a single row empty.
+  // Some programs set row_step to 0 for a single row.
   if (message.height > 1 && message.row_step < row)
     throw does_not_fit("row_step", message.row_step, row);
   const std::uint64_t needed = std::uint64_t{message.row_step} * (message.height - 1) + row;
   if (message.data.size() < needed) throw does_not_fit("data", message.data.size(), needed);
 }
 
-// The points one after the other, without what lies between rows.
+// Returns the points without padding between rows.
 std::shared_ptr<const std::string> packed_rows(const PointCloud2& message) {
   auto data = std::make_shared<std::string>();
   if (message.width == 0 || message.height == 0) return data;
@@ -81,7 +81,7 @@ void add_columns(const PointField& field, const PointCloud2& message, const std:
   const std::string& name = field.name;
   const StoredType type = type_of(field);
   const std::size_t bytes = size_of(type);
-  // Old drivers leave the count empty.
+  // Old drivers set count to 0.
   const std::size_t count = std::max<std::uint32_t>(field.count, 1);
   const bool swapped = message.is_bigendian != (std::endian::native == std::endian::big);
   if (message.point_step < std::uint64_t{field.offset} + bytes * count)
@@ -120,7 +120,7 @@ PointCloud2 encode_cloud(const PointCloud& cloud) {
   std::size_t color_offset = 0;
   bool has_color = false;
   for (Column& column : set.columns) {
-    // RViz shows no positions of another type.
+    // RViz supports no other type of positions.
     if (column.name == "x" || column.name == "y" || column.name == "z")
       column.type = ScalarType::float32;
     PointField field;
@@ -140,7 +140,7 @@ PointCloud2 encode_cloud(const PointCloud& cloud) {
                 {.field = "points", .value = std::to_string(set.rows)});
   std::string records;
   append_records(set.columns, 0, set.rows, false, records);
-  // With PCL's alpha of 255 colors are NaN as float32, and Python's readers skip such points.
+  // With PCL's alpha of 255, colors are NaN as float32, and Python's readers skip such points.
   if (has_color)
     for (std::size_t row = 0; row < set.rows; ++row) records[row * offset + color_offset + 3] = 0;
   message.data.assign(records.begin(), records.end());
@@ -167,7 +167,7 @@ std::string only_cloud_topic(const BagListing& listing) {
   throw Error(count == 0 ? "no topic contains clouds" : "several topics contain clouds",
               {.field = std::string("topics of ") + PointCloud2::type.name,
                .value = count == 0 ? "none" : names,
-               .bound = count == 0 ? "" : "one of them named as the topic"});
+               .bound = count == 0 ? "" : "one of them, named as the topic"});
 }
 
 BagCloudResult read(const std::filesystem::path& bag, const std::string& wanted,

@@ -20,7 +20,7 @@ const BagStorage& storage_of(const fs::path& file) {
   if (head.starts_with("#ROSBAG V2.0\n") || head.starts_with("#ROSBAG V1.")) return ros1_storage;
   if (head.starts_with("SQLite format 3")) return sqlite_storage;
   if (head.starts_with("\x89MCAP0\r\n")) return mcap_storage;
-  throw Error("is no bag", {.file = file.string(),
+  throw Error("not a bag", {.file = file.string(),
                             .field = "first line",
                             .value = ros_message::printable(head.substr(0, head.find('\n'))),
                             .bound = "#ROSBAG V2.0 or V1.x, SQLite format 3 or MCAP"});
@@ -38,7 +38,7 @@ bool BagTopic::is(const MessageType& other) const {
 }
 
 bool BagTopic::has_definition_of(const MessageType& other) const {
-  // In ROS 2 the name alone says which definition it is.
+  // In ROS 2, the name alone identifies the definition.
   return is(other) && (md5sum.empty() || md5sum == other.md5sum);
 }
 
@@ -68,7 +68,7 @@ bool is_bag_path(const fs::path& path) {
   std::error_code code;
   if (!fs::is_directory(path, code)) return false;
   if (fs::exists(path / rosbag2_metadata_name, code)) return true;
-  // Without it its recording was not ended.
+  // A folder without metadata.yaml is a bag whose recording was not ended.
   return std::any_of(fs::directory_iterator(path, code), fs::directory_iterator(),
                      [](const fs::directory_entry& file) {
                        return file.path().extension() == ".db3" ||
@@ -118,10 +118,10 @@ const BagTopic& require_topic(const BagListing& listing, const std::string& name
   for (const BagTopic& topic : listing.topics) {
     if (topic.name == name && topic.has_definition_of(type)) return topic;
     if (topic.name == name && topic.is(type))
-      throw Error("is another definition of " + topic.type,
+      throw Error("not the supported definition of " + topic.type,
                   {.field = "md5sum of " + name, .value = topic.md5sum, .bound = type.md5sum});
     if (topic.name == name)
-      throw Error("is of another type",
+      throw Error("wrong type",
                   {.field = "type of " + name, .value = topic.type, .bound = type.name});
     names.push_back(topic.name);
   }

@@ -1,5 +1,5 @@
-// What a bag contains, and its messages as bytes: a bag of ROS 1, or one of ROS 2 in either of its
-// storages (bag_storage.h).
+// Reader of bags of ROS 1 and ROS 2 (sqlite3 and mcap, see bag_storage.h): topics, and messages as
+// bytes.
 #pragma once
 
 #include <cstddef>
@@ -13,72 +13,72 @@
 
 namespace libmap {
 
-// How messages are stored as bytes (message_codec.h); other: not one that is read.
+// Encoding of messages (message_codec.h); other: not supported.
 enum class MessageEncoding { ros1, cdr, other };
 
-// A type of messages, and the md5sum of its definition in ROS 1.
+// Message type with the md5sum of its definition in ROS 1.
 struct MessageType {
-  const char* name = "";  // as ROS 1 has it, e.g. "sensor_msgs/PointCloud2"
+  const char* name = "";  // name in ROS 1, e.g. "sensor_msgs/PointCloud2"
   const char* md5sum = "";
 };
-// "sensor_msgs/PointCloud2" -> "sensor_msgs/msg/PointCloud2".
+// Returns the name in ROS 2: "sensor_msgs/PointCloud2" -> "sensor_msgs/msg/PointCloud2".
 std::string ros2_name(const MessageType& type);
 
 // All connections of one topic and type.
 struct BagTopic {
   std::string name{};
-  std::string type{};    // e.g. "sensor_msgs/PointCloud2"; of ROS 2 "sensor_msgs/msg/PointCloud2"
-  std::string md5sum{};  // of the type's definition; ROS 1 alone
+  std::string type{};    // e.g. "sensor_msgs/PointCloud2"; ROS 2: "sensor_msgs/msg/PointCloud2"
+  std::string md5sum{};  // md5sum of the type's definition; ROS 1 only
   bool latching = false;
   MessageEncoding encoding = MessageEncoding::ros1;
   std::size_t messages = 0;
 
-  bool is(const MessageType& other) const;  // by name, whatever the definition
-  // By name and, in ROS 1, by definition.
+  bool is(const MessageType& other) const;  // compares the names only
+  // Compares the names and, in ROS 1, the definitions.
   bool has_definition_of(const MessageType& other) const;
   bool operator==(const BagTopic&) const = default;
 };
 
 struct BagListing {
   std::string storage{};  // "bag of ROS 1", "bag of ROS 2 (sqlite3)" or "bag of ROS 2 (mcap)"
-  std::vector<BagTopic> topics{};  // those with messages, in the order in which they were recorded
+  std::vector<BagTopic> topics{};  // topics with messages, in the order of recording
   std::size_t messages = 0;
-  double start_s = 0.0;  // when the first and the last message were recorded
+  double start_s = 0.0;  // recording times of the first and the last message
   double end_s = 0.0;
 };
 
-// *.bag, *.mcap or *.db3.
+// True for *.bag, *.mcap and *.db3.
 bool has_bag_extension(const std::filesystem::path& path);
-// Whether the path names a bag: by its extension, or a folder with metadata.yaml or files of the
-// latter two.
+// True if the path has the extension of a bag, or is a folder with metadata.yaml, .mcap or .db3.
 bool is_bag_path(const std::filesystem::path& path);
-// The files of a bag that exists: itself, or metadata.yaml and all that it names. Throws Error as
-// list_bag, for a folder.
+// Returns the files of an existing bag: the file itself, or metadata.yaml and the files listed in
+// it. For folders, throws as list_bag does.
 std::vector<std::filesystem::path> files_of_bag(const std::filesystem::path& path);
 
-// Throws Error naming the file: it cannot be read, is no bag, has no index, is broken or encrypted;
-// in a build without ROS 1's libraries (failed) for its bags, naming the packages that are missing.
+// Lists the topics of a bag. Throws Error naming the file if it cannot be read, is not a bag, has
+// no index, or is damaged or encrypted. Builds without ROS 1's libraries throw Error (failed) with
+// the missing packages for its bags.
 BagListing list_bag(const std::filesystem::path& path);
 
 struct BagRequest {
   std::string topic{};
-  // No more than so many of a message's first bytes are wanted.
+  // Maximum number of first bytes of each message to read.
   std::size_t max_bytes = std::numeric_limits<std::size_t>::max();
 };
 
 struct BagMessage {
   const BagTopic& topic;
   std::int64_t recorded_ns = 0;
-  std::string_view bytes{};  // valid during the call alone
+  std::string_view bytes{};  // valid during the call only
 };
 
-// Calls take(message) for each message of the topics, in the order of recording. Throws as
-// list_bag, and what `take` throws.
+// Calls take(message) for each message of the topics, in the order of recording. Throws as list_bag
+// does, and the exceptions of `take`.
 void read_bag(const std::filesystem::path& path, const std::vector<BagRequest>& requests,
               const std::function<void(const BagMessage&)>& take);
 
-// The topic of that name. Throws Error naming the nearest known one, or all that are of `type`,
-// and where its messages are of another type or of another definition of it.
+// Returns the topic of that name. Throws Error if there is none (with the nearest name, or all
+// topics of `type`), or if its messages have another type or definition.
 const BagTopic& require_topic(const BagListing& listing, const std::string& name,
                               const MessageType& type);
 

@@ -18,21 +18,21 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What a bag says of its depth images before they are read: stamps, calibrations, frames.
+// Metadata of a topic of depth images: stamps, calibrations, frames.
 struct SurveyedImages {
   std::string topic{};
   bool compressed = false;
-  std::string encoding{};  // of the first message; empty if none could be read
-  std::string frame{};     // of the first message
+  std::string encoding{};  // encoding of the first message; empty if none could be read
+  std::string frame{};     // frame of the first message
   std::vector<std::int64_t> stamps_ns{};
-  bool unstamped = false;  // headers without a stamp: those of the recording are taken
+  bool unstamped = false;  // true if headers have no stamp and recording times replace it
 
   std::string info_topic{};
   std::vector<Camera> calibrations{};                         // different ones
   std::vector<std::pair<std::int64_t, std::size_t>> infos{};  // stamp and calibration, ascending
-  std::string info_error{};  // why the first of those that cannot be used cannot
+  std::string info_error{};  // reason for the first unusable camera info
 
-  // Index of the calibration that is nearest in time; of equally near ones the earlier.
+  // Returns the index of the calibration nearest in time, the earlier one for equal distances.
   std::size_t calibration_at(std::int64_t stamp_ns) const {
     const auto after =
         std::lower_bound(infos.begin(), infos.end(), stamp_ns,
@@ -55,8 +55,8 @@ bool same_calibration(const Camera& a, const Camera& b) {
          a.distortion == b.distortion;
 }
 
-// Drivers of rectified images publish the calibration of the raw ones and say by P how they differ.
-// The word stands in the image's name, "image_rect" or "image_rect_raw", before a transport's.
+// True for topics of rectified images, "image_rect" or "image_rect_raw", with or without a
+// transport. Their drivers publish the calibration of the raw images, and P for the rectified ones.
 bool is_rectified(const std::string& topic) {
   const std::size_t name = topic.find("/image_rect");
   if (name == std::string::npos) return false;
@@ -69,7 +69,7 @@ void take_image(const BagMessage& message, SurveyedImages& images) {
   try {
     head = read_image_head(message.topic.encoding, message.bytes, images.compressed);
   } catch (const Error&) {
-    return;  // It is found broken again, and named, where it is read.
+    return;  // reading the image reports the error again
   }
   if (images.encoding.empty()) {
     images.encoding = head.encoding;
@@ -109,9 +109,9 @@ std::string namespace_of_image(const std::string& topic, bool compressed) {
   return name;
 }
 
-// Reads the bag once. `topics` are of images, each with whether it is compressed; no transforms are
-// read if `transform_topic` is empty. Throws Error: a broken bag or message, transforms that
-// change.
+// Reads the bag once. `topics` contains topics of images, each with true if it is compressed; no
+// transforms are read if `transform_topic` is empty. Throws Error for a damaged bag or message, or
+// transforms that change.
 BagSurvey survey_bag(const std::filesystem::path& bag,
                      const std::vector<std::pair<std::string, bool>>& topics,
                      const std::string& transform_topic) {
@@ -141,9 +141,9 @@ BagSurvey survey_bag(const std::filesystem::path& bag,
   return survey;
 }
 
-constexpr double float_unit_m = 1e-4;  // of images of 32FC1: up to 6.5 m
+constexpr double float_unit_m = 1e-4;  // unit of images of 32FC1: up to 6.5 m
 
-// A topic that the user named, or all that may carry depth, with a name if it was given one.
+// A topic given by the user, or a candidate for depth images, with its given name, if any.
 struct Choice {
   std::string name{};
   std::string topic{};
@@ -183,8 +183,8 @@ std::vector<Choice> choices_of(const BagListing& listing, const BagRigOptions& o
   return choices;
 }
 
-// Of topics that the user did not name those that carry depth; of a raw and a compressed one of the
-// same images the raw one.
+// Keeps topics of depth images among the topics not given by the user; prefers a raw topic to a
+// compressed one of the same images.
 void keep_depth_topics(std::vector<Choice>& choices, BagSurvey& survey) {
   std::vector<Choice> kept_choices;
   std::vector<SurveyedImages> kept;
@@ -217,7 +217,7 @@ std::vector<std::string> parts_of(const std::string& topic) {
   return parts;
 }
 
-// The parts of each topic in which they differ, joined by '_'; its first part if it is alone.
+// Names topics by the parts in which they differ, joined by '_'; a single topic by its first part.
 std::vector<std::string> names_by_difference(const std::vector<SurveyedImages>& images) {
   std::vector<std::vector<std::string>> parts;
   parts.reserve(images.size());
@@ -258,9 +258,9 @@ std::size_t camera_of_rig(const CameraRig& rig, const Choice& choice, const std:
   for (const std::string& candidate : candidates)
     for (std::size_t n = 0; n < names.size(); ++n)
       if (names[n] == candidate) return n;
-  throw Error("belongs to none of the rig's cameras (name it: CAMERA=TOPIC)" +
-                  did_you_mean(candidates.front(), names),
-              {.field = "topic", .value = choice.topic});
+  throw Error(
+      "matches no camera of the rig; use CAMERA=TOPIC" + did_you_mean(candidates.front(), names),
+      {.field = "topic", .value = choice.topic});
 }
 
 Camera calibrated_camera(const SurveyedImages& images, const BagListing& listing) {
@@ -279,7 +279,7 @@ std::string base_frame_of(const BagSurvey& survey, const BagRigOptions& options)
                                       : survey.transforms.root_of(survey.images.front().frame);
 }
 
-// A rig of the bag's own camera infos and transforms.
+// Makes a rig from the bag's camera infos and transforms.
 void rig_from_bag(const BagSurvey& survey, const BagListing& listing, const BagRigOptions& options,
                   BagRigPlan& plan) {
   if (survey.transforms.empty())
@@ -312,7 +312,8 @@ void set_limits(const BagSurvey& survey, const BagRigOptions& options, BagRigPla
   }
 }
 
-// The camera's images, ascending, one for each microsecond, with its first calibration alone.
+// Adds the camera's images in ascending order, at most one per microsecond, and only those with its
+// first calibration.
 void add_images(const SurveyedImages& images, std::size_t camera, bool calibrated,
                 BagRigPlan& plan) {
   std::vector<std::int64_t> stamps = images.stamps_ns;
@@ -334,13 +335,14 @@ void add_images(const SurveyedImages& images, std::size_t camera, bool calibrate
     if (count > 0)
       plan.warnings.push_back(images.topic + ": " + std::to_string(count) + " images " + text);
   };
-  warn(twice, "have the stamp of another and are left out");
-  warn(otherwise, "have another calibration than the first and are left out");
+  warn(twice, "have a duplicate stamp and are dropped");
+  warn(otherwise, "differ from the first calibration and are dropped");
   if (images.unstamped)
-    plan.warnings.push_back(images.topic + ": images without a stamp: those of the recording");
+    plan.warnings.push_back(images.topic +
+                            ": images without a stamp; the recording times are used");
 }
 
-// The synchronized sets that are wanted, and no images but theirs.
+// Selects synchronized sets and keeps their images only.
 void choose_sets(const BagRigOptions& options, const std::optional<double>& stamp_s,
                  BagRigPlan& plan) {
   std::vector<RigImage> stamps;
@@ -426,18 +428,19 @@ BagRigPlan plan_of(const fs::path& bag, const BagRigOptions& options,
 
 void bind(ParameterTable& table, BagRigOptions& options) {
   table.add("base_frame", options.base_frame,
-            "the robot's frame; auto: base_link, or the one that all else hangs on");
-  table.add("transform_topic", options.transform_topic, "transforms of static frames");
+            "frame of the robot; auto: base_link, or the root of all transforms");
+  table.add("transform_topic", options.transform_topic, "topic of the static transforms");
   table.add("depth_unit_m", options.depth_unit_m, positive,
-            "meters a unit of 16-bit images in the bag");
+            "meters per unit of 16-bit images in the bag");
   table.add("depth_scale_m", options.depth_scale_m, not_negative,
-            "meters a unit of the images written; 0: the rig's, or as in the bag, 0.1 mm for "
+            "meters per unit of the written images; 0: the rig's, or as in the bag, 0.1 mm for "
             "floats");
-  table.add("near_m", options.near_m, not_negative, "nearest depth of the rig; 0: the rig's own");
-  table.add("far_m", options.far_m, positive, "furthest depth of the rig; inf: the rig's own");
+  table.add("near_m", options.near_m, not_negative,
+            "minimum depth of the rig, m; 0: the rig's own");
+  table.add("far_m", options.far_m, positive, "maximum depth of the rig, m; inf: the rig's own");
   table.add("tolerance_s", options.tolerance_s, not_negative,
-            "images of one synchronized set are within this time of its stamp");
-  table.add("every", options.every, {1.0}, "takes the first of so many moments");
+            "maximum time between an image and the stamp of its synchronized set, s");
+  table.add("every", options.every, {1.0}, "interval of the exported synchronized sets; 1: all");
 }
 
 std::vector<std::string> names_in_rig_folder(const BagRigPlan& plan) {

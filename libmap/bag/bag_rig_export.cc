@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t images_at_once = 32;
 
-// Takes the messages of the plan's images and writes them in batches.
+// Receives the messages of the plan's images and writes the images in batches.
 class ImageWriter {
  public:
   ImageWriter(const BagRigPlan& plan, const fs::path& folder)
@@ -89,7 +89,7 @@ class ImageWriter {
       const DepthMessageImage depth = decode_depth(one.encoding, one.bytes, one.compressed,
                                                    {plan_.depth_unit_m, camera.depth_scale_m});
       if (depth.image.width != camera.camera.width || depth.image.height != camera.camera.height)
-        throw Error("does not fit the calibration",
+        throw Error("does not match the calibration",
                     {.field = "size",
                      .value = size_text(depth.image.width, depth.image.height),
                      .bound = size_text(camera.camera.width, camera.camera.height)});

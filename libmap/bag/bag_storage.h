@@ -1,4 +1,4 @@
-// The storages of bags, each of which reads and writes encoded messages:
+// Storages of bags, which read and write encoded messages:
 //   ros1     http://wiki.ros.org/Bags/Format/2.0, by librosbag
 //   sqlite3  rosbag2's default up to ROS 2 Humble: .db3 files and metadata.yaml in a folder
 //            (https://github.com/ros2/rosbag2: sqlite_storage.cpp, rosbag2_storage/yaml.hpp)
@@ -22,13 +22,13 @@
 
 namespace libmap {
 
-// What a bag's files contain, file by file.
+// Topics of a bag, accumulated over its files.
 struct RecordedTopics {
   std::vector<BagTopic> topics{};
   std::int64_t first_ns = std::numeric_limits<std::int64_t>::max();
   std::int64_t last_ns = std::numeric_limits<std::int64_t>::min();
 
-  // Index of the topic of that name, type, definition and encoding, which is appended if it is new.
+  // Returns the index of the topic of that name, type, definition and encoding; appends a new one.
   std::size_t index_of(const BagTopic& topic);
   void add(std::size_t index, std::size_t messages, std::int64_t first, std::int64_t last);
 
@@ -37,8 +37,8 @@ struct RecordedTopics {
 
 using TakeMessage = std::function<void(const BagMessage&)>;
 
-// Both throw Error naming the file. Of ROS 1: in a build without its libraries (failed), naming the
-// packages that are missing.
+// Functions of a storage. They throw Error naming the file; ROS 1's, in builds without its
+// libraries, throw Error (failed) with the missing packages.
 struct BagStorage {
   const char* name = "";
   void (*list)(const std::filesystem::path& file, RecordedTopics& topics) = nullptr;
@@ -53,21 +53,20 @@ extern const BagStorage mcap_storage;
 // rosbag2_storage/include/rosbag2_storage/yaml.hpp).
 inline constexpr const char* rosbag2_metadata_name = "metadata.yaml";
 
-// The names of the bag's files. Of any version: those from 1 to 9 have them alike; what else the
-// text says is in the files too. Throws Error: no such file, no YAML, a name missing, compressed
-// files or messages.
+// Returns the names of the bag's files. Versions 1 to 9 store them alike; all other content is in
+// the files too. Throws Error for a missing or invalid file, a missing name, and compressed bags.
 std::vector<std::string> read_rosbag2_metadata(const std::filesystem::path& path);
 
-// The text of version 5, that of Humble, which later ones read too, of one file of `storage`.
+// Returns the text for one file of `storage` in version 5 (Humble), which later versions read too.
 std::string rosbag2_metadata(const RecordedTopics& topics, const std::string& storage,
                              const std::string& file);
 
-// Quality of service (rmw's enumerations, as Humble writes them) of a latched topic, which is kept
-// for those that subscribe later; "" otherwise. And whether a recorded one is of that kind.
+// Quality of service (rmw's enumerations in Humble's format) of a latched topic, whose last message
+// is sent to late subscribers; "" for other topics. is_latching is true for such a recorded one.
 std::string quality_of_service(bool latching);
 bool is_latching(std::string_view quality_of_service);
 
-// A message to be written.
+// A message to write.
 struct StoredMessage {
   std::string topic{};
   MessageType type{};
@@ -77,25 +76,25 @@ struct StoredMessage {
   std::string bytes{};
 };
 
-// A bag in the making. Both throw Error (failed) where the disk does.
+// Writer of a bag. Its functions throw Error (failed) if a write fails.
 class BagSink {
  public:
   virtual ~BagSink() = default;
-  // Appends it. Stamps need not ascend.
+  // Appends a message. Stamps need not ascend.
   virtual void write(const StoredMessage& message) = 0;
-  // Ends the bag; without it the file is of no use.
+  // Completes the bag; without this call, the file is not a valid bag.
   virtual void close() = 0;
 };
 std::unique_ptr<BagSink> new_ros1_bag(const std::filesystem::path& path,
                                       BagCompression compression);
-// `folder` exists.
+// `folder` must exist.
 std::unique_ptr<BagSink> new_sqlite_bag(const std::filesystem::path& folder);
 std::unique_ptr<BagSink> new_mcap(const std::filesystem::path& path, BagCompression compression);
 
 // Compressed chunks of MCAP (https://mcap.dev/spec/registry#well-known-compression-formats): frames
-// of LZ4 and Zstandard, by their libraries. `size` is what they are said to expand to. Memory grows
-// with what they do expand to. Throws Error: another compression ("": none), broken, another size,
-// more than 1 GiB.
+// of LZ4 and Zstandard, by their libraries; "": no compression. `size` is the declared decompressed
+// size; memory is proportional to the actual one. Throws Error for an unknown compression, damaged
+// data, a wrong size, or more than 1 GiB.
 std::string decompress_chunk(const std::string& compression, std::string_view bytes,
                              std::uint64_t size);
 std::string compress_chunk(const std::string& compression, const std::string& bytes);

@@ -26,7 +26,7 @@ void require_topic_name(const std::string& topic) {
   };
   if (topic.size() < 2 || topic.front() != '/' || topic.back() == '/' ||
       !std::all_of(topic.begin(), topic.end(), allowed))
-    throw Error("is no name of a ROS topic",
+    throw Error("not a ROS topic name",
                 {.field = "topic", .value = topic, .bound = "'/', letters, digits and '_'"});
 }
 
@@ -41,23 +41,23 @@ std::unique_ptr<BagSink> new_bag(const fs::path& path, BagFormat format,
       break;
   }
   if (compression != BagCompression::none)
-    throw Error("a folder of .db3 is not compressed (write .mcap)",
+    throw Error("a folder of .db3 cannot be compressed; use .mcap",
                 {.field = "compression", .bound = "none"});
   return new_sqlite_bag(path);
 }
 
-// Encodes messages into a bag in the making.
+// Encodes messages and writes them to a bag.
 class BagOutput {
  public:
   BagOutput(const fs::path& path, BagFormat format, BagCompression compression)
       : format_(format), sink_(new_bag(path, format, compression)) {}
 
   Header header(double stamp_s, const std::string& frame) const {
-    // ROS 1 counts seconds in 32 bits, ROS 2 in 31.
+    // ROS 1 stores seconds in 32 bits, ROS 2 in 31.
     const bool ros1 = format_ == BagFormat::ros1;
     const double end = ros1 ? 4294967295.0 : 2147483648.0;
     if (!(stamp_s >= 1e-9) || !(stamp_s < end))
-      throw Error("ROS has no such time",
+      throw Error("outside ROS's range of time",
                   {.field = "stamp",
                    .value = to_text(stamp_s),
                    .bound = ros1 ? ">= 1e-9 and < 2^32 - 1 s" : ">= 1e-9 and < 2^31 s"});
@@ -93,8 +93,8 @@ class BagOutput {
   std::unique_ptr<BagSink> sink_;
 };
 
-// By stamp, but each camera's first image before all others: a bag lists its topics in the order in
-// which they come, and so they stand in the rig's order.
+// Sorts by stamp, but puts each camera's first image before all others: a bag lists topics in the
+// order of recording, which is then the order of the rig.
 std::vector<RigImage> in_recording_order(std::vector<RigImage> images) {
   const auto by_stamp = [](const RigImage& a, const RigImage& b) { return a.stamp_s < b.stamp_s; };
   std::stable_sort(images.begin(), images.end(), by_stamp);
@@ -116,7 +116,7 @@ BagFormat bag_format_of(const fs::path& path) {
   if (extension == ".bag") return BagFormat::ros1;
   if (extension == ".mcap") return BagFormat::mcap;
   if (extension.empty()) return BagFormat::sqlite;
-  throw Error("is no format of a bag",
+  throw Error("not a bag format",
               {.file = path.string(),
                .field = "extension",
                .value = extension,

@@ -17,7 +17,7 @@ namespace {
 constexpr std::uint16_t saturated = 65535;
 constexpr std::uint64_t max_pixels = std::uint64_t{1} << 27;
 
-// compressed_depth_image_transport puts it before the PNG: what the image is, and the two
+// Header before the PNG in compressed_depth_image_transport: type of the image, and the two
 // parameters of inverse depth.
 struct CompressionHeader {
   std::int32_t format = 0;
@@ -25,7 +25,7 @@ struct CompressionHeader {
   float depth_quantization_b = 0;
 };
 
-// Collects depths in the units that are wanted.
+// Image that converts depths to its units.
 class UnitImage {
  public:
   UnitImage(int width, int height, double unit_m) : unit_m_(unit_m) {
@@ -49,7 +49,7 @@ class UnitImage {
 
 void set_units(std::size_t pixel, std::uint16_t value, const DepthUnits& units, UnitImage& image) {
   if (value == saturated) return image.set_saturated(pixel);
-  // The product first: equal units are kept exactly.
+  // In this order of operations, values in equal units are unchanged.
   image.set(pixel, value * units.message_unit_m);
 }
 
@@ -65,7 +65,7 @@ T value_at(const char* bytes, bool swapped) {
 DepthMessageImage decode_raw(const ros_message::Image& message, const DepthUnits& units) {
   const std::string& encoding = message.encoding;
   if (!is_depth_encoding(encoding, false))
-    throw Error("no depth image",
+    throw Error("not a depth image",
                 {.field = "encoding", .value = encoding, .bound = "16UC1 or 32FC1"});
   const bool is_float = encoding == "32FC1";
   const std::uint64_t width = message.width;
@@ -74,7 +74,7 @@ DepthMessageImage decode_raw(const ros_message::Image& message, const DepthUnits
   const std::string size =
       size_text(static_cast<std::int64_t>(width), static_cast<std::int64_t>(height));
   if (width == 0 || height == 0 || width > max_pixels || width * height > max_pixels)
-    throw Error("no image has this size",
+    throw Error("invalid image size",
                 {.field = "size", .value = size, .bound = "1 to 2^27 pixels"});
   if (message.step < row)
     throw Error("shorter than a row of " + std::to_string(width) + " pixels",
@@ -82,10 +82,9 @@ DepthMessageImage decode_raw(const ros_message::Image& message, const DepthUnits
                  .value = std::to_string(message.step),
                  .bound = ">= " + std::to_string(row)});
   if (message.data.size() < message.step * (height - 1) + row)
-    throw Error("its data end too early",
-                {.field = "data",
-                 .value = std::to_string(message.data.size()) + " bytes",
-                 .bound = std::to_string(message.step * height) + " for " + size});
+    throw Error("truncated", {.field = "data",
+                              .value = std::to_string(message.data.size()) + " bytes",
+                              .bound = std::to_string(message.step * height) + " for " + size});
   const bool swapped = (message.is_bigendian != 0) != (std::endian::native == std::endian::big);
   UnitImage image(static_cast<int>(width), static_cast<int>(height), units.image_unit_m);
   for (std::uint64_t y = 0; y < height; ++y) {
@@ -103,18 +102,17 @@ DepthMessageImage decode_compressed(const ros_message::CompressedImage& message,
                                     const DepthUnits& units) {
   const std::string& format = message.format;
   if (!is_depth_encoding(format, true))
-    throw Error("no compressed depth image",
+    throw Error("not a compressed depth image",
                 {.field = "format",
                  .value = format,
                  .bound = "16UC1; compressedDepth or 32FC1; compressedDepth"});
   if (format.find("rvl") != std::string::npos)
-    throw Error("only PNG is read", {.field = "format", .value = format});
+    throw Error("only PNG is supported", {.field = "format", .value = format});
   CompressionHeader header;
   if (message.data.size() < sizeof header)
-    throw Error("its data end too early",
-                {.field = "data",
-                 .value = std::to_string(message.data.size()) + " bytes",
-                 .bound = ">= " + std::to_string(sizeof header) + " bytes"});
+    throw Error("truncated", {.field = "data",
+                              .value = std::to_string(message.data.size()) + " bytes",
+                              .bound = ">= " + std::to_string(sizeof header) + " bytes"});
   std::memcpy(&header, message.data.data(), sizeof header);
   const std::string_view png(reinterpret_cast<const char*>(message.data.data()) + sizeof header,
                              message.data.size() - sizeof header);
@@ -162,7 +160,7 @@ Camera camera_of(const ros_message::CameraInfo& info, bool rectified) {
   return camera;
 }
 
-// To the part of the sensor that the images show (image_geometry's adjustment).
+// Adjusts the camera to binning and region of interest as image_geometry does.
 void apply_region(const ros_message::CameraInfo& info, Camera& camera) {
   const double bin_x = std::max<std::uint32_t>(info.binning_x, 1);
   const double bin_y = std::max<std::uint32_t>(info.binning_y, 1);

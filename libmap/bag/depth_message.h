@@ -1,5 +1,5 @@
-// Depth images and camera calibrations out of messages (sensor_msgs/Image, CompressedImage,
-// CameraInfo), from their encoded bytes.
+// Decoder of depth images and camera calibrations from messages (sensor_msgs/Image,
+// CompressedImage, CameraInfo).
 #pragma once
 
 #include <cstdint>
@@ -13,32 +13,34 @@
 
 namespace libmap {
 
-// What the first bytes of an image's message say.
+// Metadata in the first bytes of an image's message.
 struct DepthMessageHead {
   std::int64_t stamp_ns = 0;
-  std::string frame{};     // of the camera, optical
+  std::string frame{};     // optical frame of the camera
   std::string encoding{};  // Image: "16UC1"; CompressedImage: its format
 };
 
-// `bytes` may end after the encoding, 1 KiB at most. Throws Error if they end before.
+// Decodes the metadata; 1 KiB of the message is enough. Throws Error if `bytes` ends before the end
+// of the encoding.
 DepthMessageHead read_image_head(MessageEncoding encoding, std::string_view bytes, bool compressed);
 
-// 16UC1, mono16, 32FC1; of a CompressedImage a format of compressed_depth_image_transport.
+// True for 16UC1, mono16, 32FC1; for a CompressedImage, formats of
+// compressed_depth_image_transport.
 bool is_depth_encoding(const std::string& encoding, bool compressed);
 
 struct DepthUnits {
-  // Meters a unit of 16-bit messages (REP-118: 0.001), and of the images wanted.
+  // Meters per unit of 16-bit messages (REP-118: 0.001), and of the decoded images.
   double message_unit_m = 0.001;
   double image_unit_m = 0.001;
 };
 
 struct DepthMessageImage {
-  Image<std::uint16_t> image;  // in units; 0: nothing measured; 65535: the sensor was saturated
-  std::size_t beyond = 0;      // pixels that 16 bits cannot hold, which are 0
+  Image<std::uint16_t> image;  // in image units; 0: no measurement; 65535: saturated
+  std::size_t beyond = 0;      // number of pixels that exceed 16 bits and are set to 0
 };
 
-// Throws Error: an encoding that is no depth, no size or more than 2^27 pixels, data shorter than
-// its size says, rows that are shorter than their pixels, a broken PNG.
+// Decodes a depth image. Throws Error for an encoding other than depth, no size or more than 2^27
+// pixels, truncated data or rows, and a damaged PNG.
 DepthMessageImage decode_depth(MessageEncoding encoding, std::string_view bytes, bool compressed,
                                const DepthUnits& units);
 
@@ -47,8 +49,9 @@ struct CameraInfoMessage {
   Camera camera{};  // base_from_camera is not set
 };
 
-// K and D; of `rectified` images P, which have no distortion any more. Binning and region of
-// interest as image_geometry has them. Throws Error: not calibrated, an unknown distortion model.
+// Decodes K and D, or P without distortion for `rectified` images. Applies binning and region of
+// interest as image_geometry does. Throws Error for an uncalibrated camera or an unknown distortion
+// model.
 CameraInfoMessage decode_camera_info(MessageEncoding encoding, std::string_view bytes,
                                      bool rectified);
 

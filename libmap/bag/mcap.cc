@@ -1,9 +1,8 @@
 // MCAP (https://mcap.dev/spec) consists of records: an opcode, the length of the content as uint64,
 // the content; little-endian.
 //
-// Reads record by record, in the order of the file: its index is not needed, and need not be
-// believed. Writes it with the profile ros2: chunks of messages, then the index by which readers
-// seek.
+// The reader reads the records in the order of the file and ignores the index, which can be wrong.
+// The writer uses the profile ros2: chunks of messages, then the index for seeking.
 #include <lz4frame.h>
 #include <zlib.h>
 #include <zstd.h>
@@ -31,7 +30,7 @@ using ros_message::printable;
 
 constexpr std::string_view magic("\x89MCAP0\r\n", 8);
 
-// The kinds of records that are read or written.
+// Types of records that are read or written.
 enum class Opcode : std::uint8_t {
   header = 1,
   footer,
@@ -46,7 +45,7 @@ enum class Opcode : std::uint8_t {
   data_end = 0x0F
 };
 
-// The record as bytes: its opcode, the length of its content, the content.
+// Returns a record: opcode, length of the content, content.
 std::string as_record(Opcode opcode, const ByteWriter& content) {
   return ByteWriter().number(opcode).text<std::uint64_t>(content.content()).content();
 }
@@ -54,11 +53,11 @@ std::string as_record(Opcode opcode, const ByteWriter& content) {
 constexpr std::uint64_t max_chunk_bytes = std::uint64_t{1} << 30;
 
 Error broken_chunk(const std::string& compression) {
-  return Error("is broken", {.field = "chunk of " + compression});
+  return Error("is damaged", {.field = "chunk of " + compression});
 }
 
-// Calls step(input, input size, output, output size), which sets both sizes to what it has used and
-// made and returns whether more is to come, until nothing is.
+// Calls step(input, input size, output, output size), which sets both sizes to the bytes consumed
+// and produced, until it returns false.
 template <typename Step>
 std::string expand(const std::string& compression, std::string_view bytes, std::uint64_t size,
                    const Step& step) {
@@ -114,7 +113,7 @@ MessageEncoding encoding_named(std::string_view name) {
 
 class McapReader {
  public:
-  // Of each message: its topic's index, its stamp and its bytes.
+  // Receives the topic's index, the stamp and the bytes of each message.
   using Take = std::function<void(std::size_t, std::int64_t, std::string_view)>;
 
   McapReader(const fs::path& path, RecordedTopics& topics, Take take)
@@ -123,7 +122,7 @@ class McapReader {
     left_ = fs::file_size(path);
     file_.seekg(-static_cast<std::streamoff>(magic.size()), std::ios::end);
     if (read_bytes(magic.size()) != magic)
-      throw Error("is cut off: its recording was not ended (`mcap recover` mends it)",
+      throw Error("is truncated: its recording was not ended; repair it with `mcap recover`",
                   {.file = path_.string()});
     file_.seekg(static_cast<std::streamoff>(magic.size()));
     left_ -= std::min<std::uint64_t>(left_, magic.size());
@@ -134,7 +133,7 @@ class McapReader {
       while (read_record(static_cast<Opcode>(read_bytes(1).front()))) {
       }
     } catch (const std::length_error&) {
-      throw Error("is broken: a record ends too early", {.file = path_.string()});
+      throw Error("is damaged: a record is truncated", {.file = path_.string()});
     } catch (const Error& error) {
       throw error.in_file(path_.string());
     }
@@ -142,7 +141,7 @@ class McapReader {
 
  private:
   const std::string& read_bytes(std::uint64_t count) {
-    if (count > left_) throw std::length_error("a record ends too early");
+    if (count > left_) throw std::length_error("a record is truncated");
     left_ -= count;
     buffer_.resize(count);
     file_.read(buffer_.data(), static_cast<std::streamsize>(count));
@@ -150,7 +149,7 @@ class McapReader {
     return buffer_;
   }
 
-  // False behind the last message: what follows is the index.
+  // Reads a record. Returns false after the last message; the rest is the index.
   bool read_record(Opcode opcode) {
     const auto length = ByteReader(read_bytes(8)).number<std::uint64_t>();
     const std::string_view content = read_bytes(length);
@@ -168,10 +167,10 @@ class McapReader {
     const auto checksum = chunk.number<std::uint32_t>();
     const std::string compression = printable(std::string(chunk.text()));
     const std::string records = decompress_chunk(compression, chunk.text<std::uint64_t>(), size);
-    // 0: it was not calculated.
+    // 0: not calculated.
     if (checksum != 0 &&
         checksum != crc32_z(0, reinterpret_cast<const Bytef*>(records.data()), records.size()))
-      throw Error("does not fit its checksum", {.field = "chunk"});
+      throw Error("does not match its checksum", {.field = "chunk"});
     ByteReader rest(records);
     while (!rest.empty()) {
       const auto opcode = rest.number<Opcode>();
@@ -189,10 +188,11 @@ class McapReader {
       const auto id = record.number<std::uint16_t>();
       const auto channel = channels_.find(id);
       if (channel == channels_.end())
-        throw Error("was not said", {.field = "channel of a message", .value = std::to_string(id)});
-      record.take(4);  // its number
+        throw Error("is not declared",
+                    {.field = "channel of a message", .value = std::to_string(id)});
+      record.take(4);  // sequence number
       const auto stamp = static_cast<std::int64_t>(record.number<std::uint64_t>());
-      record.take(8);  // when it was published
+      record.take(8);  // time of publishing
       take_(channel->second, stamp, record.rest());
     }
   }
@@ -252,7 +252,7 @@ constexpr std::size_t chunk_bytes = std::size_t{4} << 20;
 
 std::string compression_name(BagCompression compression) {
   if (compression == BagCompression::bz2)
-    throw Error("is not of MCAP",
+    throw Error("is not supported by MCAP",
                 {.field = "compression", .value = "bz2", .bound = "none, lz4 or zstd"});
   return compression == BagCompression::lz4    ? "lz4"
          : compression == BagCompression::zstd ? "zstd"
@@ -330,7 +330,7 @@ class McapSink : public BagSink {
     return channel;
   }
 
-  // Before the first message that needs it, and again in the summary.
+  // Writes a definition before the first message that needs it, and again in the summary.
   void add_definition(std::string& summary, const std::string& record) {
     summary += record;
     chunk_ += record;
@@ -411,7 +411,7 @@ class McapSink : public BagSink {
     }
     const std::uint64_t offsets_begin = position_;
     put(offsets);
-    // 0: no checksum of the summary.
+    // Checksum 0: the summary has none.
     put(as_record(Opcode::footer,
                   ByteWriter().number(begin).number(offsets_begin).number(std::uint32_t{0})));
   }
@@ -422,7 +422,7 @@ class McapSink : public BagSink {
   std::uint64_t position_ = 0;
 
   std::string chunk_;
-  std::map<std::uint16_t, ByteWriter> entries_;  // of the chunk's messages, by channel
+  std::map<std::uint16_t, ByteWriter> entries_;  // index entries of the chunk, by channel
   std::uint64_t first_ns_ = std::numeric_limits<std::uint64_t>::max();
   std::uint64_t last_ns_ = 0;
 
@@ -454,10 +454,10 @@ std::string decompress_chunk(const std::string& compression, std::string_view by
     result = bytes;
   else
     throw Error(
-        "is not known",
+        "is not supported",
         {.field = "compression of a chunk", .value = compression, .bound = "lz4, zstd or none"});
   if (result.size() != size)
-    throw Error("has another size", {.field = "chunk",
+    throw Error("has a wrong size", {.field = "chunk",
                                      .value = std::to_string(result.size()) + " bytes",
                                      .bound = std::to_string(size)});
   return result;

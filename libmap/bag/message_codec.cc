@@ -45,7 +45,7 @@ class Ros1Input {
 class CdrInput {
  public:
   static constexpr bool ros2 = true;
-  // It reads alone, but takes no constant bytes.
+  // Fast CDR requires mutable bytes, although it only reads them.
   explicit CdrInput(std::string_view bytes)
       : size_(bytes.size()),
         buffer_(const_cast<char*>(bytes.data()), bytes.size()),
@@ -79,7 +79,7 @@ class Ros1Output {
   std::string bytes_;
 };
 
-// Not by Fast CDR: it leaves in the padding what was in memory, so equal messages would differ.
+// Replaces Fast CDR, which does not initialize padding, so that equal messages would differ.
 class CdrOutput {
  public:
   static constexpr bool ros2 = true;
@@ -98,7 +98,7 @@ class CdrOutput {
   std::string bytes_ = std::string("\0\1\0\0", head_bytes);  // CDR, little-endian, no options
 };
 
-// Reads each field that it visits.
+// Visitor that reads each field.
 template <typename Input>
 class Reader {
  public:
@@ -147,12 +147,12 @@ class Reader {
       values.resize(count(sizeof(T)));
       input_.numbers(values.data(), values.size());
     } else {
-      // One by one: memory grows with what is there, not with what is promised.
+      // One by one, so that memory depends on the actual size, not on the declared one.
       for (std::size_t left = count(1); left > 0; --left) read(values.emplace_back());
     }
   }
 
-  // The length of what follows, in elements of so many bytes at least.
+  // Reads the length of an array whose elements have at least `element_bytes` bytes.
   std::size_t count(std::size_t element_bytes) {
     std::uint32_t value = 0;
     input_.numbers(&value, 1);
@@ -213,7 +213,7 @@ class Writer {
   Output output_;
 };
 
-// The definition of what it visits, and of the messages therein.
+// Visitor that collects the definition of a message and of the messages in it.
 class Definition {
  public:
   static constexpr bool ros2 = true;
@@ -301,7 +301,7 @@ Message decode(MessageEncoding encoding, std::string_view bytes) {
   } catch (const std::length_error&) {
   } catch (const eprosima::fastcdr::exception::Exception&) {
   }
-  throw Error("a message promises more than its " + std::to_string(bytes.size()) +
+  throw Error("a message declares more than its " + std::to_string(bytes.size()) +
               " bytes contain");
 }
 

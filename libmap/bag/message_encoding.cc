@@ -23,7 +23,7 @@ ros_message::ColorRGBA to_ros_color(const Color& color) {
           static_cast<float>(color[2]) / 255.0F, 1.0F};
 }
 
-// Columns x, y, z, of which x is the direction.
+// Returns a rotation whose x axis is the direction.
 Eigen::Matrix3d axes_along(const Eigen::Vector3d& direction) {
   const Eigen::Vector3d x = direction.normalized();
   const Eigen::Vector3d guide =
@@ -120,7 +120,7 @@ ros_message::MarkerArray encode_markers(const BagPlaces& places,
     Marker text = marker_of("text", id, Marker::TEXT_VIEW_FACING, header);
     text.pose.position = to_ros_point(start);
     text.text = place.text;
-    text.scale.z = length / 4;  // height of a letter
+    text.scale.z = length / 4;  // letter height
     text.color = to_ros_color({255, 255, 255});
     message.markers.push_back(arrow);
     message.markers.push_back(text);
@@ -138,7 +138,7 @@ ros_message::GridMap encode_grid_map(const BagGrid& grid, const ros_message::Hea
   message.info.length_y = grid.cell_m * static_cast<double>(grid.rows);
   message.info.pose.position.x = grid.corner_m.x() + message.info.length_x / 2;
   message.info.pose.position.y = grid.corner_m.y() + message.info.length_y / 2;
-  const auto rows = static_cast<std::uint32_t>(grid.columns);  // grid_map's lead along x
+  const auto rows = static_cast<std::uint32_t>(grid.columns);  // grid_map's row index is along x
   const auto columns = static_cast<std::uint32_t>(grid.rows);
   for (const BagGrid::Layer& layer : grid.layers) {
     message.layers.push_back(layer.name);

@@ -1,4 +1,4 @@
-// Plain data as messages, most without their headers. Private to libmap/bag.
+// Conversion of plain data to messages, most without their headers. Private to libmap/bag.
 #pragma once
 
 #include <cstdint>
@@ -13,31 +13,32 @@
 
 namespace libmap {
 
-// As RViz and PCL take it: float32 x, y, z, then normal_x, normal_y, normal_z, rgb (PCL's packing,
-// as float32) and the cloud's fields in their own types; little-endian, no padding. Throws Error
-// for more than 4 GiB.
+// Encodes a cloud for RViz and PCL: float32 x, y, z, then normal_x, normal_y, normal_z, rgb (PCL's
+// packing, as float32) and the cloud's fields in their own types; little-endian, no padding. Throws
+// Error for more than 4 GiB.
 ros_message::PointCloud2 encode_cloud(const PointCloud& cloud);
 
-// In meters (REP-118's 32FC1, 0: not measured) or in millimeters (16UC1), whichever keeps the
-// image's units exactly.
+// Encodes depth in meters (REP-118's 32FC1, 0: not measured) or millimeters (16UC1), whichever
+// represents the image's units exactly.
 ros_message::Image encode_depth(const Image<std::uint16_t>& image, double image_unit_m);
 
 ros_message::CameraInfo encode_camera_info(const Camera& camera);
 
 ros_message::TransformStamped encode_transform(const BagTransform& transform);
 
-// Poses whose x axis is the direction.
+// Encodes poses whose x axis is the direction.
 ros_message::PoseArray encode_poses(const std::vector<BagPlace>& places);
 
-// For each place an arrow that ends there, and its text; and one list of balls for all.
+// Encodes, for each position, an arrow that ends there and its text, and one list of balls for all.
 ros_message::MarkerArray encode_markers(const BagPlaces& places, const ros_message::Header& header);
 
-// From the corner of largest x and y, x first: what the arrays have in the opposite order.
-// Column-major with the labels and strides of grid_map (https://github.com/ANYbotics/grid_map,
-// grid_map_ros/include/grid_map_ros/GridMapMsgHelpers.hpp); the circular buffer begins at 0, 0.
+// Encodes layers from the corner of largest x and y, x first, the reverse order of BagGrid's
+// arrays. Column-major with the labels and strides of grid_map
+// (https://github.com/ANYbotics/grid_map, grid_map_ros/include/grid_map_ros/GridMapMsgHelpers.hpp);
+// the circular buffer begins at 0, 0.
 ros_message::GridMap encode_grid_map(const BagGrid& grid, const ros_message::Header& header);
 
-// In percent; unknown is -1.
+// Encodes the occupancy in percent; unknown is -1.
 ros_message::OccupancyGrid encode_occupancy_grid(const BagGrid& grid,
                                                  const ros_message::Header& header);
 

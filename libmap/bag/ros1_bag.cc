@@ -1,8 +1,7 @@
 // ROS 1's storage, read and written by librosbag.
 //
-// A bag's own bytes say where its messages are, and librosbag follows them without checking whether
-// they lead outside. So it reads in a process of its own, with 3 GiB of memory at most, and what it
-// finds comes through a pipe: a bag on which it crashes is an Error here.
+// librosbag does not check the offsets in a bag. It therefore reads in a child process with at most
+// 3 GiB of memory and sends the content through a pipe. A bag on which it crashes is an Error.
 #include <geometry_msgs/PoseArray.h>
 #include <ros/serialization.h>
 #include <rosbag/bag.h>
@@ -28,7 +27,7 @@
 
 namespace libmap {
 
-// An encoded message, as librosbag's templates take one.
+// An encoded message for librosbag's templates.
 struct EncodedMessage {
   const StoredMessage& message;
   std::string definition;
@@ -88,18 +87,18 @@ using ros_message::printable;
 
 constexpr std::uint64_t max_data_bytes = std::uint64_t{3} << 30;
 
-// What comes through the pipe: one head, then a text or a message.
+// Header of a text or message in the pipe.
 struct Parcel {
   enum class Kind : std::uint32_t { topic, message, error, end };
   Kind kind = Kind::end;
   std::uint32_t topic = 0;     // index
-  std::uint64_t size = 0;      // of a topic: how many messages
-  std::int64_t stamp_ns = 0;   // of a message; of a topic: of its first one
-  std::int64_t last_ns = 0;    // of a topic's last message
-  std::uint32_t latching = 0;  // of a topic
+  std::uint64_t size = 0;      // topic: number of messages
+  std::int64_t stamp_ns = 0;   // stamp of the message; topic: of its first message
+  std::int64_t last_ns = 0;    // topic: stamp of its last message
+  std::uint32_t latching = 0;  // topic: 1 if latched
 };
 
-// The end of the pipe at which librosbag works.
+// Writing end of the pipe, in librosbag's process.
 class Sender {
  public:
   explicit Sender(const GuardedProcess::Write& write) : output_(write) {}
@@ -122,7 +121,7 @@ using Work = std::function<void(const rosbag::Bag&, Sender&)>;
 
 void serve(const fs::path& path, const GuardedProcess::Write& write, const Work& work) {
   Sender sender(write);
-  // librosbag looks for plugins of encryption by rospack, which keeps what it finds in this folder.
+  // librosbag searches encryption plugins by rospack, which caches its results in this folder.
   setenv("ROS_HOME", "/dev/null", 1);
   try {
     rosbag::Bag bag;
@@ -130,18 +129,18 @@ void serve(const fs::path& path, const GuardedProcess::Write& write, const Work&
     work(bag, sender);
     sender.send({.kind = Parcel::Kind::end}, {});
   } catch (const rosbag::BagUnindexedException&) {
-    sender.send_error("has no index: its recording was not ended (`rosbag reindex` makes one)");
+    sender.send_error("has no index: its recording was not ended; repair it with `rosbag reindex`");
   } catch (const rosbag::BagException& error) {
-    sender.send_error("is broken or cut off: " + printable(error.what()));
+    sender.send_error("is damaged or truncated: " + printable(error.what()));
   } catch (const std::bad_alloc&) {
-    sender.send_error("is broken, or contains messages of more than 1 GiB");
+    sender.send_error("is damaged or contains messages of more than 1 GiB");
   } catch (const std::exception& error) {
-    // The loader of encryption plugins, for one.
+    // For example, exceptions of the loader of encryption plugins.
     sender.send_error("cannot be read: " + printable(error.what()));
   }
 }
 
-// The process in which librosbag reads.
+// Child process in which librosbag reads.
 class GuardedBag {
  public:
   GuardedBag(const fs::path& path, const Work& work)
@@ -149,7 +148,7 @@ class GuardedBag {
           serve(path, write, work);
         }) {}
 
-  // The next topic or message and its bytes; nothing after the last.
+  // Returns the next topic or message and its bytes; nullopt after the last.
   std::optional<Parcel> receive(std::string& bytes) {
     Parcel parcel;
     in_file(path_, [&] {
@@ -167,7 +166,7 @@ class GuardedBag {
   GuardedInput input_{process_, "is broken: ROS's bag library crashed on it"};
 };
 
-// The topics of a view, in the order of recording, and the one of each connection, by its header.
+// Topics of a view in the order of recording, and the topic of each connection, by its header.
 struct Topics {
   std::vector<BagTopic> topics;
   std::map<const ros::M_string*, std::uint32_t> of_header;
@@ -175,7 +174,7 @@ struct Topics {
   std::uint32_t of(const rosbag::MessageInstance& message) const {
     const auto found = of_header.find(message.getConnectionHeader().get());
     if (found == of_header.end())
-      throw rosbag::BagFormatException("a message of a connection that it does not list");
+      throw rosbag::BagFormatException("a message belongs to an unlisted connection");
     return found->second;
   }
 };
@@ -296,7 +295,7 @@ const BagStorage ros1_storage = {"bag of ROS 1", list_ros1, read_ros1};
 
 namespace {
 
-// The text of the type's definition in ROS 1, with those that it contains.
+// Returns the type's definition in ROS 1 with the definitions of its parts.
 std::string definition_of_type(const std::string& type) {
   using namespace ros::message_traits;
   static const std::map<std::string, std::string> definitions = {
@@ -308,7 +307,7 @@ std::string definition_of_type(const std::string& type) {
       {"visualization_msgs/MarkerArray", definition<visualization_msgs::MarkerArray>()}};
   const auto found = definitions.find(type);
   if (found == definitions.end())
-    throw Error("bags of ROS 1 are written without it", {.field = "message", .value = type});
+    throw Error("not supported in bags of ROS 1", {.field = "message", .value = type});
   return found->second;
 }
 
@@ -323,12 +322,12 @@ rosbag::CompressionType to_rosbag(BagCompression compression) {
     case BagCompression::zstd:
       break;
   }
-  throw Error("is not of bags of ROS 1",
+  throw Error("is not supported by bags of ROS 1",
               {.field = "compression", .value = "zstd", .bound = "none, bz2 or lz4"});
 }
 
-// librosbag looks for plugins of encryption by rospack, which keeps what it finds in the user's
-// folder, and complains where it cannot. While this lives it keeps that in a folder of its own.
+// Redirects the cache of rospack, by which librosbag searches encryption plugins, to a temporary
+// folder. rospack warns if it cannot write to its cache in the user's folder.
 class PluginSearch {
  public:
   PluginSearch() {
@@ -363,7 +362,8 @@ std::unique_ptr<rosbag::Bag> new_bag() {
   return std::make_unique<rosbag::Bag>();
 }
 
-// librosbag's exceptions as Errors: only the disk can fail it, and the system knows how.
+// Converts librosbag's exceptions to Errors (failed) with the system's message: only writes can
+// fail.
 template <typename Action>
 void guarded(const fs::path& path, const Action& action) {
   errno = 0;
@@ -378,7 +378,7 @@ void guarded(const fs::path& path, const Action& action) {
 
 class Ros1Sink : public BagSink {
  public:
-  // Delegates, so that the destructor is called where opening fails.
+  // Delegates, so that the destructor is called if opening fails.
   Ros1Sink(const fs::path& path, BagCompression compression) : Ros1Sink(path) {
     const rosbag::CompressionType type = to_rosbag(compression);
     guarded(path_, [&] {
@@ -386,7 +386,7 @@ class Ros1Sink : public BagSink {
       bag_->setCompression(type);
     });
   }
-  // On a full disk librosbag's destructor throws: such a bag is kept instead.
+  // On a full disk, librosbag's destructor throws; the bag object is leaked instead.
   ~Ros1Sink() override {
     try {
       bag_->close();

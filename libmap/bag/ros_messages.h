@@ -1,8 +1,8 @@
-// The ROS messages that bags contain, as plain data without their encoding (message_codec.h).
-// Private to libmap/bag.
+// ROS messages in bags as plain data, without their encoding (message_codec.h). Private to
+// libmap/bag.
 //
 // fields(message, visit) calls visit(name, field) for each field in the order of its definition;
-// visit.ros2 says of which generation. Definitions of ROS 1 (Noetic):
+// visit.ros2 is true for ROS 2. Definitions of ROS 1 (Noetic):
 // http://docs.ros.org/en/noetic; of ROS 2 (Humble to Jazzy):
 // https://docs.ros.org/en/humble/p/sensor_msgs and the like,
 // https://docs.ros.org/en/jazzy/p/grid_map_msgs.
@@ -35,7 +35,7 @@ struct Duration {
 
 struct Header {
   static constexpr MessageType type{"std_msgs/Header"};
-  std::uint32_t seq = 0;  // ROS 1 alone
+  std::uint32_t seq = 0;  // ROS 1 only
   Time stamp{};
   std::string frame_id{};
 
@@ -176,7 +176,7 @@ struct CompressedImage {
   }
 };
 
-// The first fields of a message, of which `bytes` need not contain the rest.
+// First fields of a message, for decoding without the rest of its bytes.
 template <typename Message>
 struct Head : Message {
   static void fields(auto& m, auto& visit) { Message::head(m, visit); }
@@ -282,7 +282,7 @@ struct MeshFile {
   }
 };
 
-// Of ROS 2 that since Humble: before, its messages had no textures.
+// In ROS 2, the definition since Humble; earlier ones have no textures.
 struct Marker {
   static constexpr MessageType type{"visualization_msgs/Marker"};
   enum : std::int32_t { ARROW = 0, SPHERE_LIST = 7, TEXT_VIEW_FACING = 9 };
@@ -431,7 +431,7 @@ struct GridMap {
   }
 };
 
-// One line of ASCII, as ROS's names are: anything else becomes '?'.
+// Returns one line of ASCII, like ROS's names; other characters become '?'.
 inline std::string printable(std::string line) {
   for (char& c : line)
     if (c < ' ' || c > '~') c = '?';

@@ -32,12 +32,12 @@ std::string text_of(const YAML::Node& map, const char* name) {
   return node && node.IsScalar() ? node.Scalar() : std::string();
 }
 
-// Older versions put the folder's name before the file's.
+// Returns the file name without the folder, which older versions prepend.
 std::string name_of_file(const YAML::Node& node) {
   const std::string name =
       node.IsScalar() ? fs::path(node.Scalar()).filename().string() : std::string();
   if (name.empty() || name == "." || name == "..")
-    throw at_node(Error("is no name of a file"), "relative_file_paths", node);
+    throw at_node(Error("not a file name"), "relative_file_paths", node);
   return name;
 }
 
@@ -62,8 +62,8 @@ std::string lines_of_times(const RecordedTopics& topics, const std::string& inde
 std::vector<std::string> read_rosbag2_metadata(const fs::path& path) {
   if (!fs::exists(path))
     throw Error(
-        "no such file: its recording was not ended (`ros2 bag reindex` makes one), or this "
-        "is no bag",
+        "no such file: not a bag, or its recording was not ended; repair it with "
+        "`ros2 bag reindex`",
         {.file = path.string()});
   std::vector<std::string> names;
   read_yaml(read_whole_file(path, max_yaml_bytes), path.string(), [&](const YAML::Node& document) {
@@ -71,11 +71,11 @@ std::vector<std::string> read_rosbag2_metadata(const fs::path& path) {
     if (!bag || !bag.IsMap()) throw Error("is missing", {.field = "rosbag2_bagfile_information"});
     const std::string format = text_of(bag, "compression_format");
     if (!format.empty())
-      throw Error("compressed folders are not read (`ros2 bag convert` decompresses)",
+      throw Error("compressed folders are not supported; decompress with `ros2 bag convert`",
                   {.field = "compression_format", .value = ros_message::printable(format)});
     const YAML::Node files = field_of(bag, "relative_file_paths");
     if (!files || !files.IsSequence() || files.size() == 0)
-      throw Error("names no file", {.field = "relative_file_paths"});
+      throw Error("contains no file name", {.field = "relative_file_paths"});
     for (const YAML::Node& file : files) names.push_back(name_of_file(file));
   });
   return names;
@@ -121,25 +121,25 @@ constexpr const char* db3_name = "bag_0.db3";
 void require_columns(const SqliteFile& file, const std::string& table,
                      const std::vector<std::string>& names) {
   if (!file.tables().contains(table))
-    throw Error("is no bag of ROS 2: no such table",
+    throw Error("not a bag of ROS 2: no such table",
                 {.file = file.path().string(), .field = "table", .value = table});
   const std::set<std::string> columns = file.columns(table);
   for (const std::string& name : names)
     if (!columns.contains(name))
-      throw Error("is no bag of ROS 2: no such column",
+      throw Error("not a bag of ROS 2: no such column",
                   {.file = file.path().string(), .field = "table " + table, .value = name});
 }
 
-// By their id in the file.
+// Returns the topics by their id in the file.
 std::map<std::int64_t, BagTopic> stored_topics(const SqliteFile& file) {
-  // SQLite takes what is missing of the last page for zeros.
+  // SQLite reads missing bytes of the last page as zeros.
   file.each_row("PRAGMA page_size", {}, [&](const SqliteRow& row) {
     if (fs::file_size(file.path()) % static_cast<std::uint64_t>(row.integer(0)) != 0)
-      throw Error("is cut off: no whole number of pages", {.file = file.path().string()});
+      throw Error("is truncated: no whole number of pages", {.file = file.path().string()});
   });
   require_columns(file, "topics", {"id", "name", "type", "serialization_format"});
   require_columns(file, "messages", {"topic_id", "timestamp", "data"});
-  // Dashing's bags have none.
+  // Dashing's bags do not have this column.
   const bool has_quality = file.columns("topics").contains("offered_qos_profiles");
   std::map<std::int64_t, BagTopic> topics;
   file.each_row("SELECT id, name, type, serialization_format, " +
@@ -190,7 +190,7 @@ void read_sqlite(const fs::path& path, const std::vector<BagRequest>& requests,
       if (request.topic == topic.name)
         max_bytes[id] = static_cast<std::int64_t>(
             std::min<std::size_t>(request.max_bytes, std::numeric_limits<int>::max()));
-  // Sorted here: where the file has no index of stamps, SQLite would sort the data with them.
+  // Sorted here, because without an index of stamps SQLite would sort the rows with their data.
   std::vector<StoredRow> rows;
   file.each_row("SELECT timestamp, rowid, topic_id FROM messages", {}, [&](const SqliteRow& row) {
     if (max_bytes.contains(row.integer(2)))
@@ -212,7 +212,7 @@ class SqliteSink : public BagSink {
     guarded([&] {
       database_.emplace((folder_ / db3_name).string(),
                         SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
-      // The file is of use as a whole only: nothing to roll back to, no journal to leave.
+      // An incomplete file is useless, so no journal is needed for rolling back.
       database_->exec(
           "PRAGMA page_size = 4096; PRAGMA encoding = 'UTF-8'; PRAGMA locking_mode = EXCLUSIVE; "
           "PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF; BEGIN EXCLUSIVE; "
@@ -234,7 +234,7 @@ class SqliteSink : public BagSink {
   void write(const StoredMessage& message) override {
     constexpr std::size_t max_bytes = 1'000'000'000;  // SQLite's own
     if (message.bytes.size() > max_bytes)
-      throw Error("is more than a .db3 can contain (write .mcap)",
+      throw Error("is too large for a .db3; use .mcap",
                   {.field = "bytes of a message on " + message.topic,
                    .value = std::to_string(message.bytes.size()),
                    .bound = "<= 10^9"});

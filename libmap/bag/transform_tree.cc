@@ -25,7 +25,7 @@ void TransformTree::add(const std::string& parent, const std::string& child,
   const std::string above = plain_frame(parent);
   const std::string frame = plain_frame(child);
   if (above.empty() || frame.empty() || above == frame)
-    throw Error("a transform must lead from one frame to another",
+    throw Error("a transform must connect two different frames",
                 {.field = "frames", .value = above + " and " + frame});
   if (!parent_from_child.matrix().allFinite())
     throw Error("a transform is not finite", {.field = "frame", .value = frame});
@@ -51,13 +51,13 @@ std::vector<std::string> TransformTree::frames() const { return {frames_.begin()
 std::vector<std::string> TransformTree::chain_of(const std::string& given) const {
   const std::string frame = plain_frame(given);
   if (!frames_.contains(frame))
-    throw Error("no static transform is known of this frame" + did_you_mean(frame, frames()),
+    throw Error("this frame has no static transform" + did_you_mean(frame, frames()),
                 {.field = "frame", .value = frame});
   std::vector<std::string> chain = {frame};
   for (auto link = links_.find(frame); link != links_.end();
        link = links_.find(link->second.parent)) {
     if (chain.size() > links_.size())
-      throw Error("the transforms above this frame lead back to it",
+      throw Error("the transforms above this frame form a cycle",
                   {.field = "frame", .value = frame});
     chain.push_back(link->second.parent);
   }
@@ -83,7 +83,7 @@ Pose TransformTree::target_from_source(const std::string& target, const std::str
     if (const auto link = links_.find(frame); link != links_.end())
       common_from_source = link->second.parent_from_child * common_from_source;
   }
-  throw Error("no transforms lead from it to " + plain_frame(target),
+  throw Error("no transforms connect it to " + plain_frame(target),
               {.field = "frame", .value = plain_frame(source)});
 }
 
@@ -95,7 +95,7 @@ void add_transforms(MessageEncoding encoding, std::string_view bytes, TransformT
     const Eigen::Quaterniond rotation(q.w, q.x, q.y, q.z);
     const std::string& child = transform.child_frame_id;
     if (!(std::abs(rotation.norm() - 1.0) < 0.01))
-      throw Error("is no rotation", {.field = "quaternion of frame " + child});
+      throw Error("not a rotation", {.field = "quaternion of frame " + child});
     tree.add(transform.header.frame_id, child, make_pose({t.x, t.y, t.z}, rotation));
   }
 }

@@ -1,4 +1,4 @@
-// Frames that stand still against each other, as /tf_static tells of them.
+// Tree of static transforms between frames, as in /tf_static.
 #pragma once
 
 #include <map>
@@ -12,23 +12,23 @@
 
 namespace libmap {
 
-// Each frame hangs on one parent. Names are without a leading '/', as of tf2.
+// Each frame has one parent. Names have no leading '/', as in tf2.
 class TransformTree {
  public:
-  // Throws Error: empty names, a frame that is its own parent, a pose that is not finite, one that
-  // is there already with another parent or elsewhere by more than 1e-5 (m, or of the rotation's
-  // entries): then it does not stand still.
+  // Adds a transform. Throws Error for empty names, a frame that is its own parent, a pose that is
+  // not finite, and a known frame with another parent or a pose that differs by more than 1e-5 (m,
+  // or in the entries of the rotation): then it is not static.
   void add(const std::string& parent, const std::string& child, const Pose& parent_from_child);
 
   bool empty() const { return frames_.empty(); }
-  bool has(const std::string& frame) const;  // whether the tree knows the frame
+  bool has(const std::string& frame) const;  // true if the tree contains the frame
   std::vector<std::string> frames() const;   // ascending
 
-  // The frame that hangs on no other, above `frame`. Throws Error: an unknown frame (with the
-  // nearest known one), or one that hangs on itself.
+  // Returns the ancestor of `frame` without a parent. Throws Error for an unknown frame (with the
+  // nearest known one) and for a cycle.
   std::string root_of(const std::string& frame) const;
 
-  // Throws Error as root_of, and if no transforms lead from one to the other.
+  // Throws Error as root_of does, and if no transforms connect the frames.
   Pose target_from_source(const std::string& target, const std::string& source) const;
 
  private:
@@ -36,18 +36,18 @@ class TransformTree {
     std::string parent;
     Pose parent_from_child = Pose::Identity();
   };
-  // `frame` and all above it.
+  // Returns `frame` and all its ancestors.
   std::vector<std::string> chain_of(const std::string& frame) const;
 
   std::map<std::string, Link> links_;  // by child
   std::set<std::string> frames_;
 };
 
-// "/base_link" -> "base_link".
+// Removes a leading '/': "/base_link" -> "base_link".
 std::string plain_frame(const std::string& name);
 
-// Adds a message's transforms to `tree`. Throws Error: the message ends before its last transform,
-// a quaternion whose norm differs from 1 by 0.01 or more, and as TransformTree::add.
+// Adds a message's transforms to `tree`. Throws Error for a truncated message, a quaternion whose
+// norm differs from 1 by 0.01 or more, and as TransformTree::add does.
 void add_transforms(MessageEncoding encoding, std::string_view bytes, TransformTree& tree);
 
 }  // namespace libmap

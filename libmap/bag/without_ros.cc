@@ -1,4 +1,4 @@
-// Stands for ROS 1's storage in builds without its libraries: it says what is missing.
+// ROS 1's storage in builds without its libraries: reports the missing packages.
 #include "libmap/bag/bag_storage.h"
 #include "libmap/core/error.h"
 

@@ -42,7 +42,7 @@ Camera with_intrinsics(Camera camera, const double* values) {
   return camera;
 }
 
-// Projected minus found, of all corners of a picture.
+// Residuals of all corners of an image: projected minus detected.
 struct PictureResidual {
   const Camera& camera;
   const std::vector<Eigen::Vector3d>& in_board;
@@ -103,7 +103,7 @@ double adjust_boards(BoardFit& fit, const BoardCorners& corners) {
   settings.dense_linear_algebra_library_type = ceres::EIGEN;
   settings.num_threads = 1;
   settings.max_num_iterations = 200;
-  settings.max_trust_region_radius = 1e8;  // with less damping, Cholesky fails and Ceres warns
+  settings.max_trust_region_radius = 1e8;  // less damping makes Cholesky fail with a warning
   settings.function_tolerance = 1e-12;
   settings.gradient_tolerance = 1e-14;
   settings.parameter_tolerance = 1e-12;
@@ -128,7 +128,7 @@ Eigen::MatrixXd unit_covariance(const BoardFit& fit, const BoardCorners& corners
       sparse.rows.data(), sparse.cols.data(), sparse.values.data());
   const Eigen::MatrixXd normal = jacobian.transpose() * jacobian;
   if (!normal.allFinite() || (normal.diagonal().array() <= 0).any()) return {};
-  // Pixels and lens terms differ by many orders of magnitude.
+  // Scaled because pixels and distortion terms differ by orders of magnitude.
   const Eigen::VectorXd scale = normal.diagonal().cwiseSqrt().cwiseInverse();
   const SymmetricEigen<Eigen::Dynamic> eigen =
       symmetric_eigen(Eigen::MatrixXd(scale.asDiagonal() * normal * scale.asDiagonal()));

@@ -83,7 +83,7 @@ StereoCalibrationRecord read_stereo_record(ByteReader& reader) {
     const std::size_t before = reader.rest().size();
     *side = read_record(reader);
     if (static_cast<std::int64_t>(before - reader.rest().size()) != size)
-      throw Error("calibration of a stereo camera has another length than it says",
+      throw Error("calibration of a stereo camera: length differs from the stored one",
                   {.value = std::to_string(size)});
   }
   return stereo;
@@ -106,7 +106,8 @@ void append_stereo_record(ByteWriter& bytes, const StereoCalibrationRecord& ster
   bytes.bytes(left.content()).bytes(right.content());
 }
 
-// The first four int32 are small numbers; those of floats are not, unless the focal length is 0.
+// Records begin with four small int32; float32 values interpreted as int32 are large unless they
+// are 0.
 bool begins_with_record(std::string_view bytes) {
   if (bytes.size() < 4 * sizeof(std::int32_t)) return false;
   const auto numbers = ByteReader(bytes).number<std::array<std::int32_t, 4>>();
@@ -120,7 +121,7 @@ Calibration read_records(std::string_view bytes) {
   ByteReader reader(bytes);
   while (!reader.empty()) {
     const std::string_view rest = reader.rest();
-    if (!begins_with_record(rest)) throw Error("calibration contains bytes that are no record");
+    if (!begins_with_record(rest)) throw Error("calibration contains an invalid record");
     if (rest[12] == 0)
       calibration.cameras.push_back(read_record(reader));
     else
@@ -146,8 +147,8 @@ std::int32_t size_of(float number) {
   return static_cast<std::int32_t>(number);
 }
 
-// Both layouts fit 576 bytes (8 cameras or 9) and their multiples: image sizes decide, since the
-// places where they stand hold numbers of a rotation in the other.
+// Multiples of 576 bytes match both layouts (8 or 9 cameras). Image sizes distinguish them: the
+// other layout has numbers of a rotation at their positions.
 bool holds_sizes(std::string_view bytes) {
   constexpr std::size_t step = floats_bytes(CalibrationLayout::floats_with_size, false);
   for (std::size_t at = 0; at < bytes.size(); at += step) {
@@ -210,14 +211,14 @@ Pose base_from_camera_of(const CalibrationRecord& record) {
 }
 
 void set_distortion(Camera& camera, std::vector<double> terms) {
-  // A fisheye lens whose terms are 0 still is none: its angles are its radii.
+  // A fisheye lens with zero terms is not a pinhole: radii are proportional to angles.
   if (terms.size() == 6) {
     camera.distortion_model = DistortionModel::equidistant;
     camera.distortion = {terms[0], terms[1], terms[4], terms[5]};
     return;
   }
   if (std::all_of(terms.begin(), terms.end(), [](double term) { return term == 0; })) return;
-  // Terms 13 and 14 tilt the sensor.
+  // Terms 13 and 14 describe a tilted sensor.
   if (terms.size() == 14 && terms[12] == 0 && terms[13] == 0) terms.resize(12);
   camera.distortion_model = DistortionModel::radial_tangential;
   camera.distortion = std::move(terms);
@@ -260,10 +261,10 @@ StereoCamera stereo_camera_of(const StereoCalibrationRecord& record, int width, 
   else if (record.t.size() == 3)
     stereo.baseline_m = Eigen::Vector3d(record.t[0], record.t[1], record.t[2]).norm();
   if (!(stereo.baseline_m > 0) || !std::isfinite(stereo.baseline_m))
-    throw Error("stereo camera cannot be used",
+    throw Error("invalid stereo camera",
                 {.field = "baseline_m", .value = to_text(stereo.baseline_m), .bound = "> 0"});
   stereo.right_from_left.translation().x() = -stereo.baseline_m;
-  // Of the raw images.
+  // Raw images have the stored relative pose.
   if (has_right && !is_used(record.right.p) && record.r.size() == 9 && record.t.size() == 3) {
     using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
     stereo.right_from_left.linear() = nearest_rotation(Eigen::Map<const RowMajor>(record.r.data()));

@@ -1,4 +1,4 @@
-// Calibrations as RTAB-Map stores them with each node, in all of their layouts.
+// Reads and writes the calibrations that RTAB-Map stores with each node, in all layouts.
 #pragma once
 
 #include <array>
@@ -12,22 +12,22 @@
 
 namespace libmap {
 
-// How Data.calibration is laid out, by the version of RTAB-Map that wrote it.
+// Layout of Data.calibration by version of RTAB-Map.
 enum class CalibrationLayout {
-  records,           // 0.18.0 on: a record for each camera or stereo pair
+  records,           // since 0.18.0: one record per camera or stereo pair
   floats_with_size,  // 0.11.2 to 0.17: fx fy cx cy [baseline] width height L, float32
-  floats             // 0.10.0 to 0.11.1: the same without width and height
+  floats             // 0.10.0 to 0.11.1: fx fy cx cy [baseline] L, float32
 };
 std::string to_text(CalibrationLayout layout);
 
 struct CalibrationRecord {
   std::array<std::int32_t, 3> version{};  // of RTAB-Map
-  std::int32_t width = 0;                 // pixels; 0 where not stored
+  std::int32_t width = 0;                 // pixels; 0 if not stored
   std::int32_t height = 0;
-  std::vector<double> k{};  // 3 x 3 or empty: of the raw image
+  std::vector<double> k{};  // 3 x 3 or empty: camera matrix of the raw image
   std::vector<double> d{};  // distortion of the raw image
   std::vector<double> r{};  // 3 x 3 or empty: rectification
-  std::vector<double> p{};  // 3 x 4 or empty: of the rectified image
+  std::vector<double> p{};  // 3 x 4 or empty: projection of the rectified image
   std::vector<float> l{};   // 3 x 4 or empty: base_from_camera
 
   bool operator==(const CalibrationRecord&) const = default;
@@ -40,8 +40,8 @@ struct StereoCalibrationRecord {
   std::vector<double> e{};  // 3 x 3 or empty
   std::vector<double> f{};  // 3 x 3 or empty
   CalibrationRecord left{};
-  CalibrationRecord right{};  // k, d, r and p are empty in the layouts of floats
-  float baseline_m = 0;       // in the layouts of floats alone
+  CalibrationRecord right{};  // k, d, r and p are empty in the float layouts
+  float baseline_m = 0;       // only in the float layouts
 
   bool operator==(const StereoCalibrationRecord&) const = default;
 };
@@ -55,20 +55,21 @@ struct Calibration {
   bool operator==(const Calibration&) const = default;
 };
 
-// The layout is recognized by the bytes themselves. Throws Error if they fit none, or are not
-// whole.
+// Decodes a calibration; the layout is recognized from the bytes. Throws Error for an unknown
+// layout or truncated data.
 Calibration decode_calibration(std::string_view bytes);
-// In layout `records`, of which decode_calibration keeps all that is stored.
+// Encodes a calibration in layout `records`. Decoded records are reproduced exactly.
 std::string encode_calibration(const Calibration& calibration);
 
-// The cameras of the stored images: P where it is stored, since images are rectified then, else K
-// with D. Where the record holds no size, each camera has its share of an image of `image_width` x
-// `image_height`. D of 6 terms is equidistant: k1 k2 0 0 k3 k4. Throws Error naming the field.
+// Cameras of the stored images: from P if it is stored (images are rectified), else from K and D.
+// A camera without a stored size has its share of an image of `image_width` x `image_height`. D of
+// 6 terms is equidistant: k1 k2 0 0 k3 k4. Throws Error naming the field, for example without K and
+// P.
 std::vector<Camera> cameras_of(const Calibration& calibration, int image_width, int image_height);
 std::vector<StereoCamera> stereo_cameras_of(const Calibration& calibration, int image_width,
                                             int image_height);
 
-// One record of layout `records`: K, D where it is distorted, L; and P = [K | 0] where it is not.
+// Record of a camera in layout `records`: K, L, and D if it is distorted, else P = [K | 0].
 CalibrationRecord record_of(const Camera& camera);
 
 }  // namespace libmap

@@ -21,7 +21,7 @@ constexpr std::size_t min_pictures = 3;
 constexpr int min_side = 3;  // corners
 constexpr int max_side = 100;
 constexpr double same_place_px = 1.0;
-// A focal length known no better than this is not known.
+// Maximum relative standard deviation of the focal length for a determined camera.
 constexpr double max_relative_deviation = 0.2;
 
 using Points2 = std::vector<cv::Point2f>;
@@ -51,8 +51,8 @@ Pose pose_of(const cv::Mat& rotation_vector, const cv::Mat& translation) {
 
 [[noreturn]] void refuse_undetermined() {
   throw Error(
-      "the pictures do not determine the camera: show the board at different tilts, some "
-      "of 30 degrees and more, about both of its axes");
+      "the images do not determine the camera: show the board at different tilts about both "
+      "axes, some of 30 degrees and more");
 }
 
 DistortionModel distortion_of(LensModel lens) {
@@ -122,7 +122,7 @@ std::optional<Pose> pose_by_rays(const std::vector<Eigen::Vector3d>& in_board,
   return pose_of(rotation, translation);
 }
 
-// Every board by itself, the camera as it is. Nothing if a corner has no ray.
+// Estimates the pose of each board with a fixed camera. Returns nullopt if a corner has no ray.
 std::optional<BoardFit> with_poses(const Camera& camera, const BoardCorners& corners) {
   BoardFit fit{camera, {}};
   for (const auto& in_image : corners.in_images) {
@@ -139,7 +139,7 @@ std::optional<BoardFit> with_poses(const Camera& camera, const BoardCorners& cor
   return fit;
 }
 
-// Squared; infinite where a board lies behind the camera.
+// Squared error of each image; infinite if the board is behind the camera.
 std::vector<double> picture_errors(const BoardFit& fit, const BoardCorners& corners) {
   std::vector<double> errors;
   for (std::size_t n = 0; n < corners.in_images.size(); ++n) {
@@ -150,7 +150,7 @@ std::vector<double> picture_errors(const BoardFit& fit, const BoardCorners& corn
   return errors;
 }
 
-// Of the three quarters of the boards that fit best, so that a bad picture does not choose.
+// Sum over the best three quarters of the images, to be robust against bad images.
 double robust_error(const BoardFit& fit, const BoardCorners& corners) {
   std::vector<double> errors = picture_errors(fit, corners);
   std::sort(errors.begin(), errors.end());
@@ -158,8 +158,8 @@ double robust_error(const BoardFit& fit, const BoardCorners& corners) {
   return std::accumulate(errors.begin(), errors.begin() + used, 0.0);
 }
 
-// Many focal lengths are tried: cv::fisheye::calibrate knows one start, and gives up where a board
-// looks ill-conditioned from there.
+// Tries many initial focal lengths: cv::fisheye::calibrate has only one, and fails if a board is
+// ill-conditioned there.
 BoardFit fit_from_many_starts(const BoardCorners& corners, int width, int height, LensModel lens) {
   Camera camera;
   camera.width = width;
@@ -187,7 +187,7 @@ BoardFit fit_camera(const BoardCorners& corners, int width, int height, LensMode
     BoardFit fit = lens == LensModel::equidistant
                        ? fit_from_many_starts(corners, width, height, lens)
                        : fit_by_opencv(corners, width, height, lens);
-    // OpenCV rounds corners to float32.
+    // OpenCV rounds corners to float32, so its result is refined.
     const double error = adjust_boards(fit, corners);
     fit.camera.check();
     if (std::isfinite(error)) return fit;
@@ -229,7 +229,7 @@ void add_coverage(CameraCalibrationResult& result) {
   result.corners_height_share = (high.y() - low.y()) / result.camera.height;
 }
 
-// Whichever end of the board comes first.
+// Returns true if both images show the same corners, in either order.
 bool shows_the_same(const BoardPicture& a, const BoardPicture& b) {
   double forward = 0.0;
   double backward = 0.0;
@@ -244,7 +244,7 @@ bool shows_the_same(const BoardPicture& a, const BoardPicture& b) {
 CameraCalibrationResult calibrate_once(const std::vector<BoardPicture>& pictures, int width,
                                        int height, const CameraCalibrationOptions& options) {
   if (pictures.size() < min_pictures)
-    throw Error("too few pictures show the board in places of its own",
+    throw Error("too few distinct images of the board",
                 {.field = "pictures",
                  .value = std::to_string(pictures.size()),
                  .bound = ">= " + std::to_string(min_pictures) + ", better 15 and more"});
@@ -260,7 +260,7 @@ CameraCalibrationResult calibrate_once(const std::vector<BoardPicture>& pictures
       sum += residual.squaredNorm();
   }
   const auto count = static_cast<double>(pictures.size() * corner_count(options.board));
-  // OpenCV's own deviations leave near-singular directions out.
+  // OpenCV's standard deviations neglect near-singular directions.
   const Eigen::MatrixXd covariance = unit_covariance(fit, corners);
   if (covariance.size() == 0) refuse_undetermined();
   const double unknowns =
@@ -274,8 +274,8 @@ CameraCalibrationResult calibrate_once(const std::vector<BoardPicture>& pictures
   return result;
 }
 
-// The picture that no camera explains while it explains the others: its corners may be mixed up,
-// and all of them together then determine no camera.
+// Index of an image that is inconsistent with a camera that fits all others, for example because of
+// wrongly ordered corners; nullopt if there is none.
 std::optional<std::size_t> find_odd_picture(const std::vector<BoardPicture>& pictures, int width,
                                             int height, const CameraCalibrationOptions& options) {
   constexpr double times_the_median = 5.0;
@@ -289,16 +289,16 @@ std::optional<std::size_t> find_odd_picture(const std::vector<BoardPicture>& pic
 }
 
 cv::Mat as_mat(const GrayImage& image) {
-  // OpenCV takes no read-only pixels, and does not write to these.
+  // OpenCV has no read-only images, but does not modify this one.
   return cv::Mat(image.height, image.width, CV_8UC1,
                  const_cast<std::uint8_t*>(image.pixels.data()));
 }
 
-// Empty if the board is not all there.
+// Corners with pixel accuracy; empty unless the complete board is visible.
 Points2 coarse_corners(const cv::Mat& pixels, const Chessboard& board) {
   const cv::Size size(board.columns, board.rows);
   Points2 found;
-  // Duda and Frese 2018: finds boards under blur and noise; the older way those near the border.
+  // Duda and Frese 2018 is robust to blur and noise; the older method detects boards at the border.
   const bool complete =
       cv::findChessboardCornersSB(pixels, size, found,
                                   cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_EXHAUSTIVE) ||
@@ -309,8 +309,8 @@ Points2 coarse_corners(const cv::Mat& pixels, const Chessboard& board) {
   return found;
 }
 
-// The gradients around a corner all point past it (Foerstner 1987). On rendered boards the mean
-// error is half of what finding them leaves.
+// Refines corners: gradients around a corner are orthogonal to the direction from it (Foerstner
+// 1987). On rendered boards this halves the mean error.
 Points2 refine_corners(const cv::Mat& pixels, const Chessboard& board, Points2 corners) {
   if (corners.empty()) return corners;
   double spacing = std::numeric_limits<double>::infinity();
@@ -354,12 +354,12 @@ std::vector<std::pair<std::string, LensModel>> lens_model_names() {
 }
 
 void bind(ParameterTable& table, CameraCalibrationOptions& options) {
-  table.add("square_mm", options.board.square_mm, positive, "side of the board's squares");
+  table.add("square_mm", options.board.square_mm, positive, "side of the board's squares, mm");
   table.add("lens", options.lens, lens_model_names(),
-            "distortion: none; plumb_bob: k1 k2 p1 p2 k3; rational: and k4 k5 k6; equidistant: a "
-            "fisheye's k1 to k4");
+            "distortion model; plumb_bob: k1 k2 p1 p2 k3; rational: k1 k2 p1 p2 k3 k4 k5 k6; "
+            "equidistant: k1 k2 k3 k4 of a fisheye lens");
   table.add("max_picture_error_px", options.max_picture_error_px, not_negative,
-            "pictures with a larger reprojection error are left out; 0: none");
+            "maximum RMS reprojection error; worse images are rejected, pixels; 0: no limit");
 }
 
 std::optional<std::vector<Eigen::Vector2d>> find_chessboard(const GrayImage& image,
@@ -371,7 +371,7 @@ std::optional<std::vector<Eigen::Vector2d>> find_chessboard(const GrayImage& ima
     const Points2 found = refine_corners(pixels, board, coarse_corners(pixels, board));
     for (const cv::Point2f& corner : found) corners.emplace_back(corner.x, corner.y);
   } catch (const cv::Exception&) {
-    return std::nullopt;  // an image smaller than the filters
+    return std::nullopt;  // the image is smaller than the filters
   }
   if (corners.empty()) return std::nullopt;
   return corners;
@@ -455,7 +455,7 @@ CameraCalibrationResult calibrate_camera(const std::vector<BoardPicture>& pictur
       result.repeated = repeated;
       return result;
     }
-    // One at a time: a bad picture spoils the others'.
+    // One image at a time, because a bad image increases the errors of the others.
     reject(static_cast<std::size_t>(worst - result.pictures.begin()));
   }
 }

@@ -56,11 +56,11 @@ void append_numbers(const YAML::Node& list, const std::string& field, int depth,
     else
       numbers.push_back(number_of(entry, field));
     if (numbers.size() > max_numbers)
-      throw Error("contains more numbers than any camera has", {.field = field});
+      throw Error("too many numbers for a camera", {.field = field});
   }
 }
 
-// {rows, cols, data}, or the numbers alone.
+// Reads a matrix {rows, cols, data}, or a list of numbers.
 std::vector<double> matrix_of(const YAML::Node& node, const std::string& field,
                               std::size_t max_numbers = max_camera_numbers) {
   std::vector<double> numbers;
@@ -88,7 +88,7 @@ void read_matrix(const YAML::Node& root, Camera& camera) {
   if (k.size() != 9) refuse(field, std::to_string(k.size()) + " numbers", "wrong size", "3 x 3");
   if (k[1] != 0) refuse(field, to_text(k[1]), "skewed pixels are not supported", "no skew");
   if (k[3] != 0 || k[6] != 0 || k[7] != 0 || k[8] != 1)
-    throw Error("is no camera matrix: fx 0 cx, 0 fy cy, 0 0 1", {.field = field});
+    throw Error("not a camera matrix: must be fx 0 cx, 0 fy cy, 0 0 1", {.field = field});
   camera.fx = k[0];
   camera.cx = k[2];
   camera.fy = k[4];
@@ -117,7 +117,8 @@ void read_distortion(const YAML::Node& root, Camera& camera) {
   if (root[field]) terms = matrix_of(root[field], field);
   const bool all_zero = std::all_of(terms.begin(), terms.end(), [](double k) { return k == 0; });
   if (all_zero && model != "equidistant" && model != "fisheye") return;
-  if (model == "none") throw Error("is given beside distortion_model none", {.field = field});
+  if (model == "none")
+    throw Error("contradicts distortion_model none: remove one of them", {.field = field});
   if (model == "equidistant" || model == "fisheye") {
     camera.distortion_model = DistortionModel::equidistant;
     if (terms.size() == 6 && terms[2] == 0 && terms[3] == 0)
@@ -125,7 +126,7 @@ void read_distortion(const YAML::Node& root, Camera& camera) {
     if (terms.empty()) terms.assign(4, 0.0);
   } else {
     camera.distortion_model = DistortionModel::radial_tangential;
-    // The last two of OpenCV's 14 tilt the sensor.
+    // The last two of OpenCV's 14 terms describe a tilted sensor.
     if (terms.size() == 14 && terms[12] == 0 && terms[13] == 0) terms.resize(12);
   }
   camera.distortion = terms;
@@ -173,7 +174,7 @@ void read_timing(const YAML::Node& root, CameraFile& file) {
       matrix_of(root["frame_motions"], "frame_motions", max_motion_numbers);
   if (numbers.size() % 7 != 0)
     refuse("frame_motions", std::to_string(numbers.size()) + " numbers", "wrong size",
-           "7 of each frame");
+           "7 per frame");
   for (std::size_t n = 0; n < numbers.size(); n += 7)
     file.motions.push_back({numbers[n],
                             {numbers[n + 1], numbers[n + 2], numbers[n + 3]},
@@ -195,7 +196,7 @@ void read_findings(const YAML::Node& root, CameraFile& file) {
   }
 }
 
-// As cv::FileStorage, which does not take a flow map after a tag.
+// Block style, because cv::FileStorage does not accept a flow map after a tag.
 std::string matrix_text(const std::string& key, int rows, int cols,
                         const std::vector<double>& numbers) {
   std::string text = key + ": !!opencv-matrix\n  rows: " + std::to_string(rows) +
@@ -260,14 +261,14 @@ Pose pose_from_yaml(const YAML::Node& node, const std::string& field) {
   const Eigen::Matrix3d rotation = nearest_rotation(written);
   const double deviation = (rotation - written).cwiseAbs().maxCoeff();
   if (!(deviation <= 1e-3))
-    refuse(field, "off by " + to_text(deviation), "its 3 x 3 part is no rotation", "<= 0.001");
-  // Exact numbers stay as they are.
+    refuse(field, "off by " + to_text(deviation), "the 3 x 3 part is not a rotation", "<= 0.001");
+  // Exact rotations are not modified.
   if (deviation > 1e-9) pose.linear() = rotation;
   return pose;
 }
 
 CameraFile camera_from_yaml(const YAML::Node& root) {
-  if (!root.IsMap()) throw Error("a camera is a map of keys and values");
+  if (!root.IsMap()) throw Error("not a camera: must be a map of keys and values");
   CameraFile file;
   if (root["camera_name"] && root["camera_name"].IsScalar())
     file.name = root["camera_name"].Scalar();

@@ -1,4 +1,5 @@
-// Camera calibrations as YAML, in the layout that OpenCV's FileStorage, RTAB-Map and ROS share:
+// Reads and writes camera calibrations as YAML in the layout of OpenCV's FileStorage, RTAB-Map and
+// ROS:
 //
 //   %YAML:1.0
 //   ---
@@ -13,25 +14,25 @@
 //   distortion_model: plumb_bob
 //   distortion_coefficients: !!opencv-matrix
 //     {rows: 1, cols: 5, dt: d, data: [...]}
-//   local_transform: !!opencv-matrix          # base_from_camera, 3 x 4; may be missing
+//   local_transform: !!opencv-matrix          # base_from_camera, 3 x 4; optional, as all below
 //     {rows: 3, cols: 4, dt: d, data: [...]}
-//   depth_correction: !!opencv-matrix         # DepthCorrection: spline_m; may be missing
+//   depth_correction: !!opencv-matrix         # DepthCorrection: spline_m
 //     {rows: 1, cols: 14, dt: d, data: [...]}
 //   depth_correction_range: !!opencv-matrix   # first_m, step_m
 //     {rows: 1, cols: 2, dt: d, data: [0.6, 0.2]}
 //   depth_correction_radial: !!opencv-matrix  # radial
 //     {rows: 1, cols: 3, dt: d, data: [...]}
-//   depth_scale: 1.008                        # scale; may be missing
-//   camera_timing: [0.01, 0.02]               # depth_delay_s, rolling_shutter_s; may be missing
-//   frame_motions: !!opencv-matrix            # FrameMotion of each frame; may be missing
+//   depth_scale: 1.008                        # scale
+//   camera_timing: [0.01, 0.02]               # depth_delay_s, rolling_shutter_s
+//   frame_motions: !!opencv-matrix            # FrameMotion of each frame
 //     {rows: 60, cols: 7, dt: d, data: [...]}
-//   findings: ["depth bends by ..."]          # CameraFile; may be missing
+//   findings: ["depth bends by ..."]          # CameraFile::findings
 //
 // distortion_model  plumb_bob: k1 k2 p1 p2 [k3]; rational_polynomial: 8 or 12 terms in OpenCV's
-// order; equidistant or fisheye: k1 k2 k3 k4, or RTAB-Map's k1 k2 0 0 k3 k4. Without it the number
-// of terms decides, and `fisheye_model: 1` of OpenCV's own calibration sample. A camera whose terms
-// are all zero is read as undistorted. Keys of other meaning are passed over, as these files carry
-// many (projection_matrix, avg_reprojection_error, ...).
+// order; equidistant or fisheye: k1 k2 k3 k4, or RTAB-Map's k1 k2 0 0 k3 k4. Without this key, the
+// model follows from the number of terms and from `fisheye_model: 1` of OpenCV's calibration
+// sample. A camera with all terms 0 is read as undistorted. Other keys, such as projection_matrix
+// and avg_reprojection_error, are ignored.
 #pragma once
 
 #include <Eigen/Core>
@@ -48,7 +49,7 @@ class Node;
 
 namespace libmap {
 
-// How the base moves when a frame is taken, in its own frame.
+// Velocity of the base when a frame is taken, in the base frame.
 struct FrameMotion {
   double stamp_s = 0.0;
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();   // m/s
@@ -58,20 +59,20 @@ struct FrameMotion {
 struct CameraFile {
   std::string name{};  // may be empty
   Camera camera{};
-  // Of depth that is registered to the camera's pictures: where it was taken from, if not from the
-  // camera's own place (depth_registration, 3 x 4; may be missing), and what is added to it.
+  // Correction of depth that is registered to the camera: pose of the depth camera
+  // (depth_registration, 3 x 4, optional), and correction of its values.
   Pose color_from_depth = Pose::Identity();
   DepthCorrection depth{};
-  // Depth is taken this much after the middle row of the picture, beyond what their stamps say, and
-  // the picture's rows one after the other in this time. The motions are those of the scan that
-  // they were estimated from.
+  // Delay of depth after the middle row of the color image, in addition to the difference of their
+  // stamps, and time from the first to the last row of the color image. `motions` are those of the
+  // scan from which the delays were estimated.
   double depth_delay_s = 0.0;
   double rolling_shutter_s = 0.0;
   std::vector<FrameMotion> motions{};   // by ascending stamp
-  std::vector<std::string> findings{};  // what the estimation found, a sentence each
+  std::vector<std::string> findings{};  // results of the estimation, one sentence each
 
-  // Of the frame of this stamp; the base does not move in frames that `motions` does not list.
-  // `depth_later_s` as in RgbdFrame.
+  // Pose of the depth camera in the frame of this stamp, including the motion during the delay. The
+  // base does not move in frames that are not in `motions`. `depth_later_s` as in RgbdFrame.
   Pose color_from_depth_at(double stamp_s, double depth_later_s = 0.0) const;
   bool changes_depth() const {
     return !depth.empty() || !color_from_depth.matrix().isIdentity(0.0) ||
@@ -79,16 +80,17 @@ struct CameraFile {
   }
 };
 
-// Throws Error naming `file`, the key, its value and its bound: no YAML, a key that is missing, a
-// matrix of another size, skew, a transform that is no rotation, terms that are no known model's.
+// Read a camera. Throw Error naming `file`, the key, its value and its bound: invalid YAML, a
+// missing key, wrong matrix size, skew, a transform without a valid rotation, an unknown distortion
+// model.
 CameraFile parse_camera(const std::string& text, const std::string& file);
 CameraFile read_camera(const std::filesystem::path& path);
 CameraFile camera_from_yaml(const YAML::Node& root);
-// Of a matrix of 3 x 4 or 4 x 4.
+// Reads a pose from a matrix of 3 x 4 or 4 x 4. Throws Error naming `field`.
 Pose pose_from_yaml(const YAML::Node& matrix, const std::string& field);
 
-// Text that parse_camera reads back as the same numbers, and cv::FileStorage and RTAB-Map as well.
-// `comment` stands at its head, line by line.
+// YAML that parse_camera reads back exactly, and that cv::FileStorage and RTAB-Map can read. The
+// lines of `comment` are written first, as comments.
 std::string to_yaml(const CameraFile& camera, const std::string& comment = {});
 
 }  // namespace libmap

@@ -14,8 +14,7 @@ namespace libmap {
 
 namespace {
 
-// How far from the optical axis, along x and y in units of z, a rectangle reaches whose rays all
-// meet the image.
+// Half extent (x/z, y/z) of the largest rectangle around the optical axis that is inside the image.
 Eigen::Vector2d inner_reach(const Camera& camera) {
   Eigen::Vector2d reach = Eigen::Vector2d::Constant(std::numeric_limits<double>::infinity());
   const auto meet = [&](double u, double v, Eigen::Index axis, double side) {
@@ -33,12 +32,12 @@ Eigen::Vector2d inner_reach(const Camera& camera) {
   return reach;
 }
 
-// Pixels, at most `half_extent` to each side of the middle. An odd number if the principal point
-// is closer to a pixel's center, else an even one, so that pixels fall on pixels.
+// Number of pixels with at most `half_extent` on each side of the center: odd if the principal
+// point is closer to a pixel's center, else even, so that pixels of both images coincide.
 int centered_size(double half_extent, double principal_point) {
   constexpr double rounding = 1e-9;
   const bool odd = std::llround(2.0 * principal_point) % 2 == 0;
-  // More than any image has.
+  // Limits the integer range; images are smaller.
   half_extent = std::min(half_extent, 1e8);
   return odd ? 2 * static_cast<int>(std::floor(half_extent + rounding)) + 1
              : 2 * static_cast<int>(std::floor(half_extent + 0.5 + rounding));
@@ -50,13 +49,13 @@ Camera centered_pinhole(const Camera& camera) {
   camera.check();
   const Eigen::Vector2d reach = inner_reach(camera);
   if (!(reach.minCoeff() > 0.0) || !reach.allFinite())
-    throw Error("the optical axis does not meet the image",
+    throw Error("the optical axis is outside the image",
                 {.field = "principal point",
                  .value = to_text(camera.cx) + ", " + to_text(camera.cy),
                  .bound = "inside " + size_text(camera.width, camera.height)});
   Camera centered = without_distortion(camera);
   const double focal = std::max(camera.fx, camera.fy);
-  // No more pixels than the image has, however far a fisheye sees.
+  // Limits the size for fisheye lenses of wide angle.
   centered.width = std::min(centered_size(focal * reach.x(), camera.cx), 2 * camera.width + 1);
   centered.height = std::min(centered_size(focal * reach.y(), camera.cy), 2 * camera.height + 1);
   centered.width = std::max(centered.width, 1);
@@ -69,9 +68,9 @@ Camera centered_pinhole(const Camera& camera) {
 
 ColorImage resample_image(const ColorImage& image, const Camera& from, const Camera& to) {
   if (image.width != from.width || image.height != from.height)
-    throw Error("the image does not fit its camera", {.field = "size",
-                                                      .value = size_text(image.width, image.height),
-                                                      .bound = size_text(from.width, from.height)});
+    throw Error("image and camera differ in size", {.field = "size",
+                                                    .value = size_text(image.width, image.height),
+                                                    .bound = size_text(from.width, from.height)});
   cv::Mat places(to.height, to.width, CV_32FC2);
   parallel_for(static_cast<std::size_t>(to.height), 16, [&](std::size_t begin, std::size_t end) {
     for (auto row = static_cast<int>(begin); row < static_cast<int>(end); ++row)

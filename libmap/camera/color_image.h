@@ -1,4 +1,4 @@
-// Photographs as a camera without distortion would have taken them, and how sharp they are.
+// Resamples color images to a pinhole camera, and measures their sharpness.
 #pragma once
 
 #include "libmap/core/camera.h"
@@ -6,22 +6,21 @@
 
 namespace libmap {
 
-// The camera with square pixels, no distortion and its principal point exactly in the middle of the
-// image, ((width - 1) / 2, (height - 1) / 2), that shows as much of what `camera` shows as fits
-// into a rectangle about its optical axis. Its focal length is the longer one of `camera`. Where
-// only the principal point is off the middle and lies on whole or half pixels its pixels are those
-// of `camera`, columns and rows at the border left out. Throws Error: `camera` cannot be, or its
-// optical axis does not meet its image.
+// Camera with square pixels, no distortion and the principal point at the image center, ((width -
+// 1) / 2, (height - 1) / 2), with the largest image around the optical axis that `camera` covers
+// completely. The focal length is the larger one of `camera`. If `camera` differs only in its
+// principal point, at whole or half pixels, pixels are those of `camera` cropped at the border.
+// Throws Error: an invalid camera, or one whose optical axis is outside its image.
 Camera centered_pinhole(const Camera& camera);
 
-// The image of `from` as `to` sees it from the same place, in the same direction: bicubic, to 1/32
-// of a pixel; pixels of `from` that fall on pixels of `to` are kept as they are. Throws Error if
-// the image has not the size of `from`.
+// Resamples an image of camera `from` to camera `to` with the same pose: bicubic, in steps of 1/32
+// pixel. Pixels of `from` that coincide with pixels of `to` are not changed. Throws Error if the
+// image does not have the size of `from`.
 ColorImage resample_image(const ColorImage& image, const Camera& from, const Camera& to);
 
-// How fine the structures of an image are that have contrast at all: the sum of the squares of its
-// Laplacian over that of its gradient, both after a blur of one pixel, against noise. Comparable
-// among pictures of one scene and size. 0 for a plain image, or one smaller than 5 x 5.
+// Sharpness of an image: sum of squares of its Laplacian over that of its gradient, both after a
+// blur of one pixel against noise. Comparable among images of one scene and size. 0 for a uniform
+// image, or one smaller than 5 x 5.
 double image_sharpness(const ColorImage& image);
 
 }  // namespace libmap

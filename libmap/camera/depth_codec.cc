@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::string_view rvl_signature = "DEPTHRVL";
 constexpr std::size_t rvl_header_bytes = 16;
-// 4096 x 4096. A few bytes can stand for that many zeros.
+// 4096 x 4096. A limit is necessary because RVL encodes many zeros in few bytes.
 constexpr std::uint64_t max_depth_pixels = std::uint64_t{1} << 24;
 
 std::uint32_t uint32_at(std::string_view bytes, std::size_t at) {
@@ -24,12 +24,12 @@ std::uint32_t uint32_at(std::string_view bytes, std::size_t at) {
   return value;
 }
 
-// Nibbles of 32-bit words, the most significant first.
+// Reads the nibbles of 32-bit words, most significant first.
 class NibbleReader {
  public:
   explicit NibbleReader(std::string_view words) : words_(words) {}
 
-  // A number in groups of 3 bits, the lowest first; bit 3 says that another follows.
+  // A number in groups of 3 bits, lowest first; bit 3 is set if another group follows.
   std::uint32_t number() {
     std::uint32_t value = 0;
     for (int shift = 0; shift < 32; shift += 3) {
@@ -98,7 +98,7 @@ void check_size(std::uint64_t columns, std::uint64_t rows) {
   if (columns <= max_depth_pixels && rows <= max_depth_pixels &&
       columns * rows <= max_depth_pixels && (columns == 0) == (rows == 0))
     return;
-  throw Error("depth image of no valid size",
+  throw Error("invalid size of a depth image",
               {.field = "image size",
                .value = std::to_string(columns) + " x " + std::to_string(rows),
                .bound = "<= " + std::to_string(max_depth_pixels) + " pixels"});
@@ -113,10 +113,9 @@ DepthInfo rvl_info(std::string_view bytes) {
 }
 
 [[noreturn]] void refuse_run(std::uint64_t count, std::uint64_t left) {
-  throw Error("RVL contains more pixels than its size says",
-              {.field = "run of pixels",
-               .value = std::to_string(count),
-               .bound = "<= " + std::to_string(left)});
+  throw Error("RVL contains more pixels than its size", {.field = "run of pixels",
+                                                         .value = std::to_string(count),
+                                                         .bound = "<= " + std::to_string(left)});
 }
 
 }  // namespace
@@ -198,7 +197,7 @@ std::string encode_rvl(const MillimeterImage& image) {
   return bytes;
 }
 
-// OpenCV takes the four bytes of a float for blue, green, red and alpha.
+// OpenCV stores the four bytes of a float as blue, green, red and alpha.
 DepthImage decode_float_png(std::string_view bytes) {
   const RgbaImage rgba = decode_rgba(bytes);
   DepthImage image(rgba.width, rgba.height);

@@ -1,5 +1,5 @@
-// Depth images as RTAB-Map stores them: RVL (Wilson 2017, "Fast lossless depth image compression"),
-// 16-bit PNG, both in whole millimeters, or the bytes of float32 meters as the four channels of a
+// Reads and writes depth images in RTAB-Map's formats: RVL (Wilson 2017, "Fast lossless depth image
+// compression") and 16-bit PNG in whole millimeters, and float32 meters as the four channels of a
 // PNG.
 #pragma once
 
@@ -12,12 +12,12 @@
 
 namespace libmap {
 
-// RTAB-Map's "no measurement" besides 0.
+// RTAB-Map's second value for "no measurement", besides 0.
 inline constexpr std::uint16_t no_depth_mm = 65535;
 
-using MillimeterImage = Image<std::uint16_t>;  // 0 and 65535: nothing was measured
+using MillimeterImage = Image<std::uint16_t>;  // 0 and 65535: no measurement
 
-enum class DepthFormat { rvl, png16, float_png };  // how a depth image is stored
+enum class DepthFormat { rvl, png16, float_png };  // storage format of a depth image
 std::string to_text(DepthFormat format);           // "RVL", "16-bit PNG", "float PNG"
 
 struct DepthInfo {
@@ -26,23 +26,24 @@ struct DepthInfo {
   int height = 0;
 };
 
-// From the header alone: `bytes` may end after it. Nothing if it is another kind of image, such as
-// the right one of a stereo pair. Throws Error if it is no image.
+// Reads the header; `bytes` may end after it. Returns nullopt for another kind of image, such as
+// the right image of a stereo pair. Throws Error if it is not an image or has an invalid size.
 std::optional<DepthInfo> read_depth_info(std::string_view bytes);
 
-// In meters; 0 where nothing was measured: 0 and 65535 mm; NaN, infinity and values <= 0 of floats.
-// Sizes are checked before memory is taken, and every read is bounded. Throws Error.
+// Decodes a depth image, m. Depth is 0 for 0 and 65535 mm, and for NaN, infinity and floats <= 0.
+// Sizes are checked before memory is allocated. Throws Error for another format or damaged data.
 DepthImage decode_depth(std::string_view bytes);
 
-// RVL with RTAB-Map's header: "DEPTHRVL", columns, rows.
+// RVL with RTAB-Map's header: "DEPTHRVL", columns, rows. Decoding throws Error for damaged data.
 MillimeterImage decode_rvl(std::string_view bytes);
 std::string encode_rvl(const MillimeterImage& image);
 
-// Floats keep their bits.
+// float32 as PNG; all bits are preserved. Decoding throws Error for damaged data.
 DepthImage decode_float_png(std::string_view bytes);
 std::string encode_float_png(const DepthImage& image);
 
-// Nearest millimeter; 0 for what is not finite, not above 0 or beyond 65.534 m.
+// Conversion between meters and millimeters. to_millimeters rounds to the nearest millimeter; 0 for
+// values that are not finite, <= 0 or above 65.534 m.
 MillimeterImage to_millimeters(const DepthImage& image);
 DepthImage to_meters(const MillimeterImage& image);
 

@@ -90,7 +90,7 @@ void correct_depth(DepthImage& depth, const DepthCorrection& correction) {
 
 namespace {
 
-// The pixels whose centers a pixel's image covers; empty where it falls on none.
+// Pixels whose centers are inside a projected pixel; may be empty.
 struct PixelBox {
   int left = 0;
   int top = 0;

@@ -1,7 +1,7 @@
-// A smooth correction of a camera's depth: what is added to it as a function of depth (a uniform
-// cubic B-spline) and of the radius in the image, and a scale of the sum. Linear in the numbers
-// that are added, so that they are estimated by least squares. Teichman et al. (2013) correct each
-// range and each place in the image; a scan has too few data for that.
+// Smooth correction of a camera's depth: an offset that depends on depth (uniform cubic B-spline)
+// and image radius, and a scale of the sum. The offset is linear in its coefficients, which are
+// estimated by least squares. Teichman et al. (2013) correct each range and pixel; a scan has too
+// few data for that. Also registers depth images to another camera.
 #pragma once
 
 #include <array>
@@ -14,15 +14,14 @@
 namespace libmap {
 
 struct DepthCorrection {
-  double first_m = 0.0;            // nearer depths are corrected as this one, farther than last_m()
-                                   // as that one
-  double step_m = 0.0;             // between the spline's knots
-  std::vector<double> spline_m{};  // its coefficients, 4 or more; empty: no correction at all
-  std::array<double, 3> radial{};  // of r^2 and r^4 (m), of depth r^2; r is 1 in corners
-  double scale = 1.0;              // of the sum
+  double first_m = 0.0;            // the correction is constant below first_m and above last_m()
+  double step_m = 0.0;             // distance of the spline's knots
+  std::vector<double> spline_m{};  // coefficients, at least 4; empty: scale only
+  std::array<double, 3> radial{};  // factors of r^2 and r^4 (m), and depth r^2; r is 1 in corners
+  double scale = 1.0;              // of the sum of depth and offset
 
-  // What a depth takes from the spline (the coefficients from `first` on) and from the radial
-  // terms.
+  // Basis functions at a depth and radius: weights of the spline coefficients from index `first`,
+  // and of the radial coefficients.
   struct Terms {
     std::size_t first = 0;
     std::array<double, 4> spline{};
@@ -31,28 +30,28 @@ struct DepthCorrection {
 
   bool empty() const { return spline_m.empty() && scale == 1.0; }
   double last_m() const { return first_m + step_m * (static_cast<double>(spline_m.size()) - 3.0); }
-  // At a depth, and a squared radius as of `at`.
+  // Basis functions; `radius2` is the result of squared_image_radius. Requires a spline.
   Terms terms(double depth_m, double radius2) const;
-  // The corrected depth less `depth_m`.
+  // Corrected depth minus `depth_m`, m.
   double at(double depth_m, double radius2) const;
-  // The same without the change by the scale alone.
+  // at() without the change of `depth_m` by the scale.
   double bend(double depth_m, double radius2) const {
     return at(depth_m, radius2) - (scale - 1.0) * depth_m;
   }
-  // Throws Error naming the field: a step > 0, no or 4 to 1000 coefficients of less than 1 m each,
-  // a scale from 0.5 to 2.
+  // Throws Error naming the field unless step_m > 0, there are 0 or 4 to 1000 coefficients of at
+  // most 1 m each, and the scale is from 0.5 to 2.
   void check() const;
   bool operator==(const DepthCorrection&) const = default;
 };
 
-// From the middle of the image, squared, of that of its corners' pixels.
+// Squared distance of a pixel from the image center, relative to that of the corner pixels.
 double squared_image_radius(int width, int height, double x_px, double y_px);
 
-// Pixels without a depth stay so.
+// Corrects a depth image, m. Pixels without depth are not changed.
 void correct_depth(DepthImage& depth, const DepthCorrection& correction);
 
-// Each measurement covers the pixels of `target` on which its own pixel falls, the nearest one
-// where several do; pixels that the depth camera cannot see stay without depth.
+// Registers a depth image of `camera` to the pixels of `target`. Each measurement covers the pixels
+// of `target` inside its projected pixel; the nearest one is kept. Occluded pixels have no depth.
 DepthImage register_depth(const DepthImage& depth, const Camera& camera, const Camera& target,
                           const Pose& target_from_camera);
 

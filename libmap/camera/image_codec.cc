@@ -17,9 +17,9 @@ namespace libmap {
 
 namespace {
 
-// A smaller image is never refused for its number of bytes.
+// Images up to this size are not checked against the number of bytes.
 constexpr std::int64_t always_allowed_pixels = std::int64_t{1} << 18;
-// A Huffman-coded JPEG spends at least one bit on each block of 8 x 8.
+// A Huffman-coded JPEG has at least one bit per block of 8 x 8 pixels.
 constexpr std::int64_t jpeg_pixels_per_byte = 4096;
 constexpr std::string_view png_signature("\x89PNG\r\n\x1a\n", 8);
 
@@ -45,7 +45,7 @@ void check_size(const ImageInfo& info, std::size_t bytes, std::int64_t max_pixel
                                         static_cast<std::int64_t>(deflate_ratio)
                                   : pixels / jpeg_pixels_per_byte;
   if (wanted > held)
-    throw Error("more than its " + std::to_string(held) + " bytes can hold",
+    throw Error("more than " + std::to_string(held) + " bytes can contain",
                 {.field = "image size", .value = text});
 }
 
@@ -156,8 +156,8 @@ std::string encode_jpeg(const std::uint8_t* pixels, int width, int height, int p
 
 // -------------------------------------------------------------------------------------------- PNG
 
-// What libpng's callbacks share. Functions that libpng may leave by longjmp hold no object with a
-// destructor.
+// State shared with libpng's callbacks. Functions that libpng may leave by longjmp must not have
+// objects with destructors.
 struct PngText {
   std::jmp_buf jump;
   char message[128] = "";
@@ -190,13 +190,13 @@ void read_bytes(png_structp png, png_bytep target, png_size_t count) {
 
 enum class PngWanted { color, gray, gray16, rgba };
 
-// The rows as wanted into `target`; false if the PNG is broken.
+// Decodes all rows into `target`. Returns false if the PNG is damaged.
 bool decode_png_rows(PngSource& source, PngWanted wanted, std::uint8_t* target,
                      std::size_t row_bytes, png_structp png, png_infop info) {
   if (setjmp(source.jump) != 0) return false;
   png_set_read_fn(png, &source, read_bytes);
-  // No pixel depends on them, and libpng takes the memory that a text or an eXIf promises before it
-  // reads it, whatever png_set_chunk_malloc_max says (1.6.39: too large a chunk is a warning).
+  // Ancillary chunks do not affect pixels, and libpng allocates the stated size of a text or eXIf
+  // chunk before reading it, in spite of png_set_chunk_malloc_max (1.6.39: only a warning).
   png_set_keep_unknown_chunks(png, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);
   png_read_info(png, info);
   if (wanted == PngWanted::color || wanted == PngWanted::gray) {
@@ -260,7 +260,7 @@ bool encode_png_rows(PngSink& sink, const PngPixels& pixels, png_structp png, pn
   png_set_IHDR(png, info, static_cast<png_uint_32>(pixels.width),
                static_cast<png_uint_32>(pixels.height), pixels.bits, pixels.color_type,
                PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
-  // Higher levels take several times as long for a few per cent.
+  // Higher levels save a few percent of bytes but take several times as long.
   png_set_compression_level(png, 3);
   png_write_info(png, info);
   if (pixels.bits == 16 && std::endian::native == std::endian::little) png_set_swap(png);
@@ -300,7 +300,7 @@ Image<Pixel> decode_png_as(std::string_view bytes, const ImageInfo& info, PngWan
   return image;
 }
 
-// A PNG of just these channels and bits.
+// Throws Error unless the image is a PNG with these channels and bits.
 ImageInfo require_png(std::string_view bytes, int channels, int bits) {
   const ImageInfo info = checked_info(bytes);
   if (info.format != ImageFormat::png || info.channels != channels || info.bits != bits)

@@ -1,8 +1,8 @@
-// Image files as bytes in memory: JPEG (libjpeg-turbo) and PNG (libpng).
+// Decodes and encodes images in memory: JPEG (libjpeg-turbo) and PNG (libpng).
 //
-// Sizes are taken from the header and checked before memory is taken: at most 2^27 pixels, and no
-// more than that many bytes can hold. An image that ends too early, fails its check sums or makes
-// the decoder warn is an Error; what() does not name the file.
+// Sizes are read from the header and checked before memory is allocated: at most 2^27 pixels, and
+// no more than the file size permits. Decoding throws Error if an image is truncated, has a wrong
+// checksum or causes a warning of the decoder; what() does not name the file.
 #pragma once
 
 #include <array>
@@ -15,11 +15,11 @@
 
 namespace libmap {
 
-enum class ImageFormat { jpeg, png };            // how a color image is stored, by its first bytes
+enum class ImageFormat { jpeg, png };            // storage format of an image
 std::string to_text(ImageFormat format);         // "JPEG", "PNG"
 std::string file_extension(ImageFormat format);  // ".jpg", ".png"
 
-// By the first bytes; nothing if it is neither.
+// Format according to the first bytes; nullopt if it is neither.
 std::optional<ImageFormat> image_format(std::string_view bytes);
 
 struct ImageInfo {
@@ -27,35 +27,35 @@ struct ImageInfo {
   int width = 0;
   int height = 0;
   int channels = 0;  // as stored; a palette counts as 3
-  int bits = 8;      // of a channel
+  int bits = 8;      // per channel
 };
 
-// From the header alone: `bytes` may end after it. Nothing if it ends before the size is known;
-// throws Error if this is no JPEG or PNG.
+// Reads the header; `bytes` may end after it. Returns nullopt if they end before the size is known.
+// Throws Error if this is not a JPEG or PNG.
 std::optional<ImageInfo> read_image_info(std::string_view bytes);
 
-// Decoding takes up to ten bytes per pixel. Frames of a scan are decoded by several threads at
-// once.
+// Limit for frames of a scan, which several threads decode at once, with up to ten bytes per pixel.
 inline constexpr std::int64_t max_frame_pixels = std::int64_t{1} << 25;
-// Pages of a texture and pictures come one at a time.
+// Limit for texture pages and other images, which are decoded one at a time.
 inline constexpr std::int64_t max_picture_pixels = std::int64_t{1} << 27;
 
-// Any image as 8-bit color; gray becomes red = green = blue, transparency is ignored. Throws Error
-// if there are more than `max_pixels`, as the following do beyond max_frame_pixels.
+// Decodes any image as 8-bit color; gray becomes red = green = blue, transparency is ignored.
+// Throws Error for more than `max_pixels`; the following functions do so above max_frame_pixels.
 ColorImage decode_color(std::string_view bytes, std::int64_t max_pixels = max_frame_pixels);
-// Any image as 8-bit gray; color by ITU-R BT.601 (Y = 0.299 R + 0.587 G + 0.114 B).
+// Decodes any image as 8-bit gray; color by ITU-R BT.601 (Y = 0.299 R + 0.587 G + 0.114 B).
 GrayImage decode_gray(std::string_view bytes);
-// A PNG of one channel of 16 bits; throws Error for any other.
+// Decodes a PNG with one 16-bit channel; throws Error for any other image.
 Image<std::uint16_t> decode_gray16(std::string_view bytes);
 using RgbaColor = std::array<std::uint8_t, 4>;  // red, green, blue, opacity
 using RgbaImage = Image<RgbaColor>;
-// A PNG of four channels of 8 bits, as stored; throws Error for any other.
+// Decodes a PNG with four 8-bit channels, as stored; throws Error for any other image.
 RgbaImage decode_rgba(std::string_view bytes);
 
-// `quality` 1 to 100; chroma at half resolution. Throws Error for an empty image.
+// Encodes a JPEG with `quality` 1 to 100 and chroma at half resolution. Throws Error for an empty
+// image.
 std::string encode_jpeg(const ColorImage& image, int quality = 95);
 std::string encode_jpeg(const GrayImage& image, int quality = 95);
-// Without loss. Throws Error for an empty image.
+// Encodes a PNG without loss. Throws Error for an empty image.
 std::string encode_png(const ColorImage& image);
 std::string encode_png(const GrayImage& image);
 std::string encode_png(const Image<std::uint16_t>& image);

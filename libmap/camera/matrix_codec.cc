@@ -34,15 +34,15 @@ std::uint64_t checked_bytes(const StoredMatrix& matrix, std::uint64_t stream_byt
   const std::uint64_t cell_bytes =
       static_cast<std::uint64_t>(matrix.channels) * bytes_of(matrix.element);
   if (cells > most / cell_bytes)
-    throw Error(
-        "compressed matrix of more than its " + std::to_string(stream_bytes) + " bytes can hold",
-        {.value = matrix_size_text(matrix)});
+    throw Error("compressed matrix: size exceeds what " + std::to_string(stream_bytes) +
+                    " bytes can contain",
+                {.value = matrix_size_text(matrix)});
   return cells * cell_bytes;
 }
 
 struct InflateStream {
   explicit InflateStream(std::string_view bytes) {
-    // zlib does not write to its input, and counts it in 32 bits, as SQLite does.
+    // zlib does not modify its input. Its 32-bit size is sufficient: SQLite has the same limit.
     stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
     stream.avail_in = static_cast<uInt>(bytes.size());
     if (inflateInit(&stream) != Z_OK) throw Error("zlib cannot be used", {}, ErrorKind::failed);
@@ -68,7 +68,7 @@ StoredMatrix read_matrix_header(std::string_view blob) {
   std::memcpy(numbers.data(), blob.data() + blob.size() - trailer_bytes, trailer_bytes);
   const auto [rows, columns, type] = numbers;
   if (rows < 0 || columns < 0)
-    throw Error("compressed matrix of no valid size",
+    throw Error("compressed matrix of invalid size",
                 {.value = std::to_string(rows) + " x " + std::to_string(columns)});
   if (type < 0 || (type & 7) > static_cast<int>(MatrixElement::float64) ||
       (type >> 3) + 1 > max_channels)
@@ -136,7 +136,7 @@ std::string encode_matrix(const StoredMatrix& matrix) {
 std::string decode_compressed_text(std::string_view blob) {
   StoredMatrix matrix = decode_matrix(blob);
   if (matrix.element != MatrixElement::int8 || matrix.channels != 1 || matrix.rows != 1)
-    throw Error("compressed matrix that is no text");
+    throw Error("compressed matrix is not a text");
   std::string text = std::move(matrix.bytes);
   text.resize(std::strlen(text.c_str()));
   return text;

@@ -1,5 +1,5 @@
-// Matrices and texts as RTAB-Map compresses them: a zlib stream, then rows, columns and OpenCV's
-// type as int32, little-endian.
+// Reads and writes matrices and texts as compressed by RTAB-Map: a zlib stream, followed by rows,
+// columns and OpenCV's type as little-endian int32.
 #pragma once
 
 #include <cstddef>
@@ -31,7 +31,7 @@ struct StoredMatrix {
   MatrixElement element = MatrixElement::uint8;
   std::string bytes;  // rows * columns * channels elements, row by row, little-endian
 
-  // All elements, in the order of `bytes`; T must have the size of `element`.
+  // Returns all elements in the order of `bytes`. T must have the size of `element`.
   template <typename T>
   std::vector<T> values() const {
     std::vector<T> list(bytes.size() / sizeof(T));
@@ -42,24 +42,26 @@ struct StoredMatrix {
   bool operator==(const StoredMatrix&) const = default;
 };
 
-// Sizes and type from a blob's end, without its bytes. Throws Error if they are none.
+// Reads sizes and type from a blob's end; `bytes` is empty. Throws Error if they are invalid.
 StoredMatrix read_matrix_header(std::string_view blob);
 
-// deflate packs at most 1032 bytes into one (RFC 1951: 258 bytes in two bits).
+// Maximum compression ratio of deflate (RFC 1951: 258 bytes in two bits).
 inline constexpr std::uint64_t deflate_ratio = 1032;
 
-// The most that decode_matrix takes: 16 million float32, ten turns of a lidar of 128 x 2048 points.
+// Limit of decode_matrix: 16 million float32, ten revolutions of a lidar with 128 x 2048 points.
 inline constexpr std::uint64_t max_matrix_bytes = std::uint64_t{1} << 26;
 
-// Sizes are checked before memory is taken: at most max_matrix_bytes, and no more than the stream
-// can hold. Throws Error for a broken stream or one of another length than its sizes say.
+// Decodes a matrix. Sizes are checked before memory is allocated: at most max_matrix_bytes, and no
+// more than the stream can contain. Throws Error for a damaged stream or one of wrong length.
 StoredMatrix decode_matrix(std::string_view blob);
-// The same bytes, of any number, in pieces of a multiple of 8 bytes but the last: memory for one.
+// Decodes a matrix of any size piecewise, in constant memory. All pieces except the last have a
+// multiple of 8 bytes. Throws Error as decode_matrix does.
 void each_matrix_piece(std::string_view blob,
                        const std::function<void(std::string_view bytes)>& use);
 std::string encode_matrix(const StoredMatrix& matrix);
 
-// A text as a matrix of one row of int8 that ends with NUL.
+// Decodes a text, stored as a matrix of one row of int8 ending with NUL. Throws Error for any other
+// matrix.
 std::string decode_compressed_text(std::string_view blob);
 
 }  // namespace libmap

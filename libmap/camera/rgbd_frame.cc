@@ -9,21 +9,20 @@ namespace libmap {
 
 namespace {
 
-// Width of one of `count` pictures side by side.
+// Width of one of `count` images side by side.
 int part_width(int node, const std::string& what, int width, std::size_t count) {
   const int cameras = static_cast<int>(count);
   if (width % cameras != 0)
-    throw Error("images of several cameras cannot be told apart",
+    throw Error("the image cannot be divided among the cameras",
                 {.field = "node " + std::to_string(node) + ": " + what + " width",
                  .value = std::to_string(width),
                  .bound = "a multiple of " + std::to_string(cameras)});
   return width / cameras;
 }
 
-// The camera at the size of its other image. RTAB-Map downsamples images by taking every n-th pixel
-// and multiplies the principal point with the size: pixels are samples here, not areas. A database
-// whose color is half the size of its depth fits this, and not pixels as areas: those put the
-// surface 4.5 mm off.
+// The camera at another image size. RTAB-Map downsamples images by taking every n-th pixel and
+// scales the principal point with the size: pixels are samples, not areas. This was verified on a
+// database with color at half the size of depth; pixels as areas shift the surface by 4.5 mm.
 Camera downsampled_camera(Camera camera, int width, int height) {
   const double sx = static_cast<double>(width) / camera.width;
   const double sy = static_cast<double>(height) / camera.height;

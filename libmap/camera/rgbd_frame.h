@@ -1,4 +1,4 @@
-// What one node of a scan has recorded.
+// Images and cameras of one node of a scan.
 #pragma once
 
 #include <cstddef>
@@ -10,7 +10,7 @@
 
 namespace libmap {
 
-// A rectified pair: the right camera lies `baseline_m` along the left one's x axis.
+// A rectified pair: the right camera is at `baseline_m` on the x axis of the left camera.
 struct StereoCamera {
   Camera left;
   Camera right;
@@ -18,37 +18,39 @@ struct StereoCamera {
   Pose right_from_left = Pose::Identity();
 };
 
-// Color and depth of one or several cameras; several stand side by side in one image, each with
-// the same share of its width, in the order of `cameras`. Depth is registered to the color camera,
-// and may have another size than color.
+// Color and depth images of one or several cameras. Images of several cameras are side by side in
+// one image, with equal widths and in the order of `cameras`. Depth (m) is registered to the color
+// camera and may have a different size.
 struct RgbdFrame {
   int node = 0;
   double stamp_s = 0.0;
-  double depth_later_s = 0.0;   // stamp of depth after that of color, where both have one
-  std::vector<Camera> cameras;  // of the color images; of the depth images where there is no color
-  ColorImage color;             // empty if not stored or not asked for
+  double depth_later_s = 0.0;   // stamp of depth minus stamp of color, if both are known
+  std::vector<Camera> cameras;  // of the color images; of the depth images if there is no color
+  ColorImage color;             // empty if not stored or not requested
   DepthImage depth;
-  GrayImage right;  // of a stereo pair
+  GrayImage right;  // right image of a stereo pair
   std::vector<StereoCamera> stereo;
 };
 
 // One camera's part of a frame.
 struct CameraView {
   Camera color_camera;
-  // color_camera at the size of `depth`; the principal point goes with the size, as in RTAB-Map.
+  // color_camera at the size of `depth`; the principal point is scaled with the size, as in
+  // RTAB-Map.
   Camera depth_camera;
   ColorImage color;
   DepthImage depth;
 };
 
-// The frame cut into its cameras. Throws Error naming the node if the image does not fit them.
+// Splits a frame into its cameras; empty without cameras. Throws Error naming the node if the image
+// width is not a multiple of their number.
 std::vector<CameraView> camera_views(const RgbdFrame& frame);
 
-// Pixels of the frame's cameras, or of its depth image where that has more.
+// Number of pixels of the frame's cameras, color or depth image, whichever is largest.
 std::size_t image_pixels(const RgbdFrame& frame);
 
-// How many frames are held in memory side by side: by their size, not by the number of threads,
-// which results must not depend on. 8 of up to 2 megapixels each, fewer of larger ones, at least 1.
+// Number of frames in memory at a time: 8 of up to 2 megapixels, fewer of larger ones, at least 1.
+// It does not depend on the number of threads, as results must not.
 std::size_t frames_in_batch(std::size_t max_image_pixels);
 
 }  // namespace libmap

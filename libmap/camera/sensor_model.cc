@@ -16,21 +16,23 @@ constexpr std::size_t max_bytes = std::size_t{1} << 20U;
 }  // namespace
 
 void bind(ParameterTable& table, SensorModel& model) {
-  table.add("noise_m", model.noise_m, not_negative, "standard deviation of depth at range 0");
-  table.add("noise_of_range", model.noise_of_range, not_negative, "what it grows by, m a m");
+  table.add("noise_m", model.noise_m, not_negative,
+            "standard deviation of depth: constant term, m");
+  table.add("noise_of_range", model.noise_of_range, not_negative,
+            "standard deviation of depth: term proportional to range, m per m");
   table.add("noise_of_square", model.noise_of_square, not_negative,
-            "what it grows by with range squared, 1/m");
-  table.add("near_m", model.near_m, not_negative, "nearest useful depth");
-  table.add("far_m", model.far_m, positive, "farthest useful depth");
+            "standard deviation of depth: term proportional to squared range, 1/m");
+  table.add("near_m", model.near_m, not_negative, "minimum useful depth, m");
+  table.add("far_m", model.far_m, positive, "maximum useful depth, m");
   table.add("depth_delay_s", model.depth_delay_s, any_number,
-            "depth after the middle row of the picture");
+            "time of depth after the middle row of the color image, s");
   table.add("rolling_shutter_s", model.rolling_shutter_s, not_negative,
-            "from the first to the last row of a picture");
-  table.add("refine.frame_time_s", model.frame_time_s, positive, "between two pictures");
+            "time from the first to the last row of the color image, s");
+  table.add("refine.frame_time_s", model.frame_time_s, positive, "time between two frames, s");
   table.add("refine.max_bend_m", model.max_bend_m, not_negative,
-            "maximum systematic error of depth at range 0");
+            "maximum systematic depth error: constant term, m");
   table.add("refine.bend_of_range", model.bend_of_range, not_negative,
-            "what it grows by, m a m of range");
+            "maximum systematic depth error: term proportional to range, m per m");
 }
 
 SensorModel read_sensor_model(const std::string& name) {
@@ -44,14 +46,15 @@ SensorModel read_sensor_model(const std::string& name) {
           .string();
   read_yaml(read_whole_file(path, max_bytes), path, [&](const YAML::Node& root) {
     if (!root.IsMap()) throw Error("not a map of keys and values");
-    // Other keys are of the simulation.
+    // All other keys belong to the simulation.
     for (const auto& entry : root)
       if (const auto key = entry.first.as<std::string>();
           table.knows(key) || key.starts_with("refine."))
         table.set(key, entry.second.as<std::string>());
     table.check();
     if (!(model.noise_m + model.noise_of_range + model.noise_of_square > 0.0))
-      throw Error("a sensor without noise", {.field = "noise_m"});
+      throw Error("the sensor has no noise: at least one noise key must be > 0",
+                  {.field = "noise_m"});
   });
   return model;
 }

@@ -1,4 +1,4 @@
-// Published properties of depth cameras, of data/sensors/NAME.yaml.
+// Reads published properties of depth cameras from data/sensors/NAME.yaml.
 #pragma once
 
 #include <string>
@@ -7,23 +7,23 @@
 
 namespace libmap {
 
-// The keys are those of `simulate scan`; keys "refine.KEY" are of refinement alone.
+// Keys are those of `simulate scan`; keys "refine.KEY" are only used for refinement.
 struct SensorModel {
-  double noise_m = 0.0;          // standard deviation along the optical axis at range 0
-  double noise_of_range = 0.0;   // what it grows by, m a m of range
-  double noise_of_square = 0.0;  // ... and by range squared, 1/m
+  double noise_m = 0.0;          // standard deviation along the optical axis: constant term
+  double noise_of_range = 0.0;   // term proportional to range, m per m
+  double noise_of_square = 0.0;  // term proportional to squared range, 1/m
   double near_m = 0.0;           // useful range
   double far_m = 0.0;
-  double depth_delay_s = 0.0;      // depth after the middle row of the picture
-  double rolling_shutter_s = 0.0;  // from the first to the last row of a picture
-  double frame_time_s = 0.033;     // between two pictures
-  double max_bend_m = 0.01;        // of a systematic error of depth at range 0 ...
-  double bend_of_range = 0.02;     // ... and what it grows by, m a m of range
+  double depth_delay_s = 0.0;      // time of depth after the middle row of the color image
+  double rolling_shutter_s = 0.0;  // time from the first to the last row of the color image
+  double frame_time_s = 0.033;     // time between two frames
+  double max_bend_m = 0.01;        // maximum systematic depth error: constant term
+  double bend_of_range = 0.02;     // term proportional to range, m per m
 };
 void bind(ParameterTable& table, SensorModel& model);
 
-// A path, or the name of a file in data/sensors; "d435" and "ipad" will do. Throws Error: unknown
-// name (with the nearest known one), or a file that cannot be read.
+// Reads a model by path, by the name of a file in data/sensors, or by the short names "d435" and
+// "ipad". Throws Error: an unknown name (with the nearest known one), or an invalid file.
 SensorModel read_sensor_model(const std::string& name);
 
 }  // namespace libmap

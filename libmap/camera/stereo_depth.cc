@@ -29,7 +29,7 @@ const std::vector<std::pair<std::string, StereoDirections>> direction_names = {
 
 void check(const GrayImage& image, const Camera& camera, const std::string& field) {
   if (image.width != camera.width || image.height != camera.height)
-    refuse_pair("does not fit its calibration", field + " image",
+    refuse_pair("image and calibration differ in size", field + " image",
                 size_text(image.width, image.height), size_text(camera.width, camera.height));
   if (camera.is_distorted())
     throw Error("not rectified: the camera has lens distortion", {.field = field + " camera"});
@@ -43,7 +43,7 @@ void check(const StereoCamera& cameras) {
     refuse_pair("not rectified: the cameras' focal lengths differ", "right fx",
                 to_text(cameras.right.fx), "fx of the left, " + to_text(cameras.left.fx));
   if (!(cameras.baseline_m > 0) || !std::isfinite(cameras.baseline_m))
-    refuse_pair("no stereo pair", "baseline_m", to_text(cameras.baseline_m), "> 0");
+    refuse_pair("not a stereo pair", "baseline_m", to_text(cameras.baseline_m), "> 0");
 }
 
 StereoDepthOptions checked(StereoDepthOptions options) {
@@ -59,10 +59,10 @@ int mode_of(StereoDirections directions) {
   return directions == StereoDirections::five ? cv::StereoSGBM::MODE_SGBM : cv::StereoSGBM::MODE_HH;
 }
 
-// With columns repeated on both sides: SGBM gives nothing where a disparity of the range would
-// leave the image.
+// Repeats border columns on both sides, because SGBM has no result where disparities of the range
+// are outside the image.
 cv::Mat widened(const GrayImage& image, int left_px, int right_px) {
-  // OpenCV takes no read-only pixels, and does not write to these.
+  // OpenCV has no read-only images, but does not modify this one.
   const cv::Mat pixels(image.height, image.width, CV_8UC1,
                        const_cast<std::uint8_t*>(image.pixels.data()));
   cv::Mat wide;
@@ -70,7 +70,7 @@ cv::Mat widened(const GrayImage& image, int left_px, int right_px) {
   return wide;
 }
 
-// Gray levels that the square of `side_px` around each pixel spans.
+// Range of gray levels in a square of `side_px` around each pixel.
 cv::Mat contrast(const GrayImage& image, int side_px) {
   const cv::Mat pixels = widened(image, 0, 0);
   const cv::Mat square = cv::getStructuringElement(cv::MORPH_RECT, cv::Size(side_px, side_px));
@@ -89,22 +89,21 @@ void paste(const DepthImage& part, int x, DepthImage& whole) {
 
 void bind(ParameterTable& table, StereoDepthOptions& options) {
   table.add("min_disparity_px", options.min_disparity_px, Range{-1024, 1024},
-            "smallest disparity; below 0 only where the cameras squint");
+            "minimum disparity, pixels; below 0 only for converging cameras");
   table.add("disparities_px", options.disparities_px, Range{16, 1024},
-            "range of disparities: the nearest depth is fx * baseline / (min + this)");
-  table.add("block_px", options.block_px, Range{1, 31}, "side of the matched window, odd");
+            "range of disparities, pixels; minimum depth: fx * baseline / (min_disparity + range)");
+  table.add("block_px", options.block_px, Range{1, 31}, "side of the matched window, odd, pixels");
   table.add("uniqueness_percent", options.uniqueness_percent, Range{0, 100},
-            "by which the best match must beat the next");
+            "minimum margin between best and second-best match, percent");
   table.add("left_right_px", options.left_right_px, Range{-1, 1024},
-            "by which both directions of matching may differ; -1: not asked");
+            "maximum difference of the left-right check, pixels; -1: disabled");
   table.add("speckle_px", options.speckle_px, Range{0, 1e6},
-            "smaller patches of their own disparity are dropped; 0: none");
+            "minimum area of a connected patch of disparity, pixels; 0: no limit");
   table.add("min_contrast", options.min_contrast, Range{0, 255},
-            "gray levels that the matched window must span");
+            "minimum gray-level range of the matched window");
   table.add("directions", options.directions, direction_names,
-            "along which matching costs are summed");
-  table.add("max_depth_m", options.max_depth_m, not_negative,
-            "what lies beyond is dropped; 0: no limit");
+            "number of directions along which matching costs are summed");
+  table.add("max_depth_m", options.max_depth_m, not_negative, "maximum depth, m; 0: no limit");
 }
 
 DepthImage stereo_depth(const GrayImage& left, const GrayImage& right, const StereoCamera& cameras,
@@ -117,7 +116,7 @@ DepthImage stereo_depth(const GrayImage& left, const GrayImage& right, const Ste
   const int border_left = std::max(0, largest);
   const int border_right = std::max(0, -in_force.min_disparity_px);
   const int block2 = in_force.block_px * in_force.block_px;
-  // Penalties as OpenCV recommends them for one channel.
+  // Penalties recommended by OpenCV for one channel.
   const cv::Ptr<cv::StereoSGBM> matcher = cv::StereoSGBM::create(
       in_force.min_disparity_px, in_force.disparities_px, in_force.block_px, 8 * block2,
       32 * block2, in_force.left_right_px, 0, in_force.uniqueness_percent, in_force.speckle_px, 2,
@@ -147,11 +146,11 @@ DepthImage stereo_depth(const GrayImage& left, const GrayImage& right, const Ste
 DepthImage stereo_depth(const RgbdFrame& frame, const StereoDepthOptions& options) {
   const std::string node = "node " + std::to_string(frame.node);
   if (frame.stereo.empty() || frame.right.empty() || frame.color.empty())
-    throw Error("has no pair of images", {.field = node});
+    throw Error("no stereo images", {.field = node});
   const auto pairs = static_cast<int>(frame.stereo.size());
   if (frame.right.width % pairs != 0 || frame.color.width % pairs != 0 ||
       frame.color.height != frame.right.height || frame.color.width != frame.right.width)
-    refuse_pair("left and right image do not fit each other", node + ": right image",
+    refuse_pair("left and right image differ in size", node + ": right image",
                 size_text(frame.right.width, frame.right.height),
                 size_text(frame.color.width, frame.color.height));
   const GrayImage left = luminance(frame.color);

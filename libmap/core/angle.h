@@ -1,4 +1,4 @@
-// Degrees and radians.
+// Conversion factor between degrees and radians.
 #pragma once
 
 #include <numbers>

@@ -1,4 +1,4 @@
-// Numbers as little-endian bytes, as file formats contain them one after the other.
+// Reader and writer of consecutive little-endian numbers, as in binary file formats.
 #pragma once
 
 #include <cstddef>
@@ -11,7 +11,8 @@
 
 namespace libmap {
 
-// Takes numbers off the front. Throws std::length_error where the bytes end too early.
+// Reads numbers from the front of a byte string, which must outlive the reader. Throws
+// std::length_error if too few bytes remain.
 class ByteReader {
  public:
   explicit ByteReader(std::string_view bytes) : bytes_(bytes) {}
@@ -19,12 +20,12 @@ class ByteReader {
   bool empty() const { return bytes_.empty(); }
   std::string_view rest() const { return bytes_; }
   std::string_view take(std::uint64_t count) {
-    if (count > bytes_.size()) throw std::length_error("the bytes end too early");
+    if (count > bytes_.size()) throw std::length_error("too few bytes");
     const std::string_view taken = bytes_.substr(0, count);
     bytes_.remove_prefix(count);
     return taken;
   }
-  // A number or a struct of numbers.
+  // Reads a number or a trivially copyable struct.
   template <typename T>
   T number() {
     T value;
@@ -33,15 +34,15 @@ class ByteReader {
   }
   template <typename T>
   std::vector<T> numbers(std::int64_t count) {
-    // Before memory is taken.
+    // The check precedes the allocation.
     if (count < 0 || static_cast<std::uint64_t>(count) > bytes_.size() / sizeof(T))
-      throw std::length_error("the bytes end too early");
+      throw std::length_error("too few bytes");
     std::vector<T> values(static_cast<std::size_t>(count));
     const std::string_view taken = take(values.size() * sizeof(T));
     if (!values.empty()) std::memcpy(values.data(), taken.data(), taken.size());
     return values;
   }
-  // Its length, of type `Length`, then its bytes.
+  // Reads a length of type `Length`, then that many bytes.
   template <typename Length = std::uint32_t>
   std::string_view text() {
     return take(number<Length>());
@@ -51,7 +52,7 @@ class ByteReader {
   std::string_view bytes_;
 };
 
-// Appends numbers.
+// Appends numbers in the format of ByteReader.
 class ByteWriter {
  public:
   template <typename T>

@@ -14,7 +14,7 @@ namespace libmap {
 
 namespace {
 
-// Far beyond all lenses; within them no ray, and no product of two, leaves the range of doubles.
+// Bounds far beyond all lenses. They keep rays and their products within the range of doubles.
 constexpr double min_focal_px = 1e-6;
 constexpr double max_pixels = 1e9;
 constexpr double max_distortion = 1e12;
@@ -23,10 +23,10 @@ using Matrix2 = Eigen::Matrix2d;
 
 struct Distorted {
   Eigen::Vector2d ray;
-  Matrix2 derivative;  // of the distorted by the undistorted ray
+  Matrix2 derivative;  // of the distorted ray with respect to the undistorted ray
 };
 
-// OpenCV's model of 4, 5, 8 or 12 terms; missing ones are 0. Most calls need no derivative.
+// OpenCV's model with 4, 5, 8 or 12 coefficients; missing ones are 0. Few calls need a derivative.
 template <bool with_derivative>
 Distorted distort_radial_tangential(const std::vector<double>& terms, const Eigen::Vector2d& ray) {
   std::array<double, 12> k{};
@@ -93,7 +93,7 @@ Pose optical_to_body_rotation() {
 }
 
 bool Camera::is_distorted() const {
-  // Without terms too, an equidistant lens is no pinhole.
+  // An equidistant lens with zero coefficients is not a pinhole either.
   if (distortion_model == DistortionModel::equidistant) return true;
   return distortion_model != DistortionModel::none &&
          std::any_of(distortion.begin(), distortion.end(), [](double term) { return term != 0.0; });
@@ -139,7 +139,7 @@ std::optional<Eigen::Vector2d> pixel_to_ray(const Camera& camera, const Eigen::V
   if (!camera.is_distorted()) return wanted;
   Eigen::Vector2d ray = wanted;
   if (camera.distortion_model == DistortionModel::equidistant) {
-    // The wanted radius is nearly the angle itself.
+    // The distorted radius is close to the angle from the axis.
     const double angle = wanted.norm();
     if (angle >= 1.57) return std::nullopt;
     if (angle > 0) ray = wanted * (std::tan(angle) / angle);
@@ -148,7 +148,7 @@ std::optional<Eigen::Vector2d> pixel_to_ray(const Camera& camera, const Eigen::V
     const Distorted at = distort<true>(camera, ray);
     const Eigen::Vector2d miss = at.ray - wanted;
     if (!miss.allFinite()) return std::nullopt;
-    // Beyond the fold of the polynomial a second ray would give the same pixel.
+    // Beyond the fold of the polynomial, a second ray has the same pixel.
     if (at.derivative.determinant() <= 0) return std::nullopt;
     if (miss.norm() <= 1e-12 * (1 + wanted.norm())) return ray;
     const Eigen::Vector2d move = at.derivative.inverse() * miss;

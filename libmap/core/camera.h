@@ -16,7 +16,7 @@ namespace libmap {
 // radial part and thin prisms). equidistant: OpenCV's fisheye k1..k4 (Kannala and Brandt 2006).
 enum class DistortionModel { none, radial_tangential, equidistant };
 
-// x forward, y left, z up from an optical frame.
+// Rotation from an optical frame to a body frame (x forward, y left, z up).
 Pose optical_to_body_rotation();
 
 struct Camera {
@@ -27,30 +27,30 @@ struct Camera {
   double cx = 0.0;
   double cy = 0.0;
   DistortionModel distortion_model = DistortionModel::none;
-  std::vector<double> distortion{};  // 4, 5, 8 or 12 numbers; 4 where equidistant
+  std::vector<double> distortion{};  // 4, 5, 8 or 12 coefficients; equidistant: 4
   Pose base_from_camera = optical_to_body_rotation();
 
-  bool is_distorted() const;  // whether any term of the distortion is not 0
-  // Throws Error naming the field, its value and its bound: sizes > 0, focal lengths of 1e-6 to
-  // 1e9 pixels, a principal point within 1e9 of them, a known number of distortion terms up to
-  // 1e12, a position within 1e8 m.
+  // True if a distortion coefficient is not 0 or the model is equidistant.
+  bool is_distorted() const;
+  // Throws Error naming field, value and bound: size > 0, focal lengths 1e-6 to 1e9 px, principal
+  // point within 1e9 px, valid number of coefficients, each at most 1e12, position within 1e8 m.
   void check() const;
 };
 
-// The same camera without its distortion.
+// Returns the camera with the model `none` and no coefficients.
 Camera without_distortion(Camera camera);
 
-// x/z, y/z -> pixel, distortion included; and back (Newton's method, to 1e-9 of a focal length).
-// unproject gives nothing where no ray belongs to the pixel.
+// Conversion between rays (x/z, y/z) and distorted pixel positions; the inverse uses Newton's
+// method with a tolerance of 1e-9 focal lengths. pixel_to_ray returns nullopt if no ray exists.
 Eigen::Vector2d distort_to_pixel(const Camera& camera, const Eigen::Vector2d& ray);
 std::optional<Eigen::Vector2d> pixel_to_ray(const Camera& camera, const Eigen::Vector2d& pixel);
 
-// The pixel of a point in the optical frame, or nothing if it lies behind the camera. The pixel may
-// lie outside the image.
+// Projects a point in the optical frame, m. Returns nullopt unless z > 0. The pixel can be outside
+// the image.
 std::optional<Eigen::Vector2d> project_point(const Camera& camera,
                                              const Eigen::Vector3d& point_in_camera);
 
-// x/z, y/z of every pixel's ray, row by row; NaN where no ray belongs to the pixel.
+// Rays (x/z, y/z) of all pixels, width * height in row-major order; NaN if a pixel has no ray.
 std::vector<Eigen::Vector2d> ray_table(const Camera& camera);
 
 }  // namespace libmap

@@ -1,4 +1,4 @@
-// The data that come with graspmap: grippers, scenarios, scenes, sites, camera rigs.
+// Location of the data shipped with graspmap: grippers, scenarios, scenes, sites, camera rigs.
 #pragma once
 
 #include <filesystem>
@@ -6,11 +6,11 @@
 
 namespace libmap {
 
-// PREFIX/share/graspmap of an installed library, else `data` of the source tree.
+// Returns PREFIX/share/graspmap for an installed library, else the source tree's folder `data`.
 std::filesystem::path data_folder();
 
-// A path if it has a '/' or ends in .yaml, else data_folder()/KIND/NAME.yaml, e.g.
-// ("grippers", "scar-e"). Throws Error naming the nearest known name.
+// Returns `name` if it contains '/' or ends in .yaml, else data_folder()/KIND/NAME.yaml, e.g. for
+// ("grippers", "scar-e"). Throws Error if the file is missing, with the nearest known name.
 std::filesystem::path find_data_file(const std::string& kind, const std::string& name);
 
 }  // namespace libmap

@@ -1,5 +1,5 @@
-// The one exception type of the project. It says which file, which field, which value and which
-// bound; a command prints what() as one line and ends with the exit code of its kind.
+// The exception type of the project. It contains file, field, value and bound; a command prints
+// what() as one line and exits with the code of its kind.
 #pragma once
 
 #include <filesystem>
@@ -8,20 +8,20 @@
 
 namespace libmap {
 
-// bad_input: the user's file, option or data cannot be used (exit code 3).
-// failed: the run itself went wrong, for instance a full disk (exit code 1).
+// bad_input: a file, an option or data is invalid (exit code 3).
+// failed: the run itself failed, for example because of a full disk (exit code 1).
 enum class ErrorKind { bad_input, failed };
 
 struct ErrorContext {
   std::string file{};   // as the user named it
   std::string field{};  // column, key, header line or option
-  std::string value{};  // what stood there
-  std::string bound{};  // what would have been accepted, e.g. "> 0"
+  std::string value{};  // the rejected value
+  std::string bound{};  // the accepted values, e.g. "> 0"
 };
 
 class Error : public std::runtime_error {
  public:
-  // what() is "FILE: FIELD is VALUE: REASON (must be BOUND)"; empty parts are left out.
+  // what() is "FILE: FIELD is VALUE: REASON (must be BOUND)", without the empty parts.
   explicit Error(std::string reason, ErrorContext context = {},
                  ErrorKind kind = ErrorKind::bad_input);
 
@@ -29,9 +29,9 @@ class Error : public std::runtime_error {
   const std::string& reason() const { return reason_; }
   ErrorKind kind() const { return kind_; }
 
-  // The same error naming `file`, unless it names one already.
+  // Returns a copy that names `file`, unless the error names a file already.
   Error in_file(const std::string& file) const;
-  // The same error of a field within `place`: "PLACE: FIELD", or the place where it names no field.
+  // Returns a copy with the field "PLACE: FIELD", or "PLACE" if the error names no field.
   Error in_field(const std::string& place, const char* joint = ": ") const;
 
  private:
@@ -40,7 +40,7 @@ class Error : public std::runtime_error {
   ErrorKind kind_;
 };
 
-// The result of `step`; its Errors that name no file name `file`.
+// Returns step(). Adds `file` to Errors of `step` that name no file.
 template <typename Step>
 auto in_file(const std::filesystem::path& file, const Step& step) {
   try {
@@ -50,7 +50,7 @@ auto in_file(const std::filesystem::path& file, const Step& step) {
   }
 }
 
-// The same of a field: what its Errors name is in `place`.
+// Returns step(). Prefixes the field of its Errors with `place`, as Error::in_field does.
 template <typename Step>
 auto in_field(const std::string& place, const Step& step) {
   try {

@@ -25,8 +25,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// A signal ends the whole process, so this is of the whole process. It is never destroyed: threads
-// may outlast main.
+// State of the whole process, because a signal ends the whole process. It is never destroyed:
+// threads can outlive main.
 struct Unfinished {
   std::recursive_mutex mutex;
   std::set<fs::path> temporaries;
@@ -37,8 +37,8 @@ Unfinished& unfinished() {
   return *all;
 }
 
-// Other threads may go on filling a folder by its name: under another one it is theirs no more, but
-// for the files that they are just opening.
+// Renames a folder before its removal, because other threads can still create files by its old
+// name. Only files that they are opening at that moment remain.
 void remove_whole(const fs::path& path) {
   constexpr int tries = 100;
   std::error_code code;
@@ -63,15 +63,15 @@ bool is_still_named(int descriptor, const fs::path& path) {
 }
 
 // Opens `temporary` with `open_temporary`, which returns a descriptor or -1 with errno, and locks
-// it; again where another process has put it in place meanwhile. Throws Error naming `final_path`:
-// it cannot be opened, or another process holds it.
+// it. Repeats this if another process has committed the temporary in between. Throws Error naming
+// `final_path` if it cannot be opened or another process has locked it.
 int lock_temporary(const fs::path& temporary, const fs::path& final_path,
                    int (*open_temporary)(const char*)) {
   for (;;) {
     const int lock = open_temporary(temporary.c_str());
     if (lock < 0 && errno == ENOENT && fs::is_directory(folder_of(temporary))) continue;
     if (lock < 0) throw system_failure(final_path, "cannot be written", errno);
-    // NFS locks no folder that is open for reading (EBADF): it goes without.
+    // NFS cannot lock a folder that is open for reading (EBADF): it stays unlocked.
     if (flock(lock, LOCK_EX | LOCK_NB) != 0 && errno != EBADF) {
       const int code = errno;
       close(lock);
@@ -79,7 +79,7 @@ int lock_temporary(const fs::path& temporary, const fs::path& final_path,
       throw Error("another process is writing it", {.file = final_path.string()},
                   ErrorKind::failed);
     }
-    // Between opening and locking, another process may have put this very file in place.
+    // Between opening and locking, another process can have committed this file.
     if (is_still_named(lock, temporary)) return lock;
     close(lock);
   }
@@ -94,7 +94,7 @@ void require_folder_of(const fs::path& final_path) {
 const fs::path& checked_file(const fs::path& final_path) {
   if (final_path.filename().empty() || fs::is_directory(final_path))
     throw Error("is a folder, not a file", {.file = final_path.string()});
-  // A device or a pipe would be replaced by a file of its name.
+  // A commit would replace a device or a pipe by a regular file.
   if (fs::exists(final_path) && !fs::is_regular_file(final_path))
     throw Error("is not a regular file", {.file = final_path.string()});
   require_folder_of(final_path);
@@ -117,9 +117,8 @@ void require_own_content(const fs::path& path, const std::vector<std::string>& n
   for (const fs::directory_entry& entry : fs::directory_iterator(path)) {
     const std::string name = entry.path().filename().string();
     if (std::find(names.begin(), names.end(), name) == names.end())
-      throw Error(
-          "would be replaced as a whole, but contains " + name + ", which is not of its kind",
-          {.file = path.string()});
+      throw Error("contains " + name + ", which this command does not write; use another folder",
+                  {.file = path.string()});
   }
 }
 
@@ -130,31 +129,31 @@ fs::path without_slash(const fs::path& path) {
 fs::path checked_folder(const fs::path& given, const std::vector<std::string>& names) {
   fs::path final_path = without_slash(given);
   if (final_path.filename() == "." || final_path.filename() == "..")
-    throw Error("the output folder needs a name of its own", {.file = final_path.string()});
+    throw Error("the output folder must have a name", {.file = final_path.string()});
   require_folder_of(final_path);
   require_own_content(final_path, names);
   return final_path;
 }
 
-// The lock is on the folder itself, which commit() takes away from its name.
+// The lock is on the folder itself, which commit() renames.
 int open_folder(const char* path) {
   if (mkdir(path, 0777) != 0 && errno != EEXIST) return -1;
   return open(path, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
 }
 
-// Whether an earlier folder took the temporary's name.
+// Renames the temporary to the final path. True if both existed and were exchanged.
 bool put_in_place(const fs::path& temporary, const fs::path& final_path) {
   if (renameat2(AT_FDCWD, temporary.c_str(), AT_FDCWD, final_path.c_str(), RENAME_EXCHANGE) == 0)
     return true;
   const int exchange_code = errno;
   if (exchange_code != ENOENT && exchange_code != EINVAL && exchange_code != ENOSYS)
-    throw system_failure(final_path, "cannot be put in place", exchange_code);
-  // Nothing is there, or the temporary is gone, and the earlier folder stays; or the file system
-  // cannot exchange.
+    throw system_failure(final_path, "cannot be replaced", exchange_code);
+  // ENOENT: there is no earlier folder, or the temporary is gone and the earlier folder is kept.
+  // Otherwise, the file system cannot exchange.
   std::error_code code;
   if (exchange_code != ENOENT) fs::remove_all(final_path, code);
   if (!code) fs::rename(temporary, final_path, code);
-  if (code) throw system_failure(final_path, "cannot be put in place", code.value());
+  if (code) throw system_failure(final_path, "cannot be replaced", code.value());
   return false;
 }
 
@@ -187,10 +186,10 @@ void require_file_size(const fs::path& path, std::uint64_t max_bytes) {
   const std::uint64_t bytes = fs::file_size(path, code);
   if (code) throw Error(code.message(), {.file = path.string()});
   if (bytes > max_bytes)
-    throw Error("too large to be read whole", {.file = path.string(),
-                                               .field = "size",
-                                               .value = std::to_string(bytes) + " bytes",
-                                               .bound = "<= " + std::to_string(max_bytes)});
+    throw Error("too large to be read into memory", {.file = path.string(),
+                                                     .field = "size",
+                                                     .value = std::to_string(bytes) + " bytes",
+                                                     .bound = "<= " + std::to_string(max_bytes)});
 }
 
 std::string read_whole_file(const fs::path& path, std::uint64_t max_bytes) {
@@ -252,7 +251,7 @@ void OutputFile::commit() {
   const CommitGuard guard;
   std::error_code code;
   fs::rename(temporary_path(), final_path(), code);
-  if (code) throw system_failure(final_path(), "cannot be put in place", code.value());
+  if (code) throw system_failure(final_path(), "cannot be replaced", code.value());
   release();
   sync_file(folder_of(final_path()));
 }
@@ -260,16 +259,16 @@ void OutputFile::commit() {
 OutputFolder::OutputFolder(const fs::path& final_path, const std::vector<std::string>& names)
     : PendingOutput(checked_folder(final_path, names),
                     "." + without_slash(final_path).filename().string() + ".partial", open_folder) {
-  // What a run that was killed has left.
+  // Leftovers of a killed run.
   for (const fs::directory_entry& entry : fs::directory_iterator(temporary_path()))
     fs::remove_all(entry.path());
 }
 
 void OutputFolder::commit() {
-  // All files at once: one by one it takes a write to the disk each.
+  // Syncs all files at once: one by one, each file costs a disk write.
   if (syncfs(lock()) != 0) throw system_failure(final_path(), "cannot be synced", errno);
   const CommitGuard guard;
-  // The earlier folder is locked too, so that nobody takes it for a temporary of his own.
+  // The earlier folder is locked too, so that no other process uses it as its temporary.
   const int earlier = open(final_path().c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
   if (earlier >= 0) flock(earlier, LOCK_EX | LOCK_NB);
   const bool exchanged = put_in_place(temporary_path(), final_path());
@@ -293,7 +292,7 @@ void commit_together(std::vector<OutputFile>& outputs) {
 
 void abandon_unfinished_outputs() {
   unfinished().mutex.lock();
-  // Twice, for files that a thread opened by their name in the meantime.
+  // Twice, because threads can create files by name in the meantime.
   for (int n = 0; n < 2; ++n)
     for (const fs::path& temporary : unfinished().temporaries) remove_whole(temporary);
 }
@@ -323,12 +322,12 @@ void write_named(const fs::path& temporary, const fs::path& output,
 }
 
 TempFile::TempFile(std::filesystem::path folder) : folder_(std::move(folder)) {
-  // Without a name it goes with the process; not every file system has such.
+  // An unnamed file ends with the process, but not every file system supports it.
   file_ = open(folder_.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
   if (file_ >= 0) return;
   std::string name = (folder_ / ".unnamed-XXXXXX").string();
   file_ = mkostemp(name.data(), O_CLOEXEC);
-  if (file_ < 0) throw system_failure(folder_, "no file can be made in it", errno);
+  if (file_ < 0) throw system_failure(folder_, "cannot create a temporary file", errno);
   unlink(name.c_str());
 }
 
@@ -346,7 +345,7 @@ std::uint64_t TempFile::append(const void* bytes, std::size_t count) {
     const ssize_t written = pwrite(file_, static_cast<const char*>(bytes) + done, count - done,
                                    static_cast<off_t>(begin + done));
     if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) throw system_failure(folder_, "what is kept in it cannot be written", errno);
+    if (written <= 0) throw system_failure(folder_, "cannot write a temporary file", errno);
     done += static_cast<std::size_t>(written);
   }
   return begin;
@@ -358,7 +357,7 @@ void TempFile::read(std::uint64_t begin, void* bytes, std::size_t count) const {
     const ssize_t got = pread(file_, static_cast<char*>(bytes) + done, count - done,
                               static_cast<off_t>(begin + done));
     if (got < 0 && errno == EINTR) continue;
-    if (got <= 0) throw system_failure(folder_, "what is kept in it cannot be read", errno);
+    if (got <= 0) throw system_failure(folder_, "cannot read a temporary file", errno);
     done += static_cast<std::size_t>(got);
   }
 }

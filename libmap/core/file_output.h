@@ -1,4 +1,4 @@
-// Files in and out: whole files in, outputs that appear whole or not at all, temporary files.
+// Reads whole files and writes outputs atomically through temporary files.
 #pragma once
 
 #include <cstddef>
@@ -14,28 +14,29 @@
 
 namespace libmap {
 
-// Throws Error with one clear reason unless `path` is a file that can be read.
+// Throws Error unless `path` is a readable regular file.
 void require_readable_file(const std::filesystem::path& path);
 
 // Throws Error if the file `path` is larger than `max_bytes`, or missing.
 void require_file_size(const std::filesystem::path& path, std::uint64_t max_bytes);
 
-// Throws Error: no such file, a folder, not readable, or larger than `max_bytes`.
+// Returns the content. Throws Error if the file is missing, a folder, not readable, or larger than
+// `max_bytes`.
 std::string read_whole_file(const std::filesystem::path& path,
                             std::uint64_t max_bytes = std::uint64_t{1} << 30);
 
-// The first bytes of a file, at most `max_bytes`; none if it cannot be read.
+// Returns the first bytes of a file, at most `max_bytes`; empty if it cannot be read.
 std::string file_head(const std::filesystem::path& path, std::size_t max_bytes);
 
-// `content` straight to `path`, for callers that hold an OutputFile. Throws Error (failed).
+// Writes `content` directly to `path`, the temporary of an OutputFile. Throws Error (failed).
 void write_text(const std::filesystem::path& path, std::string_view content);
 
-// `content` as a whole file, through an OutputFile.
+// Writes `content` atomically through an OutputFile, and throws as it does.
 void write_whole_file(const std::filesystem::path& path, std::string_view content);
 
-// An uncommitted output in the folder of the final one, under a temporary name. Without a commit
-// the temporary is removed and an earlier output stays as it was. While it exists, a second process
-// that wants to write the same output gets an Error.
+// An uncommitted output, stored under a temporary name in the folder of the final output. Without a
+// commit, the temporary is removed and an earlier output is unchanged. While this object exists, a
+// second process that writes the same output gets an Error.
 class PendingOutput {
  public:
   ~PendingOutput();
@@ -46,10 +47,10 @@ class PendingOutput {
   const std::filesystem::path& final_path() const { return final_path_; }
 
  protected:
-  // `open_temporary` makes and opens the temporary; it returns a descriptor, or -1 with errno.
+  // `open_temporary` creates and opens the temporary. It returns a descriptor, or -1 with errno.
   PendingOutput(std::filesystem::path final_path, const std::string& temporary_name,
                 int (*open_temporary)(const char* path));
-  // From now on the temporary's name is free again.
+  // Unlocks the temporary and forgets its name.
   void release();
   int lock() const { return lock_; }
 
@@ -59,34 +60,32 @@ class PendingOutput {
   int lock_ = -1;
 };
 
-// One output file. Write to temporary_path(), which has the extension of the final one.
+// An output file. Write to temporary_path(), which has the extension of the final path.
 class OutputFile : public PendingOutput {
  public:
-  // Throws Error if the folder does not exist or cannot be written to, or the path is a folder or
-  // anything else that is no regular file.
+  // Throws Error if the folder does not exist or is not writable, or if the path exists and is not
+  // a regular file.
   explicit OutputFile(const std::filesystem::path& final_path);
-  // Syncs it and renames it onto the final path. Throws Error (failed).
+  // Syncs the temporary and renames it to the final path. Throws Error (failed).
   void commit();
 };
 
-// One output folder. Write into temporary_path().
+// An output folder. Write into temporary_path().
 class OutputFolder : public PendingOutput {
  public:
-  // `names` are those that the folder may contain: an earlier one that contains any other is not
-  // replaced. Throws Error: the path is not a folder, or one with foreign content, or it cannot be
-  // written.
+  // `names` lists the permitted entries: an earlier folder with any other entry is not replaced.
+  // Throws Error if the path is not a folder, contains other entries or is not writable.
   OutputFolder(const std::filesystem::path& final_path, const std::vector<std::string>& names);
-  // Syncs it and puts it in place of the final one, whose earlier content is then gone. Throws
-  // Error (failed).
+  // Syncs the temporary and replaces the final folder with all its content. Throws Error (failed).
   void commit();
 };
 
-// Syncs all `outputs`, then puts them in place in their order. abandon_unfinished_outputs() takes
-// effect before or after all of it. Throws Error (failed) as OutputFile::commit() does.
+// Syncs all `outputs`, then commits them in order. abandon_unfinished_outputs() runs before or
+// after all commits. Throws Error (failed) as OutputFile::commit() does.
 void commit_together(std::vector<OutputFile>& outputs);
 
-// While one exists, abandon_unfinished_outputs() waits: for outputs that belong together and are
-// put in place one after the other.
+// Blocks abandon_unfinished_outputs() while it exists, so that related outputs are committed
+// together.
 class CommitGuard {
  public:
   CommitGuard();
@@ -95,33 +94,33 @@ class CommitGuard {
   std::unique_lock<std::recursive_mutex> lock_;
 };
 
-// Removes the temporary files and folders of all uncommitted outputs of this process. Threads that
-// make, commit or drop an output wait from then on and for ever: call it right before the process
-// ends.
+// Removes the temporary files and folders of all uncommitted outputs of this process. Afterwards,
+// threads that create, commit or drop an output block forever: call it right before the process
+// exits.
 void abandon_unfinished_outputs();
 
-// Whether a file or folder bears the name of an uncommitted one. A run that was killed leaves such.
+// True if the name is that of an uncommitted file or folder, as a killed run leaves behind.
 bool is_named_unfinished(const std::filesystem::path& path);
 
-// The same error for another file.
+// Returns a copy of the error that names `file`.
 Error naming(const Error& error, const std::filesystem::path& file);
 
-// Calls `write` with `temporary`. An Error of it that names that file, or one in that folder, names
-// `output`, or the one in it, instead.
+// Calls `write` with `temporary`. In Errors that name `temporary`, or a file in it, replaces the
+// temporary path by `output`.
 void write_named(const std::filesystem::path& temporary, const std::filesystem::path& output,
                  const std::function<void(const std::filesystem::path&)>& write);
 
-// Bytes on disk in a file without a name: nothing is left of it, however the process ends.
+// An unnamed temporary file. The system removes it however the process ends.
 class TempFile {
  public:
-  // Throws Error (failed): no file can be made in the folder.
+  // Throws Error (failed) if no file can be created in the folder.
   explicit TempFile(std::filesystem::path folder);
   ~TempFile();
   TempFile(const TempFile&) = delete;
   TempFile& operator=(const TempFile&) = delete;
 
-  // Returns the position of the appended bytes. Both may be called from several threads, and throw
-  // Error (failed).
+  // Appends bytes and returns their offset; reads bytes at an offset. Both functions are
+  // thread-safe and throw Error (failed).
   std::uint64_t append(const void* bytes, std::size_t count);
   void read(std::uint64_t begin, void* bytes, std::size_t count) const;
 

@@ -1,4 +1,4 @@
-// Where local coordinates are on the Earth or another body.
+// Relation of local coordinates to a coordinate reference system of the Earth or another body.
 #pragma once
 
 #include <Eigen/Core>
@@ -6,11 +6,11 @@
 
 namespace libmap {
 
-// Local coordinates (x east, y north, z up, meters) are those of a projected coordinate reference
-// system (CRS) minus an offset, which keeps them small: easting = (origin_m.x + x) / unit_m,
-// northing = (origin_m.y + y) / unit_m, height = origin_m.z + z in meters.
+// Local coordinates (x east, y north, z up, meters) are projected coordinates minus an offset, so
+// that they are small: easting = (origin_m.x + x) / unit_m, northing = (origin_m.y + y) / unit_m,
+// height = origin_m.z + z in meters.
 struct Georeference {
-  std::string crs_wkt;  // WKT 2 (ISO 19162:2019); empty: the CRS is not known
+  std::string crs_wkt;  // WKT 2 (ISO 19162:2019); empty: unknown reference system
   double unit_m = 1.0;  // of eastings and northings
   Eigen::Vector3d origin_m = Eigen::Vector3d::Zero();
 

@@ -29,12 +29,12 @@ void write_all(int pipe, std::string_view bytes) {
   while (!bytes.empty()) {
     const ssize_t written = write(pipe, bytes.data(), bytes.size());
     if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) _exit(0);  // Nobody listens any more.
+    if (written <= 0) _exit(0);  // The parent has closed the pipe.
     bytes.remove_prefix(static_cast<std::size_t>(written));
   }
 }
 
-// Libraries write to the terminal; the Error says it all.
+// Suppresses what libraries write to the terminal: the Error reports the failure.
 void be_silent() {
   const int null = open("/dev/null", O_WRONLY);
   if (null < 0) return;
@@ -54,14 +54,14 @@ void bound_memory(std::uint64_t max_data_bytes) {
                         const std::function<void(const GuardedProcess::Write&)>& work) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   for (const int signal : {SIGSEGV, SIGBUS, SIGABRT, SIGFPE, SIGPIPE}) std::signal(signal, SIG_DFL);
-  // It ends with its parent, which must not take a signal to both of them for broken input.
+  // The child ends with its parent: a signal to both must not look like damaged input.
   for (const int signal : {SIGHUP, SIGINT, SIGTERM}) std::signal(signal, SIG_IGN);
   be_silent();
   bound_memory(max_data_bytes);
   try {
     work([&](std::string_view bytes) { write_all(pipe, bytes); });
   } catch (...) {
-    // What was not written says that it fell.
+    // The parent detects the failure by the missing bytes.
   }
   _exit(0);
 }
@@ -83,7 +83,7 @@ GuardedProcess::GuardedProcess(std::uint64_t max_data_bytes,
     pipe_.reset(fdopen(ends[0], "rb"));
   }
   if (process_ < 0 || !pipe_)
-    throw Error(std::string("no process to read it in: ") + std::strerror(errno), {},
+    throw Error(std::string("cannot start a child process: ") + std::strerror(errno), {},
                 ErrorKind::failed);
 }
 
@@ -94,7 +94,7 @@ bool GuardedProcess::read(void* bytes, std::size_t count) {
 }
 
 std::string GuardedProcess::end() {
-  pipe_.reset();  // A process that still writes ends by it.
+  pipe_.reset();  // ends a child that still writes
   int status = 0;
   if (process_ > 0)
     while (waitpid(process_, &status, 0) < 0 && errno == EINTR) continue;

@@ -1,5 +1,5 @@
-// A process of its own for the work of libraries that follow broken input out of their buffers: if
-// they fall, this process does not.
+// Child process for libraries that overrun their buffers on damaged input. A crash of the child
+// does not end this process.
 #pragma once
 
 #include <cstddef>
@@ -20,16 +20,16 @@ class GuardedProcess {
  public:
   using Write = std::function<void(std::string_view bytes)>;
 
-  // Calls work(write) there, silently, with `max_data_bytes` of memory at most; what it writes,
-  // read() gives here. Throws Error (failed) if there can be no process.
+  // Calls work(write) in a child process without terminal output and with at most `max_data_bytes`
+  // of memory. read() returns the written bytes. Throws Error (failed) if no process can start.
   GuardedProcess(std::uint64_t max_data_bytes, const std::function<void(const Write&)>& work);
-  ~GuardedProcess();  // it ends too
+  ~GuardedProcess();  // ends the child
   GuardedProcess(const GuardedProcess&) = delete;
   GuardedProcess& operator=(const GuardedProcess&) = delete;
 
-  // The next bytes. False if it ended before it had written so many.
+  // Reads the next bytes. Returns false if the child ended before it had written `count` bytes.
   bool read(void* bytes, std::size_t count);
-  // How it ended, after read() said false: "" or " (signal 11)".
+  // Waits for the child and returns the cause of its end: "" or " (signal 11)".
   std::string end();
 
  private:
@@ -41,19 +41,19 @@ class GuardedProcess {
   std::unique_ptr<std::FILE, CloseFile> pipe_;
 };
 
-// The two ends of the pipe. What passes a result through it is a template of the end, and so sends
-// and receives the same.
+// Writing end of the pipe. It has the same functions as GuardedInput, so that one template both
+// sends and receives a result.
 class GuardedOutput {
  public:
   explicit GuardedOutput(const GuardedProcess::Write& write) : write_(write) {}
 
-  // A number or a struct of numbers.
+  // Sends a number or a trivially copyable struct.
   template <typename Value>
   void value(const Value& value) {
     static_assert(std::is_trivially_copyable_v<Value>);
     write_({reinterpret_cast<const char*>(&value), sizeof value});
   }
-  // The length of an array; then its values.
+  // Sends the length of an array.
   template <typename Array>
   void size(const Array& values) {
     value(std::uint64_t{values.size()});
@@ -63,15 +63,15 @@ class GuardedOutput {
     size(values);
     write_({reinterpret_cast<const char*>(values.data()), values.size() * sizeof values[0]});
   }
-  // An Error, or that there is none.
+  // Sends an Error, or nullptr for success.
   void error(const Error* error);
 
  private:
   const GuardedProcess::Write& write_;
 };
 
-// Each throws Error with `broken` as reason, and how the process ended, if there is no more to
-// read.
+// Reading end of the pipe. If the data end too early, each function throws Error with the reason
+// `broken` and the cause of the child's end.
 class GuardedInput {
  public:
   GuardedInput(GuardedProcess& process, std::string broken)
@@ -93,7 +93,7 @@ class GuardedInput {
     size(values);
     read(values.data(), values.size() * sizeof values[0]);
   }
-  // Throws the Error, if there is one.
+  // Throws the sent Error, if any.
   void error();
 
  private:
@@ -105,7 +105,8 @@ class GuardedInput {
   std::string broken_;
 };
 
-// What make() returns or throws in a process of its own. pass(end, result) sends and receives it.
+// Calls make() in a child process and returns its result or throws its Error. pass(end, result)
+// sends and receives the result. Throws Error with the reason `broken` if the child crashes.
 template <typename Result, typename Make, typename Pass>
 Result run_guarded(std::uint64_t max_data_bytes, const std::string& broken, const Make& make,
                    const Pass& pass) {

@@ -1,4 +1,4 @@
-// Images as plain data, row by row from the top left. Pixel centers have whole coordinates:
+// Images as plain data in row-major order from the top left. Pixel centers have whole coordinates:
 // column x, row y.
 #pragma once
 
@@ -38,7 +38,7 @@ struct Image {
 
 using ColorImage = Image<Color>;
 using GrayImage = Image<std::uint8_t>;
-// Distance from the camera's plane (its z) in meters; 0 where nothing was measured.
+// Depth z in the camera's optical frame, m; 0 for pixels without a measurement.
 using DepthImage = Image<float>;
 
 // "640 x 480".
@@ -46,7 +46,7 @@ inline std::string size_text(std::int64_t width, std::int64_t height) {
   return std::to_string(width) + " x " + std::to_string(height);
 }
 
-// Columns `x` to `x + width - 1`, one of several pictures that stand side by side.
+// Returns columns `x` to `x + width - 1`, one of several images stored side by side.
 template <typename T>
 Image<T> crop_columns(const Image<T>& image, int x, int width) {
   Image<T> part(width, image.height);
@@ -55,7 +55,7 @@ Image<T> crop_columns(const Image<T>& image, int x, int width) {
   return part;
 }
 
-// The color between the centers of pixels, bilinear; the image goes on as at its border.
+// Bilinear interpolation of the color at a pixel position; positions outside the image are clamped.
 template <typename Pixel>
 Eigen::Vector3f bilinear_color(const Image<Pixel>& image, double x, double y) {
   const double within_x = std::clamp(x, 0.0, image.width - 1.0);

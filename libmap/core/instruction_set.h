@@ -1,5 +1,5 @@
-// The instruction sets that the innermost loops are written for. No inline functions: this is seen
-// by sources that are compiled for more than the base instruction set.
+// Instruction sets of the innermost loops. No inline functions: sources that are compiled for more
+// than the base instruction set include this header.
 #pragma once
 
 namespace libmap {
@@ -7,8 +7,8 @@ namespace libmap {
 // avx2: with POPCNT. avx512: F, BW, VL and VPOPCNTDQ.
 enum class InstructionSet { portable, avx2, avx512 };
 
-// Whether this processor has it and loops for it were built; `portable` always.
+// True if this processor supports `set` and loops for it were built; always true for `portable`.
 bool has_instruction_set(InstructionSet set);
-InstructionSet best_instruction_set();  // the fastest of those that it has
+InstructionSet best_instruction_set();  // the fastest supported set
 
 }  // namespace libmap

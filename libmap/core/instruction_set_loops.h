@@ -1,7 +1,7 @@
-// Compiles the functions of GRASPMAP_LOOPS, a file that ends with their table `all`, once for each
-// instruction set; GRASPMAP_REGISTER is the size of its vector registers, bytes. To be included in
-// an anonymous namespace of a source that is compiled alone. The file must see no type whose inline
-// functions other sources compile too.
+// Compiles the functions of GRASPMAP_LOOPS, a file that ends with their table `all`, once per
+// instruction set; GRASPMAP_REGISTER is the size of its vector registers, bytes. Include this in an
+// anonymous namespace of a source that is compiled alone. GRASPMAP_LOOPS must not use types whose
+// inline functions are compiled in other sources too.
 
 #define GRASPMAP_REGISTER 16
 namespace portable {
@@ -31,7 +31,7 @@ namespace avx512 {
 
 #endif
 
-// The table for instructions that the processor has.
+// Returns the table `all` for an instruction set.
 constexpr auto& all_of([[maybe_unused]] libmap::InstructionSet instructions) {
 #if defined(GRASPMAP_X86_LOOPS)
   if (instructions == libmap::InstructionSet::avx512) return avx512::all;

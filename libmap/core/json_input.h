@@ -1,5 +1,5 @@
-// JSON from outside by nlohmann's library (`Json` is one of its types), which by itself casts any
-// number to any other, and walks through what is nested without a bound.
+// Checked parsing of untrusted JSON. nlohmann's library (`Json` is one of its types) casts between
+// all number types and does not limit the nesting depth.
 #pragma once
 
 #include <cstddef>
@@ -12,13 +12,13 @@
 
 namespace libmap {
 
-// Throws Error where arrays and objects are nested deeper than 64 levels, or an object has more
-// than 10,000 members (which ordered_json finds one by one), and what Json::parse throws.
+// Throws Error if arrays and objects are nested deeper than 64 levels or an object has more than
+// 10,000 members (ordered_json searches them linearly), and the exceptions of Json::parse.
 template <typename Json>
 Json parse_json(const std::string& text) {
   constexpr int max_depth = 64;
   constexpr std::size_t max_members = 10'000;
-  std::vector<std::size_t> members;  // of the objects around
+  std::vector<std::size_t> members;  // member counts of the enclosing objects
   return Json::parse(text, [&](int depth, typename Json::parse_event_t event, auto&) {
     if (depth > max_depth) throw Error("is nested deeper than 64 levels");
     if (event == Json::parse_event_t::object_start) members.push_back(0);
@@ -29,7 +29,7 @@ Json parse_json(const std::string& text) {
   });
 }
 
-// `json` as an Integer. Throws Error naming `field` if it is no whole number or out of range.
+// Returns `json` as an Integer. Throws Error naming `field` if it is not a whole number in range.
 template <typename Integer, typename Json>
 Integer integer_of(const Json& json, const std::string& field) {
   if (json.is_number_unsigned()) {
@@ -39,11 +39,11 @@ Integer integer_of(const Json& json, const std::string& field) {
     const auto value = json.template get<std::int64_t>();
     if (std::in_range<Integer>(value)) return static_cast<Integer>(value);
   }
-  throw Error("is no whole number, or out of range",
+  throw Error("not a whole number or out of range",
               {.field = field, .value = json.is_number() ? json.dump() : json.type_name()});
 }
 
-// The member `key` of an object as an Integer. Throws as integer_of, and what Json::at throws.
+// Returns the member `key` of an object as an Integer. Throws as integer_of and Json::at do.
 template <typename Integer, typename Json>
 Integer integer_at(const Json& json, const char* key) {
   return integer_of<Integer>(json.at(key), key);

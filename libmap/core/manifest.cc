@@ -21,7 +21,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// Of a matrix that is written as a rotation, by Frobenius' norm.
+// Maximum Frobenius distance between a stored rotation matrix and the nearest rotation.
 constexpr double max_rotation_error = 1e-3;
 
 class Sha256 {
@@ -59,7 +59,7 @@ double from_json_number(const Json& json) {
 
 ManifestValue from_json_value(const Json& json) {
   if (json.is_boolean()) return json.get<bool>();
-  // Compared as json they would become signed first.
+  // A comparison as Json would convert to a signed number first.
   const bool is_large =
       json.is_number_unsigned() && !std::in_range<std::int64_t>(json.get<std::uint64_t>());
   if (json.is_number_integer() && !is_large) return json.get<std::int64_t>();
@@ -95,7 +95,7 @@ std::vector<double> to_numbers(const Pose& pose) {
 
 Pose from_numbers(const std::vector<double>& numbers) {
   if (numbers.size() != 12)
-    throw Error("a transform has 12 numbers",
+    throw Error("a transform must have 12 numbers",
                 {.field = "transforms", .value = std::to_string(numbers.size()) + " numbers long"});
   Pose pose = Pose::Identity();
   std::size_t n = 0;
@@ -104,7 +104,7 @@ Pose from_numbers(const std::vector<double>& numbers) {
   const double error = (nearest_rotation(pose.linear()) - pose.linear()).norm();
   if (!(error <= max_rotation_error) ||
       !(pose.translation().cwiseAbs().maxCoeff() <= max_position_m))
-    throw Error("a transform is a rotation and a shift of at most 1e8 m", {.field = "transforms"});
+    throw Error("not a rotation and a translation of at most 1e8 m", {.field = "transforms"});
   return pose;
 }
 
@@ -121,10 +121,10 @@ Georeference georeference_from(const Json& json) {
   georeference.unit_m = json.at("unit_m").get<double>();
   const auto origin = json.at("origin_m").get<std::vector<double>>();
   if (origin.size() != 3 || !(georeference.unit_m > 0.0))
-    throw Error("origin_m has 3 numbers, and unit_m is > 0", {.field = "georeference"});
+    throw Error("origin_m must have 3 numbers and unit_m must be > 0", {.field = "georeference"});
   georeference.origin_m = Eigen::Vector3d(origin.data());
   if (!(georeference.origin_m.cwiseAbs().maxCoeff() <= max_position_m))
-    throw Error("an offset of at most 1e8 m", {.field = "georeference"});
+    throw Error("origin_m must be at most 1e8 m", {.field = "georeference"});
   return georeference;
 }
 

@@ -1,5 +1,5 @@
-// OUTPUT.json: what made an output, and from what. All but the section "run" is the same for the
-// same input, seed and version.
+// Manifest of an output (OUTPUT.json): command, parameters, inputs and results. All sections but
+// "run" are reproducible for equal input, seed and version.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,7 @@
 
 namespace libmap {
 
-// A real or whole number; nothing for another type and for no value.
+// Returns a real or whole number as double; nullopt for other types and nullptr.
 std::optional<double> number_of(const ManifestValue* value);
 
 struct ManifestInput {
@@ -32,14 +32,14 @@ struct Manifest {
   std::vector<ManifestInput> inputs;
   std::string frame;  // of the output's coordinates; lengths are meters
   std::vector<std::pair<std::string, Pose>> transforms;  // by name, e.g. "terrain_from_input"
-  // Of the frame before site_from_map and terrain_from_input.
+  // Georeference of the frame before site_from_map and terrain_from_input.
   std::optional<Georeference> georeference;
   std::vector<std::pair<std::string, ManifestValue>> results;  // counts, residuals
   std::vector<std::pair<std::string, double>> timings_s;       // in the section "run"
   unsigned threads = 0;                                        // in the section "run"
 
-  void add_parameters(const ParameterTable& table);   // each key with the value in force
-  void add_results(const ResultTable& table);         // those with a value
+  void add_parameters(const ParameterTable& table);   // all keys with their current values
+  void add_results(const ResultTable& table);         // skips results without a value
   void add_input(const std::filesystem::path& path);  // reads and hashes the file
   const ManifestValue* find_parameter(std::string_view name) const;  // or nullptr
   const ManifestValue* find_result(std::string_view name) const;     // or nullptr
@@ -50,9 +50,10 @@ struct Manifest {
 std::filesystem::path manifest_path(const std::filesystem::path& output);
 
 std::string to_json(const Manifest& manifest);  // fixed order; numbers read back the same
-// The other way round; the section "run" may be missing. Throws Error naming `file`.
+// Parses the output of to_json; the section "run" is optional. Throws Error naming `file`.
 Manifest parse_manifest(const std::string& json, const std::string& file);
-// Throws Error naming file and field. Nothing if there is no manifest beside `output`.
+// Reads the manifest next to `output`. Returns nullopt if there is none. Throws Error naming file
+// and field if it is invalid.
 std::optional<Manifest> read_manifest_of(const std::filesystem::path& output);
 
 // SHA-256 (FIPS 180-4) of a file's bytes, 64 hexadecimal digits.

@@ -1,4 +1,4 @@
-// The middle of some numbers.
+// Median of numbers.
 #pragma once
 
 #include <algorithm>
@@ -7,7 +7,7 @@
 
 namespace libmap {
 
-// The middle value, of an even number of values the upper of the two. At least one value.
+// Median of at least one value; the upper median if the number of values is even.
 inline double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());

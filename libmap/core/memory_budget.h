@@ -1,4 +1,4 @@
-// A bound on the memory of work that several threads do side by side.
+// Limit on the memory that several threads use at the same time.
 #pragma once
 
 #include <condition_variable>
@@ -7,17 +7,17 @@
 
 namespace libmap {
 
-// Bytes of memory of the machine: to read a larger file whole would end the program.
+// Physical memory of the machine in bytes.
 std::uint64_t machine_memory();
 
-// Threads take a share before they begin what needs much memory, and wait while the shares of
-// others leave too little. Order and number of results stay as they are; only time is lost.
+// Memory budget that threads share. A thread takes a share before work that needs much memory, and
+// waits while too little is free. Results do not depend on the budget.
 //
-// A thread that has a share must not run a parallel loop: a thread that waits for its end may take
-// up other work, which waits for the share.
+// A thread that owns a share must not run a parallel loop: while it waits for the loop, it can
+// start other work that waits for the same share (deadlock).
 class MemoryBudget {
  public:
-  // An eighth of the machine's memory.
+  // Uses an eighth of the machine's memory.
   MemoryBudget();
   explicit MemoryBudget(std::uint64_t bytes) : free_(bytes), bytes_(bytes) {}
   MemoryBudget(const MemoryBudget&) = delete;
@@ -37,7 +37,7 @@ class MemoryBudget {
     std::uint64_t bytes_;
   };
 
-  // Returns when the bytes are free. More than there are is given out alone.
+  // Blocks until the bytes are free. A request above the whole budget waits for the whole budget.
   [[nodiscard]] Share take(std::uint64_t bytes);
 
  private:

@@ -19,7 +19,7 @@ Error system_failure(const fs::path& path, const std::string& what, int code) {
 
 void sync_file(const fs::path& path) {
   const int descriptor = open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (descriptor < 0) throw system_failure(path, "cannot be opened to sync it", errno);
+  if (descriptor < 0) throw system_failure(path, "cannot be opened for syncing", errno);
   const int result = fsync(descriptor);
   const int code = errno;
   close(descriptor);

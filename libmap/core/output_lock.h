@@ -1,4 +1,4 @@
-// Locks on files, syncs, and the errors of system calls.
+// File locks, file synchronization and errors of system calls.
 #pragma once
 
 #include <filesystem>
@@ -9,25 +9,25 @@
 
 namespace libmap {
 
-// "WHAT: the system's message", kind failed. `code` is an errno; 0: no message.
+// Returns the error "WHAT: system message" of kind failed. `code` is an errno; 0: no message.
 Error system_failure(const std::filesystem::path& path, const std::string& what, int code);
 
-// Has what was written to a file or folder put on the disk. Throws Error (failed) naming `path`.
+// Writes a file or folder to disk (fsync). Throws Error (failed) naming `path`.
 void sync_file(const std::filesystem::path& path);
 
-// "." where the path has no folder.
+// Returns the parent folder; "." if the path has none.
 std::filesystem::path folder_of(const std::filesystem::path& path);
 
-// Held by at most one process or object at a time. The file of that name is made if it is missing,
-// and is left there. Throws Error (failed): it cannot be made.
+// Exclusive lock of one process or object on a file. A missing file is created; it is not removed.
+// Throws Error (failed) if the file cannot be created.
 class FileLock {
  public:
-  // Waits until nobody else holds it.
+  // Waits until the lock is free.
   explicit FileLock(const std::filesystem::path& path);
   ~FileLock();
   FileLock(FileLock&&) noexcept;
   FileLock& operator=(FileLock&&) noexcept;
-  // Nothing if somebody else holds it.
+  // Returns nullopt if the lock is taken.
   static std::optional<FileLock> try_lock(const std::filesystem::path& path);
 
  private:

@@ -23,8 +23,8 @@ namespace libmap {
 
 #ifdef GRASPMAP_THREAD_SANITIZER
 
-// Debian's oneTBB is compiled without the sanitizer, which sees nothing of how it orders its
-// threads. Plain threads stand in for it, so that what the chunks do with each other's data shows.
+// Debian's oneTBB is compiled without the sanitizer, which therefore does not see its
+// synchronization. Plain threads replace it, so that data races between chunks are detected.
 void parallel_for(std::size_t count, std::size_t grain,
                   const std::function<void(std::size_t begin, std::size_t end)>& body) {
   if (count == 0) return;
@@ -58,7 +58,7 @@ void parallel_for(std::size_t count, std::size_t grain,
                   const std::function<void(std::size_t begin, std::size_t end)>& body) {
   if (count == 0) return;
   grain = std::max<std::size_t>(grain, 1);
-  // Chunks are cut here and not by oneTBB, whose ranges depend on the number of threads.
+  // Chunks are formed here and not by oneTBB, whose ranges depend on the number of threads.
   const std::size_t chunks = (count - 1) / grain + 1;
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, chunks, 1),
                     [&](const tbb::blocked_range<std::size_t>& range) {

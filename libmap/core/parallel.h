@@ -1,5 +1,5 @@
-// Parallel loops whose result does not depend on the number of threads: work is cut into chunks by
-// count and grain alone, and reductions join the chunks in their order.
+// Parallel loops with results that do not depend on the number of threads. Chunks depend on count
+// and grain only, and reductions join the chunks in order.
 #pragma once
 
 #include <cstddef>
@@ -12,11 +12,11 @@
 namespace libmap {
 
 // Calls body(begin, end) for consecutive ranges of at most `grain` items that cover 0..count-1, on
-// oneTBB's threads. An exception in a body ends the loop and is thrown here.
+// oneTBB's threads. An exception in a body ends the loop and is rethrown to the caller.
 void parallel_for(std::size_t count, std::size_t grain,
                   const std::function<void(std::size_t begin, std::size_t end)>& body);
 
-// Calls step(n) for each n of 0..count-1 in parallel, `grain` of them at a time or one by one.
+// Calls step(n) for each n of 0..count-1 in parallel, in chunks of `grain` (default 1).
 template <typename Step>
 void parallel_each(std::size_t count, std::size_t grain, const Step& step) {
   parallel_for(count, grain, [&](std::size_t begin, std::size_t end) {
@@ -28,7 +28,7 @@ void parallel_each(std::size_t count, const Step& step) {
   parallel_each(count, 1, step);
 }
 
-// chunk(begin, end) of each range, joined left to right with join(a, b).
+// Returns the results of chunk(begin, end) of all ranges, joined left to right with join(a, b).
 template <typename T, typename Chunk, typename Join>
 T parallel_reduce(std::size_t count, std::size_t grain, T identity, const Chunk& chunk,
                   const Join& join) {
@@ -47,10 +47,10 @@ T parallel_reduce(std::size_t count, std::size_t grain, T identity, const Chunk&
   return result;
 }
 
-// Bounds the number of threads while it lives; 0 means all of the machine's.
+// Limits the number of threads during its lifetime.
 class ThreadLimit {
  public:
-  explicit ThreadLimit(unsigned threads);  // 0: as many as the machine has
+  explicit ThreadLimit(unsigned threads);  // 0: all hardware threads
   ~ThreadLimit();
   ThreadLimit(const ThreadLimit&) = delete;
   ThreadLimit& operator=(const ThreadLimit&) = delete;

@@ -113,7 +113,7 @@ void ParameterTable::add(std::string key, std::uint64_t& field, Range range,
 void ParameterTable::add(std::string key, bool& field, std::string description) {
   const auto set = [&field, key](std::string_view text) {
     const std::optional<bool> value = parse_bool(text);
-    if (!value) throw wrong_value(key, text, "not a switch", "true or false");
+    if (!value) throw wrong_value(key, text, "not a boolean", "true or false");
     field = *value;
   };
   parameters_.push_back({.key = key,
@@ -243,7 +243,7 @@ std::string to_yaml(const ParameterTable& table) {
   for (const auto& [key, text] : table.values()) {
     const Parameter* parameter = table.find(key);
     YAML::Emitter value;
-    // Free text is quoted: it might read as something else.
+    // Free text is quoted, because YAML could parse it as another type.
     if (parameter == nullptr ||
         (parameter->type == ParameterType::text && parameter->choices.empty()))
       value << YAML::DoubleQuoted;

@@ -1,6 +1,6 @@
-// A table of the named parameters of one or more option structs: the single place where a field
-// meets its key, its description and its bound. Command-line flags, YAML files, --print-config and
-// the manifest all go through it, so that a default stands once, in the struct.
+// Table of the named parameters of one or more option structs. It binds each field to its key,
+// description and range. Command-line flags, YAML files, --print-config and the manifest use it, so
+// that defaults are defined once, in the struct.
 #pragma once
 
 #include <cstdint>
@@ -17,9 +17,9 @@
 
 namespace libmap {
 
-enum class ParameterType { boolean, integer, real, text };  // of a flag's or key's value
+enum class ParameterType { boolean, integer, real, text };  // type of a parameter's value
 
-// What a number may be. An open end excludes its value.
+// Interval of valid numbers. An open end excludes its value.
 struct Range {
   double min = -std::numeric_limits<double>::infinity();
   double max = std::numeric_limits<double>::infinity();
@@ -39,43 +39,43 @@ struct Parameter {
   std::vector<std::string> choices{};  // for enumerations
   std::function<std::string()> get;
   std::function<void(std::string_view)> set;  // throws Error naming key, value and bound
-  std::function<void()> check{};  // the field's own value; throws as `set`; none: any is right
+  std::function<void()> check{};  // checks the field; throws as `set` does; empty: no bound
 };
 
 class ParameterTable {
  public:
   void add(std::string key, double& field, Range range, std::string description);
-  // "auto" for no value.
+  // The text "auto" is nullopt.
   void add(std::string key, std::optional<double>& field, Range range, std::string description);
   void add(std::string key, int& field, Range range, std::string description);
   void add(std::string key, std::uint64_t& field, Range range, std::string description);
   void add(std::string key, bool& field, std::string description);
   void add(std::string key, std::string& field, std::string description);
-  // An enumeration by its names.
+  // Adds an enumeration with the names of its values.
   template <typename Enum>
   void add(std::string key, Enum& field, const std::vector<std::pair<std::string, Enum>>& names,
            std::string description);
 
-  // Keys "PREFIX.KEY" are collected as text, for a second table that is filled from a file first
-  // ("gripper.opening_angle_deg"), the last text of each key; who applies them checks their names.
+  // Collects keys "PREFIX.KEY" as text for a second table that is read from a file first
+  // ("gripper.opening_angle_deg"). The last text of a key counts; the caller checks the names.
   void add_overrides(std::string prefix, std::vector<std::pair<std::string, std::string>>& texts);
 
   const std::vector<Parameter>& parameters() const { return parameters_; }
-  std::vector<std::string> keys() const;              // in the order in which they were added
-  const Parameter* find(std::string_view key) const;  // the parameter of that key, or nullptr
-  // Whether set() takes this key: a parameter, or one with the prefix of overrides.
+  std::vector<std::string> keys() const;              // in the order of insertion
+  const Parameter* find(std::string_view key) const;  // nullptr if there is no such key
+  // True if set() accepts this key: a parameter, or a key with the prefix of overrides.
   bool knows(std::string_view key) const;
-  // Every key and its value as text, overrides included, as set_from_yaml would take them.
+  // Keys and values as text in the format of set_from_yaml, overrides included.
   std::vector<std::pair<std::string, std::string>> values() const;
 
-  // The first key whose value differs from that of `other`, a table of the same keys.
+  // Returns the first key with different values in both tables, which have equal keys.
   std::optional<std::string> first_difference(const ParameterTable& other) const;
 
-  // Sets one parameter from text. Throws Error: unknown key (with the nearest known one), or a
-  // value that is not of its type or outside its bound.
+  // Sets one parameter from text. Throws Error if the key is unknown (with the nearest known key),
+  // or if the value has another type or is out of range.
   void set(std::string_view key, std::string_view value) const;
 
-  // Throws the Error of set() for the first field whose value is outside its bound.
+  // Throws the Error of set() for the first field that is out of range.
   void check() const;
 
  private:
@@ -86,8 +86,8 @@ class ParameterTable {
   std::vector<std::pair<std::string, Overrides*>> overrides_;  // by prefix
 };
 
-// Throws Error naming field, value and bound if a field of `options` is outside the range, or is
-// none of the choices, that bind(table, options) declares for it.
+// Throws Error naming field, value and bound if a field of `options` violates the range or the
+// choices that bind(table, options) declares.
 template <typename Options>
 void check_parameters(Options options) {
   ParameterTable table;
@@ -95,7 +95,7 @@ void check_parameters(Options options) {
   table.check();
 }
 
-// The key of the first field that `bind` declares and that does not have its default, if any.
+// Returns the key of the first bound field that differs from its default; nullopt if none does.
 template <typename Options>
 std::optional<std::string> changed_key(Options options, void (*bind)(ParameterTable&, Options&)) {
   Options unset;
@@ -106,17 +106,16 @@ std::optional<std::string> changed_key(Options options, void (*bind)(ParameterTa
   return table.first_difference(defaults);
 }
 
-// "voxel_size_m" -> "--voxel-size": the flag of a key, without the unit at its end.
+// Returns the flag of a key without its unit: "voxel_size_m" -> "--voxel-size".
 std::string flag_of(std::string_view key);
 
-// A YAML map of scalars, `text` (named `file` in errors), into the table; a section "a: {b: 1}"
-// holds the keys "a.b". A key that is not in the table, is a duplicate or holds no scalar is an
-// Error; nothing is set halfway: all keys are known before the first is set. Returns the keys that
-// the text holds.
+// Sets the table from YAML `text`, a map of scalars; a section "a: {b: 1}" contains the key "a.b".
+// Throws Error naming `file` for unknown keys, duplicates and values that are not scalars (before
+// any field is set), and for invalid values. Returns the keys of the text.
 std::vector<std::string> set_from_yaml(const ParameterTable& table, const std::string& text,
                                        const std::string& file);
 
-// The table as YAML that set_from_yaml reads back, each line followed by its description.
+// Returns the table as YAML for set_from_yaml, with the description as a comment on each line.
 std::string to_yaml(const ParameterTable& table);
 
 template <typename Enum>

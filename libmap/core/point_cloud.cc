@@ -58,7 +58,7 @@ PointCloud select_points(const PointCloud& cloud, const std::vector<std::size_t>
 
 namespace {
 
-// Of the fields NAME_x, NAME_y, NAME_z, if all three are there.
+// Applies `change` to the vectors in the fields NAME_x, NAME_y, NAME_z, if all three exist.
 template <typename Change>
 void change_vectors(PointCloud& cloud, const std::string& name, const Change& change) {
   ScalarField* x = cloud.find_field(name + "_x");
@@ -107,7 +107,7 @@ PointCloud transform_cloud(const PointCloud& cloud, const Pose& target_from_sour
   for (Eigen::Vector3d& point : moved.positions) point = target_from_source * point;
   const Eigen::Matrix3f rotation = target_from_source.linear().cast<float>();
   for (Eigen::Vector3f& normal : moved.normals) normal = rotation * normal;
-  // The identity says that the viewpoint is not known, and a move does not make it known.
+  // The identity means an unknown viewpoint, which a transform does not change.
   if (!cloud.viewpoint.matrix().isIdentity(0.0))
     moved.viewpoint = target_from_source * cloud.viewpoint;
   change_vectors(moved, "vp", [&](const Eigen::Vector3d& place) -> Eigen::Vector3d {

@@ -1,4 +1,4 @@
-// A cloud of points as plain data: positions, and whatever else its source knew of them.
+// Point cloud as plain data: positions with optional normals, colors and scalar fields.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,10 +13,10 @@
 
 namespace libmap {
 
-// How a scalar field is stored in files; in memory every value is a double.
+// Type of a scalar field in files; in memory, all values are doubles.
 enum class ScalarType { int8, uint8, int16, uint16, int32, uint32, float32, float64 };
 
-// One number per point (or a face), for instance "score" or "curvature". Names are unique.
+// One number per point or face, for example "score" or "curvature". Names are unique.
 struct ScalarField {
   std::string name;
   ScalarType type = ScalarType::float32;
@@ -25,20 +25,20 @@ struct ScalarField {
   bool operator==(const ScalarField&) const = default;
 };
 
-// The field of that name, or nullptr.
+// Returns the field of that name, or nullptr.
 const ScalarField* find_field(const std::vector<ScalarField>& fields, std::string_view name);
 ScalarField* find_field(std::vector<ScalarField>& fields, std::string_view name);
 
 using Color = std::array<std::uint8_t, 3>;  // red, green, blue
 
-// Positions in meters. `normals` and `colors` are either empty or as long as `positions`, and so is
-// each field. Normals need not be of unit length: some programs store their confidence in it.
+// Positions in meters. `normals` and `colors` are empty or as long as `positions`; fields are as
+// long as `positions`. Normals can have any length: some programs store a confidence in it.
 struct PointCloud {
   std::vector<Eigen::Vector3d> positions;
   std::vector<Eigen::Vector3f> normals;
   std::vector<Color> colors;
   std::vector<ScalarField> fields;
-  // cloud_from_sensor, as PCD's VIEWPOINT; the identity where it is not known.
+  // cloud_from_sensor, as PCD's VIEWPOINT; the identity if it is not known.
   Pose viewpoint = Pose::Identity();
 
   std::size_t size() const { return positions.size(); }
@@ -46,35 +46,35 @@ struct PointCloud {
   bool has_normals() const { return !normals.empty(); }
   bool has_colors() const { return !colors.empty(); }
 
-  // The field of that name, or nullptr.
+  // Returns the field of that name, or nullptr.
   const ScalarField* find_field(std::string_view name) const {
     return libmap::find_field(fields, name);
   }
   ScalarField* find_field(std::string_view name) { return libmap::find_field(fields, name); }
 
-  // Adds a field of size() zeros, or empties and retypes the one of that name.
+  // Adds a field of size() zeros, or resets the existing field of that name to zeros of `type`.
   ScalarField& add_field(std::string_view name, ScalarType type);
 
   // Throws Error naming the first array whose length is not size().
   void check() const;
 };
 
-// The points of `cloud` at `indices`, in that order, with all that belongs to them.
+// Returns the points of `cloud` at `indices`, in that order, with normals, colors and fields.
 PointCloud select_points(const PointCloud& cloud, const std::vector<std::size_t>& indices);
 
-// The points of `more` behind the others. Normals, colors and fields are left that both have; all
-// of one if the other has no points.
+// Appends the points of `more`. Keeps normals, colors and fields that both clouds have; keeps
+// everything if one cloud is empty. The viewpoint is the identity if the viewpoints differ.
 void append_cloud(const PointCloud& more, PointCloud& cloud);
-// The same of one value per point.
+// Appends values per point; the result is empty if either vector is empty.
 template <typename T>
 void append_values(const std::vector<T>& more, std::vector<T>& values) {
   if (more.empty()) values.clear();
   if (!values.empty()) values.insert(values.end(), more.begin(), more.end());
 }
-// The same of fields alone: those of both names and types.
+// Appends the values of fields; keeps fields that both have with equal name and type.
 void append_fields(const std::vector<ScalarField>& more, std::vector<ScalarField>& fields);
 
-// The cloud moved: positions, a known viewpoint and the fields vp_x, vp_y, vp_z by
+// Returns the transformed cloud: positions, a known viewpoint and the fields vp_x, vp_y, vp_z by
 // `target_from_source`; normals and the fields approach_x, approach_y, approach_z by its rotation.
 PointCloud transform_cloud(const PointCloud& cloud, const Pose& target_from_source);
 
@@ -83,7 +83,7 @@ struct Bounds3d {
   Eigen::Vector3d max = Eigen::Vector3d::Zero();
 };
 
-// The smallest axis-aligned box around the points; zeros for an empty cloud.
+// Axis-aligned bounding box of the points; zeros if there are none.
 Bounds3d bounds_of(const std::vector<Eigen::Vector3d>& positions);
 
 }  // namespace libmap

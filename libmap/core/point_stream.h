@@ -1,5 +1,4 @@
-// Points that come in blocks, so that what needs each of them only in passing can be had of clouds
-// that do not fit into memory.
+// Stream of points in blocks, for clouds that do not fit into memory.
 #pragma once
 
 #include <cstddef>
@@ -12,18 +11,18 @@ namespace libmap {
 class PointStream {
  public:
   virtual ~PointStream() = default;
-  // Every block but the last holds block_points points, so that sums over chunks of a block are
-  // the same whatever files the points come from.
+  // Number of points in each block but the last. Fixed blocks make sums independent of how the
+  // points are distributed over files.
   static constexpr std::size_t block_points = 65536;
-  // What the visitor needs: normals may be left out if it does without.
+  // Attributes that the visitor uses; the stream can omit normals if they are not needed.
   enum class Need { positions, positions_and_normals };
   using Visit = std::function<void(const PointCloud& block)>;
-  // Visits all points from the first on, in their order; may be called any number of times. All
-  // blocks have normals or none has, and all have the same viewpoint.
+  // Visits all points in order; can be called repeatedly. Either all blocks have normals or none
+  // has, and all have the same viewpoint.
   virtual void for_each_block(Need need, const Visit& visit) const = 0;
 };
 
-// A cloud in memory as a single block of any size.
+// Stream of a cloud in memory as a single block of any size.
 class CloudAsStream : public PointStream {
  public:
   explicit CloudAsStream(const PointCloud& cloud) : cloud_(cloud) {}

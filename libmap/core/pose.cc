@@ -29,8 +29,8 @@ Eigen::Vector3d roll_pitch_yaw_deg(const Pose& pose) {
   const Eigen::Matrix3d r = pose.linear();
   const double yaw = std::atan2(r(1, 0), r(0, 0));
   const double pitch = std::atan2(-r(2, 0), std::hypot(r(0, 0), r(1, 0)));
-  // Of Rz(-yaw) R, whose middle row is (0, cos roll, -sin roll): near +-90 deg of pitch, where yaw
-  // alone is lost, the three together still give R.
+  // Roll is read from Rz(-yaw) R, whose middle row is (0, cos roll, -sin roll). Near +-90 deg of
+  // pitch, yaw is arbitrary, but the three angles still reproduce R.
   const double s = std::sin(yaw);
   const double c = std::cos(yaw);
   const double roll = std::atan2(s * r(0, 2) - c * r(1, 2), c * r(1, 1) - s * r(0, 1));
@@ -42,8 +42,8 @@ Eigen::Matrix4d align_points(const Eigen::Matrix3Xd& source, const Eigen::Matrix
   return Eigen::umeyama(source, target, with_scale);
 }
 
-// As Eigen::Quaterniond::FromTwoVectors, without its singular value decomposition for directions
-// that are opposite.
+// Eigen::Quaterniond::FromTwoVectors without its singular value decomposition for opposite
+// directions.
 Eigen::Matrix3d shortest_rotation(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
   const Eigen::Vector3d a = from.normalized();
   const Eigen::Vector3d b = to.normalized();

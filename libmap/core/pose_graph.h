@@ -1,4 +1,4 @@
-// Poses of a scan and what binds them together.
+// Pose graph of a scan: nodes, links between poses, and trajectories.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,7 +12,7 @@
 
 namespace libmap {
 
-// Numbers as RTAB-Map stores them.
+// Types of links, with RTAB-Map's numbers.
 enum class LinkType {
   neighbor = 0,
   global_closure = 1,
@@ -25,12 +25,12 @@ enum class LinkType {
   landmark = 8,    // to < 0
   gravity = 9      // from = to
 };
-// "neighbor", "global closure", ...; "type N" for a number that is not known.
+// Returns "neighbor", "global closure", ...; "type N" for an unknown number.
 std::string to_text(LinkType type);
 
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
-// pose_to = pose_from * from_from_to.
+// Relative pose between two nodes: pose_to = pose_from * from_from_to.
 struct PoseLink {
   int from = 0;
   int to = 0;
@@ -39,11 +39,11 @@ struct PoseLink {
   // Inverse covariance in the order x y z roll pitch yaw, m and rad.
   Matrix6d information = Matrix6d::Identity();
 };
-// Says where a pose lies by itself: priors, gravity. No other link binds a node to itself.
+// True for links of a single node: pose priors and gravity. Only these have from = to.
 bool is_absolute(const PoseLink& link);
 
-// What readers accept, so that every format can be written and read again: coordinates of poses,
-// and entries of information matrices, which formats of halved angles multiply by 4.
+// Maximum coordinates of poses and entries of information matrices that readers accept. They keep
+// values in range in all formats; formats with half angles multiply the entries by 4.
 inline constexpr double max_position_m = 1e8;
 inline constexpr double max_information = 1e300;
 
@@ -56,7 +56,7 @@ struct GpsFix {
   double bearing_deg = 0.0;  // clockwise from north
 };
 
-// One place at which the scan was recorded.
+// Node of the pose graph: one recorded frame.
 struct GraphNode {
   static constexpr int invalid_weight = -9;  // RTAB-Map's, of nodes without a usable signature
 
@@ -66,7 +66,7 @@ struct GraphNode {
   double stamp_s = 0.0;
   std::string label{};
   std::optional<Pose> odometry_from_base{};
-  std::optional<Pose> truth_from_base{};            // ground truth, in a frame of its own
+  std::optional<Pose> truth_from_base{};            // ground truth, in its own frame
   std::optional<std::array<double, 6>> velocity{};  // m/s and rad/s: x y z roll pitch yaw
   std::optional<GpsFix> gps{};
 };
@@ -74,13 +74,13 @@ struct GraphNode {
 struct PoseGraph {
   std::vector<GraphNode> nodes;                 // by ascending id
   std::vector<PoseLink> links;                  // each once, whatever its direction
-  std::map<int, Pose> optimized_map_from_base;  // as stored with the scan; may be empty
+  std::map<int, Pose> optimized_map_from_base;  // poses stored with the scan; can be empty
 
-  // nullptr if there is no such node.
+  // Returns nullptr if there is no such node.
   const GraphNode* find_node(int id) const;
 };
 
-// One pose of a trajectory. `node` is 0 where only the time is known.
+// Pose of a trajectory. `node` is 0 if only the time is known.
 struct TrajectoryPose {
   int node = 0;
   double stamp_s = 0.0;
@@ -88,21 +88,20 @@ struct TrajectoryPose {
 };
 using Trajectory = std::vector<TrajectoryPose>;
 
-// Which of a scan's own poses: by odometry, optimized by the program that recorded it, ground
-// truth.
+// Source of a scan's stored poses: odometry, optimized by the recording program, or ground truth.
 enum class PoseSource { odometry, optimized, ground_truth };
 std::string to_text(PoseSource source);  // "odometry", "optimized", "ground-truth"
 
-// The poses of that source, by ascending node; nodes that have none, and invalid nodes, are left
-// out.
+// Returns the poses of a source in ascending order of nodes, without invalid nodes and nodes that
+// have no such pose.
 Trajectory trajectory_of(const PoseGraph& graph, PoseSource source);
 
 // Sum of the distances between consecutive poses, m.
 double path_length(const Trajectory& trajectory);
 
-// Where an image was taken.
+// Camera pose of an image.
 struct ImagePose {
-  std::string image{};                        // its name in the file
+  std::string image{};                        // image name in the pose file
   Pose world_from_camera = Pose::Identity();  // optical frame: z forward, x right, y down
 };
 

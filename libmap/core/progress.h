@@ -1,5 +1,5 @@
-// How long work says how far it is. Library functions take a Progress; the caller decides whether
-// that is a bar, JSON lines or nothing.
+// Progress reporting. Library functions take a Progress; the caller chooses a bar, JSON lines or
+// no output.
 #pragma once
 
 #include <cstddef>
@@ -10,14 +10,14 @@ namespace libmap {
 class Progress {
  public:
   virtual ~Progress() = default;
-  // A stage of `total` steps begins; it ends the one before. 0: the number is not known.
+  // Begins a stage of `total` steps (0: unknown) and ends the previous stage.
   virtual void begin(std::string_view stage, std::size_t total) = 0;
-  // `steps` more are done. May be called from any thread.
+  // Reports `steps` more completed steps. Can be called from any thread.
   virtual void advance(std::size_t steps) = 0;
   virtual void end() = 0;
 };
 
-// Says nothing.
+// Returns a Progress without output.
 Progress& no_progress();
 
 }  // namespace libmap

@@ -1,5 +1,5 @@
-// Random numbers that depend on what they are for and not on who draws them first: a stream of its
-// own for each seed and key, cheap enough for one a pixel.
+// Random number streams keyed by seed and purpose, so that results do not depend on the order of
+// calls. A stream is cheap enough to have one per pixel.
 #pragma once
 
 #include <cmath>
@@ -9,7 +9,7 @@
 
 namespace libmap {
 
-// Well mixed 64 bits of two numbers (the finaliser of SplitMix64, Steele et al. 2014).
+// 64-bit hash of two numbers (the finaliser of SplitMix64, Steele et al. 2014).
 inline std::uint64_t mix_bits(std::uint64_t a, std::uint64_t b) {
   std::uint64_t bits = a * 0x9e3779b97f4a7c15U + b + 0x9e3779b97f4a7c15U;
   bits = (bits ^ (bits >> 30)) * 0xbf58476d1ce4e5b9U;
@@ -17,7 +17,7 @@ inline std::uint64_t mix_bits(std::uint64_t a, std::uint64_t b) {
   return bits ^ (bits >> 31);
 }
 
-// The same as a number, 0 <= u < 1.
+// mix_bits as a number in [0, 1).
 inline double unit_noise(std::uint64_t a, std::uint64_t b) {
   return static_cast<double>(mix_bits(a, b) >> 11) * 0x1p-53;
 }
@@ -26,14 +26,14 @@ class RandomStream {
  public:
   RandomStream(std::uint64_t seed, std::uint64_t key) : key_(mix_bits(seed, key)) {}
 
-  // In [0, 1).
+  // Uniform in [0, 1).
   double uniform() { return unit_noise(++count_, key_); }
   double uniform(double low, double high) { return low + (high - low) * uniform(); }
-  // A whole number in [0, count).
+  // Uniform whole number in [0, count).
   std::size_t below(std::size_t count) {
     return static_cast<std::size_t>(uniform() * static_cast<double>(count));
   }
-  // Mean 0, standard deviation 1 (Box and Muller 1958).
+  // Normal deviate with mean 0 and standard deviation 1 (Box and Muller 1958).
   double normal() {
     if (has_spare_) {
       has_spare_ = false;

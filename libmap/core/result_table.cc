@@ -19,8 +19,7 @@ Number merged(const Number& whole, const Number& tile, Merge merge) {
   return whole;
 }
 
-// Tables have the same type for results that are only read; merge_into takes one that is not
-// constant.
+// Tables of constant and mutable results have the same type; merge_into passes a mutable result.
 template <typename Number>
 Number& writable(const Number* field) {
   return const_cast<Number&>(*field);

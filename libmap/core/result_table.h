@@ -1,6 +1,6 @@
-// A table of the named results of a stage, the twin of ParameterTable: describe(table, result) next
-// to a result struct is the single place where a field meets its key and its description. The
-// manifest, --json, printed lists, the progress of tiles and the Python module all go through it.
+// Table of the named results of a stage, the counterpart of ParameterTable. describe(table, result)
+// next to a result struct binds each field to its key and description. The manifest, --json,
+// printed lists, the progress of tiles and the Python module use it.
 #pragma once
 
 #include <cstddef>
@@ -19,7 +19,7 @@ namespace libmap {
 using ManifestValue = std::variant<bool, std::int64_t, double, std::string, std::vector<double>>;
 
 struct NamedResult {
-  // `found`: a truth value, a number, a text, several numbers, or an optional of one of these.
+  // `found` is a boolean, a number, a text, a range of numbers, or an optional of one of these.
   template <typename Found>
   NamedResult(std::string result_key, const Found& found, std::string text = {})
       : key(std::move(result_key)),
@@ -34,9 +34,9 @@ struct NamedResult {
 
   std::string key;                     // with its unit: "radius_m"
   std::string description;             // one line
-  ManifestValue type;                  // any value of the type of `value`
-  bool may_lack;                       // of an optional
-  std::optional<ManifestValue> value;  // none: null in JSON, left out of the manifest
+  ManifestValue type;                  // a default value of the type of `value`
+  bool may_lack;                       // true for optionals
+  std::optional<ManifestValue> value;  // nullopt: null in JSON, omitted in the manifest
 
  private:
   template <typename Found>
@@ -74,16 +74,16 @@ struct NamedResult {
   }
 };
 
-// How the fields of several tiles make that of the whole.
+// Rule for combining a field of several tiles.
 enum class Merge { sum, max, min };
 
-// A field that each tile has, and that its progress stores.
+// Field of a tile's result, stored in the progress of the tiles.
 struct TileField {
   std::string key;
   std::variant<const std::size_t*, const double*> field;
   Merge merge;
 
-  // Reads or sets the field; set() only of a result that is not constant.
+  // Reads or sets the field. set() requires that the result is not constant.
   ManifestValue value() const;
   void set(const ManifestValue& value) const;
 };
@@ -102,19 +102,19 @@ class ResultTable {
     add_hidden(key, field, merge);
     add(std::move(key), field, std::move(description));
   }
-  // A field of tiles that is no result by itself.
+  // Adds a field that is merged over tiles but is not reported as a result.
   template <typename Number>
   void add_hidden(std::string key, const Number& field, Merge merge) {
     tile_fields_.push_back({std::move(key), &field, merge});
   }
 
-  // Adds the results of another table, their keys after `prefix`.
+  // Adds the results of another table with `prefix` before their keys.
   void append(const std::string& prefix, ResultTable table);
 
   const std::vector<NamedResult>& results() const { return results_; }
   const std::vector<TileField>& tile_fields() const { return tile_fields_; }
 
-  // Merges the fields of a tile, a table of the same keys, into those of this one.
+  // Merges the fields of a tile, a table with the same keys, into the fields of this table.
   void merge(const ResultTable& tile) const;
 
  private:
@@ -122,7 +122,7 @@ class ResultTable {
   std::vector<TileField> tile_fields_;
 };
 
-// The table that describe(table, result) fills. It points into the result.
+// Returns the table that describe(table, result) fills. `result` must outlive it.
 template <typename Result>
 ResultTable described(const Result& result) {
   ResultTable table;
@@ -130,7 +130,7 @@ ResultTable described(const Result& result) {
   return table;
 }
 
-// Merges the fields of a tile into those of the whole, each by its Merge.
+// Merges the fields of a tile into `whole` by their Merge rules.
 template <typename Result>
 void merge_into(Result& whole, const Result& tile) {
   described(whole).merge(described(tile));

@@ -1,4 +1,4 @@
-// The colors of graspability scores in the thesis's legend, for files and pictures alike.
+// Colors of graspability scores by the thesis's legend, for files and images.
 #pragma once
 
 #include <array>
@@ -9,7 +9,7 @@
 namespace libmap {
 
 struct ScoreClass {
-  double min_score = 0.0;  // of 0..1
+  double min_score = 0.0;  // in 0..1
   Color color{};
   const char* text = "";
 };
@@ -27,8 +27,8 @@ inline constexpr std::array<ScoreClass, 7> score_classes{{
 inline constexpr Color below_plane_color{255, 255, 255};
 inline constexpr Color no_value_color{128, 128, 128};
 
-// A bound is met from 1e-6 below it, so that a score stored in single precision keeps its class.
-// NaN is gray.
+// Returns the color of a score's class; gray for NaN. Class limits have a tolerance of 1e-6, so
+// that a score stored in single precision keeps its class.
 constexpr Color score_color(double score) {
   for (const ScoreClass& one : score_classes)
     if (score >= one.min_score - 1e-6) return one.color;

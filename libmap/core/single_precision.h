@@ -1,12 +1,12 @@
-// Numbers as single precision keeps them.
+// Rounding to single precision.
 #pragma once
 
 #include <Eigen/Core>
 
 namespace libmap {
 
-// The nearest float32. A function of its own, not a pair of casts: GCC 12 from -O2 on takes
-// static_cast<double>(static_cast<float>(x)) for x where it makes vectors of two such numbers.
+// Returns the nearest float32. Not an inline pair of casts: from -O2 on, GCC 12 replaces
+// static_cast<double>(static_cast<float>(x)) by x when it vectorizes two such numbers.
 double rounded_to_single(double value);
 Eigen::Vector3d rounded_to_single(const Eigen::Vector3d& values);
 

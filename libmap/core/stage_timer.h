@@ -1,4 +1,4 @@
-// Wall times of the steps of a stage, as its result struct and the manifest keep them.
+// Wall times of the steps of a stage, for its result struct and the manifest.
 #pragma once
 
 #include <algorithm>
@@ -11,8 +11,8 @@ namespace libmap {
 
 using StageTimings = std::vector<std::pair<std::string, double>>;  // step, seconds
 
-// Adds the time from its construction to its end, by an exception too; the times of steps of one
-// name are one.
+// Adds the time from its construction to its destruction, also after an exception. Times of steps
+// with equal names are summed.
 class StageTimer {
  public:
   StageTimer(StageTimings& timings_s, std::string name)
@@ -35,7 +35,7 @@ class StageTimer {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-// What `step` returns, its time added.
+// Returns step() and adds its time.
 template <typename Step>
 auto timed(StageTimings& timings_s, const char* name, const Step& step) {
   const StageTimer timer(timings_s, name);

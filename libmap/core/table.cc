@@ -10,10 +10,10 @@ namespace libmap {
 
 namespace {
 
-// What is done with a table may take time by the square of its columns.
+// Limit, because the time of some operations is proportional to the square of the columns.
 constexpr std::size_t max_columns = 10000;
 
-// One record of `text` from `position` on, which moves behind its end of line.
+// Reads one record of `text` at `position` and moves `position` behind its end of line.
 std::vector<std::string> next_record(std::string_view text, std::size_t& position,
                                      std::size_t& line) {
   std::vector<std::string> cells(1);
@@ -87,7 +87,7 @@ std::optional<double> Table::optional_number(std::size_t row, std::size_t column
 Table parse_csv(std::string_view text, const std::string& file) {
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
   if (text.find('\n') == std::string_view::npos && text.find('\r') != std::string_view::npos) {
-    std::string lines(text);  // of classic Mac OS
+    std::string lines(text);  // line ends of classic Mac OS
     std::replace(lines.begin(), lines.end(), '\r', '\n');
     return parse_csv(lines, file);
   }
@@ -113,7 +113,7 @@ Table parse_csv(std::string_view text, const std::string& file) {
                                            .bound = "<= " + std::to_string(max_columns)});
         for (const char other : {';', '\t'})
           if (cells.size() == 1 && cells.front().find(other) != std::string::npos)
-            throw Error("the columns need commas between them and points in numbers",
+            throw Error("columns must be separated by commas, and decimals by points",
                         {.field = "separator in line " + std::to_string(first_line),
                          .value = other == ';' ? "';'" : "tab",
                          .bound = "','"});
@@ -121,7 +121,7 @@ Table parse_csv(std::string_view text, const std::string& file) {
         continue;
       }
       if (cells.size() != table.columns.size())
-        throw Error("the header names " + std::to_string(table.columns.size()) + " columns",
+        throw Error("the header has " + std::to_string(table.columns.size()) + " columns",
                     {.field = "line " + std::to_string(first_line),
                      .value = std::to_string(cells.size()) + " cells long"});
       table.rows.push_back(std::move(cells));
@@ -143,7 +143,7 @@ std::string csv_line(const std::vector<std::string>& cells) {
     if (i > 0) text += ',';
     text += quoted_cell(cells[i]);
   }
-  // An empty line would be passed over.
+  // A reader would skip an empty line.
   if (cells.size() == 1 && cells.front().empty()) text += "\"\"";
   return text + '\n';
 }

@@ -1,4 +1,4 @@
-// A table of text cells with named columns, as CSV files hold it (RFC 4180).
+// Table of text cells with named columns, and its CSV format (RFC 4180).
 #pragma once
 
 #include <cstddef>
@@ -13,24 +13,24 @@ namespace libmap {
 struct Table {
   std::vector<std::string> columns;
   std::vector<std::vector<std::string>> rows;  // each as long as `columns`
-  std::string file;                            // where it was read from, for errors; may be empty
+  std::string file;                            // source file, for errors; can be empty
 
-  std::optional<std::size_t> find_column(std::string_view name) const;  // its index
-  // Throws Error naming the file, the column and the nearest known one.
+  std::optional<std::size_t> find_column(std::string_view name) const;  // index of a column
+  // Returns the index of a column. Throws Error naming file, column and the nearest known column.
   std::size_t column(std::string_view name) const;
-  // The cell as a number. Throws Error naming file, line and column if it is not one.
+  // Returns a cell as a number. Throws Error naming file, row and column if it is not a number.
   double number(std::size_t row, std::size_t column) const;
-  // The same, nothing for an empty cell.
+  // Returns a cell as a number, or nullopt if it is empty. Throws as number() does.
   std::optional<double> optional_number(std::size_t row, std::size_t column) const;
 };
 
-// CSV text with a header line; quotes as in RFC 4180; CRLF, LF or CR; a UTF-8 byte order mark,
-// empty lines and lines that begin with '#' are passed over. A row of another length and a header
-// with another separator are an Error.
+// Parses CSV text with a header line, quotes as in RFC 4180 and line ends CRLF, LF or CR. Skips a
+// UTF-8 byte order mark, empty lines and lines that begin with '#'. Throws Error if the length of a
+// row differs from the header or the separator is not a comma.
 Table parse_csv(std::string_view text, const std::string& file);
 Table read_csv(const std::filesystem::path& path);
 std::string to_csv(const Table& table);
-// One row of it, its end of line included.
+// Returns one row of CSV text with its end of line.
 std::string csv_line(const std::vector<std::string>& cells);
 
 }  // namespace libmap

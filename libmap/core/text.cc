@@ -33,7 +33,7 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
   return row.back();
 }
 
-// std::from_chars knows no '+'. What follows it may not be a second sign.
+// std::from_chars rejects '+'. A second sign after it remains invalid.
 std::string_view without_plus(std::string_view text) {
   return text.size() > 1 && text[0] == '+' && text[1] != '-' ? text.substr(1) : text;
 }
@@ -42,7 +42,7 @@ std::string_view without_plus(std::string_view text) {
 
 std::string lower_case(std::string_view text) {
   std::string lower(text);
-  // Not std::tolower: it follows the locale.
+  // std::tolower would depend on the locale.
   for (char& c : lower)
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
   return lower;
@@ -71,7 +71,7 @@ std::vector<std::string> split_list(std::string_view text) {
 }
 
 std::string to_fixed_text(double value, int decimals) {
-  // 309 digits of the largest double, a sign, a point and the decimals.
+  // Space for the 309 digits of the largest double, a sign, a point and the decimals.
   std::string text(312 + static_cast<std::size_t>(std::max(decimals, 0)), ' ');
   const auto end = std::to_chars(text.data(), text.data() + text.size(), value,
                                  std::chars_format::fixed, decimals);
@@ -119,7 +119,7 @@ std::optional<bool> parse_bool(std::string_view text) {
 
 std::optional<std::string> nearest_name(std::string_view name,
                                         const std::vector<std::string>& candidates) {
-  // The distance takes as many steps as the product of the lengths; longer names are no slips.
+  // The time is proportional to the product of the lengths; longer names are not typing errors.
   constexpr std::size_t longest = 200;
   if (name.size() > longest) return std::nullopt;
   const std::string wanted = lower_case(name);
@@ -133,7 +133,7 @@ std::optional<std::string> nearest_name(std::string_view name,
       nearest = candidate;
     }
   }
-  // A name that was broken off is meant as its whole.
+  // A truncated name matches the first candidate that it begins.
   if (!nearest && wanted.size() >= 3)
     for (const std::string& candidate : candidates)
       if (lower_case(candidate).starts_with(wanted)) return candidate;

@@ -16,7 +16,7 @@ namespace {
 
 void require_word(const TextLine& line, std::size_t word, const std::string& file) {
   if (word >= line.words.size())
-    throw wrong_columns("ends too early", line, file, ">= " + std::to_string(word + 1));
+    throw wrong_columns("too few columns", line, file, ">= " + std::to_string(word + 1));
 }
 
 }  // namespace
@@ -111,10 +111,10 @@ Error duplicate(const TextLine& line, const std::string& record, const std::stri
 
 void require_room_for_text(std::uint64_t rows, std::uint64_t words, std::uint64_t bytes,
                            const std::string& what) {
-  // A word takes a character and a blank, but for the file's last one.
+  // Each word needs a character and a blank, except for the last word of the file.
   const std::uint64_t line_bytes = 2 * words;
   if (line_bytes > 0 && rows > (bytes + 1) / line_bytes)
-    throw Error("the header promises " + std::to_string(rows) + " " + what + ", but only " +
+    throw Error("the header declares " + std::to_string(rows) + " " + what + ", but only " +
                 std::to_string(bytes) + " bytes of text follow");
 }
 
@@ -123,10 +123,10 @@ Pose pose_of(const TextLine& line, const Eigen::Vector3d& translation,
   constexpr double length_tolerance = 0.05;
   const double length = rotation.norm();
   if (!(std::abs(length - 1.0) <= length_tolerance))
-    throw in_line("no rotation", line, file, to_text(length), "a quaternion of length 1");
+    throw in_line("not a rotation", line, file, to_text(length), "a quaternion of length 1");
   const double distance = translation.cwiseAbs().maxCoeff();
   if (!(distance <= max_position_m))
-    throw in_line("no position", line, file, to_text(distance), "<= 1e8 m");
+    throw in_line("position out of range", line, file, to_text(distance), "<= 1e8 m");
   return make_pose(translation, rotation);
 }
 

@@ -1,4 +1,4 @@
-// Text formats of one record per line: lines of words, and their numbers.
+// Parser of text formats with one record per line of words.
 #pragma once
 
 #include <array>
@@ -26,9 +26,9 @@ class LineReader {
   // `first_line` is the number of the first line of `text`.
   explicit LineReader(std::string_view text, std::size_t first_line = 1,
                       std::string_view separators = " \t\r\v\f");
-  // The next line, or false at the end.
+  // Reads the next line. Returns false at the end.
   bool next(TextLine& line);
-  std::size_t remaining() const { return text_.size(); }  // bytes behind the line read last
+  std::size_t remaining() const { return text_.size(); }  // bytes after the last line read
 
  private:
   std::string_view text_;
@@ -36,45 +36,47 @@ class LineReader {
   std::array<bool, 256> is_separator_{};
 };
 
-// The words of one line, separated by blanks.
+// Returns the words of one line, separated by blanks.
 std::vector<std::string_view> words_of(std::string_view line);
 
-// All lines with a word, comments too, without a byte order mark. Words are separated by spaces,
-// tabs, commas and semicolons.
+// Returns all lines with at least one word, including comments. Words are separated by spaces,
+// tabs, commas and semicolons. A byte order mark is skipped.
 std::vector<TextLine> split_lines(std::string_view text);
 
 inline bool is_comment(const TextLine& line) { return line.words.front().front() == '#'; }
 
-// "line 12".
+// Returns "line 12".
 std::string name_of(const TextLine& line);
 
-// Words `first` to `first + count - 1` as finite numbers. Throws Error naming file and line.
+// Returns words `first` to `first + count - 1` as finite numbers, or one word as an integer of 32
+// or 64 bits. Throws Error naming file and line if a word is missing or invalid.
 std::vector<double> numbers_of(const TextLine& line, std::size_t first, std::size_t count,
                                const std::string& file);
 int integer_of(const TextLine& line, std::size_t word, const std::string& file);
 std::int64_t large_integer_of(const TextLine& line, std::size_t word, const std::string& file);
 
-// "REASON" in that line of `file`.
+// Returns an error with a reason in a line of `file`.
 Error in_line(const std::string& reason, const TextLine& line, const std::string& file,
               std::string value, std::string bound = {});
-// The same for a line with a wrong number of words.
+// Returns an error for a line with a wrong number of words.
 Error wrong_columns(const std::string& reason, const TextLine& line, const std::string& file,
                     std::string bound);
-// For a record that an earlier line already has.
+// Returns an error for a record that an earlier line has already defined.
 Error duplicate(const TextLine& line, const std::string& record, const std::string& file);
 
-// Throws Error if `bytes` bytes are too few for `rows` lines of `words` words.
+// Throws Error if `bytes` bytes are too few for `rows` lines of `words` words each. `what` is the
+// plural name of the rows in the error.
 void require_room_for_text(std::uint64_t rows, std::uint64_t words, std::uint64_t bytes,
                            const std::string& what);
 
-// A pose whose numbers are in that line. Throws Error: the quaternion's length differs from 1 by
-// more than 5 %, the position is more than 1e8 m from the origin.
+// Returns a pose read from a line. Throws Error if the quaternion's length differs from 1 by more
+// than 5 % or a coordinate exceeds 1e8 m.
 Pose pose_of(const TextLine& line, const Eigen::Vector3d& translation,
              const Eigen::Quaterniond& rotation, const std::string& file);
 
-// Numbers as words with a space before each.
+// Returns numbers as words with a space before each.
 std::string to_words(std::initializer_list<double> numbers);
-// Of the two quaternions of a pose's rotation the one with qw >= 0.
+// Returns the quaternion of a pose's rotation with qw >= 0.
 Eigen::Quaterniond quaternion_of(const Pose& pose);
 
 }  // namespace libmap

@@ -12,7 +12,7 @@ namespace {
 
 void require_length(const std::string& what, std::size_t length, std::size_t wanted) {
   if (length == wanted) return;
-  throw Error("the mesh wants " + std::to_string(wanted),
+  throw Error("the mesh needs " + std::to_string(wanted),
               {.field = what, .value = std::to_string(length) + " values long"});
 }
 
@@ -30,9 +30,9 @@ void TriangleMesh::check() const {
   for (std::size_t i = 0; i < triangles.size(); ++i)
     for (const std::uint32_t index : triangles[i])
       if (index >= vertices.size())
-        throw Error("there is no such vertex", {.field = "triangle " + std::to_string(i),
-                                                .value = "vertex " + std::to_string(index),
-                                                .bound = "< " + std::to_string(vertices.size())});
+        throw Error("no such vertex", {.field = "triangle " + std::to_string(i),
+                                       .value = "vertex " + std::to_string(index),
+                                       .bound = "< " + std::to_string(vertices.size())});
 }
 
 void append_mesh(const TriangleMesh& more, TriangleMesh& mesh) {
@@ -68,7 +68,7 @@ double surface_area(const TriangleMesh& mesh) {
 
 double signed_volume(const TriangleMesh& mesh) {
   if (mesh.vertices.empty()) return 0.0;
-  // About a vertex and not the origin, which may be far away.
+  // Relative to a vertex, because a distant origin would cost precision.
   const Eigen::Vector3d origin = mesh.vertices.front();
   double sixfold = 0.0;
   for (const Triangle& t : mesh.triangles)
@@ -93,9 +93,9 @@ namespace {
 
 void require_one_a_triangle(const TexturedMesh& model, const char* name, std::size_t count) {
   if (count == model.mesh.triangles.size()) return;
-  throw Error("not one a triangle", {.field = name,
-                                     .value = std::to_string(count) + " values",
-                                     .bound = std::to_string(model.mesh.triangles.size())});
+  throw Error("not one per triangle", {.field = name,
+                                       .value = std::to_string(count) + " values",
+                                       .bound = std::to_string(model.mesh.triangles.size())});
 }
 
 }  // namespace
@@ -107,7 +107,7 @@ void TexturedMesh::check() const {
   for (std::size_t t = 0; t < page_of_triangle.size(); ++t) {
     const std::int32_t page = page_of_triangle[t];
     if (page != no_page && (page < 0 || static_cast<std::size_t>(page) >= pages.size()))
-      throw Error("there is no such page of the texture",
+      throw Error("no such texture page",
                   {.field = "triangle " + std::to_string(t),
                    .value = std::to_string(page),
                    .bound = "0 to " + std::to_string(pages.size()) + " - 1"});

@@ -1,4 +1,4 @@
-// A triangle mesh as plain data.
+// Triangle mesh, with or without textures, as plain data.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,8 +13,8 @@ namespace libmap {
 
 using Triangle = std::array<std::uint32_t, 3>;  // vertex indices, counter-clockwise from outside
 
-// Positions in meters. `vertex_normals` and `vertex_colors` are empty or one a vertex, vertex
-// fields hold one value per vertex, face fields one per triangle.
+// Positions in meters. `vertex_normals` and `vertex_colors` are empty or have one entry per vertex.
+// Vertex fields have one value per vertex, face fields one per triangle.
 struct TriangleMesh {
   std::vector<Eigen::Vector3d> vertices;
   std::vector<Triangle> triangles;
@@ -27,32 +27,32 @@ struct TriangleMesh {
   void check() const;
 };
 
-// The vertices and triangles of `more` behind the others. Normals, colors and fields are left that
-// both have; all of one if the other has no vertices.
+// Appends the vertices and triangles of `more`. Keeps normals, colors and fields that both meshes
+// have; keeps everything if one mesh has no vertices. Throws Error for more than 2^32 - 1 vertices.
 void append_mesh(const TriangleMesh& more, TriangleMesh& mesh);
 
-// Twice-signed-area normal of a triangle, not normalized: its length is twice the area in m2.
+// Normal of a triangle with twice its area as length, m2.
 Eigen::Vector3d area_normal(const TriangleMesh& mesh, const Triangle& triangle);
 
 // Surface area in m2.
 double surface_area(const TriangleMesh& mesh);
 
-// Signed volume in m3 by the divergence theorem; the enclosed volume of a closed mesh.
+// Signed volume in m3 by the divergence theorem; for a closed mesh, the enclosed volume.
 double signed_volume(const TriangleMesh& mesh);
 
-// Unit vertex normals: mean of the adjacent triangles' normals weighted by area.
+// Unit vertex normals, area-weighted means of the adjacent triangles' normals; 0 without triangles.
 std::vector<Eigen::Vector3f> estimate_vertex_normals(const TriangleMesh& mesh);
 
-// Where a triangle's corners lie on its page: from 0 to 1 over the page's width and height, from
-// the top left (as in glTF; OBJ counts from the bottom). The center of texel (column, row) lies at
-// ((column + 0.5) / width, (row + 0.5) / height).
+// Texture coordinates of a triangle's corners: 0 to 1 over the width and height of its texture
+// page, from the top left (as in glTF; OBJ counts from the bottom). The center of texel (column,
+// row) is ((column + 0.5) / width, (row + 0.5) / height).
 using TextureCorners = std::array<Eigen::Vector2f, 3>;
 
-// A triangle without texture.
+// Page index of a triangle without texture.
 constexpr std::int32_t no_page = -1;
 
-// `texture_coordinates` and `page_of_triangle` are one a triangle. Corners without texture have
-// the page no_page.
+// Mesh with texture pages. `texture_coordinates` and `page_of_triangle` have one entry per
+// triangle; triangles without texture have the page no_page.
 struct TexturedMesh {
   TriangleMesh mesh;
   std::vector<TextureCorners> texture_coordinates;
@@ -62,7 +62,7 @@ struct TexturedMesh {
   bool has_texture() const { return !pages.empty(); }
 
   // Throws Error naming the first array of a wrong length, page out of range or coordinate that is
-  // not finite; and what TriangleMesh::check throws.
+  // not finite, and the errors of TriangleMesh::check.
   void check() const;
 };
 

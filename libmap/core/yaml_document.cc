@@ -16,11 +16,11 @@ namespace libmap {
 
 namespace {
 
-// A node of yaml-cpp takes some 250 bytes, a comma and a letter of the file two.
+// A node of yaml-cpp takes about 250 bytes of memory, but only two bytes of the file.
 constexpr std::size_t max_nodes = 500'000;
 
-// Counts nodes, and keeps none. An alias counts as all that it stands for: who reads the document
-// walks through it each time.
+// Counts nodes without storing them. An alias counts as all nodes that it refers to, because a
+// reader visits them each time.
 class NodeCount : public YAML::EventHandler {
  public:
   void OnDocumentStart(const YAML::Mark&) override { sizes_.clear(); }
@@ -53,7 +53,7 @@ class NodeCount : public YAML::EventHandler {
   }
   void open(YAML::anchor_t anchor) {
     open_.emplace_back(anchor, count_);
-    // Within itself: yaml-cpp makes a circle of it, through which a reader would walk without end.
+    // An alias inside its own anchor: yaml-cpp makes a cycle, which a reader would follow forever.
     sizes_[anchor] = max_nodes;
     add(1);
   }
@@ -67,8 +67,7 @@ class NodeCount : public YAML::EventHandler {
   std::vector<std::pair<YAML::anchor_t, std::size_t>> open_;  // anchors, and the count before
 };
 
-// YAML::LoadAll would take memory without end where something stands that belongs to no document:
-// "[a], b".
+// YAML::LoadAll would allocate memory without limit if text outside a document follows: "[a], b".
 bool has_second_document(const std::string& text) {
   std::istringstream stream(text);
   YAML::Parser parser(stream);
@@ -101,7 +100,7 @@ void check_keys(const YAML::Node& map, const std::vector<std::string>& known,
                 const std::string& whose) {
   std::set<std::string> seen;
   for (const auto& entry : map) {
-    if (!entry.first.IsScalar()) throw Error("a key is not a name");
+    if (!entry.first.IsScalar()) throw Error("a key is not a scalar");
     const std::string& key = entry.first.Scalar();
     if (std::find(known.begin(), known.end(), key) == known.end())
       throw unknown_key(key, known, whose);

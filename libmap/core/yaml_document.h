@@ -1,4 +1,4 @@
-// A text of YAML, with errors that name file and line.
+// YAML parser whose errors name file and line.
 #pragma once
 
 #include <cstdint>
@@ -15,24 +15,25 @@ class Node;
 
 namespace libmap {
 
-// Of a file of YAML that is read whole.
+// Maximum size of a YAML file.
 inline constexpr std::uint64_t max_yaml_bytes = std::uint64_t{16} << 20;
 
-// Gives the one document in `text` to `read`, a null node where there is none. Throws Error naming
-// `file` where the text is no YAML or holds more documents, and names `file` in what `read` throws.
+// Calls `read` with the single document in `text`, a null node if the text is empty. Throws Error
+// naming `file` if the text is not YAML or contains several documents; adds `file` to Errors of
+// `read`.
 void read_yaml(const std::string& text, const std::string& file,
                const std::function<void(const YAML::Node&)>& read);
 
-// "unknown key", then `whose`, then the nearest known key.
+// Returns the error "unknown key" + `whose`, with the nearest known key.
 Error unknown_key(std::string_view key, const std::vector<std::string>& known,
                   const std::string& whose = "");
 
-// Each key of the map known and there once: YAML itself lets the first or the last of two stand.
-// Throws Error: another one, of which it says "unknown key" and then `whose`.
+// Throws Error if a key of the map is unknown ("unknown key" + `whose`) or a duplicate. YAML
+// libraries accept duplicates silently.
 void check_keys(const YAML::Node& map, const std::vector<std::string>& known,
                 const std::string& whose = "");
 
-// The error of what `node` holds, at PLACE.FIELD (line N).
+// Returns a copy of `error` with the field "PLACE.FIELD (line N)", where N is the line of `node`.
 Error at_node(const Error& error, const std::string& place, const YAML::Node& node);
 
 }  // namespace libmap

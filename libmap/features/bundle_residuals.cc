@@ -4,12 +4,12 @@ namespace libmap {
 
 namespace {
 
-// What the motion of the base does to an observation, to first order.
+// First-order effect of the base's motion on an observation.
 struct Moving {
-  double time_s = 0.0;   // of the row
-  double later_s = 0.0;  // depth after it
+  double time_s = 0.0;   // time of the row
+  double later_s = 0.0;  // delay of the depth relative to the row
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
-  Vector6d depth_by_motion = Vector6d::Zero();  // a second of it
+  Vector6d depth_by_motion = Vector6d::Zero();  // per second of motion
   double added_by_time = 0.0;
 };
 
@@ -32,7 +32,7 @@ bool CalibratedFeature::evaluate(const Pose& map_from_base, const Vector6d& moti
                                  CalibratedResidual& result, bool with_derivatives) const {
   const Eigen::Matrix3d base_from_map = map_from_base.linear().transpose();
   const Eigen::Vector3d in_base = base_from_map * (point - map_from_base.translation());
-  // Where the base is when the row is exposed.
+  // Position of the base when the row is exposed.
   Moving moving;
   Eigen::Matrix3d by_base = camera_from_base_;
   double added = calibrated_.added_m;
@@ -41,7 +41,7 @@ bool CalibratedFeature::evaluate(const Pose& map_from_base, const Vector6d& moti
     moving.later_s = camera_params[timing_at] + calibrated_.depth_later_s - moving.time_s;
     moving.velocity = motion.head<3>() + motion.tail<3>().cross(in_base);
     by_base -= moving.time_s * camera_from_base_ * cross_matrix(motion.tail<3>());
-    // The step of the registration that a motion makes: motion_in_camera, transposed.
+    // Registration step caused by a motion: motion_in_camera, transposed.
     const Eigen::Vector3d shift = camera_from_base_.transpose() * calibrated_.by_step.head<3>();
     moving.depth_by_motion << shift, camera_from_base_.transpose() * calibrated_.by_step.tail<3>() +
                                          base_from_camera_.cross(shift);

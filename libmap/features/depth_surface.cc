@@ -13,7 +13,7 @@ namespace libmap {
 
 namespace {
 
-constexpr double most_step = 0.03;  // of depth, between elements of one surface
+constexpr double most_step = 0.03;  // maximum relative depth step between elements of one surface
 
 constexpr double normal_scale = 32767.0;
 constexpr double noise_unit_m = 1e-6;
@@ -68,14 +68,14 @@ DepthSurface::DepthSurface(const Camera& depth_camera, int step_px, std::vector<
   }
   if (cells_.empty() ||
       cells_.size() != static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_))
-    throw Error("a surface does not fit its camera",
+    throw Error("number of cells does not match the camera's image size",
                 {.field = "cells",
                  .value = std::to_string(cells_.size()),
                  .bound = std::to_string(columns_) + " x " + std::to_string(rows_)});
   find_rays();
 }
 
-// The inverse depth of a plane, n r / h on the ray r, keeps its value and its slopes by the pixel.
+// The inverse depth of a plane, n r / h on the ray r, and its derivatives by the pixel are kept.
 void DepthSurface::set_camera(const Camera& depth_camera) {
   const auto intrinsics = [](const Camera& camera) {
     return std::array{camera.fx, camera.fy, camera.cx, camera.cy};
@@ -113,7 +113,7 @@ void DepthSurface::set_noise(const DepthNoise& before, const DepthNoise& after) 
   }
 }
 
-// z(u, v) + c(z, r): its slopes by the pixel are z' (1 + dc/dz) + dc/du.
+// Corrected depth z(u, v) + c(z, r); its derivative by the pixel is z' (1 + dc/dz) + dc/du.
 void DepthSurface::correct(const DepthCorrection& correction) {
   if (correction.empty()) return;
   constexpr double step_m = 1e-3;
@@ -133,7 +133,7 @@ void DepthSurface::correct(const DepthCorrection& correction) {
       const Eigen::Vector2d by_pixel(
           (added(z, x_px + step_px, y_px) - added(z, x_px - step_px, y_px)) / (2.0 * step_px),
           (added(z, x_px, y_px + step_px) - added(z, x_px, y_px - step_px)) / (2.0 * step_px));
-      // By the ray: of the plane n r z = h, z' = -z n / (n r).
+      // Derivative by the ray for the plane n r z = h: z' = -z n / (n r).
       const Eigen::Vector2d ray = element.point.head<2>() / z;
       const double facing = element.normal.dot(ray.homogeneous());
       Cell& cell = cells_[index(column, row)];
@@ -151,7 +151,7 @@ void DepthSurface::correct(const DepthCorrection& correction) {
     }
 }
 
-// NaN where no ray belongs to the pixel.
+// Rays are NaN for pixels outside the range of the lens model.
 void DepthSurface::find_rays() {
   rays_.clear();
   if (!camera_.is_distorted()) return;
@@ -176,7 +176,7 @@ bool DepthSurface::at(int column, int row, SurfacePatch& element) const {
   element.point = static_cast<double>(depth_m) * ray_at(column, row).homogeneous();
   const double x = cell.normal_x / normal_scale;
   const double y = cell.normal_y / normal_scale;
-  // Nearly all normals look back at the camera (z < 0); a wide lens may see others, by a little.
+  // Nearly all normals point to the camera (z < 0). With a wide lens a few are slightly off.
   element.normal = {x, y, -std::sqrt(std::max(0.0, 1.0 - x * x - y * y))};
   element.noise_m = cell.noise * noise_unit_m;
   return true;

@@ -1,4 +1,4 @@
-// A depth image downsampled to a grid of small planes, to be looked up by rays.
+// A depth image downsampled to a grid of small planes, with lookup by rays.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,21 +15,21 @@
 
 namespace libmap {
 
-// The surface through one pixel of the grid, in the camera's optical frame.
+// Plane at one element of the grid, in the camera's optical frame (m).
 struct SurfacePatch {
   Eigen::Vector3d point = Eigen::Vector3d::Zero();
-  Eigen::Vector3d normal = Eigen::Vector3d::Zero();  // towards the camera
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();  // unit, towards the camera
   double noise_m = 0.0;                              // standard deviation along the normal
 };
 
 class DepthSurface {
  public:
-  // 10 bytes: the cells of all frames are what a long scan keeps in memory most of.
+  // One element in 10 bytes. The cells of all frames dominate the memory of a long scan.
   struct Cell {
-    std::array<std::uint16_t, 2> depth_bits{};  // of a float, m; 0: none
-    std::int16_t normal_x = 0;                  // of 32767
+    std::array<std::uint16_t, 2> depth_bits{};  // bits of a float, m; 0: no measurement
+    std::int16_t normal_x = 0;                  // in units of 1/32767
     std::int16_t normal_y = 0;
-    std::uint16_t noise = 0;  // of 1e-6 m
+    std::uint16_t noise = 0;  // in units of 1e-6 m
 
     float depth_m() const { return std::bit_cast<float>(depth_bits); }
     void set_depth_m(float depth_m) {
@@ -38,31 +38,34 @@ class DepthSurface {
   };
 
   DepthSurface() = default;
-  // Every step_px-th pixel of `planes`. Planes of fewer than a quarter of their disc's pixels, as
-  // at edges, are left out.
+  // Takes every step_px-th pixel of `planes`. Drops planes that are supported by less than a
+  // quarter of the pixels of a full disc, for example at edges.
   DepthSurface(const DepthPlanes& planes, const Camera& depth_camera, const DepthNoise& noise,
                double surface_noise_m, int step_px);
-  // As another was. Throws Error unless there is a cell for each step_px-th pixel of the camera.
+  // Restores a stored surface. Throws Error if the number of cells is not that of every step_px-th
+  // pixel of the camera.
   DepthSurface(const Camera& depth_camera, int step_px, std::vector<Cell> cells);
 
   const Camera& camera() const { return camera_; }
-  // The same measurements seen through another camera of the same size and distortion: depths stay
-  // at their pixels, normals turn with the rays.
+  // Replaces the camera by one of the same size and distortion. Each pixel keeps its depth, and
+  // normals are recomputed.
   void set_camera(const Camera& depth_camera);
-  // The same measurements with another noise of depth.
+  // Rescales the noise from the depth noise model `before` to `after`.
   void set_noise(const DepthNoise& before, const DepthNoise& after);
-  // The same with other depths, normals as they turn by them.
+  // Applies the correction to the depths and recomputes the normals. Drops elements without a
+  // positive depth.
   void correct(const DepthCorrection& correction);
   int step_px() const { return step_px_; }
   const std::vector<Cell>& cells() const { return cells_; }
   int columns() const { return columns_; }
   int rows() const { return rows_; }
-  // The element at a grid place; false where nothing was measured.
+  // The lookups return false, and leave `element` unchanged, if nothing was measured there.
+  // Element at a grid position, which must be inside the grid.
   bool at(int column, int row, SurfacePatch& element) const;
-  // The element whose pixel lies nearest to where the camera sees `point_in_camera`.
+  // Element nearest to the projection of `point_in_camera`.
   bool seen_at(const Eigen::Vector3d& point_in_camera, SurfacePatch& element) const;
-  // The surface on the ray of that point: the planes of the four elements around it, weighted
-  // bilinearly, where all were measured on one surface; else that of the nearest.
+  // Surface on the ray through the point: bilinear mean of the four neighboring planes if all four
+  // were measured on one surface, otherwise the nearest plane.
   bool met_at(const Eigen::Vector3d& point_in_camera, SurfacePatch& element) const;
 
  private:
@@ -71,11 +74,11 @@ class DepthSurface {
   int columns_ = 0;
   int rows_ = 0;
   std::vector<Cell> cells_;
-  std::vector<Eigen::Vector2f> rays_;  // of a lens that distorts; else empty
+  std::vector<Eigen::Vector2f> rays_;  // one per cell with lens distortion, otherwise empty
 
   void find_rays();
   Eigen::Vector2d ray_at(int column, int row) const;
-  // Where the camera sees a point, in steps of the grid.
+  // Projection of a point, in steps of the grid; nullopt if it is not in the image.
   std::optional<Eigen::Vector2d> place_of(const Eigen::Vector3d& point_in_camera) const;
   std::size_t index(int column, int row) const {
     return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +

@@ -19,7 +19,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-// Another one for each change of what a frame's features are or how they are written.
+// Increased by each change of the features or of the file format.
 constexpr const char* format_version = "graspmap features 3";
 constexpr std::size_t digest_digits = 64;
 constexpr std::uint64_t max_file_bytes = std::uint64_t{1} << 28;
@@ -53,7 +53,7 @@ Json binary(const std::vector<T>& values) {
 template <typename T>
 std::vector<T> values_of(const Json& json) {
   const std::vector<std::uint8_t>& bytes = json.get_binary();
-  if (bytes.size() % sizeof(T) != 0) throw Error("does not contain what it should");
+  if (bytes.size() % sizeof(T) != 0) throw Error("number of bytes is not a multiple of the type's");
   std::vector<T> values(bytes.size() / sizeof(T));
   if (!values.empty()) std::memcpy(values.data(), bytes.data(), bytes.size());
   return values;
@@ -81,7 +81,7 @@ std::string packed(const FrameFeatures& frame) {
   return bytes;
 }
 
-// Whether CBOR is nested no deeper than ours: nlohmann's parser goes down by calling itself.
+// Limits the nesting of CBOR to that of this format, because nlohmann's parser is recursive.
 class DepthCheck : public Json::json_sax_t {
  public:
   static bool passes(std::string_view bytes) {
@@ -112,9 +112,9 @@ class DepthCheck : public Json::json_sax_t {
 
 FrameFeatures unpacked(std::string_view bytes, FeatureType type,
                        const std::vector<Camera>& depth_cameras) {
-  if (!DepthCheck::passes(bytes)) throw Error("is no CBOR of ours");
+  if (!DepthCheck::passes(bytes)) throw Error("not CBOR or nested too deeply");
   const Json json = Json::from_cbor(bytes);
-  if (json.at("version") != format_version) throw Error("another version");
+  if (json.at("version") != format_version) throw Error("unknown format version");
   FrameFeatures frame;
   frame.without_depth = integer_at<std::size_t>(json, "without_depth");
   const auto numbers = values_of<float>(json.at("numbers"));

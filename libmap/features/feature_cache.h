@@ -1,4 +1,4 @@
-// Features kept between runs: a file each frame in one folder, named by what they were made of.
+// Features stored between runs: one file per frame in a folder, named by a hash of the inputs.
 #pragma once
 
 #include <filesystem>
@@ -11,27 +11,26 @@
 
 namespace libmap {
 
-// SHA-256 of the frame's pictures, depth, cameras, the options and the version of the format: equal
-// keys mean equal features, whatever file the frame comes from.
+// SHA-256 of the frame's images and cameras, the options and the format version. Equal keys mean
+// equal features, independent of the file that contains the frame.
 std::string feature_key(const RgbdFrame& frame, const FeatureOptions& options);
 
-// May be used from several threads, and by several processes at once. Files are CBOR (RFC 8949)
-// behind a line with the SHA-256 of the rest; they appear whole.
+// Safe for use by several threads and processes at once. A file contains one line with the SHA-256
+// of the rest, followed by CBOR (RFC 8949). Files are written atomically.
 class FeatureCache {
  public:
-  FeatureCache() = default;  // keeps nothing
-  // The folder is made when the first frame is kept; its parent must be there by then.
+  FeatureCache() = default;  // disabled
+  // The folder is created when the first frame is stored; its parent must exist then.
   explicit FeatureCache(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
   bool enabled() const { return !folder_.empty(); }
-  // The features, descriptors and surfaces of the frame into `frame`, whose cameras are there;
-  // `depth_cameras` are those of the surfaces. False, and the frame untouched, if there is no file
-  // of the key, or it is damaged, or another program's.
+  // Reads features, descriptors and surfaces into `frame`; `depth_cameras` has one camera per
+  // surface. Returns false and leaves `frame` unchanged if the key has no valid file.
   bool read(const std::string& key, const std::vector<Camera>& depth_cameras,
             FrameFeatures& frame) const;
-  // In its folder; nullptr where there is none, or none can be made.
+  // Temporary file in the folder; nullptr if the cache is disabled or the file cannot be created.
   std::shared_ptr<TempFile> unnamed_file() const;
-  // A file that cannot be written is no error: the next run goes without it. False then.
+  // Stores the frame. Returns false, without an error, if the file cannot be written.
   bool write(const std::string& key, const FrameFeatures& frame) const;
 
  private:

@@ -16,7 +16,8 @@ namespace libmap {
 
 namespace {
 
-// Features of all frames as one row of numbers, joined into sets; the members of a set are a ring.
+// Features of all frames, numbered consecutively and joined into sets. Members of a set form a
+// ring.
 class FeatureSets {
  public:
   explicit FeatureSets(const std::vector<FrameFeatures>& frames) {
@@ -31,7 +32,7 @@ class FeatureSets {
 
   enum class Join { joined, conflict, unlinked };
 
-  // A conflict if the two sets hold different features of one frame.
+  // Returns conflict if the two sets contain different features of one frame.
   Join join(const Observation& a, const Observation& b, const std::set<FramePair>* linked) {
     const std::uint32_t one = sets_.find(number_of(a));
     const std::uint32_t other = sets_.find(number_of(b));
@@ -88,7 +89,7 @@ Observation observation(std::size_t frame, int feature) {
 constexpr int few_matches = 6;
 
 bool is_held_out(int feature, std::size_t frame, int every) {
-  // Features stand by strength: numbers alone would pick like ones in every frame.
+  // Features are ordered by strength: selection by index would bias all frames alike.
   return mix_bits(static_cast<std::uint64_t>(frame), static_cast<std::uint64_t>(feature)) %
              static_cast<std::uint64_t>(every) ==
          0;
@@ -116,7 +117,7 @@ Verified verify_pair(const FrameFeatures& a, const FrameFeatures& b, FramePair p
   link.chi_square_per_freedom = pose.chi_square_per_freedom;
   for (const FeatureMatch& match : kept) {
     const MatchResidual residual = match_residual(a, b, match, pose.a_from_b);
-    // Wider than for inliers: the poses of later stages are measured by them.
+    // Wider than for inliers, because these matches evaluate the poses of later stages.
     if (residual.in_front && residual.chi_square() <= 4.0 * options.estimate.max_chi_square)
       link.held_out.push_back(match);
   }
@@ -130,7 +131,7 @@ const std::vector<FeatureMatch>* known_matches(const KnownMatches* known, const 
   return found == known->end() ? nullptr : &found->second;
 }
 
-// In the order of RelativePoseOutcome.
+// `counted` is in the order of RelativePoseOutcome.
 void count(RelativePoseOutcome outcome, RejectionCounts& counts) {
   constexpr std::array counted = {&RejectionCounts::accepted, &RejectionCounts::too_few_matches,
                                   &RejectionCounts::too_few_inliers, &RejectionCounts::narrow,

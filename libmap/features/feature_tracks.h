@@ -1,5 +1,5 @@
-// Features that several frames see: matches of pairs of frames with the motion that they agree on,
-// and the tracks of points that matches form.
+// Matches between pairs of frames, verified by a rigid motion, and tracks: the observations of one
+// point in several frames.
 #pragma once
 
 #include <cstddef>
@@ -14,34 +14,34 @@
 
 namespace libmap {
 
-// How the features of two frames are matched.
+// Options for matching the features of two frames.
 struct MatchingOptions {
-  double max_ratio = 0.8;  // > 0: of the descriptors' distances (match_features)
-  int held_out = 10;       // >= 2: every so many features serve for checks alone
+  double max_ratio = 0.8;  // > 0: maximum ratio of descriptor distances (match_features)
+  int held_out = 10;       // >= 2: one in this many features is used for evaluation only
   RelativePoseOptions estimate{};
 };
 
-// Two frames, by their places in the list of frames; first < second.
+// Indices of two frames in the list of frames; first < second.
 using FramePair = std::pair<std::size_t, std::size_t>;
 
 // One verified link between two frames.
 struct FeatureLink {
   FramePair frames;
-  PoseLink link{};                       // node to node
-  std::vector<FeatureMatch> matches{};   // a in the link's `from`; those it was estimated from
-  std::vector<FeatureMatch> held_out{};  // matches that fit and were not used
+  PoseLink link{};                       // from node to node
+  std::vector<FeatureMatch> matches{};   // inliers of the estimate; a is in the link's `from`
+  std::vector<FeatureMatch> held_out{};  // consistent matches that the estimate did not use
   double chi_square_per_freedom = 0.0;
 };
 
-// Why pairs of frames gave no link.
+// Numbers of pairs of frames by outcome.
 struct RejectionCounts {
   std::size_t candidates = 0;
   std::size_t too_few_matches = 0;
   std::size_t too_few_inliers = 0;
-  std::size_t narrow = 0;  // inliers on one spot or line of the picture
+  std::size_t narrow = 0;  // inliers in one spot or on one line of the image
   std::size_t not_converged = 0;
-  std::size_t against_graph = 0;  // further from the graph's own estimate than it can be
-  std::size_t unconfirmed = 0;    // between parts of the graph, without a second that agrees
+  std::size_t against_graph = 0;  // not consistent with the graph's estimate and its covariance
+  std::size_t unconfirmed = 0;    // the only link between two components of the graph
   std::size_t accepted = 0;
 };
 
@@ -50,20 +50,23 @@ struct PairVerification {
   RejectionCounts counts;
 };
 
-// Of pairs of frames whose descriptors have been compared: that does not depend on their cameras.
+// Matches by pair of frames. They depend on the descriptors, not on the cameras.
 using KnownMatches = std::map<FramePair, std::vector<FeatureMatch>>;
 
-// Matches the features of each pair and estimates its motion. The same for any number of threads.
-// With `known`, matches of pairs that are not in it are added.
+// Matches the features of each pair and estimates the relative pose. The result does not depend on
+// the number of threads. Pairs in `known` are not matched again; matches of other pairs are added.
+// Throws Error if descriptors cannot be read from their temporary file.
 PairVerification verify_pairs(const std::vector<FrameFeatures>& frames,
                               const std::vector<FramePair>& pairs, const MatchingOptions& options,
                               std::uint64_t seed, Progress& progress = no_progress(),
                               KnownMatches* known = nullptr);
 
-// The motion that some matches of a pair agree on, be they too few for a link: a guess.
+// Initial guess of first_from_second for a pair, from as few as six consistent matches; nullopt if
+// there are fewer. Throws as verify_pairs.
 std::optional<Pose> guess_motion(const std::vector<FrameFeatures>& frames, const FramePair& pair,
                                  const MatchingOptions& options, std::uint64_t seed);
 
+// Indices of a frame and of one of its features.
 struct Observation {
   std::uint32_t frame = 0;
   std::uint32_t feature = 0;
@@ -71,22 +74,21 @@ struct Observation {
 };
 
 struct FeatureTrack {
-  std::vector<Observation> observations;  // by ascending frame, each frame once
+  std::vector<Observation> observations;  // by ascending frame, at most one per frame
 };
 
 struct FeatureTracks {
-  std::vector<FeatureTrack> tracks;  // of two observations or more
-  std::size_t conflicts = 0;         // matches left out: they would show a point twice in a frame
-  std::size_t split = 0;             // ... or join frames without a link
+  std::vector<FeatureTrack> tracks;  // two or more observations each
+  std::size_t conflicts = 0;         // matches dropped: a track would have two features of a frame
+  std::size_t split = 0;             // matches dropped: a track would join frames without a link
 };
 
-// linked: those of a track are linked with each other, each with each; a point that many frames see
-// becomes several tracks. The system of such tracks is as sparse as the graph of the links, however
-// often a place is visited.
+// linked: all frames of a track are linked pairwise, and a point with many observations becomes
+// several tracks. The normal equations of such tracks are as sparse as the graph of the links.
 enum class TrackFrames { any, linked };
 
-// Joins matches into tracks (union-find), those first that fit best; a match that would join two
-// features of one frame is left out.
+// Joins matches into tracks by union-find, in ascending order of chi-square. Drops a match that
+// would join two features of one frame.
 FeatureTracks build_tracks(const std::vector<FrameFeatures>& frames,
                            const std::vector<FeatureLink>& links,
                            TrackFrames together = TrackFrames::any);

@@ -19,17 +19,17 @@ constexpr std::size_t sift_bytes = 128;
 constexpr std::size_t orb_bytes = 32;
 constexpr double sift_scale = 512.0;  // square-rooted SIFT of unit length in bytes, as in most uses
 
-// OpenCV's SIFT doubles the picture about its corner, not about its first pixel's center, and
-// halves the places of features again: they lie a quarter of a pixel too far right and down.
+// OpenCV's SIFT upsamples the image about its corner, not about the center of its first pixel.
+// Detected positions are a quarter of a pixel too far right and down.
 constexpr float sift_offset_px = 0.25F;
 
-// Features are found in pictures of at most 4 megapixels: SIFT, which doubles them first, takes
-// some 240 bytes for each pixel. Larger ones are halved, and give the octaves that are left.
+// Images are halved to at most 4 megapixels for detection, because SIFT doubles the image first and
+// needs about 240 bytes per pixel. Larger images lose the finest octaves.
 constexpr std::size_t max_detection_pixels = std::size_t{1} << 22;
 constexpr std::uint64_t detection_bytes = 240;
-constexpr std::uint64_t frame_bytes = 40;  // a pixel's share of the planes, and of the gray picture
+constexpr std::uint64_t frame_bytes = 40;  // per pixel, for the planes and the gray image
 
-// OpenCV runs on our threads alone while this lives.
+// Disables OpenCV's own threads during its lifetime.
 class SingleThreadedOpenCv {
  public:
   SingleThreadedOpenCv() : threads_(cv::getNumThreads()) { cv::setNumThreads(1); }
@@ -70,9 +70,9 @@ void detect_in(const cv::Mat& gray, const FeatureOptions& options,
 }
 
 struct Detection {
-  std::vector<cv::KeyPoint> points;  // in the picture as it came
+  std::vector<cv::KeyPoint> points;  // in pixels of the full image
   cv::Mat descriptors;
-  double scale = 1.0;  // of the picture to the one in which they were found
+  double scale = 1.0;  // size of the full image relative to the image used for detection
 };
 
 Detection detect(const cv::Mat& gray, const FeatureOptions& options) {
@@ -82,7 +82,7 @@ Detection detect(const cv::Mat& gray, const FeatureOptions& options) {
   Detection found;
   detect_in(halved, options, found.points, found.descriptors);
   if (halved.size() == gray.size()) return found;
-  // An odd row or column more makes pixels of a little more than 2.
+  // With an odd number of rows or columns, the scale is slightly above 2.
   const float x_scale = static_cast<float>(gray.cols) / static_cast<float>(halved.cols);
   const float y_scale = static_cast<float>(gray.rows) / static_cast<float>(halved.rows);
   const float scale = std::sqrt(x_scale * y_scale);
@@ -112,10 +112,10 @@ void append_descriptor(const cv::Mat& descriptors, int row, FrameFeatures& frame
   }
 }
 
-// The plane at the pixel of a depth camera through which the ray goes, carried to the ray.
+// Intersection of a ray with the plane at the depth pixel it passes through.
 struct DepthAtRay {
   double depth_m = 0.0;
-  double per_pixel = 0.0;  // how fast the depth changes, m/px
+  double per_pixel = 0.0;  // slope of the depth, m/px
   int support = 0;
 };
 
@@ -197,14 +197,14 @@ FoundFeatures features_of(const ScanSource& scan, int node, const FeatureOptions
   return result;
 }
 
-// Of the first frame that has any.
+// Cameras of the first frame that has any.
 std::vector<Camera> cameras_of(const ScanSource& scan, const std::vector<int>& nodes) {
   for (const int node : nodes) {
     try {
       const RgbdFrame frame = scan.read_frame(node, {.color = false, .depth = false});
       if (!frame.cameras.empty()) return frame.cameras;
     } catch (const Error&) {
-      // Reported when its pictures are read.
+      // Reported when its images are read.
     }
   }
   return {};
@@ -220,26 +220,28 @@ void keep_descriptors(const std::shared_ptr<TempFile>& file, FrameFeatures& fram
 
 void bind(ParameterTable& table, FeatureOptions& options) {
   table.add("features", options.type, {{"sift", FeatureType::sift}, {"orb", FeatureType::orb}},
-            "kind of features");
-  table.add("max_features", options.max_features, {1, 100000}, "features a picture, at most");
+            "type of image features");
+  table.add("max_features", options.max_features, {1, 100000},
+            "maximum number of features per image");
   table.add("min_contrast", options.min_contrast, positive,
-            "least contrast of a SIFT feature, of 1");
+            "minimum contrast of a SIFT feature, for image values from 0 to 1");
   table.add("pixel_noise_px", options.pixel_noise_px, positive,
-            "standard deviation of a feature's place at the finest scale");
+            "standard deviation of a feature's image position at the finest scale");
   table.add("scale_noise", options.scale_noise, not_negative,
-            "what each pixel of a feature's size adds to that, px a px");
+            "standard deviation of a feature's position per pixel of its size, px/px");
   table.add("surface_noise_m", options.surface_noise_m, not_negative,
-            "standard deviation of fitted depth that more pixels do not lessen");
+            "standard deviation of fitted depth that does not decrease with more pixels");
   table.add("surface_step_px", options.surface_step_px, {1, 32},
             "step of the grid to which depth images are downsampled");
-  table.add("min_depth_m", options.planes.min_depth_m, positive, "nearer depths are left out");
-  table.add("max_depth_m", options.planes.max_depth_m, positive, "farther depths are left out");
+  table.add("min_depth_m", options.planes.min_depth_m, positive, "nearer measurements are dropped");
+  table.add("max_depth_m", options.planes.max_depth_m, positive,
+            "farther measurements are dropped");
   table.add("axial_noise_m", options.planes.noise.axial_m, positive,
             "standard deviation of depth at range 0");
   table.add("range_noise", options.planes.noise.axial_of_range, not_negative,
-            "what each meter of range adds to it, m a m");
+            "standard deviation of depth added by each meter of range, m/m");
   table.add("square_noise", options.planes.noise.axial_of_square, not_negative,
-            "what range squared adds to it, as of stereo and structured light, 1/m");
+            "standard deviation of depth per squared range (stereo, structured light), 1/m");
 }
 
 Eigen::Vector3d FrameFeatures::point_in_camera(std::size_t n) const {

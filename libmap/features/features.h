@@ -1,6 +1,5 @@
-// What the poses of a scan are estimated from: the features of each frame's pictures with the depth
-// behind them, and its depth downsampled to a grid of planes. Frames are read one by one; a few
-// hundred kilobytes of each are kept.
+// Inputs of pose estimation: image features with depth, and depth images downsampled to a grid of
+// planes. Frames are read one by one. Each needs a few hundred kilobytes of memory afterwards.
 #pragma once
 
 #include <Eigen/Core>
@@ -25,77 +24,77 @@ namespace libmap {
 // et al. 2011).
 enum class FeatureType { sift, orb };
 
-// Of one feature's descriptor.
+// Size of one descriptor in bytes.
 std::size_t descriptor_bytes(FeatureType type);
 
 struct FeatureOptions {
   FeatureType type = FeatureType::sift;
-  int max_features = 800;         // >= 1: of a camera, the strongest
-  double min_contrast = 0.02;     // > 0: SIFT's, of a picture with values from 0 to 1
-  double pixel_noise_px = 0.15;   // > 0: of a feature's place in the picture, at the finest scale
-  double scale_noise = 0.06;      // >= 0: ... and what each pixel of its size adds (squared), px/px
-  double surface_noise_m = 5e-4;  // >= 0: of a fitted plane's depth, whatever the number of pixels
-  int surface_step_px = 3;        // 1 to 32: of the grid of planes, at least
-  DepthPlaneOptions planes{};     // of the depth images
-  // Not bound, for long scans: of all frames' surfaces; and frames whose descriptors are in memory,
-  // those of more are on disk beside the cache.
+  int max_features = 800;         // >= 1: per image, the strongest are kept
+  double min_contrast = 0.02;     // > 0: of SIFT, for image values from 0 to 1
+  double pixel_noise_px = 0.15;   // > 0: deviation of a feature's position at the finest scale
+  double scale_noise = 0.06;      // >= 0: deviation per pixel of feature size, added in squares
+  double surface_noise_m = 5e-4;  // >= 0: part of a plane's deviation that averaging leaves
+  int surface_step_px = 3;        // 1 to 32: minimum step of the grid of planes
+  DepthPlaneOptions planes{};     // planes of the depth images
+  // Not bound, for long scans: memory of the surfaces of all frames.
   std::size_t max_surface_bytes = std::size_t{256} << 20U;
-  std::size_t max_frames_in_memory = 300;
+  std::size_t max_frames_in_memory = 300;  // not bound; with more, descriptors are stored on disk
 };
 void bind(ParameterTable& table, FeatureOptions& options);
 
-// The step of the grid with which the surfaces of so many frames with these cameras' pictures take
-// at most max_surface_bytes: 32 if none does.
+// Smallest grid step (px), at least surface_step_px, for which the surfaces of `frames` frames with
+// these cameras need at most max_surface_bytes; 32 if no step suffices.
 int surface_step(std::size_t frames, const std::vector<Camera>& cameras,
                  const FeatureOptions& options);
 
 struct Feature {
-  Eigen::Vector2f ray = Eigen::Vector2f::Zero();  // x/z and y/z in its camera
-  float depth_m = 0.0F;                           // of the plane through its pixel, > 0
-  float depth_noise_m = 0.0F;                     // standard deviations
-  float pixel_noise_px = 0.0F;
+  Eigen::Vector2f ray = Eigen::Vector2f::Zero();  // x/z and y/z in the camera's optical frame
+  float depth_m = 0.0F;                           // depth of the plane at the pixel, > 0
+  float depth_noise_m = 0.0F;                     // standard deviation
+  float pixel_noise_px = 0.0F;                    // standard deviation
   std::uint16_t camera = 0;
 };
 
 struct FrameFeatures {
   int node = 0;
-  double stamp_s = 0.0;         // of the pictures
+  double stamp_s = 0.0;         // time of the color images
   double depth_later_s = 0.0;   // RgbdFrame::depth_later_s
   std::vector<Camera> cameras;  // of the color images
   std::vector<Feature> features;
   FeatureType type = FeatureType::sift;
-  std::vector<std::uint8_t> descriptors;  // 128 (SIFT) or 32 (ORB) bytes a feature; may be dropped
-                                          // when all that look alike has been found
-  std::shared_ptr<const TempFile> descriptor_file;  // where they are instead, if any
-  std::uint64_t descriptors_begin = 0;              // in it
-  std::vector<DepthSurface> surfaces;               // one a camera
-  std::size_t without_depth = 0;                    // features that were dropped for it
+  // 128 (SIFT) or 32 (ORB) bytes per feature; may be dropped after the search for similar frames.
+  std::vector<std::uint8_t> descriptors;
+  std::shared_ptr<const TempFile> descriptor_file;  // contains the descriptors instead, if set
+  std::uint64_t descriptors_begin = 0;              // byte offset in descriptor_file
+  std::vector<DepthSurface> surfaces;               // one per camera
+  std::size_t without_depth = 0;                    // features dropped for lack of depth
 
-  // Where feature n lies by its depth, in its camera's optical frame; in the frame of the base.
+  // Position of feature n from its ray and depth, in the camera's optical frame or the base frame.
   Eigen::Vector3d point_in_camera(std::size_t n) const;
   Eigen::Vector3d point_in_base(std::size_t n) const;
 };
 
 struct FeatureResult {
   std::vector<FrameFeatures> frames;           // by ascending node
-  std::vector<std::pair<int, Error>> skipped;  // node and what it lacks
-  std::size_t from_cache = 0;                  // frames
+  std::vector<std::pair<int, Error>> skipped;  // node and reason
+  std::size_t from_cache = 0;                  // number of frames
 };
 
 class FeatureCache;
 
-// The frames of `nodes`. The same for any number of threads, with a cache and without. Frames that
-// cannot be read, or have no depth, are listed and left out; a frame without color has surfaces
-// only. Throws Error for options out of their ranges.
+// Finds the features of `nodes`. The result does not depend on the number of threads or the cache.
+// Frames that cannot be read or have no depth are in `skipped`. A frame without color has surfaces
+// only. Throws Error: options out of their ranges.
 FeatureResult find_features(const ScanSource& scan, const std::vector<int>& nodes,
                             const FeatureOptions& options = {}, Progress& progress = no_progress(),
                             const FeatureCache* cache = nullptr);
 
-// The features of one picture with its depth, without surfaces.
+// Appends the features of one image to `frame`; their camera is the last one of frame.cameras.
 void add_features(const CameraView& view, const DepthPlanes& planes, const FeatureOptions& options,
                   FrameFeatures& frame);
 
-// One unit vector a column; their products order as the descriptors' likeness does.
+// Descriptors as unit vectors, one column per feature; their products measure similarity. Throws
+// Error if the descriptor file cannot be read.
 Eigen::MatrixXf descriptor_vectors(const FrameFeatures& frame);
 
 }  // namespace libmap

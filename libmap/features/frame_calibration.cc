@@ -8,11 +8,11 @@ namespace libmap {
 
 namespace {
 
-constexpr double plane_radius_px = 3.0;    // of the disc that it is fitted to
-constexpr double unmeasured_share = 0.01;  // of the nearest and of the farthest depths
+constexpr double plane_radius_px = 3.0;    // of the disc that a plane is fitted to
+constexpr double unmeasured_share = 0.01;  // of the depths, ignored at either end of the range
 
-// The plane of depth that a feature's ray meets if the depth's camera is at `color_from_depth`;
-// false where there is none.
+// Finds the depth plane that a feature's ray intersects if the depth camera is at
+// `color_from_depth`. Returns false if there is none.
 bool plane_at(const FrameFeatures& frame, const Feature& feature, const Pose& color_from_depth,
               SurfacePatch& element) {
   if (feature.camera >= frame.surfaces.size()) return false;
@@ -23,7 +23,7 @@ bool plane_at(const FrameFeatures& frame, const Feature& feature, const Pose& co
   const Pose from_seen = seen_from.inverse();
   const Eigen::Vector3d ray = feature.ray.cast<double>().homogeneous();
   double depth = static_cast<double>(feature.depth_m);
-  // Where the ray meets the plane is where the plane is to be looked for.
+  // The lookup needs the intersection of ray and plane, which is found by iteration.
   for (int round = 0; round < 4; ++round) {
     if (!surface.met_at(from_seen * (depth * ray), element)) return false;
     element.point = seen_from * element.point;
@@ -95,7 +95,7 @@ void correct_depth(FrameFeatures& frame, const std::vector<DepthCorrection>& cor
   }
 }
 
-// Of each feature: how far the camera moves from the frame's time to that of the feature's row.
+// Motion of the camera from the frame's time to the exposure of each feature's row.
 std::vector<Pose> row_motions(const FrameFeatures& frame, const SensorCalibration& calibration) {
   const auto motion = calibration.motion.find(frame.node);
   if (calibration.timing.empty() || motion == calibration.motion.end()) return {};
@@ -111,7 +111,7 @@ std::vector<Pose> row_motions(const FrameFeatures& frame, const SensorCalibratio
 
 void move_surfaces(FrameFeatures& frame, const std::vector<IntrinsicsStep>& steps) {
   for (std::size_t n = 0; n < frame.surfaces.size(); ++n) {
-    // The depth image may have another size than the picture.
+    // The depth image may differ in size from the color image.
     const Camera& depth_camera = frame.surfaces[n].camera();
     IntrinsicsStep step = steps[n];
     step.cx_px *= static_cast<double>(depth_camera.width) / frame.cameras[n].width;
@@ -147,7 +147,7 @@ FrameFeatures calibrated_features(const FrameFeatures& frame,
   result.depth_later_s = frame.depth_later_s;
   result.cameras = frame.cameras;
   result.features = frame.features;
-  // By pixels, which the stored camera made of the features' rays.
+  // Pixels are those of the stored camera.
   const std::vector<Pose> motions = row_motions(frame, calibration);
   if (!calibration.color_from_depth.empty() || !motions.empty())
     for (Feature& its : result.features) {
@@ -181,7 +181,7 @@ void calibrate(FrameFeatures& frame, const SensorCalibration& calibration) {
   for (std::size_t n = 0; n < std::min(frame.surfaces.size(), calibration.depth.size()); ++n)
     frame.surfaces[n].correct(calibration.depth[n]);
   if (!calibration.intrinsics.empty()) move_surfaces(frame, calibration.intrinsics);
-  // In their places: callers keep references to them.
+  // Copied in place, because callers keep references to the elements.
   std::copy(calibrated.features.begin(), calibrated.features.end(), frame.features.begin());
   std::copy(calibrated.cameras.begin(), calibrated.cameras.end(), frame.cameras.begin());
 }
@@ -221,8 +221,8 @@ Pose color_from_depth_of(const FrameFeatures& frame, const Feature& feature,
   return moved(Pose::Identity(), later_s * motion_in_camera(camera, motion->second)) * pose;
 }
 
-// The plane n p = h turned by w and shifted by t about the color camera is met by the ray r at
-// z = (h + n t) / (n r + w (n x r)).
+// The ray r intersects the plane n p = h, rotated by w and translated by t about the color camera,
+// at z = (h + n t) / (n r + w (n x r)).
 RegisteredDepth registered_depth(const FrameFeatures& frame, const Feature& feature,
                                  const Pose& color_from_depth) {
   SurfacePatch before;
@@ -231,9 +231,9 @@ RegisteredDepth registered_depth(const FrameFeatures& frame, const Feature& feat
   if (!plane_at(frame, feature, Pose::Identity(), before) ||
       !plane_at(frame, feature, color_from_depth, element))
     return depth;
-  // Of a small shift in the depth image, by how much the plane that the ray meets changes: features
-  // know their depth a little better than the grid of planes does. Planes further apart are of
-  // other pixels, and the noise of both would add up.
+  // For a small shift in the depth image, only the difference of both planes is added, since a
+  // feature's own depth is more accurate than the grid. Planes at a larger shift share no pixels,
+  // and the noise of both would add up.
   const Camera& camera = frame.cameras[feature.camera];
   const Eigen::Vector2d shift =
       (color_from_depth.inverse() * element.point).hnormalized() - before.point.hnormalized();

@@ -1,4 +1,4 @@
-// What a frame's features and surfaces are when its cameras are others than the stored ones.
+// Recomputes a frame's features and surfaces for a changed camera calibration.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,29 +13,29 @@
 
 namespace libmap {
 
-// Steps away from a camera's own.
+// Change of a camera's intrinsics.
 struct IntrinsicsStep {
-  double fx_share = 0.0;  // of fx
-  double fy_share = 0.0;
+  double fx_share = 0.0;  // relative to fx
+  double fy_share = 0.0;  // relative to fy
   double cx_px = 0.0;
   double cy_px = 0.0;
 };
 
-// When a camera takes what it stores as one frame. Rows of a picture are exposed one after the
-// other, the middle row at the time of the frame's pose; depth is taken at one moment.
+// Times of exposure within a frame. Image rows are exposed one after the other, the middle row at
+// the time of the frame's pose. All depth is measured at one time.
 struct CameraTiming {
-  double depth_delay_s = 0.0;  // depth after the picture's middle row, beyond what the stamps of
-                               // both say (FrameFeatures::depth_later_s)
-  double rolling_shutter_s = 0.0;  // from the first to the last row of the picture
+  double depth_delay_s = 0.0;      // delay of the depth relative to the middle image row, in
+                                   // addition to FrameFeatures::depth_later_s
+  double rolling_shutter_s = 0.0;  // time from the first to the last image row
 };
 
-// How cameras differ from the stored ones, of each camera of the rig; empty: they do not.
+// Differences from the stored calibration, one element per camera of the rig. Empty: no difference.
 struct SensorCalibration {
   std::vector<IntrinsicsStep> intrinsics{};
   std::vector<DepthCorrection> depth{};
-  std::vector<Pose> color_from_depth{};  // where registered depth was taken from
+  std::vector<Pose> color_from_depth{};  // true pose of the depth camera of registered depth
   std::vector<CameraTiming> timing{};
-  // With timing only: how the base moves at each node, in its own frame: m/s, rad/s.
+  // With timing only: velocity of the base by node, in the base frame, m/s and rad/s.
   std::map<int, Vector6d> motion{};
 
   bool empty() const {
@@ -43,47 +43,50 @@ struct SensorCalibration {
   }
 };
 
-// The frame as if it had been recorded with the calibration: features and surfaces.
+// Applies the calibration to the features, surfaces and cameras of a frame.
 void calibrate(FrameFeatures& frame, const SensorCalibration& calibration);
 
-// The frame as if its depth camera had another noise.
+// Rescales the depth noise of features and surfaces from the model `before` to `after`.
 void set_depth_noise(FrameFeatures& frame, const DepthNoise& before, const DepthNoise& after);
 
-// Its cameras and features alone, without surfaces and descriptors.
+// Calibrated copy of the frame's cameras and features, without surfaces and descriptors.
 FrameFeatures calibrated_features(const FrameFeatures& frame, const SensorCalibration& calibration);
 
-// The camera with the step.
+// Returns the camera with changed intrinsics.
 Camera moved(Camera camera, const IntrinsicsStep& step);
 
-// Where the feature is in its image, as DepthCorrection takes it; and its row, from -0.5 (first) to
-// 0.5 (last), of which the picture's exposure is a part of CameraTiming::rolling_shutter_s late.
+// Squared image radius of a feature, as squared_image_radius.
 double squared_radius_of(const Feature& feature, const Camera& camera);
+// Image row of a feature from -0.5 (first row) to 0.5 (last row). The row is exposed this share of
+// CameraTiming::rolling_shutter_s after the middle row.
 double row_share_of(const Feature& feature, const Camera& camera);
 
-// The motion of the base as the camera has it.
+// Converts a velocity of the base (base frame) to that of the camera (optical frame).
 Vector6d motion_in_camera(const Camera& camera, const Vector6d& base_motion);
-// Where registered depth is taken from, seen from the color camera when it sees the feature.
+// Pose of the depth camera relative to the color camera at the exposure of the feature.
 Pose color_from_depth_of(const FrameFeatures& frame, const Feature& feature,
                          const SensorCalibration& calibration);
 
-// The depth of a feature if depth is taken from `color_from_depth`: what is added to that of the
-// stored registration, and by a small step (rigid_motion.h) of the color camera's view of it. Not
-// known, and 0, where there is no plane behind it: its depth is then of something else.
+// Change of a feature's depth if the depth camera is at `color_from_depth` instead of the stored
+// registration, and its derivative by the step s in moved(Pose::Identity(), s) * color_from_depth
+// (rigid_motion.h). Unknown, with zeros, if there is no plane at the feature, whose depth is then
+// that of another surface.
 struct RegisteredDepth {
   bool known = false;
   double added_m = 0.0;
   Vector6d by_step = Vector6d::Zero();
 };
-inline constexpr float unknown_depth_m = 1.0F;  // standard deviation then
+inline constexpr float unknown_depth_m = 1.0F;  // standard deviation of an unknown depth
 RegisteredDepth registered_depth(const FrameFeatures& frame, const Feature& feature,
                                  const Pose& color_from_depth);
-// Whether there is a plane behind it by the stored registration; at edges there is none.
+// True if there is a plane at the feature with the stored registration; false at edges.
 bool has_plane(const FrameFeatures& frame, const Feature& feature);
 
-// Whether coefficients of the one are those of the other.
+// True if both splines have the same knots, so that coefficients can be exchanged.
 bool has_same_knots(const DepthCorrection& a, const DepthCorrection& b);
 
-// No correction yet: knots for the depths of the features of each camera.
+// Zero corrections, one per camera, with knots over the depths of the camera's features at a
+// distance of at most `knot_m` (100 intervals or fewer). Empty for a camera without a depth range.
 std::vector<DepthCorrection> corrections_for(const std::vector<FrameFeatures>& frames,
                                              std::size_t cameras, double knot_m);
 

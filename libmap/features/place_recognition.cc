@@ -12,7 +12,7 @@ namespace libmap {
 
 namespace {
 
-// The nearest column of `words` to each column of `vectors`; all of unit length.
+// Index of the most similar column of `words` for each column of `vectors`; all are unit vectors.
 std::vector<int> quantize(const Eigen::MatrixXf& vectors, const Eigen::MatrixXf& words) {
   constexpr Eigen::Index block = 256;
   std::vector<int> nearest(static_cast<std::size_t>(vectors.cols()), 0);
@@ -87,7 +87,7 @@ std::vector<Bag> bags_of(const std::vector<FrameFeatures>& frames, const Eigen::
   for (Bag& bag : bags) {
     double square = 0.0;
     for (auto& [word, count] : bag) {
-      // Smoothed, so that words that all frames hold count a little.
+      // Smoothed, so that words that occur in all frames keep a small weight.
       count *= std::log(1.0 + all / frames_with[word]);
       square += count * count;
     }

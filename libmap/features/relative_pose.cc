@@ -18,7 +18,7 @@ namespace {
 
 constexpr int max_steps = 20;
 
-// The best match of each column of `from` among those of `to`, or -1.
+// Index of the best row for each column, or -1 if none passes the ratio test.
 std::vector<int> best_matches(const Eigen::MatrixXf& likeness, double max_ratio) {
   std::vector<int> best(static_cast<std::size_t>(likeness.cols()), -1);
   const auto limit = static_cast<float>(max_ratio * max_ratio);
@@ -36,7 +36,7 @@ std::vector<int> best_matches(const Eigen::MatrixXf& likeness, double max_ratio)
         second = value;
       }
     }
-    // |x - y|^2 = 2 - 2 x.y of unit vectors, but for rounding.
+    // |x - y|^2 = 2 - 2 x.y for unit vectors; max() covers rounding.
     const float best_square = std::max(0.0F, 1.0F - first);
     const float next_square = std::max(0.0F, 1.0F - second);
     if (place >= 0 && (max_ratio >= 1.0 || best_square < limit * next_square))
@@ -60,7 +60,7 @@ Pose motion_of(const std::array<const PointPair*, 3>& pairs) {
   return Pose(align_points(b, a, false));
 }
 
-// Three points that three others can be, as a rigid body.
+// True if the triangles in a and b have equal side lengths within `slack_m`.
 bool is_congruent(const std::array<const PointPair*, 3>& pairs, double slack_m) {
   for (int n = 0; n < 3; ++n) {
     const PointPair& p = *pairs[static_cast<std::size_t>(n)];
@@ -124,7 +124,7 @@ class RelativePoseEstimate {
 };
 
 bool RelativePoseEstimate::sample(std::uint64_t seed) {
-  // Motions of three points are rougher than of all: within three times the deviations.
+  // A motion from three points is less accurate than from all: three times the deviations.
   const double wide = 9.0 * options_.max_chi_square / 3.0;
   constexpr double slack_m = 0.03;
   std::vector<PointPair> pairs;
@@ -148,7 +148,7 @@ bool RelativePoseEstimate::sample(std::uint64_t seed) {
     if (inliers.size() <= inliers_.size()) continue;
     inliers_ = std::move(inliers);
     pose_ = motion;
-    // Congruent triples are true more often than single matches are: this stops late.
+    // Congruent triples are correct more often than single matches, so this stops late.
     const double share = static_cast<double>(inliers_.size()) / static_cast<double>(pairs.size());
     needed = std::max(20.0, std::log(1e-4) / std::log(1.0 - std::pow(share, 3) + 1e-12));
   }
@@ -195,7 +195,7 @@ double RelativePoseEstimate::spread() const {
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
   const double count = static_cast<double>(inliers_.size());
   const auto ray = [&](std::size_t n) -> Eigen::Vector2d {
-    // By the point's place in the base, so that several cameras count together.
+    // From the position in the base frame, so that several cameras are evaluated together.
     const Eigen::Vector3d point = a_.point_in_base(static_cast<std::size_t>(matches_[n].a));
     const Camera& camera = a_.cameras.front();
     const Eigen::Vector3d seen = camera.base_from_camera.inverse() * point;
@@ -245,7 +245,7 @@ MatchResidual match_residual(const FrameFeatures& a, const FrameFeatures& b,
                                         in_a.ray.cast<double>(), static_cast<double>(in_a.depth_m));
   result.residual = projection.residual;
   const Eigen::Matrix3d rotation = camera_from_base.linear() * a_from_b.linear();
-  // Noise of b's point: across its ray by the pixel, along it by the depth.
+  // Noise of b's point: pixel noise perpendicular to its ray, depth noise along it.
   const double lateral =
       static_cast<double>(in_b.depth_m) * static_cast<double>(in_b.pixel_noise_px) / camera_b.fx;
   const Eigen::Vector3d ray_in_b = in_b.ray.cast<double>().homogeneous();

@@ -1,4 +1,4 @@
-// The motion between two frames by their features.
+// Relative pose of two frames, estimated from their features.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,26 +11,25 @@
 namespace libmap {
 
 struct FeatureMatch {
-  int a = 0;  // number of the feature in the one frame
-  int b = 0;  // ... and in the other
+  int a = 0;  // index of the feature in frame a
+  int b = 0;  // index of the feature in frame b
   bool operator==(const FeatureMatch&) const = default;
 };
 
-// Features that are each other's most alike and clearly more so than the next: the distance of the
-// descriptors is at most `max_ratio` of that of the second best (Lowe 2004). `a` and `b` hold
-// descriptor_vectors. By ascending a.
+// Mutual nearest neighbors whose descriptor distance is less than `max_ratio` times that of the
+// second nearest (Lowe 2004), by ascending a. `a` and `b` are descriptor_vectors.
 std::vector<FeatureMatch> match_features(const Eigen::MatrixXf& a, const Eigen::MatrixXf& b,
                                          double max_ratio);
 
-// How far a feature of b, carried to a by `a_from_b`, lies from its match: x and y in pixels, depth
-// in meters, and the covariance of the three from the noise of both.
+// Residual of a feature of b, transformed to a by `a_from_b`, against its match: x and y (px),
+// depth (m), and their covariance from the noise of both features.
 struct MatchResidual {
-  bool in_front = false;
+  bool in_front = false;  // of the camera in a; if false, the residual is not set
   Eigen::Vector3d residual = Eigen::Vector3d::Zero();
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();
   Eigen::Matrix<double, 3, 6> jacobian;  // by a step of a_from_b (rigid_motion.h)
 
-  double chi_square() const;  // squared Mahalanobis length, 3 degrees of freedom
+  double chi_square() const;  // squared Mahalanobis distance, 3 degrees of freedom
 };
 MatchResidual match_residual(const FrameFeatures& a, const FrameFeatures& b,
                              const FeatureMatch& match, const Pose& a_from_b,
@@ -39,12 +38,12 @@ MatchResidual match_residual(const FrameFeatures& a, const FrameFeatures& b,
 struct RelativePoseOptions {
   int ransac_iterations = 400;     // >= 1
   int min_inliers = 25;            // >= 6
-  double min_inlier_share = 0.25;  // of the matches
-  double max_chi_square = 14.16;   // of a match's three residuals: 99.7 % of true ones are below
-  double min_spread = 0.06;        // across the inliers' least extent, of the focal length
+  double min_inlier_share = 0.25;  // >= 0: minimum share of the matches
+  double max_chi_square = 14.16;   // of a match's three residuals; 99.7 % of true matches are below
+  double min_spread = 0.06;        // of RelativePose::spread
 };
 
-// Why a pair has no relative pose, or that it has.
+// Outcome of the estimation. degenerate: the inliers are in one spot or on one line of the image.
 enum class RelativePoseOutcome {
   found,
   too_few_matches,
@@ -56,16 +55,16 @@ enum class RelativePoseOutcome {
 struct RelativePose {
   RelativePoseOutcome outcome = RelativePoseOutcome::too_few_matches;
   Pose a_from_b = Pose::Identity();
-  // Of a step of a_from_b: J^T W J, divided by chi_square_per_freedom where that is above 1.
+  // Information of a step of a_from_b: J^T W J / max(1, chi_square_per_freedom).
   Matrix6d information = Matrix6d::Zero();
   double chi_square_per_freedom = 0.0;
-  double spread = 0.0;  // standard deviation of the inliers' rays along their narrow axis, twice
+  double spread = 0.0;  // twice the standard deviation of the inliers' rays along the narrow axis
   std::vector<FeatureMatch> inliers;
 };
 
 // Seeded RANSAC over the rigid motions of three matched points (Fischler and Bolles 1981; Umeyama
-// 1991), then least squares of match_residual over all inliers, which are chosen anew in each step
-// (Gauss-Newton).
+// 1991), then Gauss-Newton over the match_residual of the inliers, which are selected again in each
+// step. a_from_b is valid only if `outcome` is found.
 RelativePose estimate_relative_pose(const FrameFeatures& a, const FrameFeatures& b,
                                     const std::vector<FeatureMatch>& matches,
                                     const RelativePoseOptions& options, std::uint64_t seed);

@@ -10,10 +10,10 @@ namespace libmap {
 
 namespace {
 
-constexpr int patch_cells = 6;  // wider than the discs that planes are fitted to
+constexpr int patch_cells = 6;  // larger than the discs that planes are fitted to
 constexpr std::uint64_t every_patch = 10;
 
-// Other patches in each frame.
+// The patches differ between frames.
 bool is_for_checks(int node, std::size_t camera, int row, int column) {
   const std::uint64_t frame =
       mix_bits(static_cast<std::uint64_t>(node), static_cast<std::uint64_t>(camera));

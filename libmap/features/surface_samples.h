@@ -1,4 +1,4 @@
-// Samples of a frame's surfaces, in its base.
+// Samples of a frame's surfaces, in the base frame.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,22 +8,22 @@
 
 namespace libmap {
 
+// Plane element in the base frame (m).
 struct BaseElement {
   Eigen::Vector3d point = Eigen::Vector3d::Zero();
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
   double noise_m = 0.0;  // standard deviation along the normal
-  double range_m = 0.0;  // along the optical axis
+  double range_m = 0.0;  // depth along the optical axis
 };
 
-// One in ten patches of each depth image serves for checks alone: no pose is estimated from what it
-// shows.
+// One in ten patches of each depth image is held out for checks and never used for estimation.
 enum class SampleUse { estimation, checks };
 
-// About `count` elements, evenly over the pictures.
+// Returns about `count` elements, evenly distributed over the images.
 std::vector<BaseElement> surface_samples(const FrameFeatures& frame, int count, SampleUse use);
 
-// The element of the frame's surfaces that lies where its cameras see the point; false where none
-// does.
+// Finds the element at the projection of the point, in the first camera that has one. Returns false
+// if there is none.
 bool seen_from_base(const FrameFeatures& frame, const Eigen::Vector3d& point_in_base,
                     BaseElement& element);
 

@@ -26,22 +26,22 @@ namespace libmap {
 
 namespace {
 
-// Frames whose coarse surfaces are made side by side.
+// Number of frames whose coarse surfaces are made in parallel.
 constexpr std::size_t frames_in_flight = 8;
-// What one pixel takes while its frame is made into a coarse surface.
+// Memory per pixel while a frame is made into a coarse surface.
 constexpr std::uint64_t coarse_pixel_bytes = 60;
-// Elements, about, by which frames are registered: so many, or so many for each frame.
+// Approximate number of elements for registration: the larger of a total and a number per frame.
 constexpr std::size_t registration_elements = 20000;
 constexpr std::size_t registration_elements_per_frame = 40;
-// Voxels that are kept for one such element, at most: noise spreads a surface over more than one,
-// and after each downsampling half of them are left.
+// Maximum number of voxels per such element: noise spreads a surface over several voxels, and each
+// downsampling keeps half of them.
 constexpr std::size_t voxels_per_element = 8;
 constexpr unsigned max_thinning = 32;
-// By which frames may lie off the coarse surface when they are first registered.
+// Maximum distance of frames from the coarse surface in the first round of registration.
 constexpr double first_search_voxels = 3.0;
-// Corrections of heights, root mean square, that are not worth another round.
+// Smaller corrections of heights (root mean square) are not applied.
 constexpr double min_correction_voxels = 0.05;
-// Width of the cells in which frames are compared with those before them.
+// Width of the cells in which frames are compared with earlier frames.
 constexpr double coverage_voxels = 8.0;
 
 void check(const DepthFusionOptions& options) {
@@ -54,14 +54,14 @@ void check(const DepthFusionOptions& options) {
 
 std::string node_name(int node) { return "node " + std::to_string(node); }
 
-// What one frame gives to a coarse surface.
+// Contribution of one frame to a coarse surface and the survey.
 struct CoarseFrame {
   SurfaceVoxels::Frame voxels;
   DepthPixelCounts pixels;
-  std::size_t number = 0;      // among the frames
-  FusionFrame frame;           // of the survey
-  FrameCoverage coverage;      // of the survey
-  std::optional<Error> fault;  // of the survey; none: it can be used
+  std::size_t number = 0;      // index of the frame
+  FusionFrame frame;           // survey only
+  FrameCoverage coverage;      // survey only
+  std::optional<Error> fault;  // survey only; none for a usable frame
 };
 
 class Fusion {
@@ -90,7 +90,7 @@ class Fusion {
   DepthFusionResult report() const;
 
  private:
-  // The frames that matter to a tile, and those that are counted in it, by their numbers.
+  // Indices of the frames that affect a tile, and of the frames that are counted in it.
   struct Members {
     std::vector<std::size_t> frames;
     std::vector<std::size_t> counted;
@@ -104,9 +104,9 @@ class Fusion {
 
   Error no_frames(std::size_t poses) const {
     if (survey_.skipped.empty())
-      return Error(poses == 0 ? "no poses to fuse by" : "no frame has depth");
-    return Error("none of " + std::to_string(poses) + " frames can be used, the first because " +
-                 survey_.skipped.front().second.what());
+      return Error(poses == 0 ? "there are no poses" : "no frame has depth");
+    return Error("none of " + std::to_string(poses) +
+                 " frames can be used; the first: " + survey_.skipped.front().second.what());
   }
 
   void skip(int node, const Error& fault) {
@@ -133,8 +133,8 @@ class Fusion {
     return frames;
   }
 
-  // merge(n, make(n, cells)) for each frame in their order: one thread merges the frames before,
-  // while others make these by the cells as they were.
+  // Calls merge(n, make(n, cells)) for each frame in order. One thread merges the previous frames
+  // while others make the next ones.
   template <typename Make, typename Merge>
   void each_frame(std::size_t count, const TileMask& cells, const Make& make, const Merge& merge) {
     std::vector<CoarseFrame> before;
@@ -154,7 +154,7 @@ class Fusion {
     }
   }
 
-  // Adds the planes through the pixels of one frame; of pixels and planes those in `cells`.
+  // Adds the planes of one frame's pixels that are in `cells`.
   void add_frame(const RgbdFrame& depth, const Pose& grid_from_base, const TileMask& cells,
                  FittedPixels fitted, CoarseFrame& coarse) {
     const MemoryBudget::Share share = memory_.take(coarse_pixel_bytes * depth.depth.pixels.size());
@@ -169,7 +169,7 @@ class Fusion {
     coarse.voxels = std::move(voxels).take_frame();
   }
 
-  // What the frame can be used for, how far it reaches, and what it adds to the surface.
+  // Determines the frame's reach and coverage, or the fault that makes it unusable.
   void survey_frame(CoarseFrame& coarse) {
     FusionFrame& frame = coarse.frame;
     const std::shared_ptr<const RgbdFrame> depth = images_.depth_of(frame.node);
@@ -184,7 +184,7 @@ class Fusion {
     return std::max(registration_elements, registration_elements_per_frame * frames);
   }
 
-  // Frames are compared with those before them.
+  // Sorts frames into usable, redundant and skipped ones, comparing each with earlier frames.
   void survey(const std::vector<FusionFrame>& given) {
     progress_->begin("survey", given.size());
     ViewCoverage known;
@@ -215,7 +215,7 @@ class Fusion {
     }
   }
 
-  // The coarse surface in random squares of the plan, by the poses as they are now.
+  // Makes the coarse surface in random squares of the x-y plane, with the present poses.
   void sample_surface() {
     sample_ = {};
     const std::size_t max_voxels = voxels_per_element * wanted_elements(frames().size());
@@ -238,7 +238,7 @@ class Fusion {
     return {options_.disc_radius_voxels * options_.voxel_size_m, search_m};
   }
 
-  // Some of the coarse surface.
+  // Selects elements for registration from the sampled surface, and frees it.
   std::vector<SurfaceElement> registration_elements_of_sample() {
     std::vector<SurfaceElement> elements = surface_elements(sample_, false);
     sample_ = {};
@@ -255,7 +255,7 @@ class Fusion {
     return elements;
   }
 
-  // By what the frames measured of the elements.
+  // Registers the frames by their heights above the selected elements.
   FrameRegistration registration(int round) {
     const std::vector<SurfaceElement> elements = registration_elements_of_sample();
     const SurfaceSearch search = search_within(first_search_voxels * options_.voxel_size_m / round);
@@ -275,7 +275,7 @@ class Fusion {
 
   void register_frames() {
     if (frames().size() < 2) return;
-    // Only color could accept it: depth has been used for the poses.
+    // Refined poses already use depth, so only color can confirm a registration.
     survey_.registration_rejected = options_.refined_poses && !images_.has_color(frames());
     for (int round = 1; round <= options_.registration_rounds && !survey_.registration_rejected;
          ++round) {
@@ -284,7 +284,7 @@ class Fusion {
       const FrameRegistration found = registration(round);
       if (round == 1) survey_.disagreement_before_m = found.disagreement_before_m;
       survey_.disagreement_after_m = found.disagreement_before_m;
-      // Poses that are right stay as they are.
+      // Correct poses remain unchanged.
       if (!(found.correction_m > min_correction_voxels * options_.voxel_size_m)) break;
       std::vector<FusionFrame> moved = frames();
       for (std::size_t n = 0; n < moved.size(); ++n) move(moved[n], found.corrected_from_given[n]);
@@ -303,7 +303,7 @@ class Fusion {
   }
 
   FusionTiling tiling_of(double tile_m) const {
-    // By refinement's gate a height lies within it of its element's plane.
+    // The gate of refinement bounds the distance between a point and its element.
     const SurfaceSearch search = search_within(options_.voxel_size_m);
     const double gate_m = max_gate_m(options_.planes, search);
     double shift_m = 0.0;
@@ -329,16 +329,16 @@ class Fusion {
                         FusionCounts& counts) const;
 
   DepthFusionOptions options_;
-  Progress* progress_;  // of a tile: none
+  Progress* progress_;  // no output while tiles are made
   Trajectory world_from_base_;
   FusionFrames images_;
   MemoryBudget memory_;
   FusionSurvey survey_;
-  TileMask sampled_;  // the part of the coarse surface that frames are registered by
+  TileMask sampled_;  // squares of the x-y plane used for registration
   SurfaceVoxels sample_;
   std::optional<FusionTiling> tiling_;
   std::vector<XyTile> tiles_;
-  std::vector<Members> members_;  // of the tiles
+  std::vector<Members> members_;  // one per tile
   StageTimings timings_s_;
 };
 
@@ -349,7 +349,7 @@ const TrajectoryPose& Fusion::given_pose(int node) const {
   return *given;
 }
 
-// Frames that were left out are corrected as the nearest one by number is that was used.
+// Applies the correction of the used frame with the nearest number to each redundant frame.
 void Fusion::add_redundant_poses(Trajectory& poses) const {
   const Trajectory used = poses;
   for (const int node : survey_.redundant) {
@@ -368,7 +368,7 @@ void Fusion::add_redundant_poses(Trajectory& poses) const {
                    [](const auto& a, const auto& b) { return a.node < b.node; });
 }
 
-// The frames with the poses that they are fused by.
+// Fills the poses and all metrics of the frames.
 DepthFusionResult Fusion::report() const {
   DepthFusionResult result;
   result.redundant_frames = survey_.redundant.size();

@@ -11,7 +11,7 @@ void describe_surface(ResultTable& table, const FusionCounts& counts) {
   table.add("dropped_too_few_views", points.unconfirmed, Merge::sum,
             "elements measured by fewer than min_views frames");
   table.add("dropped_seen_through", points.seen_through, Merge::sum,
-            "elements that views see through");
+            "elements that too many views see through");
   table.add("dropped_missed", points.missed, Merge::sum, "elements where views measured nothing");
   table.add("dropped_beside", points.beside, Merge::sum, "elements connected to contradicted ones");
   table.add("dropped_beyond_edges", points.bent_away, Merge::sum,
@@ -27,42 +27,41 @@ void describe_surface(ResultTable& table, const FusionCounts& counts) {
 
 void bind(ParameterTable& table, DepthFusionOptions& options) {
   DepthPlaneOptions& planes = options.planes;
-  table.add("voxel_size_m", options.voxel_size_m, positive, "one point per voxel of this size");
-  table.add("min_depth_m", planes.min_depth_m, positive, "nearer measurements are dropped");
-  table.add("max_depth_m", planes.max_depth_m, positive, "farther measurements are dropped");
+  table.add("voxel_size_m", options.voxel_size_m, positive, "size of a voxel; one point per voxel");
+  table.add("min_depth_m", planes.min_depth_m, positive, "minimum depth of measurements");
+  table.add("max_depth_m", planes.max_depth_m, positive, "maximum depth of measurements");
   table.add("max_incidence_deg", planes.max_incidence_deg, {0, 89.5, true, false},
-            "measurements more oblique than this to their surface are dropped");
+            "maximum angle between line of sight and surface normal");
   table.add("axial_noise_m", planes.noise.axial_m, positive,
             "standard deviation of depth at range 0");
   table.add("range_noise", planes.noise.axial_of_range, not_negative,
             "standard deviation of depth added by each meter of range, m/m");
   table.add("lateral_noise_px", planes.noise.lateral_px, not_negative,
-            "standard deviation across the line of sight");
+            "standard deviation of measurements across the line of sight");
   table.add("plane_radius_px", planes.radius_px, {1, 7},
-            "disc of pixels that a plane is fitted to");
+            "radius of the disc of pixels that a plane is fitted to");
   table.add("min_pair_share", planes.min_pair_share, zero_to_one,
-            "share of the pairs of opposite pixels around a pixel that must agree with it");
+            "minimum share of the pairs of opposite pixels around a pixel that agree with it");
   table.add("disc_radius_voxels", options.disc_radius_voxels, positive,
-            "disc of the surface whose measurements make a point");
+            "radius of the disc in which measurements are averaged, in voxels");
   table.add("pose_error_m", options.pose_error_m, not_negative,
-            "standard deviation of a whole frame, along a normal");
+            "standard deviation of a whole frame along the surface normal");
   table.add("registration_rounds", options.registration_rounds, {0, 20},
-            "times, at most, that poses are corrected so that frames agree; 0: not at all");
+            "maximum number of rounds of registration of the frames; 0: poses are unchanged");
   table.add("enough_views", options.enough_views, not_negative,
-            "frames are left out that add less than 1/enough_views to what earlier frames measured "
-            "of nearly all their surface; 0: all frames are fused");
+            "skip frames that add less than 1/enough_views to the information of earlier frames "
+            "on nearly all of their surface; 0: all frames are fused");
   table.add("min_views", options.points.min_views, {1},
-            "points that fewer frames measured are dropped");
+            "minimum number of frames that measured a point");
   table.add("max_seen_through", options.points.max_seen_through, not_negative,
-            "points are dropped that are seen through more often, against being seen");
+            "maximum ratio of views that see through a point to views that see it");
   table.add("max_missed", options.points.max_missed, not_negative,
-            "points are dropped where more views that should measure them measure nothing, against "
-            "being seen");
-  table.add("extend_edges", options.extend_edges,
-            "also points one voxel beyond the edges of what was measured");
-  table.add("color", options.color, "colors, blended with the nearest front views ahead");
+            "maximum ratio of views that should measure a point and measure nothing to views that "
+            "see it");
+  table.add("extend_edges", options.extend_edges, "add points one voxel beyond the measured edges");
+  table.add("color", options.color, "add colors, weighted towards near frontal views");
   table.add("stereo", options.stereo, "compute the depth of stereo pairs by semi-global matching");
-  table.add("strict", options.strict, "end with an error if a frame cannot be used");
+  table.add("strict", options.strict, "fail if a frame cannot be used");
 }
 
 void describe(ResultTable& table, const FusionCounts& counts) {
@@ -79,7 +78,7 @@ void describe(ResultTable& table, const DepthFusionResult& result) {
   table.add("registration_rounds", result.registration_rounds,
             "rounds of registration that moved frames");
   table.add("registration_rejected", result.registration_rejected,
-            "whether held-out measurements rejected the registration");
+            "true if held-out measurements rejected the registration");
   const auto add_check = [&](const std::string& kind, const PairCosts& costs) {
     const auto if_measured = [&](double cost) {
       return costs.count > 0 ? std::optional(cost) : std::nullopt;
@@ -96,9 +95,9 @@ void describe(ResultTable& table, const DepthFusionResult& result) {
   table.add("registration_turn_deg", result.registration_turn_deg,
             "rotation of the frames by registration, root mean square");
   table.add("disagreement_before_m", result.disagreement_before_m,
-            "deviation of the heights that frames measured from their mean, with the given poses");
+            "deviation of frames' heights from the mean of all frames, with the given poses");
   table.add("disagreement_after_m", result.disagreement_after_m,
-            "deviation of the heights that frames measured from their mean, after registration");
+            "deviation of frames' heights from the mean of all frames, after registration");
   describe_surface(table, result);
 }
 

@@ -1,7 +1,7 @@
-// The innermost loops of depth_planes over the pixels of one row, each for
-// several instruction sets, with the same bits from each: no pixel depends on those in other lanes.
-// Plain pointers alone: sources that are compiled for more than the base instruction set must see
-// no type whose inline functions other sources compile too.
+// Inner loops of depth_planes over the pixels of one row, for several instruction sets. All sets
+// compute the same bits, because no pixel depends on other lanes. Only plain pointers are used:
+// sources compiled for an extended instruction set must not include types with inline functions
+// that other sources compile too.
 #pragma once
 
 #include <cstddef>
@@ -11,8 +11,8 @@
 
 namespace libmap {
 
-// Rows of `count` pixels are read and written up to the next multiple of `lanes`; only those of
-// depth images end with the last pixel.
+// Functions on rows of `count` pixels. Rows are read and written up to the next multiple of
+// `lanes`, except rows of depth images, which end with the last pixel.
 struct DepthPlaneLoops {
   static constexpr int lanes = 16;
 
@@ -24,33 +24,33 @@ struct DepthPlaneLoops {
     float axial_of_range;
     float axial_of_square;
   };
-  // How many are not measured, and beyond the limits.
+  // Numbers of pixels without depth and outside the limits.
   struct MeasureCounts {
     int unmeasured;
     int out_of_range;
   };
-  // Inverse depth, and how far the mean of two pixels may lie from that between; both 0 where there
-  // is no depth within the limits.
+  // Computes inverse depth and the maximum difference of a pixel from the mean of two opposite
+  // ones; inverse depth is 0 if there is no depth within the limits.
   MeasureCounts (*measure)(const float* depth, int count, const Limits& limits, float* inverse,
                            float* tolerance);
 
   // A pair of opposite pixels.
   struct Offset {
-    std::ptrdiff_t pixels;  // in the image of inverse depths
-    std::int32_t counts;    // 1, and by 2^8 and 2^20 the squares of its columns and rows
-    std::int32_t product;   // columns by rows
+    std::ptrdiff_t pixels;  // offset in the image of inverse depths
+    std::int32_t counts;    // 1 + 2^8 columns^2 + 2^20 rows^2
+    std::int32_t product;   // columns x rows
     float dx;
     float dy;
-    float steepest;  // the difference that slope alone may make, of the inverse depth
+    float steepest;  // maximum difference due to slope, per inverse depth
   };
-  // The plane around each pixel; `support` is 0 where there is none.
+  // Planes around each pixel; `support` is 0 without a plane.
   struct InversePlanes {
     float* value;
     float* by_column;
     float* by_row;
     std::uint8_t* support;
   };
-  // `wanted` marks the pixels whose planes are wanted, not 0; nullptr: all.
+  // Fits planes to the pixels with `wanted` not 0; nullptr: to all pixels.
   void (*fit)(const float* inverse, const float* tolerance, const std::uint8_t* wanted, int count,
               const Offset* offsets, std::size_t offset_count, float min_pairs,
               const InversePlanes& planes);
@@ -58,11 +58,11 @@ struct DepthPlaneLoops {
   struct Rays {
     const float* x;
     const float* y;
-    // From the row above to that below, those of an image at its edge itself.
+    // Offsets of the rows above and below; 0 at the edge of the image.
     std::ptrdiff_t above;
     std::ptrdiff_t below;
   };
-  // The rows of a plane: z on the pixel's ray, normal, cosine of the incidence, and support.
+  // Planes of a row: z on the pixel's ray, normal, cosine of incidence, and support.
   struct Planes {
     float* depth_m;
     float* normal[3];
@@ -90,15 +90,15 @@ struct DepthPlaneLoops {
     float* normal[3];
     float* weight;
   };
-  // Where support is not 0.
+  // Transforms planes with support to the grid.
   void (*place)(const Planes& planes, const float* ray_x, const float* ray_y, int count,
                 const Placement& placement, const Places& places);
-  // Of the depths alone, x and y.
+  // Transforms measured depths to x and y in the grid.
   void (*place_depths)(const float* depth, const float* ray_x, const float* ray_y, int count,
                        const Placement& placement, float* x, float* y);
 };
 
-// Of instructions that the processor has.
+// Returns the loops for an instruction set that the processor has.
 const DepthPlaneLoops& depth_plane_loops_of(InstructionSet instructions);
 
 }  // namespace libmap

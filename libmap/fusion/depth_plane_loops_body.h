@@ -1,5 +1,4 @@
-// The functions of depth_plane_loops.h but for their instruction set; for depth_plane_loops.cc
-// alone.
+// Functions of depth_plane_loops.h, included by depth_plane_loops.cc once per instruction set.
 
 constexpr int width = GRASPMAP_REGISTER / static_cast<int>(sizeof(float));
 
@@ -62,7 +61,7 @@ inline int sum(const Ints& values) {
   return all;
 }
 
-// The lanes of a row of `count` pixels.
+// Lanes with an index below `count`.
 inline Ints lanes_within(int count) {
   Ints lane;
   for (int n = 0; n < width; ++n) lane[n] = n;
@@ -94,7 +93,7 @@ DepthPlaneLoops::MeasureCounts measure(const float* depth, int count,
   return {sum(unmeasured), sum(out_of_range)};
 }
 
-// Doubled sums and differences, slack and gate: the halves are exact.
+// Sums and gates are doubled, because halving is exact.
 inline void fit_some(const float* inverse, const float* tolerance,
                      const DepthPlaneLoops::Offset* offsets, std::size_t offset_count,
                      float min_pairs, const DepthPlaneLoops::InversePlanes& planes) {
@@ -112,7 +111,7 @@ inline void fit_some(const float* inverse, const float* tolerance,
     const Floats b = load<Floats>(inverse - offset.pixels);
     const Floats both = a + b;
     const Floats change = a - b;
-    // Both are measured and agree with the pixel between, within noise and slope.
+    // Both pixels are measured and agree with the center within noise and slope.
     const Ints agrees = (absolute(both - twice) < gate) &
                         (absolute(change) < gate + offset.steepest * center) &
                         ((a < b ? a : b) > 0.0F);
@@ -130,7 +129,7 @@ inline void fit_some(const float* inverse, const float* tolerance,
   const Floats row_square = __builtin_convertvector(reinterpret_cast<Ints>(squares >> 20U), Floats);
   const Floats mixed = __builtin_convertvector(product, Floats);
   const Floats determinant = column_square * row_square - mixed * mixed;
-  // The determinant is a whole number, 0 where all pairs lie on one line.
+  // The determinant is an integer; it is 0 if all pairs are on one line.
   const Ints is_fitted = (center > 0.0F) & (number >= min_pairs) & (determinant >= 0.5F);
   const Floats divisor = is_fitted ? determinant : Floats{} + 1.0F;
   store((center + mean) / (1.0F + 2.0F * number), planes.value);
@@ -156,7 +155,7 @@ void fit(const float* inverse, const float* tolerance, const std::uint8_t* wante
   }
 }
 
-// The rays left and right of pixels, those of an image at its edge itself.
+// Rays left and right of pixels; at the edge of an image, the ray of the edge pixel.
 struct Beside {
   Floats left;
   Floats right;
@@ -215,7 +214,7 @@ DepthPlaneLoops::PlaneCounts finish(const float* inverse,
     const Floats ny = -(b / length);
     const Floats nz = -(c / length);
     const Floats cosine = -(nx * rx + (ny * ry + nz)) / square_root(rx * rx + (ry * ry + 1.0F));
-    // Not where the rays around the pixel have no slope, either.
+    // The comparison is also false for NaN, if the rays around the pixel do not differ.
     const Ints is_used = has_plane & (cosine >= min_cosine);
     used -= is_used;
     flying -= is_measured & ~has_plane;
@@ -254,7 +253,7 @@ void place(const DepthPlaneLoops::Planes& planes, const float* ray_x, const floa
         placement.axial_m + (placement.axial_of_range + placement.axial_of_square * depth) * depth;
     const Floats support = __builtin_convertvector(
         __builtin_convertvector(load<Bytes>(planes.support + x), Ints), Floats);
-    // Front views know lateral places and normals better.
+    // Frontal views determine lateral position and normal better.
     store(load<Floats>(planes.cosine + x) * support / (sigma * sigma), places.weight + x);
   }
 }

@@ -16,9 +16,9 @@ namespace libmap {
 
 namespace {
 
-// Standard deviations within which measurements of one surface lie.
+// Maximum deviation of measurements of one surface, in standard deviations.
 constexpr double gate_sigmas = 3.0;
-// Pixels by which a fitted plane reaches beyond the pixels that it was fitted to.
+// Number of pixels by which fitted planes are extended at the edges of surfaces.
 constexpr int edge_reach_px = 2;
 
 using Loops = DepthPlaneLoops;
@@ -66,7 +66,7 @@ class PlaneFit {
     return static_cast<std::size_t>(y + r) * margin_stride() + static_cast<std::size_t>(x + r);
   }
   float measured(int x, int y) const { return measured_[margin_at(x, y)]; }
-  // Around support are a row above and below, and as many pixels left and right as words have.
+  // `support_` has a margin of one row above and below, and one 64-bit word left and right.
   std::size_t support_stride() const { return stride_ + 2 * sizeof(std::uint64_t); }
   std::size_t support_at(int x, int y) const {
     return static_cast<std::size_t>(y + 1) * support_stride() + sizeof(std::uint64_t) +
@@ -80,7 +80,7 @@ class PlaneFit {
   void take_measurements();
   std::vector<Loops::Offset> pair_offsets() const;
   void fit_pairs();
-  // A pixel at the edge of a surface, and the one whose plane it takes.
+  // A pixel at the edge of a surface, with the adjacent plane that it takes.
   struct Taken {
     std::size_t plane = 0;
     std::size_t support = 0;
@@ -99,14 +99,14 @@ class PlaneFit {
   const Loops& loops_ = depth_plane_loops_of(best_instruction_set());
   int width_;
   int height_;
-  std::size_t stride_;            // of all rows that follow, but for margins
+  std::size_t stride_;            // of all rows below, without margins
   std::vector<float> measured_;   // inverse depth with a margin, 0 where not measured
-  std::vector<float> tolerance_;  // of the mean of a pair against the pixel between
-  // Inverse depth of a pixel's plane and its change by column and row.
+  std::vector<float> tolerance_;  // maximum difference of a pair's mean from the pixel between
+  // Inverse depth of each pixel's plane, and its derivatives by column and row.
   std::unique_ptr<float[]> value_;
   std::unique_ptr<float[]> by_column_;
   std::unique_ptr<float[]> by_row_;
-  std::vector<std::uint8_t> support_;  // with a margin; 0 where there is no plane
+  std::vector<std::uint8_t> support_;  // with a margin; 0 without a plane
   DepthPixelCounts counts_;
 };
 
@@ -118,8 +118,7 @@ void PlaneFit::take_measurements() {
   counts_.pixels = depth_.pixels.size();
   const Loops::Limits limits{
       static_cast<float>(options_.min_depth_m), static_cast<float>(options_.max_depth_m),
-      // The difference of a pixel and the mean of two has 3/2 of the
-      // variance of one.
+      // The difference of a pixel and the mean of two has 3/2 of a pixel's variance.
       static_cast<float>(gate_sigmas * std::sqrt(1.5)), static_cast<float>(options_.noise.axial_m),
       static_cast<float>(options_.noise.axial_of_range),
       static_cast<float>(options_.noise.axial_of_square)};
@@ -141,7 +140,7 @@ void PlaneFit::take_measurements() {
 
 std::vector<Loops::Offset> PlaneFit::pair_offsets() const {
   const int r = options_.radius_px;
-  // The difference that a surface at the greatest incidence makes from pixel to pixel and back.
+  // Maximum difference of opposite pixels on a surface at the maximum incidence.
   const double tangent = std::tan(options_.max_incidence_deg * std::numbers::pi / 180.0);
   const Eigen::Vector2d extent = rays_.max - rays_.min;
   const double pitch =
@@ -157,8 +156,8 @@ std::vector<Loops::Offset> PlaneFit::pair_offsets() const {
   return offsets;
 }
 
-// Marks in `wanted` the pixels that are fitted, four side by side where one of them is asked for.
-// Whether there is any.
+// Marks the pixels to fit in `wanted`: each group of four with a pixel in `only`. Returns true if
+// there are any.
 bool mark_fours(const std::uint8_t* only, int width, std::vector<std::uint8_t>& wanted) {
   bool has_any = false;
   for (int x = 0; x < width; x += 4) {
@@ -188,7 +187,8 @@ void PlaneFit::fit_pairs() {
   }
 }
 
-// Of eight pixels side by side, a byte each: not 0 for those beside a plane, unless all have one.
+// One byte for each of eight adjacent pixels: not 0 if a neighbor has a plane. 0 for all if all
+// eight have planes.
 std::uint64_t PlaneFit::open_pixels(int x, int y) const {
   const auto eight = [&](std::size_t first) {
     std::uint64_t word = 0;
@@ -262,9 +262,9 @@ void PlaneFit::finish(const UsePlaneRow& use) {
   }
 }
 
-// No plane is further than this from the depth of its pixel, along the axis, m.
-// The gate g s(z) / z^2 is of inverse depth: with d = g s(z) / z a plane is at most z d / (1 - d)
-// farther than its pixel, and less nearer.
+// Maximum distance of a plane from the depth of its pixel, along the optical axis, m. The gate g
+// s(z) / z^2 is in inverse depth: with d = g s(z) / z, a plane is at most z d / (1 - d) behind its
+// pixel, and less in front of it.
 double max_plane_distance_m(const DepthPlaneOptions& options) {
   const double gate = gate_sigmas * std::sqrt(1.5);
   const double nearest = gate * options.noise.axial_at(options.min_depth_m) / options.min_depth_m;
@@ -272,8 +272,8 @@ double max_plane_distance_m(const DepthPlaneOptions& options) {
   return gate * options.noise.axial_at(options.max_depth_m) / (1.0 - nearest);
 }
 
-// The marked pixels, not 0, and those that decide on their planes: with these as `only`, the planes
-// of the marked pixels are those of the whole image.
+// Returns the marked pixels (not 0) and all pixels that affect their planes. With the result as
+// `only`, the planes of the marked pixels equal those of the whole image.
 std::vector<std::uint8_t> dilate_mask(const std::vector<std::uint8_t>& marks, int width,
                                       int height) {
   std::vector<std::uint8_t> grown(marks.size(), 0);
@@ -290,8 +290,8 @@ std::vector<std::uint8_t> dilate_mask(const std::vector<std::uint8_t>& marks, in
   return grown;
 }
 
-// Calls use(y, planes) for each row in which there are planes. `only`, if it is not empty, marks
-// the pixels whose planes are wanted, not 0; others have none, and the counts say nothing.
+// Calls use(y, planes) for each row with planes. If `only` is not empty, only its pixels that are
+// not 0 get planes, and the counts are meaningless.
 DepthPixelCounts each_plane_row(const DepthImage& depth, const PixelRays& rays,
                                 const DepthPlaneOptions& options,
                                 const std::vector<std::uint8_t>& only, const UsePlaneRow& use) {
@@ -319,7 +319,7 @@ std::size_t row_begin(const DepthImage& depth, int y) {
   return static_cast<std::size_t>(y) * static_cast<std::size_t>(depth.width);
 }
 
-// Marks the pixels that were measured in `cells`, not 0.
+// Marks the pixels with measurements in `cells` by a value that is not 0.
 std::vector<std::uint8_t> pixels_in(const DepthImage& depth, const PixelRays& rays,
                                     const Loops::Placement& placement, double max_depth_m,
                                     const TileMask& cells) {
@@ -342,7 +342,7 @@ std::vector<std::uint8_t> pixels_in(const DepthImage& depth, const PixelRays& ra
   return are_in;
 }
 
-// Marks all pixels whose planes may be in `cells`, and those that these planes depend on.
+// Marks all pixels whose planes may be in `cells`, and the pixels that affect these planes.
 std::vector<std::uint8_t> pixels_around(const DepthImage& depth, const PixelRays& rays,
                                         const Loops::Placement& placement,
                                         const DepthPlaneOptions& options, double voxel_size_m,
@@ -419,11 +419,11 @@ void describe(ResultTable& table, const DepthPixelCounts& counts) {
   table.add("measurements_used", counts.used, Merge::sum, "pixels that were fused");
   table.add("rejected_unmeasured", counts.unmeasured, Merge::sum, "pixels without depth");
   table.add("rejected_out_of_range", counts.out_of_range, Merge::sum,
-            "pixels outside the range of depth");
+            "pixels outside the depth range");
   table.add("rejected_without_ray", counts.without_ray, Merge::sum,
             "pixels outside the invertible lens distortion");
   table.add("rejected_flying", counts.flying, Merge::sum,
-            "pixels that no surface around them explains");
+            "pixels that are not on a surface of their neighbors");
   table.add("rejected_grazing", counts.grazing, Merge::sum, "pixels seen at a grazing angle");
 }
 

@@ -18,13 +18,14 @@ namespace {
 
 constexpr int robust_rounds = 3;
 constexpr int max_iterations = 200;
-constexpr double tolerance = 1e-4;  // of the gradient at the start
-// Of a long scan slopes would be most of the memory of fusion: 48 bytes each.
+constexpr double tolerance = 1e-4;  // relative to the initial gradient
+// Slopes of 48 bytes each are recomputed beyond this number, because they would need most of the
+// memory for a long scan.
 constexpr std::size_t max_kept_slopes = 600'000;
-// Ranges of elements whose sums are made side by side and joined in their order.
+// Number of ranges of elements whose sums are computed in parallel and added in order.
 constexpr std::size_t sum_ranges = 16;
 
-// Sums over the frames' corrections; heights about the mean of each element.
+// Least squares over the frames' corrections, of heights about the mean of each element.
 class Adjustment {
  public:
   Adjustment(std::span<const SurfaceElement> elements,
@@ -91,7 +92,7 @@ class Adjustment {
   }
 
   void solve() {
-    // From here: (J' W J + P) step = -J' W r - P x.
+    // Conjugate gradients for (J' W J + P) step = -J' W r - P x.
     std::vector<Vector6d> gradient(corrections_.size());
     for (std::size_t f = 0; f < gradient.size(); ++f)
       gradient[f] = -prior_.cwiseProduct(corrections_[f]);
@@ -131,7 +132,7 @@ class Adjustment {
 
  private:
   std::size_t elements() const { return starts_.size() - 1; }
-  // Of an element's observations, each one's residual about their mean.
+  // Computes the residual of each of an element's observations about their mean.
   void find_offsets(std::size_t element, std::vector<double>& offsets) const {
     offsets.clear();
     double sum = 0.0;
@@ -147,7 +148,7 @@ class Adjustment {
   double information(const SurfaceObservation& one) const {  // inverse variance
     return share_ / (static_cast<double>(one.variance_m2) + scatter2_);
   }
-  // Of the height: by a turn, by a shift of its frame.
+  // Derivative of the height by a rotation and a shift of its frame.
   Vector6d slope(std::size_t number) const {
     if (!slopes_.empty()) return slopes_[number];
     return slope_of(observations_[number]);
@@ -171,8 +172,8 @@ class Adjustment {
   double residual(const SurfaceObservation& one, const Vector6d& slope) const {
     return static_cast<double>(one.height_m) + slope.dot(corrections_[one.frame]);
   }
-  // Adds J' W (value - its mean on the element): the elements' heights are eliminated. `value` is
-  // of an observation and its slope.
+  // Adds J' W (value - its mean on the element), which eliminates the elements' heights. `value` is
+  // a function of an observation and its slope.
   template <typename Value>
   void accumulate(const Value& value, std::vector<Vector6d>& sums) const {
     using Sums = std::vector<Vector6d>;
@@ -223,11 +224,11 @@ class Adjustment {
   std::span<const SurfaceObservation> observations_;
   std::span<const Eigen::Vector3d> centers_;
   double scatter2_;  // m2
-  double share_;     // of its information that an observation counts with
+  double share_;     // factor of the information of each observation
   Vector6d prior_;
-  std::vector<Vector6d> slopes_;     // of the observations; empty: computed anew each time
-  std::vector<double> weights_;      // of the observations: their information, made robust
-  std::vector<std::size_t> starts_;  // of each element's observations
+  std::vector<Vector6d> slopes_;     // of the observations; empty: recomputed each time
+  std::vector<double> weights_;      // robust information of the observations
+  std::vector<std::size_t> starts_;  // index of each element's first observation
   std::vector<Vector6d> corrections_;
   double first_rho_ = 0.0;  // preconditioned square of the gradient at the start
 };

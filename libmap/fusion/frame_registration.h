@@ -1,5 +1,5 @@
-// Poses of depth frames corrected so that what the frames measured of a surface agrees. Inner part
-// of depth_fusion.
+// Corrects poses of depth frames so that their measurements of a surface agree. Private to
+// depth_fusion.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,29 +12,30 @@
 namespace libmap {
 
 struct FrameRegistrationOptions {
-  // > 0: standard deviations of the poses as they are given.
+  // > 0: standard deviations of the given poses.
   double place_error_m = 0.02;
   double rotation_error_deg = 1.0;
-  // > 0: frames that differ from the others by more than this have less weight.
+  // > 0: heights that differ from the others by more than this have less weight.
   double scatter_m = 0.005;
-  // > 0: heights of a frame, on the mean, that count as independent, however many there are.
-  // Against the errors of the poses: normals of a plane scatter a little, and a frame slid along it
-  // would seem to fit better.
+  // > 0: mean number of independent heights per frame, whatever the number of observations. Limits
+  // their weight against the given poses: because of noisy normals, sliding along a plane seems to
+  // improve the fit.
   double independent_heights = 150.0;
 };
 
 struct FrameRegistration {
-  std::vector<Pose> corrected_from_given;  // one a frame, in the elements' frame
-  // Root mean square of frames' heights about their elements' means, by weight.
+  std::vector<Pose> corrected_from_given;  // one per frame, in the elements' frame
+  // Weighted root mean square of frames' heights about their elements' means.
   double disagreement_before_m = 0.0;
   double disagreement_after_m = 0.0;  // to first order
-  double correction_m = 0.0;          // root mean square of what heights change by
+  double correction_m = 0.0;          // root mean square of the changes of heights
 };
 
-// All frames at once: turns and shifts, small, that minimize the weighted squares of the heights
-// about each element's own mean (point to plane, Chen and Medioni 1991; all views jointly, Bergevin
-// et al. 1996), by conjugate gradients. Robust by weights after Geman and McClure (1987). Elements
-// in meters; `centers` are where the frames turn about. The same for any number of threads.
+// Estimates small rotations and shifts of all frames jointly. They minimize the weighted squares of
+// the heights about each element's mean (point to plane, Chen and Medioni 1991; all views jointly,
+// Bergevin et al. 1996), by conjugate gradients with robust weights (Geman and McClure 1987).
+// Elements and `centers`, the centers of rotation of the frames, are in meters. The result does not
+// depend on the number of threads.
 FrameRegistration register_frames(std::span<const SurfaceElement> elements,
                                   std::span<const SurfaceObservation> observations,
                                   std::span<const Eigen::Vector3d> centers,

@@ -15,7 +15,7 @@ namespace libmap {
 
 namespace {
 
-// Of decoded depth that is kept.
+// Limit of the cache of decoded depth.
 constexpr std::size_t max_kept_bytes = std::size_t{256} << 20;
 
 std::size_t bytes_of(const RgbdFrame& frame) { return sizeof(float) * frame.depth.pixels.size(); }
@@ -32,7 +32,7 @@ FusionFrame frame_at(const TrajectoryPose& pose, const Eigen::Vector3d& grid_ori
   const double bound = 0.9 * voxel_cell_limit * voxel_size_m;
   const double needed = reach + max_depth_m;
   if (needed > bound && reach <= max_depth_m)
-    throw Error("voxels too small for the reach of the depth images",
+    throw Error("voxels are too small for the range of the depth images",
                 {.field = "voxel_size_m",
                  .value = to_text(voxel_size_m),
                  .bound = "> " + to_text(static_cast<float>(voxel_size_m * needed / bound))});
@@ -64,7 +64,7 @@ std::shared_ptr<const RgbdFrame> FusionFrames::depth_of(int node) {
   if (frame->depth.empty()) {
     if (frame->right.empty()) throw Error("it has no depth image", {.field = name});
     if (!options_.stereo)
-      throw Error("it has a stereo pair and no depth, which stereo matching would compute",
+      throw Error("it has a stereo pair but no depth; --stereo computes the depth",
                   {.field = name});
     *frame = scan_.read_frame(node);
     frame->depth = stereo_depth(*frame);
@@ -72,7 +72,7 @@ std::shared_ptr<const RgbdFrame> FusionFrames::depth_of(int node) {
   if (frame->cameras.empty()) throw Error("it has no calibration", {.field = name});
   frame->color = {};
   frame->right = {};
-  // All passes go through the frames in one order: those that came first stay.
+  // All passes visit the frames in the same order, so the first frames are cached.
   const std::scoped_lock lock(mutex_);
   if (kept_bytes_ + bytes_of(*frame) <= max_kept_bytes && kept_.emplace(node, frame).second)
     kept_bytes_ += bytes_of(*frame);
@@ -101,7 +101,7 @@ std::vector<RefinementView> FusionFrames::views_of(const FusionFrame& frame, std
   try {
     if (color) images.color = scan_.read_frame(frame.node, {.color = true, .depth = false}).color;
   } catch (const Error&) {
-    if (options_.strict) throw;  // else the frame's depth is used alone
+    if (options_.strict) throw;  // otherwise only the frame's depth is used
   }
   std::vector<RefinementView> views;
   for (CameraView& view : camera_views(images)) {
@@ -128,7 +128,7 @@ void FusionFrames::measure_reach(const RgbdFrame& depth, double max_depth_m, Fus
     frame.reach.extend(grid_from_camera.translation());
     const Eigen::Matrix3f rotation = grid_from_camera.linear().cast<float>();
     const auto max_depth = static_cast<float>(max_depth_m);
-    Eigen::AlignedBox3f met;  // from the camera
+    Eigen::AlignedBox3f met;  // measured points relative to the camera
     for (std::size_t n = 0; n < view.depth.pixels.size(); ++n)
       if (const float z = view.depth.pixels[n]; z > 0.0F)
         met.extend(rotation *

@@ -1,5 +1,4 @@
-// Tiles of the x-y plane in which fusion makes its cloud, one after the other. Inner part of
-// depth_fusion.
+// Tiles of the x-y plane for fusion, with their margins. Private to depth_fusion.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,15 +13,15 @@
 
 namespace libmap {
 
-// Voxels around an element that decide whether and where it is.
+// Distance in voxels within which other voxels affect an element.
 inline constexpr int element_neighborhood = 3;
 
-// Tiles of whole voxels in the x-y plane of the world, and what their points depend on.
+// Tiles of whole voxels in the x-y plane of the world, with the margins that affect their points.
 class FusionTiling {
  public:
   using Cell = Eigen::Array<std::int64_t, 2, 1>;
-  // Tiles of about `tile_m`; the grid has its origin at `grid_origin` of the world. A point may
-  // have moved by `shift_m` from its element, and a measurement counts `disc_m` around.
+  // Tiles of about `tile_m`. `grid_origin` is the grid's origin in the world. Points are up to
+  // `shift_m` from their elements, and measurements affect elements within `disc_m`.
   FusionTiling(double tile_m, double voxel_m, const Eigen::Vector3d& grid_origin, double shift_m,
                double disc_m)
       : voxel_m_(voxel_m),
@@ -33,7 +32,7 @@ class FusionTiling {
         frame_margin_(element_margin_ + element_neighborhood + 1 +
                       static_cast<int>(std::ceil((shift_m + disc_m) / voxel_m))) {}
 
-  // use(tile) for each tile to which a frame of this reach in the grid, m, matters.
+  // Calls use(tile) for each tile that a frame with this reach, in the grid, m, affects.
   template <typename Use>
   void each_tile(const Eigen::AlignedBox3d& reach, const Use& use) const {
     const auto tile_of = [&](const Eigen::Vector3d& position, int margin) -> Cell {
@@ -47,18 +46,18 @@ class FusionTiling {
       for (std::int64_t j = first.y(); j <= last.y(); ++j) use(XyTile{i, j});
   }
 
-  // The cells of the grid whose points are in the tile.
+  // Returns the columns of the grid whose points are in the tile.
   TileMask points(const XyTile& tile) const {
     const Cell low = Cell(tile.i, tile.j) * side_ - origin_;
     constexpr std::int64_t limit = voxel_cell_limit;
     return {low.max(-limit).min(limit).cast<int>(),
             (low + side_).max(-limit).min(limit).cast<int>(), 0};
   }
-  // Voxels around a tile whose elements its points depend on.
+  // Margin in voxels around a tile whose elements affect its points.
   int element_margin() const { return element_margin_; }
 
  private:
-  // Voxels around a point that decide its normal, and whether it is an echo.
+  // Distance in voxels within which other points affect a point's normal and removal.
   static constexpr int point_neighborhood = 4;
 
   std::int64_t floor_of_ratio(std::int64_t cell) const {

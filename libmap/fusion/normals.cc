@@ -18,10 +18,10 @@ namespace libmap {
 
 namespace {
 
-// Second eigenvalue of the neighbors' covariance, against the first, below which they lie on a
-// line.
+// Neighbors are collinear if the second eigenvalue of their covariance divided by the first is
+// smaller.
 constexpr double min_spread = 1e-6;
-// Neighbors along which sides are passed on.
+// Number of neighbors per point in the graph of orientations.
 constexpr std::size_t graph_neighbors = 10;
 
 using Normals = std::vector<Eigen::Vector3f>;
@@ -88,7 +88,7 @@ class SpanningTree {
   const PointTree& tree_;
   Normals& normals_;
   std::vector<GraphEdge> edges_;
-  std::vector<std::uint32_t> starts_;  // of each point's branches
+  std::vector<std::uint32_t> starts_;  // index of each point's first branch
   std::vector<std::uint32_t> branches_;
 };
 
@@ -114,7 +114,7 @@ void SpanningTree::find_edges() {
       if (edge.turn >= 0.0F) edges_.push_back(edge);
 }
 
-// Kruskal 1956.
+// Minimum spanning tree (Kruskal 1956).
 void SpanningTree::choose_tree() {
   std::sort(edges_.begin(), edges_.end(), [](const GraphEdge& one, const GraphEdge& two) {
     return std::tie(one.turn, one.a, one.b) < std::tie(two.turn, two.a, two.b);
@@ -141,7 +141,7 @@ void SpanningTree::choose_tree() {
   }
 }
 
-// All that hangs together with `first`, turned as it is.
+// Collects the points connected to `first` and orients them like it.
 void SpanningTree::walk(std::uint32_t first, std::vector<char>& seen,
                         std::vector<std::uint32_t>& part) {
   part.assign(1, first);
@@ -174,7 +174,7 @@ void SpanningTree::turn_out(const std::vector<std::uint32_t>& part) {
   for (const std::uint32_t n : part) normals_[n] = -normals_[n];
 }
 
-// Where each point was seen from, if the cloud's fields say so.
+// Fields with the sensor position of each point; nullopt if the cloud does not have them.
 std::optional<std::array<const ScalarField*, 3>> view_fields(const PointCloud& cloud) {
   const std::array<const ScalarField*, 3> fields = {
       cloud.find_field("vp_x"), cloud.find_field("vp_y"), cloud.find_field("vp_z")};
@@ -220,7 +220,7 @@ std::string_view to_text(NormalOrientation orientation) {
 
 void bind(ParameterTable& table, NormalEstimationOptions& options) {
   table.add("normal_neighbors", options.neighbors, {3, 1000},
-            "points that a plane is fitted to where normals are estimated");
+            "number of nearest points that a plane is fitted to for estimating a normal");
 }
 
 NormalEstimationResult estimate_normals(const PointCloud& cloud,

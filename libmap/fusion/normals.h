@@ -1,5 +1,5 @@
-// Normals of a cloud that has none: planes through each point's neighbors, turned to the side from
-// which the surface was seen.
+// Estimates and orients normals of a cloud: planes through each point's neighbors, with normals
+// towards the sensor.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,35 +14,36 @@
 namespace libmap {
 
 struct NormalEstimationOptions {
-  int neighbors = 16;  // 3 to 1000: nearest points that a plane is fitted to, the point's own too
+  int neighbors = 16;  // 3 to 1000: nearest points that a plane is fitted to, including the point
 };
 void bind(ParameterTable& table, NormalEstimationOptions& options);
 
-// By what the sides of normals were chosen.
+// Source of the orientation of normals.
 enum class NormalOrientation {
-  view_fields,   // fields vp_x, vp_y, vp_z: where each point was seen from, as PCL names them
-  viewpoint,     // the cloud's viewpoint, where it is not the identity
-  spanning_tree  // neighbors look the same way; most of each part outwards or up
+  view_fields,   // sensor position per point in the fields vp_x, vp_y, vp_z, as in PCL
+  viewpoint,     // the cloud's viewpoint, if it is not the identity
+  spanning_tree  // consistent with neighbors; each component outwards or up
 };
 std::string_view to_text(NormalOrientation orientation);
 
 struct NormalEstimationResult {
-  // Unit; zero where the neighbors lie on a line or in one place.
+  // Unit normals, one per point; zero if the neighbors are collinear or coincide.
   std::vector<Eigen::Vector3f> normals;
-  std::size_t undefined = 0;  // normals that are zero
+  std::size_t undefined = 0;  // number of zero normals
   NormalOrientation orientation = NormalOrientation::spanning_tree;
-  std::size_t parts = 0;  // of the graph of neighbors, each with sides of its own
+  std::size_t parts = 0;  // independently oriented components of the graph of neighbors
 };
 
-// Planes of total least squares (Hoppe et al. 1992, section 3.2). Without views, sides go along the
-// minimum spanning tree of the graph of neighbors, by which the least turning neighbor decides
-// (section 3.3); of each part they are such that it looks away from its middle or, where it rather
-// has an up than an outside, up. The same for any number of threads. Throws Error: an option out of
-// its range.
+// Fits planes by total least squares (Hoppe et al. 1992, section 3.2). Without views, orientations
+// are propagated along the minimum spanning tree of the graph of neighbors, weighted by the angle
+// between normals (section 3.3). Each component is then oriented away from its center or up,
+// whichever is more distinct. The result does not depend on the number of threads. Throws Error if
+// an option is out of range or the cloud is inconsistent.
 NormalEstimationResult estimate_normals(const PointCloud& cloud,
                                         const NormalEstimationOptions& options = {});
 
-// The cloud's own normals as unit vectors, with sides chosen in the same way; NaN becomes zero.
+// Normalizes the cloud's own normals and orients them like estimate_normals; NaN becomes zero.
+// Throws Error if the cloud is inconsistent.
 NormalEstimationResult orient_normals(const PointCloud& cloud);
 
 }  // namespace libmap

@@ -68,7 +68,7 @@ class ViewProjection {
     return Eigen::Vector3d(ray->x() * depth, ray->y() * depth, depth);
   }
 
-  // Nothing outside the image and where nothing was measured.
+  // Returns nullopt outside the image and for pixels without depth.
   std::optional<double> depth_at(int x, int y) const {
     if (x < 0 || y < 0 || x >= view_.depth.width || y >= view_.depth.height) return std::nullopt;
     const double depth = view_.depth.at(x, y);
@@ -85,7 +85,7 @@ class ViewProjection {
     return (jumps(-1, 0) && jumps(1, 0)) || (jumps(0, -1) && jumps(0, 1));
   }
 
-  // Where only one of two opposite neighbors lies on the surface, the pixel stands for the other.
+  // If only one of two opposite neighbors is on the surface, the pixel itself replaces the other.
   std::optional<Eigen::Vector3d> tangent(int x, int y, int dx, int dy,
                                          const Eigen::Vector3d& point) const {
     const auto neighbor = [&](int sign) -> std::optional<Eigen::Vector3d> {
@@ -103,7 +103,7 @@ class ViewProjection {
     const auto along_row = tangent(x, y, 1, 0, point);
     const auto along_column = tangent(x, y, 0, 1, point);
     if (!along_row || !along_column) return Eigen::Vector3f::Zero();
-    // Row to the right, column downwards: this product looks back at the camera.
+    // With rows to the right and columns downwards, this product points to the camera.
     Eigen::Vector3d across = along_column->cross(*along_row);
     if (!(across.norm() > 0)) return Eigen::Vector3f::Zero();
     if (across.dot(point) > 0) across = -across;
@@ -117,13 +117,13 @@ class ViewProjection {
 }  // namespace
 
 void bind(ParameterTable& table, PanoramaOptions& options) {
-  table.add("stride_px", options.stride_px, Range{1, 1e6}, "takes every n-th row and column");
+  table.add("stride_px", options.stride_px, Range{1, 1e6}, "step between used rows and columns");
   table.add("flying_pixel_jump_m", options.flying_pixel_jump_m, not_negative,
-            "drops pixels that differ by more from both neighbors in a row or column; 0: keeps "
+            "maximum depth difference of a pixel from both neighbors in a row or column; 0: keeps "
             "all");
-  table.add("normals", options.normals, "normals from neighboring pixels, towards the camera");
+  table.add("normals", options.normals, "add normals from neighboring pixels");
   table.add("normal_jump_m", options.normal_jump_m, positive,
-            "neighbors that differ by more are another surface");
+            "maximum depth difference of neighboring pixels on one surface");
 }
 
 PanoramaResult make_panorama(const std::vector<PanoramaView>& views,

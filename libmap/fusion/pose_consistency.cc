@@ -28,19 +28,20 @@ constexpr double min_turn_rad = 8.0 * std::numbers::pi / 180.0;
 constexpr double min_shift_m = 0.1;
 constexpr double max_difference = 0.05;
 constexpr std::size_t min_measurements = 500;
-constexpr double doubtful_share = 0.2;       // contradicted, from which conventions are tried
-constexpr double contradictory_share = 0.5;  // from which a warning names no convention
-constexpr double min_gain = 3.0;             // of the difference, by another convention
-constexpr double max_fitting_share = 0.5;    // contradicted by a convention that fits
+// Shares of contradicted measurements.
+constexpr double doubtful_share = 0.2;       // minimum for trying conventions
+constexpr double contradictory_share = 0.5;  // minimum for a warning without a convention
+constexpr double max_fitting_share = 0.5;    // maximum for a convention that fits
+constexpr double min_gain = 3.0;             // minimum ratio of differences, given to best
 
-// Poses as another convention has them; `depth_factor` is by how much larger depth is.
+// Converts poses from another convention; depth is multiplied by `depth_factor`.
 struct Convention {
   std::string text;
   std::function<Pose(const Pose& given, const Pose& base_from_camera)> world_from_base;
   double depth_factor = 1.0;
 };
 
-// Axes in another order or direction, mirrored ones too, with the text of the new coordinates.
+// All permutations and reflections of the axes, with the text of the new coordinates.
 std::vector<std::pair<std::string, Eigen::Matrix3d>> axis_changes() {
   std::vector<std::pair<std::string, Eigen::Matrix3d>> rotations;
   std::array<int, 3> order = {0, 1, 2};
@@ -135,7 +136,7 @@ DepthAgreement agreement_of(const std::vector<ViewedPair>& pairs, const Conventi
   return agreement;
 }
 
-// The next frame that has moved far enough to show a wrong convention.
+// The next frame that has moved enough to reveal a wrong convention; nullopt if there is none.
 std::optional<std::size_t> partner_of(std::size_t first, const Trajectory& poses) {
   for (std::size_t n = first + 1; n < std::min(first + max_gap, poses.size()); ++n) {
     const Pose motion = poses[first].world_from_base.inverse() * poses[n].world_from_base;
@@ -184,11 +185,11 @@ std::string PoseConsistency::warning() const {
                                 ? std::to_string(pairs) + " pairs of frames have no depth in common"
                                 : percent(given.contradicted) + " of the depth that " +
                                       std::to_string(pairs) +
-                                      " pairs of frames have in common contradicts each other";
+                                      " pairs of frames have in common is contradictory";
   if (!convention.empty())
     return "the poses fit " + to_fixed_text(given.difference / best.difference, 0) +
            " times better " + convention + "; " + found + ", and " + percent(best.contradicted) +
-           " then";
+           " with it";
   if (given.measurements < min_measurements || given.contradicted < contradictory_share) return {};
   return found + ": poses, depth unit or calibration are wrong, and no usual convention fits";
 }

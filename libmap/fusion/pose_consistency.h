@@ -1,5 +1,5 @@
-// Whether the depth images of a scan agree by given poses; if not, the usual other convention of
-// poses or depth by which they do.
+// Checks that the depth images of a scan agree with given poses; if not, finds the convention of
+// poses or depth with which they agree.
 #pragma once
 
 #include <cstddef>
@@ -10,28 +10,28 @@
 
 namespace libmap {
 
-// How well measurements of pairs of frames agree.
+// Agreement of depth between pairs of frames.
 struct DepthAgreement {
-  std::size_t measurements = 0;  // that two frames of a pair have in common
-  double contradicted = 0.0;     // share whose depths differ by more than 5 %; 1 without any
-  double difference = 0.0;       // median, in depths; 1 without any
+  std::size_t measurements = 0;  // measurements common to both frames of a pair
+  double contradicted = 0.0;     // share with a relative difference above 5 %; 1 if there are none
+  double difference = 0.0;       // median relative difference; 1 if there are none
 };
 
 struct PoseConsistency {
   std::size_t pairs = 0;
   DepthAgreement given;
-  // By the convention that fits best, if one is far better; empty otherwise.
+  // Agreement with the best other convention if that fits much better; empty otherwise.
   DepthAgreement best{};
   std::string convention{};
 
-  // One sentence, or nothing if the frames agree or have too little in common.
+  // Returns one sentence; empty if the frames agree or have too few common measurements.
   std::string warning() const;
 };
 
-// Compares up to 24 frames with the next one that has moved by 8 degrees or 0.1 m. Conventions that
-// are tried: quaternions as w x y z, poses of the base, the camera's optical frame or a camera with
-// y up, inverse poses, positions in other axes than the rotations, and depth in a unit 5 or 1000
-// times larger or smaller. Frames that cannot be read are left out.
+// Compares up to 24 frames with the next frame that has moved by 8 degrees or 0.1 m. If they
+// disagree, these conventions are tried: quaternions as w x y z; poses of the base, the camera's
+// optical frame or a camera with y up; inverse poses; positions in other axes than the rotations;
+// depth in a unit 5 or 1000 times larger or smaller. Frames that cannot be read are ignored.
 PoseConsistency check_pose_consistency(const ScanSource& scan, const Trajectory& world_from_base);
 
 }  // namespace libmap

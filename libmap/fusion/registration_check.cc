@@ -17,13 +17,13 @@ namespace {
 
 constexpr std::size_t max_anchors = 24;
 constexpr std::size_t partners = 3;
-constexpr double min_common_reach = 0.3;  // of the smaller of two frames' boxes
-constexpr float gate = 0.05F;             // of depth against expected depth, for colors
+constexpr double min_common_reach = 0.3;  // overlap of two boxes by the smaller box
+constexpr float gate = 0.05F;             // maximum relative depth difference for comparing colors
 constexpr double cost_scale = 9.0;        // a cost is log(1 + chi-square / 9)
 constexpr double clear_deviations = 2.0;
 constexpr double clear_share = 0.005;
 
-// A frame and others that it is compared with.
+// A frame with the other frames that it is compared with.
 struct Anchor {
   std::size_t frame = 0;
   std::vector<std::size_t> others;
@@ -59,7 +59,7 @@ struct PairSums {
   double after = 0.0;
 };
 
-// `cost` is of an entry; entries that one of the two lacks are left out.
+// Adds the costs of all entries that both vectors have.
 template <typename Cost>
 void add(const std::vector<float>& before, const std::vector<float>& after, const Cost& cost,
          PairSums& sums) {
@@ -92,7 +92,7 @@ PairCosts costs_of(const std::vector<PairSums>& pairs) {
   return costs;
 }
 
-// Forgets the depth of all samples of `from` that are not in held-out squares.
+// Removes the depth of all samples of `from` outside held-out squares.
 void keep_held_out(const RefinementView& from, double voxel_size_m, ViewComparison& compared) {
   const Pose grid_from_camera = from.camera_from_grid.inverse();
   for (std::size_t n = 0; n < compared.depth.size(); ++n) {

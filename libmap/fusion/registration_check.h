@@ -1,5 +1,4 @@
-// Registration of frames, accepted or rejected by measurements that it has not used. Inner part of
-// depth_fusion.
+// Validation of a registration of frames by held-out measurements. Private to depth_fusion.
 #pragma once
 
 #include <span>
@@ -9,7 +8,7 @@
 
 namespace libmap {
 
-// Compares up to 72 pairs of overlapping frames by their poses before and after a registration.
+// Compares up to 72 pairs of overlapping frames with their poses before and after a registration.
 RegistrationCheck check_registration(FusionFrames& images, std::span<const FusionFrame> before,
                                      std::span<const FusionFrame> after, const DepthSensor& sensor,
                                      double voxel_size_m);

@@ -17,32 +17,34 @@ namespace libmap {
 
 namespace {
 
-// Beyond an edge a surface is believed as far as it goes on straight: in voxels along the normal.
+// Maximum shift of an element beyond an edge along its normal, in voxels. A larger one indicates
+// that the surface bends.
 constexpr double max_extended_shift = 0.5;
-// Part of its neighbor's uncertainty below which a point makes the neighbor an echo.
+// A point with less than this share of its neighbor's standard error makes the neighbor an echo.
 constexpr float echo_certainty = 0.5F;
-// Voxels along the normal within which points of two voxels are the same.
+// Maximum distance along the normal between two points of one surface, in voxels.
 constexpr double max_echo_distance = 0.5;
 constexpr double normal_radius_voxels = 2.0;
-// What so few frames measured is dropped where others contradict this share of what is around it.
+// Points measured by at most this number of frames are dropped if other frames contradict this
+// share of such points around them.
 constexpr std::uint32_t weak_frames = 2;
 constexpr double contradicted_share = 0.5;
 
 constexpr float min_agreement = 0.7F;
-// Second eigenvalue of the neighbors' covariance, in squared radii, below which they lie on a
-// line.
+// Neighbors are collinear if the second eigenvalue of their covariance, in squared radii, is
+// smaller.
 constexpr float min_spread_ratio = 0.02F;
 
-// What a fit needs of a point, lengths in radii.
+// A point of a fit; lengths are in radii.
 struct Neighbor {
-  Eigen::Vector3f position = Eigen::Vector3f::Zero();  // from the middle of the cell
+  Eigen::Vector3f position = Eigen::Vector3f::Zero();  // relative to the cell's center
   Eigen::Vector3f normal = Eigen::Vector3f::Zero();
   float certainty = 0.0F;
 };
 
-// Points by cells as wide as the radius, the points of a cell side by side. Not a PointTree: one
-// walk serves all points of a cell (the tree's search alone takes 3 times as long as all of
-// fit_normals), and the order of the cells is that of the single-precision sums.
+// Points sorted into cells as wide as the radius. It replaces a PointTree, because one search
+// serves all points of a cell (the tree's search takes 3 times as long as all of fit_normals), and
+// the order of cells determines that of single-precision sums.
 class NeighborCells {
  public:
   NeighborCells(const PointCloud& cloud, double radius_m, const std::vector<double>& deviations_m)
@@ -68,11 +70,11 @@ class NeighborCells {
     return {members_.data() + starts_[cell], members_.data() + starts_[cell + 1]};
   }
 
-  // Of the cell and the 26 around it; the cell's own members first.
+  // Gathers the points of the cell, then those of the 26 cells around it.
   void gather(std::size_t cell, std::vector<Neighbor>& neighbors) const {
     neighbors.clear();
     const Eigen::Vector3i there = unpack(index_.keys()[cell]).cell;
-    // Of whole numbers, so that it does not depend on what lies far off.
+    // Computed from integers, so that it does not depend on distant points.
     const Eigen::Vector3d middle =
         (first_cell_ + there.cast<double>().array() + 0.5).matrix() * radius_m_;
     add_members(cell, middle, neighbors);
@@ -88,7 +90,7 @@ class NeighborCells {
   void add_members(std::size_t cell, const Eigen::Vector3d& middle,
                    std::vector<Neighbor>& neighbors) const {
     for (const std::uint32_t n : members(cell)) {
-      // No point is believed more than 1 % of the radius.
+      // Deviations below 1 % of the radius do not increase the weight.
       const double deviation = deviations_m_[n] / radius_m_;
       neighbors.push_back({((cloud_.positions[n] - middle) / radius_m_).cast<float>(),
                            cloud_.normals[n],
@@ -99,7 +101,7 @@ class NeighborCells {
   const PointCloud& cloud_;
   double radius_m_;
   const std::vector<double>& deviations_m_;
-  Eigen::Array3d first_cell_;  // cells count from 0 on
+  Eigen::Array3d first_cell_;  // offset that makes the minimum cell index 0
   VoxelIndex index_;
   std::vector<std::uint32_t> starts_;
   std::vector<std::uint32_t> members_;
@@ -134,14 +136,14 @@ Eigen::Vector3f fitted_normal(const Neighbor& point, const std::vector<Neighbor>
 
 // Points that share a voxel, weighted by their certainty.
 struct MergedPoint {
-  Eigen::Vector3f position = Eigen::Vector3f::Zero();  // these three weighted
+  Eigen::Vector3f position = Eigen::Vector3f::Zero();  // weighted sum, like normal and color
   Eigen::Vector3f normal = Eigen::Vector3f::Zero();
   Eigen::Vector3f color = Eigen::Vector3f::Zero();
   float weight = 0.0F;
   float expected_error_m = 0.0F;
-  std::uint32_t frames = 0;  // 0: not begun
+  std::uint32_t frames = 0;  // 0: empty
   bool extended = false;
-  bool is_wanted = true;  // in the columns asked for
+  bool is_wanted = true;  // in the requested columns
 };
 
 Color to_color(const Eigen::Vector3f& color) {
@@ -160,7 +162,7 @@ class PointMaker {
   SurfacePoints run() {
     find_contradicted();
     points_.reserve(surface_.elements.size());
-    // What was measured first: it speaks for its voxel before what lies beyond the edges.
+    // Measured elements come first and take precedence over extended ones in their voxel.
     for (const bool extended : {false, true})
       for (std::size_t n = 0; n < surface_.elements.size(); ++n) {
         const SurfaceElement& element = surface_.elements[n];
@@ -174,7 +176,7 @@ class PointMaker {
 
  private:
   bool is_weak(std::size_t n) const { return surface_.refined[n].frames <= weak_frames; }
-  // 1 if its column of voxels is one of those asked for, 0 otherwise.
+  // 1 if the element's column of voxels is requested, 0 otherwise.
   std::size_t wanted(const SurfaceElement& element) const;
   bool is_contradicted(std::size_t n);
   void find_contradicted();
@@ -189,7 +191,7 @@ class PointMaker {
   double voxel_size_m_;
   const TileMask& cells_;
   const SurfacePointOptions& options_;
-  std::vector<char> is_contradicted_;  // one an element
+  std::vector<char> is_contradicted_;  // one per element
   VoxelIndex index_;
   std::vector<MergedPoint> points_;
   SurfacePointCounts counts_;
@@ -221,9 +223,9 @@ void PointMaker::find_contradicted() {
   spread_contradiction();
 }
 
-// Other frames may see through a part only of what has moved: the rest, above or below, lies
-// outside their images. Squares of the plan, not all that hangs together: tiles then decide as the
-// whole does.
+// Drops the other points of moved objects. Other frames may see through a part of an object only,
+// because the rest is outside their images. Squares of the x-y plane are evaluated instead of
+// connected components, so that the result does not depend on tiles.
 void PointMaker::spread_contradiction() {
   struct Counts {
     std::size_t all = 0;
@@ -245,7 +247,7 @@ void PointMaker::spread_contradiction() {
     ++counts[block_of[n]].all;
     counts[block_of[n]].contradicted += is_contradicted_[n] != 0 ? 1 : 0;
   }
-  std::vector<char> is_moved(counts.size(), 0);  // of squares, by those around them too
+  std::vector<char> is_moved(counts.size(), 0);  // per square, including its neighbors' counts
   for (std::size_t number = 0; number < counts.size(); ++number) {
     const Eigen::Vector3i block = unpack(blocks.keys()[number]).cell;
     Counts around;
@@ -305,13 +307,13 @@ void PointMaker::merge(const SurfaceElement& element, const RefinedElement& refi
   point.normal += weight * element.normal;
   for (int c = 0; c < 3; ++c)
     point.color[c] += weight * static_cast<float>(refined.color[static_cast<std::size_t>(c)]);
-  // Their measurements are partly the same: the mean is as certain as the best of them.
+  // The points share measurements, so the mean has the smallest of their errors.
   point.expected_error_m = point.frames == 0 ? error : std::min(error, point.expected_error_m);
   point.frames = std::max(point.frames, refined.frames);
 }
 
-// Whether `other`, in a voxel before or behind that of `point`, makes it one point too many: noise,
-// a pose error or a surface on the border of two voxels has left two of the same place.
+// Returns true if `point` duplicates `other`, which is in the next voxel along its normal. Noise, a
+// pose error or a surface at the border of two voxels causes such echoes.
 bool PointMaker::is_echo(std::size_t point, std::size_t other, int axis) const {
   const MergedPoint& one = points_[point];
   const MergedPoint& two = points_[other];

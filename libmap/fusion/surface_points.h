@@ -1,4 +1,4 @@
-// Refined elements of a surface as a cloud: one point per voxel, without those that views
+// Makes a cloud of refined surface elements: one point per voxel, without points that views
 // contradict.
 #pragma once
 
@@ -11,47 +11,46 @@
 
 namespace libmap {
 
-// Side, in voxels, of the squares of the plan in which measurements of one or two frames are
-// evaluated together, each square with the eight around it.
+// Side, in voxels, of the squares of the x-y plane in which measurements of one or two frames are
+// evaluated together, each square with its eight neighbors.
 inline constexpr int contradiction_block = 16;
 
 struct SurfacePointOptions {
-  int min_views = 1;  // distinct frames that must have measured a point
-  // Drops points that more views see through than see, each counted by its cosine (Merrell et al.
-  // 2007). Larger values keep more.
+  int min_views = 1;  // minimum number of distinct frames that measured a point
+  // Maximum ratio of views that see through a point to views that see it, weighted by cosine
+  // (Merrell et al. 2007).
   double max_seen_through = 0.3;
-  // The same for views that measured nothing around a point, although it is within their range and
-  // not seen obliquely: what moves before an open background.
+  // Maximum ratio for views that measured nothing around a point, although it is in range and not
+  // oblique. Removes moving objects in front of an open background.
   double max_missed = 1.5;
 };
 
 struct SurfacePointCounts {
   std::size_t unconfirmed = 0;      // dropped: measured by too few frames
-  std::size_t max_views = 0;        // frames that measured one element, at most
+  std::size_t max_views = 0;        // maximum number of frames that measured one element
   std::size_t seen_through = 0;     // dropped: views see through them
   std::size_t missed = 0;           // dropped: views measured nothing there
-  std::size_t beside = 0;           // dropped: one or two frames measured them, and others
-                                    // contradict most of what such frames measured above,
-                                    // below and beside them
-  std::size_t bent_away = 0;        // dropped: beyond an edge where the surface does not go on
-  std::size_t merged = 0;           // with another one of the same voxel, or an echo of one
-  std::size_t extended_points = 0;  // of the cloud: beyond the edges
+  std::size_t beside = 0;           // dropped: measured by one or two frames, in a square where
+                                    // others contradict most measurements of such frames
+  std::size_t bent_away = 0;        // dropped: beyond an edge where the surface bends
+  std::size_t merged = 0;           // merged with, or an echo of, another point
+  std::size_t extended_points = 0;  // points of the cloud beyond measured edges
 };
 
 struct SurfacePoints {
-  // With normals, colors if the surface has them, and the fields `views` and `expected_error`.
+  // Normals; colors if the surface has them; fields `views` and `expected_error`.
   PointCloud cloud;
   SurfacePointCounts counts;
 };
-// The refined elements as points: contradicted ones dropped, one left per voxel, edges extended.
-// Returns and counts the points in the columns of voxels `cells`.
+// Makes points of the refined elements: drops contradicted ones, keeps one per voxel and extends
+// edges. Returns and counts only points in the columns of voxels `cells`.
 SurfacePoints make_surface_points(const RefinedSurface& surface, double voxel_size_m,
                                   const TileMask& cells, const SurfacePointOptions& options);
 
-// Replaces each normal of `cloud`, of unit length, by that of the plane of weighted total least
-// squares through the points within `radius_m` whose normals look the same way (within 45 degrees;
-// Hoppe et al. 1992). `deviations_m` are the points' own standard deviations, one each; sides are
-// kept. A point whose neighbors span no plane keeps its normal.
+// Replaces each unit normal of `cloud` by that of a plane fitted by weighted total least squares to
+// the points within `radius_m` whose normals differ by less than 45 degrees (Hoppe et al. 1992).
+// `deviations_m` has one standard deviation per point. Orientations do not change. A point whose
+// neighbors do not determine a plane keeps its normal.
 void fit_normals(PointCloud& cloud, double radius_m, const std::vector<double>& deviations_m);
 
 }  // namespace libmap

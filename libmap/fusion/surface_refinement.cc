@@ -14,30 +14,30 @@ namespace libmap {
 namespace {
 
 constexpr std::size_t chunk_size = 128;
-// Measurements further off than this many standard deviations have no weight (Tukey's biweight).
+// Gate of Tukey's biweight, in standard deviations.
 constexpr float refinement_gate_sigmas = 4.0F;
-// More oblique views are not searched farther.
+// Lower bound of the cosine of incidence for the gate along the ray.
 constexpr float min_search_cosine = 0.2F;
-// Frames' worth of belief in the noise model against the scatter between frames.
+// Weight of the noise model against the scatter between frames, as a number of frames.
 constexpr float prior_frames = 4.0F;
-// Smallest cosine of a pixel's ray and the plane's normal that is computed with.
+// Lower bound of the cosine between a pixel's ray and the plane's normal.
 constexpr float min_cosine = 0.02F;
-// Part of a shift that is taken for an error left: on the test sites errors grow with it so.
+// Share of a shift that is counted as remaining error, measured on the test sites.
 constexpr float bend_share = 0.5F;
-// Smallest cosine of the incidence at which every surface gives a measurement.
+// Minimum cosine of incidence at which every surface is expected to be measured.
 constexpr float sure_cosine = 0.5F;
-// Part of the depths that a frame has measured in which it measures every surface.
+// Share of a frame's depth range in which every surface is expected to be measured.
 constexpr float sure_range = 0.95F;
-// How much color counts where no depth says that it is the element's own.
+// Weight of color without depth that confirms the element.
 constexpr float unmeasured_color_share = 1e-3F;
 
 using Four = Eigen::Array<float, 4, 1>;
 
-// Weighted sums over one frame or all; heights along the normal in meters.
+// Weighted sums over one frame or all frames; heights are along the normal, m.
 struct HeightSum {
   float weight = 0.0F;
-  float height = 0.0F;   // weighted
-  float squares = 0.0F;  // of the weights, each times the variance of its measurement
+  float height = 0.0F;   // sum of weight x height
+  float squares = 0.0F;  // sum of weight^2 x variance of the measurement
 
   void operator+=(const HeightSum& more) {
     weight += more.weight;
@@ -48,7 +48,7 @@ struct HeightSum {
 
 struct ElementSum {
   HeightSum all;
-  // Frames' means by their own variances: number, sum and sum of squares of heights.
+  // Frames' mean heights, weighted by their variances: sums of weights, heights and squares.
   std::array<float, 3> scatter{};
   std::uint32_t frames = 0;
   float seen = 0.0F;
@@ -56,7 +56,7 @@ struct ElementSum {
   float missed = 0.0F;
   std::array<float, 3> color{};
   float color_weight = 0.0F;
-  // The frame that is being gathered: it may have several cameras.
+  // The frame that is being gathered, possibly from several cameras.
   std::uint32_t frame = 0;
   HeightSum current;
 };
@@ -75,20 +75,20 @@ struct PixelBox {
   int bottom = 0;
 };
 
-// An element as one camera sees it.
+// An element in the frame of one camera.
 struct SeenElement {
   Eigen::Vector3f position;  // optical frame
   Eigen::Vector3f normal;
   float plane = 0.0F;   // normal . position
-  float cosine = 0.0F;  // of the incidence
+  float cosine = 0.0F;  // cosine of incidence
   Eigen::Vector2f pixel;
-  float sigma = 0.0F;        // axial
-  float gate = 0.0F;         // of depth against the plane's
-  float radius = 0.0F;       // of the disc
+  float sigma = 0.0F;        // axial noise, m
+  float gate = 0.0F;         // maximum difference between measured depth and the plane's depth, m
+  float radius = 0.0F;       // radius of the disc, m
   float information = 0.0F;  // inverse variance along the normal
 };
 
-// By Eigen's `max`, which gives four results at once where a comparison would not.
+// Uses Eigen's `max`, which is vectorized, unlike a comparison.
 inline Four not_negative_part(const Four& value) { return value.max(Four::Zero()); }
 
 class ViewGather {
@@ -105,7 +105,7 @@ class ViewGather {
         min_incidence_(
             static_cast<float>(std::cos(sensor.max_incidence_deg * std::numbers::pi / 180.0))),
         is_distorted_(view.depth_camera.is_distorted()) {
-    // Beyond the pixels at the edge by one or two of their widths.
+    // Margin of two pixels around the image.
     const Eigen::Vector2d beyond = (view.rays->max - view.rays->min) * 2.0 /
                                    std::max(1, std::min(view.rays->width, view.rays->height));
     lowest_ray_ = view.rays->min - beyond;
@@ -186,13 +186,13 @@ class ViewGather {
         1.0F / (seen.sigma * seen.sigma * square + lateral * lateral * (1.0F - square));
     seen.gate = refinement_gate_sigmas * seen.sigma +
                 static_cast<float>(search_.search_m) / std::max(seen.cosine, min_search_cosine);
-    // At least the pixel's own footprint: a disc without a pixel says nothing.
+    // At least the footprint of a pixel, so that the disc is not empty.
     seen.radius = std::max(static_cast<float>(search_.disc_radius_m),
                            static_cast<float>(min_disc_pixels) * pixel_pitch_ * z);
     return true;
   }
 
-  // Whether the view would have measured the element, and has measured nothing around its pixel.
+  // Returns true if the view should measure the element but has no depth around its pixel.
   bool should_measure(const SeenElement& seen, int x, int y) const {
     const float z = seen.position.z();
     if (seen.cosine < sure_cosine || z * sure_range < view_.nearest_m ||
@@ -212,7 +212,7 @@ class ViewGather {
     return seen.plane / std::min(along, -min_cosine);
   }
 
-  // Around the disc's image, to first order.
+  // Bounding box of the disc's image, to first order.
   PixelBox box_of(const SeenElement& seen) const {
     const Eigen::Vector3f& p = seen.position;
     const auto reach = [&](int axis, double focal_length) {
@@ -232,9 +232,9 @@ class ViewGather {
             std::min(height - 1, static_cast<int>(std::floor(seen.pixel.y() + ry)))};
   }
 
-  // Heights of the measurements over the element's plane, weighted by their distance from its
-  // middle (Epanechnikov) and from the plane (Tukey). Each counts where its ray meets the plane:
-  // noise does not move it along the surface.
+  // Sums heights of the measurements above the element's plane, weighted by their distance from its
+  // center (Epanechnikov) and from the plane (Tukey). A measurement's position is the intersection
+  // of its ray with the plane, which does not depend on noise.
   HeightSum disc(const SeenElement& seen) const {
     const PixelBox box = box_of(seen);
     const float* ray_x = view_.rays->x.data();
@@ -266,8 +266,8 @@ class ViewGather {
         squares += weight * weight;
       }
     }
-    // Depth against depth along a ray is `along` times that along the normal: towards the camera
-    // both are negative.
+    // A depth difference along a ray is `along` times the height along the normal; both are
+    // negative towards the camera.
     return {seen.information * weights.sum(), seen.information * heights.sum(),
             seen.information * squares.sum()};
   }
@@ -288,8 +288,7 @@ class ViewGather {
     const int below = std::min(y + 1, camera.height - 1);
     const float a = u - static_cast<float>(x);
     const float b = v - static_cast<float>(y);
-    // Pixels that the element's area covers, squared: the nearest and straightest views speak
-    // loudest.
+    // The squared number of pixels on the element favors near and frontal views.
     const float area = seen.cosine / (seen.position.z() * seen.position.z());
     const float weight = share * area * area;
     for (std::size_t c = 0; c < 3; ++c) {
@@ -319,7 +318,7 @@ void close_frame(ElementSum& sum, float pose_variance) {
   const HeightSum& one = sum.current;
   if (one.weight > 0.0F) {
     const float mean = one.height / one.weight;
-    // However much a frame measured, its pose is wrong but once.
+    // All measurements of a frame share its pose error.
     const float own = one.weight * one.weight / one.squares;
     const float information = own / (1.0F + pose_variance * own);
     const float share = 1.0F / (1.0F + pose_variance * own);
@@ -342,7 +341,7 @@ RefinedElement result_of(const ElementSum& sum) {
   if (sum.frames == 0) return refined;
   const float mean = sum.all.height / sum.all.weight;
   refined.shift_m = mean;
-  // Where frames scatter more, or less, than the noise says, so does their mean (Birge 1932).
+  // Scales the error of the mean by the ratio of frames' scatter to noise (Birge 1932).
   const float excess =
       std::max(0.0F, sum.scatter[2] - 2.0F * mean * sum.scatter[1] + mean * mean * sum.scatter[0]);
   const float birge =

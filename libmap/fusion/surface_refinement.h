@@ -1,5 +1,4 @@
-// Elements of a surface moved along their normals to where all views of their place together put
-// it.
+// Refines surface elements: moves each along its normal to the weighted mean of all views.
 #pragma once
 
 #include <Eigen/Core>
@@ -20,26 +19,27 @@
 
 namespace libmap {
 
-// Which measurements count for an element.
+// Neighborhood of the measurements that are used for an element.
 struct SurfaceSearch {
-  double disc_radius_m = 0.015;  // > 0: measurements this near along the surface are averaged
+  double disc_radius_m = 0.015;  // > 0: radius of the disc in which measurements are averaged
   double search_m = 0.01;        // >= 0: maximum error of an element along its normal
 };
 
-// Depths that differ more from an element's plane have no weight, at any distance, m.
+// Maximum difference of a depth from an element's plane, over all ranges, m. Other depths have no
+// weight.
 double max_gate_m(const DepthSensor& sensor, const SurfaceSearch& search);
 // Radius of the smallest disc.
 inline constexpr double min_disc_pixels = 1.5;
 
-// One camera of one frame, made ready.
+// One camera of one frame, prepared for refinement.
 struct RefinementView {
   std::uint32_t frame = 0;  // ascending; views of one frame count as one
   Camera depth_camera;
   Camera color_camera;
-  std::vector<float> depth_m;  // 0 where there is no ray; four more than pixels
-  float nearest_m = 0.0F;      // of these depths
-  float farthest_m = 0.0F;
-  ColorImage color;  // may be empty
+  std::vector<float> depth_m;  // 0 for pixels without a ray; four entries of padding at the end
+  float nearest_m = 0.0F;      // minimum depth
+  float farthest_m = 0.0F;     // maximum depth
+  ColorImage color;            // may be empty
   std::shared_ptr<const PixelRays> rays;
   Pose camera_from_grid = Pose::Identity();
 };
@@ -49,37 +49,40 @@ RefinementView make_refinement_view(CameraView view, std::shared_ptr<const Pixel
 struct RefinedElement {
   float shift_m = 0.0F;  // along the normal
   float expected_error_m = 0.0F;
-  std::uint32_t frames = 0;   // that measured it
-  float seen = 0.0F;          // views on whose central pixel it lies, by their cosine
-  float seen_through = 0.0F;  // views that see beyond it there
-  float missed = 0.0F;        // views that measured nothing around it, though within their range
+  std::uint32_t frames = 0;  // number of frames that measured it
+  // Sums of the cosines of incidence of views whose depth at the element's pixel agrees with it,
+  // is behind it, or is missing around it, although it is in range.
+  float seen = 0.0F;
+  float seen_through = 0.0F;
+  float missed = 0.0F;
   Color color{};
 };
 
 struct RefinedSurface {
   std::vector<SurfaceElement> elements;
-  std::vector<RefinedElement> refined;  // one an element
+  std::vector<RefinedElement> refined;  // one per element
   bool has_color = false;
 };
 
-// What the views measured of every element. `pose_error_m` >= 0 is the standard deviation of a
-// whole frame along the normal. `each_group(add)` calls add(views) for all views, by frame: their
-// order changes the result by rounding, their grouping and the number of threads do not. Elements
-// in meters.
+// Refines the elements, in meters, with all views. `pose_error_m` >= 0 is the standard deviation of
+// a whole frame along the normal. `each_group(add)` must call add(views) for all views, by frame.
+// The result depends on their order by rounding only, and not on their grouping or the number of
+// threads.
 using AddViews = std::function<void(std::span<const RefinementView>)>;
 RefinedSurface refine_surface(std::vector<SurfaceElement> elements, const DepthSensor& sensor,
                               const SurfaceSearch& search, double pose_error_m,
                               const std::function<void(const AddViews&)>& each_group);
 
-// What one frame measured of an element: the mean height within its disc.
+// Mean height of one frame's measurements within the disc of an element.
 struct SurfaceObservation {
   std::uint32_t element = 0;
   std::uint32_t frame = 0;
-  float height_m = 0.0F;     // over the element, along its normal
-  float variance_m2 = 0.0F;  // by noise
+  float height_m = 0.0F;     // above the element, along its normal
+  float variance_m2 = 0.0F;  // due to noise
 };
 
-// By element, then by view. The same for any number of threads.
+// Measures the height of each element, in meters, in each view. Returns the observations by
+// element, then by view, whatever the number of threads.
 std::vector<SurfaceObservation> observe_surface(std::span<const SurfaceElement> elements,
                                                 std::span<const RefinementView> views,
                                                 const DepthSensor& sensor,

@@ -55,16 +55,16 @@ void SurfaceVoxels::merge(const Frame& frame, const TileMask& cells) {
 
 namespace {
 
-// Voxels within which two pieces of a column are one surface, spread by noise.
+// Maximum distance in voxels between two pieces of a column that are one surface, spread by noise.
 constexpr float one_surface = 1.0F;
 
-// The surface of one voxel, seen along its column.
+// Piece of surface in one voxel and its column.
 struct Piece {
   Eigen::Vector3f normal = Eigen::Vector3f::Zero();
   int axis = 2;                   // of the column
-  float height = 0.0F;            // along it, on its center line
-  bool speaks = false;            // for its column
-  std::array<bool, 4> is_edge{};  // by neighbor
+  float height = 0.0F;            // along the axis, on the column's center line
+  bool speaks = false;            // selected for its column
+  std::array<bool, 4> is_edge{};  // true for neighboring columns without surface
 };
 
 class ElementMaker {
@@ -99,7 +99,7 @@ class ElementMaker {
   }
 
  private:
-  // Sums of what the neighbors of an empty voxel expect in it.
+  // Sums over the neighbors of an empty voxel, for extrapolating the surface into it.
   struct Beside {
     int axis = 2;
     float weight = 0.0F;
@@ -117,13 +117,13 @@ class ElementMaker {
     piece.normal = length > 0.0F ? Eigen::Vector3f(sum.normal / length) : Eigen::Vector3f::UnitZ();
     piece.normal.cwiseAbs().maxCoeff(&piece.axis);
     const int cell = unpack(key_of(n)).cell[piece.axis];
-    // The plane through the mean meets the column's center line.
+    // Intersects the plane through the mean with the column's center line.
     const float along = piece.normal.dot(offset) / piece.normal[piece.axis];
     piece.height = static_cast<float>(cell) + 0.5F + along;
     return piece;
   }
 
-  // The number of the piece that another voxel of the column has on the same side.
+  // Index of the piece on the same side in another voxel of the column; nullopt if there is none.
   std::optional<std::size_t> piece_at(Eigen::Vector3i cell, int axis, int height,
                                       const Eigen::Vector3f& normal) const {
     cell[axis] = height;
@@ -150,7 +150,7 @@ class ElementMaker {
     return true;
   }
 
-  // Where a piece goes on in the column beside it.
+  // Continuation of a piece in an adjacent column.
   struct Neighbor {
     VoxelPlace place;
     float height = 0.0F;
@@ -185,7 +185,7 @@ class ElementMaker {
     const std::uint32_t n = beside_index_.find_or_add(pack(there.place));
     Beside& beside =
         n < beside_.size() ? beside_[n] : beside_.emplace_back(Beside{.axis = piece.axis});
-    // Columns along another axis have their middle elsewhere.
+    // Columns along another axis have another center line.
     if (beside.axis != piece.axis) return;
     beside.weight += weight;
     beside.height += weight * there.height;
@@ -197,8 +197,7 @@ class ElementMaker {
     order.reserve(found_.size());
     for (const auto& [place, element] : found_)
       order.emplace_back(place, static_cast<std::uint32_t>(order.size()));
-    // A place is taken twice at most, and then by one that was measured and, found later, one that
-    // was not.
+    // Two elements with the same key are a measured one, followed by an extended one.
     std::sort(order.begin(), order.end());
     std::vector<SurfaceElement> elements;
     elements.reserve(order.size());

@@ -1,5 +1,5 @@
-// A hashed grid that holds, for each voxel a surface passes through, the weighted means of the
-// places and normals measured in it. Voxels exist only where something was measured.
+// Hashed voxel grid with the weighted means of measured positions and normals, and surface elements
+// from it. Only voxels with measurements are stored.
 #pragma once
 
 #include <Eigen/Core>
@@ -24,18 +24,18 @@ class SurfaceVoxels {
     std::uint32_t frames = 0;
   };
 
-  // One measurement, its place in voxels; places beyond voxel_cell_limit are left out. A
-  // measurement whose normal points away from the first side's mean belongs to the other side.
+  // Adds one measurement at the position `place`, in voxels; ignored beyond voxel_cell_limit. A
+  // voxel has two sides: normals opposite to the mean of the first belong to the second.
   void add(const Eigen::Vector3f& place, const Eigen::Vector3f& normal, float weight);
-  // What one frame measured, without what finds a voxel: that would be most of the memory.
+  // Sums of one frame without the hash index, which would need most of the memory.
   struct Frame {
     std::vector<std::uint64_t> keys;
     std::vector<Sum> sums;
   };
   Frame take_frame() && { return {std::move(index_).take_keys(), std::move(sums_)}; }
-  // All of it that is in the columns `cells`.
+  // Adds the sums of the frame in the columns `cells`.
   void merge(const Frame& frame, const TileMask& cells);
-  // Those in the columns `cells`, in their order.
+  // Returns the voxels in the columns `cells`, in the same order.
   SurfaceVoxels in(const TileMask& cells) const;
 
   std::size_t size() const { return sums_.size(); }
@@ -49,18 +49,17 @@ class SurfaceVoxels {
   std::vector<Sum> sums_;
 };
 
-// A small piece of surface, to be refined.
+// Surface element: a point with a normal, to be refined.
 struct SurfaceElement {
   Eigen::Vector3f position = Eigen::Vector3f::Zero();  // voxels
   Eigen::Vector3f normal = Eigen::Vector3f::Zero();    // towards the cameras
-  bool extended = false;                               // one voxel beyond what was measured
+  bool extended = false;                               // one voxel beyond measured ones
 };
 
-// One element for each column of voxels that a piece of surface passes through: columns run along
-// the axis that the normal is nearest to, the element lies on the column's center line. Where
-// noise spreads a surface over two voxels of a column, the heavier one speaks for it. With
-// `extend`, also an element in each empty column beside. Neighbors stand near each other, in an
-// order that depends on the voxels alone.
+// Returns one element per column of voxels and surface in it. Columns are parallel to the axis
+// nearest to the normal; elements are on their center lines. If noise spreads a surface over two
+// voxels of a column, the voxel with more weight is used. With `extend`, adjacent empty columns get
+// an element too. The order depends on the voxels only, and is near in memory for neighbors.
 std::vector<SurfaceElement> surface_elements(const SurfaceVoxels& voxels, bool extend);
 
 }  // namespace libmap

@@ -1,4 +1,4 @@
-// Columns of voxels chosen by their place in the x-y plane. Inner part of depth_fusion.
+// Selects columns of voxels by their position in the x-y plane. Private to depth_fusion.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,8 +13,7 @@ namespace libmap {
 struct TileMask {
   Eigen::Array2i low = Eigen::Array2i::Constant(-voxel_cell_limit);
   Eigen::Array2i high = Eigen::Array2i::Constant(voxel_cell_limit);  // excluded
-  // Of squares of 4 x 4 columns, one in 2^thinning, by chance; those of a larger number are among
-  // those of a smaller one.
+  // Selects one in 2^thinning squares of 4 x 4 columns at random. A larger value selects a subset.
   unsigned thinning = 0;
 
   bool has_cell(const Eigen::Array2i& cell) const {
@@ -23,8 +22,8 @@ struct TileMask {
     const auto square = [&](int axis) { return static_cast<std::uint64_t>(cell[axis] >> 2); };
     return mix_bits(square(0), square(1)) >> (64U - thinning) == 0;
   }
-  // One of ten squares of 4 x 4 columns: frames are not registered by it, but the registration is
-  // validated by it.
+  // Returns true in one of ten squares of 4 x 4 columns, which validate a registration and are not
+  // used by it. The position is in voxels.
   static bool is_held_out(const Eigen::Vector2f& place) {
     const Eigen::Array2i square = (place.array() / 4.0F).floor().cast<int>();
     return mix_bits(~static_cast<std::uint64_t>(square.x()),
@@ -32,7 +31,7 @@ struct TileMask {
                10 ==
            0;
   }
-  // The place is in voxels.
+  // Returns true if the position, in voxels, is in a selected column.
   bool has_place(const Eigen::Vector2f& place) const {
     return (place.array().abs() < static_cast<float>(voxel_cell_limit)).all() &&
            has_cell(place.array().floor().cast<int>());

@@ -9,7 +9,7 @@ namespace libmap {
 namespace {
 
 constexpr double pixels_per_view = 4800.0;
-constexpr double ignored_share = 0.05;  // of a frame's pixels
+constexpr double ignored_share = 0.05;  // share of a frame's pixels
 
 }  // namespace
 

@@ -1,4 +1,5 @@
-// How well frames have measured a surface, in cells of the grid. Inner part of depth_fusion.
+// Information that frames have measured of a surface, in cells of the grid. Private to
+// depth_fusion.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +12,7 @@
 
 namespace libmap {
 
-// What one frame adds: the inverse variances of some of its pixels, summed over each cell.
+// Information of one frame: inverse variances of sampled pixels, summed per cell.
 struct FrameCoverage {
   VoxelIndex cells;
   std::vector<float> information;
@@ -24,8 +25,8 @@ struct FrameCoverage {
 
 class ViewCoverage {
  public:
-  // Whether a frame adds more than 1/views to what is known of a cell, for more than 5 % of its
-  // pixels.
+  // Returns true if for more than 5 % of its pixels the frame adds more than 1/views to the
+  // information of their cell.
   bool is_improved_by(const FrameCoverage& frame, double views) const;
   void add(const FrameCoverage& frame);
 

@@ -13,13 +13,13 @@ namespace {
 constexpr double samples_per_view = 2000.0;
 constexpr int patch_radius = 2;
 constexpr std::size_t patch_pixels = 25;
-constexpr float max_patch_relief = 0.05F;  // in depths
-constexpr float min_deviation = 4.0F;      // of the brightness, of 255
+constexpr float max_patch_relief = 0.05F;  // depth range of a patch, relative to its depth
+constexpr float min_deviation = 4.0F;      // of the brightness, 0 to 255
 constexpr float unknown = std::numeric_limits<float>::quiet_NaN();
 
 using Patch = Eigen::Array<float, patch_pixels, 1>;
 
-// Brightness at a pixel of the depth image, linearly interpolated; nothing outside the image.
+// Brightness at a pixel of the depth image, linearly interpolated; nullopt outside the image.
 std::optional<float> brightness(const RefinementView& view, const Eigen::Vector2d& pixel) {
   const Camera& depth = view.depth_camera;
   const Camera& color = view.color_camera;

@@ -1,4 +1,4 @@
-// Depth and color of one camera, compared with those of another one at a given motion between them.
+// Compares depth and color of two cameras at a given relative pose.
 #pragma once
 
 #include <vector>
@@ -8,10 +8,10 @@
 
 namespace libmap {
 
-// One entry for each sampled pixel of the first view; NaN where the second view does not show it.
+// One entry per sampled pixel of the first view; NaN if the second view does not show it.
 struct ViewComparison {
-  std::vector<Eigen::Vector3f> points;  // in the first camera; 0 without depth
-  std::vector<float> depth;             // measured minus expected depth, in expected depths
+  std::vector<Eigen::Vector3f> points;  // in the first camera's frame; 0 without depth
+  std::vector<float> depth;             // (measured - expected depth) / expected depth
   std::vector<float> color;             // 1 - correlation of the brightness of 5 x 5 pixels
 };
 

@@ -1,4 +1,4 @@
-// Disjoint sets of numbers (Galler and Fischer 1964).
+// Disjoint-set forest (Galler and Fischer 1964).
 #pragma once
 
 #include <algorithm>
@@ -8,7 +8,8 @@
 
 namespace libmap {
 
-// Sets of the numbers below `count`, initially one per number. A set is named by its least number.
+// Disjoint sets of the numbers 0..count-1, initially one per number. find() returns the smallest
+// number of a set as its name; join() merges two sets.
 template <typename Index>
 class DisjointSets {
  public:

@@ -1,5 +1,5 @@
-// Nonlinear least squares: the loops of Levenberg-Marquardt and Gauss-Newton. A problem brings its
-// normal equations and their solver, dense, sparse or of fixed size.
+// Nonlinear least squares: the loops of Levenberg-Marquardt and Gauss-Newton. The problem provides
+// its normal equations and their solver, dense, sparse or of fixed size.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,7 +8,7 @@
 
 namespace libmap {
 
-// J^T W J x = -J^T W r.
+// Normal equations J^T W J x = -J^T W r, accumulated over residuals.
 template <int size>
 struct NormalEquations {
   Eigen::Matrix<double, size, size> matrix = Eigen::Matrix<double, size, size>::Zero();

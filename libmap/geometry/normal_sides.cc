@@ -13,18 +13,18 @@ namespace {
 
 constexpr std::size_t max_indexed = 65536;
 constexpr std::size_t max_looked_at = 4000;
-constexpr std::size_t min_pairs = 100;  // fewer say nothing
+constexpr std::size_t min_pairs = 100;  // fewer pairs are not significant
 constexpr std::size_t neighbors = 4;    // the point itself is one
-constexpr float min_cosine = 0.7F;      // of neighbors that are not across a crease
+constexpr float min_cosine = 0.7F;      // smaller: the neighbors are across a crease
 
 bool is_direction(const Eigen::Vector3f& normal) {
   return normal.allFinite() && !normal.isZero(0.0F);
 }
 
-// The mean normal, or none if the normals cancel.
+// Mean normal; nullopt if the normals cancel.
 std::optional<Eigen::Vector3d> mean_direction(const std::vector<Eigen::Vector3f>& normals) {
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();
-  // From wide to narrow: walls and rocks drop out, the ground remains.
+  // The narrowing cones exclude walls and rocks; the ground remains.
   for (const double within_deg : {180.0, 60.0, 45.0, 30.0, 30.0}) {
     const double min_dot = std::cos(within_deg * std::numbers::pi / 180.0);
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();

@@ -1,4 +1,4 @@
-// The side of a surface that is up, as far as its normals agree.
+// Upper side of a surface, decided by its normals.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,11 +9,10 @@
 
 namespace libmap {
 
-// Smaller shares of normals on one side do not decide which side is up. Rocks seen from all sides
-// on their ground have 0.92, eigenvectors without an orientation up to 0.82 (with opposing
-// neighbors).
+// Minimum share of normals on one side that decides the upper side. Rocks on their ground, seen
+// from all sides, have 0.92; unoriented eigenvectors have up to 0.82 (with opposing neighbors).
 inline constexpr double min_agreeing_share = 0.8;
-// Neighbors of an oriented surface rarely face opposite sides: thin parts do.
+// Maximum share of opposing neighbors of an oriented surface; only thin parts have such neighbors.
 inline constexpr double max_opposing_share = 0.1;
 
 // Sums of |cosine| between unit normals and an axis, by side. Zero and NaN normals are skipped.
@@ -40,23 +39,23 @@ struct NormalVotes {
 };
 
 // Share of neighboring points whose normals face opposite sides, among the first 65536 points; 0.5
-// for normals with random sides. Neighbors across a crease do not count. Positions may be NaN.
+// for random sides, 0 for too few points. Ignores neighbors across a crease and positions of NaN.
 double opposing_share(const std::vector<Eigen::Vector3d>& positions,
                       const std::vector<Eigen::Vector3f>& normals);
 
-// "its normals do not agree on a side (52.0 % of at least 80 %; ...)"
+// Returns the warning "its normals do not agree on a side: 52.0 % are on the larger one (...)".
 std::string disagreement_text(double share, double opposing);
 
 struct UpOfNormals {
   Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();  // unit
-  double share = 0.0;     // of the normals on its side (NormalVotes); 0: no normals
+  double share = 0.0;     // NormalVotes::share() of the normals; 0: no normals
   double opposing = 0.0;  // opposing_share
-  bool decided = false;   // by the normals; else `direction` is +z
+  bool decided = false;   // true if the normals agree; else `direction` is +z
 };
 
-// Up by the normals of a surface: the mean of the normals, repeatedly taken among those around it,
-// so that walls and rocks do not tilt it. +z if that mean is within 20 degrees of +z, or if the
-// normals do not agree. Normals may have any length; zeros and NaN are skipped.
+// Up direction of a surface: the mean of its normals, repeatedly restricted to normals near the
+// mean, so that walls and rocks do not tilt it. Returns +z if the mean is within 20 degrees of +z
+// or if the normals do not agree. Normals can have any length; zeros and NaN are skipped.
 UpOfNormals up_of_normals(const std::vector<Eigen::Vector3d>& positions,
                           const std::vector<Eigen::Vector3f>& normals);
 

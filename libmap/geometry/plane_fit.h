@@ -1,4 +1,4 @@
-// Weighted least-squares planes, the step of every robust plane fit.
+// Weighted least-squares planes, the inner step of robust plane fits.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,7 +9,7 @@
 
 namespace libmap {
 
-// Weighted sums over points about an origin near them.
+// Weighted sums over point offsets from a nearby origin.
 struct PlaneMoments {
   double weight = 0.0;
   Eigen::Vector3d first = Eigen::Vector3d::Zero();
@@ -28,7 +28,7 @@ struct PlaneMoments {
   }
 };
 
-// Principal axes of weighted points; the first one is the normal of their plane, of either sign.
+// Principal axes of weighted points. The first axis is the plane normal, of either sign.
 struct PlaneSpread {
   Eigen::Vector3d center = Eigen::Vector3d::Zero();
   Eigen::Vector3d variances = Eigen::Vector3d::Zero();  // ascending
@@ -41,11 +41,12 @@ struct PlaneSpread {
   }
 };
 
-// Without weight the center is the origin and the variances are zero.
+// Returns the principal axes of accumulated moments. If the total weight is 0, the center is
+// `origin` and the variances are 0.
 PlaneSpread spread_of(const PlaneMoments& moments, const Eigen::Vector3d& origin);
 
-// Points count by weight(point) > 0. Sums run in chunks, so that the result does not depend on the
-// number of threads.
+// Returns the principal axes of points with weight(point) > 0. Sums over fixed chunks make the
+// result independent of the number of threads.
 template <typename Weight>
 PlaneSpread weighted_spread(const std::vector<Eigen::Vector3d>& points,
                             const Eigen::Vector3d& origin, std::size_t points_per_chunk,

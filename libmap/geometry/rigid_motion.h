@@ -1,6 +1,6 @@
-// Small rigid motions. A pose T moves by a step e = (x y z, rotation vector) in its own frame:
-// moved(T, e) = T * [exp(rotation) | translation]. Covariances and information matrices of poses
-// are of such steps, in the order of PoseLink::information.
+// Small rigid motions and their derivatives. A step e = (x y z, rotation vector), m and rad, moves
+// a pose T in its own frame: moved(T, e) = T * [exp(rotation) | translation]. Covariances and
+// information matrices of poses refer to such steps, in the order of PoseLink::information.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,14 +13,14 @@ namespace libmap {
 
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
-// cross_matrix(a) * b = a x b.
+// Matrix of the cross product: cross_matrix(a) * b = a x b.
 inline Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& a) {
   Eigen::Matrix3d matrix;
   matrix << 0.0, -a.z(), a.y(), a.z(), 0.0, -a.x(), -a.y(), a.x(), 0.0;
   return matrix;
 }
 
-// Exponential and logarithm of SO(3); the rotation vector is at most pi long.
+// Exponential and logarithm of SO(3), rad; the logarithm has a length of at most pi.
 Eigen::Quaterniond rotation_of(const Eigen::Vector3d& rotation_vector);
 Eigen::Vector3d rotation_vector_of(const Eigen::Matrix3d& rotation);
 
@@ -30,15 +30,15 @@ Eigen::Matrix3d rotation_vector_derivative(const Eigen::Vector3d& rotation_vecto
 
 Pose moved(const Pose& pose, const Vector6d& step);
 
-// The step from `from` to `to`; its derivative by a step of `to`.
+// Step from `from` to `to`, and its derivative with respect to a step of `to`.
 Vector6d step_between(const Pose& from, const Pose& to);
 Matrix6d step_derivative(const Pose& from, const Pose& to);
 
-// True if the distance and the angle between two poses are at most these.
+// True if two poses differ by at most `distance_m` and `angle_rad`.
 bool is_near(const Pose& a, const Pose& b, double distance_m, double angle_rad);
 
-// Derivatives of the step of a_from_b = a^-1 b by steps of a and b: minus the adjoint of b_from_a,
-// and the identity.
+// Derivatives of the step of a_from_b = a^-1 b with respect to steps of a (minus the adjoint of
+// b_from_a) and b (the identity).
 struct RelativeJacobian {
   Matrix6d by_a;
   Matrix6d by_b;

@@ -15,7 +15,7 @@ namespace libmap {
 
 namespace {
 
-// nanoflann's view of a list of points.
+// Adapter of a list of points to nanoflann.
 struct PointList {
   const std::vector<Eigen::Vector3d>& points;
   std::size_t kdtree_get_point_count() const { return points.size(); }
@@ -30,27 +30,28 @@ struct PointList {
 using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, PointList>,
                                                  PointList, 3, std::size_t>;
 
-// The nearest point, the first of them found. At no distance nothing is nearer: without a stop
-// there, a search among points in one place would go through all of them.
+// The first nearest point found. The search stops at a distance of 0; otherwise, it would visit all
+// points of equal position.
 struct NearestPoint {
   NeighborPoint neighbor{0, std::numeric_limits<double>::infinity()};
 
   bool full() const { return true; }
   double worstDist() const { return neighbor.square_m2; }
-  // Whether to search on.
+  // Returns true to continue the search.
   bool addPoint(double square_m2, std::size_t index) {
     if (square_m2 < neighbor.square_m2) neighbor = {index, square_m2};
     return neighbor.square_m2 > 0.0;
   }
 };
 
-// The tree rounds the distances of its boxes: it is asked for a little more.
+// Search radius with a margin, because the tree rounds the distances of its boxes.
 double with_margin(double square_m2) {
   constexpr double margin = 1e-9;
   return std::nextafter(square_m2 * (1.0 + margin), HUGE_VAL);
 }
 
-// It keeps no list: from far off all points are nearly as near.
+// The nearest point with the lowest index. It keeps no list of candidates: from far away, all
+// points are at nearly the same distance.
 struct FirstOfNearest {
   NeighborPoint neighbor{0, HUGE_VAL};
   double worst = HUGE_VAL;
@@ -67,7 +68,7 @@ struct FirstOfNearest {
   }
 };
 
-// The `count` nearest points, among equally near ones those of the lowest index.
+// The `count` nearest points; ties are resolved by the lowest index.
 struct FirstOfNearestPoints {
   std::size_t count;
   std::vector<NeighborPoint> neighbors{};  // the nearest first
@@ -150,8 +151,8 @@ std::vector<NeighborPoint> PointTree::within(const Eigen::Vector3d& point, doubl
 
 namespace {
 
-// The square of the distance to the nearest point that lies elsewhere; 0 if none was met among
-// many that lie here.
+// Squared distance to the nearest point at another position; 0 if the first 512 points are at this
+// position.
 double square_to_next(const PointTree& tree, const Eigen::Vector3d& point) {
   constexpr std::size_t max_here = 512;
   for (std::size_t count = 2; count <= max_here; count *= 4)
@@ -165,13 +166,13 @@ double square_to_next(const PointTree& tree, const Eigen::Vector3d& point) {
 namespace {
 
 constexpr std::size_t area_neighbors = 17;  // the point itself is one
-// A nearest neighbor at a smaller share of the spacing by area is a near-duplicate: random points
+// A nearest neighbor within this share of the spacing by area is a near-duplicate. Random points
 // have 0.47, grids 1.
 constexpr double min_nearest_share = 0.3;
 constexpr double merged_share = 0.25;
 
-// Spacing of a square grid that has as many points per area: the median distance to the 16th
-// neighbor is the radius of a disc of 16 of them.
+// Spacing of a square grid with as many points per area. The median distance to the 16th neighbor
+// is the radius of a disc that contains 16 points.
 double area_spacing(const PointTree& tree, const std::vector<Eigen::Vector3d>& points) {
   constexpr std::size_t most = 2000;
   std::vector<double> squares(std::min(points.size(), most));
@@ -183,7 +184,7 @@ double area_spacing(const PointTree& tree, const std::vector<Eigen::Vector3d>& p
   return std::sqrt(std::numbers::pi * median(std::move(squares)) / static_cast<double>(count - 1));
 }
 
-// The points, in their order, without those nearer than `distance_m` to one that is kept.
+// Returns the points in order, without points closer than `distance_m` to a point kept before.
 std::vector<Eigen::Vector3d> merge_near(const std::vector<Eigen::Vector3d>& points,
                                         double distance_m) {
   GrowingGrid grid(points.front(), distance_m, points.size());

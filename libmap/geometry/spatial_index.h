@@ -1,6 +1,6 @@
-// Neighbor search among points: PointTree for points that are all known, GrowingGrid for points
-// that are added between searches. Other structures exist where these are measurably slower or
-// where sums depend on the order of the neighbors; each states its measurement:
+// Neighbor search among points: PointTree for a fixed set of points, GrowingGrid for points added
+// between searches. Other structures exist only where these are measurably slower or where sums
+// depend on the order of the neighbors; each states its measurement:
 // libgtd/shape/point_grid.h (8 times as fast for 27 neighbors), libmap/fusion/surface_points.cc (3
 // times), libmap/surface/self_intersections.cc (boxes of triangles), Embree for rays and distances.
 #pragma once
@@ -16,29 +16,29 @@ namespace libmap {
 
 struct NeighborPoint {
   std::size_t index = 0;
-  double square_m2 = 0.0;  // of the distance
+  double square_m2 = 0.0;  // squared distance
 };
 
-// A k-d tree by nanoflann.
+// k-d tree by nanoflann. All functions are thread-safe.
 class PointTree {
  public:
-  // The points, all finite, must stay while the tree lives.
+  // The points must be finite and outlive the tree.
   explicit PointTree(const std::vector<Eigen::Vector3d>& points);
   ~PointTree();
   PointTree(PointTree&&) noexcept;
   PointTree& operator=(PointTree&&) noexcept;
 
-  // The `count` nearest points, or all if there are fewer, the nearest first, of equally near ones
-  // those of the lowest index. May be called from several threads at once.
+  // Returns the `count` nearest points by ascending distance, or all if there are fewer. Ties are
+  // resolved by the lowest index.
   std::vector<NeighborPoint> nearest(const Eigen::Vector3d& point, std::size_t count) const;
-  // The nearest one; there must be one.
+  // Returns a nearest point. The tree must not be empty.
   NeighborPoint nearest(const Eigen::Vector3d& point) const;
-  // The nearest one, among equally near ones that of the lowest index; there must be one.
+  // Returns the nearest point with the lowest index. The tree must not be empty.
   NeighborPoint first_of_nearest(const Eigen::Vector3d& point) const;
-  // The `count` points nearest to the n-th and at most `radius_m` away, the nearest first, without
-  // the n-th.
+  // Returns the at most `count` points nearest to point n within `radius_m`, without point n, by
+  // ascending distance.
   std::vector<NeighborPoint> around(std::size_t n, std::size_t count, double radius_m) const;
-  // All points at most `radius_m` away, by index.
+  // Returns all points within `radius_m` by ascending index.
   std::vector<NeighborPoint> within(const Eigen::Vector3d& point, double radius_m) const;
 
  private:
@@ -46,25 +46,25 @@ class PointTree {
   std::unique_ptr<Index> index_;
 };
 
-// Median of the distances from points to the nearest elsewhere, m; of at most 10000 of them, spread
+// Median distance to the nearest point at another position, m, over at most 10000 points, spread
 // evenly over the list. If most points are near-duplicates (first and last returns, joined clouds),
-// the spacing of a square grid with as many places per area, near-duplicates merged. 0 if there are
-// no two places.
+// they are merged and the result is by_area_m of the merged points. Returns 0 if all positions are
+// equal.
 double median_spacing(const std::vector<Eigen::Vector3d>& points);
 
 struct CloudSpacing {
   double nearest_m = 0.0;  // median_spacing
-  double by_area_m = 0.0;  // of a square grid with as many points per area
+  double by_area_m = 0.0;  // spacing of a square grid with as many points per area
 };
-// Both spacings of a cloud; 0 where there are no two places.
+// Both spacings of a cloud; 0 if all positions are equal.
 CloudSpacing point_spacing(const std::vector<Eigen::Vector3d>& points);
 
-// Points in a hashed grid of cubes. nanoflann's tree that grows takes 10 times as long for 74,000
-// samples. Cells share slots where their hashes meet, so that a search may see points that lie
-// elsewhere: who searches measures distances anyway. Positions are counted from `origin`.
+// Points in a hashed grid of cubes that starts at `origin`. nanoflann's dynamic tree takes 10 times
+// as long for 74,000 samples. Cells with equal hashes share a slot, so a search can visit points
+// outside the box; the caller checks distances anyway.
 class GrowingGrid {
  public:
-  // Quickest for boxes of about `cell_m`.
+  // Fastest for boxes of about `cell_m`.
   GrowingGrid(const Eigen::Vector3d& origin, double cell_m, std::size_t expected_points)
       : origin_(origin), cells_per_m_(1.0 / cell_m) {
     std::size_t slots = 64;
@@ -85,8 +85,8 @@ class GrowingGrid {
     link(static_cast<std::uint32_t>(nodes_.size() - 1));
   }
 
-  // visit(position, index) of each point in the box, and of others; true ends the search. Returns
-  // whether one did.
+  // Calls visit(position, index) for each point in the box, and for some others, until it returns
+  // true. Returns true if a call did.
   template <typename Visit>
   bool any_in_box(const Eigen::Vector3d& low, const Eigen::Vector3d& high,
                   const Visit& visit) const {
@@ -100,7 +100,7 @@ class GrowingGrid {
     return false;
   }
 
-  // Whether a point is closer to `place` than the root of `square_m2`, which is `radius_m`.
+  // True if a point is closer to `place` than `radius_m`, the square root of `square_m2`.
   bool any_nearer(const Eigen::Vector3d& place, double radius_m, double square_m2) const {
     const Eigen::Vector3d reach = Eigen::Vector3d::Constant(radius_m);
     return any_in_box(place - reach, place + reach,
@@ -120,14 +120,14 @@ class GrowingGrid {
   };
 
   Cell cell_of(const Eigen::Vector3d& position) const {
-    constexpr double farthest = 1e18;  // that whole numbers hold
+    constexpr double farthest = 1e18;  // within the range of std::int64_t
     const Eigen::Vector3d at =
         ((position - origin_) * cells_per_m_).cwiseMin(farthest).cwiseMax(-farthest);
     return {static_cast<std::int64_t>(std::floor(at.x())),
             static_cast<std::int64_t>(std::floor(at.y())),
             static_cast<std::int64_t>(std::floor(at.z()))};
   }
-  // Neighbors along x lie side by side.
+  // Neighbors along x are adjacent in memory.
   std::size_t slot(const Cell& cell) const {
     return (static_cast<std::uint64_t>(cell.x) + 73856093U * static_cast<std::uint64_t>(cell.y) +
             19349663U * static_cast<std::uint64_t>(cell.z)) &

@@ -1,5 +1,5 @@
 // Eigenvalues and eigenvectors of symmetric matrices by Eigen's Householder tridiagonalization and
-// implicit QR, compiled once: the solver costs the compiler one to three seconds in each file.
+// implicit QR, compiled once, because the solver takes one to three seconds to compile per file.
 #pragma once
 
 #include <Eigen/Core>

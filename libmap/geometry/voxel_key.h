@@ -1,4 +1,5 @@
-// Voxels packed into 64 bits, and their numbers in a hash table. Inline, for innermost loops.
+// Voxel indices packed into 64-bit keys, and a hash table from keys to consecutive numbers. Inline,
+// for innermost loops.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,20 +11,20 @@
 
 namespace libmap {
 
-// Index of a voxel in its grid, and which of the two sides of a thin sheet it holds.
+// Index of a voxel in its grid, and the side of a thin sheet that it represents.
 struct VoxelPlace {
   Eigen::Vector3i cell = Eigen::Vector3i::Zero();
   int side = 0;  // 0 or 1
 };
 
-// Cells -limit..limit-1 along each axis.
+// Cell indices are -limit..limit-1 along each axis.
 inline constexpr int voxel_cell_limit = 1 << 20;
 
-// Of a voxel: 21 bits an axis and one of the side.
+// Layout of a key: 21 bits per axis and one bit for the side.
 namespace voxel_key {
 
 inline constexpr std::uint64_t axis_mask = (std::uint64_t{1} << 21U) - 1;
-// Of the voxel's place in a block of 4 x 4 x 2.
+// Bits of the voxel's position in its block of 4 x 4 x 2 voxels.
 inline constexpr std::uint64_t block_bits =
     std::uint64_t{3} << 43U | std::uint64_t{3} << 22U | std::uint64_t{1} << 1U;
 
@@ -31,7 +32,7 @@ inline std::uint64_t axis_bits(std::int64_t cell) {
   return static_cast<std::uint64_t>(cell + voxel_cell_limit) & axis_mask;
 }
 
-// Two zeros before each of the 21 bits.
+// Inserts two zeros before each of the 21 bits.
 inline std::uint64_t spread(std::uint64_t bits) {
   bits &= axis_mask;
   bits = (bits | bits << 32U) & 0x1f00000000ffffU;
@@ -68,28 +69,28 @@ inline VoxelPlace unpack(std::uint64_t key) {
   return {{cell(key >> 43U), cell(key >> 22U), cell(key >> 1U)}, static_cast<int>(key & 1U)};
 }
 
-// Position of a voxel on a Z-order curve (Morton 1966), its side last: what is near in space is
-// near on the curve.
+// Position of a voxel on a Z-order curve (Morton 1966), with the side as the last bit. Neighbors in
+// space are close on the curve.
 inline std::uint64_t z_order(std::uint64_t key) {
   return voxel_key::spread(key >> 43U) << 3U | voxel_key::spread(key >> 22U) << 2U |
          voxel_key::spread(key >> 1U) << 1U | (key & 1U);
 }
 
-// Keys to consecutive numbers, in the order in which they come. A hash table (open addressing)
-// holds blocks of 4 x 4 x 2 voxels of one side: neighbors are in one block mostly.
+// Hash table (open addressing) from keys to consecutive numbers in the order of insertion. Its
+// entries are blocks of 4 x 4 x 2 voxels of one side, because neighbors are mostly in one block.
 class VoxelIndex {
  public:
   static constexpr std::uint32_t none = 0xffffffff;
 
   VoxelIndex() : slots_(1U << 6U) {}  // no key yet
 
-  // The key's number, or `none`.
+  // Returns the key's number, or `none`.
   std::uint32_t find(std::uint64_t key) const {
     const Slot& slot = slots_[slot_of(key & ~voxel_key::block_bits)];
     return slot.block == none ? none : blocks_[slot.block][voxel_key::place_in_block(key)];
   }
 
-  // The key's number, the next one if it is new.
+  // Returns the key's number; a new key gets the next number.
   std::uint32_t find_or_add(std::uint64_t key) {
     const std::uint64_t block_key = key & ~voxel_key::block_bits;
     if (block_key != last_key_ || last_block_ == none) {
@@ -120,7 +121,7 @@ class VoxelIndex {
     return slot;
   }
 
-  // The block's number; a new one if it is not known.
+  // Returns the block's number; adds the block if it is new.
   std::uint32_t block_of(std::uint64_t block_key) {
     Slot& slot = slots_[slot_of(block_key)];
     if (slot.block != none) return slot.block;
@@ -140,8 +141,8 @@ class VoxelIndex {
 
   std::vector<std::uint64_t> keys_;
   std::vector<Block> blocks_;
-  std::vector<Slot> slots_;     // a power of 2
-  std::uint64_t last_key_ = 0;  // of the block that was asked for: pixels side by side share it
+  std::vector<Slot> slots_;     // the size is a power of 2
+  std::uint64_t last_key_ = 0;  // last block searched; adjacent pixels mostly share it
   std::uint32_t last_block_ = none;
 };
 

@@ -56,17 +56,17 @@ Eigen::Affine3d to_eigen(const aiMatrix4x4& m) {
   return affine;
 }
 
-// z up from y up.
+// Rotation from y up to z up.
 Eigen::Matrix3d z_up_from_y_up() {
   Eigen::Matrix3d rotation;
   rotation << 1, 0, 0, 0, 0, -1, 0, 1, 0;
   return rotation;
 }
 
-// Of a triangle without texture coordinates.
+// Material index of a triangle without texture coordinates.
 constexpr unsigned no_material = 0xffffffff;
 
-// Gathers the parts of a scene into one mesh.
+// Collects the parts of a scene in one mesh.
 class MeshBuilder {
  public:
   MeshBuilder(const aiScene& scene, const std::string& format)
@@ -82,14 +82,14 @@ class MeshBuilder {
   void add_node(const aiNode& node, const Eigen::Affine3d& root_from_parent) {
     const Eigen::Affine3d root_from_node = root_from_parent * to_eigen(node.mTransformation);
     for (unsigned i = 0; i < node.mNumMeshes; ++i) {
-      if (node.mMeshes[i] >= scene_.mNumMeshes) throw Error("a node names no mesh");
+      if (node.mMeshes[i] >= scene_.mNumMeshes) throw Error("a node refers to a missing mesh");
       add_mesh(*scene_.mMeshes[node.mMeshes[i]], root_from_node);
     }
     for (unsigned i = 0; i < node.mNumChildren; ++i) add_node(*node.mChildren[i], root_from_node);
   }
   TriangleMesh take() { return std::move(mesh_); }
 
-  // One a triangle, from the top left; and the material of each.
+  // Texture coordinates, from the top left, and material of each triangle.
   const std::vector<TextureCorners>& coordinates() const { return coordinates_; }
   const std::vector<unsigned>& materials() const { return materials_; }
 
@@ -99,7 +99,7 @@ class MeshBuilder {
     result.fill(Eigen::Vector2f::Zero());
     if (!part.HasTextureCoords(0)) return result;
     for (std::size_t k = 0; k < 3; ++k) {
-      // assimp counts from the bottom in every format.
+      // assimp's origin is the bottom left in all formats.
       const aiVector3D& c = part.mTextureCoords[0][corners[k]];
       result[k] = {c.x, 1.0F - c.y};
     }
@@ -115,8 +115,8 @@ class MeshBuilder {
       corners.clear();
       for (unsigned k = 0; k < face.mNumIndices; ++k) {
         if (face.mIndices[k] >= part.mNumVertices)
-          throw Error("a corner is no vertex", {.field = "face " + std::to_string(i),
-                                                .value = std::to_string(face.mIndices[k])});
+          throw Error("no such vertex", {.field = "face " + std::to_string(i),
+                                         .value = std::to_string(face.mIndices[k])});
         corners.push_back(vertex(part, face.mIndices[k], root_from_node, normal_matrix));
       }
       std::vector<unsigned> indices(face.mIndices, face.mIndices + face.mNumIndices);
@@ -130,7 +130,7 @@ class MeshBuilder {
     }
   }
 
-  // The vertex of a corner: a new one, or the one that is equal.
+  // Returns the vertex of a corner: an equal vertex, or a new one.
   std::uint32_t vertex(const aiMesh& part, unsigned index, const Eigen::Affine3d& root_from_node,
                        const Eigen::Matrix3d& normal_matrix) {
     const aiVector3D& p = part.mVertices[index];
@@ -176,7 +176,7 @@ std::unique_ptr<aiNode> make_root(std::size_t parts, bool y_up) {
   root->mNumMeshes = static_cast<unsigned>(parts);
   root->mMeshes = new unsigned[parts];
   std::iota(root->mMeshes, root->mMeshes + parts, 0U);
-  // y up from z up, as glTF's readers expect.
+  // Rotation from z up to y up, as glTF requires.
   if (y_up) root->mTransformation = aiMatrix4x4(1, 0, 0, 0, 0, 0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 1);
   return root;
 }
@@ -200,7 +200,7 @@ void copy_vertices(const TriangleMesh& mesh, aiMesh& part) {
   part.mColors[0] = new aiColor4D[count];
   for (std::size_t i = 0; i < count; ++i) {
     const Color& c = mesh.vertex_colors[i];
-    // STL keeps none.
+    // STL has no colors.
     part.mColors[0][i] = aiColor4D(linear_of(c[0]), linear_of(c[1]), linear_of(c[2]), 1.0F);
   }
 }
@@ -216,10 +216,10 @@ void copy_faces(const TriangleMesh& mesh, aiMesh& part) {
   }
 }
 
-// Unlit: photographs hold the light that fell.
+// Unlit material, because photographs already contain the scene's illumination.
 std::unique_ptr<aiMaterial> make_material(std::int32_t page) {
   auto material = std::make_unique<aiMaterial>();
-  // Not as an int: the exporter looks for the enumeration's own type.
+  // The exporter requires the enumeration's type, not an int.
   const aiShadingMode unlit = aiShadingMode_Unlit;
   material->AddProperty(&unlit, 1, AI_MATKEY_SHADING_MODEL);
   if (page == no_page) {
@@ -236,7 +236,7 @@ std::unique_ptr<aiMaterial> make_material(std::int32_t page) {
   return material;
 }
 
-// A compressed picture has no height; its width counts bytes.
+// A compressed image has height 0; its width is its size in bytes.
 std::unique_ptr<aiTexture> make_texture(const EncodedPicture& picture) {
   auto texture = std::make_unique<aiTexture>();
   texture->mWidth = static_cast<unsigned>(picture.bytes.size());
@@ -250,12 +250,12 @@ void copy_coordinates(const std::vector<Eigen::Vector2f>& coordinates, aiMesh& p
   if (coordinates.empty()) return;
   part.mTextureCoords[0] = new aiVector3D[coordinates.size()];
   part.mNumUVComponents[0] = 2;
-  // assimp counts from the bottom.
+  // assimp's origin is the bottom left.
   for (std::size_t i = 0; i < coordinates.size(); ++i)
     part.mTextureCoords[0][i] = aiVector3D(coordinates[i].x(), 1.0F - coordinates[i].y(), 0.0F);
 }
 
-// The scene owns all that is hung into it.
+// The scene takes ownership of its elements.
 template <typename T>
 T** hang(std::vector<std::unique_ptr<T>>& things, unsigned& count) {
   count = static_cast<unsigned>(things.size());
@@ -281,7 +281,7 @@ std::unique_ptr<aiMesh> mesh_of(const TriangleMesh& mesh, unsigned material) {
   return part;
 }
 
-// The first line of a message, without assimp's name for bytes in memory.
+// First line of a message, without assimp's name for bytes in memory.
 std::string first_line(const char* text) {
   const std::string_view reason = text == nullptr ? "" : text;
   std::string line(reason.substr(0, std::min<std::size_t>(reason.find('\n'), 200)));
@@ -290,16 +290,16 @@ std::string first_line(const char* text) {
   return line.replace(at, line.find_first_of("'\" :,", at) - at, "the file");
 }
 
-// The picture of a material's own color, or nothing.
+// Texture image of a material's base color; nullopt if it has none.
 std::optional<TexturePicture> picture_of(const aiScene& scene, const aiMaterial& material) {
   for (const aiTextureType type : {aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE}) {
     aiString path;
     if (material.GetTexture(type, 0, &path) != aiReturn_SUCCESS) continue;
     const aiTexture* const embedded = scene.GetEmbeddedTexture(path.C_Str());
-    // However it is named, a picture is read once.
+    // An image is read once, even if several materials refer to it by different names.
     if (embedded == nullptr)
       return TexturePicture{{}, std::filesystem::path(path.C_Str()).lexically_normal().string()};
-    // Compressed pictures have no height; their width counts bytes.
+    // Compressed images have height 0; their width is their size in bytes.
     if (embedded->mHeight != 0) continue;
     return TexturePicture{
         std::string(reinterpret_cast<const char*>(embedded->pcData), embedded->mWidth), {}};
@@ -309,7 +309,7 @@ std::optional<TexturePicture> picture_of(const aiScene& scene, const aiMaterial&
 
 DecodedModel model_of(const aiScene& scene, MeshBuilder& builder) {
   DecodedModel result;
-  // Pages in the order of the materials; several materials may have one picture.
+  // Pages in the order of the materials; several materials can share an image.
   std::vector<std::int32_t> page_of_material(scene.mNumMaterials, no_page);
   for (unsigned m = 0; m < scene.mNumMaterials; ++m) {
     std::optional<TexturePicture> picture = picture_of(scene, *scene.mMaterials[m]);
@@ -329,7 +329,7 @@ DecodedModel model_of(const aiScene& scene, MeshBuilder& builder) {
   return result;
 }
 
-// assimp takes memory for the length of the text before it compares it with the file's.
+// assimp allocates the declared length of the JSON text before it compares it with the file size.
 void require_sound_glb(std::string_view header, std::uint64_t bytes) {
   constexpr std::size_t text_length_at = 12;
   constexpr std::size_t text_at = 20;
@@ -339,17 +339,17 @@ void require_sound_glb(std::string_view header, std::uint64_t bytes) {
   std::memcpy(&length, header.data() + text_length_at, sizeof length);
   if (text_at + std::uint64_t{length} > bytes)
     throw Error("not a readable glb file",
-                {.field = "length of its text",
+                {.field = "length of the JSON text",
                  .value = std::to_string(length),
-                 .bound = "within its " + std::to_string(bytes) + " bytes"});
+                 .bound = "within the file's " + std::to_string(bytes) + " bytes"});
 }
 
-// read(importer) gives the scene, take(scene, builder) the result.
+// read(importer) returns the scene, take(scene, builder) the result.
 template <typename Read, typename Take>
 auto decode(const std::string& format, const Read& read, const Take& take) {
   try {
     Assimp::Importer importer;
-    // No aiProcess_Triangulate: on some broken files it ends the program by an assertion.
+    // No aiProcess_Triangulate: on some damaged files, it ends the program with an assertion.
     const aiScene* const scene = read(importer);
     if (scene == nullptr || scene->mRootNode == nullptr)
       throw Error("not a readable " + format + " file: " + first_line(importer.GetErrorString()));
@@ -359,15 +359,15 @@ auto decode(const std::string& format, const Read& read, const Take& take) {
     builder.add_node(*scene->mRootNode, root);
     return take(*scene, builder);
   } catch (const std::bad_alloc&) {
-    throw Error("claims more data than there is memory");
+    throw Error("declares more data than fits into memory");
   } catch (const std::length_error&) {
-    throw Error("claims more data than there is memory");
+    throw Error("declares more data than fits into memory");
   }
 }
 
-// What decode() returns or throws in a process of its own: assimp crashes on some broken files.
+// Calls decode() in a child process, because assimp crashes on some damaged files.
 DecodedModel decode_guarded(std::uint64_t file_bytes, const std::function<DecodedModel()>& decode) {
-  // assimp's scene, our mesh and its bytes; a line of OBJ becomes some hundred bytes.
+  // Memory for assimp's scene, the mesh and its bytes; a line of OBJ needs some hundred bytes.
   const std::uint64_t memory = (std::uint64_t{1} << 30) + 100 * file_bytes;
   return run_guarded<DecodedModel>(memory, "is broken: the library for its format crashed on it",
                                    decode, [](auto& pipe, DecodedModel& decoded) {
@@ -387,7 +387,7 @@ DecodedModel decode_guarded(std::uint64_t file_bytes, const std::function<Decode
 }
 
 Error not_written(const Assimp::Exporter& exporter) {
-  return Error("assimp cannot write it: " + first_line(exporter.GetErrorString()), {},
+  return Error("assimp cannot write the file: " + first_line(exporter.GetErrorString()), {},
                ErrorKind::failed);
 }
 
@@ -435,7 +435,7 @@ void write_model_by_assimp(const std::filesystem::path& path, std::vector<ModelP
   std::vector<std::unique_ptr<aiMesh>> meshes;
   std::vector<std::unique_ptr<aiMaterial>> materials;
   std::vector<std::unique_ptr<aiTexture>> textures;
-  // The exporter copies the scene: what it replaces is given back at once.
+  // The exporter copies the scene, so the memory of each part is released at once.
   for (ModelPart& part : parts) {
     meshes.push_back(mesh_of(part.mesh, static_cast<unsigned>(materials.size())));
     copy_coordinates(part.texture_coordinates, *meshes.back());
@@ -455,8 +455,8 @@ void write_model_by_assimp(const std::filesystem::path& path, std::vector<ModelP
     throw not_written(exporter);
   }
   const int failure = errno;
-  // The second number of the header (glTF 2.0, 4.4.2) is the file's length; assimp does not see
-  // what fails when the file is closed.
+  // The header contains the file's length (glTF 2.0, 4.4.2). assimp does not detect write errors
+  // when it closes the file.
   std::ifstream file(path, std::ios::binary);
   std::array<std::uint32_t, 3> header{};
   file.read(reinterpret_cast<char*>(header.data()), sizeof header);

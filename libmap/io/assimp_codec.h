@@ -1,4 +1,4 @@
-// OBJ, STL and GLB through assimp.
+// Codec of OBJ, STL and GLB by assimp.
 #pragma once
 
 #include <cstdint>
@@ -11,43 +11,45 @@
 
 namespace libmap {
 
-// `format` is "obj", "stl" or "glb". Equal corners become one vertex. Throws Error (without
-// the file's name) with assimp's own reason.
+// Decodes a mesh; `format` is "obj", "stl" or "glb". Equal corners become one vertex. Throws Error
+// (without the file's name) with assimp's reason.
 TriangleMesh decode_by_assimp(const std::string& bytes, const std::string& format);
 
-// A picture of a file: its bytes where they lie within, else its path as the file names it.
+// Texture image of a model: its bytes if it is embedded, else its path as stored in the file.
 struct TexturePicture {
   std::string bytes;
   std::string path;
 };
 
-// A mesh whose pages are still files: page_of_triangle counts `pictures`.
+// A mesh with undecoded texture pages: page_of_triangle contains indices of `pictures`.
 struct DecodedModel {
   TexturedMesh model;
   std::vector<TexturePicture> pictures;
 };
 
-// The .obj (with its materials) or .glb at `path`. Throws as decode_by_assimp does.
+// Reads the .obj (with its materials) or .glb at `path`. Throws as decode_by_assimp does.
 DecodedModel decode_model_by_assimp(const std::filesystem::path& path, const std::string& format);
 
-// `format` is "stl" or "glb". Throws Error.
+// Encodes a mesh; `format` is "stl" or "glb". Throws Error if the mesh has no triangles, or if
+// assimp fails.
 std::string encode_by_assimp(const TriangleMesh& mesh, const std::string& format, bool ascii);
 
-// A piece of a model that has one page: a texture coordinate a vertex, as in TexturedMesh, none
-// without a page.
+// Part of a model with one texture page. It has one texture coordinate per vertex, as in
+// TexturedMesh, or none without a page.
 struct ModelPart {
   TriangleMesh mesh;
   std::vector<Eigen::Vector2f> texture_coordinates;
   std::int32_t page = no_page;
 };
 
-// A picture as the bytes of a file; `format` is "png" or "jpg".
+// Texture image as the bytes of a file; `format` is "png" or "jpg".
 struct EncodedPicture {
   std::string bytes;
   std::string format;
 };
 
-// .glb with the pictures within, unlit (KHR_materials_unlit). Throws Error.
+// Writes a .glb with embedded images and unlit materials (KHR_materials_unlit). Throws Error
+// (failed).
 void write_model_by_assimp(const std::filesystem::path& path, std::vector<ModelPart> parts,
                            std::vector<EncodedPicture> pictures);
 

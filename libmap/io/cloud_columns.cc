@@ -47,7 +47,7 @@ Triple require_positions(const ColumnSet& set) {
   if (const auto triple = find_triple(set, position_names)) return *triple;
   std::string all;
   for (const std::string& name : names_of(set)) all += " " + name.substr(0, 40);
-  throw Error("contains no points: fields x, y and z are needed, it has" +
+  throw Error("contains no points: fields x, y and z are required, found" +
               (all.empty() ? std::string(" none") : all.substr(0, 400)));
 }
 
@@ -57,7 +57,7 @@ std::vector<Eigen::Vector3d> read_positions(const Triple& triple, std::size_t ro
     for_each_value_in_parallel(
         *triple[static_cast<std::size_t>(axis)], rows,
         [&](std::size_t row, double value) { positions[row][axis] = value; });
-  // Text declared as float32 reads as the float that was written, unless it has digits beyond it.
+  // Text declared as float32 is rounded to float32, unless it has more digits than float32.
   const bool is_float_text = std::any_of(triple.begin(), triple.end(), [](const Column* column) {
     return column->type == ScalarType::float32 && column->stored == StoredType::float64;
   });
@@ -100,7 +100,7 @@ std::vector<Color> read_colors(const Triple& triple, std::size_t rows) {
 
 ScalarField read_field(const Column& column, std::size_t rows) {
   ScalarField field{column.name, column.type, std::vector<double>(rows)};
-  // Numbers that lie in memory as they are declared need no rounding.
+  // Numbers stored in their declared type need no rounding.
   const bool rounds = column.stored != stored_as(column.type);
   for_each_value_in_parallel(column, rows, [&](std::size_t row, double value) {
     field.values[row] = rounds ? as_type(value, column.type) : value;
@@ -112,7 +112,7 @@ bool uses(const std::optional<Triple>& triple, const Column& column) {
   return triple && std::find(triple->begin(), triple->end(), &column) != triple->end();
 }
 
-// The cloud without points that are not finite.
+// Removes or rejects points that are not finite.
 CloudFromColumns without_holes(PointCloud cloud, NotFinite not_finite) {
   std::vector<std::size_t> kept;
   kept.reserve(cloud.size());
@@ -132,7 +132,7 @@ const std::byte* bytes_of(const T* values) {
   return reinterpret_cast<const std::byte*>(values);
 }
 
-// A field that would be read back as something else is refused rather than changed in silence.
+// Rejects fields that a reader would take for positions, normals or colors.
 void require_readable_back(const ColumnSet& set, const std::vector<ScalarField>& fields) {
   ColumnSet alone;
   for (const ScalarField& field : fields) {
@@ -144,8 +144,8 @@ void require_readable_back(const ColumnSet& set, const std::vector<ScalarField>&
                              find_triple(alone, color_names)})
     if (triple)
       throw Error(
-          "scalar fields under these names would be read back as positions, normals or "
-          "colors",
+          "scalar fields with these names would be read back as positions, normals or "
+          "colors; rename them",
           {.field = (*triple)[0]->name + " " + (*triple)[1]->name + " " + (*triple)[2]->name});
 }
 

@@ -1,8 +1,8 @@
-// Which named columns make up a cloud, and the way back.
+// Conversion between named columns and clouds.
 //
-// Read under any of these names: x y z, X Y Z; normal_x .., nx .., Normals_0 ..; red green blue,
-// r g b, diffuse_red ... Three columns are a triple only if all three are there; every other column
-// becomes a scalar field. Colors stored as fractions (float, none above 1) are scaled to 0-255.
+// Recognized names: x y z, X Y Z; normal_x .., nx .., Normals_0 ..; red green blue, r g b,
+// diffuse_red ... Three columns form a triple only if all three exist; all other columns become
+// scalar fields. Colors stored as fractions (float, none above 1) are scaled to 0-255.
 #pragma once
 
 #include <cstddef>
@@ -15,44 +15,45 @@
 
 namespace libmap {
 
-enum class NotFinite { drop, refuse };  // what becomes of points whose position is not finite
+enum class NotFinite { drop, refuse };  // treatment of positions that are not finite
 
 struct CloudFromColumns {
   PointCloud cloud;
-  std::size_t dropped_points = 0;  // those whose position is not finite
+  std::size_t dropped_points = 0;  // points whose position is not finite
 };
 
-// Throws Error: no x, y or z; two fields of one name; a position that is not finite, if refused.
+// Throws Error if x, y or z is missing, two fields have equal names, or a position is not finite
+// (with NotFinite::refuse).
 CloudFromColumns cloud_from_columns(const ColumnSet& columns, NotFinite not_finite);
 
-// Those of the columns that make the cloud's positions and, where they are wanted, its normals.
+// Returns the columns of the positions and, with `with_normals`, of the normals.
 std::vector<Column> geometry_columns(const std::vector<Column>& columns, bool with_normals);
 
-// The columns of a format: normals as nx ny nz (PLY, CSV) or normal_x normal_y normal_z (PCD).
+// Names of the normals' columns: nx ny nz (PLY, CSV) or normal_x normal_y normal_z (PCD).
 enum class NormalNames { short_names, long_names };
 
-// Views on `cloud`, which must outlive them. Positions are declared float32 unless that moves some
-// coordinate by more than 1e-5 m, then float64. Throws Error if a field's name would be taken for
-// something else when it is read back.
+// Returns views on `cloud`, which must outlive them. Positions are declared float32, or float64 if
+// float32 would move a coordinate by more than 1e-5 m. Throws Error if a reader would take fields
+// for positions, normals or colors by their names.
 ColumnSet columns_of_cloud(const PointCloud& cloud, NormalNames names);
 
-// Positions (as above), then fields; for arrays of any length.
+// Appends columns that view the given arrays, which must outlive `set`.
 void add_position_columns(const std::vector<Eigen::Vector3d>& positions, ColumnSet& set);
 void add_normal_columns(const std::vector<Eigen::Vector3f>& normals, NormalNames names,
                         ColumnSet& set);
 void add_color_columns(const std::vector<Color>& colors, ColumnSet& set);
 void add_field_columns(const std::vector<ScalarField>& fields, ColumnSet& set);
 
-// The columns as scalar fields, all rows. Throws Error: two of one name.
+// Returns the columns as scalar fields. Throws Error if two columns have equal names.
 std::vector<ScalarField> fields_of_columns(const ColumnSet& columns);
 
-// red, green, blue out of PCL's one number 0xAARRGGBB, whose bytes begin at `first`; and into one
-// column `rgb` of such numbers, where the three are there.
+// Unpacks PCL's packed color 0xAARRGGBB, whose bytes begin at `first`, into columns red, green,
+// blue; with_packed_color packs these columns, if all three exist, into a column `rgb`.
 void add_packed_color_columns(const std::byte* first, std::size_t stride, bool big_endian,
                               ColumnSet& set);
 ColumnSet with_packed_color(const ColumnSet& columns);
 
-// Whether some coordinate is off by more than 1e-5 m as float32.
+// True if float32 would move a coordinate by more than 1e-5 m.
 bool need_float64(const std::vector<Eigen::Vector3d>& positions);
 
 }  // namespace libmap

@@ -36,7 +36,7 @@ bool has_numbers(const Table& table, std::size_t column) {
                      [column](const auto& row) { return parse_double(row[column]).has_value(); });
 }
 
-// int32 if every cell is an integer of its range.
+// int32 if every value is an integer in its range, else float64.
 ScalarType type_of(const std::vector<double>& values) {
   const bool integers = std::all_of(values.begin(), values.end(), [](double value) {
     return fits_type(value, ScalarType::int32) && !(value == 0.0 && std::signbit(value));
@@ -55,8 +55,8 @@ std::vector<double> numbers_of(const Table& table, std::size_t column) {
   return values;
 }
 
-// Columns without a single number are passed over and named in info.skipped. Throws Error: a cell
-// that is no number in a column of numbers, an empty cell in x, y or z.
+// Skips columns without any number and lists them in info.skipped. Throws Error for a cell that is
+// not a number in a column of numbers, and for an empty cell in x, y or z.
 GeometryColumns decode_csv(std::string_view text, const std::string& file) {
   const Table table = parse_csv(text, file);
   GeometryColumns content;
@@ -79,7 +79,7 @@ GeometryColumns decode_csv(std::string_view text, const std::string& file) {
   return content;
 }
 
-// A header line and a row per point, each number as the shortest text that reads back the same.
+// A header line and a row per point, each number as the shortest text that parses to it.
 void encode_csv(const ColumnSet& columns, std::ostream& out) {
   Table header;
   for (const Column& column : columns.columns) header.columns.push_back(column.name);
@@ -89,7 +89,7 @@ void encode_csv(const ColumnSet& columns, std::ostream& out) {
   });
 }
 
-// `is_read`: the formats that clouds are read from, else those that they are written in.
+// Throws Error unless the format can be read (`is_read`) or written.
 void require_format(const std::filesystem::path& path, bool is_read) {
   const std::string format = format_of(path);
   std::vector<std::string> formats = {".pcd", ".ply", ".csv"};
@@ -98,7 +98,7 @@ void require_format(const std::filesystem::path& path, bool is_read) {
   else
     formats.emplace_back(".vtp");
   if (std::find(formats.begin(), formats.end(), format) != formats.end()) return;
-  // No library of Debian 12 reads LAS, and LAZ even less.
+  // Debian 12 has no library for LAS and LAZ.
   if (format == ".las" || format == ".laz")
     throw Error(
         "LAS and LAZ cannot be read or written: Debian has no library for them; convert "
@@ -111,7 +111,7 @@ void require_format(const std::filesystem::path& path, bool is_read) {
                .bound = is_read ? ".pcd, .ply, .csv or .tif" : ".pcd, .ply, .csv or .vtp"});
 }
 
-// The file's bytes as the system's own cache holds them, without a copy.
+// Decodes a memory-mapped file without a copy.
 GeometryColumns decode_mapped_pcd(const std::filesystem::path& path) {
   namespace ipc = boost::interprocess;
   if (std::filesystem::file_size(path) == 0) throw Error("is empty");
@@ -150,8 +150,8 @@ void require_cloud_format(const std::filesystem::path& path) { require_format(pa
 void refuse_vtp(const std::filesystem::path& path) {
   if (format_of(path) == ".vtp")
     throw Error(
-        ".vtp is written only, for ParaView; readable are clouds as .pcd, .ply, .csv or .tif and "
-        "meshes as .ply, .obj, .off, .stl, .glb or .tif",
+        ".vtp is written only, for ParaView; readable formats are .pcd, .ply, .csv or .tif "
+        "(clouds) and .ply, .obj, .off, .stl, .glb or .tif (meshes)",
         {.file = path.string()});
 }
 
@@ -196,7 +196,7 @@ std::vector<std::filesystem::path> cloud_pieces(const std::filesystem::path& giv
   std::vector<std::filesystem::path> pieces;
   for (const std::filesystem::directory_entry& entry : std::filesystem::directory_iterator(given)) {
     const std::string format = format_of(entry.path());
-    // A .vtp is refused when it is opened: a terrain without it would be incomplete.
+    // A .vtp counts as a cloud, so that opening it fails: without it, the terrain is incomplete.
     const bool is_cloud = format == ".pcd" || format == ".ply" || format == ".vtp" ||
                           format == ".csv" || is_dem_path(entry.path());
     if (is_cloud && entry.is_regular_file() && entry.path().filename().string().front() != '.')
@@ -270,17 +270,17 @@ PcdPartsWriter::PcdPartsWriter(std::filesystem::path path, const PcdPartsOptions
   require_good();
 }
 
-// An ofstream tells of a failed open, write or close by its state alone; the system's call that
-// failed was the last one.
+// An ofstream reports a failed open, write or close only by its state; errno is that of the last
+// system call.
 void PcdPartsWriter::require_good() const {
   if (!file_) throw system_failure(path_, "cannot be written", errno);
 }
 
 void PcdPartsWriter::append(const PointCloud& part) {
-  if (part.empty()) return;  // it does not say whether the whole has normals and colors
+  if (part.empty()) return;  // an empty part does not determine the attributes of the cloud
   written_ += part.size();
   if (written_ > options_.points)
-    throw Error("contains more points than were promised", {.file = path_.string()});
+    throw Error("contains more points than declared", {.file = path_.string()});
   ColumnSet set = columns_of_cloud(part, NormalNames::long_names);
   for (Column& column : set.columns)
     if (column.name == "x" || column.name == "y" || column.name == "z")
@@ -297,7 +297,7 @@ void PcdPartsWriter::append(const PointCloud& part) {
 
 void PcdPartsWriter::finish() {
   if (written_ != options_.points)
-    throw Error("contains fewer points than were promised", {.file = path_.string()});
+    throw Error("contains fewer points than declared", {.file = path_.string()});
   file_.close();
   require_good();
 }

@@ -1,4 +1,4 @@
-// Clouds from and to files. The extension, in any case, says the format: .pcd .ply .vtp .csv.
+// Reader and writer of cloud files. The extension, in any case, selects the format.
 //
 //          fields and their types   viewpoint   encodings
 //   .pcd   all                      yes         ascii, binary, binary_compressed
@@ -7,12 +7,12 @@
 //   .csv   all, without types       no          text
 //   .tif   not written (a map: libmap/raster); a DEM is read as the centers of its pixels
 //
-// Coordinates are doubles in memory. They are written as float32 unless that moves some coordinate
-// by more than 1e-5 m, then as float64; normals as float32, colors as three bytes, integers as
-// their type. CSV: a header line; columns x y z, optionally nx ny nz and red green blue; a column
-// of integers is read as int32, any other as float64, an empty cell as NaN. Its numbers are the
-// shortest that read back as the float32 written; as doubles they may differ from it by half a unit
-// of its last digit.
+// Coordinates are doubles in memory. They are written as float32, or as float64 if float32 would
+// move a coordinate by more than 1e-5 m; normals as float32, colors as three bytes, integers as
+// their type. CSV has a header line and columns x y z, optionally nx ny nz and red green blue.
+// Columns of integers are read as int32, others as float64, empty cells as NaN. CSV numbers have
+// the fewest digits that parse to the same float32; parsed as doubles, they can differ from it by
+// half a unit of the last digit.
 #pragma once
 
 #include <cstddef>
@@ -32,67 +32,68 @@ namespace libmap {
 
 struct CloudReadResult {
   PointCloud cloud;
-  std::size_t dropped_points = 0;  // those with a position that is NaN or infinite
+  std::size_t dropped_points = 0;  // points whose position is NaN or infinite
   GeometryFileInfo info;
 };
 
-// The file itself, or the cloud files of a folder in the order of their names; hidden files are
-// passed over. Throws Error: nothing there, or a folder without a cloud file.
+// Returns the file itself, or the cloud files of a folder in the order of their names, without
+// hidden files. Throws Error if the path does not exist or the folder contains no cloud file.
 std::vector<std::filesystem::path> cloud_pieces(const std::filesystem::path& file_or_folder);
 
-// Of a folder all pieces together, and the last one's info. Throws Error naming the file: it cannot
-// be read, is not of its format, promises more than it holds, or has no fields x, y and z. A file
-// of no points is an empty cloud.
+// Reads a file, or all files of a folder into one cloud with the info of the last file. A file
+// without points is an empty cloud. Throws Error naming the file if it cannot be read, is invalid
+// or truncated, or has no fields x, y and z.
 CloudReadResult read_cloud(const std::filesystem::path& path);
 
-// The same of the header alone where the format has one (PCD, PLY); CSV is read whole.
+// Reads the header only if the format has one (PCD, PLY); CSV is read completely. Throws as
+// read_cloud does.
 GeometryFileInfo read_cloud_info(const std::filesystem::path& path);
 
-// Writes straight to `path`; callers that need the file whole or not at all pass an OutputFile's
-// temporary path. Throws Error: unknown extension, a field's name that the format cannot hold or
-// that would be read back as something else, a failed write (ErrorKind::failed).
+// Writes directly to `path`; for atomic output, pass the temporary path of an OutputFile. Throws
+// Error for an unknown extension, a field name that the format does not support or a reader would
+// take for another attribute, and a failed write (ErrorKind::failed).
 void write_cloud(const std::filesystem::path& path, const PointCloud& cloud,
                  const GeometryWriteOptions& options = {});
 
-// Throws Error unless clouds are written in the format that the extension names.
+// Throws Error unless the extension is a format that write_cloud supports.
 void require_cloud_format(const std::filesystem::path& path);
 
-// Throws Error unless `path` is a readable file of a format that clouds are read from.
+// Throws Error unless `path` is a readable file of a format that read_cloud supports.
 void require_cloud_file(const std::filesystem::path& path);
 
-// Throws Error, with the formats that can be read, for a .vtp file: VTP is written only.
+// Throws Error with the readable formats if `path` is a .vtp file, which can be written only.
 void refuse_vtp(const std::filesystem::path& path);
 
-// The extension in lower case, e.g. ".ply".
+// Returns the extension in lower case, e.g. ".ply".
 std::string format_of(const std::filesystem::path& path);
 
-// The file's first MiB: more than any header.
+// Returns the first MiB of a file, which is longer than any header.
 std::string read_head(const std::filesystem::path& path);
 
-// The file's bytes, for the codecs. Throws Error: no such file, a folder, not readable, empty.
+// Returns the content of a file. Throws Error if it is missing, a folder, not readable or empty.
 std::shared_ptr<const std::string> read_geometry_bytes(const std::filesystem::path& path);
 
-// Opens `path`, calls write(stream) and sees that all of it was written; names the file in Errors.
+// Opens `path` and calls write(stream). Adds the file to Errors. Throws Error (failed) if the file
+// was not written completely.
 void write_geometry_file(const std::filesystem::path& path,
                          const std::function<void(std::ostream&)>& write);
 
 struct PcdPartsOptions {
-  std::uint64_t points = 1;        // of all parts together, at least 1
-  bool float64_positions = false;  // else float32: what write_cloud would choose for the whole
+  std::uint64_t points = 1;        // total of all parts, at least 1
+  bool float64_positions = false;  // else float32; write_cloud's choice for the whole cloud
 };
 
-// A binary PCD written part by part, so that no more than one part is in memory. The file is that
-// of write_cloud for all parts in one cloud, byte for byte.
+// Writer of a binary PCD in parts, so that only one part is in memory. The file is identical to the
+// file of write_cloud for all parts in one cloud.
 class PcdPartsWriter {
  public:
-  // Writes straight to `path`, as write_cloud does. Throws Error (failed).
+  // Opens `path`, to which it writes directly, as write_cloud does. Throws Error (failed).
   PcdPartsWriter(std::filesystem::path path, const PcdPartsOptions& options);
 
-  // All parts have the fields of the first, and normals and colors if it has; empty ones are
-  // passed over. Throws Error: one has others, more points than promised, a failed write
-  // (ErrorKind::failed).
+  // Appends a part; empty parts are skipped. Throws Error if its fields, normals or colors differ
+  // from the first part's, the total exceeds `points`, or the write fails (ErrorKind::failed).
   void append(const PointCloud& part);
-  // After the last part. Throws Error: fewer points than promised, a failed write.
+  // Call it after the last part. Throws Error if the total is below `points` or the write fails.
   void finish();
 
  private:
@@ -101,7 +102,7 @@ class PcdPartsWriter {
   std::filesystem::path path_;
   PcdPartsOptions options_;
   std::ofstream file_;
-  std::string header_;  // once the first part is written
+  std::string header_;  // empty before the first part
   std::uint64_t written_ = 0;
 };
 

@@ -31,7 +31,7 @@ void append_points(const PointCloud& from, std::size_t begin, std::size_t end, P
   add(from.normals, to.normals);
 }
 
-// One file, from its first point on.
+// Reader of the points of one file in blocks.
 class CloudBlockReader {
  public:
   // Throws Error naming the file, as read_cloud does.
@@ -46,14 +46,14 @@ class CloudBlockReader {
     });
   }
 
-  // Of the file as its header says: no points; with normals; cloud_from_sensor.
+  // Properties of the file by its header; the viewpoint is cloud_from_sensor.
   bool is_empty() const { return rows_left_ == 0; }
   bool has_normals() const { return has_normals_; }
   const Pose& viewpoint() const { return viewpoint_; }
   std::size_t dropped_points() const { return dropped_; }  // so far
 
-  // Appends the next `rows` points, or as many as are left, without those whose position is not
-  // finite. False if none is left.
+  // Reads the next `rows` points, or all remaining ones, and appends those with a finite position.
+  // Returns false if no points remain.
   bool append(std::size_t rows, PointCloud& cloud) {
     rows = std::min(rows, rows_left_);
     if (rows == 0) return false;
@@ -68,12 +68,12 @@ class CloudBlockReader {
     return true;
   }
 
-  // Of a DEM.
+  // Georeference of a DEM; nullopt for other files.
   std::optional<Georeference> georeference() const {
     return dem_ ? std::optional(dem_->info().georeference) : std::nullopt;
   }
 
-  // From now on, normals are passed over.
+  // Skips normals from now on.
   void leave_out_normals() {
     columns_ = geometry_columns(columns_, false);
     whole_.normals.clear();
@@ -86,7 +86,7 @@ class CloudBlockReader {
     file_.open(path_, std::ios::binary);
     const std::uint64_t bytes = fs::file_size(path_);
     const std::string head = read_head(path_);
-    // Thousands of small pieces are opened, each more than once.
+    // Small buffers for small files: thousands of files are opened, each more than once.
     block_.resize(std::min<std::uint64_t>(bytes, max_block_bytes));
     const auto records = format == ".pcd" ? pcd_records(head, bytes, block_.data())
                                           : ply_records(head, bytes, block_.data());
@@ -97,7 +97,7 @@ class CloudBlockReader {
     columns_ = geometry_columns(records->columns, true);
     ColumnSet none;
     none.columns = records->columns;
-    cloud_from_columns(none, NotFinite::drop);  // throws where there is no x, y or z
+    cloud_from_columns(none, NotFinite::drop);  // throws if x, y or z is missing
     has_normals_ = columns_.size() > 3;
     record_bytes_ = records->bytes;
     rows_left_ = records->count;
@@ -114,7 +114,7 @@ class CloudBlockReader {
   void append_pixels(std::size_t count, PointCloud& cloud) {
     for (; count > 0; --count, ++next_pixel_) {
       if (next_pixel_ == pixels_.heights_m.size()) {
-        if (!dem_->next(pixels_)) throw Error("ends too early", {.file = path_.string()});
+        if (!dem_->next(pixels_)) throw Error("is truncated", {.file = path_.string()});
         next_pixel_ = 0;
       }
       if (std::isfinite(pixels_.heights_m[next_pixel_]))
@@ -160,7 +160,7 @@ class CloudBlockReader {
   std::vector<std::byte> block_;
   std::size_t record_bytes_ = 0;
   std::vector<Column> columns_;
-  // ... or pixels of a DEM, those without a height included ...
+  // ... or pixels of a DEM, including pixels without a height ...
   std::optional<DemReader> dem_;
   DemBlock pixels_;
   std::size_t next_pixel_ = 0;
@@ -176,7 +176,7 @@ PieceStream::PieceStream(std::vector<fs::path> pieces) : pieces_(std::move(piece
   for (const fs::path& piece : pieces_) {
     const CloudBlockReader reader(piece, georeference_);
     if (is_dem_path(piece) != is_dem_path(pieces_.front()))
-      throw Error("is in another frame: a folder contains DEMs alone or none",
+      throw Error("DEMs and clouds have different frames; use separate folders",
                   {.file = piece.string()});
     if (!georeference_) georeference_ = reader.georeference();
     if (reader.is_empty()) continue;

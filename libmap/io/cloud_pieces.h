@@ -1,7 +1,7 @@
-// A terrain in one or many cloud files, read block by block: memory goes with a block, not with a
-// file, for binary PCD and for PLY that is binary without lists at its vertices. Files of other
-// encodings are read whole, one at a time. Positions and normals alone are read. DEMs (.tif) are
-// all in the local frame of the first one.
+// Terrain in one or many cloud files, read in blocks. For binary PCD and binary PLY without lists
+// at its vertices, memory is proportional to the size of a block. Files of other encodings are read
+// completely, one at a time. Only positions and normals are read. All DEMs (.tif) are in the local
+// frame of the first DEM.
 #pragma once
 
 #include <cstddef>
@@ -16,17 +16,18 @@
 
 namespace libmap {
 
-// All points of all pieces, one after the other, in blocks of PointStream::block_points.
+// Stream of all points of all files in order, in blocks of PointStream::block_points.
 class PieceStream : public PointStream {
  public:
-  // Throws Error naming the file: it cannot be read, or only some pieces have normals or are DEMs.
-  // Where the pieces' viewpoints differ, that of the whole is not known.
+  // Reads the headers. Throws Error naming the file if it cannot be read, or if only some files
+  // have normals or are DEMs. If the files' viewpoints differ, the viewpoint is the identity
+  // (unknown).
   explicit PieceStream(std::vector<std::filesystem::path> pieces);
 
   const std::vector<std::filesystem::path>& pieces() const { return pieces_; }
   bool has_normals() const { return has_normals_; }
   const Pose& viewpoint() const { return viewpoint_; }
-  // Of pieces that are DEMs.
+  // Georeference of the first DEM; nullopt for other files.
   const std::optional<Georeference>& georeference() const { return georeference_; }
   void for_each_block(Need need, const Visit& visit) const override;
 
@@ -38,12 +39,12 @@ class PieceStream : public PointStream {
 };
 
 struct TileInfo {
-  std::size_t points = 0;  // with a position
+  std::size_t points = 0;  // points with a finite position
   std::size_t dropped_points = 0;
   Bounds3d box;
 };
-// Reads the whole piece once; `georeference` is that of its PieceStream. Throws Error naming it if
-// it cannot be read.
+// Reads a file and returns its number of points and its bounding box. `georeference` is the
+// PieceStream's. Throws Error naming the file if it cannot be read.
 TileInfo survey_tile(const std::filesystem::path& piece,
                      const std::optional<Georeference>& georeference = std::nullopt);
 
@@ -51,7 +52,7 @@ struct PiecesReadResult {
   PointCloud cloud;
   std::size_t dropped_points = 0;
 };
-// All of it in memory.
+// Reads all files into memory. Throws as PieceStream does.
 PiecesReadResult read_pieces(const std::vector<std::filesystem::path>& pieces);
 
 }  // namespace libmap

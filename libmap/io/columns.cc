@@ -48,11 +48,11 @@ void store(double value, bool swap_bytes, char* at) {
   std::memcpy(at, bytes.data(), sizeof(T));
 }
 
-// The column as T, `step` bytes from row to row.
+// Writes the column as T, with `step` bytes between rows.
 template <typename T>
 void store_rows(const Column& column, std::size_t rows, bool swap_bytes, char* at,
                 std::size_t step) {
-  // Numbers that lie in memory as they are declared need no rounding.
+  // Numbers stored in their declared type need no rounding.
   const bool rounds = column.stored != stored_as(column.type);
   for_each_value(column, rows, [&](std::size_t row, double value) {
     store<T>(rounds ? as_type(value, column.type) : value, swap_bytes, at + row * step);
@@ -117,7 +117,7 @@ double number_of(const TextLine& line, std::size_t word, const std::string& fiel
                  ScalarType type) {
   const std::string_view text = line.words[word];
   const std::optional<double> value = parse_double(text);
-  const char* const fault = !value ? " contains no number there"
+  const char* const fault = !value ? " contains no number in this field"
                             : !fits_type(*value, type)
                                 ? " contains a number that its type cannot represent"
                                 : nullptr;

@@ -1,5 +1,5 @@
-// Numbers in named columns: what the codecs of all formats read and write. A column is a view on
-// memory that somebody else keeps, so that neither reading nor writing copies a cloud.
+// Named columns of numbers, the common data of all codecs. A column is a view on memory with
+// another owner, so that reading and writing do not copy a cloud.
 #pragma once
 
 #include <array>
@@ -25,7 +25,7 @@
 
 namespace libmap {
 
-// How a number lies in memory. 64-bit integers are read as float64: exact up to 2^53.
+// Type of a number in memory. 64-bit integers are read as float64: exact up to 2^53.
 enum class StoredType {
   int8,
   uint8,
@@ -39,33 +39,33 @@ enum class StoredType {
   uint64
 };
 
-// A type in a file, the other way round (64-bit integers become doubles), and the bytes of a
-// number.
+// Conversions between types in memory and in files (64-bit integers become float64), and the size
+// of a number in bytes.
 StoredType stored_as(ScalarType type);
 ScalarType scalar_type_of(StoredType type);
 std::size_t size_of(StoredType type);
 
 struct Column {
   std::string name;
-  ScalarType type = ScalarType::float32;    // as the file declares or is to declare it
-  StoredType stored = StoredType::float32;  // as it lies in memory
-  const std::byte* first = nullptr;         // of row 0
-  std::size_t stride = 0;                   // bytes from row to row
-  bool swapped = false;                     // the other byte order
+  ScalarType type = ScalarType::float32;    // declared type in the file
+  StoredType stored = StoredType::float32;  // type in memory
+  const std::byte* first = nullptr;         // address of row 0
+  std::size_t stride = 0;                   // bytes between rows
+  bool swapped = false;                     // true for the opposite byte order
 };
 
 struct ColumnSet {
   std::size_t rows = 0;
   std::vector<Column> columns;
-  std::vector<std::shared_ptr<const void>> storage;  // keeps alive what the columns view
+  std::vector<std::shared_ptr<const void>> storage;  // owners of the viewed memory
 
-  const Column* find(std::string_view name) const;  // the column of that name, or nullptr
-  // A new column of `rows` numbers to be filled; the set owns them.
+  const Column* find(std::string_view name) const;  // nullptr if there is no such column
+  // Adds a column of `rows` numbers, owned by the set, and returns a pointer for filling them.
   double* add_numbers(std::string name, ScalarType type);
 };
 
-// A file's whole content, as its codec yields it. Faces of more than three corners are cut into
-// fans, and the fan's triangles share the face's row of `faces`.
+// Decoded content of a file. Faces with more than three corners are split into triangle fans; the
+// triangles of a fan share the face's row of `faces`.
 struct GeometryColumns {
   GeometryFileInfo info;
   ColumnSet vertices;
@@ -75,7 +75,7 @@ struct GeometryColumns {
   std::optional<Pose> viewpoint;
 };
 
-// What a codec writes; the pointers may be null.
+// Content to encode; the pointers can be null.
 struct GeometryContent {
   const ColumnSet* vertices = nullptr;
   const std::vector<Triangle>* triangles = nullptr;
@@ -83,43 +83,43 @@ struct GeometryContent {
   const Pose* viewpoint = nullptr;   // not written if it is the identity
 };
 
-// `value` as `type` holds it: integers rounded and brought into range, NaN as 0.
+// Converts `value` to `type`: integers are rounded and clamped, NaN becomes 0.
 double as_type(double value, ScalarType type);
-// Whether a file may say `value` for that type.
+// True if `type` can represent `value`; always true for float types.
 bool fits_type(double value, ScalarType type);
 
-// Word `word` of a line as a number that fits `type`. Throws Error naming field and line.
+// Returns word `word` of a line as a number of type `type`. Throws Error naming field and line.
 double number_of(const TextLine& line, std::size_t word, const std::string& field, ScalarType type);
 
 // Calls body(row, value) for each row.
 template <typename Body>
 void for_each_value(const Column& column, std::size_t rows, const Body& body);
-// The same on all threads, in any order.
+// Calls body(row, value) for each row on all threads, in any order.
 template <typename Body>
 void for_each_value_in_parallel(const Column& column, std::size_t rows, const Body& body);
 
-// Rows begin..end-1 one after another, each column as its `type`, without gaps.
+// Appends rows begin..end-1 as packed records, each column as its `type`.
 void append_records(const std::vector<Column>& columns, std::size_t begin, std::size_t end,
                     bool swap_bytes, std::string& out);
 std::size_t record_size(const std::vector<Column>& columns);
-// The same as text, shortest form that reads back as the same number.
+// Appends rows begin..end-1 as text, each number in the shortest form that parses to it.
 void append_rows_of_text(const std::vector<Column>& columns, std::size_t begin, std::size_t end,
                          char separator, std::string& out);
-// All rows, block by block: append(begin, end, text) gives the bytes of some.
+// Writes all rows in blocks. append(begin, end, text) appends the bytes of rows begin..end-1.
 void write_rows(
     std::size_t rows, std::ostream& out,
     const std::function<void(std::size_t begin, std::size_t end, std::string& text)>& append);
 
-// cloud_from_sensor in files: tx ty tz qw qx qy qz, as numbers and as words with a space before
-// each.
+// cloud_from_sensor in the order of files, tx ty tz qw qx qy qz, as numbers and as words with a
+// space before each.
 std::array<double, 7> viewpoint_numbers(const Pose& viewpoint);
 std::string viewpoint_words(const Pose& viewpoint);
-// Nothing if the quaternion is zero.
+// Inverse of viewpoint_numbers; nullopt if the quaternion is zero.
 std::optional<Pose> pose_of_viewpoint(const std::array<double, 7>& numbers);
 
-inline constexpr std::size_t rows_a_chunk = 16384;  // that one thread takes
+inline constexpr std::size_t rows_a_chunk = 16384;  // rows per parallel chunk
 
-// body(row, value) for each row, in order; the numbers are stored as T.
+// Calls body(row, value) for each row in order; the numbers are stored as T.
 template <typename T, typename Body>
 void for_each_stored(const Column& column, std::size_t rows, const Body& body) {
   const std::byte* at = column.first;
@@ -132,7 +132,7 @@ void for_each_stored(const Column& column, std::size_t rows, const Body& body) {
   }
 }
 
-// use(T{}), T being the type.
+// Calls use(T{}) with the C++ type T of `type`.
 template <typename Use>
 void with_type(StoredType type, const Use& use) {
   switch (type) {
@@ -175,11 +175,12 @@ void for_each_value_in_parallel(const Column& column, std::size_t rows, const Bo
   });
 }
 
+// Records of a binary file, for reading it in blocks.
 struct BinaryRecords {
-  std::uint64_t begin = 0;  // of the first record in the file
-  std::size_t bytes = 0;    // of a record
+  std::uint64_t begin = 0;  // offset of the first record in the file
+  std::size_t bytes = 0;    // size of a record
   std::uint64_t count = 0;
-  std::vector<Column> columns;  // on a block of records that the caller keeps
+  std::vector<Column> columns;  // views on a block of records that the caller owns
   Pose viewpoint = Pose::Identity();
 };
 

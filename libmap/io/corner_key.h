@@ -1,4 +1,4 @@
-// Corners of faces that are equal bit for bit become one vertex.
+// Hash keys of face corners, for merging corners that are equal bit for bit into one vertex.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,12 +11,12 @@
 
 namespace libmap {
 
-// A corner's numbers: position, normal, color.
+// Bits of a corner's position (float64), normal (float32) and color.
 using Corner = std::array<std::uint32_t, 6 + 3 + 1>;
 
 struct CornerHash {
   std::size_t operator()(const Corner& corner) const {
-    // FNV-1a, a word at a time.
+    // FNV-1a on 32-bit words.
     std::uint64_t hash = 14695981039346656037ULL;
     for (const std::uint32_t word : corner) hash = (hash ^ word) * 1099511628211ULL;
     return static_cast<std::size_t>(hash ^ (hash >> 32));

@@ -1,4 +1,4 @@
-// What a cloud or mesh file says of itself, whatever its format.
+// Format-independent description of cloud and mesh files.
 #pragma once
 
 #include <cstddef>
@@ -10,19 +10,19 @@
 
 namespace libmap {
 
-// How the numbers of a file are stored; PLY knows the first two.
+// Encoding of the numbers in a file; PLY has the first two.
 enum class FileEncoding { ascii, binary, binary_compressed };
 
 struct GeometryWriteOptions {
   FileEncoding encoding =
-      FileEncoding::binary;  // what a format does not have is the nearest it has
+      FileEncoding::binary;  // a format without this encoding uses the nearest one
   bool big_endian = false;   // PLY, binary
 };
 
 struct FileField {
   std::string name;
   ScalarType type = ScalarType::float32;
-  std::size_t count = 1;  // numbers a point; 0 for a list whose length differs from point to point
+  std::size_t count = 1;  // numbers per point; 0 for a list of variable length
 
   bool operator==(const FileField&) const = default;
 };
@@ -32,10 +32,10 @@ struct GeometryFileInfo {
   FileEncoding encoding = FileEncoding::binary;
   bool big_endian = false;
   std::uint64_t bytes = 0;           // size of the file
-  std::uint64_t points = 0;          // as the file holds them, before any is dropped
+  std::uint64_t points = 0;          // points in the file, before any is dropped
   std::uint64_t faces = 0;           // polygons
-  std::vector<FileField> fields;     // of the points, in the file's order and under its names
-  std::vector<std::string> skipped;  // what the file holds and the reader passes over
+  std::vector<FileField> fields;     // point fields with the file's names and order
+  std::vector<std::string> skipped;  // content of the file that the reader ignores
 };
 
 std::string to_text(FileEncoding encoding);  // "ascii", "binary", "binary_compressed"

@@ -37,7 +37,7 @@ std::string color_text(const Color& color) {
   return text;
 }
 
-// The text with comments blanked out, so that lines keep their numbers.
+// Returns the text with comments replaced by blanks, so that line numbers are preserved.
 std::string without_comments(std::string_view text) {
   std::string plain(text);
   bool in_comment = false;
@@ -67,7 +67,7 @@ struct OffCounts {
   std::uint64_t faces = 0;
 };
 
-// "OFF", and the counts on the same line or on the next.
+// Reads "OFF" and the counts, on the same line or on the next.
 OffCounts read_off_counts(LineReader& lines) {
   TextLine line;
   if (!lines.next(line) ||
@@ -84,7 +84,7 @@ OffCounts read_off_counts(LineReader& lines) {
 }
 
 Eigen::Vector3d read_off_vertex(const TextLine& line) {
-  if (line.words.size() < 3) throw bad_line(line, "a vertex needs three numbers");
+  if (line.words.size() < 3) throw bad_line(line, "a vertex must have three numbers");
   Eigen::Vector3d vertex;
   for (std::size_t axis = 0; axis < 3; ++axis)
     vertex[static_cast<int>(axis)] =
@@ -95,7 +95,7 @@ Eigen::Vector3d read_off_vertex(const TextLine& line) {
 
 void read_off_face(const TextLine& line, TriangleMesh& mesh) {
   const std::uint64_t corners = index_of(line, 0, line.words.size());
-  if (corners < 3) throw bad_line(line, "a face needs three corners");
+  if (corners < 3) throw bad_line(line, "a face must have at least three corners");
   Triangle triangle{};
   for (std::uint64_t i = 0; i < corners; ++i) {
     const auto corner = static_cast<std::uint32_t>(index_of(line, 1 + i, mesh.vertices.size()));
@@ -106,9 +106,9 @@ void read_off_face(const TextLine& line, TriangleMesh& mesh) {
   }
 }
 
-// Object File Format, also COFF and NOFF without their colors and normals. Polygons are cut into
-// fans. Throws Error: more rows promised than there are lines, a vertex that is not finite, a face
-// with less than three corners or with a corner that is no vertex.
+// Reads the Object File Format, including COFF and NOFF without their colors and normals. Polygons
+// are split into triangle fans. Throws Error for a truncated file, a vertex that is not finite, and
+// a face with less than three corners or an index out of range.
 TriangleMesh read_off(std::string_view text) {
   const std::string plain = without_comments(text);
   LineReader lines(plain);
@@ -117,7 +117,7 @@ TriangleMesh read_off(std::string_view text) {
   TextLine line;
   const auto next = [&](const char* what, std::uint64_t done, std::uint64_t promised) {
     if (!lines.next(line))
-      throw Error("the file promises " + std::to_string(promised) + " " + what +
+      throw Error("the file declares " + std::to_string(promised) + " " + what +
                   ", but ends after " + std::to_string(done));
   };
   for (std::uint64_t i = 0; i < counts.vertices; ++i) {
@@ -131,11 +131,11 @@ TriangleMesh read_off(std::string_view text) {
   return mesh;
 }
 
-// Text formats are written in doubles with the shortest numbers that read back the same. (assimp
-// writes OBJ in float32 and renumbers its vertices, does not write OFF, and ends the program on
-// some broken OFF files.)
+// Text formats are written in double precision with the shortest numbers that parse to the same
+// value. (assimp writes OBJ in float32 and renumbers its vertices, does not write OFF, and ends the
+// program on some damaged OFF files.)
 //
-// Wavefront OBJ: v (with r g b from 0 to 1 where there are colors), vn, f.
+// Wavefront OBJ: v (with colors r g b from 0 to 1, if any), vn, f.
 void write_obj(const TriangleMesh& mesh, std::ostream& out) {
   const bool colored = !mesh.vertex_colors.empty();
   const bool has_normals = !mesh.vertex_normals.empty();
@@ -149,7 +149,7 @@ void write_obj(const TriangleMesh& mesh, std::ostream& out) {
   for (const Triangle& triangle : mesh.triangles) {
     line = "f";
     for (const std::uint32_t corner : triangle) {
-      // Indices count from 1.
+      // OBJ indices start at 1.
       const std::string index = std::to_string(std::uint64_t{corner} + 1);
       line += ' ' + index;
       if (has_normals) line += "//" + index;
@@ -158,7 +158,7 @@ void write_obj(const TriangleMesh& mesh, std::ostream& out) {
   }
 }
 
-// Geometry alone.
+// Writes geometry only.
 void write_off(const TriangleMesh& mesh, std::ostream& out) {
   out << "OFF\n" + std::to_string(mesh.vertices.size()) + ' ' +
              std::to_string(mesh.triangles.size()) + " 0\n";
@@ -184,7 +184,7 @@ Error no_mesh_format(const std::filesystem::path& path, const std::string& bound
        .bound = bound});
 }
 
-// A field of polygons as one of triangles.
+// Converts a field of polygons to a field of triangles.
 ScalarField field_of_triangles(const ScalarField& field, const std::vector<std::uint32_t>& faces) {
   ScalarField spread{field.name, field.type, {}};
   spread.values.reserve(faces.size());
@@ -205,7 +205,7 @@ TriangleMesh mesh_of_columns(GeometryColumns& content) {
   return mesh;
 }
 
-// What the formats without fields have.
+// File info for formats without fields.
 GeometryFileInfo info_of(const TriangleMesh& mesh, const std::string& format,
                          const std::string& bytes) {
   GeometryFileInfo info;
@@ -340,7 +340,7 @@ void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh,
   mesh.check();
   for (std::size_t n = 0; n < mesh.vertices.size(); ++n)
     if (!mesh.vertices[n].allFinite())
-      throw Error("a vertex is not finite",
+      throw Error("position is not finite",
                   {.file = path.string(), .field = "vertex", .value = std::to_string(n)});
   const std::string format = format_of(path);
   if (format == ".obj" || format == ".stl" || format == ".glb")

@@ -1,21 +1,21 @@
-// Triangle meshes from and to files. The extension, in any case, says the format.
+// Reader and writer of triangle mesh files. The extension, in any case, selects the format.
 //
-//          read by         written by      kept
+//          read by         written by      content
 //   .ply   ply_codec       ply_codec       doubles, normals, colors, vertex and face fields
 //   .vtp   not read        VTK             doubles, normals, colors, vertex and face fields
 //   .obj   obj_codec       this file       doubles; normals, colors
-//   .off   this file       this file       doubles; geometry alone
-//   .stl   assimp          assimp          float32; geometry alone
+//   .off   this file       this file       doubles; geometry only
+//   .stl   assimp          assimp          float32; geometry only
 //   .glb   assimp          assimp          float32; normals, colors
-//   .tif   libmap/raster   not written     a DEM; geometry alone
+//   .tif   libmap/raster   not written     a DEM; geometry only
 //
-// float32 holds 24 bits: at 16 m from the origin a step is 2 micrometers, at 500 km (map
-// coordinates) 3 cm. Move such a mesh to a local origin, or use .ply or .vtp, which store float64
-// where float32 would move some coordinate by more than 1e-5 m.
+// float32 has 24 bits: the resolution is 2 micrometers at 16 m from the origin, and 3 cm at 500 km
+// (map coordinates). Move such a mesh to a local origin, or use .ply or .vtp, which store float64
+// if float32 would move a coordinate by more than 1e-5 m.
 //
-// assimp yields corners, not vertices: corners equal in every number are made
-// one vertex again, in the order of their first use, and vertices of no triangle are lost. GLB has
-// y up by its standard, this project z: writing and reading turn it about x.
+// assimp returns corners, not vertices. Equal corners are merged into one vertex, in the order of
+// first use; vertices without triangles are lost. GLB has y up by its standard, this project z up:
+// writing and reading rotate about x.
 #pragma once
 
 #include <filesystem>
@@ -31,34 +31,34 @@ struct MeshReadResult {
   GeometryFileInfo info;
 };
 
-enum class FileKind { cloud, mesh };  // what a file holds: points alone, or faces too
+enum class FileKind { cloud, mesh };  // content of a file: points only, or faces too
 
-// Of a folder all pieces together, vertices on seams once a piece, and the last one's info.
-// Polygons of more than three corners are cut into fans of triangles, each with the polygon's face
-// fields; lines and points are passed over. Throws Error naming the file: it cannot be read, is not
-// of its format, holds no triangle, promises more than it holds, has a corner that is no vertex or
-// a vertex that is not finite.
+// Reads a file, or all files of a folder into one mesh with the info of the last file; vertices on
+// seams are not merged. Polygons are split into triangle fans with the polygon's face fields; lines
+// and points are ignored. Throws Error naming the file if it cannot be read, is invalid or
+// truncated, or contains no triangle, an index out of range or a vertex that is not finite.
 MeshReadResult read_mesh(const std::filesystem::path& path);
 
-// The file itself, or the files of a folder with an extension that meshes are read from, in the
-// order of their names; hidden files are passed over. Throws Error: a folder without one.
+// Returns the file itself, or the mesh files of a folder in the order of their names, without
+// hidden files. Throws Error if the folder contains no mesh file.
 std::vector<std::filesystem::path> mesh_pieces(const std::filesystem::path& file_or_folder);
 
-// Writes straight to `path`; callers that need the file whole or not at all pass an OutputFile's
-// temporary path. What a format cannot keep (the table above) is left out. Throws Error: unknown
-// extension, a vertex not finite, an index out of range, a failed write (ErrorKind::failed).
+// Writes directly to `path`; for atomic output, pass the temporary path of an OutputFile. Omits
+// attributes that the format does not have (the table above). Throws Error for an unknown
+// extension, a vertex that is not finite, an index out of range and a failed write
+// (ErrorKind::failed).
 void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh,
                 const GeometryWriteOptions& options = {});
 
-// Throws Error unless meshes are written in the format that the extension names.
+// Throws Error unless the extension is a format that write_mesh supports.
 void require_mesh_format(const std::filesystem::path& path);
 
-// Throws Error if a vertex is no single-precision number, as which these formats keep or assimp
-// reads it: it would come back infinite.
+// Throws Error if a coordinate exceeds the range of float32, as which these formats store it or
+// assimp reads it.
 void require_single_precision(const TriangleMesh& mesh, const std::string& format);
 
-// Whether the file holds a mesh (it has faces), or a folder one that does, or a cloud: by its
-// extension, and for .ply by its content. Throws Error: an extension of neither, or a file that
+// Returns mesh if the file, or a file of the folder, contains faces, else cloud. Decides by the
+// extension, and for .ply by the header. Throws Error if the extension is unknown or the file
 // cannot be read.
 FileKind file_kind(const std::filesystem::path& path);
 

@@ -49,7 +49,7 @@ class ObjReader {
     line.words.erase(comment, line.words.end());
   }
 
-  // The numbers behind the key, at least `least`, up to seven; 0 beyond.
+  // Returns up to seven numbers after the key, at least `least`; missing ones are 0.
   static Numbers numbers(const TextLine& line, std::size_t least) {
     Numbers values = Numbers::Zero();
     if (line.words.size() <= least)
@@ -66,7 +66,7 @@ class ObjReader {
     return values;
   }
 
-  // x y z, x y z w, x y z r g b or x y z w r g b.
+  // Adds x y z, x y z w, x y z r g b or x y z w r g b.
   void add_position(const TextLine& line) {
     const Numbers values = numbers(line, 3);
     const std::size_t count = line.words.size() - 1;
@@ -85,7 +85,7 @@ class ObjReader {
     mixed_.push_back(Eigen::Vector3f::Zero());
   }
 
-  // From 1 on, or from the last backwards: -1.
+  // Index from 1, or negative from the end of the list (-1 is the last entry).
   static std::uint32_t index_of(const TextLine& line, std::string_view word, std::size_t count,
                                 const char* what) {
     const std::optional<std::int64_t> number = parse_integer(word);
@@ -99,7 +99,7 @@ class ObjReader {
     return static_cast<std::uint32_t>(index);
   }
 
-  // v, v/vt, v//vn or v/vt/vn; the index of v.
+  // Adds a corner v, v/vt, v//vn or v/vt/vn and returns the index of v.
   std::uint32_t add_corner(const TextLine& line, std::string_view word) {
     const std::size_t first = std::min(word.find('/'), word.size());
     const std::size_t second = std::min(word.find('/', first + 1), word.size());
@@ -115,7 +115,7 @@ class ObjReader {
     return vertex;
   }
 
-  // One normal stays as it is; of several, the mean.
+  // A single normal is kept unchanged; several normals are averaged.
   void add_normal(std::uint32_t vertex, std::uint32_t normal) {
     std::uint32_t& known = normal_of_[vertex];
     if (known == none) known = normal;
@@ -124,7 +124,8 @@ class ObjReader {
   }
 
   void add_face(const TextLine& line) {
-    if (line.words.size() < 4) throw Error("a face needs three corners", {.field = name_of(line)});
+    if (line.words.size() < 4)
+      throw Error("a face must have at least three corners", {.field = name_of(line)});
     Triangle triangle{};
     for (std::size_t n = 1; n < line.words.size(); ++n) {
       triangle[1] = triangle[2];
@@ -173,8 +174,8 @@ class ObjReader {
   std::vector<Color> colors_;
   std::vector<Eigen::Vector3f> normals_;
   std::size_t texture_coordinates_ = 0;
-  std::vector<std::uint32_t> normal_of_;           // of each position, its first normal
-  std::vector<Eigen::Vector3f> mixed_;             // of each position, the sum of its normals
+  std::vector<std::uint32_t> normal_of_;           // first normal of each position
+  std::vector<Eigen::Vector3f> mixed_;             // sum of the normals of each position
   std::unordered_set<std::uint32_t> has_several_;  // positions with different normals
   std::vector<Triangle> triangles_;
   bool has_normals_ = true;

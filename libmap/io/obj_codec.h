@@ -1,4 +1,4 @@
-// Wavefront OBJ without materials and textures.
+// Decoder of Wavefront OBJ without materials and textures.
 #pragma once
 
 #include <string_view>
@@ -7,11 +7,11 @@
 
 namespace libmap {
 
-// Positions in double precision. Polygons are cut into fans. The corners of one `v` line are one
-// vertex, whose normal is the mean of their `vn`; `v` lines with equal position, color and normal
-// are one vertex too. Vertices are in the order of their first use; unused ones are left out.
-// Normals and colors only if all corners have them. Throws Error naming the line: a number that is
-// none, an index beyond the list that it refers to, a face with less than three corners.
+// Returns the mesh with positions in double precision. Polygons are split into triangle fans. The
+// corners of one `v` line are one vertex, whose normal is the mean of their `vn`; `v` lines with
+// equal position, color and normal are merged. Vertices are in the order of first use; unused ones
+// are dropped. Normals and colors are kept only if all corners have them. Throws Error naming the
+// line for an invalid number, an index out of range, or a face with less than three corners.
 TriangleMesh decode_obj(std::string_view text);
 
 }  // namespace libmap

@@ -53,10 +53,10 @@ std::uint64_t header_count(const std::string& key, const std::string& word, std:
   return static_cast<std::uint64_t>(*value);
 }
 
-// More than any header: in a file without line breaks nobody looks for one to the end.
+// Maximum size of a header, which limits the search for line breaks in other files.
 constexpr std::size_t max_header_bytes = 1U << 20U;
 
-// The lines up to DATA by their key; sets where the data begin.
+// Returns the lines up to DATA by key, and sets the beginning of the data in `header`.
 HeaderLines read_lines(std::string_view file, PcdHeader& header) {
   const std::string_view text = file.substr(0, max_header_bytes);
   constexpr std::array<std::string_view, 10> known = {"VERSION",   "FIELDS", "COLUMNS", "SIZE",
@@ -96,15 +96,15 @@ const std::string& single_word(const HeaderLines& lines, const std::string& key)
   return words.front();
 }
 
-// The words of a line that has one for each field, or `standard` for each if there is no such line.
+// Returns the words of a line with one word per field, or `standard` for each if it is missing.
 std::vector<std::string> field_words(const HeaderLines& lines, const std::string& key,
                                      std::size_t fields, const std::string& standard) {
   const auto found = lines.find(key);
   if (found == lines.end()) return std::vector<std::string>(fields, standard);
   if (found->second.size() != fields)
-    throw bad_header("does not fit the line FIELDS", key,
+    throw bad_header("does not match the line FIELDS", key,
                      std::to_string(found->second.size()) + " words long",
-                     std::to_string(fields) + ", one a field");
+                     std::to_string(fields) + ", one per field");
   return found->second;
 }
 
@@ -116,7 +116,7 @@ StoredType stored_type(const std::string& type, const std::string& size, const s
       {"U8", StoredType::uint64}};
   const auto found = types.find(type + size);
   if (found == types.end())
-    throw Error("no such number type",
+    throw Error("unknown number type",
                 {.field = "TYPE and SIZE of field '" + name.substr(0, 40) + "'",
                  .value = (type + " " + size).substr(0, 80),
                  .bound = "I or U with 1, 2, 4 or 8, or F with 4 or 8"});
@@ -127,7 +127,7 @@ std::vector<PcdField> read_fields(const HeaderLines& lines) {
   const auto names = lines.find("FIELDS");
   if (names == lines.end()) throw bad_header("is missing", "FIELDS");
   const std::size_t count = names->second.size();
-  if (count == 0) throw bad_header("names no field", "FIELDS");
+  if (count == 0) throw bad_header("contains no field", "FIELDS");
   const auto sizes = field_words(lines, "SIZE", count, "4");
   const auto types = field_words(lines, "TYPE", count, "F");
   const auto counts = field_words(lines, "COUNT", count, "1");
@@ -142,7 +142,7 @@ std::vector<PcdField> read_fields(const HeaderLines& lines) {
         {name, stored_type(types[i], sizes[i], name), header_count("COUNT", counts[i], 1)});
     if (fields.back().count > max_record_bytes ||
         (record += fields.back().size()) > max_record_bytes)
-      throw bad_header("a point would take more than a MiB", "COUNT", counts[i]);
+      throw bad_header("a point is larger than 1 MiB", "COUNT", counts[i]);
     if ((columns += fields.back().is_padding() ? 1 : fields.back().count) > max_columns)
       throw bad_header("more than 10000 columns", "FIELDS");
   }
@@ -157,11 +157,11 @@ std::uint64_t read_points(const HeaderLines& lines) {
   const std::uint64_t height =
       lines.contains("HEIGHT") ? header_count("HEIGHT", single_word(lines, "HEIGHT"), 0) : 1;
   if (height > 0 && width > std::numeric_limits<std::int64_t>::max() / height)
-    throw bad_header("times HEIGHT is no number of points", "WIDTH", std::to_string(width));
+    throw bad_header("WIDTH x HEIGHT is too large", "WIDTH", std::to_string(width));
   if (!has_points) return width * height;
   const std::uint64_t points = header_count("POINTS", single_word(lines, "POINTS"), 0);
   if (lines.contains("WIDTH") && points != width * height)
-    throw bad_header("does not fit the others", "POINTS", std::to_string(points),
+    throw bad_header("does not match WIDTH and HEIGHT", "POINTS", std::to_string(points),
                      "WIDTH x HEIGHT = " + std::to_string(width * height));
   return points;
 }
@@ -179,7 +179,7 @@ Pose read_viewpoint(const HeaderLines& lines) {
       throw bad_header("not a number", "VIEWPOINT", found->second[i]);
     numbers[i] = *number;
   }
-  // Some programs write 0 0 0 0 0 0 0 where they know none.
+  // Some programs write 0 0 0 0 0 0 0 for an unknown viewpoint.
   return pose_of_viewpoint(numbers).value_or(Pose::Identity());
 }
 
@@ -206,7 +206,7 @@ std::uint64_t record_bytes(const PcdHeader& header, bool with_padding) {
   return bytes;
 }
 
-// Throws unless `points` records fit into the bytes that follow the header.
+// Throws Error unless the file is large enough for its points.
 void require_data(const PcdHeader& header, std::uint64_t file_bytes) {
   const std::uint64_t data = file_bytes - header.data_begin;
   const std::uint64_t record = record_bytes(header, true);
@@ -215,7 +215,7 @@ void require_data(const PcdHeader& header, std::uint64_t file_bytes) {
     for (const PcdField& field : header.fields) words += field.count;
     require_room_for_text(header.points, words, data, "points");
   } else if (header.encoding == FileEncoding::binary && header.points > data / record) {
-    throw Error("the header promises " + std::to_string(header.points) + " points of " +
+    throw Error("the header declares " + std::to_string(header.points) + " points of " +
                 std::to_string(record) + " bytes, but only " + std::to_string(data) +
                 " bytes of data follow (" + std::to_string(data / record) + " points)");
   }
@@ -263,8 +263,8 @@ std::uint32_t little_endian_u32(std::string_view bytes) {
   return value;
 }
 
-// Field after field, each packed. The writer of the Point Cloud Library leaves padding out, and
-// others do not: the size tells.
+// Reads compressed data, which are stored field by field. The Point Cloud Library omits padding,
+// other writers do not; the size distinguishes them.
 void add_compressed(const PcdHeader& header, std::string_view data, ColumnSet& set) {
   if (data.size() < 8 && header.points == 0)
     return add_binary(header, reinterpret_cast<const std::byte*>(data.data()), set);
@@ -280,10 +280,10 @@ void add_compressed(const PcdHeader& header, std::string_view data, ColumnSet& s
   const bool few = header.points <= std::numeric_limits<std::uint32_t>::max();
   const bool padded = few && uncompressed == header.points * record;
   if (!padded && !(few && uncompressed == header.points * record_unpadded))
-    throw Error("the header promises " + std::to_string(header.points) + " points of " +
+    throw Error("the header declares " + std::to_string(header.points) + " points of " +
                 std::to_string(record_unpadded) + " bytes, but the data contain " +
                 std::to_string(uncompressed) + " bytes");
-  // LZF makes at most 264 bytes of 3.
+  // LZF expands 3 bytes to at most 264.
   if (uncompressed / 88 > compressed)
     throw Error("the compressed data cannot contain " + std::to_string(uncompressed) + " bytes");
   auto buffer = std::make_shared<std::string>(uncompressed, '\0');
@@ -301,8 +301,7 @@ void add_compressed(const PcdHeader& header, std::string_view data, ColumnSet& s
   set.storage.push_back(buffer);
 }
 
-// Text into records, which then are read as binary ones are: so that packed colors keep the bits
-// of a float whatever its value.
+// Converts text to binary records, so that packed colors keep the bits of a float of any value.
 void add_text(const PcdHeader& header, std::string_view text, ColumnSet& set) {
   struct Target {
     const PcdField* field;
@@ -314,7 +313,7 @@ void add_text(const PcdHeader& header, std::string_view text, ColumnSet& set) {
     for (std::size_t i = 0; i < field.count; ++i) {
       Target target{&field, nullptr, nullptr};
       if (field.is_packed_color() && set.find("red") == nullptr) {
-        // Without points too there is an address to count from.
+        // One extra element, so that the address is valid without points too.
         auto packed = std::make_shared<std::vector<std::uint32_t>>(header.points + 1);
         target.packed = packed->data();
         set.storage.push_back(packed);
@@ -330,7 +329,7 @@ void add_text(const PcdHeader& header, std::string_view text, ColumnSet& set) {
   TextLine line;
   for (std::size_t row = 0; row < header.points; ++row) {
     if (!lines.next(line))
-      throw Error("the header promises " + std::to_string(header.points) + " points, but only " +
+      throw Error("the header declares " + std::to_string(header.points) + " points, but only " +
                   std::to_string(row) + " lines of data follow");
     if (line.words.size() != targets.size())
       throw Error(name_of(line) + " contains " + std::to_string(line.words.size()) + " of " +
@@ -362,7 +361,7 @@ void require_name(const Column& column) {
 void write_compressed(const ColumnSet& set, std::ostream& out) {
   std::string data;
   const std::uint64_t size = static_cast<std::uint64_t>(record_size(set.columns)) * set.rows;
-  // The buffer for LZF's output, half as large again, is counted in 32 bits as well.
+  // The size of LZF's output buffer, 1.5 times the data, is limited to 32 bits as well.
   if (size / 2 * 3 + 16 > std::numeric_limits<std::uint32_t>::max())
     throw Error("too large for binary_compressed PCD; write it as binary",
                 {.field = "data", .value = std::to_string(size) + " bytes"});

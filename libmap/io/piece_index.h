@@ -1,5 +1,5 @@
-// Points near a place, of a terrain in one or many cloud files, with their normals, colors and
-// fields: memory depends on the size of a piece and of what is asked for.
+// Access to the points of a terrain in one or many cloud files by rectangle, with their normals,
+// colors and fields. Memory depends on the size of a file and of the result.
 #pragma once
 
 #include <cstddef>
@@ -17,16 +17,16 @@ namespace libmap {
 
 class PieceIndex {
  public:
-  // Reads each piece once and calls visit(cloud) with it. Throws Error naming the file: it cannot
-  // be read, or only some pieces have normals.
+  // Reads each file once and calls visit(cloud). Throws Error naming the file if it cannot be read,
+  // or if only some files have normals.
   using Visit = std::function<void(const PointCloud& piece)>;
   PieceIndex(std::vector<std::filesystem::path> pieces, const Visit& visit);
 
   std::size_t points() const { return points_; }
-  std::size_t dropped_points() const { return dropped_; }  // whose position is not finite
+  std::size_t dropped_points() const { return dropped_; }  // points that are not finite
 
-  // The points with low <= (x, y) < high, piece by piece in their order, with the colors and fields
-  // that all pieces there have. The pieces read last are kept, up to 4 million points.
+  // Returns the points with low <= (x, y) < high in the order of the files, with the colors and
+  // fields that all files in the rectangle have. Caches the last files, up to 4 million points.
   PointCloud points_in(const Eigen::Vector2d& low, const Eigen::Vector2d& high);
 
  private:
@@ -36,11 +36,11 @@ class PieceIndex {
   };
   const PointCloud& cloud_of(const Piece& piece);
 
-  std::vector<Piece> pieces_;  // that have points
+  std::vector<Piece> pieces_;  // files with points
   bool has_normals_ = false;
   std::size_t points_ = 0;
   std::size_t dropped_ = 0;
-  std::list<std::pair<const Piece*, PointCloud>> kept_;  // the last used first
+  std::list<std::pair<const Piece*, PointCloud>> kept_;  // cache, the most recently used first
 };
 
 }  // namespace libmap

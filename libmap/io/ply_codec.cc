@@ -20,7 +20,7 @@ struct PlyProperty {
   std::string name;
   StoredType type = StoredType::float32;
   bool is_list = false;
-  StoredType count_type = StoredType::uint8;  // of a list's length
+  StoredType count_type = StoredType::uint8;  // type of a list's length
 };
 
 struct PlyElement {
@@ -28,12 +28,12 @@ struct PlyElement {
   std::uint64_t count = 0;
   std::vector<PlyProperty> properties;
 
-  // Whether a row's length depends on its content.
+  // True if a row's length depends on its content.
   bool has_lists() const {
     return std::any_of(properties.begin(), properties.end(),
                        [](const PlyProperty& property) { return property.is_list; });
   }
-  // Bytes of a row in a binary file, the least if it has lists.
+  // Size of a row in a binary file; the minimum if it has lists.
   std::size_t record_bytes() const {
     std::size_t bytes = 0;
     for (const PlyProperty& property : properties)
@@ -46,12 +46,11 @@ struct PlyHeader {
   FileEncoding encoding = FileEncoding::ascii;
   bool big_endian = false;
   std::vector<PlyElement> elements;
-  std::optional<Pose>
-      viewpoint;  // "comment viewpoint tx ty tz qw qx qy qz", as this project writes
+  std::optional<Pose> viewpoint;  // "comment viewpoint tx ty tz qw qx qy qz", written by encode_ply
   std::size_t data_begin = 0;
   std::size_t data_line = 1;
 
-  // The element of that name, or nullptr.
+  // Returns the element of that name, or nullptr.
   const PlyElement* find(std::string_view name) const {
     for (const PlyElement& element : elements)
       if (element.name == name) return &element;
@@ -78,7 +77,8 @@ StoredType type_of(std::string_view name, std::size_t line) {
 }
 
 FileEncoding encoding_of(const Words& words, std::size_t line, PlyHeader& header) {
-  if (words.size() != 3 || words[2] != "1.0") throw bad_line(line, "not 'format ENCODING 1.0'");
+  if (words.size() != 3 || words[2] != "1.0")
+    throw bad_line(line, "expected 'format ENCODING 1.0'");
   header.big_endian = words[1] == "binary_big_endian";
   if (words[1] == "ascii") return FileEncoding::ascii;
   if (header.big_endian || words[1] == "binary_little_endian") return FileEncoding::binary;
@@ -88,7 +88,7 @@ FileEncoding encoding_of(const Words& words, std::size_t line, PlyHeader& header
 PlyElement element_of(const Words& words, std::size_t line) {
   const std::optional<std::int64_t> count =
       words.size() == 3 ? parse_integer(words[2]) : std::nullopt;
-  if (!count || *count < 0) throw bad_line(line, "not 'element NAME COUNT'");
+  if (!count || *count < 0) throw bad_line(line, "expected 'element NAME COUNT'");
   return {std::string(words[1]), static_cast<std::uint64_t>(*count), {}};
 }
 
@@ -96,10 +96,10 @@ PlyProperty property_of(const Words& words, std::size_t line) {
   if (words.size() == 3)
     return {std::string(words[2]), type_of(words[1], line), false, StoredType::uint8};
   if (words.size() != 5 || words[1] != "list")
-    throw bad_line(line, "not 'property TYPE NAME' or 'property list TYPE TYPE NAME'");
+    throw bad_line(line, "expected 'property TYPE NAME' or 'property list TYPE TYPE NAME'");
   const StoredType count_type = type_of(words[2], line);
   if (count_type == StoredType::float32 || count_type == StoredType::float64)
-    throw bad_line(line, "a list's length is an integer", words[2]);
+    throw bad_line(line, "the type of a list's length must be an integer", words[2]);
   return {std::string(words[4]), type_of(words[3], line), true, count_type};
 }
 
@@ -115,8 +115,7 @@ std::optional<Pose> viewpoint_of(const Words& words) {
 }
 
 void add_element(PlyElement element, std::size_t line, PlyHeader& header) {
-  if (header.find(element.name) != nullptr)
-    throw bad_line(line, "this element is a duplicate", element.name);
+  if (header.find(element.name) != nullptr) throw bad_line(line, "duplicate element", element.name);
   constexpr std::size_t max_elements = 1000;
   if (header.elements.size() == max_elements) throw bad_line(line, "more than 1000 elements");
   header.elements.push_back(std::move(element));
@@ -125,8 +124,7 @@ void add_element(PlyElement element, std::size_t line, PlyHeader& header) {
 void add_property(PlyProperty property, std::size_t line, PlyHeader& header) {
   if (header.elements.empty()) throw bad_line(line, "a property before the first element");
   for (const PlyProperty& other : header.elements.back().properties)
-    if (other.name == property.name)
-      throw bad_line(line, "this property is a duplicate", property.name);
+    if (other.name == property.name) throw bad_line(line, "duplicate property", property.name);
   constexpr std::size_t max_properties = 10'000;
   if (header.elements.back().properties.size() == max_properties)
     throw bad_line(line, "more than 10000 properties");
@@ -163,15 +161,14 @@ PlyHeader read_ply_header(std::string_view text) {
       header.data_line = line + 1;
       return header;
     } else {
-      throw bad_line(line, "unknown word", words[0]);
+      throw bad_line(line, "unknown keyword", words[0]);
     }
   }
 }
 
-// "char", "uchar", ... "double".
 std::string ply_type_name(ScalarType type) { return type_names[static_cast<std::size_t>(type)]; }
 
-// Where in the file the next element's rows begin.
+// Position of the next element's rows in the file.
 struct Cursor {
   const std::shared_ptr<const std::string>& bytes;
   std::size_t position;
@@ -183,18 +180,18 @@ std::string quoted_name(const PlyElement& element) {
 }
 
 std::string ends_early(const PlyElement& element, std::uint64_t row) {
-  return "the header promises " + std::to_string(element.count) + " rows of " +
+  return "the header declares " + std::to_string(element.count) + " rows of " +
          quoted_name(element) + ", but the data end in row " + std::to_string(row);
 }
 
-// Throws unless the element can stand in what is left of the file.
+// Throws Error unless the remaining bytes of the file are enough for the element.
 void require_room(const PlyElement& element, FileEncoding encoding, std::uint64_t bytes) {
   if (encoding == FileEncoding::ascii)
     return require_room_for_text(element.count, element.properties.size(), bytes,
                                  "rows of " + quoted_name(element));
   const std::uint64_t record = element.record_bytes();
   if (record > 0 && element.count > bytes / record)
-    throw Error("the header promises " + std::to_string(element.count) + " rows of " +
+    throw Error("the header declares " + std::to_string(element.count) + " rows of " +
                 quoted_name(element) + " of " + std::to_string(record) + " bytes, but only " +
                 std::to_string(bytes) + " bytes of data follow (" + std::to_string(bytes / record) +
                 " rows)");
@@ -205,7 +202,7 @@ bool is_index_list(const PlyElement& element, const PlyProperty& property) {
          (property.name == "vertex_indices" || property.name == "vertex_index");
 }
 
-// One row at a time, whatever the encoding: first the number, or the list's length and numbers.
+// Reader of rows in any encoding. A property is a number, or a list's length and its numbers.
 class RowReader {
  public:
   RowReader(const PlyElement& element, FileEncoding encoding, bool swapped, Cursor& cursor)
@@ -223,7 +220,7 @@ class RowReader {
   double number(const PlyProperty& property, StoredType type) {
     return ascii_ ? text_number(property, type) : binary_number(type);
   }
-  // A list's length, known to fit into what is left.
+  // Reads a list's length. Throws Error if the list is longer than the remaining data.
   std::uint64_t length(const PlyProperty& property) {
     const double length = number(property, property.count_type);
     const std::uint64_t left =
@@ -266,7 +263,7 @@ class RowReader {
   std::uint64_t row_ = 0;
 };
 
-// Columns on the rows, from `at` on, of a binary element without lists.
+// Returns columns that view the rows at `at` of a binary element without lists.
 std::vector<Column> columns_at(const PlyElement& element, bool swapped, const std::byte* at) {
   std::vector<Column> columns;
   for (const PlyProperty& property : element.properties) {
@@ -281,7 +278,7 @@ bool is_swapped(const PlyHeader& header) {
   return header.big_endian == (std::endian::native == std::endian::little);
 }
 
-// A binary element without lists needs no copy.
+// Reads a binary element without lists, which needs no copy.
 ColumnSet view_rows(const PlyElement& element, bool swapped, Cursor& cursor) {
   ColumnSet set;
   set.rows = element.count;
@@ -301,9 +298,9 @@ void add_fan(const std::vector<double>& corners, std::uint64_t face, std::uint64
   for (const double corner : corners)
     if (!(corner >= 0.0) || corner >= static_cast<double>(vertices) ||
         corner > std::numeric_limits<std::uint32_t>::max())
-      throw Error("a corner is no vertex", {.field = name,
-                                            .value = to_text(corner),
-                                            .bound = "0 to " + std::to_string(vertices) + " - 1"});
+      throw Error("no such vertex", {.field = name,
+                                     .value = to_text(corner),
+                                     .bound = "0 to " + std::to_string(vertices) + " - 1"});
   for (std::size_t i = 2; i < corners.size(); ++i) {
     content.triangles.push_back({static_cast<std::uint32_t>(corners[0]),
                                  static_cast<std::uint32_t>(corners[i - 1]),
@@ -312,7 +309,7 @@ void add_fan(const std::vector<double>& corners, std::uint64_t face, std::uint64
   }
 }
 
-// Rows with lists, or of text.
+// Copies rows of text or with lists.
 ColumnSet copy_rows(const PlyElement& element, const PlyHeader& header, bool swapped,
                     Cursor& cursor, GeometryColumns& content) {
   ColumnSet set;
@@ -379,7 +376,7 @@ void require_vertices(const PlyHeader& header) {
   if (header.find("vertex") == nullptr) throw Error("the PLY header has no element vertex");
 }
 
-// Throws unless all elements fit into a file of that size.
+// Throws Error unless the file is large enough for all elements.
 PlyHeader checked_header(std::string_view head, std::uint64_t file_bytes) {
   PlyHeader header = read_ply_header(head);
   require_vertices(header);
@@ -429,7 +426,7 @@ void write_rows(const ColumnSet& set, const GeometryWriteOptions& options, std::
   });
 }
 
-// A list of three is written as four numbers: its length, and the corners.
+// Writes each face as four numbers: the length 3 and the corners.
 void write_faces(const GeometryContent& content, const GeometryWriteOptions& options,
                  std::ostream& out) {
   const std::vector<Triangle>& triangles = *content.triangles;

@@ -1,7 +1,6 @@
-// PLY (Turk 1994): ascii, binary little- and big-endian, in memory, for clouds and meshes alike.
-// All scalar properties of `vertex` and `face` are kept with their types; `vertex_indices` (or
-// `vertex_index`) makes the faces; other lists and other elements are passed over and named in
-// info.skipped.
+// In-memory codec of PLY (Turk 1994), ascii and binary little- and big-endian, for clouds and
+// meshes. All scalar properties of `vertex` and `face` are kept with their types. The faces are the
+// list `vertex_indices` or `vertex_index`; other lists and elements are listed in info.skipped.
 #pragma once
 
 #include <cstddef>
@@ -17,20 +16,21 @@
 
 namespace libmap {
 
-// The header alone; `file_bytes` is the size of the whole file. Throws Error as decode_ply does.
+// Reads the header only; `file_bytes` is the size of the whole file. Throws as decode_ply does.
 GeometryFileInfo ply_info(std::string_view head, std::uint64_t file_bytes);
 
-// The vertices of a binary file without lists in or before them, with columns on records that begin
-// at `block`; nothing for any other file. Throws Error as decode_ply does.
+// Returns the vertices of a binary file without lists in or before them, with columns that view
+// records at `block`; nullopt for other files. Throws Error as decode_ply does.
 std::optional<BinaryRecords> ply_records(std::string_view head, std::uint64_t file_bytes,
                                          const std::byte* block);
 
-// Throws Error (without the file's name): a header line that cannot be understood, more rows
-// promised than there is data (known before memory for them is taken), a face with less than three
-// corners or with a corner that is no vertex.
+// Decodes a file. Throws Error (without the file's name) for an invalid header line, truncated data
+// (checked before memory is allocated), and a face with less than three corners or an index out of
+// range.
 GeometryColumns decode_ply(const std::shared_ptr<const std::string>& bytes);
 
-// The viewpoint is a comment line. Throws Error: a field name that cannot stand in the header.
+// Writes a file; the viewpoint is a comment line. Throws Error for a field name that is not valid
+// in a header, or more than 2^31 - 1 vertices of a mesh.
 void encode_ply(const GeometryContent& content, const GeometryWriteOptions& options,
                 std::ostream& out);
 

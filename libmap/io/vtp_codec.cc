@@ -24,7 +24,7 @@
 namespace libmap {
 namespace {
 
-// While it lives, VTK's numbers do not follow the locale. One at a time: a program has one locale.
+// Sets the classic locale for VTK's numbers. Only one object at a time: a process has one locale.
 class ClassicLocale {
  public:
   ClassicLocale()
@@ -54,7 +54,7 @@ int vtk_type_of(ScalarType type) {
   return types[static_cast<std::size_t>(type)];
 }
 
-// Columns of one type as an array with a part for each.
+// Returns columns of one type as an array with one component per column.
 vtkSmartPointer<vtkDataArray> make_array(const std::vector<Column>& columns, std::size_t rows,
                                          const std::string& name) {
   vtkSmartPointer<vtkDataArray> array =
@@ -150,7 +150,7 @@ void encode_vtp(const GeometryContent& content, FileEncoding encoding, std::ostr
     writer->EncodeAppendedDataOff();
   }
   if (encoding != FileEncoding::binary_compressed) writer->SetCompressorTypeToNone();
-  if (writer->Write() != 1) throw Error("VTK cannot write it", {}, ErrorKind::failed);
+  if (writer->Write() != 1) throw Error("VTK cannot write the file", {}, ErrorKind::failed);
   out << writer->GetOutputString();
 }
 

@@ -1,7 +1,7 @@
-// Writes VTP, ParaView's polygonal data, through VTK, in memory. Points of a cloud are vertex
-// cells, so that ParaView shows them. Normals are the point normals, colors a uint8 x 3 array
-// "rgb", scalar fields arrays of their own type. The viewpoint is a field array "viewpoint" (tx ty
-// tz qw qx qy qz).
+// In-memory encoder of VTP, ParaView's polygonal data, by VTK. Points of a cloud are vertex cells,
+// so that ParaView shows them. Normals are point normals, colors a uint8 x 3 array "rgb", scalar
+// fields arrays of their own type. The viewpoint is a field array "viewpoint" (tx ty tz qw qx qy
+// qz).
 #pragma once
 
 #include <ostream>
@@ -10,8 +10,8 @@
 
 namespace libmap {
 
-// Without triangles every point is a vertex cell. VTK cannot read NaN and infinity as text: data
-// that hold some are written as binary.
+// Without triangles, every point is a vertex cell. VTK cannot parse NaN and infinity: arrays that
+// contain them are written as binary. Throws Error (failed) if VTK fails.
 void encode_vtp(const GeometryContent& content, FileEncoding encoding, std::ostream& out);
 
 }  // namespace libmap

@@ -97,11 +97,11 @@ SurfacePieces::SurfacePieces(const SurfacePieces& triangles, double longest_m,
 
 void SurfacePieces::cut(const PlacedFragment& fragment, double longest_m, std::size_t max_parts) {
   if (!(fragment.area_m2() > 0.0)) return;
-  // At least so many parts lie along its longest side.
+  // Minimum number of parts along the longest side.
   const double parts = std::sqrt(fragment.square_of_longest_side()) / longest_m;
   if (static_cast<double>(parts_.size()) + parts > static_cast<double>(max_parts))
-    throw Error("the mesh is too large to be cut so small",
-                {.field = "size of a piece", .value = to_text(longest_m) + " m"});
+    throw Error("the mesh is too large for pieces of this size",
+                {.field = "piece size", .value = to_text(longest_m) + " m"});
   if (parts > 1.0) {
     for (const PlacedFragment& half : fragment.halves()) cut(half, longest_m, max_parts);
     return;
@@ -151,7 +151,7 @@ SurfaceBlock SurfacePieces::measured(std::size_t begin, std::size_t end) const {
 
 namespace {
 
-// In radii.
+// Lengths in radii.
 constexpr double piece_size = 4.0;
 constexpr double first_gap_size = 1.0 / 3.0;
 constexpr double smallest_gap = 1e-3;
@@ -160,16 +160,16 @@ constexpr std::size_t gaps_per_chunk = 256;
 constexpr double samples_a_part = 131072.0;
 constexpr std::size_t max_pieces = 30'000'000;
 
-// Darts of each round over the whole surface, in expected samples.
+// Darts per round over the whole surface, relative to the expected number of samples.
 constexpr std::array<double, 5> dart_rounds = {0.5, 0.5, 1.0, 2.0, 4.0};
 
 struct Candidate {
-  double order;  // who comes first
+  double order;  // random priority; smallest first
   TrianglePoint place;
   Eigen::Vector3d position;
 };
 
-// What chunk(begin, end, found) finds in each range of at most `at_once`, in their order.
+// Concatenates the elements that chunk(begin, end, found) appends for ranges of at most `at_once`.
 template <typename T, typename Chunk>
 std::vector<T> collect(std::size_t count, std::size_t at_once, const Chunk& chunk) {
   std::vector<std::vector<T>> parts((count + at_once - 1) / at_once);
@@ -187,19 +187,19 @@ std::vector<T> collect(std::size_t count, std::size_t at_once, const Chunk& chun
   return all;
 }
 
-// Finds the parts of a fragment that no single disc covers.
+// Finds the parts of a fragment that are not covered by a single disc.
 class GapSearch {
  public:
   GapSearch(const GrowingGrid& samples, double radius_m)
       : samples_(samples), radius_m_(radius_m), square_m2_(radius_m * radius_m) {}
 
-  // Whether a single disc covers all of the block.
+  // True if a single disc covers the block.
   bool is_covered(const SurfaceBlock& block) const {
     const double room = radius_m_ - block.reach_m;
     return room > 0.0 && samples_.any_nearer(block.center, room, room * room);
   }
 
-  // Appends those parts, cut until their sides are at most `longest_m`.
+  // Appends the uncovered parts, divided until their sides are at most `longest_m`.
   void find(const PlacedFragment& fragment, double longest_m, std::vector<Fragment>& gaps) {
     if (covers(last_, fragment) || !(fragment.area_m2() > 0.0)) return;
     if (fragment.square_of_longest_side() > 4.0 * square_m2_) {
@@ -221,7 +221,7 @@ class GapSearch {
   }
 
  private:
-  // Discs whose centers lie farther from `center` do not meet the fragment.
+  // Discs with centers farther from `center` do not intersect the fragment.
   struct Reach {
     Eigen::Vector3d center;
     double square_m2;
@@ -242,7 +242,7 @@ class GapSearch {
            (sample - fragment.corners[2]).squaredNorm() <= square_m2_;
   }
 
-  // Whether the sample's disc does; keeps it among the near ones if it only meets the fragment.
+  // True if the sample's disc covers the fragment. If it only intersects it, it is added to near_.
   bool is_covered(const Eigen::Vector3d& sample, const PlacedFragment& fragment,
                   const Reach& reach) {
     if (!((sample - reach.center).squaredNorm() <= reach.square_m2)) return false;
@@ -254,7 +254,7 @@ class GapSearch {
     return false;
   }
 
-  // Of a fragment that the near samples from `begin` on do not cover.
+  // Divides a fragment that no near sample from `begin` on covers.
   void cut(const PlacedFragment& fragment, std::size_t begin, double longest_m2,
            std::vector<Fragment>& gaps) {
     const std::size_t end = near_.size();
@@ -284,7 +284,7 @@ class Sampler {
   Sampler(const SampledSurface& surface, double radius_m, std::uint64_t seed)
       : surface_(surface),
         radius_m_(radius_m),
-        // However a reader sums and roots, it finds no pair below the radius.
+        // Slack for rounding, so that no reader computes a distance below the radius.
         min_square_m2_(radius_m * radius_m * (1.0 + 1e-14)),
         seed_(seed),
         expected_(saturation_density * surface.area_m2 / (radius_m * radius_m)),
@@ -311,7 +311,7 @@ class Sampler {
   }
 
  private:
-  // Part by part of the surface, so that not all gaps are held at once.
+  // Processes the surface in parts, to limit the memory for gaps.
   void fill_gaps(Progress& progress) {
     const std::vector<SurfaceBlock>& blocks = pieces_.blocks();
     const double max_m2 = samples_a_part * radius_m_ * radius_m_ / saturation_density;
@@ -338,7 +338,7 @@ class Sampler {
     return !samples_.any_nearer(candidate.position, radius_m_, min_square_m2_);
   }
 
-  // Of darts that are thrown evenly over the surface, those that no sample forbids.
+  // Throws darts evenly over the surface. Returns those that no sample rejects.
   std::vector<Candidate> darts(std::uint64_t round, double per_m2) const {
     const std::vector<SurfaceBlock>& blocks = pieces_.blocks();
     return collect<Candidate>(
@@ -350,7 +350,7 @@ class Sampler {
         });
   }
 
-  // One into each of so many parts of the block of equal area.
+  // Throws one dart into each of the block's strata of equal area.
   void throw_darts(const SurfaceBlock& block, double per_m2, RandomStream& random,
                    std::vector<Candidate>& found) const {
     const double count = std::floor(block.area_m2 * per_m2 + random.uniform());
@@ -372,8 +372,8 @@ class Sampler {
     }
   }
 
-  // One dart into each gap. The larger a gap, the earlier its dart comes, as in a race in which
-  // darts fall evenly.
+  // Throws one dart into each gap. Priorities are those of a race of uniformly distributed darts,
+  // in which larger gaps are hit earlier.
   std::vector<Candidate> darts_into(const std::vector<Fragment>& gaps, std::uint64_t round) const {
     return collect<Candidate>(
         gaps.size(), gaps_per_chunk,
@@ -389,7 +389,7 @@ class Sampler {
         });
   }
 
-  // In their order, each that the ones before leave room for.
+  // Accepts candidates by priority if no earlier sample rejects them.
   void accept(std::vector<Candidate> candidates) {
     std::stable_sort(candidates.begin(), candidates.end(),
                      [](const Candidate& a, const Candidate& b) { return a.order < b.order; });
@@ -413,10 +413,10 @@ class Sampler {
                              });
   }
 
-  // What is still uncovered, in smaller parts. A dart into each was in vain: the smallest lie
-  // within their own size of a disc.
+  // Returns the uncovered parts of the gaps, divided further. The smallest gaps are dropped: their
+  // dart was rejected, so they are within their own size of a disc.
   std::vector<Fragment> remaining(const std::vector<Fragment>& gaps) const {
-    // Rounding may carry every dart into a smaller gap out of it.
+    // Rounding may move a dart out of a smaller gap.
     const double smallest_m = std::max(smallest_gap * radius_m_, surface_.rounding_m);
     return collect<Fragment>(gaps.size(), gaps_per_chunk,
                              [&](std::size_t begin, std::size_t end, std::vector<Fragment>& found) {

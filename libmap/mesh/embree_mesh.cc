@@ -34,7 +34,7 @@ EmbreeMesh::EmbreeMesh(const TriangleMesh& mesh, bool robust) : triangles_(mesh.
   if (device == nullptr) throw Error("Embree cannot start", {}, ErrorKind::failed);
   device_.reset(device, rtcReleaseDevice);
   scene_.reset(rtcNewScene(device), rtcReleaseScene);
-  // Compact: 28 bytes per triangle less, no slower.
+  // Compact: saves 28 bytes per triangle at the same speed.
   if (robust)
     rtcSetSceneFlags(scene(),
                      static_cast<RTCSceneFlags>(static_cast<unsigned>(RTC_SCENE_FLAG_ROBUST) |

@@ -1,5 +1,4 @@
-// A triangle mesh in Embree, about its center. Private to libmap/mesh: rays and distances stand
-// on it.
+// Triangle mesh in Embree, for ray casting and distances. Private to libmap/mesh.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,19 +12,19 @@ struct RTCSceneTy;
 
 namespace libmap {
 
-// Positions are relative to `center`, where single precision is finest.
+// Positions are relative to the center of the mesh, where single precision is most accurate.
 class EmbreeMesh {
  public:
   // Throws Error if the mesh has no triangle, an index out of range or a vertex that is not finite.
-  // `robust`: rays do not slip through shared edges.
+  // `robust`: rays do not pass through shared edges.
   EmbreeMesh(const TriangleMesh& mesh, bool robust);
   EmbreeMesh(EmbreeMesh&&) = default;
   EmbreeMesh& operator=(EmbreeMesh&&) = default;
 
-  RTCSceneTy* scene() const { return scene_.get(); }  // coordinates less center()
+  RTCSceneTy* scene() const { return scene_.get(); }  // relative to center()
   const Eigen::Vector3d& center() const { return center_; }
-  Eigen::Vector3d size() const { return size_; }  // of the bounding box, m
-  // A corner of a triangle about the center, in double precision.
+  Eigen::Vector3d size() const { return size_; }  // size of the bounding box, m
+  // Corner of a triangle relative to center(), in double precision.
   const Eigen::Vector3d& corner(std::uint32_t triangle, int k) const {
     return vertices_[triangles_[triangle][static_cast<std::size_t>(k)]];
   }
@@ -36,7 +35,7 @@ class EmbreeMesh {
   Eigen::Vector3d center_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d size_ = Eigen::Vector3d::Zero();
   std::vector<Eigen::Vector3d> vertices_;
-  std::vector<Triangle> triangles_;  // the scene reads them too
+  std::vector<Triangle> triangles_;  // shared with the scene
 };
 
 }  // namespace libmap

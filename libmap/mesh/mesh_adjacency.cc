@@ -21,7 +21,7 @@ std::uint32_t higher_vertex(const std::vector<Triangle>& triangles, HalfEdge h) 
   return std::max(source_of(triangles, h), target_of(triangles, h));
 }
 
-// Half-edges in buckets of their edge's lower vertex; `bucket` receives the buckets' begins.
+// Half-edges sorted by the lower vertex of their edge; `bucket` receives the first index by vertex.
 std::vector<HalfEdge> by_lower_vertex(const std::vector<Triangle>& triangles, std::size_t vertices,
                                       std::vector<std::uint32_t>& bucket) {
   bucket.assign(vertices + 1, 0);
@@ -40,16 +40,16 @@ std::vector<HalfEdge> by_lower_vertex(const std::vector<Triangle>& triangles, st
   return sorted;
 }
 
-// Over the half-edge's vertex `at` to the other edge of its triangle there.
+// The other half-edge of the triangle at the vertex `at`.
 HalfEdge other_edge_at(const std::vector<Triangle>& triangles, HalfEdge h, std::uint32_t at) {
   return source_of(triangles, h) == at ? previous_in_triangle(h) : next_in_triangle(h);
 }
 
-// The open half-edge at the other side of the fan that `h` ends at its vertex `at`, or no_edge
-// where the fan ends at an edge of more than two triangles.
+// The open half-edge at the other end of the fan that starts with `h` at the vertex `at`; no_edge
+// if the fan ends at a non-manifold edge.
 HalfEdge across_fan(const std::vector<Triangle>& triangles, const std::vector<HalfEdge>& opposite,
                     HalfEdge h, std::uint32_t at) {
-  // A fan has no more triangles than the mesh: ends even if the adjacency is inconsistent.
+  // Terminates even if the adjacency is inconsistent.
   for (std::size_t step = 0; step < triangles.size(); ++step) {
     h = other_edge_at(triangles, h, at);
     if (opposite[h] == open_edge) return h;
@@ -59,8 +59,8 @@ HalfEdge across_fan(const std::vector<Triangle>& triangles, const std::vector<Ha
   return no_edge;
 }
 
-// The farthest points along directions spread evenly over the half-sphere: no direction is more
-// than 0.06 rad from one of them.
+// Extreme points along directions evenly distributed over the half-sphere: any direction is within
+// 0.06 rad of one of them.
 std::vector<Eigen::Vector3d> extreme_points(const std::vector<Eigen::Vector3d>& points) {
   constexpr int directions = 900;
   const double golden_angle = std::numbers::pi * (3.0 - std::sqrt(5.0));

@@ -10,7 +10,7 @@
 
 namespace libmap {
 
-// Half-edge 3 t + k runs from corner k of triangle t to the next one.
+// Half-edge 3 t + k leads from corner k of triangle t to the next corner.
 using HalfEdge = std::uint32_t;
 
 inline HalfEdge next_in_triangle(HalfEdge h) { return h % 3 == 2 ? h - 2 : h + 1; }
@@ -28,9 +28,9 @@ inline bool names_a_vertex_twice(const Triangle& t) {
   return t[0] == t[1] || t[1] == t[2] || t[2] == t[0];
 }
 
-// The half-edges of each undirected edge: edge e has half_edges[first[e]] .. [first[e + 1] - 1],
-// ascending; edges ascend by their lower, then by their higher vertex. Triangles that name a vertex
-// twice have none.
+// Half-edges by undirected edge: edge e has half_edges[first[e]] to half_edges[first[e + 1] - 1],
+// ascending. Edges are sorted by their lower, then by their higher vertex. Triangles with a
+// repeated vertex have no edges.
 struct MeshEdges {
   std::vector<HalfEdge> half_edges;
   std::vector<std::uint32_t> first;
@@ -41,18 +41,18 @@ struct MeshEdges {
 // Throws Error if there are more than 2^32 / 3 - 1 triangles. Indices must be in range.
 MeshEdges edges_of(const std::vector<Triangle>& triangles, std::size_t vertices);
 
-// For each half-edge the one other half-edge of its edge, in whichever sense that runs, or one of:
+// Opposite of a half-edge: the only other half-edge of its edge, in either direction, or one of
 constexpr HalfEdge open_edge = 0xffffffff;          // no other triangle
-constexpr HalfEdge non_manifold_edge = 0xfffffffe;  // more than one other
-constexpr HalfEdge no_edge = 0xfffffffd;            // the triangle names a vertex twice
+constexpr HalfEdge non_manifold_edge = 0xfffffffe;  // more than one other triangle
+constexpr HalfEdge no_edge = 0xfffffffd;            // the triangle has a repeated vertex
 inline bool is_joined(HalfEdge opposite) { return opposite < no_edge; }
-// One for each half-edge, in their order.
+// Opposites of all half-edges, indexed by half-edge.
 std::vector<HalfEdge> opposites_of(const std::vector<Triangle>& triangles, const MeshEdges& edges);
 inline std::vector<HalfEdge> opposites_of(const TriangleMesh& mesh) {
   return opposites_of(mesh.triangles, edges_of(mesh.triangles, mesh.vertices.size()));
 }
 
-// The triangles at each vertex, ascending: triangles[first[v]] .. triangles[first[v + 1] - 1].
+// Triangles by vertex, ascending: triangles[first[v]] to triangles[first[v + 1] - 1].
 struct VertexTriangles {
   std::vector<std::uint32_t> triangles;
   std::vector<std::uint32_t> first;
@@ -62,21 +62,21 @@ struct VertexTriangles {
 };
 VertexTriangles triangles_at_vertices(const std::vector<Triangle>& triangles, std::size_t vertices);
 
-// Corners (numbered as half-edges) that are joined around their vertex over `opposite`, as sets:
-// each corner's set is named by the lowest corner in it. A vertex of one fan has one set.
+// Fan of each corner (numbered as half-edges), by its lowest corner. A fan contains the corners
+// around a vertex that are joined over `opposite`; a manifold vertex has one fan.
 std::vector<HalfEdge> corner_fans(const std::vector<Triangle>& triangles,
                                   const std::vector<HalfEdge>& opposite);
 
-// Chains of open half-edges, each from its lowest one on; of an oriented manifold closed loops of
-// boundary, against the sense of the triangles inside (from target to source). Where more than one
-// chain passes a vertex, each stays with its fan of triangles.
+// Chains of open half-edges, each starting with its lowest one. For an oriented manifold they are
+// closed boundary loops, opposite to the direction of the triangles (from target to source). If
+// several chains contain a vertex, each follows its own fan of triangles.
 std::vector<std::vector<HalfEdge>> boundary_loops(const std::vector<Triangle>& triangles,
                                                   const std::vector<HalfEdge>& opposite);
 
-// Marks, `rings` times, the triangles that have a vertex in common with a marked one.
+// Dilates the marks by `rings` rings of triangles that share a vertex with a marked triangle.
 void grow_marks(const TriangleMesh& mesh, int rings, std::vector<bool>& marks);
 
-// Largest distance between two of the points, m; of more than 2,000 points at most 0.2 % too short.
+// Largest distance between two points, m. For more than 2,000 points it is up to 0.2 % too small.
 double diameter_of(const std::vector<Eigen::Vector3d>& points);
 
 }  // namespace libmap

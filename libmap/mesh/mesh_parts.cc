@@ -59,7 +59,7 @@ double blended(const ScalarField& field, const std::array<std::uint32_t, N>& ver
     return field.values[vertices[static_cast<std::size_t>(nearest)]];
   }
   double sum = 0.0;
-  // A vertex without weight must not spread a value that is not finite.
+  // Vertices without weight are skipped, since their values may not be finite.
   for (std::size_t n = 0; n < N; ++n)
     if (weights[n] != 0.0) sum += weights[n] * field.values[vertices[n]];
   return sum;
@@ -91,7 +91,7 @@ std::size_t count_of(const std::vector<bool>& marks) {
 
 TriangleMesh select_triangles(const TriangleMesh& mesh, const std::vector<bool>& keep_triangle) {
   if (keep_triangle.size() != mesh.triangles.size())
-    throw Error("marks do not fit the mesh", {.field = "marked triangles",
+    throw Error("not one mark per triangle", {.field = "marked triangles",
                                               .value = std::to_string(keep_triangle.size()),
                                               .bound = std::to_string(mesh.triangles.size())});
   std::vector<std::uint32_t> triangles;

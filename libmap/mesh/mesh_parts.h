@@ -1,4 +1,4 @@
-// Parts of a mesh with all that belongs to their vertices and faces: normals, colors, fields.
+// Selection, components and interpolation of meshes with their normals, colors and fields.
 #pragma once
 
 #include <cstddef>
@@ -11,21 +11,20 @@
 
 namespace libmap {
 
-// How many are marked.
+// Number of marks that are set.
 std::size_t count_of(const std::vector<bool>& marks);
 
-// The triangles that are marked, in their order, and the vertices that they use, in theirs.
-// `keep_triangle` is one a triangle.
+// Returns the triangles with a set mark and the vertices that they use, in the original order.
+// Throws Error unless there is one mark per triangle.
 TriangleMesh select_triangles(const TriangleMesh& mesh, const std::vector<bool>& keep_triangle);
 
-// Connected components over shared edges, numbered by their first triangle.
+// Components connected by shared edges, numbered in the order of their first triangles.
 struct MeshComponents {
   std::vector<std::uint32_t> of_triangle;
-  std::vector<double> areas_m2;  // of each component
+  std::vector<double> areas_m2;  // by component
 };
 MeshComponents connected_components(const TriangleMesh& mesh);
-// The same where its half-edges are known (opposites_of): a hash table of all edges takes three
-// times as long.
+// As above with known opposites_of(mesh), in a third of the time.
 MeshComponents connected_components(const TriangleMesh& mesh,
                                     const std::vector<HalfEdge>& opposite);
 
@@ -33,18 +32,18 @@ inline bool is_whole(ScalarType type) {
   return type != ScalarType::float32 && type != ScalarType::float64;
 }
 
-// A new vertex on the segment from a (t = 0) to b (t = 1), all of its values interpolated linearly;
-// normals are made unit again. Fields of whole numbers take the nearer end's value.
+// Appends a vertex on the segment from a (t = 0) to b (t = 1) and returns its index. Its values are
+// interpolated linearly, normals are normalized, and integer fields take the nearer end's value.
 std::uint32_t append_vertex_between(TriangleMesh& mesh, std::uint32_t a, std::uint32_t b, double t);
 
-// Positions, unit normals and a known viewpoint carried by `target_from_source`.
+// Returns the mesh with positions, normals and viewpoint transformed by `target_from_source`.
 TriangleMesh transform_mesh(const TriangleMesh& mesh, const Pose& target_from_source);
 
 inline Eigen::Vector3d center_of(const TriangleMesh& mesh, const Triangle& t) {
   return (mesh.vertices[t[0]] + mesh.vertices[t[1]] + mesh.vertices[t[2]]) / 3.0;
 }
 
-// A place on a triangle: (1 - u - v) * a + u * b + v * c.
+// Point on a triangle: (1 - u - v) * a + u * b + v * c.
 struct TrianglePoint {
   std::uint32_t triangle = 0;
   double u = 0.0;
@@ -52,9 +51,9 @@ struct TrianglePoint {
 };
 Eigen::Vector3d position_on(const TriangleMesh& mesh, const TrianglePoint& point);
 
-// The surface at `points` as a cloud: unit normals (of the vertices, interpolated, or else of the
-// triangle), colors and vertex fields by barycentric interpolation, face fields of the triangle.
-// Fields of whole numbers take the nearest vertex's value.
+// Returns the surface at `points` as a cloud. Vertex normals, colors and vertex fields are
+// interpolated; integer fields take the value of the nearest vertex. Without vertex normals, those
+// of the triangles are used. Face fields are those of the triangle.
 PointCloud points_on_surface(const TriangleMesh& mesh, const std::vector<TrianglePoint>& points);
 
 }  // namespace libmap

@@ -16,7 +16,7 @@ bool is_before(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end());
 }
 
-// The vertices within a box by position, those at one position by their number.
+// Vertices within a box, sorted by position, then by index.
 std::vector<std::uint32_t> sorted_vertices(const TriangleMesh& mesh,
                                            const Eigen::AlignedBox3d& box) {
   std::vector<std::uint32_t> order;

@@ -1,4 +1,4 @@
-// The pieces of a mesh in many files, each with the surface around it: memory depends on the size
+// Access to a mesh in many files: each piece with the surface around it. Memory depends on the size
 // of a piece.
 #pragma once
 
@@ -13,15 +13,15 @@
 
 namespace libmap {
 
-// A mesh with what is around it behind its own vertices and triangles.
+// A mesh followed by the surface around it.
 struct MeshWithMargin {
   TriangleMesh mesh;
-  std::size_t triangles = 0;  // the first so many are its own
+  std::size_t triangles = 0;  // number of triangles before those of the margin
 };
 
 // Appends the triangles of `other` with a corner in `box` (x and y, borders included). Vertices of
-// `other` at exactly the position of one that is there become that one, so that meshes with equal
-// seams are joined along them. Normals, colors and fields of `other` are kept as append_mesh does.
+// `other` at exactly the position of an existing vertex are replaced by it, which joins meshes with
+// equal seams. Normals, colors and fields are treated as in append_mesh.
 void append_part_within(const TriangleMesh& other, const Eigen::AlignedBox2d& box,
                         TriangleMesh& mesh);
 
@@ -30,14 +30,15 @@ class MeshPieceIndex {
   // Reads each piece once. Throws Error naming the file that cannot be read.
   explicit MeshPieceIndex(std::vector<std::filesystem::path> pieces);
 
-  // Pieces are in the order of their paths as given.
+  // Number of pieces; indices are those of the given paths.
   std::size_t size() const { return pieces_.size(); }
   const std::filesystem::path& path(std::size_t piece) const { return pieces_[piece].path; }
-  // Of its vertices, x and y.
+  // Bounding box in x and y.
   const Eigen::AlignedBox2d& box(std::size_t piece) const { return pieces_[piece].box; }
 
-  // The piece, and of the others the triangles with a corner within `margin_m` of its bounding box
-  // in x and y. The pieces read last are kept, up to 1 million triangles.
+  // Returns the piece, and the triangles of other pieces with a corner within `margin_m` of its
+  // box. Caches recently used pieces, up to 1 million triangles. Throws Error if a file cannot be
+  // read.
   MeshWithMargin with_margin(std::size_t piece, double margin_m);
 
  private:
@@ -48,7 +49,7 @@ class MeshPieceIndex {
   const TriangleMesh& mesh_of(const Piece& piece);
 
   std::vector<Piece> pieces_;
-  std::list<std::pair<const Piece*, TriangleMesh>> kept_;  // the last used first
+  std::list<std::pair<const Piece*, TriangleMesh>> kept_;  // most recently used first
 };
 
 }  // namespace libmap

@@ -17,8 +17,8 @@ namespace {
 
 constexpr double max_samples = 1e8;
 constexpr double count_tolerance = 0.01;
-// Within this distance of the origin along each axis, single precision moves no coordinate by more
-// than 1e-5 m: that is how files keep positions.
+// Within this distance of the origin along each axis, rounding to single precision, as in files,
+// changes coordinates by at most 1e-5 m.
 constexpr double single_precision_m = 256.0;
 
 SampledSurface surface_of(const TriangleMesh& mesh) {
@@ -43,8 +43,7 @@ SampledSurface surface_of(const TriangleMesh& mesh) {
 void require_sense(const SampledSurface& surface, const PoissonDiskOptions& options) {
   check_parameters(options);
   if (options.count > 0) return;
-  // By a radius that is small against the mesh, a small file asks for as many as a large one: not
-  // more than some for each triangle.
+  // The number of samples per triangle is limited, so that a small file cannot exhaust the memory.
   const double most =
       std::clamp(100.0 * static_cast<double>(surface.mesh.triangles.size()), 2.5e6, max_samples);
   const double least = std::sqrt(saturation_density * surface.area_m2 / most);
@@ -54,8 +53,8 @@ void require_sense(const SampledSurface& surface, const PoissonDiskOptions& opti
                                      .bound = ">= " + to_text(static_cast<float>(least))});
 }
 
-// Looks for the radius that yields a number of samples. The number falls with the square of the
-// radius, but not evenly: each radius yields another draw.
+// Searches for the radius that yields a number of samples. The number decreases with the square of
+// the radius, with random scatter between radii.
 class CountSearch {
  public:
   CountSearch(const SampledSurface& surface, const PoissonDiskOptions& options)
@@ -64,7 +63,7 @@ class CountSearch {
         wanted_(static_cast<double>(options.count)),
         random_(options.seed, options.count) {}
 
-  // Of all radii that were tried, the samples of the one nearest to the wanted number.
+  // Returns the samples of the tried radius whose number is closest to the wanted one.
   DiskSamples run(double& radius_m, std::size_t& tries, Progress& progress) {
     radius_ = std::sqrt(saturation_density * surface_.area_m2 / wanted_);
     DiskSamples best;
@@ -89,9 +88,9 @@ class CountSearch {
 
  private:
   static constexpr std::size_t max_tries = 100;
-  static constexpr std::size_t direct_tries = 8;  // before chance helps
+  static constexpr std::size_t direct_tries = 8;  // before random radii within a bracket
 
-  // Whether the darts over the whole surface foretell about the wanted number.
+  // True if the number of darts predicts about the wanted number of samples.
   bool is_near(std::size_t thrown, std::size_t tries) {
     thrown_ = static_cast<double>(thrown);
     const double miss = std::abs(thrown_ / share_of_darts_ / wanted_ - 1.0);
@@ -99,13 +98,13 @@ class CountSearch {
     return is_full_;
   }
 
-  // The next radius, after this one has yielded `found`.
+  // Sets the next radius after the current one yielded `found` samples.
   void aim(double found, std::size_t tries) {
     if (is_full_ && found > wanted_) too_small_ = std::max(too_small_, radius_);
     if (is_full_ && found < wanted_) too_large_ = std::min(too_large_, radius_);
     const bool is_bracketed = too_small_ > 0.0 && std::isfinite(too_large_);
     if (tries < direct_tries || !is_bracketed) {
-      // Islands much smaller than the radius keep their samples until it spans their distances.
+      // Islands much smaller than the radius keep one sample each until it exceeds their distances.
       const double step = std::sqrt(found / wanted_);
       radius_ *= tries < direct_tries ? step : (step > 1.0 ? std::max(step, 1.5) : step);
       return;
@@ -162,10 +161,10 @@ PoissonDiskResult sample(const SampledSurface& surface, const PoissonDiskOptions
 
 void bind(ParameterTable& table, PoissonDiskOptions& options) {
   table.add("radius_m", options.radius_m, positive,
-            "least distance of two samples; no point of the surface is farther from one");
+            "minimum distance between samples, and maximum distance of the surface to a sample");
   table.add("count", options.count, {0.0, max_samples},
-            "> 0: so many samples, to 1 %, of the radius that yields them");
-  table.add("seed", options.seed, {}, "of the random draws");
+            "> 0: number of samples within 1 %, instead of the radius");
+  table.add("seed", options.seed, {}, "random seed");
 }
 
 PoissonDiskResult sample_poisson_disk(const TriangleMesh& mesh, const PoissonDiskOptions& options,
@@ -177,7 +176,7 @@ PieceSampler::PieceSampler(std::vector<Bounds3d> boxes, const PoissonDiskOptions
     : boxes_(std::move(boxes)), options_(options), near_(boxes_.size()) {
   check_parameters(options);
   if (options.count > 0)
-    throw Error("needs the whole surface at once, which comes in pieces",
+    throw Error("a number of samples requires the whole surface, not pieces; use a radius",
                 {.field = "count", .value = std::to_string(options.count), .bound = "0"});
 }
 
@@ -203,13 +202,14 @@ PoissonDiskResult PieceSampler::sample(const TriangleMesh& mesh, std::size_t num
 }
 
 void describe(ResultTable& table, const PoissonDiskResult& result) {
-  table.add("points", result.cloud.size(), "samples");
+  table.add("points", result.cloud.size(), "number of samples");
   table.add("area_m2", result.area_m2, "area of the surface");
-  table.add("radius_m", result.radius_m, "minimum distance that was required of samples");
-  table.add("smallest_distance_m", result.smallest_distance_m, "minimum distance of two samples");
+  table.add("radius_m", result.radius_m, "required minimum distance between samples");
+  table.add("smallest_distance_m", result.smallest_distance_m,
+            "actual minimum distance between samples");
   table.add("relative_radius", result.relative_radius,
             "minimum distance relative to the densest packing of as many discs");
-  table.add("radii_tried", result.tries, "radii that were tried");
+  table.add("radii_tried", result.tries, "number of radii that were tried");
 }
 
 }  // namespace libmap

@@ -1,4 +1,4 @@
-// Poisson-disk samples of a surface: no two nearer than a radius, no room for another.
+// Poisson-disk sampling of a surface: a maximal set of samples with a minimum distance.
 #pragma once
 
 #include <cstddef>
@@ -15,49 +15,49 @@
 namespace libmap {
 
 struct PoissonDiskOptions {
-  // Half of the scenarios' voxel of 1 cm: every disc of this radius on the surface holds a sample,
-  // and so does every voxel that level ground passes through.
-  double radius_m = 0.005;  // > 0: least distance of two samples
-  std::uint64_t count = 0;  // > 0: so many samples to 1 %; the radius is searched for
+  // The default is half of the scenarios' voxel of 1 cm. Every disc of this radius on the surface
+  // contains a sample, and so does every voxel that level ground intersects.
+  double radius_m = 0.005;  // > 0: minimum distance between samples
+  std::uint64_t count = 0;  // > 0: number of samples within 1 %, instead of the radius
   std::uint64_t seed = 1;
 };
 void bind(ParameterTable& table, PoissonDiskOptions& options);
 
 struct PoissonDiskResult {
-  // Unit normals, colors and fields of the surface. Positions are those of single precision where
-  // the mesh lies within 256 m of its origin: files keep them, and so their distances, exactly.
+  // Samples with unit normals, colors and fields of the surface. Within 256 m of the origin,
+  // positions are rounded to single precision, so that files preserve the minimum distance.
   PointCloud cloud;
   double radius_m = 0.0;
   double area_m2 = 0.0;
-  double smallest_distance_m = 0.0;  // of two samples, >= radius_m; 0 if there is but one
-  // smallest_distance_m over that of the densest packing of as many discs in the plane: R / (2
+  double smallest_distance_m = 0.0;  // between two samples, >= radius_m; 0 for a single sample
+  // smallest_distance_m relative to the densest packing of as many discs in the plane: R / (2
   // sqrt(A / (2 sqrt(3) N))) (Lagae and Dutre 2008). At most 1 in the plane.
   double relative_radius = 0.0;
-  std::size_t tries = 0;      // radii that were tried
-  bool count_reached = true;  // within 1 %, if a number was asked for
+  std::size_t tries = 0;      // number of radii that were tried
+  bool count_reached = true;  // false if `count` was missed by more than 1 %
   StageTimings timings_s;
 };
 void describe(ResultTable& table, const PoissonDiskResult& result);
 
-// Distances are Euclidean: two sheets of a thin plate share their samples. Every point of the
-// surface lies within 1.001 radii of a sample, and what single precision moves that. Darts are
-// thrown evenly over the whole surface, then over what they left uncovered, which is cut into
-// smaller and smaller triangles until a disc covers each (after Ebeida et al. 2012). The same bytes
-// for any number of threads; `count` of less than 100 is met exactly, where some radius yields it.
-// Throws Error: options out of their ranges, a mesh without area or with a vertex that is not
-// finite, a count of more than 10^8 samples, or a radius that asks for more than 100 a triangle
-// or 2.5 million, whichever is more, or than 10^8.
+// Samples a mesh. Distances are Euclidean, so both sheets of a thin plate share their samples.
+// Every point of the surface is within 1.001 radii (plus rounding) of a sample. Darts are thrown
+// evenly over the surface, then into the gaps, which are divided until each is covered by a disc
+// (after Ebeida et al. 2012). The result does not depend on the number of threads. A `count` below
+// 100 is met exactly if some radius yields it. Throws Error: options out of their ranges, a mesh
+// without area, a vertex that is not finite, a count of more than 10^8, or a radius that yields
+// more than 100 samples per triangle (limit at least 2.5 million and at most 10^8 samples).
 PoissonDiskResult sample_poisson_disk(const TriangleMesh& mesh, const PoissonDiskOptions& options,
                                       Progress& progress = no_progress());
 
-// The same surface in pieces, one after the other, by radius alone: no two samples of any pieces
-// are nearer than the radius, and seams have no gap. Memory depends on the size of a piece, and on
-// the samples near others.
+// Samples a surface in consecutive pieces by radius. The minimum distance also holds between
+// pieces, and seams have no gaps. Memory depends on the size of a piece and on the samples near
+// seams.
 class PieceSampler {
  public:
-  // `boxes` of all pieces. Throws Error if a number of samples is asked for.
+  // Takes the bounding boxes of all pieces. Throws Error if options.count is not 0.
   PieceSampler(std::vector<Bounds3d> boxes, const PoissonDiskOptions& options);
-  // Of piece `number`, each once; a mesh without area has none.
+  // Samples piece `number`, once per piece. Without area, the result has no samples. Throws as
+  // sample_poisson_disk.
   PoissonDiskResult sample(const TriangleMesh& mesh, std::size_t number,
                            Progress& progress = no_progress());
 

@@ -16,15 +16,15 @@ namespace {
 constexpr double largest_float = std::numeric_limits<float>::max();
 constexpr std::size_t packet_size = 8;
 
-// A ray as Embree sees it: of unit length, about the mesh's center, and begun just outside the
-// mesh's box, where single precision is finest.
+// Ray for Embree: relative to the mesh's center, with unit direction, starting just outside the
+// mesh's box for accuracy in single precision.
 struct LocalRay {
   Eigen::Vector3f origin;
   Eigen::Vector3f direction;
   float near = 0.0F;
-  float far = -1.0F;     // less than near: the ray meets nothing
-  double length = 1.0;   // of the direction as given
-  double skipped = 0.0;  // unit lengths from the given origin to `origin`
+  float far = -1.0F;     // less than near: no intersection with the box
+  double length = 1.0;   // length of the given direction
+  double skipped = 0.0;  // distance from the given origin to `origin`
 };
 
 LocalRay localize(const EmbreeMesh& mesh, const Eigen::AlignedBox3d& box,
@@ -71,7 +71,7 @@ RayHit refine(const EmbreeMesh& mesh, const Eigen::Vector3d& origin,
   const Eigen::Vector3d normal = ab.cross(ac);
   const Eigen::Vector3d start = origin - mesh.center();
   const double exact = normal.dot(a - start) / normal.dot(direction);
-  // Where a ray grazes its triangle the plane says less about the hit than Embree does.
+  // For a grazing ray, the intersection with the plane is less accurate than Embree's.
   if (!(std::abs(exact - hit.distance) * ray.length <= 1e-5 * (1e-3 + std::abs(unit_distance))))
     return hit;
   hit.distance = exact;
@@ -124,7 +124,10 @@ void RayCaster::cast_bundle(const Eigen::Vector3d& origin,
                             std::span<const Eigen::Vector3d> directions, std::span<RayHit> hits,
                             double near, double far) const {
   if (hits.size() != directions.size())
-    throw Error("a bundle of " + std::to_string(directions.size()) + " rays wants as many hits");
+    throw Error("number of hits differs from number of rays",
+                {.field = "hits",
+                 .value = std::to_string(hits.size()),
+                 .bound = std::to_string(directions.size())});
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;

@@ -1,5 +1,5 @@
-// Rays against a triangle mesh (Embree). Triangles are found in single precision about the mesh's
-// center, watertight along shared edges; where a ray meets them is then computed in double
+// Ray casting against a triangle mesh (Embree). Triangles are found in single precision relative to
+// the mesh's center, watertight along shared edges; intersections are then computed in double
 // precision.
 #pragma once
 
@@ -16,7 +16,7 @@ namespace libmap {
 struct RayHit {
   static constexpr std::uint32_t no_triangle = 0xffffffff;
 
-  double distance = 0.0;  // in lengths of the ray's direction
+  double distance = 0.0;  // in units of the direction's length
   std::uint32_t triangle = 0;
   double u = 0.0;  // barycentric: (1 - u - v) * a + u * b + v * c
   double v = 0.0;
@@ -25,23 +25,24 @@ struct RayHit {
 class RayCaster {
  public:
   // Throws Error if the mesh has no triangle, an index out of range or a vertex that is not finite.
-  // The mesh may go away afterwards.
+  // Copies the mesh.
   explicit RayCaster(const TriangleMesh& mesh);
 
-  // The nearest triangle along origin + distance * direction, distance between `near` and `far`
-  // (0 <= near <= far), from either side. Nothing where the direction is zero or not finite. May be
-  // called from several threads at once.
+  // Nearest intersection origin + distance * direction with either side of a triangle, `near` <=
+  // distance <= `far`. Returns nullopt if there is none, or if the direction is zero or not finite.
+  // Thread-safe.
   std::optional<RayHit> cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                              double near = 0.0, double far = 1e30) const;
 
-  // The same for many rays from one place, quickest where neighbors in `directions` point nearly
-  // the same way; `hits` is as long. RayHit::no_triangle marks a ray that meets nothing.
+  // Casts many rays from one origin, fastest if neighbors in `directions` are similar. `hits`
+  // receives one element per direction, with RayHit::no_triangle for no intersection. Throws Error
+  // if the sizes differ.
   void cast_bundle(const Eigen::Vector3d& origin, std::span<const Eigen::Vector3d> directions,
                    std::span<RayHit> hits, double near = 0.0, double far = 1e30) const;
 
  private:
   EmbreeMesh mesh_;
-  Eigen::AlignedBox3d box_;  // about the mesh's center, a little larger than the mesh
+  Eigen::AlignedBox3d box_;  // slightly larger than the mesh, relative to its center
 };
 
 }  // namespace libmap

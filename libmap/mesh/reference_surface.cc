@@ -70,7 +70,7 @@ struct ReferenceSurface::MeshShape : Shape {
     return (at(t, 1) - at(t, 0)).cross(at(t, 2) - at(t, 0)).normalized();
   }
 
-  // Shares of the corners in a place of the triangle; all zero if it has no area.
+  // Barycentric coordinates of a position in the triangle; all zero if it has no area.
   std::array<double, 3> shares(std::uint32_t t, const Eigen::Vector3d& position) const {
     const Eigen::Vector3d normal = (at(t, 1) - at(t, 0)).cross(at(t, 2) - at(t, 0));
     std::array<double, 3> result{};
@@ -82,15 +82,14 @@ struct ReferenceSurface::MeshShape : Shape {
   }
 
   NearestPlace nearest(const Eigen::Vector3d& point) const override {
-    // Of an edge's length: nearer than this to an edge is on it.
-    constexpr double on_edge = 1e-6;
+    constexpr double on_edge = 1e-6;  // barycentric coordinates below this are on the edge
     const SurfacePoint found = surface.nearest(point);
     NearestPlace place{found.position, Eigen::Vector3d::Zero(), found.distance_m, false};
     const std::uint32_t t = found.triangle;
     const std::array<double, 3> share = shares(t, found.position);
     std::size_t zeros = 0;
-    std::size_t zero = 0;     // the last corner without a share
-    std::size_t largest = 0;  // the corner with the largest one
+    std::size_t zero = 0;     // last corner with a coordinate of zero
+    std::size_t largest = 0;  // corner with the largest coordinate
     for (std::size_t k = 0; k < 3; ++k) {
       if (share[k] < on_edge) {
         ++zeros;
@@ -117,7 +116,7 @@ struct ReferenceSurface::MeshShape : Shape {
 
 struct ReferenceSurface::CloudShape : Shape {
   std::vector<Eigen::Vector3d> points;
-  std::vector<Eigen::Vector3d> normals;  // unit or zero, one a point
+  std::vector<Eigen::Vector3d> normals;  // unit or zero, one per point
   double disc_radius_m = 0.0;
   std::unique_ptr<PointTree> tree;
 

@@ -19,15 +19,17 @@ namespace libmap {
 
 void bind(ParameterTable& table, SurfaceAlignmentOptions& options) {
   table.add("icp_max_distance_m", options.max_distance_m, positive,
-            "points farther from the surface do not count in ICP");
+            "maximum distance from the surface of points used by ICP");
   table.add("icp_min_overlap", options.min_overlap, zero_to_one,
-            "share of the points that must count in ICP");
-  table.add("icp_max_iterations", options.max_iterations, {1.0, 1e6}, "steps of ICP at most");
+            "minimum share of the points that overlap the surface in ICP");
+  table.add("icp_max_iterations", options.max_iterations, {1.0, 1e6},
+            "maximum number of ICP iterations");
   table.add("icp_tolerance_m", options.tolerance_m, positive,
-            "ICP has converged when its step is smaller, m");
-  table.add("icp_max_points", options.max_points, {6.0, 1e8}, "points that ICP uses at most");
+            "step below which ICP has converged, m");
+  table.add("icp_max_points", options.max_points, {6.0, 1e8},
+            "maximum number of points used by ICP");
   table.add("icp_min_curvature", options.min_curvature, zero_to_one,
-            "share of the greatest curvature below which ICP leaves a motion alone");
+            "share of the maximum curvature below which ICP does not change a motion");
 }
 
 namespace {
@@ -48,7 +50,7 @@ struct Pair {
   double weight = 0.0;
 };
 
-// Those that overlap the surface.
+// Pairs of points that overlap the surface and their nearest points. Throws Error if too few.
 std::vector<Pair> pairs_of(const std::vector<Eigen::Vector3d>& points, const Pose& moved,
                            const ReferenceSurface& surface,
                            const SurfaceAlignmentOptions& options) {
@@ -62,16 +64,16 @@ std::vector<Pair> pairs_of(const std::vector<Eigen::Vector3d>& points, const Pos
   });
   const double share = static_cast<double>(pairs.size()) / static_cast<double>(points.size());
   if (pairs.size() < 6 || share < options.min_overlap)
-    throw Error("too little overlap to align by",
+    throw Error("too little overlap to align with the surface",
                 {.field = "points within " + to_text(static_cast<float>(options.max_distance_m)) +
-                          " m over the surface",
+                          " m of the surface",
                  .value = to_fixed_text(100.0 * share, 1) + " %",
                  .bound = ">= " + to_fixed_text(100.0 * options.min_overlap, 1) + " %"});
   return pairs;
 }
 
-// Tukey's biweight; its scale is the normalized median absolute deviation. Returns the number of
-// pairs with a weight.
+// Sets the weights by Tukey's biweight, with the normalized median absolute deviation as scale.
+// Returns the number of pairs with a weight above 0.
 std::size_t weigh(std::vector<Pair>& pairs, double floor_m) {
   std::vector<double> distances;
   distances.reserve(pairs.size());
@@ -85,8 +87,8 @@ std::size_t weigh(std::vector<Pair>& pairs, double floor_m) {
   return inliers;
 }
 
-// Rotations count by how far they move the points, so that all six are lengths: turned about
-// `center` by an angle times `radius_m`.
+// Normal equations of six motions in meters. A rotation is about `center`, by an angle times
+// `radius_m`, which is the distance that it moves the points.
 struct CenteredEquations : NormalEquations<6> {
   Eigen::Vector3d center = Eigen::Vector3d::Zero();
   double radius_m = 0.0;
@@ -130,7 +132,7 @@ Step solve(const CenteredEquations& equations, double min_curvature) {
   Vector6d motion = Vector6d::Zero();
   for (Eigen::Index n = 5; n >= 0; --n) {
     const double curvature = eigen.values[n] / greatest;
-    // Rounding leaves some 1e-16 where there is nothing.
+    // Rounding produces curvatures of about 1e-16 instead of 0.
     if (!(curvature >= std::max(min_curvature, 1e-13))) {
       ++step.free_motions;
       continue;
@@ -165,14 +167,14 @@ SurfaceAlignmentResult align_to_surface(const std::vector<Eigen::Vector3d>& poin
                                         const ReferenceSurface& surface,
                                         const SurfaceAlignmentOptions& options) {
   check_parameters(options);
-  if (!surface.is_oriented()) throw Error("a surface without normals cannot be aligned to");
+  if (!surface.is_oriented()) throw Error("cannot align to a surface without normals");
   if (points.size() < 6)
     throw Error("too few points to align",
                 {.field = "points", .value = std::to_string(points.size()), .bound = ">= 6"});
   for (const Eigen::Vector3d& point : points)
     if (!point.allFinite()) throw Error("a point is not finite");
   const std::vector<Eigen::Vector3d> used = downsampled(points, options.max_points);
-  // Distances below it are rounding.
+  // Smaller distances are rounding errors.
   const double floor_m = 1e-9 * (surface.bounds().max - surface.bounds().min).norm();
   SurfaceAlignmentResult result;
   result.points = used.size();

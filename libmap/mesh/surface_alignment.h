@@ -1,4 +1,4 @@
-// Points aligned with a surface: point-to-plane ICP (Chen and Medioni 1992) with Tukey's biweight.
+// Aligns points with a surface by point-to-plane ICP (Chen and Medioni 1992) with Tukey's biweight.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,14 +12,14 @@
 namespace libmap {
 
 struct SurfaceAlignmentOptions {
-  double max_distance_m = 0.2;  // > 0: points farther from the surface are left out
-  double min_overlap = 0.1;     // 0..1: share of the points that must be nearer, over the surface
+  double max_distance_m = 0.2;  // > 0: points farther from the surface are ignored
+  double min_overlap = 0.1;     // 0 to 1: minimum share of points within max_distance_m
   int max_iterations = 100;     // >= 1
-  double tolerance_m = 1e-7;    // > 0: converged when no step moves the points by more (RMS)
-  int max_points = 50000;       // >= 6: so many of the points are used, evenly over the list
-  // 0..1: a motion whose curvature in the sum of squares is a smaller share of the greatest one is
-  // not determined by the surface and is left alone (Zhang, Kaess and Singh 2016): a plane does not
-  // slide, a ball does not turn.
+  double tolerance_m = 1e-7;    // > 0: converged if a step moves the points by less (RMS)
+  int max_points = 50000;       // >= 6: maximum number of points used, evenly over the list
+  // 0 to 1: minimum curvature of the sum of squares along a motion, relative to the maximum.
+  // Motions with less are not determined by the surface and are not changed (Zhang, Kaess and Singh
+  // 2016), for example the translation along a plane.
   double min_curvature = 1e-4;
 };
 void bind(ParameterTable& table, SurfaceAlignmentOptions& options);
@@ -28,21 +28,20 @@ struct SurfaceAlignmentResult {
   Pose surface_from_points = Pose::Identity();
   bool converged = false;
   int iterations = 0;
-  int free_motions = 0;    // of six, left alone in the last step
-  double curvature = 0.0;  // the least one that was used, as a share of the greatest
-  std::size_t points = 0;  // used
-  std::size_t overlap =
-      0;  // of them nearer than max_distance_m and not beyond a border, at the end
-  std::size_t inliers = 0;  // of those the ones with a weight
+  int free_motions = 0;     // number of the six motions not determined in the last step
+  double curvature = 0.0;   // smallest relative curvature above min_curvature
+  std::size_t points = 0;   // points used
+  std::size_t overlap = 0;  // points within max_distance_m and not beyond a border, at the end
+  std::size_t inliers = 0;  // overlapping points with a weight above 0
   double rmse_m = 0.0;      // of the inliers' distances
 };
 
-// The rigid motion of `points` after which the weighted squares of their distances along the
-// surface's normals are least. Points whose nearest place is on the surface's border have no
-// counterpart. Weights come from 1.4826 times the median distance in each step, so fewer than half
-// of the points that overlap may be wrong. The same for any number of threads. Throws Error:
+// Finds the rigid motion of `points` that minimizes the weighted squares of their distances along
+// the surface's normals. Points whose nearest point is on the border are ignored. The scale of the
+// weights is 1.4826 times the median distance in each step, so that up to half of the overlapping
+// points may be outliers. The result does not depend on the number of threads. Throws Error:
 // options out of their ranges, fewer than six points, one that is not finite, a surface without
-// sides, too little overlap in some step.
+// orientation, too little overlap in some step.
 SurfaceAlignmentResult align_to_surface(const std::vector<Eigen::Vector3d>& points,
                                         const ReferenceSurface& surface,
                                         const SurfaceAlignmentOptions& options = {});

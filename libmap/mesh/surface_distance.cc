@@ -22,7 +22,7 @@ Eigen::Vector3d nearest_on_segment(const Eigen::Vector3d& point, const Eigen::Ve
   return a + std::clamp((point - a).dot(b - a) / square, 0.0, 1.0) * (b - a);
 }
 
-// Of a triangle without area: of its sides.
+// Nearest point on the sides of a triangle without area.
 Eigen::Vector3d nearest_on_sides(const Eigen::Vector3d& point, const Eigen::Vector3d& a,
                                  const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
   Eigen::Vector3d nearest = nearest_on_segment(point, a, b);
@@ -44,7 +44,7 @@ SurfacePoint SurfaceDistance::nearest(const Eigen::Vector3d& point) const {
   struct Search {
     const EmbreeMesh& mesh;
     Eigen::Vector3d point;
-    double slack;  // by which single precision may misplace a triangle
+    double slack;  // maximum error of Embree's single precision
     Eigen::Vector3d best;
     std::uint32_t triangle;
     double distance;
@@ -64,7 +64,7 @@ SurfacePoint SurfaceDistance::nearest(const Eigen::Vector3d& point) const {
     Search& found = *static_cast<Search*>(arguments->userPtr);
     const Eigen::Vector3d at = nearest_on(found.mesh, arguments->primID, found.point);
     const double distance = (at - found.point).norm();
-    // Among equals the first triangle, however the tree is walked.
+    // Among equal distances the lowest triangle, independent of the tree.
     if (distance > found.distance ||
         (distance == found.distance && arguments->primID >= found.triangle))
       return false;
@@ -140,7 +140,7 @@ DistanceStatistics distance_statistics(std::vector<double> distances_m) {
 
 std::vector<TrianglePoint> sample_triangles(const TriangleMesh& mesh, double per_m2,
                                             std::uint64_t seed) {
-  // Each takes some hundred bytes of those who work with them: many of a mesh that is large itself.
+  // A sample takes some hundred bytes in total, so the limit is proportional to the mesh's size.
   const double most = std::clamp(100.0 * static_cast<double>(mesh.triangles.size()), 2.5e6, 1e8);
   std::vector<double> area_before;
   double area = 0.0;
@@ -154,14 +154,14 @@ std::vector<TrianglePoint> sample_triangles(const TriangleMesh& mesh, double per
     throw Error(
         "too many samples of the surface",
         {.field = "samples",
-         .value = to_text(per_m2) + " on each of " + to_text(static_cast<float>(area)) + " m2",
+         .value = to_text(per_m2) + " per m2 on " + to_text(static_cast<float>(area)) + " m2",
          .bound = "<= " + std::to_string(static_cast<std::size_t>(most)) + " in all for " +
                   std::to_string(mesh.triangles.size()) + " triangles"});
   const auto count = static_cast<std::size_t>(wanted);
   RandomStream random(seed, 0);
   std::vector<TrianglePoint> samples(count);
   for (std::size_t n = 0; n < count; ++n) {
-    // One in each of `count` strata of equal area.
+    // One sample in each of `count` strata of equal area.
     const double at =
         (static_cast<double>(n) + random.uniform()) / static_cast<double>(count) * area;
     const auto above = std::upper_bound(area_before.begin(), area_before.end(), at);

@@ -13,8 +13,8 @@ using Sparse = Eigen::SparseMatrix<double>;
 
 Eigen::Index place(std::size_t block) { return 6 * static_cast<Eigen::Index>(block); }
 
-// Where each block goes so that the factor fills little: approximate minimum degree (Amestoy, Davis
-// and Duff 1996).
+// Order of the blocks for little fill-in: approximate minimum degree (Amestoy, Davis and Duff
+// 1996).
 std::vector<std::size_t> fill_reducing_places(const BlockSystem& system) {
   const auto size = static_cast<Eigen::Index>(system.size());
   std::vector<Eigen::Triplet<double>> entries;
@@ -74,8 +74,8 @@ void BlockSystem::clear_rhs() {
 
 struct BlockSolver::Parts {
   Eigen::Index size = 0;
-  std::vector<std::size_t> places;  // of the blocks in the factored matrix
-  // All entries of a block are stored, so that the factor too consists of whole blocks.
+  std::vector<std::size_t> places;  // positions of the blocks in the factored matrix
+  // All entries of a block are stored, so that the factor consists of complete blocks as well.
   Eigen::SimplicialLDLT<Sparse, Eigen::Lower, Eigen::NaturalOrdering<int>> solver;
   bool valid = false;
 
@@ -132,10 +132,10 @@ std::vector<Matrix6d> BlockSolver::inverse_column(std::size_t column) const {
 
 namespace {
 
-// The factor in blocks: L_bb D_b L_bb^T of the diagonal, and below it L_ib of each column b divided
-// by L_bb, so that the matrix is the product of block-unit-triangular and block-diagonal ones.
+// The factor in blocks: L_bb D_b L_bb^T on the diagonal, and below it L_ib L_bb^-1 for each column
+// b. The matrix is the product of block-unit-triangular and block-diagonal matrices.
 struct BlockFactor {
-  std::vector<std::size_t> begin{0};  // of each column among `rows`; one more than columns
+  std::vector<std::size_t> begin{0};  // first index in `rows` by column; one more than columns
   std::vector<std::size_t> rows;      // below the diagonal, ascending
   std::vector<Matrix6d> below;
   std::vector<Matrix6d> inverse_diagonal;
@@ -173,8 +173,8 @@ BlockFactor::BlockFactor(const Sparse& lower, const Eigen::VectorXd& diagonal) {
   }
 }
 
-// The blocks of the inverse Z at the factor's places and on the diagonal, from the last column to
-// the first: Z_ib = -sum_k Z_ik L_kb, Z_bb = D_b^-1 - sum_k L_kb^T Z_kb.
+// Computes the blocks of the inverse Z at the positions of the factor's blocks, from the last
+// column to the first: Z_ib = -sum_k Z_ik L_kb, Z_bb = D_b^-1 - sum_k L_kb^T Z_kb.
 struct FactorInverse {
   std::vector<Matrix6d> below;
   std::vector<Matrix6d> diagonal;
@@ -185,7 +185,7 @@ struct FactorInverse {
 FactorInverse::FactorInverse(const BlockFactor& factor)
     : below(factor.below.size(), Matrix6d::Zero()), diagonal(factor.inverse_diagonal) {
   const std::size_t none = factor.below.size();
-  std::vector<std::size_t> entry_of(diagonal.size(), none);  // of the column at hand
+  std::vector<std::size_t> entry_of(diagonal.size(), none);  // of the current column
   for (std::size_t column = diagonal.size(); column-- > 0;) {
     const std::size_t begin = factor.begin[column];
     const std::size_t end = factor.begin[column + 1];

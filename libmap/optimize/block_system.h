@@ -1,4 +1,4 @@
-// Sparse normal equations in blocks of six: one block of unknowns per pose.
+// Sparse normal equations with one block of six unknowns per pose, and their solver.
 #pragma once
 
 #include <cstddef>
@@ -13,18 +13,17 @@ namespace libmap {
 
 class BlockSystem {
  public:
-  explicit BlockSystem(std::size_t blocks);  // all zero
+  explicit BlockSystem(std::size_t blocks);  // number of poses; all entries are zero
   std::size_t size() const { return size_; }
 
-  // The information matrix's block (row, column) and its mirror image.
+  // Adds to block (row, column) of the information matrix and to its transpose at (column, row).
   void add(std::size_t row, std::size_t column, const Matrix6d& block);
   void add_rhs(std::size_t row, const Vector6d& rhs);
-  // A residual that is linear in two blocks of unknowns, with its own information and right-hand
-  // side.
+  // Adds a residual with derivatives by two blocks, its information and its right-hand side.
   void add_pair(std::size_t a, std::size_t b, const Matrix6d& by_a, const Matrix6d& by_b,
                 const Matrix6d& information, const Vector6d& rhs);
-  void add(const BlockSystem& other);
-  Matrix6d block(std::size_t row, std::size_t column) const;  // zero where none was added
+  void add(const BlockSystem& other);                         // of equal size
+  Matrix6d block(std::size_t row, std::size_t column) const;  // zero if none was added
   const std::map<std::pair<std::size_t, std::size_t>, Matrix6d>& blocks() const { return blocks_; }
   const std::vector<Vector6d>& rhs() const { return rhs_; }
   void clear_rhs();
@@ -35,8 +34,7 @@ class BlockSystem {
   std::vector<Vector6d> rhs_;
 };
 
-// The factored system. Sparse LDL^T with a fill-reducing order of the blocks: the same bytes on
-// every run.
+// Sparse LDL^T factorization with a fill-reducing order of the blocks. The result is deterministic.
 class BlockSolver {
  public:
   // `damping` is added to the diagonal.
@@ -45,14 +43,14 @@ class BlockSolver {
   BlockSolver(const BlockSolver&) = delete;
   BlockSolver& operator=(const BlockSolver&) = delete;
 
-  bool valid() const;  // positive definite
-  // The unknowns for one right-hand side; only where valid().
+  bool valid() const;  // true if the system is positive definite; the methods below require it
+  // Solution for one right-hand side.
   std::vector<Vector6d> solve(const std::vector<Vector6d>& rhs) const;
-  // Blocks (row, column) of the inverse for each row, of one column.
+  // Blocks of one column of the inverse, by row.
   std::vector<Matrix6d> inverse_column(std::size_t column) const;
-  // The blocks of the inverse where `wanted` has blocks. Those that the factored system has too, be
-  // they zero, take about the time of the factorization together (Takahashi, Fagan and Chin 1973);
-  // others take a column each.
+  // Blocks of the inverse at the positions of the blocks of `wanted`. Blocks that the system has as
+  // well, even if zero, cost about one factorization in total (Takahashi, Fagan and Chin 1973).
+  // Each of the others costs one inverse_column.
   BlockSystem selected_inverse(const BlockSystem& wanted) const;
 
  private:

@@ -19,12 +19,12 @@ namespace libmap {
 
 namespace {
 
-constexpr std::size_t dense_below = 120;  // poses: the Schur complement of more is never formed
+constexpr std::size_t dense_below = 120;  // poses; with more, no dense Schur complement is formed
 constexpr double registration_prior_m = 0.02;
 constexpr double registration_prior_rad = 0.03;
-// Standard deviation of the delays of depth by its stamps that determines the motions' scale.
+// Scatter of the stamps' depth delays from which on the scale of the motions is observable.
 constexpr double stamps_tell_s = 0.005;
-// Keeps a pose that nothing binds from making the system singular.
+// Keeps the system regular if a pose is not constrained.
 constexpr double pose_damping = 1e-6;
 
 std::size_t max_cameras(const std::vector<FrameFeatures>& frames) {
@@ -33,12 +33,12 @@ std::size_t max_cameras(const std::vector<FrameFeatures>& frames) {
   return cameras;
 }
 
-// Of the cameras' numbers, as residuals a x - b.
+// Priors of the camera parameters x as residuals a x - b.
 class Priors {
  public:
   explicit Priors(Eigen::Index numbers) : numbers_(numbers) {}
 
-  // Returns a row, to be filled.
+  // Returns a row of zeros for the caller to fill.
   Eigen::VectorXd& add(double mean = 0.0) {
     means_.push_back(mean);
     return rows_.emplace_back(Eigen::VectorXd::Zero(numbers_));
@@ -62,15 +62,15 @@ class Priors {
   std::vector<double> means_;
 };
 
-// Rows of normal equations.
+// Rows of the free unknowns in the normal equations.
 struct FreeRows {
-  std::vector<Eigen::Index> poses;   // the first of six each: of a step (rigid_motion.h)
+  std::vector<Eigen::Index> poses;   // first row of the six of each pose's step (rigid_motion.h)
   std::vector<Eigen::Index> params;  // of cameras and motions
 };
 
-// Changes of the parameters by one standard deviation in independent directions, poses being
-// unknown (Schur complement): the `count` ones that move the positions of the poses most. Points
-// are eliminated from the information already.
+// The `count` changes of the parameters by one standard deviation in independent directions that
+// change the positions of the poses most. Poses are eliminated by the Schur complement; points have
+// been eliminated from the information before.
 struct CalibrationModes {
   std::vector<Eigen::VectorXd> changes;
   Eigen::VectorXd deviations;  // of each parameter
@@ -83,7 +83,7 @@ CalibrationModes calibration_modes(const Eigen::MatrixXd& information, const Fre
     for (Eigen::Index n = 0; n < 6; ++n) steps.push_back(first + n);
   Eigen::MatrixXd of_poses = information(steps, steps);
   of_poses.diagonal().array() += pose_damping;
-  // How poses follow the cameras.
+  // Derivative of the optimal poses by the parameters.
   const Eigen::MatrixXd mixed = information(steps, rows.params);
   const Eigen::MatrixXd follow = -of_poses.ldlt().solve(mixed);
   const Eigen::MatrixXd of_params =
@@ -131,16 +131,16 @@ class Adjustment {
   const std::vector<FeatureTrack>& tracks_;
   const BundleAdjustmentOptions& options_;
   BundleAdjustmentResult result_;
-  std::size_t cameras_ = 0;                   // with something to refine
-  std::vector<DepthCorrection> corrections_;  // of 0: their knots
+  std::size_t cameras_ = 0;                   // number of cameras; 0 if none is refined
+  std::vector<DepthCorrection> corrections_;  // zero corrections that define the knots
   SensorCalibration start_;
-  std::map<int, std::size_t> place_;  // of each node among the poses
-  std::vector<Eigen::Index> first_;   // number of each camera
-  std::vector<bool> sees_;            // of each camera, anything
+  std::map<int, std::size_t> place_;  // row of a node's pose
+  std::vector<Eigen::Index> first_;   // first parameter of a camera
+  std::vector<bool> sees_;            // true for cameras with observations
   double mean_later_s_ = 0.0;         // of FrameFeatures::depth_later_s
   double later_deviation_s_ = 0.0;
-  std::vector<Eigen::Index> free_;   // numbers
-  std::vector<std::size_t> points_;  // their tracks
+  std::vector<Eigen::Index> free_;   // indices of the free parameters
+  std::vector<std::size_t> points_;  // track of each point
   JointProblem problem_;
   JointState state_;
 };
@@ -220,7 +220,7 @@ void Adjustment::start_numbers(const SensorCalibration& start,
   }
 }
 
-// In the middle of where the frames see them.
+// Points start at the mean of the frames' measurements.
 void Adjustment::add_observations() {
   for (std::size_t t = 0; t < tracks_.size(); ++t) {
     const std::vector<Observation>& all = tracks_[t].observations;
@@ -298,7 +298,7 @@ void Adjustment::add_camera_priors(std::size_t camera, Priors& priors) {
   if (options_.refine_depth && !corrections_[camera].empty()) add_depth_priors(camera, priors);
 }
 
-// Each number is small, the spline bends little, and depths keep their mean (depth_gauge).
+// Priors: coefficients are small, the spline is smooth, and the mean depth is kept (depth_gauge).
 void Adjustment::add_depth_priors(std::size_t camera, Priors& priors) {
   const DepthCorrection& depth = corrections_[camera];
   const auto knots = static_cast<Eigen::Index>(depth.spline_m.size());
@@ -335,11 +335,11 @@ void Adjustment::add_depth_priors(std::size_t camera, Priors& priors) {
   gauge /= count * depth_gauge;
 }
 
-// Only the product of time and motion is seen: the motions are right on average if their regression
-// on those between poses has the slope 1. The hand's tremor is missing in the latter, so that least
-// squares with both as measurements makes times too long.
+// Only the product of time and motion is observable. Motions are correct on average if their
+// regression on the motions between poses has slope 1. The latter miss the tremor of the hand, so
+// that least squares with both as measurements overestimates times.
 double Adjustment::motion_scale() const {
-  // Different delays by stamps determine it.
+  // Varying delays of the stamps determine the scale.
   if (!problem_.moving || problem_.fix_cameras || later_deviation_s_ > stamps_tell_s) return 1.0;
   double mixed = 0.0;
   double squares = 0.0;
@@ -422,7 +422,7 @@ BundleAdjustmentResult Adjustment::run(const std::vector<GraphLinkResult>& links
     result_.initial_cost = summary.initial_cost;
     result_.final_cost = summary.final_cost;
     result_.iterations = summary.iterations;
-    result_.converged = true;  // the cost has not risen
+    result_.converged = true;  // the cost never increases
   }
   result_.map_from_base = state_.poses;
   result_.points.assign(tracks_.size(), Eigen::Vector3d::Zero());
@@ -455,29 +455,31 @@ void add_information(const std::vector<FrameFeatures>& frames,
 
 void bind(ParameterTable& table, BundleAdjustmentOptions& options) {
   table.add("observation_scale", options.robust_scale, positive,
-            "of Cauchy's loss, standard deviations of an observation");
+            "width of Cauchy's loss for observations, in standard deviations");
   table.add("bundle_iterations", options.max_iterations, {1, 10000},
-            "of the bundle adjustment, at most");
+            "maximum number of bundle adjustment iterations");
   table.add("focal_prior", options.focal_prior, positive,
-            "standard deviation of the focal length, of itself");
+            "prior standard deviation of the focal length, relative");
   table.add("center_prior_px", options.center_prior_px, positive,
-            "standard deviation of the principal point");
+            "prior standard deviation of the principal point");
   table.add("depth_prior", options.depth_prior, positive,
-            "standard deviation of a correction of depth, in standard deviations of depth");
+            "prior standard deviation of the depth correction, relative to the depth noise");
   table.add("depth_bend", options.depth_bend, positive,
-            "the same of its second difference from knot to knot");
-  table.add("depth_knot_m", options.depth_knot_m, {0.02}, "between its knots");
+            "prior standard deviation of the depth correction's second differences between knots, "
+            "relative to the depth noise");
+  table.add("depth_knot_m", options.depth_knot_m, {0.02},
+            "distance between knots of the depth correction");
   table.add("frame_time_s", options.bounds.frame_time_s, positive,
-            "maximum delay of depth and maximum time of a picture's rows; more is impossible");
+            "maximum depth delay and rolling shutter time of a possible calibration");
   table.add("max_bend_m", options.bounds.max_bend_m, not_negative,
-            "maximum correction of depth at range 0");
+            "maximum depth correction at range 0");
   table.add("bend_of_range", options.bounds.bend_of_range, not_negative,
-            "what each meter of range adds to max_bend_m, m a m");
+            "increase of max_bend_m per meter of range, m/m");
 }
 
 namespace {
 
-// The largest absolute correction at depths of its range, m.
+// Pairs of depth and largest absolute correction at that depth (m), over the range of the spline.
 std::vector<std::pair<double, double>> largest_bends(const DepthCorrection& depth) {
   constexpr int depths = 40;
   constexpr int radii = 4;
@@ -498,34 +500,34 @@ std::optional<std::string> exceeded_bound(const SensorCalibration& calibration,
                                           const BundleAdjustmentOptions& options) {
   const CalibrationBounds& bounds = options.bounds;
   const auto exceeds = [](const char* what, double value, double bound, const char* unit) {
-    return what + (" " + to_fixed_text(value, 1)) + unit + ", at most " + to_fixed_text(bound, 1) +
-           unit + " is possible";
+    return what + (" " + to_fixed_text(value, 1)) + unit + " (must be < " +
+           to_fixed_text(bound, 1) + unit + ")";
   };
   for (const CameraTiming& timing : calibration.timing) {
     const double rows_s = std::abs(timing.rolling_shutter_s);
     const double delay_s = std::abs(timing.depth_delay_s);
     if (std::max(rows_s, delay_s) >= bounds.frame_time_s)
-      return exceeds(rows_s > delay_s ? "rows of a picture exposed over" : "delay of depth",
+      return exceeds(rows_s > delay_s ? "rolling shutter time" : "depth delay",
                      1e3 * std::max(rows_s, delay_s), 1e3 * bounds.frame_time_s, " ms");
   }
   for (const IntrinsicsStep& step : calibration.intrinsics) {
     const double focal = std::max(std::abs(step.fx_share), std::abs(step.fy_share));
     const double center_px = std::max(std::abs(step.cx_px), std::abs(step.cy_px));
     if (focal >= bounds.deviations * options.focal_prior)
-      return exceeds("focal length off by", 100.0 * focal,
+      return exceeds("focal length changed by", 100.0 * focal,
                      100.0 * bounds.deviations * options.focal_prior, " %");
     if (center_px >= bounds.deviations * options.center_prior_px)
-      return exceeds("principal point off by", center_px,
+      return exceeds("principal point moved by", center_px,
                      bounds.deviations * options.center_prior_px, " px");
   }
   for (const Pose& pose : calibration.color_from_depth)
     if (pose.translation().norm() >= bounds.deviations * registration_prior_m)
-      return exceeds("depth registered to color", 1e3 * pose.translation().norm(),
-                     1e3 * bounds.deviations * registration_prior_m, " mm off");
+      return exceeds("registration of depth to color moved by", 1e3 * pose.translation().norm(),
+                     1e3 * bounds.deviations * registration_prior_m, " mm");
   for (const DepthCorrection& depth : calibration.depth)
     for (const auto& [z, bend] : largest_bends(depth))
       if (const double most = bounds.max_bend_m + bounds.bend_of_range * z; bend >= most)
-        return exceeds("depth bends by", 1e3 * bend, 1e3 * most, " mm") + " at " +
+        return exceeds("depth correction", 1e3 * bend, 1e3 * most, " mm") + " at a depth of " +
                to_fixed_text(z, 1) + " m";
   return std::nullopt;
 }

@@ -1,6 +1,5 @@
-// Poses, points and, if wanted, intrinsics and a correction of depth that agree best with all
-// observations of the points, in the pictures and in depth (Triggs et al. 2000), the points
-// eliminated.
+// Bundle adjustment (Triggs et al. 2000) of poses, points and optionally camera parameters, from
+// image positions and depths of the points. Points are eliminated by the Schur complement.
 #pragma once
 
 #include <cstddef>
@@ -19,36 +18,36 @@
 
 namespace libmap {
 
-// Values that no camera exceeds: a calibration beyond them explains other errors.
+// Bounds of physically possible calibrations. Larger values compensate other errors.
 struct CalibrationBounds {
-  double frame_time_s = 0.033;  // > 0: of a delay of depth and of the rows of a picture
-  double max_bend_m = 0.01;     // >= 0: of a correction of depth at range 0 ...
-  double bend_of_range = 0.02;  // >= 0: ... and what each meter of range adds, m/m
-  double deviations = 4.0;      // not bound; of other parameters, from their prior
+  double frame_time_s = 0.033;  // > 0: maximum depth delay and rolling shutter time
+  double max_bend_m = 0.01;     // >= 0: maximum depth correction at range 0
+  double bend_of_range = 0.02;  // >= 0: increase of max_bend_m per meter of range, m/m
+  double deviations = 4.0;      // not bound; other parameters, in deviations of their prior
 };
 
 struct BundleAdjustmentOptions {
-  double robust_scale = 3.0;         // > 0: of Cauchy's loss, standard deviations of an observation
+  double robust_scale = 3.0;         // > 0: width of Cauchy's loss, standard deviations
   int max_iterations = 30;           // >= 1
-  bool refine_intrinsics = false;    // of each camera of the rig, the same in all frames; their
-                                     // distortion stays
-  bool refine_depth = false;         // a DepthCorrection of each camera
-  bool refine_registration = false;  // of depth to color, of each camera
-  bool refine_timing = false;        // a CameraTiming of each camera, and the motion at each node
-  double focal_prior = 0.02;         // > 0: standard deviation of the focal length, of itself
-  double center_prior_px = 8.0;      // > 0: ... and of the principal point
-  double depth_prior = 4.0;          // > 0: ... and of a correction of depth, of depth's own noise
-  double depth_bend = 0.7;           // > 0: ... and of its second difference from knot to knot
-  double depth_knot_m = 0.2;         // >= 0.02: between the knots of its spline
+  bool refine_intrinsics = false;    // of each camera, equal in all frames; distortion is fixed
+  bool refine_depth = false;         // a DepthCorrection per camera
+  bool refine_registration = false;  // pose of the depth camera relative to the color camera
+  bool refine_timing = false;        // a CameraTiming per camera and a velocity per node
+  // Standard deviations of the priors.
+  double focal_prior = 0.02;     // > 0: of the focal length, relative
+  double center_prior_px = 8.0;  // > 0: of the principal point
+  double depth_prior = 4.0;      // > 0: of the depth correction, relative to the depth noise
+  double depth_bend = 0.7;       // > 0: of its second differences, relative to the depth noise
+  double depth_knot_m = 0.2;     // >= 0.02: distance of the knots of the correction's spline
   CalibrationBounds bounds{};
   // Not bound.
   DepthNoise depth_noise{};
-  CameraTiming timing_mean{};  // of the prior; its deviation is the frame time
-  double tolerance = 1e-6;     // steps end when one lowers the cost by less than this share
-  bool hold_cameras = false;   // at the start's calibration: of what is free, motions alone change
-  bool hold_poses = false;
-  std::size_t alternatives = 0;  // of the result's calibration
-  bool with_information = true;  // of the result
+  CameraTiming timing_mean{};    // mean of the prior; its deviation is frame_time_s
+  double tolerance = 1e-6;       // converged if a step reduces the cost by less than this share
+  bool hold_cameras = false;     // cameras stay at the start's calibration; velocities are free
+  bool hold_poses = false;       // poses are fixed
+  std::size_t alternatives = 0;  // maximum number of alternative calibrations in the result
+  bool with_information = true;  // the result contains the information matrix
 
   bool refines_cameras() const {
     return refine_intrinsics || refine_depth || refine_registration || refine_timing;
@@ -56,69 +55,69 @@ struct BundleAdjustmentOptions {
 };
 void bind(ParameterTable& table, BundleAdjustmentOptions& options);
 
-// A sentence about the first parameter of a calibration that is outside its bounds; nullopt if the
-// calibration is physically possible.
+// Describes the first parameter of a calibration that is outside its bounds, with value and bound.
+// Returns nullopt if the calibration is physically possible.
 std::optional<std::string> exceeded_bound(const SensorCalibration& calibration,
                                           const BundleAdjustmentOptions& options);
 
-// The mean share of the depths of its features by which a camera's depth may be corrected: pictures
-// and depth alone cannot tell a scale of depth from a larger scene, so the scale stays that of the
-// depth camera.
+// Standard deviation of the mean relative depth correction of a camera's features. Images and depth
+// do not distinguish a depth scale error from a larger scene, so the depth camera sets the scale.
 inline constexpr double depth_gauge = 1e-6;
 
 struct BundleAdjustmentResult {
   std::map<int, Pose> map_from_base;
-  std::vector<Eigen::Vector3d> points;  // in the map, one a track
-  SensorCalibration calibration;        // what was free
-  // Calibrations one standard deviation away in independent directions: those that move the
+  std::vector<Eigen::Vector3d> points;  // in the map, one per track
+  SensorCalibration calibration;        // of the free parameters
+  // Calibrations at one standard deviation along independent directions, those that change the
   // positions of the poses most.
   std::vector<SensorCalibration> alternatives;
-  SensorCalibration deviations;  // standard deviations of intrinsics and timing, with alternatives
-  // Of steps of the poses (rigid_motion.h), in the order of map_from_base, the points eliminated
-  // (Schur complement), at the end: the links among them.
+  SensorCalibration deviations;  // of intrinsics and timing; set if alternatives are requested
+  // Information of steps of the poses (rigid_motion.h) at the optimum, in the order of
+  // map_from_base, including the links. Points are eliminated (Schur complement).
   BlockSystem information{0};
   std::size_t tracks = 0;
-  std::size_t conflicts = 0;  // matches that are in no track (FeatureTracks)
+  std::size_t conflicts = 0;  // matches without a track (FeatureTracks)
   std::size_t observations = 0;
   double initial_cost = 0.0;
   double final_cost = 0.0;
-  // Root mean squares of what is not down-weighted below a half.
+  // Root mean squares of the residuals of inliers.
   double reprojection_rms_px = 0.0;
   double depth_rms_m = 0.0;
-  std::size_t outliers = 0;
+  std::size_t outliers = 0;  // observations with a weight below one half
   int iterations = 0;
   bool converged = false;
 };
 
-// The poses fit frames that are calibrated by the result's calibration. `links` are those of the
-// graph at its optimum (odometry, closures of other sources, priors); the gauge nodes of the
-// components stay where they are. The information is that of `system_tracks` where there are any:
-// of TrackFrames::linked it is a little less, and sparse. `start` is where what is free begins;
-// without it, at the stored cameras and the motion between poses. Memory grows with the square of
-// the poses.
+// Adjusts poses, points and free camera parameters. The resulting poses fit frames after
+// calibrate() with the result's calibration. `links` are those of the graph at its optimum
+// (odometry, other closures, priors). The gauge node of each component is fixed. The information is
+// computed from `system_tracks` if there are any: with TrackFrames::linked tracks it is sparse and
+// slightly smaller. `start` is the initial calibration; by default the stored cameras and the
+// motion between poses. Memory grows with the square of the number of poses. Throws Error: options
+// out of range.
 BundleAdjustmentResult adjust_bundle(
     const std::vector<FrameFeatures>& frames, const std::vector<FeatureTrack>& tracks,
     const std::map<int, Pose>& map_from_base, const std::vector<GraphLinkResult>& links,
     const std::vector<GraphComponent>& components, const BundleAdjustmentOptions& options = {},
     const std::vector<FeatureTrack>& system_tracks = {}, const SensorCalibration& start = {});
 
-// The same of all that links of features say. More than a hundred frames or so are adjusted in the
-// sparse system of the links (sparse_adjustment.h), unless calibration is free.
+// Adjusts the tracks built from feature links, as above. From 120 poses on it uses the sparse
+// system of the links (sparse_adjustment.h), unless camera parameters are free. Throws as above.
 BundleAdjustmentResult adjust_bundle(
     const std::vector<FrameFeatures>& frames, const std::vector<FeatureLink>& feature_links,
     const std::map<int, Pose>& map_from_base, const std::vector<GraphLinkResult>& links,
     const std::vector<GraphComponent>& components, const BundleAdjustmentOptions& options = {},
     const SensorCalibration& start = {}, Progress& progress = no_progress());
 
-// What a result without information lacks: the information, and the counts and residuals of
-// observations. Without points of the tracks, they are where their observations agree best.
+// Sets the information, the counts and the residuals of a result. `points` are those of `tracks`
+// (map frame); if empty, they are estimated at the result's poses.
 void add_information(const std::vector<FrameFeatures>& frames,
                      const std::vector<FeatureTrack>& tracks,
                      const std::vector<GraphLinkResult>& links,
                      const BundleAdjustmentOptions& options, BundleAdjustmentResult& result,
                      const std::vector<Eigen::Vector3d>& points = {});
 
-// The tracks whose system is the information of a result with so many poses.
+// Builds the tracks for the information of a result with `poses` poses: linked ones from 120 on.
 FeatureTracks information_tracks(const std::vector<FrameFeatures>& frames,
                                  const std::vector<FeatureLink>& feature_links, std::size_t poses);
 

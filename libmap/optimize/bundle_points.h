@@ -1,5 +1,5 @@
-// Points of a bundle adjustment at given poses and cameras: where they fit best, and their
-// elimination from the normal equations (Schur complement). Private to libmap/optimize.
+// Optimization of bundle adjustment points at given poses and cameras, and their elimination from
+// the normal equations (Schur complement). Private to libmap/optimize.
 #pragma once
 
 #include <Eigen/Cholesky>
@@ -19,20 +19,20 @@
 namespace libmap {
 
 struct BundleObservation {
-  std::size_t node = 0;          // row of its pose
-  Eigen::Index first_param = 0;  // of its camera
+  std::size_t node = 0;          // row of the pose
+  Eigen::Index first_param = 0;  // first parameter of the camera
   CalibratedFeature feature;
 };
 
-// Weight of a residual by Cauchy's loss of this width.
+// Weight of a residual for Cauchy's loss of width `scale`.
 inline double robust_weight(const Eigen::Vector3d& residual, double scale) {
   return cauchy_weight(residual.squaredNorm() / (scale * scale));
 }
 
-// Where observations are evaluated. All that it points to outlives it.
+// State at which observations are evaluated. Does not own the data that it points to.
 struct BundleView {
   std::vector<const Pose*> poses;                  // by row
-  const std::vector<Vector6d>* motions = nullptr;  // nullptr: none
+  const std::vector<Vector6d>* motions = nullptr;  // by row; nullptr: no motion
   const double* camera_params = nullptr;
 
   explicit BundleView(const std::map<int, Pose>& map_from_base) {
@@ -44,7 +44,7 @@ struct BundleView {
                                  motions != nullptr ? (*motions)[seen.node] : Vector6d::Zero(),
                                  camera_params + seen.first_param, point, result, with_derivatives);
   }
-  // Cauchy's loss. A point that is not in front of the camera is far off; its residual is too.
+  // Cauchy's loss. Sets a very large residual if the point is not in front of the camera.
   double cost(const BundleObservation& seen, const Eigen::Vector3d& point, double robust_scale,
               CalibratedResidual& result) const {
     constexpr double behind = 1e6;
@@ -54,7 +54,7 @@ struct BundleView {
   }
 };
 
-// Gauss-Newton steps of one point.
+// Optimizes the position of one point (map frame) by Gauss-Newton.
 inline void optimize_point(std::span<const BundleObservation> observations, const BundleView& view,
                            double robust_scale, int point_iterations, Eigen::Vector3d& point) {
   gauss_newton(point_iterations, [&] {
@@ -70,8 +70,8 @@ inline void optimize_point(std::span<const BundleObservation> observations, cons
   });
 }
 
-// Observations of one point, until it is eliminated. `System` has
-//   add(row, column, block)  of two nodes, row >= column
+// Collects the observations of one point and eliminates the point. `System` provides
+//   add(row, column, block)  for two nodes, row >= column
 //   add_rhs(row, vector)
 template <int node_size, typename System>
 class PointSchur {
@@ -86,7 +86,7 @@ class PointSchur {
     return by_node;
   }
 
-  // What is not mixed with the point goes to the system. Observations come by ascending node.
+  // Adds the terms of the node to the system. Observations must be added by ascending node.
   void add(const BundleObservation& observation, const CalibratedResidual& seen, double weight,
            System& system) {
     const ByNode jacobian = by_node(seen);
@@ -115,8 +115,8 @@ class PointSchur {
  protected:
   struct View {
     std::size_t node;
-    Mixed mixed;    // derivatives by the node and by the point
-    Mixed reduced;  // times the inverse of the point's
+    Mixed mixed;    // second derivatives by node and point
+    Mixed reduced;  // mixed times the inverse Hessian of the point
   };
   std::vector<View> views_;
   Eigen::Matrix3d hessian_ = Eigen::Matrix3d::Zero();

@@ -9,8 +9,8 @@ namespace libmap {
 
 namespace {
 
-// Keeps unknowns that no link binds, such as the rotation of a landmark that is only a point, from
-// making the system singular; nothing beside the information of any link.
+// Keeps the system regular if unknowns are not constrained, for example the rotation of a landmark
+// that is a point. Negligible relative to the information of any link.
 constexpr double damping = 1e-6;
 constexpr double gauge_weight = 1e12;
 

@@ -13,7 +13,7 @@ namespace {
 
 Eigen::Vector3d up_in(const Pose& pose) { return pose.linear().transpose().col(2); }
 
-// visit(link, row of its `from`, pose, row of its `to`, pose, weight) of each link in use.
+// Calls visit(link, row of `from`, its pose, row of `to`, its pose, weight) for each link in use.
 template <typename Visit>
 void visit_links(const std::map<int, Pose>& map_from_base,
                  const std::vector<GraphLinkResult>& links, const Visit& visit) {

@@ -16,7 +16,7 @@ namespace libmap {
 namespace {
 
 constexpr int overlap_samples = 300;
-constexpr double reach_m = 2.5;  // frames further apart are not tried
+constexpr double reach_m = 2.5;  // maximum distance between the poses of a pair
 constexpr double view_angle_deg = 100.0;
 constexpr std::size_t max_candidates = 24;
 constexpr std::size_t nearest_considered = 8 * max_candidates;
@@ -41,7 +41,7 @@ double overlap_of(const std::vector<BaseElement>& samples, const FrameFeatures& 
   return seen / static_cast<double>(samples.size());
 }
 
-// Of the posed frames, those that may see what the n-th sees.
+// Frames whose field of view may overlap that of the n-th frame, nearest first.
 std::vector<std::size_t> candidates_of(const PointTree& neighbors,
                                        const std::vector<PosedFrame>& posed,
                                        const std::map<int, std::size_t>& component_of,

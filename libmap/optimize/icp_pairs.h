@@ -1,4 +1,4 @@
-// The pairs of frames whose surfaces are laid against each other. Inner part of icp_refinement.
+// Selects the pairs of frames for ICP. Private to icp_refinement.
 #pragma once
 
 #include <map>
@@ -13,15 +13,14 @@
 
 namespace libmap {
 
-// Those that links join, in ascending order, the lower frame first. Frames without a pose are left
-// out.
+// Pairs of frames that are joined by links, in ascending order. Frames without a pose are ignored.
 std::vector<FramePair> linked_pairs(const std::vector<FrameFeatures>& frames,
                                     const std::map<int, Pose>& map_from_base,
                                     const std::vector<PoseLink>& links);
 
-// Each frame with those of its component whose surfaces overlap its own most by their poses, in the
-// same order: `min_overlap` and `pairs_per_frame` of the options. The same for any number of
-// threads.
+// Pairs of each frame with the `pairs_per_frame` frames of its component whose surfaces overlap its
+// own most (share >= `min_overlap`), in ascending order, the lower frame first. The result does not
+// depend on the number of threads.
 std::vector<FramePair> overlapping_pairs(const std::vector<FrameFeatures>& frames,
                                          const std::map<int, Pose>& map_from_base,
                                          const std::vector<GraphComponent>& components,

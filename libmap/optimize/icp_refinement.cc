@@ -23,24 +23,23 @@ namespace libmap {
 namespace {
 
 constexpr double robust_scale = 2.5;  // of Geman and McClure's loss, standard deviations
-// Of a graduated alignment: width of the loss, of the distance; the distance's fall in a step; and
-// its least, in standard deviations.
-constexpr double graduation = 0.5;
-constexpr double graduated_fall = 0.8;
-constexpr double noise_reach = 4.0;
+// Graduated alignment.
+constexpr double graduation = 0.5;      // width of the loss per maximum distance
+constexpr double graduated_fall = 0.8;  // factor of the maximum distance per step
+constexpr double noise_reach = 4.0;     // minimum of the maximum distance, standard deviations
 constexpr double min_distance_m = 0.004;
 constexpr double settled_step = 2e-6;
 constexpr double max_step = 0.2;  // m and rad
-constexpr double cell_m = 0.25;   // residuals of one cell of the map depend on each other
+constexpr double cell_m = 0.25;   // residuals within one cell of the map are correlated
 constexpr std::size_t max_cells = 400;
 constexpr std::size_t frames_per_cell_share = 100;
 
 // align_pair
-constexpr double guess_m = 0.15;  // standard deviations of a pair's guessed motion
+constexpr double guess_m = 0.15;  // standard deviations of the initial guess
 constexpr double guess_rad = 0.1;
 constexpr double pair_degenerate = 1e-4;
-constexpr std::size_t min_pair_samples = 300;  // that must match
-constexpr double min_pair_share = 0.4;         // of a pair's samples
+constexpr std::size_t min_pair_samples = 300;  // matched samples
+constexpr double min_pair_share = 0.4;         // matched share of a pair's samples
 constexpr double max_pair_rms_m = 0.012;
 constexpr int pair_agreement_samples = 300;
 constexpr double pair_agreement_m = 0.005;
@@ -48,7 +47,7 @@ constexpr double min_pair_agreement = 0.95;
 
 using Cell = std::array<int, 3>;
 
-// One cell in `share`, by chance, but always the same.
+// Selects one cell in `share` by a hash of the cell.
 bool is_drawn(const Cell& cell, std::uint64_t share) {
   std::uint64_t bits = 0;
   for (const int number : cell) bits = mix_bits(bits, static_cast<std::uint64_t>(number));
@@ -59,7 +58,7 @@ bool is_drawn(const Cell& cell, std::uint64_t share) {
 struct PairEquations {
   Matrix6d information = Matrix6d::Zero();
   Vector6d rhs = Vector6d::Zero();
-  std::map<Cell, Vector6d> rhs_of_cell;  // only where asked for
+  std::map<Cell, Vector6d> rhs_of_cell;  // for the selected cells
   double squares_m2 = 0.0;
   double weight = 0.0;
   std::size_t samples = 0;
@@ -119,8 +118,8 @@ class Alignment {
   IcpResult result_;
 };
 
-// Samples of a frame against the planes of `onto`. Residuals are linear in the step of a_from_b,
-// where the frame is b: p -> p + t + r x p before a_from_b; and where it is a, the inverse.
+// Equations of a frame's samples against the planes of `onto`, in steps (t, r) of a_from_b. If the
+// frame is b, a sample p moves to p + t + r x p before a_from_b; if it is a, by the inverse.
 PairEquations Alignment::half_of(const std::vector<BaseElement>& samples, std::size_t onto,
                                  const Pose& onto_from_from, bool from_is_a, double max_distance_m,
                                  std::uint64_t cell_share) const {
@@ -157,9 +156,9 @@ PairEquations Alignment::half_of(const std::vector<BaseElement>& samples, std::s
       }
       return jacobian;
     };
-    // The two frames' normals have noise of their own: products of the one with the other are free
-    // of its square, which would bind frames along a plane to where they are (instrumental
-    // variables, Durbin 1954).
+    // The noise of both normals is independent. Products of one normal with the other are free of
+    // squared noise, which would constrain motions along a plane (instrumental variables, Durbin
+    // 1954).
     const Vector6d by_plane = jacobian_by(plane.normal);
     const Vector6d by_sample = jacobian_by(normal);
     equations.information +=
@@ -181,9 +180,9 @@ PairEquations Alignment::half_of(const std::vector<BaseElement>& samples, std::s
   return equations;
 }
 
-// Directions that a pair hardly binds, such as along a plane, are given no information at all: what
-// the noise of normals says about them is not to be believed (Zhang, Kaess and Singh 2016).
-// Rotations count by the way that the surface moves at a meter.
+// Removes the information about directions that a pair hardly constrains, such as along a plane,
+// because it comes from the noise of the normals (Zhang, Kaess and Singh 2016). Rotations in
+// radians are compared with translations in meters.
 void Alignment::drop_degenerate(PairEquations& equations) const {
   const SymmetricEigen<6> eigen = symmetric_eigen(equations.information);
   const double least = options_.degenerate * eigen.values[5];
@@ -200,7 +199,7 @@ void Alignment::drop_degenerate(PairEquations& equations) const {
   for (auto& [cell, rhs] : equations.rhs_of_cell) rhs = kept * rhs;
 }
 
-// What the prior asks of the poses as they are.
+// Adds the prior's normal equations at the current poses.
 void Alignment::add_prior(BlockSystem& system) const {
   system.add(prior_);
   system.clear_rhs();
@@ -213,8 +212,9 @@ void Alignment::add_prior(BlockSystem& system) const {
   }
 }
 
-// Frame by frame, so that the samples of few are in memory; both halves of a pair are then added.
-// Sides by cells: of one cell in cell_share; 0: of none.
+// Equations of all pairs. The work is done by frame, to limit the samples in memory; then both
+// halves of each pair are added. Right-hand sides by cell are set for one cell in cell_share; 0:
+// none.
 std::vector<PairEquations> Alignment::all_equations(double max_distance_m,
                                                     std::uint64_t cell_share) const {
   std::vector<std::vector<std::size_t>> pairs_of_frame(frames_.size());
@@ -243,7 +243,7 @@ std::vector<PairEquations> Alignment::all_equations(double max_distance_m,
   return of_second;
 }
 
-// What the surfaces of the pairs ask; their root mean square distance.
+// Adds the equations of the pairs to `system`. Returns the root mean square distance.
 double Alignment::add_pairs(double max_distance_m, BlockSystem& system) {
   const std::vector<PairEquations> equations = all_equations(max_distance_m, 0);
   double squares = 0.0;
@@ -264,7 +264,7 @@ double Alignment::add_pairs(double max_distance_m, BlockSystem& system) {
   return weight > 0.0 ? std::sqrt(squares / weight) : 0.0;
 }
 
-// One step of Gauss and Newton; how far the poses moved.
+// Gauss-Newton step. Returns the largest motion of a pose (m or rad), infinity if it failed.
 double Alignment::step(double max_distance_m, double& rms_m) {
   BlockSystem system(place_.size());
   add_prior(system);
@@ -289,16 +289,16 @@ double Alignment::step(double max_distance_m, double& rms_m) {
   return farthest;
 }
 
-// By how much the errors of the poses exceed those of independent residuals, by the larger of two
-// measures. The mean over all unknowns of the cluster-robust covariance (Liang and Zeger 1986)
-// relative to the inverse of the information: residuals in one cell of the map share the noise of
-// the same patches of depth, and what depth is wrong there. And the chi-square of the way that the
-// surfaces moved the poses from the prior, which they do not share noise with (Birge 1932).
+// Ratio of the poses' errors to those from independent residuals: the larger of two estimates.
+// First, the cluster-robust covariance (Liang and Zeger 1986) relative to the inverse information,
+// averaged over all unknowns: residuals in one cell of the map share noise and depth errors.
+// Second, the chi-square of the motion of the poses from the prior, whose noise is independent of
+// the surfaces (Birge 1932).
 double Alignment::deviation_scale(double max_distance_m) const {
   BlockSystem system(place_.size());
   add_prior(system);
   std::map<Cell, std::map<std::size_t, Vector6d>> sides;
-  // Of a long scan few cells are in memory; about max_cells of them are enough.
+  // For a long scan, only a sample of the cells is in memory; about max_cells suffice.
   const std::uint64_t share = 1 + frames_.size() / frames_per_cell_share;
   const std::vector<PairEquations> equations = all_equations(max_distance_m, share);
   for (std::size_t n = 0; n < pairs_.size(); ++n) {
@@ -340,7 +340,7 @@ double Alignment::deviation_scale(double max_distance_m) const {
   for (const auto& [node, pose] : result_.map_from_base)
     way -= step_between(start_.at(node), pose).dot(system.rhs()[place++]);
   const BlockSystem inverse = solver.selected_inverse(prior_);
-  double bound = unknowns;  // freedom of the way: what the prior does not decide
+  double bound = unknowns;  // degrees of freedom that the prior does not determine
   for (const auto& [key, block] : prior_.blocks())
     bound -= (key.first == key.second ? 1.0 : 2.0) *
              block.cwiseProduct(inverse.block(key.first, key.second)).sum();
@@ -371,7 +371,7 @@ IcpResult Alignment::run(const std::vector<PoseLink>& links, Progress& progress)
   });
   progress.end();
   if (summary.state == StepState::failed) {
-    // What nothing binds runs away: not a refinement.
+    // Divergence of unconstrained poses: the input is returned.
     result_.map_from_base = start_;
     result_.information = prior_;
     return std::move(result_);
@@ -388,8 +388,8 @@ IcpResult Alignment::run(const std::vector<PoseLink>& links, Progress& progress)
   return std::move(result_);
 }
 
-// Of what both frames see, the share that lies where both say; what lies behind a surface is
-// hidden.
+// Share of the samples of `a` observed by `b` that agree with b's surface. Samples behind b's
+// surface are occluded and not counted.
 double agreement_of(const FrameFeatures& a, const FrameFeatures& b, const Pose& b_from_a) {
   double seen = 0.0;
   double agreed = 0.0;
@@ -412,16 +412,18 @@ double agreement_of(const FrameFeatures& a, const FrameFeatures& b, const Pose& 
 void bind(ParameterTable& table, IcpOptions& options) {
   table.add("icp", options.mode,
             {{"off", IcpMode::off}, {"links", IcpMode::links}, {"global", IcpMode::global}},
-            "depth against depth: the frames that links join, or all that overlap");
-  table.add("icp_iterations", options.iterations, {1, 1000}, "of it, at most");
-  table.add("icp_pairs", options.pairs_per_frame, {1, 1000}, "frames that a frame is laid against");
-  table.add("icp_samples", options.samples, {1, 1000000}, "of a frame");
+            "ICP between depth images: of frames joined by links, or of all that overlap");
+  table.add("icp_iterations", options.iterations, {1, 1000}, "maximum number of ICP iterations");
+  table.add("icp_pairs", options.pairs_per_frame, {1, 1000},
+            "maximum number of frames that ICP aligns a frame with");
+  table.add("icp_samples", options.samples, {1, 1000000},
+            "approximate number of ICP samples per frame");
   table.add("icp_distance_m", options.max_distance_m, positive,
-            "between a sample and a surface, at first");
+            "initial maximum ICP distance between a sample and a surface");
   table.add("icp_degenerate", options.degenerate, zero_to_one,
-            "share of the best-bound direction's information below which a pair says nothing");
+            "share of the largest ICP information below which a direction is ignored");
   table.add("icp_correlation", options.correlation, {1.0},
-            "samples that tell as much as one independent one");
+            "number of correlated ICP samples equivalent to one independent sample");
 }
 
 IcpResult align_surfaces(const std::vector<FrameFeatures>& frames,

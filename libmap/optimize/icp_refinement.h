@@ -1,5 +1,5 @@
-// Poses by the depth images themselves: each frame's surface against the planes of all frames that
-// see the same place, together (multi-view point-to-plane ICP; Chen and Medioni 1992, Pulli 1999).
+// Refines poses by depth images: aligns each frame's surface with the planes of all overlapping
+// frames simultaneously (multi-view point-to-plane ICP; Chen and Medioni 1992, Pulli 1999).
 #pragma once
 
 #include <cstddef>
@@ -16,61 +16,63 @@
 
 namespace libmap {
 
-// links: each pair of frames that a link joins; global: each frame with all that overlap it.
+// links: aligns pairs of frames that are joined by a link. global: aligns all overlapping frames.
 enum class IcpMode { off, links, global };
 
 struct IcpOptions {
   IcpMode mode = IcpMode::global;
   int iterations = 12;           // >= 1
-  int pairs_per_frame = 8;       // >= 1: global, those that overlap most
-  double min_overlap = 0.25;     // 0 to 1: of the one frame's surface
-  int samples = 1500;            // >= 1: of a frame against another, at most
-  double max_distance_m = 0.03;  // > 0: between a sample and the plane, at first
+  int pairs_per_frame = 8;       // >= 1: with global, frames with the largest overlap
+  double min_overlap = 0.25;     // 0 to 1: with global, share of a frame's samples
+  int samples = 1500;            // >= 1: approximate number of samples per frame
+  double max_distance_m = 0.03;  // > 0: initial maximum distance between a sample and the plane
   double max_normal_angle_deg = 35.0;
-  double correlation = 4.0;   // >= 1: samples that tell as much as one independent one
-  double degenerate = 0.002;  // >= 0: share of the best-bound direction's information below
-                              // which a pair says nothing about a direction
-  // Not bound: the loss is at first as wide as the distance, and narrows slowly (graduated
-  // non-convexity, Blake and Zisserman 1987), for starts that are far away.
+  double correlation = 4.0;   // >= 1: samples equivalent to one independent sample
+  double degenerate = 0.002;  // >= 0: share of the largest information; a pair's directions with
+                              // less are ignored
+  // Not bound: for inaccurate initial poses, the width of the loss starts at the distance and
+  // decreases slowly (graduated non-convexity, Blake and Zisserman 1987).
   bool graduated = false;
 };
 void bind(ParameterTable& table, IcpOptions& options);
 
 struct IcpResult {
   std::map<int, Pose> map_from_base;
-  // Prior and surfaces together, in the order of the poses, divided by the square of
-  // deviation_scale.
+  // Information of prior and surfaces in the order of the poses, divided by deviation_scale^2.
   BlockSystem information{0};
-  double deviation_scale = 1.0;  // >= 1: how much larger errors are than independent noise explains
+  double deviation_scale = 1.0;  // >= 1: ratio of the errors to those of independent noise
   std::size_t pairs = 0;
-  std::size_t samples = 0;                // that matched, at the end
+  std::size_t samples = 0;                // matched samples in the last iteration
   std::size_t degenerate_directions = 0;  // of all pairs
-  double initial_rms_m = 0.0;             // along the normals
+  double initial_rms_m = 0.0;             // distances along the normals
   double final_rms_m = 0.0;
   int iterations = 0;
   bool converged = false;
-  std::vector<FramePair> frame_pairs;  // that were laid against each other
-  double max_distance_m = 0.0;         // between a sample and a plane at the end
+  std::vector<FramePair> frame_pairs;  // aligned pairs
+  double max_distance_m = 0.0;         // final maximum distance between a sample and a plane
 };
 
-// `prior` holds what is known already (BundleAdjustmentResult::information), of steps from
-// `map_from_base`; directions that the surfaces do not bind are left to it. `links` are the pairs
-// of IcpMode::links. The same for any number of threads.
+// Aligns the surfaces of frames with a pose. `prior` is the information of steps from
+// `map_from_base` (BundleAdjustmentResult::information), one block per pose. It determines
+// directions that the surfaces do not constrain. `links` selects the pairs of IcpMode::links. The
+// gauge node of each component is fixed. Returns the input poses and the prior if there are no
+// pairs or the alignment diverges. The result does not depend on the number of threads. Throws
+// Error if the size of `prior` is not the number of poses.
 IcpResult align_surfaces(const std::vector<FrameFeatures>& frames,
                          const std::map<int, Pose>& map_from_base, const BlockSystem& prior,
                          const std::vector<GraphComponent>& components,
                          const std::vector<PoseLink>& links, const IcpOptions& options = {},
                          Progress& progress = no_progress());
 
-// What the surfaces of pairs of frames ask of steps of the poses as they are. The same for any
-// number of threads.
+// Normal equations of the surfaces of `pairs` for steps of the poses. Each frame of a pair must
+// have a pose. The result does not depend on the number of threads.
 BlockSystem surface_system(const std::vector<FrameFeatures>& frames,
                            const std::map<int, Pose>& map_from_base,
                            const std::vector<FramePair>& pairs, double max_distance_m,
                            const IcpOptions& options);
 
-// How frame `b` moved from frame `a` by their depth alone. Directions that the surfaces do not bind
-// keep the guess `a_from_b`. Returns nullopt if the surfaces do not align.
+// Estimates the motion from frame `a` to frame `b` from depth alone, as a link. Unconstrained
+// directions keep the initial guess `a_from_b`. Returns nullopt if the surfaces do not align.
 std::optional<PoseLink> align_pair(const FrameFeatures& a, const FrameFeatures& b,
                                    const Pose& a_from_b);
 

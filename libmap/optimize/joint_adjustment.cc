@@ -11,11 +11,11 @@ namespace libmap {
 
 namespace {
 
-constexpr std::size_t parts = 4;  // of the points, whose systems are in memory
+constexpr std::size_t parts = 4;  // parts of the points; the system of each part is in memory
 constexpr std::size_t points_per_task = 500;
-constexpr int first_point_iterations = 2;  // before anything else moves
+constexpr int first_point_iterations = 2;  // before the first step of poses and cameras
 
-// a b^T and a b, column by column: Eigen's general product costs more for so few numbers.
+// Products a b^T and a b, column by column: faster than Eigen's general product for this size.
 template <typename Left, typename Right, typename Block>
 void subtract_product(const Left& a, const Right& b, Block&& from) {
   for (Eigen::Index n = 0; n < b.rows(); ++n)
@@ -27,7 +27,7 @@ void add_product(const Left& a, const Right& b, Block&& to) {
     to.col(n) += a.col(0) * b(0, n) + a.col(1) * b(1, n) + a.col(2) * b(2, n);
 }
 
-// With the parameters of the cameras, which border the system.
+// Schur complement with the camera parameters, which border the system.
 template <int node_size>
 class CameraPointSchur : public PointSchur<node_size, JointSystem> {
  public:
@@ -63,7 +63,7 @@ class CameraPointSchur : public PointSchur<node_size, JointSystem> {
 
   Eigen::Index cameras_;
   Eigen::Index params_;
-  MixedParams mixed_params_;  // derivatives by the parameters and by the point
+  MixedParams mixed_params_;  // second derivatives by parameters and point
 };
 
 template <int node_size>
@@ -94,7 +94,7 @@ void CameraPointSchur<node_size>::add_camera(const BundleObservation& observatio
       depth * seen.by_point.row(2);
 }
 
-// For levenberg_marquardt.
+// Problem for levenberg_marquardt.
 class JointSolver {
  public:
   JointSolver(const JointProblem& problem, JointState state)

@@ -1,5 +1,5 @@
-// Bundle adjustment with all that is unknown in one dense system: poses, motions, points and the
-// parameters of cameras, the points eliminated. Private to libmap/optimize.
+// Bundle adjustment in one dense system of poses, motions and camera parameters, with points
+// eliminated. Private to libmap/optimize.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,15 +14,15 @@
 namespace libmap {
 
 struct JointProblem {
-  std::vector<BundleObservation> observations;  // those of a point side by side
-  std::vector<std::size_t> begin = {0};         // of each point's; one more than points
-  double robust_scale = 3.0;                    // of Cauchy's loss
-  std::vector<bool> fixed;                      // of each pose
+  std::vector<BundleObservation> observations;  // grouped by point
+  std::vector<std::size_t> begin = {0};         // first observation by point; one more than points
+  double robust_scale = 3.0;                    // width of Cauchy's loss, standard deviations
+  std::vector<bool> fixed;                      // by pose
   bool fix_cameras = false;
-  bool moving = false;                // motions are unknown
-  std::vector<Vector6d> motion_mean;  // their prior
+  bool moving = false;                // true: motions are unknown
+  std::vector<Vector6d> motion_mean;  // prior of the motions
   std::vector<Vector6d> motion_deviation;
-  // Prior of the cameras' parameters: residuals a x - b.
+  // Prior of the camera parameters x: residuals prior x - prior_mean.
   Eigen::MatrixXd prior;
   Eigen::VectorXd prior_mean;
   std::vector<GraphLinkResult> links;
@@ -35,18 +35,18 @@ struct JointProblem {
 
 struct JointState {
   std::map<int, Pose> poses;
-  std::vector<Vector6d> motions;  // of each pose
+  std::vector<Vector6d> motions;  // by pose, base frame, m/s and rad/s
   Eigen::VectorXd camera_params;  // of all cameras
   std::vector<Eigen::Vector3d> points;
 };
 
-// Half the sum of squares of steps (rigid_motion.h) of poses, each followed by its motion if that
-// is unknown, then of the cameras' parameters.
+// Normal equations. The unknowns are steps (rigid_motion.h) of poses, each followed by its motion
+// if motions are unknown, then the camera parameters.
 struct JointSystem {
   Eigen::MatrixXd matrix;  // lower triangle
-  Eigen::VectorXd rhs;     // minus the gradient
+  Eigen::VectorXd rhs;     // negative gradient
 
-  // Of the blocks of two poses, row >= column.
+  // Adds to the block of two poses, row >= column.
   template <typename Block>
   void add(std::size_t row, std::size_t column, const Block& block) {
     constexpr int size = Block::RowsAtCompileTime;
@@ -62,13 +62,12 @@ struct JointSystem {
   }
 };
 
-// Levenberg-Marquardt; converged when the cost falls by less than `tolerance` of itself. The state
-// never gets worse. The same for any number of threads.
+// Levenberg-Marquardt. Converges when a step reduces the cost by less than the share `tolerance`.
+// The cost of the state never increases. The result does not depend on the number of threads.
 LeastSquaresSummary adjust_jointly(const JointProblem& problem, JointState& state,
                                    int max_iterations, double tolerance);
 
-// The normal equations at a state. Unknowns that nothing binds, and fixed poses, have a diagonal
-// of 1.
+// Normal equations at a state. Fixed poses and unconstrained unknowns have a diagonal of 1.
 JointSystem joint_system(const JointProblem& problem, const JointState& state);
 
 }  // namespace libmap

@@ -20,18 +20,17 @@ namespace libmap {
 
 namespace {
 
-constexpr double min_scale = 0.01;  // of a group's stated deviations
+constexpr double min_scale = 0.01;  // bounds of the factor of a group's standard deviations
 constexpr double max_scale = 20.0;
-constexpr double settled = 0.02;        // relative change of the scales
-constexpr double min_redundancy = 0.1;  // of a link's residuals: with less the others do not
-                                        // tell it
-constexpr std::size_t min_links = 3;    // fewer do not tell a group's scale
-constexpr double worst_share = 0.25;    // closures near the worst are rejected with it
+constexpr double settled = 0.02;        // relative change of the scales at convergence
+constexpr double min_redundancy = 0.1;  // per residual of a link used for its group's scale
+constexpr std::size_t min_links = 3;    // of a group whose scale is estimated
+constexpr double worst_share = 0.25;    // of the worst chi-square; closures above are rejected too
 constexpr int max_rejections = 20;
 constexpr std::size_t simplicial_below = 120;              // poses
 constexpr double unknown_landmark_information = 1.001e-4;  // RTAB-Map: variance >= 9999
 
-// Rotation of a landmark that is only a point.
+// Removes the information about the rotation of a landmark that is a point.
 Matrix6d usable_information(const PoseLink& link) {
   Matrix6d information = link.information;
   if (link.type == LinkType::landmark && information(5, 5) <= unknown_landmark_information) {
@@ -41,10 +40,10 @@ Matrix6d usable_information(const PoseLink& link) {
   return information;
 }
 
-constexpr int pose_size = 16;  // numbers of a Pose in memory
+constexpr int pose_size = 16;  // values of a Pose in memory
 
-// The poses of a graph side by side, by ascending node: Ceres orders unknowns by their addresses,
-// and its sums must be the same on every run.
+// Stores the poses of a graph contiguously, by ascending node. Ceres orders unknowns by address,
+// and its sums must be deterministic.
 class PoseBlocks {
  public:
   explicit PoseBlocks(const std::map<int, Pose>& poses) {
@@ -64,8 +63,8 @@ class PoseBlocks {
 
 Pose pose_of(const double* block) { return Pose(Eigen::Map<const Eigen::Matrix4d>(block)); }
 
-// Poses change by steps (rigid_motion.h). Costs give their derivatives by a step in its six first
-// columns, so that no derivative by the numbers of a pose is needed.
+// Manifold of pose steps (rigid_motion.h). Costs store their derivatives by a step in the first six
+// columns, so that derivatives by the 16 values of a pose are not needed.
 class StepManifold : public ceres::Manifold {
  public:
   int AmbientSize() const override { return pose_size; }
@@ -98,16 +97,16 @@ void set_jacobian(const Derivative& by_step, double* jacobian) {
   out.leftCols<6>() = by_step;
 }
 
-// L^T of information = L L^T: carries residuals to unit variance.
+// L^T of information = L L^T, which transforms residuals to unit variance.
 Matrix6d whitening(const Matrix6d& information) {
   const Eigen::LLT<Matrix6d> root(information);
   if (root.info() == Eigen::Success) return root.matrixL().transpose();
-  // Of a matrix that is only semidefinite.
+  // Square root of a semidefinite matrix.
   const SymmetricEigen<6> eigen = symmetric_eigen(information);
   return eigen.values.cwiseMax(0.0).cwiseSqrt().asDiagonal() * eigen.vectors.transpose();
 }
 
-// link_residual, whitened.
+// Whitened link_residual.
 class LinkCost : public ceres::CostFunction {
  public:
   explicit LinkCost(const PoseLink& link)
@@ -133,7 +132,8 @@ class LinkCost : public ceres::CostFunction {
   Matrix6d whitening_;
 };
 
-// Fixes the position of a node and its rotation about the map's z axis, which gravity leaves open.
+// Fixes the position of a node and its rotation about the map's z axis, which gravity does not
+// constrain.
 class YawGaugeCost : public ceres::SizedCostFunction<4, pose_size> {
  public:
   explicit YawGaugeCost(const Pose& fixed) : fixed_(fixed) {}
@@ -206,7 +206,7 @@ class Optimization {
   std::map<std::string, Scales> scales_;
 };
 
-// At their first sight.
+// Landmarks start at their first observation.
 void Optimization::add_landmarks() {
   for (const GraphLink& link : links_) {
     if (link.link.type != LinkType::landmark || link.link.to >= 0) continue;
@@ -235,7 +235,7 @@ void Optimization::find_components() {
   result_.without_links.clear();
   for (auto& [first, nodes] : members) {
     GraphComponent component{std::move(nodes), 0};
-    // Landmarks stand below 0.
+    // Landmarks have negative numbers.
     const auto node =
         std::find_if(component.nodes.begin(), component.nodes.end(), [](int id) { return id > 0; });
     component.gauge_node = node != component.nodes.end() ? *node : component.nodes.front();
@@ -251,8 +251,8 @@ void Optimization::find_components() {
     if (node > 0 && !linked.contains(node)) result_.without_links.push_back(node);
 }
 
-// Relative links leave the whole component free to move: one node stands still. Priors hold it
-// already; gravity holds all but the place and the turn about the vertical.
+// Relative links do not constrain the motion of a whole component, so one node is fixed. Components
+// with priors need no gauge. With gravity, only position and yaw are fixed.
 void Optimization::fix_gauges(ceres::Problem& problem, PoseBlocks& blocks) {
   std::set<int> with_prior;
   std::set<int> with_gravity;
@@ -288,13 +288,13 @@ void Optimization::solve() {
     problem.AddResidualBlock(new LinkCost(link), new_loss(), ends);
   }
   if (ends.empty()) return;
-  auto* const manifold = new StepManifold;  // the problem's
+  auto* const manifold = new StepManifold;  // owned by the problem
   for (const auto& [node, pose] : result_.map_from_base)
     if (problem.HasParameterBlock(blocks.at(node))) problem.SetManifold(blocks.at(node), manifold);
   fix_gauges(problem, blocks);
   ceres::Solver::Options settings;
   settings.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
-  // CHOLMOD's supernodes pay where much fills in.
+  // CHOLMOD's supernodes are faster with much fill-in.
   settings.sparse_linear_algebra_library_type =
       result_.map_from_base.size() < simplicial_below ? ceres::EIGEN_SPARSE : ceres::SUITE_SPARSE;
   settings.num_threads = 1;
@@ -328,7 +328,7 @@ void Optimization::update_residuals() {
   }
 }
 
-// The closures that contradict the rest most.
+// Rejects the closures with the largest chi-square. Returns false if all are below the limit.
 bool Optimization::reject() {
   double worst = options_.max_chi_square;
   for (std::size_t n = 0; n < links_.size(); ++n)
@@ -344,9 +344,8 @@ bool Optimization::reject() {
   return true;
 }
 
-// The variance of a group by its links' squares over their redundancies (Foerstner 1979), each link
-// apart, and of these the median: up to half of a group may be wrong. 0 where too few links can be
-// told by the others.
+// Variance factor of a group: the median of its links' squared residuals over redundancies
+// (Foerstner 1979), so that up to half of the links may be wrong. 0 if there are too few links.
 double group_variance(const std::vector<double>& ratios) {
   return ratios.size() < min_links ? 0.0 : median(ratios);
 }
@@ -365,7 +364,7 @@ bool Optimization::recalibrate() {
       continue;
     const Vector6d residual = residual_of(link, result_.map_from_base);
     const std::string& group = links_[n].group;
-    // Translation and rotation apart where the link tells them apart.
+    // Translation and rotation are separate if the link's information has no mixed terms.
     const bool apart = link.information.topRightCorner<3, 3>().isZero(0.0);
     const Matrix6d share = link.information * covariance.of_relative(link.from, link.to);
     for (std::size_t part = 0; part < 2; ++part) {
@@ -378,7 +377,7 @@ bool Optimization::recalibrate() {
                                 .dot(link.information.block(first, first, size, size) *
                                      residual.segment(first, size));
       result_.groups[group].redundancy += apart ? redundancy : 0.5 * redundancy;
-      // The median of chi-square lies below its mean (Wilson and Hilferty 1931).
+      // The median of chi-square is less than its mean (Wilson and Hilferty 1931).
       ratios[group][part].push_back(square / redundancy / std::pow(1.0 - 2.0 / (9.0 * all), 3));
     }
   }
@@ -450,7 +449,7 @@ PoseGraphResult Optimization::run() {
   for (int round = 0;; ++round) {
     solve();
     update_residuals();
-    // Not by covariances as stated, if they are to be recalibrated.
+    // Closures are rejected only after the first recalibration, if there is one.
     for (int n = 0; n < max_rejections && (round > 0 || rounds == 0) && reject(); ++n) {
       solve();
       update_residuals();
@@ -467,14 +466,15 @@ PoseGraphResult Optimization::run() {
 
 void bind(ParameterTable& table, PoseGraphOptions& options) {
   table.add("recalibrate", options.recalibrate,
-            "scale the stated covariances of each type of links to their residuals");
-  table.add("recalibrations", options.recalibrations, {1}, "rounds of that, at most");
+            "scale the covariances of each type of links to match their residuals");
+  table.add("recalibrations", options.recalibrations, {1},
+            "maximum number of recalibration rounds of link covariances");
   table.add("robust_scale", options.robust_scale, not_negative,
-            "of Cauchy's loss, standard deviations of a link; 0: plain least squares");
+            "width of Cauchy's loss for links, in standard deviations; 0: plain least squares");
   table.add("max_chi_square", options.max_chi_square, positive,
-            "of a closure's residuals; closures with more are rejected");
+            "maximum chi-square of a loop closure's residuals; closures above are rejected");
   table.add("gauge_node", options.gauge_node, not_negative,
-            "node that stays where it is; 0: the first");
+            "node whose pose is fixed; 0: the first node");
 }
 
 PoseGraphResult optimize_pose_graph(const std::map<int, Pose>& map_from_base,

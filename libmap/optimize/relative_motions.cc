@@ -12,12 +12,12 @@ namespace libmap {
 
 namespace {
 
-// Of poses that are nearer, the hand's motion differs less from that between them.
+// Between closer poses, the velocity varies less.
 constexpr double unsteady_after_s = 0.33;
 constexpr double close_s = 0.15;
 constexpr double max_motion_gap_s = 3.0;
 
-// The slope at 0 of the polynomial through values at these times (Lagrange).
+// Derivative at time 0 of the polynomial through values at the given times (Lagrange).
 Vector6d slope_of(const std::vector<double>& times, const std::vector<Vector6d>& values) {
   Vector6d slope = Vector6d::Zero();
   for (std::size_t n = 0; n < times.size(); ++n) {
@@ -34,9 +34,8 @@ Vector6d slope_of(const std::vector<double>& times, const std::vector<Vector6d>&
   return slope;
 }
 
-// By the poses before and after each frame: one on either side, two where they follow each other
-// closely. Without one on both sides within max_motion_gap_s, it moves as to the only one, or not
-// at all.
+// Uses one pose before and one after each frame, or two each if they follow closely. If one side
+// has no pose within max_motion_gap_s, the velocity is that to the other side, or zero.
 void add_motions(std::vector<std::pair<double, int>> nodes, const std::map<int, Pose>& poses,
                  std::map<int, KnownMotion>& motions) {
   std::sort(nodes.begin(), nodes.end());
@@ -56,7 +55,7 @@ void add_motions(std::vector<std::pair<double, int>> nodes, const std::map<int, 
       ++last;
     }
     for (std::size_t k = first; k <= last; ++k) {
-      // Of poses further apart, the way between them says more than a curve through three.
+      // For poses further apart, a difference is more accurate than a curve through three poses.
       if (k == n && !closely && first < n && n < last) continue;
       if (!times.empty() && nodes[k].first - time_s <= times.back()) continue;
       times.push_back(nodes[k].first - time_s);

@@ -17,7 +17,7 @@ namespace {
 
 constexpr int point_iterations = 3;
 constexpr std::size_t tracks_per_task = 1000;
-constexpr std::size_t max_parallel_tasks = 8;  // whose systems are in memory
+constexpr std::size_t max_parallel_tasks = 8;  // the system of each task is in memory
 constexpr double fixed_weight = 1e12;
 // Damping is added to the diagonal.
 constexpr LevenbergMarquardtOptions levenberg_marquardt_options = {.tolerance = 1e-6,
@@ -26,7 +26,7 @@ constexpr LevenbergMarquardtOptions levenberg_marquardt_options = {.tolerance = 
                                                                    .min_damping = 1e-6,
                                                                    .raised_damping = 1.0};
 
-// The observations of tracks by frames with a pose.
+// Observations of tracks by frames with a pose.
 class TrackObservations {
  public:
   TrackObservations(const std::vector<FrameFeatures>& frames,
@@ -39,7 +39,7 @@ class TrackObservations {
   }
 
   const BundleView& view() const { return view_; }
-  // Empty where fewer than two have a pose.
+  // Observations of a track; empty if fewer than two have a pose.
   std::vector<BundleObservation> of(const FeatureTrack& track) const {
     std::vector<BundleObservation> all;
     for (const Observation& seen : track.observations) {
@@ -165,7 +165,7 @@ void TrackSystem::Totals::add_to(BundleAdjustmentResult& result) const {
 
 namespace {
 
-// For levenberg_marquardt, from the result as it is.
+// Problem for levenberg_marquardt, starting from the state in `result`.
 class SparseSolver {
  public:
   SparseSolver(const TrackSystem& observed, const std::vector<GraphLinkResult>& links,

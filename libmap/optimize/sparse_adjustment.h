@@ -1,6 +1,6 @@
-// Bundle adjustment of long scans: the poses in the sparse system of the links, each point where
-// its observations agree best (variable projection). Memory and time are proportional to the number
-// of observations, and grow with the fill-in of the graph of the links.
+// Bundle adjustment of long scans: a sparse system of poses, with each point at its optimum for the
+// poses (variable projection). Memory and time are proportional to the number of observations, and
+// grow with the fill-in of the graph of the links.
 #pragma once
 
 #include <map>
@@ -10,34 +10,36 @@
 
 namespace libmap {
 
-// Observations of tracks as a system over poses.
+// Normal equations of tracks over poses. Observations by frames without a pose are ignored, and so
+// are tracks with fewer than two others.
 class TrackSystem {
  public:
-  // All outlive it. `robust_scale` is of Cauchy's loss.
+  // Keeps references to `frames` and `tracks`. `robust_scale` is the width of Cauchy's loss.
   TrackSystem(const std::vector<FrameFeatures>& frames, const std::vector<FeatureTrack>& tracks,
               double robust_scale);
 
-  // The mean of where the frames see them, then where their observations agree best.
+  // Points of the tracks (map frame): the mean of the measurements, then optimized.
   std::vector<Eigen::Vector3d> points_at(const std::map<int, Pose>& map_from_base) const;
+  // Optimizes the points at the given poses, from their current positions.
   void optimize_points(const std::map<int, Pose>& map_from_base,
                        std::vector<Eigen::Vector3d>& points) const;
 
   struct Totals {
     double cost = 0.0;
-    std::size_t tracks = 0;  // that two poses or more see
+    std::size_t tracks = 0;  // with observations from two or more poses
     std::size_t observations = 0;
-    std::size_t outliers = 0;    // down-weighted below a half
-    double pixel_squares = 0.0;  // of the others
-    double depth_squares = 0.0;
+    std::size_t outliers = 0;    // observations with a weight below one half
+    double pixel_squares = 0.0;  // px^2, of the inliers
+    double depth_squares = 0.0;  // m^2, of the inliers
 
-    // All but the cost.
+    // Sets counts and root mean squares of the result; the cost is not used.
     void add_to(BundleAdjustmentResult& result) const;
   };
-  // Cost and residuals at these poses and points.
+  // Cost and residuals at the given poses and points.
   Totals totals(const std::map<int, Pose>& map_from_base,
                 const std::vector<Eigen::Vector3d>& points) const;
 
-  // Normal equations of steps of the poses, in their order, the points eliminated.
+  // Normal equations of steps of the poses, in the order of `map_from_base`, points eliminated.
   BlockSystem system(const std::map<int, Pose>& map_from_base,
                      const std::vector<Eigen::Vector3d>& points) const;
 
@@ -47,8 +49,8 @@ class TrackSystem {
   double robust_scale_;
 };
 
-// As adjust_bundle with TrackFrames::linked tracks and nothing to refine. The same for any number
-// of threads.
+// Computes adjust_bundle for TrackFrames::linked tracks and fixed camera parameters. The result
+// does not depend on the number of threads.
 BundleAdjustmentResult adjust_sparse(const std::vector<FrameFeatures>& frames,
                                      const std::vector<FeatureTrack>& tracks,
                                      const std::map<int, Pose>& map_from_base,

@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// From word `first` to the end of the line: names may hold spaces and commas.
+// Returns the line from word `first` to its end: names can contain spaces and commas.
 std::string rest_of(const TextLine& line, std::size_t first) {
   return std::string(trim(
       line.text.substr(static_cast<std::size_t>(line.words[first].data() - line.text.data()))));
@@ -24,7 +24,7 @@ std::string rest_of(const TextLine& line, std::size_t first) {
 
 std::vector<ColmapObservation> observations_of(const TextLine& line, const std::string& file) {
   if (line.words.size() % 3 != 0)
-    throw wrong_columns("no features of an image", line, file, "X Y POINT3D_ID of each");
+    throw wrong_columns("not a line of features", line, file, "X Y POINT3D_ID per feature");
   std::vector<ColmapObservation> observations;
   observations.reserve(line.words.size() / 3);
   for (std::size_t word = 0; word < line.words.size(); word += 3) {
@@ -60,7 +60,7 @@ ColmapCamera to_colmap(const Camera& camera) {
     while (!terms.empty() && terms.back() == 0.0) terms.pop_back();
     if (terms.size() > 8)
       throw Error(
-          "COLMAP has no such camera",
+          "COLMAP has no equivalent camera model",
           {.field = "distortion by thin prisms", .value = to_text(terms.back()), .bound = "none"});
     result.model = terms.size() > 4 ? "FULL_OPENCV" : "OPENCV";
     terms.resize(terms.size() > 4 ? 8 : 4, 0.0);
@@ -77,7 +77,8 @@ std::map<int, ColmapImage> parse_colmap_images(std::string_view text, const std:
     const TextLine& line = lines[i];
     if (is_comment(line)) continue;
     if (line.words.size() < columns)
-      throw wrong_columns("no image", line, file, "IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME");
+      throw wrong_columns("not an image", line, file,
+                          "IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME");
     const int id = integer_of(line, 0, file);
     const std::vector<double> n = numbers_of(line, 1, 7, file);
     ColmapImage image;
@@ -85,7 +86,7 @@ std::map<int, ColmapImage> parse_colmap_images(std::string_view text, const std:
                                       Eigen::Quaterniond(n[0], n[1], n[2], n[3]), file);
     image.camera = integer_of(line, 8, file);
     image.name = rest_of(line, 9);
-    // The line that follows is of the features; it is empty where there are none.
+    // The next line contains the features; it is empty if there are none.
     if (i + 1 < lines.size() && lines[i + 1].number == line.number + 1)
       image.observations = observations_of(lines[++i], file);
     if (!images.emplace(id, std::move(image)).second)
@@ -148,9 +149,9 @@ fs::path find_colmap_model(const fs::path& path) {
   for (const fs::path& place : places)
     if (is_model(place, ".bin"))
       throw Error(
-          "a binary model of COLMAP: 'colmap model_converter --output_type TXT' makes a text of it",
+          "is a binary COLMAP model; convert it with 'colmap model_converter --output_type TXT'",
           {.file = place.string()});
-  throw Error("contains no model of COLMAP: neither images.txt nor sparse/images.txt is there",
+  throw Error("contains no COLMAP model: there is no images.txt or sparse/images.txt",
               {.file = path.string()});
 }
 

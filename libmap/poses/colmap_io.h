@@ -1,9 +1,9 @@
-// Sparse models of COLMAP (Schoenberger and Frahm 2016) in its text format: a folder with
-// cameras.txt, images.txt and points3D.txt (https://colmap.github.io/format.html). Numbers are
-// written with as many digits as bring the same number back.
+// Reader and writer of sparse models in COLMAP's text format (Schoenberger and Frahm 2016): a
+// folder with cameras.txt, images.txt and points3D.txt (https://colmap.github.io/format.html).
+// Numbers are written with the fewest digits that parse to the same number.
 //
-// COLMAP's pixel centers lie at halves (u = 0.5 for the first column), ours at whole numbers. Its
-// world has the scale and the axes that its reconstruction happened to take.
+// In COLMAP, the first pixel's center has u = 0.5, in this project 0. The scale and the axes of
+// COLMAP's world are arbitrary.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@
 
 namespace libmap {
 
-// COLMAP's pixel coordinates minus ours.
+// COLMAP's pixel coordinates minus this project's.
 inline constexpr double colmap_pixel_offset = 0.5;
 
 // A line of cameras.txt: "CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]".
@@ -26,16 +26,17 @@ struct ColmapCamera {
   std::string model{};  // "PINHOLE", "OPENCV", ...
   int width = 0;        // pixels
   int height = 0;
-  std::vector<double> parameters{};  // of the model, in COLMAP's own order and pixels
+  std::vector<double> parameters{};  // model parameters in COLMAP's order and pixels
 };
 
-// PINHOLE, OPENCV, FULL_OPENCV or OPENCV_FISHEYE. Throws Error for distortion by thin prisms.
+// Returns a PINHOLE, OPENCV, FULL_OPENCV or OPENCV_FISHEYE camera. Throws Error for thin prism
+// distortion.
 ColmapCamera to_colmap(const Camera& camera);
 
 // A feature of an image.
 struct ColmapObservation {
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  // COLMAP's: centers at halves
-  std::int64_t point = -1;                          // its POINT3D_ID; -1: of no point
+  std::int64_t point = -1;                          // its POINT3D_ID; -1: no point
 };
 
 // Two lines of images.txt: "IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME" and its features.
@@ -55,7 +56,7 @@ struct ColmapTrackElement {
 struct ColmapPoint {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   Color color{};
-  double error_px = -1.0;  // -1: not known
+  double error_px = -1.0;  // -1: unknown
   std::vector<ColmapTrackElement> track{};
 };
 
@@ -65,18 +66,18 @@ struct ColmapModel {
   std::map<std::int64_t, ColmapPoint> points{};  // by POINT3D_ID
 };
 
-// The three files' texts. Throws Error naming `file` and the line: columns that are missing, no
-// finite number, a quaternion that is none, an id that is a duplicate.
+// Texts of the three files. parse_colmap_images throws Error naming `file` and line for missing
+// columns, invalid numbers, quaternions not of unit length and duplicate ids.
 std::map<int, ColmapImage> parse_colmap_images(std::string_view text, const std::string& file);
 std::string to_colmap_cameras(const ColmapModel& model);
 std::string to_colmap_images(const ColmapModel& model);
 std::string to_colmap_points(const ColmapModel& model);
 
-// The folder that holds images.txt: `path` itself, or `path`/sparse or `path`/sparse/0, where
-// COLMAP's tools put it. Throws Error if there is none; says so if the model is a binary one.
+// Returns the folder with images.txt: `path`, `path`/sparse or `path`/sparse/0, as COLMAP's tools
+// create it. Throws Error if there is none or the model is binary.
 std::filesystem::path find_colmap_model(const std::filesystem::path& path);
 
-// Writes the three files into `folder`, which is there.
+// Writes the three files into `folder`, which must exist. Throws Error (failed).
 void write_colmap_model(const std::filesystem::path& folder, const ColmapModel& model);
 
 }  // namespace libmap

@@ -9,7 +9,7 @@ namespace libmap {
 
 namespace {
 
-// Stamps near 1e9 s are multiples of 1.2e-7 s: their differences are no exact decimals.
+// Stamps near 1e9 s are multiples of 1.2e-7 s, so their differences are not exact decimals.
 constexpr double rounding_s = 1e-6;
 
 std::vector<std::size_t> order_by_stamp(const std::vector<double>& stamps) {
@@ -20,7 +20,7 @@ std::vector<std::size_t> order_by_stamp(const std::vector<double>& stamps) {
   return order;
 }
 
-// `order` is not empty. The first in the order where two are equally near.
+// Returns the nearest stamp, the first in `order` for equal distances. `order` must not be empty.
 std::size_t nearest(const std::vector<double>& stamps, const std::vector<std::size_t>& order,
                     double stamp) {
   const auto after =

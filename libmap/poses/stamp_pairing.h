@@ -1,4 +1,4 @@
-// Things recorded at about the same time, such as color and depth images of one camera.
+// Pairing of data by time, for example of color and depth images of a camera.
 #pragma once
 
 #include <cstddef>
@@ -7,12 +7,12 @@
 
 namespace libmap {
 
-// Between the clocks of one camera's images, s.
+// Default tolerance between the images of a camera, s.
 inline constexpr double pairing_tolerance_s = 0.02;
 
-// Pairs (index in `a`, index in `b`) whose stamps differ by `tolerance_s` at most, by ascending
-// index in `a`. Each of `a` looks for the nearest of `b`; of several that find the same one the
-// nearest has it, the earlier one in `a` where they are equally near. Any order of stamps.
+// Returns pairs (index in `a`, index in `b`) whose stamps differ by at most `tolerance_s`, by
+// ascending index in `a`. Each stamp of `a` selects the nearest of `b`; if several select the same
+// one, the nearest gets it, or the earlier one in `a` for equal distances. Stamps need no order.
 std::vector<std::pair<std::size_t, std::size_t>> pair_by_stamp(const std::vector<double>& a,
                                                                const std::vector<double>& b,
                                                                double tolerance_s);

@@ -63,7 +63,7 @@ double median_of(std::vector<double> values) {
   return values.size() % 2 == 1 ? values[half] : 0.5 * (values[half - 1] + values[half]);
 }
 
-// At least one of each, equally many.
+// Both vectors must have the same size, at least 1.
 TrajectoryError summarize(const std::vector<double>& distances_m,
                           const std::vector<double>& angles_deg) {
   TrajectoryError error;
@@ -83,26 +83,26 @@ TrajectoryError summarize(const std::vector<double>& distances_m,
   return error;
 }
 
-// Root mean squares over all pairs.
+// Root mean square residuals over all pairs.
 struct AlignmentResiduals {
   double position_m = 0.0;
   double rotation_rad = 0.0;  // chordal
 };
 
-// Positions about their means, as columns.
+// Returns the columns minus their mean.
 Eigen::Matrix3Xd centered(const Eigen::Matrix3Xd& positions) {
   return positions.colwise() - positions.rowwise().mean();
 }
 
-// Bounds of the lever: the distance at which a rotation residual counts as much as a position
-// residual of the same arc.
+// Bounds of the lever: the distance at which a rotation residual has the weight of a position
+// residual of the same arc length.
 struct LeverRange {
-  double min_m;  // far below any real ratio; rotations complete what positions leave open
+  double min_m;  // far below any real ratio; rotations determine the remaining directions
   double max_m;
 };
 
-// Width of a path: its root mean square distance from its longest axis. Positions alone align wider
-// paths, as in the literature.
+// Root mean square distance of a path from its longest axis above which only positions are used for
+// the alignment, as in the literature.
 constexpr double decisive_width_m = 0.5;
 
 LeverRange lever_range(const Eigen::Matrix3Xd& from) {
@@ -123,8 +123,8 @@ AlignmentResiduals residuals_of(const Eigen::Matrix3d& rotation, const Eigen::Ma
   return {std::sqrt((rotation * from - to).squaredNorm() / count), std::sqrt(squares / count)};
 }
 
-// Least squares of positions (Umeyama 1991, without scale) and rotations (chordal). The lever is
-// the ratio of their residuals (variance components), found by iteration.
+// Least-squares alignment of positions (Umeyama 1991, without scale) and rotations (chordal). The
+// lever is the ratio of their residuals (variance components), estimated iteratively.
 Pose best_alignment(const std::vector<PosePair>& pairs) {
   const auto count = static_cast<Eigen::Index>(pairs.size());
   Eigen::Matrix3Xd positions(3, count);
@@ -155,9 +155,10 @@ Pose best_alignment(const std::vector<PosePair>& pairs) {
 }
 
 Error too_few(std::size_t count, std::size_t least) {
-  return Error("too few poses are in both trajectories", {.field = "common poses",
-                                                          .value = std::to_string(count),
-                                                          .bound = ">= " + std::to_string(least)});
+  return Error("the trajectories have too few common poses",
+               {.field = "common poses",
+                .value = std::to_string(count),
+                .bound = ">= " + std::to_string(least)});
 }
 
 }  // namespace
@@ -198,7 +199,7 @@ TrajectoryError relative_trajectory_error(const Trajectory& estimate, const Traj
 }
 
 void describe(ResultTable& table, const TrajectoryError& error) {
-  table.add("poses", error.poses, "poses compared");
+  table.add("poses", error.poses, "number of compared poses");
   table.add("rmse_m", error.rmse_m, "root mean square error of the positions");
   table.add("median_m", error.median_m, "median error of the positions");
   table.add("max_m", error.max_m, "maximum error of the positions");

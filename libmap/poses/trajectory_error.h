@@ -1,5 +1,5 @@
-// How far a trajectory lies from the truth (Sturm et al. 2012, "A benchmark for the evaluation of
-// RGB-D SLAM systems").
+// Errors of a trajectory against ground truth (Sturm et al. 2012, "A benchmark for the evaluation
+// of RGB-D SLAM systems").
 #pragma once
 
 #include <cstddef>
@@ -10,7 +10,7 @@
 namespace libmap {
 
 struct TrajectoryError {
-  std::size_t poses = 0;  // compared
+  std::size_t poses = 0;  // number of compared poses
   double rmse_m = 0.0;
   double mean_m = 0.0;
   double median_m = 0.0;
@@ -21,18 +21,19 @@ struct TrajectoryError {
 void describe(ResultTable& table, const TrajectoryError& error);
 
 struct AbsoluteTrajectoryError : TrajectoryError {
-  Pose truth_from_estimate = Pose::Identity();  // the alignment that was used
+  Pose truth_from_estimate = Pose::Identity();  // applied alignment
 };
 
-// Errors after the rigid alignment that fits positions and rotations best (Umeyama 1991, without
-// scale; chordal distance of rotations). Their weights are estimated from their residuals. Paths
+// Errors after a least-squares rigid alignment of positions and rotations (Umeyama 1991, without
+// scale; chordal distance of rotations), whose weights are estimated from the residuals. Paths
 // wider than 0.5 m (root mean square distance from the longest axis) are aligned by positions
-// alone. Poses are paired by node, or by time (within 20 ms) if nodes are unknown. Throws Error for
+// only. Poses are paired by node, or by time (within 20 ms) if nodes are unknown. Throws Error for
 // fewer than 3 pairs.
 AbsoluteTrajectoryError absolute_trajectory_error(const Trajectory& estimate,
                                                   const Trajectory& truth);
 
-// Errors of the motion between poses that follow each other.
+// Errors of the motion between consecutive poses, paired as above. Throws Error for fewer than 2
+// pairs.
 TrajectoryError relative_trajectory_error(const Trajectory& estimate, const Trajectory& truth);
 
 }  // namespace libmap

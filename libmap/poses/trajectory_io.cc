@@ -29,7 +29,7 @@ constexpr std::array<std::pair<const char*, TrajectoryFormat>, 4> extensions = {
     {".toro", TrajectoryFormat::toro},
 }};
 
-// Of vertices that are the places of poses in their order.
+// First line of a file whose vertex ids are sequence numbers, not nodes.
 constexpr std::string_view numbered_head = "# graspmap: poses without nodes, numbered in order";
 
 std::vector<const GraphNode*> valid_nodes(const PoseGraph& graph) {
@@ -69,11 +69,11 @@ NodePairs pair_by_order(const Trajectory& trajectory, const PoseGraph& graph,
     return graph.optimized_map_from_base.contains(node->id);
   };
   const std::size_t valid = nodes.size();
-  // What RTAB-Map exports are its optimized poses.
+  // RTAB-Map exports its optimized poses.
   if (trajectory.size() != valid)
     std::erase_if(nodes, [&](const GraphNode* node) { return !has_stored_pose(node); });
   if (trajectory.size() != nodes.size())
-    throw Error("has neither nodes nor stamps and another number of poses than the scan has nodes",
+    throw Error("has no nodes or stamps, and the number of poses differs from the scan's nodes",
                 {.field = "poses",
                  .value = std::to_string(trajectory.size()),
                  .bound = std::to_string(valid)});
@@ -104,7 +104,7 @@ PoseAxes axes_of(TrajectoryFormat format) {
   return PoseAxes::map;
 }
 
-// Of images.txt alone: where the photographs were, whatever their cameras.
+// Reads the camera poses from images.txt; ignores the camera models.
 TrajectoryFile read_colmap(const fs::path& path) {
   const fs::path file = file_of_trajectory(path);
   TrajectoryFile read;
@@ -160,10 +160,10 @@ void require_trajectory_format(const fs::path& path) {
   if (is_trajectory_path(path)) return;
   std::string known;
   for (const auto& [name, format] : extensions) known += std::string(" ") + name;
-  throw Error("unknown format of poses", {.file = path.string(),
-                                          .field = "extension",
-                                          .value = path.extension().string(),
-                                          .bound = "one of" + known});
+  throw Error("unknown pose format", {.file = path.string(),
+                                      .field = "extension",
+                                      .value = path.extension().string(),
+                                      .bound = "one of" + known});
 }
 
 fs::path file_of_trajectory(const fs::path& path) {
@@ -188,8 +188,8 @@ TrajectoryFile read_trajectory(const fs::path& path, TrajectoryFormat format) {
 
 namespace {
 
-// Vertices need names: 1, 2, ... where no node is known, as RTAB-Map counts lines. Whether they
-// were made up, which a comment of g2o says (RTAB-Map's reader of TORO takes none).
+// Numbers the poses 1, 2, ... if their nodes are unknown, as RTAB-Map does. Returns true if it did;
+// a comment in g2o states this (RTAB-Map's reader of TORO does not support comments).
 bool number_nodes(Trajectory& poses) {
   const auto is_known = [](const TrajectoryPose& pose) { return pose.node != 0; };
   if (std::any_of(poses.begin(), poses.end(), is_known)) return false;
@@ -211,7 +211,7 @@ void write_trajectory_as(TrajectoryFormat format, const fs::path& path,
   Trajectory poses = trajectory.poses;
   const bool has_vertices = format == TrajectoryFormat::toro || format == TrajectoryFormat::g2o;
   const bool is_numbered = has_vertices && number_nodes(poses);
-  // Poses of one stamp can be told apart by their nodes alone.
+  // Only nodes distinguish poses with equal stamps.
   const bool have_nodes = std::all_of(poses.begin(), poses.end(),
                                       [](const TrajectoryPose& pose) { return pose.node > 0; });
   const bool with_nodes = nodes || (have_nodes && !have_distinct_stamps(poses));
@@ -236,7 +236,7 @@ void write_trajectory_as(TrajectoryFormat format, const fs::path& path,
     case TrajectoryFormat::euroc:
       break;
   }
-  throw Error("no format of a file of poses", {.file = path.string()});
+  throw Error("poses cannot be written in this format", {.file = path.string()});
 }
 
 void write_trajectory(const fs::path& path, const TrajectoryFile& trajectory, bool nodes) {
@@ -255,8 +255,8 @@ NodeTrajectory assign_nodes(const Trajectory& trajectory, const PoseGraph& graph
                           : have_stamps ? pair_by_time(trajectory, nodes)
                                         : pair_by_order(trajectory, graph, nodes);
   if (pairs.empty())
-    throw Error(have_nodes ? "none of the poses belongs to a node of the scan"
-                           : "no pose lies within 20 ms of a node of the scan");
+    throw Error(have_nodes ? "none of the poses matches a node of the scan"
+                           : "no pose is within 20 ms of a node of the scan");
   std::map<int, TrajectoryPose> poses;
   for (const auto& [node, pose] : pairs)
     if (!poses.emplace(node->id, TrajectoryPose{node->id, node->stamp_s, pose->world_from_base})

@@ -1,5 +1,5 @@
-// Trajectories and pose graphs as files (scan/trajectory_text.h and scan/colmap_io.h describe the
-// formats).
+// Reader and writer of trajectory and pose graph files (formats: trajectory_text.h, colmap_io.h),
+// and assignment of poses to the nodes of a scan.
 #pragma once
 
 #include <cstddef>
@@ -12,61 +12,61 @@
 
 namespace libmap {
 
-// Beside the number that RTAB-Map gives to a format. `automatic`: by the extension .tum, .kitti,
-// .g2o, .toro; a folder or images.txt is a model of COLMAP; any other name (.txt, .graph, .csv) by
-// its content. What turns the axes (1 and 2) is not to be seen in a file, so it must be named.
+// Formats, with RTAB-Map's numbers. `automatic` recognizes the extensions .tum, .kitti, .g2o,
+// .toro; a folder or images.txt as a COLMAP model; other files (.txt, .graph, .csv) by their
+// content. Formats 1 and 2, which have other axes, cannot be recognized and must be given.
 enum class TrajectoryFormat {
   automatic,
   tum,                 // 10, 11
   tum_motion_capture,  // 1
-  kitti,               // 0: the axes of the map
+  kitti,               // 0, with the axes of the map
   kitti_optical,       // 2
   toro,                // 3
   g2o,                 // 4
   colmap,
-  open3d,      // read only, as the next two
+  open3d,      // this and the following formats are read-only
   nerfstudio,  // transforms.json
   euroc
 };
 const std::vector<std::pair<std::string, TrajectoryFormat>>& trajectory_format_names();
 
 struct TrajectoryFile {
-  Trajectory poses;                 // node 0 and stamp 0 where the format has none
-  std::vector<PoseLink> links;      // of g2o and TORO
-  std::vector<ImagePose> images{};  // of COLMAP and nerfstudio, which have no poses
-  bool of_cameras = false;          // poses of the first camera's optical frame: Open3D
+  Trajectory poses;                 // node 0 and stamp 0 if the format has none
+  std::vector<PoseLink> links;      // g2o and TORO only
+  std::vector<ImagePose> images{};  // COLMAP and nerfstudio, instead of poses
+  bool of_cameras = false;          // true if the poses are of the first camera (Open3D)
 };
 
-// Whether write_trajectory takes it: .tum, .kitti, .g2o, .toro. The second throws Error if not,
-// naming them.
+// True if write_trajectory supports the extension: .tum, .kitti, .g2o, .toro. The second function
+// throws Error with these extensions otherwise.
 bool is_trajectory_path(const std::filesystem::path& path);
 void require_trajectory_format(const std::filesystem::path& path);
 
-// Throws Error naming file and line; a file without any pose is one.
+// Reads a file. Throws Error naming file and line if it is invalid or contains no pose.
 TrajectoryFile read_trajectory(const std::filesystem::path& path,
                                TrajectoryFormat format = TrajectoryFormat::automatic);
 
-// The file that read_trajectory reads: `path` itself, or the images.txt of a model.
+// Returns the file that read_trajectory reads: `path` itself, or the images.txt of a COLMAP model.
 std::filesystem::path file_of_trajectory(const std::filesystem::path& path);
 
-// For callers that hold an OutputFile, by the extension. Links are left out but in .g2o and .toro;
-// nodes stand in those (1, 2, ... where none is known) and, as a ninth column that not every reader
-// takes, in .tum where `nodes` is set.
+// Writes in the format of the extension, directly to `path` (the temporary of an OutputFile). Links
+// and nodes are written to .g2o and .toro, with nodes 1, 2, ... if unknown. With `nodes`, .tum has
+// the node as a ninth column, which not all readers support.
 void write_trajectory(const std::filesystem::path& path, const TrajectoryFile& trajectory,
                       bool nodes = false);
-// The same in a format that the extension does not say. Throws Error for automatic and colmap.
+// Writes in a given format. Throws Error for automatic, colmap and read-only formats.
 void write_trajectory_as(TrajectoryFormat format, const std::filesystem::path& path,
                          const TrajectoryFile& trajectory, bool nodes = false);
 
-// A trajectory bound to the nodes of a scan.
+// A trajectory assigned to the nodes of a scan.
 struct NodeTrajectory {
   Trajectory poses;         // with node and stamp, by ascending node
-  std::size_t foreign = 0;  // poses of the file that belong to no node; left out
+  std::size_t foreign = 0;  // number of dropped poses without a node
 };
 
-// By the poses' own nodes where all are known; else by stamps, within 20 ms; a trajectory without
-// either must have as many poses as the graph has valid nodes, or as it has nodes with a stored
-// pose, in their order. Throws Error naming no file: nothing matches, a node has two poses.
+// Assigns poses to nodes: by node if all poses have one, else by stamp within 20 ms, else by order.
+// By order, the number of poses must equal that of the valid nodes or of the nodes with a stored
+// pose. Throws Error (without the file's name) if no pose matches or a node has two poses.
 NodeTrajectory assign_nodes(const Trajectory& trajectory, const PoseGraph& graph);
 
 }  // namespace libmap

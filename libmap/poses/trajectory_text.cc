@@ -15,29 +15,29 @@ namespace libmap {
 
 namespace {
 
-constexpr double rotation_tolerance = 0.05;  // of R^T R
+constexpr double rotation_tolerance = 0.05;  // maximum deviation of R^T R from the identity
 
-// Upper triangle of a symmetric 6 x 6 matrix.
+// Number of entries in the upper triangle of a symmetric 6 x 6 matrix.
 constexpr std::size_t triangle_size = 21;
 
 constexpr std::string_view type_comment = "graspmap:type";
 constexpr std::string_view edge_comment = "graspmap:edge";
 
-// x y z qx qy qz qw.
+// Parses x y z qx qy qz qw.
 Pose pose_from_words(const TextLine& line, std::size_t first, const std::string& file) {
   const std::vector<double> n = numbers_of(line, first, 7, file);
   return pose_of(line, Eigen::Vector3d(n[0], n[1], n[2]),
                  Eigen::Quaterniond(n[6], n[3], n[4], n[5]), file);
 }
 
-// x y z qx qy qz qw, a space before each.
+// Returns x y z qx qy qz qw with a space before each.
 std::string pose_to_words(const Pose& pose) {
   const Eigen::Quaterniond q = quaternion_of(pose);
   const Eigen::Vector3d t = pose.translation();
   return to_words({t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()});
 }
 
-// x y z roll pitch yaw, radians.
+// Parses x y z roll pitch yaw, radians.
 Pose pose_from_angles(const TextLine& line, std::size_t first, const std::string& file) {
   const std::vector<double> n = numbers_of(line, first, 6, file);
   const Eigen::Vector3d angles_rad(n[3], n[4], n[5]);
@@ -47,13 +47,13 @@ Pose pose_from_angles(const TextLine& line, std::size_t first, const std::string
 }
 
 std::string pose_to_angles(const Pose& pose) {
-  // No sign before a zero.
+  // Adding 0 removes the sign of -0.
   const Eigen::Vector3d angles_rad = (roll_pitch_yaw_deg(pose) * (M_PI / 180.0)).array() + 0.0;
   const Eigen::Vector3d t = pose.translation();
   return to_words({t.x(), t.y(), t.z(), angles_rad.x(), angles_rad.y(), angles_rad.z()});
 }
 
-// The first 12 numbers are [R|t], row by row.
+// Returns the pose of the first 12 numbers, [R|t] in row-major order.
 Pose pose_of_rows(const TextLine& line, const std::vector<double>& numbers,
                   const std::string& file) {
   Eigen::Matrix<double, 3, 4> matrix;
@@ -62,7 +62,7 @@ Pose pose_of_rows(const TextLine& line, const std::vector<double>& numbers,
   const double deviation =
       (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
   if (!(deviation <= rotation_tolerance) || rotation.determinant() <= 0.0)
-    throw in_line("no rotation", line, file, to_text(rotation.determinant()),
+    throw in_line("not a rotation", line, file, to_text(rotation.determinant()),
                   "a rotation matrix, determinant 1");
   const Eigen::Matrix3d nearest = nearest_rotation(rotation);
   Pose pose = pose_of(line, matrix.col(3), Eigen::Quaterniond(nearest), file);
@@ -75,7 +75,7 @@ struct GraphFormat {
   std::string_view edge_tag;
   std::string_view planar_mark;  // in tags of planar graphs
   std::size_t pose_words;
-  double angle_factor;  // how many times larger an error of an angle is than that in the file
+  double angle_factor;  // ratio of an angle's error to the error in the file
   Pose (*pose_from)(const TextLine& line, std::size_t first, const std::string& file);
   std::string (*pose_to)(const Pose& pose);
 };
@@ -105,7 +105,7 @@ Matrix6d information_from_words(const GraphFormat& format, const TextLine& line,
     for (int column = row; column < 6; ++column) {
       const double value = numbers[next++] / factor_of(format, row, column);
       if (!(std::abs(value) <= max_information))
-        throw in_line("no information of a link", line, file, to_text(value), "<= 1e300");
+        throw in_line("information out of range", line, file, to_text(value), "<= 1e300");
       information(row, column) = value;
       information(column, row) = value;
     }
@@ -113,7 +113,7 @@ Matrix6d information_from_words(const GraphFormat& format, const TextLine& line,
   return information;
 }
 
-// from to, pose, information, from word `first` on.
+// Parses from, to, pose and information, starting at word `first`.
 PoseLink link_from_words(const GraphFormat& format, const TextLine& line, std::size_t first,
                          const std::string& file) {
   PoseLink link;
@@ -139,7 +139,7 @@ std::string link_to_words(const GraphFormat& format, const PoseLink& link) {
 
 bool is_edge(const PoseLink& link) { return link.from != link.to && link.from > 0 && link.to > 0; }
 
-// Edges between vertices that follow each other are odometry, as g2o's own tools write it.
+// Edges between consecutive vertices are odometry, as g2o's tools write it.
 void guess_type(PoseLink& link, const std::set<int>& vertices) {
   const auto [low, high] = std::minmax(link.from, link.to);
   const auto next = vertices.upper_bound(low);
@@ -180,7 +180,7 @@ struct GraphReader {
     } else if (tag == format.edge_tag) {
       add_link(line, 1);
     } else if (tag.find(format.planar_mark) != std::string_view::npos) {
-      throw in_line("a planar pose graph", line, file, std::string(tag),
+      throw in_line("planar pose graphs are not supported", line, file, std::string(tag),
                     std::string(format.vertex_tag) + " or " + std::string(format.edge_tag));
     }
   }
@@ -216,7 +216,7 @@ Trajectory parse_tum(std::string_view text, const std::string& file) {
   for (const TextLine& line : split_lines(text)) {
     if (is_comment(line)) continue;
     if (line.words.size() != 8 && line.words.size() != 9)
-      throw wrong_columns("no pose", line, file, "stamp x y z qx qy qz qw, and perhaps a node");
+      throw wrong_columns("not a pose", line, file, "stamp x y z qx qy qz qw [node]");
     TrajectoryPose pose;
     pose.stamp_s = numbers_of(line, 0, 1, file).front();
     pose.world_from_base = pose_from_words(line, 1, file);
@@ -243,7 +243,7 @@ Trajectory parse_kitti(std::string_view text, const std::string& file) {
   Trajectory trajectory;
   for (const TextLine& line : split_lines(text)) {
     if (is_comment(line)) continue;
-    if (line.words.size() != 12) throw wrong_columns("no pose", line, file, "12");
+    if (line.words.size() != 12) throw wrong_columns("not a pose", line, file, "12");
     trajectory.push_back({0, 0.0, pose_of_rows(line, numbers_of(line, 0, 12, file), file)});
   }
   return trajectory;
@@ -256,7 +256,7 @@ Trajectory parse_open3d(std::string_view text, const std::string& file) {
   for (const TextLine& line : split_lines(text)) {
     const std::size_t row = number++ % 5;
     if (line.words.size() != (row == 0 ? 3U : 4U))
-      throw wrong_columns("no pose of Open3D", line, file, row == 0 ? "3" : "4");
+      throw wrong_columns("not a pose of Open3D", line, file, row == 0 ? "3" : "4");
     if (row == 0) rows.clear();
     if (row == 0) continue;
     const std::vector<double> numbers = numbers_of(line, 0, 4, file);
@@ -274,7 +274,7 @@ Trajectory parse_euroc(std::string_view text, const std::string& file) {
   for (const TextLine& line : split_lines(text)) {
     if (is_comment(line)) continue;
     if (line.words.size() < 8)
-      throw wrong_columns("no pose", line, file, "timestamp [ns], x, y, z, qw, qx, qy, qz, ...");
+      throw wrong_columns("not a pose", line, file, "timestamp [ns], x, y, z, qw, qx, qy, qz, ...");
     const std::vector<double> n = numbers_of(line, 0, 8, file);
     const Pose pose = pose_of(line, Eigen::Vector3d(n[1], n[2], n[3]),
                               Eigen::Quaterniond(n[4], n[5], n[6], n[7]), file);
@@ -293,14 +293,14 @@ std::vector<ImagePose> parse_nerfstudio(std::string_view text, const std::string
       for (const auto& row : frame.at("transform_matrix"))
         for (const auto& value : row) rows.push_back(value.get<double>());
       if (rows.size() < 12)
-        throw in_line("no matrix", entry, file, std::to_string(rows.size()), "12 or 16 numbers");
+        throw in_line("not a matrix", entry, file, std::to_string(rows.size()), "12 or 16 numbers");
       Pose pose = pose_of_rows(entry, rows, file);
       // OpenGL's camera: y up, z backward.
       pose.linear().rightCols<2>() = -pose.linear().rightCols<2>();
       images.push_back({frame.at("file_path").get<std::string>(), pose});
     }
   } catch (const nlohmann::json::exception& error) {
-    throw Error(std::string("is no transforms.json of nerfstudio: ") + error.what(),
+    throw Error(std::string("not a transforms.json of nerfstudio: ") + error.what(),
                 {.file = file});
   }
   return images;
@@ -348,7 +348,7 @@ std::string to_toro(const Trajectory& poses, const std::vector<PoseLink>& links)
 
 namespace {
 
-// RTAB-Map's world of motion capture: map = world_axes * theirs.
+// RTAB-Map's world axes of motion capture: map = map_from_motion_capture() * world.
 Pose map_from_motion_capture() {
   Pose pose = Pose::Identity();
   pose.linear() << 0, 0, 1, 0, -1, 0, 1, 0, 0;
@@ -391,7 +391,7 @@ std::string recognize_poses(std::string_view text, const std::string& file) {
     return ".json";
   const std::vector<TextLine> lines = split_lines(text);
   for (const TextLine& line : lines) {
-    // The header of EuRoC names its columns.
+    // EuRoC's header contains the names of the columns.
     if (is_comment(line) && line.text.find("q_RS_w") < line.text.find("q_RS_x")) return ".euroc";
     if (is_comment(line)) continue;
     if (line.words.size() == 3 && &line != &lines.back() && (&line + 1)->words.size() == 4)
@@ -403,7 +403,7 @@ std::string recognize_poses(std::string_view text, const std::string& file) {
       if (tag.starts_with(start)) return ".toro";
     if (line.words.size() == 12) return ".kitti";
     if (line.words.size() == 8 || line.words.size() == 9) return ".tum";
-    throw wrong_columns("no known format of poses", line, file,
+    throw wrong_columns("unknown pose format", line, file,
                         "8 or 9 of TUM, 12 of KITTI, 3 of Open3D, or VERTEX... of g2o or TORO");
   }
   throw Error("contains no pose", {.file = file});

@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// A block of 2^24 pixels as GDAL and we hold it, its mask, and GDAL's tables.
+// Memory for a block of 2^24 pixels in GDAL and in DemBlock, its mask, and GDAL's tables.
 constexpr std::uint64_t max_data_bytes = std::uint64_t{3} << 29;
 
 enum class Parcel : std::uint8_t { info, block, end };
@@ -43,7 +43,7 @@ void pass_block(auto& pipe, auto& block) {
   pipe.array(block.heights_m);
 }
 
-// What the process does: an Error or none before each parcel.
+// Work of the child process. It sends an Error, or none, before each message.
 void serve(const fs::path& path, const std::optional<Georeference>& frame,
            const GuardedProcess::Write& write) {
   GuardedOutput output(write);
@@ -109,7 +109,7 @@ class DemReader::Process {
 
 DemReader::DemReader(const fs::path& path, const std::optional<Georeference>& frame) {
   require_readable_file(path);
-  raster_module();  // here: loaded once for all files, and what is missing is no fault of theirs
+  raster_module();  // loads the module here, once, and reports a missing one without a file
   process_ = std::make_unique<Process>(path, frame);
 }
 DemReader::~DemReader() = default;
@@ -135,8 +135,8 @@ PointCloud read_dem_cloud(const fs::path& path, std::size_t* undeclared) {
   DemReader reader(path);
   if (reader.info().pixels() > machine_memory() / (2 * sizeof(Eigen::Vector3d)))
     throw Error(
-        "its points take more than half of the machine's memory; a tile store (score -o "
-        "MAP.tiles) reads it in blocks",
+        "the points need more than half of the machine's memory; use a tile store (score -o "
+        "MAP.tiles), which reads it in blocks",
         {.file = path.string(),
          .field = "pixels",
          .value = std::to_string(reader.info().pixels())});
@@ -167,12 +167,12 @@ std::optional<Georeference> read_georeference(const fs::path& path) {
 namespace {
 
 constexpr std::uint32_t no_vertex = std::numeric_limits<std::uint32_t>::max();
-// A vertex, its number and two triangles.
+// Memory of a vertex, its index and two triangles.
 constexpr std::uint64_t bytes_per_pixel = sizeof(Eigen::Vector3d) + 7 * sizeof(std::uint32_t);
 
-using Corners = std::array<std::uint32_t, 4>;  // around a cell
+using Corners = std::array<std::uint32_t, 4>;  // corners of a cell
 
-// The triangles of a cell whose corners are given counter-clockwise from above.
+// Adds the triangles of a cell; its corners are counter-clockwise from above.
 void add_cell(const Corners& corners, TriangleMesh& mesh) {
   const auto height = [&](std::size_t corner) { return mesh.vertices[corners[corner]].z(); };
   int missing = -1;
@@ -181,7 +181,7 @@ void add_cell(const Corners& corners, TriangleMesh& mesh) {
     if (missing >= 0) return;
     missing = n;
   }
-  const auto add = [&](int first) {  // and the two after it
+  const auto add = [&](int first) {  // adds corners first to first + 2
     const auto at = [&](int n) { return corners[static_cast<std::size_t>((first + n) % 4)]; };
     mesh.triangles.push_back({at(0), at(1), at(2)});
   };
@@ -197,7 +197,7 @@ TriangleMesh read_dem_mesh(const std::filesystem::path& path) {
   DemReader reader(path);
   const DemInfo& info = reader.info();
   if (info.pixels() >= no_vertex || info.pixels() > machine_memory() / 2 / bytes_per_pixel)
-    throw Error("too many for a mesh in memory: cut the raster (gdal_translate -srcwin)",
+    throw Error("too many for a mesh in memory; crop the raster (gdal_translate -srcwin)",
                 {.file = path.string(), .field = "pixels", .value = std::to_string(info.pixels())});
   std::vector<double> heights_m(info.pixels(), std::numeric_limits<double>::quiet_NaN());
   DemBlock block;
@@ -220,7 +220,7 @@ TriangleMesh read_dem_mesh(const std::filesystem::path& path) {
   const auto width = static_cast<std::size_t>(info.columns);
   for (std::size_t row = 0; row + 1 < static_cast<std::size_t>(info.rows); ++row)
     for (std::size_t n = row * width; n + 1 < (row + 1) * width; ++n) {
-      // Rows lead south where the raster is not mirrored: its determinant is negative.
+      // Rows go south if the raster is not mirrored: its determinant is negative.
       const Corners around = {vertex_of[n], vertex_of[n + width], vertex_of[n + width + 1],
                               vertex_of[n + 1]};
       add_cell(is_mirrored ? around : Corners{around[0], around[3], around[2], around[1]}, mesh);

@@ -1,4 +1,4 @@
-// Digital elevation models (DEM) from GeoTIFF files, in blocks, by GDAL.
+// Reader of digital elevation models (DEM) from GeoTIFF files in blocks, by GDAL.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,56 +15,55 @@
 
 namespace libmap {
 
-// Whether the extension is .tif or .tiff, in any case.
+// True if the extension is .tif or .tiff, in any case.
 bool is_dem_path(const std::filesystem::path& path);
 
 struct DemInfo {
   std::int64_t columns = 0;
   std::int64_t rows = 0;
-  std::string band_type;  // as GDAL names it, e.g. "Float32"
+  std::string band_type;  // GDAL's name, e.g. "Float32"
   Georeference georeference;
-  // Local x and y, m, of (column, row, 1); the center of the first pixel is at (0.5, 0.5). Any
-  // affine transform with an area: rotated, sheared or mirrored.
+  // Maps (column, row, 1) to local x and y, m; the center of the first pixel is (0.5, 0.5). It can
+  // be any invertible affine transform, also rotated, sheared or mirrored.
   Eigen::Matrix<double, 2, 3> local_from_pixel = Eigen::Matrix<double, 2, 3>::Zero();
 
   std::uint64_t pixels() const { return static_cast<std::uint64_t>(columns * rows); }
 };
 
-// A window of pixels, row by row.
+// A window of pixels in row-major order.
 struct DemBlock {
   std::int64_t column = 0;
   std::int64_t row = 0;
   std::int64_t columns = 0;
   std::int64_t rows = 0;
-  // Local; NaN where the DEM has none, -infinity where only custom says so: -9999, -99999, -999999,
-  // -32767, -32768, not declared as nodata.
+  // Local heights; NaN for nodata, -infinity for customary nodata values that the file does not
+  // declare: -9999, -99999, -999999, -32767, -32768.
   std::vector<double> heights_m;
 };
 
-// Reads one file from its first block to its last: memory is proportional to a block (a tile, or
-// strips of at least 65536 pixels). GDAL runs in a process of its own.
+// Reads a file sequentially in blocks (a tile, or strips of at least 65536 pixels), which determine
+// the memory. GDAL runs in a child process.
 //
-// The height band is the one that is called height, elevation, dem, dsm, dtm or z, else the only
-// band. Its scale, offset, unit (m or ft), nodata value and mask are applied. The local origin is
-// that of `frame` or, without one, the center of the raster to the nearest km, and the first height
-// to the nearest 100 m: zero for small coordinates. Only what is inside the file counts: no .tfw,
-// no .aux.xml.
+// The height band is the band named height, elevation, dem, dsm, dtm or z, else the only band. Its
+// scale, offset, unit (m or ft), nodata value and mask are applied. The local origin is that of
+// `frame`, else the center of the raster rounded to km, and the first height rounded to 100 m (0
+// for small coordinates). Files next to the DEM (.tfw, .aux.xml) are ignored.
 //
-// Throws Error naming the file: it is no GeoTIFF or damaged; it has no affine transform, or a
-// geographic CRS (degrees); no height band, or one of 8 bits or of complex numbers; more than 2^33
-// pixels or blocks of more than 2^24; heights beyond 1e6 m; a CRS other than that of `frame`; or
-// graspmap was built without GDAL (failed).
+// Throws Error naming the file if it is not a GeoTIFF or damaged; has no affine transform, or a
+// geographic CRS (degrees); has no height band, or one of 8 bits or complex numbers; has more than
+// 2^33 pixels or blocks of more than 2^24; has heights beyond 1e6 m; has another CRS than `frame`;
+// or if graspmap was built without GDAL (failed).
 class DemReader {
  public:
-  // Heights in the frame of `frame`, or in one of the file's own.
+  // Heights are relative to `frame`, else to the file's own local origin.
   explicit DemReader(const std::filesystem::path& path,
                      const std::optional<Georeference>& frame = std::nullopt);
   ~DemReader();
   DemReader(DemReader&&) noexcept;
 
-  // Of the whole raster, as its header says.
+  // Properties of the whole raster by its header.
   const DemInfo& info() const;
-  // False after the last block.
+  // Reads the next block. Returns false after the last one.
   bool next(DemBlock& block);
 
  private:
@@ -72,20 +71,21 @@ class DemReader {
   std::unique_ptr<Process> process_;
 };
 
-// Local position of the center of a pixel, by its number in the block.
+// Returns the local position, m, of the center of a pixel, given by its index in the block.
 Eigen::Vector3d point_of(const DemInfo& info, const DemBlock& block, std::size_t pixel);
 
-// The DEM as a cloud: the centers of pixels that have a height, block by block. Counts undeclared
-// nodata. Throws as DemReader, and if there is not enough memory for the points.
+// Reads a DEM as a cloud of the centers of pixels with a height, in the order of blocks. Adds the
+// number of undeclared nodata pixels to `undeclared`. Throws as DemReader does, and if the points
+// need too much memory.
 PointCloud read_dem_cloud(const std::filesystem::path& path, std::size_t* undeclared = nullptr);
 
-// The georeference of a DEM, of the first DEM in a folder (in the order of names), or of any other
-// output by the manifest beside it; nothing if there is none.
+// Returns the georeference of a DEM, of the first DEM in a folder (in the order of names), or of
+// another output by its manifest; nullopt if there is none.
 std::optional<Georeference> read_georeference(const std::filesystem::path& path);
 
-// Vertices are the centers of pixels that have a height, row by row; four neighbors make two
-// triangles, split along the diagonal with the smaller step of height, three make one. Normals
-// point up. Throws Error as DemReader, and if there is not enough memory.
+// Reads a DEM as a mesh. Vertices are the centers of pixels with a height, in row-major order. Four
+// neighbors form two triangles, split along the diagonal with the smaller height difference; three
+// form one. Normals point up. Throws as DemReader does, and if the mesh needs too much memory.
 TriangleMesh read_dem_mesh(const std::filesystem::path& path);
 
 }  // namespace libmap

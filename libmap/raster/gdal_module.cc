@@ -35,7 +35,7 @@ struct CloseDataset {
 };
 using Dataset = std::unique_ptr<void, CloseDataset>;
 
-// Nothing but the named file is read or written, and the bytes do not depend on the machine.
+// Restricts GDAL to the given file, and makes its output independent of the machine.
 void prepare() {
   CPLSetErrorHandler(CPLQuietErrorHandler);
   for (const auto& [key, value] : {std::pair{"GDAL_PAM_ENABLED", "NO"},
@@ -50,7 +50,7 @@ void prepare() {
 std::string last_message() {
   std::string message = CPLGetLastErrorMsg();
   std::replace(message.begin(), message.end(), '\n', ' ');
-  return message.empty() ? "no reason is known" : message;
+  return message.empty() ? "unknown reason" : message;
 }
 
 Dataset open(const fs::path& path) {
@@ -59,11 +59,11 @@ Dataset open(const fs::path& path) {
   Dataset dataset(GDALOpenEx(path.c_str(),
                              GDAL_OF_RASTER | GDAL_OF_READONLY | GDAL_OF_VERBOSE_ERROR, drivers,
                              options, nullptr));
-  if (!dataset) throw Error("is no GeoTIFF that GDAL can read: " + last_message());
+  if (!dataset) throw Error("not a readable GeoTIFF: " + last_message());
   return dataset;
 }
 
-// The UTM zone of a place on the Earth, as an EPSG code.
+// Returns the advice to project to the UTM zone (EPSG code) of `center`.
 std::string utm_remedy(OGRSpatialReferenceH srs, const Eigen::Vector2d& center) {
   const bool is_earth = std::abs(OSRGetSemiMajor(srs, nullptr) - 6378137.0) < 1000.0;
   const bool is_place = std::abs(center.x()) <= 360.0 && std::abs(center.y()) <= 84.0;
@@ -72,7 +72,7 @@ std::string utm_remedy(OGRSpatialReferenceH srs, const Eigen::Vector2d& center) 
     const int zone = 1 + static_cast<int>(std::floor((std::fmod(center.x() + 540.0, 360.0)) / 6.0));
     target = "EPSG:" + std::to_string((center.y() < 0.0 ? 32700 : 32600) + zone);
   }
-  return "project it first: gdalwarp -t_srs " + target + " IN.tif OUT.tif";
+  return "project it with gdalwarp -t_srs " + target + " IN.tif OUT.tif";
 }
 
 // Meters per unit of the heights of `band`.
@@ -89,7 +89,7 @@ double height_unit_m(GDALRasterBandH band, OGRSpatialReferenceH srs) {
     if (unit == name) return 0.3048;
   for (const char* const name : {"us-ft", "ftus", "us survey foot", "us_survey_foot", "sft"})
     if (unit == name) return 1200.0 / 3937.0;
-  throw Error("is not known as a unit of heights",
+  throw Error("unknown unit of heights",
               {.field = "unit of the height band", .value = given, .bound = "m, ft or us-ft"});
 }
 
@@ -100,7 +100,7 @@ class Dem {
     info_.rows = GDALGetRasterYSize(dataset_.get());
     const double pixels = static_cast<double>(info_.columns) * static_cast<double>(info_.rows);
     if (pixels > max_pixels)
-      throw Error("is too large: cut it (gdal_translate -srcwin)",
+      throw Error("is too large; crop it (gdal_translate -srcwin)",
                   {.field = "pixels", .value = to_text(pixels), .bound = "<= 2^33"});
     choose_band();
     choose_window();
@@ -109,7 +109,7 @@ class Dem {
 
   const DemInfo& info() const { return info_; }
 
-  // Calls visit(block) of local heights, window by window.
+  // Calls visit(block) with the local heights of each window.
   template <typename Visit>
   void for_each_block(const Visit& visit) const {
     DemBlock block;
@@ -136,7 +136,7 @@ class Dem {
     }
     if (chosen == 0)
       throw Error(
-          "none of them is called height, elevation, dem, dsm, dtm or z: select one "
+          "no band is named height, elevation, dem, dsm, dtm or z; select one "
           "(gdal_translate -b N)",
           {.field = "bands", .value = std::to_string(count)});
     band_ = GDALGetRasterBand(dataset_.get(), chosen);
@@ -145,7 +145,7 @@ class Dem {
     if (type == GDT_Byte || GDALDataTypeIsComplex(type) != 0 ||
         GDALGetRasterColorTable(band_) != nullptr)
       throw Error(
-          "is a picture's, not of heights: gdal_translate -ot Float32 if it is one of heights",
+          "not a type of heights; if it is a height band, convert it (gdal_translate -ot Float32)",
           {.field = "type of band " + std::to_string(chosen),
            .value = info_.band_type,
            .bound = "integers of 16 bits or more, or floating point"});
@@ -158,7 +158,7 @@ class Dem {
     window_rows_ = std::max(1, rows);
     if (window_columns_ * window_rows_ > max_block_pixels)
       throw Error(
-          "too large to be read in parts: gdal_translate -co TILED=YES -co COMPRESS=DEFLATE",
+          "too large; convert it to tiles (gdal_translate -co TILED=YES -co COMPRESS=DEFLATE)",
           {.field = "pixels of a strip or tile",
            .value = std::to_string(window_columns_ * window_rows_),
            .bound = "<= 2^24"});
@@ -169,8 +169,8 @@ class Dem {
     std::array<double, 6> transform{};
     if (GDALGetGeoTransform(dataset_.get(), transform.data()) != CE_None)
       throw Error(
-          "has no affine transform: the size and place of its pixels are not known; "
-          "gdal_translate -a_ullr writes one, gdalwarp makes one of control points");
+          "has no affine transform from pixels to coordinates; add one with "
+          "gdal_translate -a_ullr, or with gdalwarp from control points");
     Eigen::Matrix<double, 2, 3> crs_from_pixel;
     crs_from_pixel << transform[1], transform[2], transform[0], transform[4], transform[5],
         transform[3];
@@ -186,7 +186,7 @@ class Dem {
     if (!(area_m2 > 1e-12) || !(area_m2 < 1e12) ||
         !(info_.local_from_pixel.cwiseAbs().maxCoeff() < max_position_m) ||
         !(center_m.cwiseAbs().maxCoeff() < max_position_m))
-      throw Error("maps pixels to no area, or farther than 1e8 m",
+      throw Error("pixels have no area or are farther than 1e8 m",
                   {.field = "affine transform",
                    .value = "pixels of " + to_text(static_cast<float>(area_m2)) + " m2"});
     height_scale_ = GDALGetRasterScale(band_, nullptr) * height_unit_m(band_, srs);
@@ -206,7 +206,7 @@ class Dem {
 
   void read_crs(OGRSpatialReferenceH srs, const Eigen::Vector2d& center) {
     if (OSRIsGeographic(srs) != 0 || OSRIsGeocentric(srs) != 0)
-      throw Error("its coordinates are degrees, not lengths: " + utm_remedy(srs, center),
+      throw Error("the coordinates are in degrees; " + utm_remedy(srs, center),
                   {.field = "CRS", .value = OSRGetName(srs) == nullptr ? "" : OSRGetName(srs)});
     const char* const options[] = {"FORMAT=WKT2_2019", "MULTILINE=NO", nullptr};
     char* wkt = nullptr;
@@ -215,13 +215,13 @@ class Dem {
     CPLFree(wkt);
     info_.georeference.unit_m = OSRGetLinearUnits(srs, nullptr);
     if (!(info_.georeference.unit_m > 1e-6 && info_.georeference.unit_m < 1e6))
-      throw Error("is no length",
+      throw Error("not a valid length",
                   {.field = "unit of the CRS, m", .value = to_text(info_.georeference.unit_m)});
   }
 
   void require_same_crs(const Georeference& frame) const {
     if (info_.georeference.crs_wkt != frame.crs_wkt || info_.georeference.unit_m != frame.unit_m)
-      throw Error("is not that of the first piece of the terrain", {.field = "CRS"});
+      throw Error("differs from the first file of the terrain", {.field = "CRS"});
   }
 
   double first_height() const {
@@ -236,7 +236,7 @@ class Dem {
     return first;
   }
 
-  // A block that was never written reads as zeros.
+  // GDAL reads a block that was never written as zeros.
   bool is_sparse(const DemBlock& block) const {
     const int status = GDALGetDataCoverageStatus(
         band_, static_cast<int>(block.column), static_cast<int>(block.row),
@@ -255,7 +255,7 @@ class Dem {
                             std::to_string(block.row) + ")"});
   }
 
-  // Values that mean "no height" by custom; no ground is that deep.
+  // True for values that customarily mean "no height"; no ground is that deep.
   bool is_undeclared_nodata(double raw) const {
     constexpr std::array customary = {-9999.0, -32768.0, -32767.0, -99999.0, -999999.0};
     return height_scale_ == 1.0 && height_offset_ == 0.0 &&
@@ -284,9 +284,8 @@ class Dem {
       }
       height = height * height_scale_ + height_offset_;
       if (!(std::abs(height) <= max_height_m))
-        throw Error(
-            "is no height: if it means that there is none, gdal_translate -a_nodata says so",
-            {.field = "height", .value = to_text(height), .bound = ">= -1e6 and <= 1e6"});
+        throw Error("not a valid height; if it means nodata, declare it (gdal_translate -a_nodata)",
+                    {.field = "height", .value = to_text(height), .bound = ">= -1e6 and <= 1e6"});
       height -= info_.georeference.origin_m.z();
     }
   }
@@ -337,7 +336,7 @@ void write_georeference(GDALDatasetH dataset, const MapRaster& raster) {
   const std::unique_ptr<void, void (*)(OGRSpatialReferenceH)> srs(
       OSRNewSpatialReference(georeference.crs_wkt.c_str()), &OSRDestroySpatialReference);
   if (!srs)
-    throw Error("is no coordinate reference system: " + last_message(),
+    throw Error("not a coordinate reference system: " + last_message(),
                 {.field = "georeference.crs_wkt"});
   OSRSetAxisMappingStrategy(srs.get(), OAMS_TRADITIONAL_GIS_ORDER);
   require(GDALSetSpatialRef(dataset, srs.get()) == CE_None);
@@ -350,12 +349,12 @@ void write_band(GDALDatasetH dataset, int number, const std::string& name, const
   if (!unit.empty()) require(GDALSetRasterUnitType(band, unit.c_str()) == CE_None);
   require(GDALSetRasterNoDataValue(band, nan_value) == CE_None);
   const int columns = GDALGetRasterXSize(dataset), rows = GDALGetRasterYSize(dataset);
-  // GDAL's C interface takes what it reads by pointers to change.
+  // GDAL's C interface takes input by pointers to non-const.
   require(GDALRasterIO(band, GF_Write, 0, 0, columns, rows, const_cast<void*>(values), columns,
                        rows, type, 0, 0) == CE_None);
 }
 
-// Nearest pixels: each value of an overview is one of the map, and numbers of kinds stay numbers.
+// Adds overviews by nearest neighbor, so that all values are values of the map, also class numbers.
 void add_overviews(GDALDatasetH dataset) {
   constexpr int small = 256;
   std::vector<int> factors;
@@ -387,7 +386,7 @@ void write_raster(const fs::path& path, const MapRaster& raster) {
   GDALFlushCache(dataset.get());
   add_overviews(dataset.get());
   dataset.reset();
-  // What closing it wrote.
+  // Closing writes data, which can fail.
   require(CPLGetLastErrorType() != CE_Failure);
 }
 

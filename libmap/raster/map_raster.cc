@@ -30,14 +30,14 @@ class Rasterizer {
  public:
   explicit Rasterizer(const RasterGrid& grid) : grid_(grid) {}
 
-  // Column from the grid's corner, and row counted northward from it.
+  // Returns column and row from the grid's corner; rows increase northward.
   Eigen::Matrix<std::int64_t, 2, 1> place_of(const Eigen::Vector3d& in_frame) const {
     const Eigen::Vector2d& u = grid_.column_axis;
     const Eigen::Vector2d from_corner = in_frame.head<2>() - grid_.corner_m;
     const Eigen::Vector2d pixels =
         Eigen::Vector2d(u.dot(from_corner), northward().dot(from_corner)) / grid_.pixel_size_m;
     if (!(pixels.cwiseAbs().maxCoeff() < 0x1p40))
-      throw Error("too small for coordinates so large",
+      throw Error("too small for the extent of the points",
                   {.field = "pixel_size_m", .value = to_text(grid_.pixel_size_m)});
     return pixels.array().floor().cast<std::int64_t>();
   }
@@ -59,16 +59,16 @@ class Rasterizer {
   }
 
   void allocate() {
-    if (!has_points_) throw Error("no points: no raster");
+    if (!has_points_) throw Error("no points to rasterize");
     raster_.columns = max_.x() - min_.x() + 1;
     raster_.rows = max_.y() - min_.y() + 1;
     const double pixels = static_cast<double>(raster_.columns) * static_cast<double>(raster_.rows);
     const double bytes = pixels * (8.0 + 4.0 * static_cast<double>(raster_.bands.size()));
     if (bytes > 0.5 * static_cast<double>(machine_memory()) || raster_.columns > 0x7fffffff ||
         raster_.rows > 0x7fffffff)
-      throw Error("its raster of " + std::to_string(raster_.columns) + " x " +
+      throw Error("the raster of " + std::to_string(raster_.columns) + " x " +
                       std::to_string(raster_.rows) +
-                      " pixels takes more than half of the machine's memory",
+                      " pixels needs more than half of the machine's memory",
                   {.field = "pixel_size_m", .value = to_text(grid_.pixel_size_m)});
     raster_.heights_m.assign(static_cast<std::size_t>(pixels), no_height);
     for (RasterBand& band : raster_.bands)

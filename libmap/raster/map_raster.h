@@ -1,4 +1,4 @@
-// Clouds and maps as rasters: one band per field, one pixel per column of points.
+// Rasterization of clouds and maps: one band per field, one pixel per vertical column of points.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,42 +14,42 @@
 
 namespace libmap {
 
-// Square pixels on the horizontal plane of a frame whose z is up.
+// Grid of square pixels on the horizontal plane of a frame whose z is up.
 struct RasterGrid {
   double pixel_size_m = 0.0;
   Pose frame_from_points = Pose::Identity();
-  // In the frame: a corner of a pixel, and the direction of the columns (unit length).
+  // In the frame: a corner of a pixel, and the unit direction of increasing columns.
   Eigen::Vector2d corner_m = Eigen::Vector2d::Zero();
   Eigen::Vector2d column_axis = Eigen::Vector2d::UnitX();
 };
 
 struct RasterBand {
   std::string name;
-  std::string unit;           // by the end of the name: _m, _deg, _n; else empty
+  std::string unit;           // from the suffix of the name: _m, _deg, _n; else empty
   std::vector<float> values;  // NaN: no data
 };
 
-// Row by row from the north; column and row axes are `column_axis` and its right.
+// Row-major raster from the north. Columns increase along `column_axis`, rows to the right of it.
 struct MapRaster {
   std::int64_t columns = 0;
   std::int64_t rows = 0;
-  Eigen::Matrix<double, 2, 3> frame_from_pixel;  // m, of (column, row, 1); corners at whole numbers
+  Eigen::Matrix<double, 2, 3> frame_from_pixel;  // (column, row, 1) to m; corners are whole numbers
   std::vector<double> heights_m;                 // z in the frame; NaN: no data
-  std::vector<RasterBand> bands;                 // beside the height
-  Georeference georeference;                     // of the frame
+  std::vector<RasterBand> bands;                 // bands other than the height
+  Georeference georeference;                     // georeference of the frame
 };
 
-// Calls the visitor with each part of a cloud; called twice.
+// Calls the visitor with each part of a cloud. make_map_raster calls it twice.
 using CloudParts = std::function<void(const std::function<void(const PointCloud&)>& visit)>;
 
-// Each pixel gets the height and the fields of its topmost point, of the first one where heights
-// are equal. Bands: the scalar fields of the first part but for i, j and k. Throws Error: no
-// points, or a raster that takes more than half of the machine's memory.
+// Returns a raster in which each pixel has the height and fields of its topmost point, the first
+// one for equal heights. Bands are the scalar fields of the first part except i, j and k. Throws
+// Error if there are no points or the raster needs more than half of the machine's memory.
 MapRaster make_map_raster(const CloudParts& parts, const RasterGrid& grid);
 
-// A tiled GeoTIFF (256 x 256 pixels, deflate) with overviews above 512 pixels: band 1 `height`,
-// then the others; nodata is NaN. float32, or float64 where that moves a height by more than 1e-5
-// m. Throws Error (failed): it cannot be written, or graspmap was built without GDAL.
+// Writes a tiled GeoTIFF (256 x 256 pixels, deflate) with overviews above 512 pixels: band 1
+// `height`, then the others; nodata is NaN. Values are float32, or float64 if float32 would move a
+// height by more than 1e-5 m. Throws Error (failed), also if graspmap was built without GDAL.
 void write_map_raster(const std::filesystem::path& path, const MapRaster& raster);
 
 }  // namespace libmap

@@ -10,7 +10,7 @@ namespace libmap {
 
 namespace {
 
-// Beside this library, wherever that was installed.
+// The module is next to this library in any installation.
 std::filesystem::path module_path() {
   Dl_info library;
   if (dladdr(reinterpret_cast<void*>(&raster_module), &library) == 0) return {};
@@ -23,7 +23,7 @@ std::filesystem::path module_path() {
 
 const RasterModule& raster_module() {
 #ifndef GRASPMAP_HAS_GDAL
-  throw Error("GeoTIFF: graspmap was built without GDAL (install libgdal-dev and build again)", {},
+  throw Error("GeoTIFF: graspmap was built without GDAL; install libgdal-dev and rebuild", {},
               ErrorKind::failed);
 #endif
   static void* const library = dlopen(module_path().c_str(), RTLD_NOW | RTLD_LOCAL);

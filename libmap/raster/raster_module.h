@@ -1,5 +1,5 @@
-// What libgraspmap_raster_gdal.so offers. It alone links GDAL, which brings some 140 libraries: it
-// is loaded when a GeoTIFF is read or written.
+// Interface of libgraspmap_raster_gdal.so, the only library that links GDAL and its 140
+// dependencies. It is loaded on the first access to a GeoTIFF.
 #pragma once
 
 #include <filesystem>
@@ -12,7 +12,7 @@
 namespace libmap {
 
 struct RasterModule {
-  // Calls head once, then block for each block. Throws Error.
+  // Calls `head` once, then `block` for each block. Throws Error as DemReader does.
   void (*read_dem)(const std::filesystem::path& path, const std::optional<Georeference>& frame,
                    const std::function<void(const DemInfo&)>& head,
                    const std::function<void(const DemBlock&)>& block);
@@ -20,11 +20,11 @@ struct RasterModule {
   void (*write_raster)(const std::filesystem::path& path, const MapRaster& raster);
 };
 
-// The name of its only symbol, a `const RasterModule`.
+// Name of the library's only symbol, a `const RasterModule`.
 inline constexpr const char* raster_module_symbol = "graspmap_raster_module";
 
-// Loads it, once. Throws Error (failed) saying what is missing: GDAL when graspmap was built, or
-// now.
+// Loads the library once. Throws Error (failed) if graspmap was built without GDAL or the library
+// cannot be loaded.
 const RasterModule& raster_module();
 
 }  // namespace libmap

@@ -22,12 +22,12 @@ namespace libmap {
 
 namespace {
 
-constexpr double max_square_m = 1.0;   // more are millimeters
-constexpr double min_noise_px = 0.01;  // of a corner
+constexpr double max_square_m = 1.0;   // a larger number is in millimeters
+constexpr double min_noise_px = 0.01;  // minimum standard deviation of a corner
 constexpr int max_iterations = 50;
 constexpr double settled_step = 1e-10;
-constexpr double max_deviation = 0.03;  // of the scale, by which no depth camera errs
-// Of a view from the others, in squares of its standard deviations and per degree of freedom.
+constexpr double max_deviation = 0.03;  // of the scale; above the error of any depth camera
+// Maximum chi-square of a view against the others, per degree of freedom.
 constexpr double max_disagreement = 9.0;
 constexpr std::size_t max_pairs = 200;
 constexpr double freedom_of_pose = 6.0;
@@ -38,7 +38,7 @@ using Corners = std::vector<Eigen::Vector3d>;  // in the board's frame, m
 struct Sight {
   Pose map_from_base = Pose::Identity();
   Pose base_from_camera = Pose::Identity();
-  Pose camera_from_board = Pose::Identity();  // by this picture alone, m
+  Pose camera_from_board = Pose::Identity();  // from this image only, m
   Matrix6d covariance = Matrix6d::Zero();
   Eigen::Vector2d focal_px = Eigen::Vector2d::Zero();
   std::vector<Eigen::Vector2d> rays{};  // x/z, y/z of the corners
@@ -50,7 +50,7 @@ struct Sight {
 
 struct PlacedBoard {
   Pose map_from_board = Pose::Identity();
-  double size = 1.0;  // of lengths in the map by true ones
+  double size = 1.0;  // lengths in the map divided by true lengths
 };
 
 [[noreturn]] void refuse_board(const Chessboard& board, const std::string& reason,
@@ -61,7 +61,7 @@ struct PlacedBoard {
                        .bound = bound});
 }
 
-// Nothing if the frame has no pose or a corner has no ray.
+// Returns nullopt if the frame has no pose or a corner has no ray.
 std::optional<Sight> sight_of(const BoardView& view, const std::vector<FrameFeatures>& frames,
                               const SensorCalibration& calibration,
                               const std::map<int, Pose>& map_from_base,
@@ -71,7 +71,7 @@ std::optional<Sight> sight_of(const BoardView& view, const std::vector<FrameFeat
   });
   const auto pose = map_from_base.find(view.node);
   if (found == frames.end() || pose == map_from_base.end()) return std::nullopt;
-  // Calibrated as features are: with the motion of the camera from row to row.
+  // Corners are calibrated like features, with the motion of the camera between rows.
   FrameFeatures frame;
   frame.node = view.node;
   frame.cameras = found->cameras;
@@ -99,7 +99,7 @@ std::optional<Sight> sight_of(const BoardView& view, const std::vector<FrameFeat
   return sight;
 }
 
-// Mean squared distance of the found corners from those of the board, px^2; nothing behind the
+// Mean squared distance between found and projected corners, px^2; nullopt if one is behind the
 // camera.
 std::optional<double> squared_distance(const Sight& sight, const PlacedBoard& board,
                                        const Corners& corners) {
@@ -113,7 +113,7 @@ std::optional<double> squared_distance(const Sight& sight, const PlacedBoard& bo
   return sum / static_cast<double>(corners.size());
 }
 
-// Which corner of the board comes first is not known: the orders of its symmetries.
+// The first corner of the board is unknown. Returns the orders of corners by its symmetries.
 std::vector<Corners> orders_of(const Chessboard& board) {
   const Corners corners = corners_on_board(board);
   const auto at = [&](int column, int row) {
@@ -136,7 +136,7 @@ struct AgreeingSights {
   std::vector<OrderedSight> sights{};
 };
 
-// The views to which the board is where it is to the view `first`, by half of its size.
+// Views that agree with the board's pose from the view `first` within half of the board's size.
 AgreeingSights sights_that_agree(const std::vector<Sight>& sights, std::size_t first,
                                  const std::vector<Corners>& orders) {
   AgreeingSights agreeing;
@@ -159,10 +159,10 @@ AgreeingSights sights_that_agree(const std::vector<Sight>& sights, std::size_t f
   return agreeing;
 }
 
-// Of residuals r = projected minus found, px: by steps of the board and its size (J, 7), r itself,
-// by a step of the base (H, 6).
-using Sums = Eigen::Matrix<double, 14, 14>;  // of [J r H]^T [J r H]
-using System = Eigen::Matrix<double, 8, 8>;  // of [J r]
+// Sums over residuals r = projected minus found, px. J (7 columns) are their derivatives by a step
+// of the board and its size, H (6 columns) those by a step of the base.
+using Sums = Eigen::Matrix<double, 14, 14>;  // [J r H]^T [J r H]
+using System = Eigen::Matrix<double, 8, 8>;  // [J r]^T [J r], weighted
 
 Sums sums_of(const Sight& sight, const Corners& corners, const PlacedBoard& board) {
   const Eigen::Matrix3d camera_from_base = sight.base_from_camera.linear().transpose();
@@ -189,8 +189,8 @@ struct WeighedView {
   double disagreement = 0.0;  // chi-square of the view's pose against the board
 };
 
-// (v I + H P H^T)^-1 = (I - H P (v I + H^T H P)^-1 H^T) / v (Woodbury): v the variance of a corner,
-// by what remains when the view's pose is free, P the covariance of its pose.
+// (v I + H P H^T)^-1 = (I - H P (v I + H^T H P)^-1 H^T) / v (Woodbury). v is the variance of a
+// corner, from the residuals with a free pose of the view; P is the covariance of its pose.
 WeighedView weigh(const Sums& sums, const Matrix6d& covariance, std::size_t corners) {
   const Matrix6d by_pose = sums.bottomRightCorner<6, 6>();
   const Eigen::Matrix<double, 8, 6> mixed = sums.topRightCorner<8, 6>();
@@ -208,7 +208,7 @@ WeighedView weigh(const Sums& sums, const Matrix6d& covariance, std::size_t corn
 
 struct Weighing {
   System system = System::Zero();
-  std::vector<double> disagreements{};  // of the views
+  std::vector<double> disagreements{};  // WeighedView::disagreement of each view
 };
 
 Weighing weigh(const std::vector<OrderedSight>& sights, const PlacedBoard& board) {
@@ -227,7 +227,7 @@ struct BoardPosition {
   double size_variance = 0.0;  // of the logarithm of the size
 };
 
-// From `start` on, by Gauss and Newton. Nothing if the views do not determine the board.
+// Gauss-Newton from `start`. Returns nullopt if the views do not determine the board.
 std::optional<BoardPosition> fit(const std::vector<OrderedSight>& sights,
                                  const PlacedBoard& start) {
   BoardPosition found{start};
@@ -250,8 +250,7 @@ double largest_usual(const std::vector<double>& disagreements) {
   return max_disagreement * std::max(freedom_of_pose, median(disagreements));
 }
 
-// Without the views that contradict the two that most others agree with: least median of squares
-// (Rousseeuw 1984).
+// Drops views that contradict the pair of views with the least median of squares (Rousseeuw 1984).
 void leave_out_contradicting(AgreeingSights& views) {
   const std::size_t count = views.sights.size();
   const std::size_t pairs = count * (count - 1) / 2;
@@ -283,7 +282,7 @@ Chessboard parse_known_board(const std::string& text) {
   const auto square_m =
       colon == std::string::npos ? std::nullopt : parse_double(text.substr(colon + 1));
   if (!square_m || !(*square_m > 0.0 && *square_m <= max_square_m))
-    throw Error("is no board of known size",
+    throw Error("is not a board of known size",
                 {.field = "board",
                  .value = text,
                  .bound = "COLUMNSxROWS:METERS with METERS > 0 and <= 1, e.g. 8x6:0.03"});
@@ -302,7 +301,7 @@ std::vector<BoardView> find_boards(const ScanSource& scan, const std::vector<Fra
     try {
       pictures = read_pictures(scan, frames[n].node, {.color = true, .depth = false});
     } catch (const Error&) {
-      return;  // a frame without pictures
+      return;  // a frame without images
     }
     for (std::size_t camera = 0; camera < pictures.size(); ++camera)
       if (auto corners = find_chessboard(luminance(pictures[camera].color), board))
@@ -317,9 +316,8 @@ std::vector<BoardView> find_boards(const ScanSource& scan, const std::vector<Fra
       nodes.insert(view.node);
     }
   if (nodes.size() < 2)
-    refuse_board(board,
-                 "pictures of " + std::to_string(nodes.size()) + " nodes show all of the board",
-                 ">= 2 nodes, by the number of inner corners, one less than of squares");
+    refuse_board(board, "images of " + std::to_string(nodes.size()) + " nodes show the whole board",
+                 ">= 2 nodes; COLUMNSxROWS counts inner corners, one less than squares");
   return views;
 }
 
@@ -348,7 +346,7 @@ ScaleEstimate scale_by_board(const std::vector<FrameFeatures>& frames,
     best.sights.erase(best.sights.begin() + (worst - disagreements.begin()));
     found.reset();
   }
-  if (!found) refuse_board(board, "no two pictures agree on where it is", "one board at rest");
+  if (!found) refuse_board(board, "no two images agree on its pose", "one static board");
   ScaleEstimate scale;
   scale.factor = 1.0 / found->board.size;
   scale.lengths = best.sights.size();
@@ -358,8 +356,8 @@ ScaleEstimate scale_by_board(const std::vector<FrameFeatures>& frames,
   scale.deviation = scale.factor * share;
   if (!(share <= max_deviation))
     refuse_board(board,
-                 "the pictures determine the scale to " + to_fixed_text(100.0 * share, 1) +
-                     " % only: show it from places farther apart",
+                 "the images determine the scale only to " + to_fixed_text(100.0 * share, 1) +
+                     " %: show the board from locations farther apart",
                  "<= " + to_text(100.0 * max_deviation) + " %");
   return scale;
 }

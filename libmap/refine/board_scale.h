@@ -1,4 +1,4 @@
-// The scale of refined poses by a chessboard of known size that lies still in the scene.
+// Scale of refined poses from a chessboard of known size that does not move in the scene.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,30 +14,30 @@
 
 namespace libmap {
 
-// COLUMNSxROWS:METERS, inner corners and side of a square, as "8x6:0.03". Throws Error with the
-// text as value.
+// Parses COLUMNSxROWS:METERS, the numbers of inner corners and the side of a square <= 1 m, e.g.
+// "8x6:0.03". Throws Error with the text as value.
 Chessboard parse_known_board(const std::string& text);
 
-// Where one picture shows the board.
+// Corners of the board in one image.
 struct BoardView {
   int node = 0;
-  std::size_t camera = 0;                  // of the node's
-  std::vector<Eigen::Vector2d> corners{};  // px, as of find_chessboard
+  std::size_t camera = 0;                  // index of the node's camera
+  std::vector<Eigen::Vector2d> corners{};  // px, in the order of find_chessboard
 };
 
-// In all pictures of the frames, in their order. Throws Error if fewer than two nodes see all of
-// the board: known before the poses are. The same for any number of threads.
+// Finds the board in all images of the frames; needs no poses. Returns one entry per image that
+// shows the whole board, in the order of the frames; the result does not depend on the number of
+// threads. Throws Error if fewer than two nodes see the whole board.
 std::vector<BoardView> find_boards(const ScanSource& scan, const std::vector<FrameFeatures>& frames,
                                    const Chessboard& board, Progress& progress = no_progress());
 
-// Place and size of the one board that all views see, by generalized least squares of its corners'
-// pixels. A view has the noise that its own corners show and the uncertainty of its pose:
-// `covariance` of steps of the poses (rigid_motion.h) in units of the map, taken as independent;
-// poses that are not in it are certain. Views that contradict the others, of another board or of
-// one that was moved, are left out. `frames` are as stored, the calibration is applied to them.
-// The result's lengths are the views that are used. Its deviation is the larger for a chi_square
-// above 1, which is that of the views' positions and directions. Throws Error where the views do
-// not determine the scale, such as those from one place.
+// Estimates the pose and size of the board by generalized least squares of its corners' pixels.
+// Each view has the noise of its own corners and the uncertainty of its pose: `covariance` is that
+// of steps of the poses (rigid_motion.h), in units of the map; poses without an entry are exact.
+// Views of another or a moved board are left out. `frames` have the stored calibration;
+// `calibration` is applied to them. In the result, `lengths` is the number of views used,
+// `chi_square` that of their poses, and `deviation` grows with a chi_square above 1. Throws Error
+// if the views do not determine the scale to 3 %, for example if all are from one location.
 ScaleEstimate scale_by_board(const std::vector<FrameFeatures>& frames,
                              const SensorCalibration& calibration,
                              const std::map<int, Pose>& map_from_base,

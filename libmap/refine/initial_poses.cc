@@ -18,7 +18,7 @@ namespace {
 constexpr double agreement_m = 0.1;
 constexpr double agreement_rad = 0.1;
 
-// RTAB-Map's variance of a motion that it does not know is 9999.
+// RTAB-Map stores a variance of 9999 for an unknown motion.
 constexpr double unknown_information = 1.001e-4;
 
 bool is_between_nodes(const PoseLink& link) {
@@ -26,13 +26,13 @@ bool is_between_nodes(const PoseLink& link) {
          link.information.diagonal().minCoeff() > unknown_information;
 }
 
-// What nodes know spreads along links, as if these were gone through in their order again and
-// again until nothing changes: known(node) says whether it knows already, tell(link, node) makes
-// the link's other end tell `node` and says whether it took it.
+// Propagates values of nodes along links, in the order of repeated passes over the list until
+// nothing changes. known(node) returns true if the node has a value. tell(link, node) passes the
+// value of the link's other end to `node` and returns true if the node accepts it.
 template <typename Known, typename Tell>
 void spread_by_links(const std::vector<PoseLink>& links, const Known& known, const Tell& tell) {
   std::map<int, std::vector<std::size_t>> links_of;
-  // By round, then by place in the list. A link acts once: when one of its ends alone knows.
+  // Ordered by pass, then by index in the list. A link acts once, when one end has a value.
   using Turn = std::pair<std::size_t, std::size_t>;
   std::priority_queue<Turn, std::vector<Turn>, std::greater<>> turns;
   for (std::size_t n = 0; n < links.size(); ++n) {
@@ -54,7 +54,7 @@ void spread_by_links(const std::vector<PoseLink>& links, const Known& known, con
   }
 }
 
-// Poses of nodes that have none, by links to nodes that have one.
+// Computes missing poses from links to nodes with a pose.
 void place_by_links(const PoseGraph& graph, const std::set<int>& wanted,
                     std::map<int, Pose>& poses) {
   spread_by_links(
@@ -67,7 +67,7 @@ void place_by_links(const PoseGraph& graph, const std::set<int>& wanted,
       });
 }
 
-// Of a scan without any pose: the first node of each chain of links begins a part.
+// For a scan without poses: the first node of each connected component begins a part.
 std::vector<std::vector<int>> begin_by_links(const PoseGraph& graph, const std::set<int>& wanted,
                                              std::map<int, Pose>& poses) {
   std::set<int> linked;
@@ -86,15 +86,15 @@ std::vector<std::vector<int>> begin_by_links(const PoseGraph& graph, const std::
   return parts;
 }
 
-// How the second part must move.
+// Motion of the second part that satisfies one link.
 struct Bridge {
   Pose move;
   Pose probe;  // a pose of the second part, where agreement is measured
 };
 
-// The one with which most agree.
+// The motion that most others agree with.
 Pose best_move(const std::vector<Bridge>& bridges) {
-  // Of very many, candidates evenly taken.
+  // Candidates are a regular sample of a long list.
   constexpr std::size_t max_candidates = 500;
   const std::size_t stride = bridges.size() / max_candidates + 1;
   std::size_t best = 0;
@@ -112,7 +112,7 @@ Pose best_move(const std::vector<Bridge>& bridges) {
   return bridges[best].move;
 }
 
-// Carries parts to where the links say: each whole grows from the largest part that is left.
+// Joins parts by their links: each joined part grows from the largest part that is left.
 class PartJoiner {
  public:
   PartJoiner(std::map<int, Pose>& poses, std::vector<std::vector<int>> parts,
@@ -156,7 +156,7 @@ class PartJoiner {
     leaving_[to->second].push_back(&link);
   }
 
-  // To where its links with the present whole say.
+  // Moves the part into the frame of the present joined part.
   void move(std::size_t part) {
     std::vector<Bridge> bridges;
     for (const PoseLink* link : leaving_[part]) {
@@ -181,11 +181,11 @@ class PartJoiner {
   }
 
   std::map<int, Pose>& poses_;
-  std::vector<std::vector<int>> parts_;  // the largest first
+  std::vector<std::vector<int>> parts_;  // by descending size
   std::map<int, std::size_t> part_of_;
-  std::vector<std::vector<const PoseLink*>> leaving_;  // links of a part that lead to another one
-  std::vector<std::size_t> whole_of_;                  // the place of a part's whole in joined_
-  std::set<std::size_t> near_;  // parts that a link ties to the present whole
+  std::vector<std::vector<const PoseLink*>> leaving_;  // links from each part to other parts
+  std::vector<std::size_t> whole_of_;                  // index in joined_ of each part
+  std::set<std::size_t> near_;                         // parts linked to the present joined part
   std::vector<std::vector<int>> joined_;
 };
 
@@ -221,14 +221,14 @@ InitialPoses initial_poses(const PoseGraph& graph, StartPoses start) {
       (start == StartPoses::automatic && (odometry.size() == wanted.size() || stored.empty()));
   result.source = by_odometry ? "odometry" : "stored";
   result.map_from_base = by_odometry ? odometry : stored;
-  // Stored poses are in one frame, whatever their session.
+  // Stored poses of all sessions are in one frame.
   std::map<int, std::vector<int>> parts;
   for (const auto& [node, pose] : result.map_from_base)
     parts[by_odometry ? session.at(node) : 0].push_back(node);
   for (auto& [number, nodes] : parts) result.parts.push_back(std::move(nodes));
   if (result.map_from_base.empty()) {
     if (start != StartPoses::automatic)
-      throw Error("the scan has no poses to start from",
+      throw Error("the scan has no initial poses of this source",
                   {.field = "poses", .value = result.source});
     result.parts = begin_by_links(graph, wanted, result.map_from_base);
     result.source = result.parts.empty() ? "visual" : "links";
@@ -237,7 +237,7 @@ InitialPoses initial_poses(const PoseGraph& graph, StartPoses start) {
   place_by_links(graph, wanted, result.map_from_base);
   for (const int node : wanted)
     if (!result.map_from_base.contains(node)) result.without_pose.push_back(node);
-  // A node that links have placed belongs to its neighbor's part.
+  // A node whose pose is from links belongs to its neighbor's part.
   std::map<int, std::size_t> part_of;
   for (std::size_t n = 0; n < result.parts.size(); ++n)
     for (const int node : result.parts[n]) part_of[node] = n;

@@ -1,4 +1,4 @@
-// Where an optimization of a scan's poses starts.
+// Initial poses for the optimization of a scan's poses.
 #pragma once
 
 #include <map>
@@ -9,25 +9,25 @@
 
 namespace libmap {
 
-// visual: no pose and no motion that the scan states, its pictures alone.
+// Source of initial poses. visual: neither poses nor motions of the scan are used, only images.
 enum class StartPoses { automatic, odometry, stored, visual };
 
 struct InitialPoses {
   std::map<int, Pose> map_from_base;
-  // Nodes whose poses are in one frame: sessions, until links between them join them.
+  // Groups of nodes whose poses are in one frame: the sessions, joined by links between them.
   std::vector<std::vector<int>> parts;
-  std::vector<int> without_pose;  // valid nodes that neither a pose nor links place
+  std::vector<int> without_pose;  // valid nodes with neither a pose nor links to one
   std::string source;             // "odometry", "stored", "links", "visual"
 };
 
-// automatic: odometry where all of the valid nodes have it, else stored poses where there are any,
-// else what odometry there is, else links alone. Nodes without a pose are placed by links. Sessions
-// are in frames of their own, but where stored links join them. visual places none. Throws Error if
-// odometry or stored poses are asked for and there are none.
+// Selects the initial poses. automatic: odometry if all valid nodes have it, else stored poses if
+// there are any, else the available odometry, else links only. Nodes without a pose get one from
+// links. Sessions without links between them remain separate parts. visual returns no poses.
+// Throws Error if `start` is odometry or stored and the scan has no such poses.
 InitialPoses initial_poses(const PoseGraph& graph, StartPoses start);
 
-// Carries parts as wholes to where the links between them say, the largest part first; of several
-// links between two parts that one which most others agree with. Returns the joined parts.
+// Transforms each part rigidly so that it agrees with its links to larger parts; of several links,
+// the one that most others agree with. Returns the joined parts.
 std::vector<std::vector<int>> join_parts(std::map<int, Pose>& map_from_base,
                                          const std::vector<std::vector<int>>& parts,
                                          const std::vector<PoseLink>& links);

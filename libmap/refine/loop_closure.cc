@@ -14,13 +14,13 @@ namespace libmap {
 namespace {
 
 constexpr double degree = std::numbers::pi / 180.0;
-constexpr double confirmed_m = 0.1;  // between two links of the same parts
+constexpr double confirmed_m = 0.1;  // between two links of the same two components
 constexpr double confirmed_rad = 5.0 * degree;
-constexpr std::size_t considered_per_pair = 8;  // times as many as are taken, for their directions
+constexpr std::size_t considered_per_pair = 8;  // candidates per pair, before the angle's test
 
 FramePair ordered(std::size_t a, std::size_t b) { return {std::min(a, b), std::max(a, b)}; }
 
-// One component's poses: each with its nearest in place and direction.
+// Adds the pairs of one component: each frame with the nearest frames of similar direction.
 void add_near_pairs(const std::vector<std::size_t>& members, const std::vector<const Pose*>& poses,
                     const LoopClosureDetectionOptions& options, std::set<FramePair>& pairs) {
   std::vector<Eigen::Vector3d> places;
@@ -53,7 +53,7 @@ Matrix6d slack_of(const LoopClosureDetectionOptions& options) {
   return square.asDiagonal();
 }
 
-// Whether the first component lies to the second, by one link, as it does by the other.
+// Returns true if both links determine the same relative pose of their two components.
 bool agree(const FeatureLink& one, const FeatureLink& other, const PoseGraphResult& graph) {
   const auto moved_by = [&](const PoseLink& link, bool swapped) {
     const Pose& a = graph.map_from_base.at(link.from);
@@ -76,7 +76,7 @@ bool agree(const FeatureLink& one, const FeatureLink& other, const PoseGraphResu
   const bool swapped = first != other_first;
   const Pose a = moved_by(one.link, false);
   const Pose b = moved_by(other.link, swapped);
-  // Where the one link's node would lie by the other.
+  // The pose of the link's node by both links.
   const Pose& node = graph.map_from_base.at(one.link.to);
   return is_near(a * node, b * node, confirmed_m, confirmed_rad);
 }
@@ -85,24 +85,24 @@ bool agree(const FeatureLink& one, const FeatureLink& other, const PoseGraphResu
 
 void bind(ParameterTable& table, LoopClosureDetectionOptions& options) {
   table.add("radius_m", options.radius_m, not_negative,
-            "candidates for closures lie this near to each other");
+            "maximum distance between candidates for closures");
   table.add("angle_deg", options.angle_deg, {0.0, 180.0},
-            "and look in directions that differ by this at most");
+            "maximum angle between viewing directions of candidates for closures");
   table.add("near_candidates", options.near_candidates, not_negative,
-            "candidates of a frame by place, at most");
+            "maximum number of near candidates per frame");
   table.add("similar_candidates", options.similar_candidates, not_negative,
-            "candidates of a frame by appearance, over the whole scan");
+            "candidates per frame by appearance, in the whole scan");
   table.add("neighbors", options.neighbors, not_negative,
-            "frames that follow a frame and are matched with it");
+            "number of following frames that a frame is matched with");
   table.add("max_ratio", options.max_ratio, {0.0, 1.0, true, false},
-            "distance of the best match's descriptor to that of the second best");
+            "maximum distance of a match's descriptors by that of the second-best match");
   table.add("min_inliers", options.estimate.min_inliers, {6, 100000},
-            "matches that must agree on a motion");
+            "minimum number of matches that agree on a motion");
   table.add("min_spread", options.estimate.min_spread, not_negative,
-            "how widely they must lie in the picture, of the focal length");
+            "minimum spread of agreeing matches in the image, in focal lengths");
   table.add("max_graph_chi_square", options.max_graph_chi_square, positive,
-            "of a closure against the graph's own estimate");
-  table.add("words", options.appearance.words, {1, 65536}, "of the vocabulary of appearance");
+            "maximum chi-square of a closure against the pose graph");
+  table.add("words", options.appearance.words, {1, 65536}, "words in the vocabulary of appearance");
 }
 
 std::set<FramePair> consecutive_pairs(const std::vector<FrameFeatures>& frames, int neighbors) {
@@ -128,7 +128,7 @@ std::set<FramePair> similar_pairs(const std::vector<FrameFeatures>& frames,
       parts.push_back(part == part_of.end() ? components.size() : part->second);
     }
   }
-  // Frames that follow each other look most alike and are candidates already.
+  // Consecutive frames are the most similar ones and are candidates already.
   const auto neighbors = static_cast<std::size_t>(options.neighbors);
   const auto wanted = static_cast<std::size_t>(options.similar_candidates);
   const auto similar =

@@ -18,10 +18,10 @@ namespace {
 constexpr std::size_t no_frame = static_cast<std::size_t>(-1);
 constexpr std::size_t backward = static_cast<std::size_t>(-1);  // steps along the list of frames
 constexpr std::size_t forward = 1;
-constexpr std::size_t most_lost = 4;          // frames of a part
-constexpr std::size_t farthest_neighbor = 4;  // frames away
+constexpr std::size_t most_lost = 4;          // maximum number of frames in a lost part
+constexpr std::size_t farthest_neighbor = 4;  // maximum distance in frames
 constexpr double most_steps_on = 1.0;
-constexpr double sides_agree_m = 0.02;  // of the alignments with both sides
+constexpr double sides_agree_m = 0.02;  // maximum difference of the alignments with both sides
 constexpr double sides_agree_rad = 2.0 * std::numbers::pi / 180.0;
 
 class LostFrames {
@@ -34,7 +34,7 @@ class LostFrames {
       for (const int node : result.parts[part]) part_of_[node] = part;
   }
 
-  // Until no frame is placed any more.
+  // Repeats until no more frames are placed.
   void run() {
     for (bool found = true; found;) {
       found = false;
@@ -58,7 +58,7 @@ class LostFrames {
   }
   int session(std::size_t frame) const { return start_.session_of(node(frame)); }
 
-  // The nearest that is not lost.
+  // The nearest frame in this direction that is not lost; no_frame if there is none.
   std::size_t neighbor(std::size_t frame, std::size_t step) const {
     if (frame == no_frame) return no_frame;
     for (std::size_t n = 0, other = frame + step; n < farthest_neighbor; ++n, other += step) {
@@ -68,7 +68,7 @@ class LostFrames {
     return no_frame;
   }
 
-  // Where the motion from `a` to `b` leads: between them, or on from b.
+  // The pose by constant motion from `a` to `b`: interpolated, or extrapolated beyond b.
   std::optional<Pose> along(std::size_t a, std::size_t b, std::size_t frame) {
     if (a == no_frame || b == no_frame || part(a) != part(b) || stamp_s(a) == stamp_s(b))
       return std::nullopt;
@@ -102,7 +102,7 @@ class LostFrames {
     return true;
   }
 
-  // To the other, from `guess` or from where few matches lead.
+  // Aligns the frame with `other`, from `guess`, else from the motion that a few matches give.
   std::optional<PoseLink> align(std::size_t frame, std::size_t other,
                                 const std::optional<Pose>& guess) {
     std::optional<PoseLink> link;
@@ -113,7 +113,7 @@ class LostFrames {
     return link;
   }
 
-  // That of the frame, carried to where the frame lies at `place`.
+  // Joins the frame's part to that of the node `at`, moved so that the frame is at `place`.
   void move_part(std::size_t frame, int at, const Pose& place) {
     const Pose move = place * pose(frame).inverse();
     const std::vector<int> nodes = std::exchange(result_.parts[part(frame)], {});

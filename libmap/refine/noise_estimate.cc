@@ -17,8 +17,8 @@ constexpr double median_of_normal = 0.6745;  // of absolute values, in standard 
 constexpr double min_axial_m = 1e-4;
 constexpr int terms = 3;
 
-// The terms of the noise, none negative, with the least relative errors: of all subsets of terms
-// the best one that has no negative term.
+// Fits non-negative terms of the noise with the least relative errors, by trying all subsets of
+// terms.
 Eigen::Vector3d fit_terms(const std::vector<Eigen::Vector2d>& range_and_noise) {
   const auto count = static_cast<Eigen::Index>(range_and_noise.size());
   Eigen::MatrixXd powers(count, terms);
@@ -87,7 +87,7 @@ std::optional<NoiseEstimate> estimate_noise(const std::vector<SurfaceResidual>& 
 std::string describe(const DepthNoise& noise) {
   return to_fixed_text(1e3 * noise.axial_m, 1) + " mm + " +
          to_fixed_text(100.0 * noise.axial_of_range, 2) + " % of range + " +
-         to_fixed_text(1e3 * noise.axial_of_square, 2) + " mm a m2 of range squared";
+         to_fixed_text(1e3 * noise.axial_of_square, 2) + " mm/m2 of range squared";
 }
 
 }  // namespace libmap

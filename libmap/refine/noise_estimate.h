@@ -1,4 +1,4 @@
-// Noise of a depth camera by range, from the scan itself.
+// Estimates the noise of a depth camera as a function of range from a scan.
 #pragma once
 
 #include <optional>
@@ -12,18 +12,18 @@ namespace libmap {
 
 struct NoiseEstimate {
   DepthNoise noise{};
-  std::size_t residuals = 0;
-  double nearest_m = 0.0;  // ranges of the residuals
+  std::size_t residuals = 0;  // number of residuals used
+  double nearest_m = 0.0;     // minimum range of the residuals
   double farthest_m = 0.0;
-  double largest_ratio = 1.0;  // >= 1: of estimated and assumed noise at a range, or its inverse
+  double largest_ratio = 1.0;  // >= 1: estimated by assumed noise or its inverse, over all ranges
 };
 
-// Constant, linear and quadratic terms that fit the robust spread of the residuals in bins of range
-// best, none negative. Returns nullopt for fewer than a thousand residuals.
+// Fits non-negative constant, linear and quadratic terms to the robust spread of the residuals in
+// bins of range. Returns nullopt for fewer than a thousand residuals.
 std::optional<NoiseEstimate> estimate_noise(const std::vector<SurfaceResidual>& residuals,
                                             const DepthNoise& assumed);
 
-// "1.2 mm + 0.10 % of range + 1.9 mm/m2 of range squared".
+// Returns the terms as text, e.g. "1.2 mm + 0.10 % of range + 1.9 mm/m2 of range squared".
 std::string describe(const DepthNoise& noise);
 
 }  // namespace libmap

@@ -17,18 +17,18 @@ namespace libmap {
 
 namespace {
 
-constexpr double settled_share = 0.01;  // new links of those before: with less, rounds end
+constexpr double settled_share = 0.01;  // rounds end with a smaller share of new links
 constexpr int max_calibrations = 3;
-// A calibration that changes less does not let other features match.
+// A smaller change of the calibration does not change the matches.
 constexpr double settled_m = 5e-4;
 constexpr double settled_rad = 3e-4;
 constexpr double settled_s = 1e-3;
-// Features err alike in the pictures of one place, which no residual shows: measured on simulated
-// scans.
+// Errors of features in images of one location are correlated, which residuals do not show.
+// Measured on simulated scans.
 constexpr double min_deviation_scale = 1.3;
-// A noise of depth that is this much larger or smaller than the assumed one replaces it.
+// An estimated depth noise that differs from the assumed one by this factor replaces it.
 constexpr double other_noise = 1.8;
-constexpr double explained_cost = 0.35;  // of held-out matches; of normal errors it is 0.26
+constexpr double explained_cost = 0.35;  // of held-out matches; 0.26 for normal errors
 
 bool is_motion(const PoseLink& link) {
   return link.from > 0 && link.to > 0 && link.from != link.to;
@@ -36,7 +36,7 @@ bool is_motion(const PoseLink& link) {
 
 bool is_by_depth(const GraphLink& link) { return link.group == depth_link_group; }
 
-// "3, 5, 6, 10-40": of ten or more in a row the ends.
+// "3, 5, 6, 10-40": ten or more consecutive numbers are a range.
 std::string join_numbers(const std::vector<int>& numbers) {
   std::string text;
   for (std::size_t n = 0; n < numbers.size(); ++n) {
@@ -64,8 +64,8 @@ bool is_all_tracked(const RefinementInput& input, const RefinementState& state) 
   });
 }
 
-// Nodes of parts that visual odometry has begun and nothing has joined: their poses are
-// undetermined. So are those of all but the largest part where one map is wanted.
+// Nodes with undetermined poses: those of parts that visual odometry began and no link joins. With
+// one_map, all parts but the largest.
 std::vector<int> unjoined(const RefinementInput& input, const RefinementState& state,
                           const std::vector<std::vector<int>>& parts) {
   std::vector<int> left;
@@ -88,7 +88,7 @@ HeldOutCosts costs_at(const RefinementState& state, const std::vector<FeatureLin
   return held_out_costs(*state.frames, links, state.poses);
 }
 
-// One refinement: its present state and the reports of its stages so far.
+// Present state of a refinement, and the reports of its stages.
 struct Run {
   RefinementInput input;
   RefinementState state{};
@@ -110,7 +110,7 @@ struct Run {
     }
   }
 
-  // Ends a stage: its times since the end of the last one, the errors of the present poses.
+  // Ends a stage: records its times and the errors of the present poses.
   void report(StageReport stage) {
     const auto now = std::chrono::steady_clock::now();
     stage.seconds = std::chrono::duration<double>(now - std::exchange(begin, now)).count();
@@ -173,17 +173,18 @@ void start(Run& run) {
     run.result.without_pose = std::move(initial.without_pose);
     if (!run.result.without_pose.empty())
       state.warnings.push_back(std::to_string(run.result.without_pose.size()) +
-                               " nodes have no pose, by odometry or by links: they are left out");
+                               " nodes have no pose from odometry or links and are left out");
   }
   run.report({.name = "start: " + initial.source});
 }
 
 void require_one_scale(const RefinementOptions& options) {
   if (options.board && !options.known_lengths.empty())
-    throw Error("known lengths determine the scale already", {.field = "board"});
+    throw Error("cannot be combined with known lengths: both determine the scale",
+                {.field = "board"});
   if (options.scale != 1.0 && (options.board || !options.known_lengths.empty() ||
                                options.scale_from == ScaleSource::odometry))
-    throw Error("the scale is determined in two ways",
+    throw Error("the scale is determined twice",
                 {.field = "scale",
                  .value = to_text(options.scale),
                  .bound = "1 with known lengths, a board or the scale from odometry"});
@@ -218,8 +219,8 @@ void find_frames(Run& run, const FeatureCache& cache) {
   run.report({.name = "board", .figures = {{"pictures", input.board_views.size()}}});
 }
 
-// Poses of all nodes by visual odometry and links, from the poses of the start. The suffix is added
-// to the names of the stages.
+// Computes poses of all nodes by visual odometry and links, from the initial poses. The suffix is
+// added to the names of the stages.
 void link_frames(Run& run, const std::string& suffix = {}) {
   const RefinementInput& input = run.input;
   RefinementState& state = run.state;
@@ -247,8 +248,8 @@ void link_frames(Run& run, const std::string& suffix = {}) {
   state.information = link_system(state.poses, state.graph.links);
 }
 
-// A rolling shutter distorts images so that few matches agree on a rigid motion, and frames are
-// lost: tracks and links them again with the calibration.
+// Tracks and links frames again with the calibration. With a rolling shutter, few matches agree on
+// a rigid motion, so that frames are lost.
 void link_again(Run& run) {
   RefinementState before = run.state;
   run.state.poses = run.input.start;
@@ -267,7 +268,7 @@ void link_again(Run& run) {
     run.state.feature_links = rematched_links(run.input, run.state);
 }
 
-// The useful range, noise, timing and bounds of the named sensor where options have their defaults.
+// Sets options with default values to the useful range, noise, timing and bounds of the sensor.
 RefinementOptions with_sensor(RefinementOptions options) {
   if (options.sensor == "auto") return options;
   const SensorModel model = read_sensor_model(options.sensor);
@@ -291,7 +292,7 @@ RefinementOptions with_sensor(RefinementOptions options) {
   return options;
 }
 
-// Replaces an assumed noise of depth by that of the held-out depth. Returns whether it differs.
+// Replaces the assumed depth noise by the noise of the held-out depth. Returns true if replaced.
 bool adapt_noise(Run& run) {
   RefinementState& state = run.state;
   const RefinementOptions& options = run.input.options;
@@ -320,8 +321,8 @@ bool adapt_noise(Run& run) {
   return true;
 }
 
-// Repeats the calibration with features that are matched by it: the matches of the stored camera
-// are those that it lets pass. A wrong registration hides most of them.
+// Repeats the calibration with features that are matched with it, because a wrong stored
+// calibration hides matches.
 void calibrate_sensor(Run& run) {
   RefinementState& state = run.state;
   for (int pass = 1; pass <= max_calibrations; ++pass) {
@@ -361,8 +362,8 @@ void drop_descriptors(RefinementState& state) {
     for (FrameFeatures& frame : *frames) frame.descriptors = {};
 }
 
-// Keeps the poses of the start if the held-out observations fit them better than the end. A scan
-// of which a part had no poses has nothing to fall back to.
+// Restores the initial poses if the held-out observations fit them better than the final ones.
+// This is impossible for a scan with nodes without initial poses.
 void keep_start_if_better(const RefinementInput& input, RefinementState& state) {
   if (!input.tracked.empty() || input.start.size() != state.poses.size()) return;
   const HeldOutEvaluation whole =
@@ -372,16 +373,15 @@ void keep_start_if_better(const RefinementInput& input, RefinementState& state) 
     state.poses = input.start;
     state.calibration = {};
     state.warnings.push_back(
-        "what was held out fits the poses of the start better: they are kept, and the camera as "
-        "it is stored");
+        "held-out observations fit the initial poses better: these and the stored camera are kept");
   } else if (whole.matches.after > explained_cost) {
     state.warnings.push_back(
-        "held-out matches fit worse than noise explains: the sensor has faults that the "
-        "calibration does not cover");
+        "residuals of held-out matches exceed the noise: the sensor has errors that the "
+        "calibration does not model");
   }
 }
 
-// In units of the depth camera.
+// Covariances of the nodes' poses, in units of the depth camera.
 std::map<int, Matrix6d> covariances(const RefinementInput& input, const RefinementState& state,
                                     const CalibrationMoves& moves) {
   input.progress.begin("covariances", 0);
@@ -413,8 +413,8 @@ void drop_unjoined(const RefinementInput& input, const RefinementState& state,
   });
   if (kept > 1)
     result.warnings.push_back(
-        "the scan is in " + std::to_string(kept) +
-        " parts that no link joins: their poses say nothing about each other");
+        "the scan has " + std::to_string(kept) +
+        " parts without links between them: their relative poses are unknown");
   if (input.tracked.empty() && !input.options.one_map) return;
   for (const int node : left) result.covariance.erase(node);
   std::sort(left.begin(), left.end());
@@ -428,7 +428,7 @@ void drop_unjoined(const RefinementInput& input, const RefinementState& state,
     if (input.tracked.contains(node)) left.push_back(node);
   std::sort(left.begin(), left.end());
   if (!left.empty())
-    result.warnings.push_back("left out, since nothing joins them to the rest: nodes " +
+    result.warnings.push_back("left out, because no link joins them to the rest: nodes " +
                               join_numbers(left));
   result.without_pose = std::move(left);
 }
@@ -450,12 +450,12 @@ RefinementResult finish(const RefinementInput& input, RefinementState state,
   result.warnings = std::move(state.warnings);
   result.losses = std::move(state.losses);
   if (!result.losses.empty())
-    result.warnings.push_back("visual odometry lost its way: " + describe(result.losses));
+    result.warnings.push_back("visual odometry lost track: " + describe(result.losses));
   drop_unjoined(input, state, result);
   return result;
 }
 
-// Frames in which no features match are linked by their depth.
+// Links frames without feature links by their depth.
 void link_by_depth(Run& run) {
   std::set<std::size_t> linked;
   for (const FeatureLink& link : run.state.feature_links) {
@@ -476,17 +476,17 @@ bool has_matches(const RefinementState& state) {
                      [](const FeatureLink& link) { return !link.matches.empty(); });
 }
 
-// Without links of features the poses rest on the scan's own links.
+// Requires links of the scan if there are no feature links.
 void require_other_links(Run& run) {
   const RefinementState& state = run.state;
   if (is_all_tracked(run.input, state) && state.other_links.empty()) {
     if (state.frames->empty() && !run.result.skipped.empty())
       throw run.result.skipped.front().second;
-    throw Error("its pictures give no poses: no two of them could be matched",
+    throw Error("no two of its images match, and there are no other links",
                 {.field = "frames", .value = std::to_string(state.frames->size())});
   }
   run.state.warnings.push_back(
-      "no two frames could be matched by features: the poses rest on the other links alone");
+      "no two frames could be matched by features: the poses are from the other links only");
 }
 
 }  // namespace
@@ -497,36 +497,34 @@ void bind(ParameterTable& table, RefinementOptions& options) {
              {"odometry", StartPoses::odometry},
              {"stored", StartPoses::stored},
              {"visual", StartPoses::visual}},
-            "poses that the work starts from; visual: by the pictures alone; auto: visual where "
-            "neither poses nor links are");
-  table.add("rounds", options.rounds, not_negative,
-            "of loop closures, each on the poses of the last, at most");
+            "source of the initial poses; visual: images only; auto: visual for nodes without "
+            "poses and links");
+  table.add("rounds", options.rounds, not_negative, "maximum number of rounds of loop closures");
   bind(table, options.features);
   bind(table, options.odometry);
   bind(table, options.closures);
   bind(table, options.graph);
-  table.add("bundle", options.bundle, "adjust poses and points together");
-  table.add(
-      "sensor", options.sensor,
-      "depth camera, a name in data/sensors or a file: noise, useful range, timing and bounds; "
-      "auto: the noise is estimated");
+  table.add("bundle", options.bundle, "refine poses and points by bundle adjustment");
+  table.add("sensor", options.sensor,
+            "depth camera as a name in data/sensors or a file, which sets noise, useful range, "
+            "timing and bounds; auto: the noise is estimated");
   table.add("intrinsics", options.intrinsics,
             {{"fixed", IntrinsicsMode::fixed},
              {"refined", IntrinsicsMode::refined},
              {"auto", IntrinsicsMode::automatic}},
-            "focal length and principal point: as stored, or estimated; auto: estimated where the "
-            "held-out matches fit better then");
+            "focal length and principal point: as stored, or estimated; auto: estimated if the "
+            "held-out matches then fit better");
   table.add("correct_depth", options.correct_depth,
-            "estimate a correction of depth by range and radius, if what was held out fits better "
-            "then");
+            "estimate a depth correction by range and radius if held-out observations then fit "
+            "better");
   table.add("scale_from", options.scale_from,
             {{"depth", ScaleSource::depth}, {"odometry", ScaleSource::odometry}},
-            "what determines the scale where neither a factor, lengths nor a board are known");
+            "source of the scale if no factor, known lengths or board are given");
   table.add("scale", options.scale, {0.5, 2.0},
-            "known factor of the scale, that of crop --border-size for one; 1: none is known");
+            "known factor of the scale, e.g. that of crop --border-size; 1: none is known");
   bind(table, options.bundle_adjustment);
   bind(table, options.icp);
-  table.add("seed", options.seed, not_negative, "of all that is random");
+  table.add("seed", options.seed, not_negative, "random seed");
 }
 
 RefinementResult refine_poses(const ScanSource& scan, const RefinementOptions& given,
@@ -578,7 +576,7 @@ void describe(ResultTable& table, const RefinementResult& result) {
   }
   table.add("poses", result.poses.size(), "poses");
   table.add("links", result.links.size(), "links between poses");
-  table.add("closures_found", result.closures.size(), "links that were found");
+  table.add("closures_found", result.closures.size(), "links that refinement found");
   table.add("parts", result.components.size(), "connected components of the pose graph");
   table.add("nodes_without_pose", result.without_pose.size(), "nodes without a pose");
   table.add("nodes_without_links", result.without_links.size(), "nodes without links");
@@ -588,9 +586,9 @@ void describe(ResultTable& table, const RefinementResult& result) {
   table.add("noise", result.noise, "noise of depth and its source");
   table.add("scale", result.scale, "source and uncertainty of the scale");
   table.add("stages_undone", rejected, "stages that were rejected");
-  table.add("trajectory_rmse_m", rmse_m, "absolute error of the trajectory, of a scan with truth");
+  table.add("trajectory_rmse_m", rmse_m, "absolute trajectory error, for a scan with true poses");
   table.add("trajectory_rotation_error_deg", rotation_deg,
-            "mean rotation error of the trajectory, of a scan with truth");
+            "mean rotation error of the trajectory, for a scan with true poses");
 }
 
 }  // namespace libmap

@@ -1,6 +1,6 @@
-// The whole way from a scan's odometry to refined poses: features, rounds of loop closures each
-// followed by an optimization of the pose graph, bundle adjustment, depth against depth. A stage
-// after which what was held out fits worse is rejected and reported.
+// Pose refinement of a scan: features, rounds of loop closures with pose graph optimization, bundle
+// adjustment, calibration and ICP. A stage after which the held-out observations fit worse is
+// rejected and reported.
 #pragma once
 
 #include <cstdint>
@@ -31,22 +31,22 @@
 
 namespace libmap {
 
-// Whether the bundle adjustment estimates focal lengths and principal points too.
-// automatic: if what was held out fits better then, by more than chance explains.
+// Treatment of focal lengths and principal points in bundle adjustment. automatic: they are
+// estimated if the held-out observations then fit significantly better.
 enum class IntrinsicsMode { fixed, refined, automatic };
 
-// What determines the scale where neither a factor, lengths nor a board are known.
+// Source of the scale if no factor, lengths or board are given.
 enum class ScaleSource { depth, odometry };
 
 struct RefinementOptions {
   StartPoses start = StartPoses::automatic;
-  int rounds = 5;  // >= 0: of loop closures, each on the poses of the last
+  int rounds = 5;  // >= 0: maximum number of rounds of loop closures
   bool bundle = true;
   IntrinsicsMode intrinsics = IntrinsicsMode::automatic;
-  // Name in data/sensors or a path: its noise, useful range, timing and bounds replace what the
-  // other options leave at their defaults. "auto": the noise is estimated.
+  // Name in data/sensors or a path. Its noise, useful range, timing and bounds replace options that
+  // have their default values. "auto": the noise is estimated.
   std::string sensor = "auto";
-  bool correct_depth = true;  // estimate a correction of depth, if what was held out asks for it
+  bool correct_depth = true;  // estimate a depth correction if held-out observations fit better
   FeatureOptions features{};
   VisualOdometryOptions odometry{};
   LoopClosureDetectionOptions closures{};
@@ -56,67 +56,68 @@ struct RefinementOptions {
   ScaleSource scale_from = ScaleSource::depth;
   double scale = 1.0;  // 0.5..2: known factor of poses and depth; 1: none is known
   std::vector<KnownLength> known_lengths{};  // not bound; they determine the scale
-  std::optional<Chessboard> board{};         // not bound; at rest in the scene, does so too
-  bool one_map = false;  // not bound: parts that nothing joins to the largest get no poses
+  std::optional<Chessboard> board{};         // not bound; a static board determines the scale
+  bool one_map = false;  // not bound: no poses for parts without links to the largest part
   std::uint64_t seed = 1;
 };
 void bind(ParameterTable& table, RefinementOptions& options);
 
-// Against true poses, where the scan holds any: for reports only, nothing is fitted to them.
+// Errors against true poses, if the scan contains them; for reports only.
 struct StageError {
   AbsoluteTrajectoryError absolute;
-  TrajectoryError relative;  // from pose to pose
+  TrajectoryError relative;  // between consecutive poses
 };
 
 struct StageReport {
   std::string name{};
   bool rejected = false;
-  RejectionCounts closures{};                       // of this stage
-  HeldOutEvaluation held_out{};                     // of this stage's links and of those before
-  std::map<std::string, LinkGroupResult> groups{};  // of an optimized graph
+  RejectionCounts closures{};                             // of this stage only
+  HeldOutEvaluation held_out{};                           // on the links of all stages so far
+  std::map<std::string, LinkGroupResult> groups{};        // of an optimized pose graph
   std::vector<std::pair<std::string, double>> figures{};  // metrics of the stage
   std::vector<std::string> warnings{};
   std::optional<StageError> error{};
-  std::optional<StageError> rejected_error{};  // of the poses that were given up
+  std::optional<StageError> rejected_error{};  // of the poses of a rejected stage
   double seconds = 0.0;
   double processor_seconds = 0.0;
 };
 
 struct RefinementResult {
-  Trajectory poses;                // by ascending node
-  std::vector<PoseLink> links;     // stored ones as recalibrated, then those found; none rejected
-  std::vector<PoseLink> closures;  // those found, among the links
-  // Of a step of each pose against its component's gauge node, that of the calibration included; in
-  // units of the depth camera, whose own scale error is not.
+  Trajectory poses;                // map from base, by ascending node
+  std::vector<PoseLink> links;     // accepted: stored links as recalibrated, then found links
+  std::vector<PoseLink> closures;  // found links among `links`
+  // Covariance of a step of each pose relative to its component's gauge node, in units of the depth
+  // camera. Includes the uncertainty of the calibration, but not the depth camera's scale error.
   std::map<int, Matrix6d> covariance;
   std::vector<GraphComponent> components;
   std::vector<StageReport> stages;             // "start" first
-  std::vector<std::pair<int, Error>> skipped;  // frames without features and why
+  std::vector<std::pair<int, Error>> skipped;  // nodes of frames without features, with the reason
   std::vector<int> without_pose;
   std::vector<TrackingLoss> losses;  // of visual odometry
   std::vector<int> without_links;
-  std::vector<PoseLink> rejected_links;  // stored ones
+  std::vector<PoseLink> rejected_links;  // stored links that the optimization rejected
   std::size_t features = 0;
   SensorCalibration calibration;      // as estimated
   SensorCalibration deviations;       // BundleAdjustmentResult::deviations
-  std::vector<Camera> cameras;        // of the pictures, as stored
-  std::vector<std::string> findings;  // about the sensor, a sentence each
-  std::string noise;                  // of depth, and its source, a sentence
-  std::string scale;                  // a sentence: what it comes from, and how certain it is
+  std::vector<Camera> cameras;        // of the images, as stored
+  std::vector<std::string> findings;  // about the sensor, one sentence each
+  std::string noise;                  // sentence: depth noise and its source
+  std::string scale;                  // sentence: source and uncertainty of the scale
   std::vector<std::string> warnings;
 };
 void describe(ResultTable& table, const RefinementResult& result);
 
-// Nodes that neither poses nor links place are placed by visual odometry (StartPoses::automatic,
-// visual); those of its parts that nothing joins to the largest one are left out of the poses, for
-// they would lie anywhere. The same bytes for any number of threads. Throws Error: options out of
-// their ranges, poses asked for that the scan has not, no two frames that could be matched where
-// nothing else gives poses, a board that does not determine the scale.
+// Refines the poses of a scan. Visual odometry estimates the poses of nodes that have neither a
+// pose nor links (StartPoses::automatic, visual). Its parts without links to the largest part get
+// no poses, because these would be undetermined. The output bytes do not depend on the number of
+// threads. Throws Error if an option is out of range, the requested poses are missing, no two
+// frames match and nothing else determines poses, the scale is determined twice, or known lengths,
+// board or odometry do not determine it.
 RefinementResult refine_poses(const ScanSource& scan, const RefinementOptions& options = {},
                               Progress& progress = no_progress(), const FeatureCache& cache = {});
 
-// The camera of the scan as estimated, with the findings. Throws Error: the scan has no
-// calibration, or several cameras.
+// Returns the scan's camera as estimated, with the findings. Throws Error if the scan has no
+// calibration or several cameras.
 CameraFile refined_camera(const RefinementResult& result, const ScanSource& scan);
 
 }  // namespace libmap

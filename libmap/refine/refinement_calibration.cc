@@ -13,19 +13,21 @@ namespace libmap {
 namespace {
 
 constexpr std::size_t max_alternatives = 10;
-constexpr double min_rematched_share = 0.9;  // of linked pairs of frames
-// Of a calibration: matches are chosen by the camera that they correct, and what a model does not
-// cover errs alike in all frames. Of timing more, whose motions change within a frame. Measured on
-// simulated scans.
+constexpr double min_rematched_share = 0.9;  // minimum share of linked pairs that match again
+// Factors of the calibration's standard deviations, measured on simulated scans. They are above 1
+// because matches are selected with the uncorrected camera and errors outside the model are
+// correlated between frames. With timing, motions also change within a frame.
 constexpr double calibration_deviation_scale = 1.1;
 constexpr double timing_deviation_scale = 1.4;
-// Of stated delays and times of rows: features of one frame err alike, and all motions have a
-// common factor. Measured on the thirds of a real sequence.
+// Factor of the reported deviations of delays and rolling shutter: errors of features are
+// correlated within a frame, and all motions have a common factor. Measured on the thirds of a real
+// sequence.
 constexpr double stated_timing_scale = 5.0;
-// Of a delay beyond stamps of arrival: they err by more than their jitter. Measured on the same.
+// Deviation of a delay relative to arrival stamps, whose errors exceed their jitter. Measured on
+// that sequence.
 constexpr double stamp_deviation_s = 0.003;
-// Of a registration's shift along the optical axis, which hardly differs from a scale, beyond what
-// the observations say. Measured on simulated scans.
+// Additional deviation of a registration's shift along the optical axis, which is hardly
+// distinguished from a scale. Measured on simulated scans.
 constexpr double axial_deviation_m = 4e-4;
 
 void add_figures(const CalibrationEstimate& estimate, StageReport& report) {
@@ -54,12 +56,12 @@ void add_figures(const CalibrationEstimate& estimate, StageReport& report) {
   }
 }
 
-// What the camera's file says is kept unless the held-out data fit clearly better otherwise:
-// RTAB-Map's own downsampling, for example, shifts images by a fraction of a pixel.
+// The stored camera is kept unless the held-out data fit another one clearly better. For example,
+// RTAB-Map's downsampling shifts images by a fraction of a pixel.
 CalibrationChoice choice_of(const RefinementOptions& options, const SensorCalibration& known) {
   CalibrationChoice choice;
   choice.only_if_better = options.intrinsics != IntrinsicsMode::refined;
-  choice.settle = !known.empty();  // the first calibration begins the next
+  choice.settle = !known.empty();  // the first calibration only initializes the next
   choice.start = known;
   if (known.empty()) {
     choice.parts = {options.intrinsics != IntrinsicsMode::fixed, options.correct_depth,
@@ -71,7 +73,7 @@ CalibrationChoice choice_of(const RefinementOptions& options, const SensorCalibr
   return choice;
 }
 
-// Standard deviation of the scale, by the moves of the poses with the calibration.
+// Standard deviation of the scale from the steps of the poses with the calibration.
 double scale_deviation(const std::map<int, Pose>& poses, const CalibrationMoves& moves_of) {
   Eigen::Vector3d center = Eigen::Vector3d::Zero();
   for (const auto& [node, moves] : moves_of) center += poses.at(node).translation();
@@ -95,13 +97,13 @@ std::optional<ScaleEstimate> odometry_scale(const RefinementInput& input,
                                             const RefinementState& state) {
   std::vector<GraphLinkResult> links;
   if (!input.scan.graph().links.empty()) links = state.results_of_other_links();
-  std::erase_if(links, [&](const GraphLinkResult& link) {  // by depth itself
+  std::erase_if(links, [&](const GraphLinkResult& link) {  // links from depth
     return input.tracked.contains(link.link.from) || input.tracked.contains(link.link.to);
   });
   return scale_by_odometry(links, state.poses);
 }
 
-// Everything that has a scale: positions, depth and links of features.
+// Scales positions, depth and feature links.
 void scale_state(double factor, RefinementState& state) {
   const std::vector<GraphComponent>& components = state.graph.components;
   const int fixed = components.empty() ? state.poses.begin()->first : components.front().gauge_node;
@@ -181,7 +183,6 @@ BlockSystem information_of(const RefinementInput& input, const RefinementState& 
   return std::move(found.information);
 }
 
-// How the poses would move with calibrations one standard deviation away, to first order.
 CalibrationMoves calibration_moves(const RefinementInput& input, const RefinementState& state,
                                    SensorCalibration& deviations) {
   CalibrationMoves moves;
@@ -224,7 +225,7 @@ CalibrationMoves calibration_moves(const RefinementInput& input, const Refinemen
     for (std::size_t n = 0; n < side.size(); ++n) side[n] -= best[n];
     std::size_t row = 0;
     const std::vector<Vector6d> steps = solver.solve(side);
-    // The information is divided by the scale's square, as the covariance is multiplied by it.
+    // `covariances` multiplies the covariance by the square of this scale.
     for (const auto& [node, pose] : state.poses)
       moves[node].emplace_back(deviation / state.deviation_scale * steps[row++]);
   }
@@ -255,21 +256,21 @@ ScaleResult scale_stage(const RefinementInput& input, const RefinementState& sta
     scale = scale_by_board(frames, state.calibration, state.poses, covariance, input.board_views,
                            *options.board);
     result.sentence = "scale " + times(*scale) + " by the board in " +
-                      std::to_string(scale->lengths) + " pictures: corrected";
-    warn_if_apart("pictures of the board", scale->chi_square);
+                      std::to_string(scale->lengths) + " images: corrected";
+    warn_if_apart("images of the board", scale->chi_square);
   } else if (options.scale != 1.0) {
     scale = ScaleEstimate{.factor = options.scale};
     result.sentence = "scale x " + to_text(options.scale) + " as given: corrected";
   } else if (options.scale_from == ScaleSource::odometry) {
     if (!odometry)
-      throw Error("the scan has no links of odometry",
+      throw Error("the scan has no odometry links",
                   {.field = "scale_from", .value = "odometry", .bound = "depth"});
     scale = odometry;
     result.sentence = "scale " + times(*scale) + " by odometry: corrected";
   } else {
-    result.sentence = "scale comes from the depth camera alone";
+    result.sentence = "scale is from the depth camera only";
     if (const double deviation = scale_deviation(state.poses, moves); deviation > 0.0)
-      result.sentence += ", +- " + to_fixed_text(100.0 * deviation, 2) + " % by its calibration";
+      result.sentence += ", +- " + to_fixed_text(100.0 * deviation, 2) + " % from its calibration";
     if (odometry) result.sentence += "; by odometry it is " + times(*odometry);
   }
   if (!scale) return result;
@@ -289,10 +290,10 @@ CameraFile refined_camera(const RefinementResult& result, const ScanSource& scan
         scan.read_frame(pose.node, {.color = false, .depth = false}).cameras;
     if (cameras.empty()) continue;
     if (cameras.size() > 1)
-      throw Error("a calibration is of one camera", {.file = scan.path().string(),
-                                                     .field = "cameras",
-                                                     .value = std::to_string(cameras.size()),
-                                                     .bound = "1"});
+      throw Error("a calibration file has one camera", {.file = scan.path().string(),
+                                                        .field = "cameras",
+                                                        .value = std::to_string(cameras.size()),
+                                                        .bound = "1"});
     CameraFile file = calibrated_camera(cameras.front(), result.cameras.front(), result.calibration,
                                         scan.graph());
     file.findings = result.findings;

@@ -89,7 +89,7 @@ StageResult link_stage(const RefinementInput& input, const RefinementState& stat
   next.feature_links.insert(next.feature_links.end(),
                             std::make_move_iterator(verified.links.begin()),
                             std::make_move_iterator(verified.links.end()));
-  // Parts that new links connect are in one frame before the graph is optimized.
+  // Newly connected parts must be in one frame before the graph is optimized.
   if (next.parts.size() > 1) next.parts = join_parts(next.poses, next.parts, links);
   input.progress.begin("pose graph", 0);
   next.graph = optimize_pose_graph(next.poses, all_links(next), options.graph);
@@ -197,7 +197,7 @@ StageResult surface_stage(const RefinementInput& input, const RefinementState& s
   next.surface_pairs = std::move(aligned.frame_pairs);
   next.surface_distance_m = aligned.max_distance_m;
   next.deviation_scale = aligned.deviation_scale;
-  // Motions have been estimated together with the poses before.
+  // Motions were estimated for the former poses.
   if (!next.calibration.timing.empty()) {
     const std::vector<GraphLinkResult> others = next.results_of_other_links();
     find_motions(calibration_input(input, next, others), true, next.calibration);

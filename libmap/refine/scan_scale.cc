@@ -27,7 +27,7 @@ std::optional<KnownLength::Place> parse_place(std::string_view text) {
 
 struct MeasuredPlace {
   Eigen::Vector3d in_map = Eigen::Vector3d::Zero();
-  double variance = 0.0;  // in each direction
+  double variance = 0.0;  // per axis, in m2
 };
 
 [[noreturn]] void refuse(const KnownLength::Place& place, const std::string& reason,
@@ -56,13 +56,13 @@ MeasuredPlace measured_place(const KnownLength::Place& place,
   const auto ray = pixel_to_ray(camera, place.pixel);
   if (!ray || place.pixel.x() < 0.0 || place.pixel.y() < 0.0 ||
       place.pixel.x() > camera.width - 1.0 || place.pixel.y() > camera.height - 1.0)
-    refuse(place, "its pixel is outside the picture",
+    refuse(place, "its pixel is outside the image",
            "0:0 to " + std::to_string(camera.width - 1) + ":" + std::to_string(camera.height - 1));
   SurfacePatch element;
   if (frame.surfaces.empty() ||
       !frame.surfaces.front().seen_at(guessed_depth_m * ray->homogeneous(), element))
     refuse(place, "no depth was measured there", "a pixel on a surface");
-  // Where the ray meets the plane through the nearest element.
+  // Intersects the ray with the plane of the nearest element.
   const double depth = element.normal.dot(element.point) / element.normal.dot(ray->homogeneous());
   if (!(depth > 0.0)) refuse(place, "no depth was measured there", "a pixel on a surface");
   frame.features.push_back({ray->cast<float>(), static_cast<float>(depth), 0.0F, 0.0F, 0});
@@ -83,9 +83,9 @@ KnownLength parse_known_length(const std::string& text) {
     const auto length = parse_double(std::string_view(text).substr(equals + 1));
     if (from && to && length && *length > 0.0 && *length < 1e6) return {*from, *to, *length};
   }
-  throw Error("is no known length", {.field = "known length",
-                                     .value = text,
-                                     .bound = "NODE:X:Y-NODE:X:Y=METERS with METERS > 0"});
+  throw Error("is not a known length", {.field = "known length",
+                                        .value = text,
+                                        .bound = "NODE:X:Y-NODE:X:Y=METERS with METERS > 0"});
 }
 
 void check_known_lengths(const std::vector<FrameFeatures>& frames,
@@ -108,7 +108,7 @@ ScaleEstimate scale_by_lengths(const std::vector<FrameFeatures>& frames,
     const double distance = (to.in_map - from.in_map).norm();
     const double deviation = std::sqrt(from.variance + to.variance);
     if (!(distance > 3.0 * deviation))
-      refuse(known.to, "its distance from the other place is not more than the noise",
+      refuse(known.to, "its distance from the other end is within the noise",
              "> " + to_fixed_text(3e3 * deviation, 1) + " mm");
     const double ratio = known.length_m / distance;
     const double weight = std::pow(distance / (ratio * deviation), 2);

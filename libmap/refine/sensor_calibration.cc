@@ -16,7 +16,7 @@ namespace libmap {
 
 namespace {
 
-// A part of a scan as a scan of its own.
+// A subset of the frames of a scan, with its links and tracks.
 struct SubScan {
   std::vector<FrameFeatures> frames;
   std::vector<FeatureLink> links;
@@ -27,12 +27,12 @@ struct SubScan {
 };
 
 constexpr std::size_t max_frames = 80;
-// Frames that follow each other determine motions, runs that are far apart in time views.
+// Consecutive frames determine motions; runs that are far apart in time show different views.
 constexpr std::size_t frames_a_run = 10;
-constexpr std::size_t min_run_links = 10;  // to the runs that are taken already
+constexpr std::size_t min_run_links = 10;  // to the selected runs
 
-// Runs of consecutive frames: the one with most links, then those that are farthest in time from
-// all taken ones and are linked to them, at last those with most links to them.
+// Selects runs of consecutive frames: first the run with most links, then runs that are linked to
+// the selected ones and farthest from them in time, last the runs with most links to them.
 std::set<std::size_t> joined_frames(std::size_t frames, const std::vector<FeatureLink>& links) {
   const std::size_t length = frames <= max_frames ? 1 : frames_a_run;
   const std::size_t runs = (frames + length - 1) / length;
@@ -119,22 +119,22 @@ BundleAdjustmentOptions with_free(const CalibrationParts& parts, BundleAdjustmen
 }
 
 constexpr int max_rounds = 4;
-// Motions are found in windows of frames that follow each other.
+// Motions are estimated in windows of consecutive frames.
 constexpr std::size_t frames_a_window = 64;
-constexpr std::size_t frames_beside = 8;    // before and after: their motions are not taken
-constexpr double max_interpolated_s = 1.0;  // over which motions are interpolated
-constexpr int motion_rounds = 2;            // planes are met elsewhere with other motions
-// Of the costs of what was held out: faults of a sensor change them by tens of percent. A part that
-// gains less absorbs what others leave, and what it is correlated with drifts.
+constexpr std::size_t frames_beside = 8;    // margin on each side, whose motions are not used
+constexpr double max_interpolated_s = 1.0;  // maximum gap for interpolating motions
+constexpr int motion_rounds = 2;            // other motions hit other points of the depth planes
+// Minimum relative gain in the held-out costs; faults of a sensor change them by tens of percent. A
+// part with a smaller gain absorbs errors of other parts, and correlated parameters drift.
 constexpr double min_gain = 0.002;
 constexpr double min_whole_gain = 0.005;  // of all parts together
-// A late depth image of a steady motion is a shifted one.
+// With constant motion, a delay of depth is hard to distinguish from a shift.
 constexpr double min_timing_gain = 0.02;
-// Of adjustments that are compared or begin the next one. Standard errors of the held-out data are
-// larger than what the last steps change.
+// Tolerance of adjustments that are compared or initialize the next one. The last iterations change
+// less than the standard errors of the held-out data.
 constexpr double rough_tolerance = 1e-4;
 
-// How what was held out fits with a model.
+// A calibration model and its fit to the held-out data.
 struct Candidate {
   CalibrationParts model;
   BundleAdjustmentResult adjustment;
@@ -148,7 +148,7 @@ Candidate try_model(const CalibrationParts& model, const SubScan& part,
   const BundleAdjustmentOptions free = with_free(model, options);
   Candidate candidate;
   candidate.model = model;
-  // Other planes are met when depth is taken from elsewhere: once more from there.
+  // A changed registration or timing hits other depth planes, so the adjustment is repeated.
   for (int round = 0; round < rounds; ++round) {
     candidate.adjustment = adjust_bundle(part.frames, part.tracks.tracks, poses, part.graph_links,
                                          part.components, free, {}, start);
@@ -164,7 +164,7 @@ Candidate try_model(const CalibrationParts& model, const SubScan& part,
   return candidate;
 }
 
-// Of frames without a motion, from those before and after.
+// Interpolates the motions of frames without one from the frames before and after.
 void interpolate_motions(const std::vector<FrameFeatures>& frames,
                          std::map<int, Vector6d>& motions) {
   std::map<double, Vector6d> known;
@@ -181,8 +181,8 @@ void interpolate_motions(const std::vector<FrameFeatures>& frames,
   }
 }
 
-// Of frames that a calibration does not rest on, those of the known one. The product of motion and
-// time stays, since nothing else is seen of them.
+// Adds the known motions of frames that the calibration did not use. They are scaled so that the
+// product of motion and time is unchanged, because only the product is observable.
 void add_other_motions(const SensorCalibration& known, SensorCalibration& calibration) {
   if (calibration.timing.empty()) return;
   const auto time_of = [&](const SensorCalibration& of) {
@@ -196,14 +196,14 @@ void add_other_motions(const SensorCalibration& known, SensorCalibration& calibr
   for (const auto& [node, motion] : known.motion) calibration.motion.emplace(node, share * motion);
 }
 
-// Whether what is free in the one model more is clearly worth it.
+// Returns true if the additional free parameters improve the held-out fit clearly.
 bool is_needed(const HeldOutCosts& without, const HeldOutCosts& with, double gain = min_gain) {
   const HeldOutEvaluation change = evaluate_held_out(without, with);
   return !change.is_worse() &&
          change.change() < -std::max(2.0 * change.deviation(), gain * change.before());
 }
 
-// The simplest model that fits.
+// Finds the simplest model that fits.
 class ModelSearch {
  public:
   ModelSearch(const SubScan& part, const BundleAdjustmentOptions& options,
@@ -230,7 +230,7 @@ class ModelSearch {
     }
     return candidate;
   }
-  // One round is enough for a comparison: planes are met where the best meets them.
+  // One round is enough for a comparison, because it begins at the best model.
   Candidate attempt_from_best(const CalibrationParts& model, int rounds) {
     return attempt(model, best_.adjustment.calibration, best_.adjustment.map_from_base, rounds);
   }
@@ -260,11 +260,11 @@ bool ModelSearch::is_good(const Candidate& candidate) const {
               : !change.is_worse());
 }
 
-// Unless what it leaves out is needed.
+// Takes the simpler model unless the dropped parts are needed.
 void ModelSearch::simplify_to(const CalibrationParts& simpler) {
   if (!is_good(best_) || simpler.name().empty() || simpler == best_.model) return;
   Candidate candidate = attempt_from_best(simpler, 1);
-  // Motions leave errors that what is not at fault would absorb.
+  // Residual errors of motions would be absorbed by correct parts.
   const double gain = best_.model.timing ? min_timing_gain : min_gain;
   if (is_good(candidate) && !is_needed(candidate.costs, best_.costs, gain))
     best_ = std::move(candidate);
@@ -286,8 +286,8 @@ void ModelSearch::settle_motions() {
   if (is_good(settled)) best_ = std::move(settled);
 }
 
-// Timing alone: a correction of depth also fits what late depth and rows of pictures distort.
-// Returns whether everything else together with it is not clearly better.
+// Tries timing alone, because a depth correction also fits distortions by late depth and a rolling
+// shutter. Returns true if timing fits and all parts together are not clearly better.
 bool ModelSearch::is_timing_enough(const CalibrationParts& others) {
   timed_ = attempt({.timing = true}, {}, part_.poses, max_rounds - 1);
   const HeldOutEvaluation change = evaluate_held_out(before_, timed_->costs);
@@ -303,14 +303,14 @@ bool ModelSearch::is_timing_enough(const CalibrationParts& others) {
   return !is_good(candidate) || !is_needed(timed_->costs, candidate.costs);
 }
 
-// The motions need more rounds than a comparison.
+// Takes timing alone as the model. Motions need more rounds than a comparison.
 void ModelSearch::use_timing_alone() {
   best_ = std::move(*timed_);
   settle_motions();
 }
 
 void ModelSearch::try_timing() {
-  if (!is_good(best_)) return;  // alone it has been tried
+  if (!is_good(best_)) return;  // timing alone was tried before
   CalibrationParts timed = best_.model;
   timed.timing = true;
   Candidate candidate = attempt_from_best(timed, 1);
@@ -328,7 +328,7 @@ CalibrationEstimate ModelSearch::run() {
     use_timing_alone();
   } else {
     best_ = attempt(all, choice_.start, part_.poses, max_rounds);
-    // Too much freedom for little data may hide what intrinsics alone explain.
+    // With little data, too many free parameters may fit worse than intrinsics alone.
     if (!is_good(best_) && choice_.leave_out && all.intrinsics && (all.depth || all.registration))
       best_ = attempt({.intrinsics = true}, {}, part_.poses, 1);
     leave_out();
@@ -442,7 +442,7 @@ CameraFile calibrated_camera(const Camera& stored, const Camera& picture,
                              const SensorCalibration& calibration, const PoseGraph& graph) {
   CameraFile file{.camera = stored};
   if (!calibration.intrinsics.empty()) {
-    // Estimated in pixels of the pictures, which may be smaller than the stored camera's.
+    // The step is in pixels of the images, which may be smaller than the stored camera's.
     IntrinsicsStep step = calibration.intrinsics.front();
     step.cx_px *= static_cast<double>(stored.width) / picture.width;
     step.cy_px *= static_cast<double>(stored.height) / picture.height;
@@ -516,7 +516,7 @@ std::vector<std::string> findings(const SensorCalibration& calibration,
     sentences.push_back(of_camera(n) + "depth taken " + to_fixed_text(std::abs(delay_ms), 1) +
                         within(&CameraTiming::depth_delay_s) + " ms " +
                         (delay_ms < 0.0 ? "before" : "after") +
-                        " color, rows of a picture exposed over " +
+                        " color, rows of an image exposed over " +
                         to_fixed_text(1e3 * timing.rolling_shutter_s, 1) +
                         within(&CameraTiming::rolling_shutter_s) + " ms: corrected");
   }

@@ -1,5 +1,5 @@
-// Focal lengths, principal points, depth corrections, registration of depth to color and timing of
-// a scan's cameras from the scan itself.
+// Self-calibration of a scan's cameras: focal lengths, principal points, depth corrections,
+// registration of depth to color, and timing.
 #pragma once
 
 #include <cstddef>
@@ -15,17 +15,17 @@
 
 namespace libmap {
 
-// What a calibration is estimated from.
+// Data that a calibration is estimated from.
 struct CalibrationInput {
   const std::vector<FrameFeatures>& frames;  // with the stored cameras
   const std::vector<FeatureLink>& links;
   const std::map<int, Pose>& map_from_base;
-  const std::vector<GraphLinkResult>& graph_links;  // other links than those of features
+  const std::vector<GraphLinkResult>& graph_links;  // links that are not from features
   const std::vector<GraphComponent>& components;
   BundleAdjustmentOptions options;
 };
 
-// Parts of a calibration: which are estimated.
+// Parts of a calibration, true for those that are estimated.
 struct CalibrationParts {
   bool intrinsics = false;
   bool depth = false;
@@ -35,54 +35,53 @@ struct CalibrationParts {
   bool operator==(const CalibrationParts&) const = default;
   std::string name() const;  // "intrinsics_depth"; empty for none
 };
-// The parts that a calibration has.
+// Returns the parts that the calibration contains.
 CalibrationParts parts_of(const SensorCalibration& calibration);
 
 struct CalibrationChoice {
-  CalibrationParts parts{true, true, true, true};  // that may be estimated
-  bool only_if_better = true;                      // if the held-out data fit clearly better
-  bool leave_out = true;                           // drop parts that are not needed
-  bool settle = true;       // the best to the tolerance of the options, not only as far as models
-                            // are compared
-  SensorCalibration start;  // where the search for registration and timing begins
+  CalibrationParts parts{true, true, true, true};  // parts that may be estimated
+  bool only_if_better = true;  // require that the held-out data fit clearly better
+  bool leave_out = true;       // drop parts that are not needed
+  bool settle = true;          // iterate the best model to the tolerance of the options
+  SensorCalibration start;     // initial values of registration and timing
 };
 
 struct CalibrationEstimate {
-  std::size_t frames = 0;             // that it rests on
-  SensorCalibration calibration;      // empty: what is stored stays
-  BundleAdjustmentResult adjustment;  // of those frames, with the best tried; without information
-  HeldOutEvaluation held_out;         // of those frames: as they were, and with the best model
-  std::vector<std::pair<std::string, HeldOutEvaluation>> tried;  // the same of each model
+  std::size_t frames = 0;             // number of frames used
+  SensorCalibration calibration;      // empty: the stored calibration remains
+  BundleAdjustmentResult adjustment;  // of these frames, best model; without information
+  HeldOutEvaluation held_out;         // of these frames: stored calibration against best model
+  std::vector<std::pair<std::string, HeldOutEvaluation>> tried;  // held_out of each model
   std::vector<std::pair<std::string, std::string>> impossible;   // models, and their exceeded bound
 };
 
-// Bundle adjustments with free intrinsics, depth corrections and registration of depth to color,
-// all together at first, since a false focal length absorbs errors of depth. If that fits the
-// held-out data clearly better, each of them is left out again unless the fit becomes clearly
-// worse; if not, intrinsics alone are tried. Timing needs a motion for each frame, so it is tried
-// last. A long scan is represented by the 80 frames that links join most closely to the one with
-// most links: more frames do not improve the estimate.
+// Selects a calibration by bundle adjustments. Timing alone is tried first; it is the result if the
+// other parts do not clearly improve the fit. Otherwise intrinsics, depth corrections and
+// registration are estimated together, because a false focal length absorbs depth errors. Each is
+// then dropped unless the held-out data fit clearly worse without it. If the joint model does not
+// fit clearly better, intrinsics alone are tried. Timing is then tried with the rest. A long scan
+// is represented by 80 linked frames. Throws Error if an option is out of range.
 CalibrationEstimate estimate_calibration(const CalibrationInput& input,
                                          const CalibrationChoice& choice);
 
-// Repeats the calibration `known` from its values, with `count` alternatives.
+// Repeats the calibration from the values of `known`, with `count` alternatives.
 BundleAdjustmentResult vary_calibration(const CalibrationInput& input,
                                         const SensorCalibration& known, std::size_t count);
 
-// The motions of all frames with a pose at the timing of a calibration, in place of those of the
-// frames that it rests on. The rest of the calibration stays.
+// Replaces the motions in `calibration` by motions of all frames with a pose, estimated at its
+// timing. `hold_poses` fixes the poses during the estimate. The rest of `calibration` is unchanged.
 void find_motions(const CalibrationInput& input, bool hold_poses, SensorCalibration& calibration);
 
-// Whether registrations and timings of all cameras differ by no more than this.
+// Returns true if registrations and timings of all cameras differ by at most these bounds.
 bool takes_depth_from_near(const SensorCalibration& a, const SensorCalibration& b, double shift_m,
                            double turn_rad, double time_s);
 
-// The first camera with the calibration, for a file; `picture` is the camera of its pictures,
-// `graph` has the stamps of the nodes.
+// Returns the first camera with the calibration applied, for a file. `picture` is the camera of its
+// images; `graph` contains the time stamps of the nodes.
 CameraFile calibrated_camera(const Camera& stored, const Camera& picture,
                              const SensorCalibration& calibration, const PoseGraph& graph);
 
-// One sentence for each thing that was found wrong and corrected; `deviations` as
+// Returns one sentence per fault that was corrected; `deviations` are
 // BundleAdjustmentResult::deviations.
 std::vector<std::string> findings(const SensorCalibration& calibration,
                                   const SensorCalibration& deviations,

@@ -16,14 +16,14 @@ namespace libmap {
 namespace {
 
 constexpr std::size_t none = static_cast<std::size_t>(-1);
-constexpr std::size_t longest_gap = 4;      // frames that one match alone may bridge
-constexpr std::size_t longest_run = 16;     // pairs that are verified at once
-constexpr double motion_agreement_m = 0.1;  // of two motions to one place
+constexpr std::size_t longest_gap = 4;      // maximum gap in frames that one match may bridge
+constexpr std::size_t longest_run = 16;     // maximum number of pairs verified at once
+constexpr double motion_agreement_m = 0.1;  // between two motions to one frame
 constexpr double motion_agreement_rad = 5.0 * std::numbers::pi / 180.0;
 
-constexpr double max_extrapolation = 2.0;  // of the last motion
+constexpr double max_extrapolation = 2.0;  // in lengths of the last motion
 
-constexpr double min_factor = 1e-3;  // of variances: rounding, where nothing is noisy
+constexpr double min_factor = 1e-3;  // minimum variance factor, for data without noise
 
 struct Trial {
   RejectionCounts counts{};
@@ -33,26 +33,26 @@ struct Trial {
 std::string reason_of(const RejectionCounts& counts) {
   if (counts.too_few_matches > 0) return "too few matches";
   if (counts.too_few_inliers > 0) return "too few matches agree on a motion";
-  if (counts.narrow > 0) return "its matches lie on one spot of the picture";
+  if (counts.narrow > 0) return "its matches cover too little of the image";
   return "its motion did not converge";
 }
 
-// The link with the noise that its matches show in place of the one that their features claim: the
-// variance factor a posteriori, sum of chi-squares over their freedom.
+// Scales the link's covariance by the a posteriori variance factor of its matches: the sum of
+// chi-squares divided by the degrees of freedom.
 void calibrate(const FrameFeatures& a, const FrameFeatures& b, FeatureLink& link) {
   double squares = 0.0;
   for (const FeatureMatch& match : link.matches)
     squares += match_residual(a, b, match, link.link.from_from_to).chi_square();
   const double freedom = 3.0 * static_cast<double>(link.matches.size()) - 6.0;
   const double factor = std::max(min_factor, squares / freedom);
-  // What the estimate has been divided by already.
+  // The estimate was already divided by this factor.
   link.link.information *= std::max(1.0, link.chi_square_per_freedom) / factor;
 }
 
-// A frame seen again from another one.
+// A relocalization candidate: a lost frame matched with an earlier one.
 struct Sighting {
-  std::size_t frame = none;  // the earlier one
-  Pose map_from_base;        // of the frame that is found, in the other's part
+  std::size_t frame = none;  // the earlier frame
+  Pose map_from_base;        // pose of the lost frame in the earlier frame's part
   std::size_t inliers = 0;
 };
 
@@ -108,18 +108,18 @@ class Tracker {
   std::vector<Pose> pose_;
   std::vector<std::size_t> part_;
   std::vector<bool> known_;
-  std::map<int, std::size_t> known_part_;            // by node, with a frame or without
+  std::map<int, std::size_t> known_part_;            // by node, also for nodes without a frame
   std::set<std::size_t> fixed_;                      // parts with known poses
-  std::set<std::size_t> loose_;                      // parts that began beside others
-  std::map<std::size_t, std::size_t> loss_of_part_;  // with which a part began
+  std::set<std::size_t> loose_;                      // parts without a known relation to others
+  std::map<std::size_t, std::size_t> loss_of_part_;  // index of the loss that began a part
   std::size_t parts_ = 0;
   std::map<FramePair, Trial> trials_;
   std::vector<std::vector<SimilarFrame>> similar_;
   std::size_t key_ = none;      // key frame
-  std::size_t last_ = none;     // the frame tracked last
-  std::size_t before_ = none;   // the frame tracked before it
-  std::size_t earlier_ = none;  // last frame before the way was lost
-  std::size_t key_run_ = 0;     // key frames that followed each other
+  std::size_t last_ = none;     // last tracked frame
+  std::size_t before_ = none;   // frame tracked before last_
+  std::size_t earlier_ = none;  // last frame before the tracking loss
+  std::size_t key_run_ = 0;     // number of consecutive key frames
   VisualOdometryResult result_;
 };
 
@@ -158,8 +158,8 @@ const Trial& Tracker::trial(std::size_t a, std::size_t b) {
   return trials_.at(pair);
 }
 
-// With the pairs that are likely to be asked for next, so that threads have work: frames go on
-// being key frames, or being bound to one, about as long as they have been.
+// Also computes the pairs that are probably needed next, so that all threads have work. Runs of key
+// frames, or of frames tracked against one key frame, are assumed to double in length.
 const Trial& Tracker::trial_ahead(std::size_t key, std::size_t frame) {
   if (const auto known = trials_.find({key, frame}); known != trials_.end()) return known->second;
   const bool fresh_key = key + 1 == frame;
@@ -197,7 +197,7 @@ void Tracker::begin_part(std::size_t frame) {
   if (is_usable(frame) && last_ != none) loose_.insert(part_[frame]);
 }
 
-// Carries a part into the frame of another; false if both hold known poses.
+// Moves a part into the frame of another; returns false if both have known poses.
 bool Tracker::move_part(std::size_t from, std::size_t onto, const Pose& onto_from_from) {
   Pose move = onto_from_from;
   if (is_fixed(from)) {
@@ -213,7 +213,7 @@ bool Tracker::move_part(std::size_t from, std::size_t onto, const Pose& onto_fro
   return true;
 }
 
-// Frames before one that is known may have a way of their own.
+// Passes a frame with a known pose; frames before it may be another part.
 void Tracker::pass_known(std::size_t frame) {
   if (!is_usable(frame)) return;
   if (last_ != none && !is_fixed(part_[last_]) && session_of(last_) == session_of(frame) &&
@@ -245,7 +245,7 @@ void Tracker::place(std::size_t frame, std::size_t reference, const FeatureLink&
 bool Tracker::track(std::size_t frame) {
   for (const std::size_t reference : {key_, last_, earlier_}) {
     if (reference == none) continue;
-    // A key frame holds for as long as frames are tracked.
+    // The gap counts from the last tracked frame, not from the key frame.
     if (frame - (reference == earlier_ ? earlier_ : last_) > longest_gap) continue;
     const Trial& tried = reference == key_ ? trial_ahead(key_, frame) : trial(reference, frame);
     if (!tried.link) continue;
@@ -256,7 +256,7 @@ bool Tracker::track(std::size_t frame) {
   return false;
 }
 
-// A blurred picture has few features, its depth is as good as ever.
+// Tracks by depth, because motion blur reduces features but not depth.
 bool Tracker::track_by_depth(std::size_t frame) {
   if (last_ == none || frame - last_ > longest_gap || session_of(last_) != session_of(frame))
     return false;
@@ -295,15 +295,15 @@ std::vector<std::size_t> Tracker::candidates_of(std::size_t frame) {
   };
   for (const SimilarFrame& other : similar_[frame])
     if (candidates.size() < wanted) add(other.frame);
-  // Where the way was lost, whatever it looks like.
+  // Frames around the tracking loss are candidates even if they are not similar.
   for (const std::size_t before : {key_, last_, earlier_})
     for (std::size_t back = 0; back < 3; ++back)
       if (before != none && before >= back) add(before - back);
   return candidates;
 }
 
-// The frame, and the part that it belongs to, carried to where two earlier frames of another part
-// see it alike.
+// Moves the frame and its part to the pose that two earlier frames of another part agree on.
+// Returns false if no two agree.
 bool Tracker::relocalize(std::size_t frame) {
   std::vector<FramePair> pairs;
   const std::vector<std::size_t> candidates = candidates_of(frame);
@@ -321,7 +321,7 @@ bool Tracker::relocalize(std::size_t frame) {
            is_near(a.map_from_base, b.map_from_base, motion_agreement_m, motion_agreement_rad);
   };
   const Sighting* best = nullptr;
-  std::pair<std::size_t, std::size_t> most{1, 0};  // sightings that agree, inliers
+  std::pair<std::size_t, std::size_t> most{1, 0};  // agreeing sightings, inliers
   for (const Sighting& sighting : sightings) {
     const auto votes = static_cast<std::size_t>(
         std::count_if(sightings.begin(), sightings.end(),
@@ -355,7 +355,7 @@ void Tracker::lose(std::size_t frame, std::size_t reference, std::string reason)
       {frames_[frame].node, reference == none ? 0 : frames_[reference].node, std::move(reason)});
 }
 
-// What the part began with is no longer lost.
+// Marks the loss that began the part as found again.
 void Tracker::find_lost(std::size_t part, std::size_t frame, std::size_t at) {
   const auto loss = loss_of_part_.find(part);
   if (loss == loss_of_part_.end()) return;
@@ -381,7 +381,7 @@ VisualOdometryResult Tracker::finish() {
                            result_.key_frames.end());
   std::set<FramePair> linked;
   for (const FeatureLink& link : result_.links) linked.insert(link.frames);
-  // Motions that were found but not confirmed may be confirmed later.
+  // Unconfirmed motions may be confirmed later and are not in `tried`.
   for (const auto& [pair, tried] : trials_)
     if (!tried.link || linked.contains(pair)) result_.tried.insert(pair);
   return std::move(result_);
@@ -403,7 +403,7 @@ VisualOdometryResult Tracker::run(Progress& progress) {
     }
     const bool begins = key_ == none || session_of(key_) != session_of(f);
     if (!begins && track(f)) {
-      // A part for itself looks for the others at each key frame.
+      // A separate part tries to relocalize at each key frame.
       if (key_ == f && loose_.contains(part_[f])) relocalize(f);
       continue;
     }
@@ -411,7 +411,8 @@ VisualOdometryResult Tracker::run(Progress& progress) {
     if (!begins) {
       loss_of_part_[none] = result_.losses.size();  // until the frame is in a part
       lose(f, key_,
-           f - last_ > longest_gap ? "no frame before it" : reason_of(trial(key_, f).counts));
+           f - last_ > longest_gap ? "no tracked frame before it"
+                                   : reason_of(trial(key_, f).counts));
     }
     if (!relocalize(f)) {
       if (earlier_ == none && !begins) earlier_ = last_;
@@ -430,13 +431,13 @@ VisualOdometryResult Tracker::run(Progress& progress) {
 
 void bind(ParameterTable& table, VisualOdometryOptions& options) {
   table.add("keyframe_inliers", options.keyframe_inliers, not_negative,
-            "visual odometry: matches below which a frame becomes the next key frame");
+            "visual odometry: a frame with fewer matches becomes the next key frame");
   table.add("keyframe_distance_m", options.keyframe_distance_m, positive,
-            "way from the key frame beyond which it does");
+            "maximum distance of a frame from its key frame");
   table.add("keyframe_angle_deg", options.keyframe_angle_deg, positive,
-            "turn from the key frame beyond which it does");
+            "maximum rotation of a frame from its key frame");
   table.add("relocalization_candidates", options.relocalization_candidates, not_negative,
-            "earlier frames, by appearance, that a lost one is compared with");
+            "number of similar earlier frames that a lost frame is compared with");
 }
 
 VisualOdometryResult track_frames(const std::vector<FrameFeatures>& frames,

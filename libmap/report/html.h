@@ -1,4 +1,4 @@
-// The parts of a report as HTML: escaped text, tables, manifests, 3-D views.
+// Generates the parts of a report as HTML: escaped text, tables, manifests, 3-D views.
 #pragma once
 
 #include <cstddef>
@@ -10,86 +10,85 @@
 
 namespace libmap {
 
-// Text as it may stand between tags and in quoted attributes: & < > " ' escaped, control characters
-// other than tab and newline replaced by U+FFFD.
+// Escapes text for elements and quoted attributes: & < > " ' are escaped, control characters other
+// than tab and newline are replaced by U+FFFD.
 std::string escape_html(std::string_view text);
 
-// The same of a name: it may be broken after '_', '/' and '.'.
+// Escapes a name and allows line breaks after '_', '/' and '.'.
 std::string breakable_html(std::string_view name);
 
-// JSON as it may stand in a <script>: every '<' as \u003c.
+// Escapes JSON for a <script> element: every '<' becomes \u003c.
 std::string escape_json_in_script(std::string json);
 
-// A script or style sheet as it may stand between its tags: "</script", "</style" and "<!--" are
-// broken up, carriage returns left out, so that the bytes are those that a browser hashes.
+// Escapes a script or style sheet for its element: "</script", "</style" and "<!--" are escaped.
+// Removes carriage returns, so that the bytes are those that a browser hashes.
 std::string escape_code(std::string_view code);
 
-// RFC 4648, section 4.
+// Base64 by RFC 4648, section 4. Throws Error for 1 GiB or more.
 std::string to_base64(std::string_view bytes);
 
-// "'sha256-...'" of `code`, as a Content-Security-Policy names it.
+// Hash source of `code` for a Content-Security-Policy: "'sha256-...'".
 std::string csp_hash(std::string_view code);
 
-// ` name="value"`, or nothing if the value is empty.
+// HTML attribute ` name="value"`; empty if the value is empty.
 std::string attribute(std::string_view name, std::string_view value);
 
 // Format of the numbers of a column.
 struct NumberStyle {
   bool numeric = false;   // every cell is empty or a number
-  int decimals = 0;       // behind the point, the same in all cells
-  bool as_given = false;  // whole numbers, and what fits no common number of decimals
+  int decimals = 0;       // common to all cells; -1: three significant digits each
+  bool as_given = false;  // show cells unchanged: integers only
 };
 
-// Three decimals at most: the longest cell of a column says how many. Columns whose largest value
-// is smaller than 0.01 keep three significant digits each.
+// Format of a column: the maximum number of decimals of its cells, at most three. Columns whose
+// largest value is smaller than 0.01 or at least 1e9 have three significant digits.
 NumberStyle number_style(const std::vector<std::string>& cells);
 
-// A cell as it is shown: "0.98214889" as "0.982".
+// Formats a cell, e.g. "0.98214889" as "0.982".
 std::string shown_number(const std::string& cell, const NumberStyle& style);
 
-// Three significant digits, e.g. of seconds or of a value alone.
+// Formats a number with three significant digits; integers below 1e9 completely.
 std::string short_number(double value);
 
 struct CellText {
   std::string text;
-  std::string title;  // the full value, if it is more than the text
+  std::string title;  // full value if it differs from the text
 };
 
-// <td> with the class "number" if it is one.
+// <td> element, with the class "number" if `numeric`.
 std::string cell_html(const CellText& cell, bool numeric);
 
-// <table> of all rows, the first column as the heads of the rows. Rows after the first 40 are
-// folded away, unless `row_attribute` is given: each row then has an attribute of that name with
-// its number.
+// <table> element; the first column contains the row headers. Rows after the first 40 are folded
+// unless `row_attribute` is set: each row then has an attribute of that name with its index.
 std::string table_html(const ReportTable& table, const std::string& row_attribute = {});
 
-// A box that scrolls by itself, named for screen readers.
+// A scrollable box, named for screen readers.
 std::string scroll_box(const std::string& table, const std::string& name);
 
-// Parameters, inputs and results of one output as lists. For several outputs, differing values side
-// by side, then the values that are equal in all.
+// Parameters, inputs and results of one output as tables. For several outputs: a table of differing
+// values with one column per output, then the common values.
 std::string parameters_html(const ReportParameters& parameters);
 
-// All outputs of a run, each folded: command, parameters, results and inputs.
+// Command, parameters, results and inputs of all outputs of a run, each folded.
 std::string sources_html(const ReportContent& content);
 
-// Milliseconds of each step and case, with sums per command and in total.
+// Milliseconds per step and case, with sums per command and in total.
 std::string timings_html(const TimingTable& table);
 
-// Legend, picture, canvas, looked-up points and data. Canvas and data only if `with_view`. `still`
-// is the picture that replaces the view, as <img>, or empty.
+// Legend, still image, canvas, look-ups and data of a map; canvas and data only if `with_view`.
+// `still` is an <img> element that replaces the view, or empty.
 std::string map_html(const ReportMap& map, const std::string& still, bool with_view);
 
-// Colors of the classes and flags, for the page's script.
+// Colors of classes and flags, for the page's script.
 std::string palette_json();
 
-// Rules of the legend's swatches, a class each.
+// CSS rules of the legend's swatches, one class per color.
 std::string palette_style();
 
-// Legend, canvas and data. Canvas and data only if `with_view`.
+// Legend, canvas and data of a scene; canvas and data only if `with_view`.
 std::string scene_html(const ReportScene& scene, bool with_view);
 
-// Approximate number of bytes that the mesh takes in the page.
+// Approximate number of bytes of the mesh in the page.
 std::size_t scene_bytes(const TriangleMesh& mesh);
 
 }  // namespace libmap

@@ -79,7 +79,7 @@ std::string manifest_html(const Manifest& manifest) {
          pair_table("Results", manifest.results) + inputs_table(manifest.inputs);
 }
 
-// Command, version, parameters and results under one name each.
+// Command, version, parameters and results; each name occurs once.
 Values all_values(const Manifest& manifest) {
   Values values = {{"command", manifest.command}, {"version", manifest.version}};
   values.insert(values.end(), manifest.parameters.begin(), manifest.parameters.end());
@@ -91,7 +91,7 @@ Values all_values(const Manifest& manifest) {
 }
 
 std::string side_by_side(const ReportParameters& parameters) {
-  // By name, in the order in which the names first appear: what each manifest says, if anything.
+  // Values of all manifests by name, in order of appearance; nullopt if a manifest has no value.
   using Cells = std::vector<std::optional<ManifestValue>>;
   std::vector<std::pair<std::string, Cells>> rows;
   std::unordered_map<std::string, std::size_t> row_of;
@@ -119,10 +119,10 @@ std::string side_by_side(const ReportParameters& parameters) {
   for (const auto& [head, manifest] : parameters.outputs)
     html += "<th scope=\"col\" class=\"number\">" + breakable_html(head) + "</th>";
   html += "</tr></thead><tbody>\n" + differ + "</tbody></table>\n";
-  html = differ.empty() ? "" : scroll_box(html, "What differs");
-  return html + "<details class=\"more\"><summary>The same in all " +
+  html = differ.empty() ? "" : scroll_box(html, "Differences");
+  return html + "<details class=\"more\"><summary>Equal in all " +
          std::to_string(parameters.outputs.size()) + "</summary>\n" +
-         scroll_box(pair_table("", same), "The same in all") + "</details>\n";
+         scroll_box(pair_table("", same), "Equal in all") + "</details>\n";
 }
 
 std::string milliseconds(const std::optional<double>& seconds) {
@@ -130,7 +130,7 @@ std::string milliseconds(const std::optional<double>& seconds) {
   return cell_html({to_fixed_text(*seconds * 1e3, 1), to_text(*seconds) + " s"}, true);
 }
 
-// Of a case, over the rows of `command`, or over all for an empty name.
+// Total of a case over the rows of `command`, or over all rows if it is empty.
 double total_seconds(const TimingTable& table, std::size_t which, const std::string& command) {
   double sum = 0.0;
   for (const TimingRow& row : table.rows)
@@ -179,7 +179,7 @@ std::string parameters_html(const ReportParameters& parameters) {
 }
 
 std::string sources_html(const ReportContent& content) {
-  // Folded by the folder of the run in which they lie.
+  // Outputs are grouped by top-level folder of the run.
   std::vector<std::pair<std::string, std::vector<const ReportSource*>>> groups;
   for (const ReportSource& source : content.sources) {
     const std::size_t slash = source.output.find('/');
@@ -225,7 +225,7 @@ std::string timings_html(const TimingTable& table) {
     if (n + 1 == table.rows.size() || table.rows[n + 1].command != row.command)
       html += sum_row(table, "sum", row.command) + "</tbody>\n";
   }
-  // The sum of a single command is that of all steps.
+  // With one command, its sum is already the total.
   const bool several =
       !table.rows.empty() && table.rows.front().command != table.rows.back().command;
   html += "<tbody>" + (several ? sum_row(table, "all steps", "") : "") + thread_row(table) +

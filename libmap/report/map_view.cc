@@ -81,7 +81,7 @@ MapLattice lattice_of(const PointCloud& map) {
   }
   if (map.size() == 1) lattice.voxel_size_m = 0.01;
   if (!(lattice.voxel_size_m > 0.0))
-    throw Error("its points lie on no lattice along the axes of its terrain",
+    throw Error("the points are not on a lattice along the terrain's axes",
                 {.field = "voxel size", .value = to_text(lattice.voxel_size_m), .bound = "> 0"});
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const auto a = static_cast<Eigen::Index>(axis);
@@ -93,7 +93,7 @@ MapLattice lattice_of(const PointCloud& map) {
       high = std::max(high, origin);
     }
     if (high - low > 0.2 * lattice.voxel_size_m)
-      throw Error("its points lie on no lattice along the axes of its terrain",
+      throw Error("the points are not on a lattice along the terrain's axes",
                   {.field = "distance from the lattice", .value = to_text(high - low) + " m"});
     lattice.origin_in_terrain[a] = 0.5 * (low + high);
   }
@@ -120,7 +120,7 @@ MapView make_map_view(const PointCloud& map, const MapViewOptions& options) {
     for (std::size_t n = 0; n < map.size(); ++n) {
       const double place = cell_of(axis, n) - lowest;
       if (!(place <= std::numeric_limits<std::uint16_t>::max()))
-        throw Error("is too wide for one view",
+        throw Error("too wide for a view",
                     {.field = "cells along an axis", .value = to_text(place), .bound = "<= 65535"});
       view.cells[n].place[axis] = static_cast<std::uint16_t>(place);
     }

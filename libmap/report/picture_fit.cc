@@ -29,7 +29,7 @@ bool is_svg(std::string_view bytes) {
          bytes.find("</svg>") != std::string_view::npos;
 }
 
-// Transparent pixels lie on white.
+// Decodes an image; transparent pixels are blended with white.
 ColorImage decode_on_white(const std::string& bytes) {
   const auto info = read_image_info(bytes);
   if (!info || info->channels != 4 || info->bits != 8)
@@ -51,14 +51,14 @@ ReportPicture read_picture_bytes(std::string bytes) {
   ReportPicture picture;
   if (is_svg(bytes)) {
     if (bytes.size() > max_svg_bytes)
-      throw Error("is too large for a page", {.value = std::to_string(bytes.size()) + " bytes",
-                                              .bound = "<= " + std::to_string(max_svg_bytes)});
+      throw Error("too large for a page", {.value = std::to_string(bytes.size()) + " bytes",
+                                           .bound = "<= " + std::to_string(max_svg_bytes)});
     picture.media_type = "image/svg+xml";
     picture.bytes = std::move(bytes);
     return picture;
   }
   const auto format = image_format(bytes);
-  if (!format) throw Error("is neither PNG nor JPEG nor SVG");
+  if (!format) throw Error("not a PNG, JPEG or SVG image");
   const ColorImage image = decode_color(bytes, max_picture_pixels);
   picture.media_type = *format == ImageFormat::png ? "image/png" : "image/jpeg";
   picture.width = image.width;
@@ -69,7 +69,7 @@ ReportPicture read_picture_bytes(std::string bytes) {
 
 ColorImage shrink_image(const ColorImage& image, int width, int height) {
   ColorImage small(width, height);
-  // OpenCV only reads what it is given as the source.
+  // OpenCV does not modify the source.
   const cv::Mat from(image.height, image.width, CV_8UC3,
                      const_cast<Color*>(image.pixels.data()));  // NOLINT
   cv::Mat to(height, width, CV_8UC3, small.pixels.data());

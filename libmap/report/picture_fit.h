@@ -1,4 +1,4 @@
-// Pictures made smaller, so that a page keeps its size.
+// Reads the images of a report and reduces their size in bytes.
 #pragma once
 
 #include <string>
@@ -8,18 +8,18 @@
 
 namespace libmap {
 
-// PNG, JPEG or SVG by the first bytes, decoded once to see that it is whole. Throws Error: none of
-// them, or damaged.
+// Reads a PNG, JPEG or SVG, recognized by its content. Decodes PNG and JPEG once to check them.
+// Throws Error: another format, a damaged image, or an SVG above 4 MiB.
 ReportPicture read_picture_bytes(std::string bytes);
 
-// No picture is changed at level 0; at the highest they are small.
+// Highest level of reduction; level 0 changes nothing.
 inline constexpr int max_picture_level = 7;
 
-// The picture as JPEG, from level 2 on also with fewer pixels; itself where that is smaller. SVG
-// stays as it is.
+// Encodes the image as JPEG, from level 2 on also with fewer pixels. Returns `picture` if that is
+// smaller, or if it is SVG.
 ReportPicture fit_picture(const ReportPicture& picture, int level);
 
-// By the mean of the pixels that each new one covers. Sizes from 1 up.
+// Scales an image down by averaging over the area of each new pixel. `width` and `height` are >= 1.
 ColorImage shrink_image(const ColorImage& image, int width, int height);
 
 }  // namespace libmap

@@ -1,4 +1,4 @@
-// What stands in a report, read and ready to be shown.
+// Content of a report, read from files and ready for output.
 #pragma once
 
 #include <cstddef>
@@ -16,43 +16,43 @@
 
 namespace libmap {
 
-// PNG, JPEG or SVG as they are put into the page.
+// A PNG, JPEG or SVG image for embedding.
 struct ReportPicture {
-  std::string file{};  // as it is named in the report
+  std::string file{};  // path relative to the run's folder
   std::string label{};
   std::string bytes{};
   std::string media_type{};
-  int width = 0;  // as shown at full size; 0: not known
+  int width = 0;  // pixels at full size; 0: unknown
   int height = 0;
-  std::string change{};  // how it differs from the file: "JPEG, 1000 px wide"; empty: not at all
+  std::string change{};  // difference from the file, e.g. "JPEG, quality 90"; empty: none
 };
 
-// Columns of a table that are shown, with their headings; none: all.
+// Columns of a table to be shown, with their headings; empty: all.
 using TableColumns = std::vector<std::pair<std::string, std::string>>;
 
 struct ReportTable {
-  Table table{};                         // the columns and at most the rows that are shown
-  std::vector<std::string> headings{};   // one a column
-  std::optional<std::uint64_t> lines{};  // of the whole file, if not all of it was read
+  Table table{};                         // shown columns and rows
+  std::vector<std::string> headings{};   // one per column
+  std::optional<std::uint64_t> lines{};  // lines of the file, if not all rows are shown
 };
 
 struct ReportMap {
   MapView view{};
-  std::optional<ReportTable> locations{};  // row n belongs to the marker n
+  std::optional<ReportTable> locations{};  // row n corresponds to marker n
   std::optional<ReportPicture> still{};
 };
 
-// A colored mesh, and what its colors mean.
+// A colored mesh and the meaning of its colors.
 struct ReportScene {
   TriangleMesh mesh{};
   std::vector<std::pair<Color, std::string>> legend{};
 };
 
 struct ReportParameters {
-  std::vector<std::pair<std::string, Manifest>> outputs{};  // by the head of their column
+  std::vector<std::pair<std::string, Manifest>> outputs{};  // column heading and manifest
 };
 
-// Running times: each step by each case, as in tables 4-2 and 4-3 of the thesis.
+// Running times per step and case, as in tables 4-2 and 4-3 of the thesis.
 struct TimingRow {
   std::string command;
   std::string step;
@@ -61,9 +61,9 @@ struct TimingRow {
 
 struct TimingTable {
   std::vector<std::string> cases;
-  std::vector<TimingRow> rows;                 // by command and step, as they first came
-  std::vector<std::vector<unsigned>> threads;  // that the manifests of each case ran with
-  // Steps that several manifests of one case name were added up.
+  std::vector<TimingRow> rows;                 // by command and step, in order of appearance
+  std::vector<std::vector<unsigned>> threads;  // distinct numbers of threads per case
+  // True if a step that occurs in several manifests of a case was summed.
   bool sums = false;
 };
 
@@ -84,19 +84,19 @@ using ReportBody = std::variant<std::monostate, ReportPictures, ReportTable, Rep
 
 struct ReportItem {
   std::string caption{};
-  std::string source{};  // file that it shows, if that is one
+  std::string source{};  // shown file, if there is exactly one
   std::vector<ReportGap> gaps{};
   ReportBody body{};
 };
 
 struct ReportSection {
   std::string heading{};
-  std::string folder{};  // relative to the run's
+  std::string folder{};  // relative to the run's folder
   std::vector<ReportItem> items{};
   std::vector<ReportSection> sections{};
 };
 
-// An output of the run and what its manifest says, or why that cannot be read.
+// An output of the run with its manifest, or the error if the manifest cannot be read.
 struct ReportSource {
   std::string output{};
   Manifest manifest{};
@@ -106,7 +106,7 @@ struct ReportSource {
 // The heading is the report's title.
 struct ReportContent : ReportSection {
   std::vector<ReportSource> sources{};
-  std::size_t more_sources = 0;  // that are not listed
+  std::size_t more_sources = 0;  // number of unlisted outputs
 };
 
 }  // namespace libmap

@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// Of a page that is too large otherwise.
+// Maximum rows per table if the page is too large otherwise.
 constexpr std::size_t short_table_rows = 100;
 
 std::string gaps_html(const std::vector<ReportGap>& gaps) {
@@ -81,7 +81,7 @@ class PageWriter {
     if (!item.source.empty())
       caption += " <code class=\"source\">" + escape_html(item.source) + "</code>";
     caption += "</figcaption>\n";
-    // Heads of tables stand above, of pictures below.
+    // Captions of tables are above, those of images below.
     const bool above = kind == "table" || kind == "map" || kind == "listing";
     return "<figure class=\"" + kind + "\">\n" + (above ? caption + body : body + caption) +
            "</figure>\n";
@@ -229,7 +229,7 @@ std::vector<ReportPicture*> pictures_of(ReportContent& content) {
   return found;
 }
 
-// Keeps the first rows of each table. Returns whether a table was longer.
+// Truncates all tables. Returns true if any table was longer.
 bool cut_tables(ReportContent& content, std::size_t max_rows) {
   bool any = false;
   each_item(content, [&](ReportItem& item) {
@@ -290,10 +290,10 @@ FittedPage fit_report_page(ReportContent content, const PageAssets& assets, std:
                           [](const auto* one) { return !one->change.empty(); }));
         return page;
       }
-      if (pictures.empty()) break;  // none that could be smaller
+      if (pictures.empty()) break;  // higher levels change nothing
     }
   } while (cut_tables(content, short_table_rows));
-  throw Error("the report is too large, even with small pictures and short tables",
+  throw Error("the report is too large even with reduced images and tables",
               {.field = "size",
                .value = fmt::format("{:.1f} MB", static_cast<double>(page.html.size()) / 1e6),
                .bound = fmt::format("<= {:.1f} MB", static_cast<double>(max_bytes) / 1e6)});

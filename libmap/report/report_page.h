@@ -1,4 +1,4 @@
-// A report as one HTML file: no other file and no network is asked for.
+// Writes a report as one HTML file that needs no other file and no network.
 #pragma once
 
 #include <string>
@@ -8,22 +8,22 @@
 
 namespace libmap {
 
-// What the page brings along.
+// Style and scripts embedded in the page.
 struct PageAssets {
   std::string style;                   // CSS
-  std::vector<std::string> scripts;    // our own, in their order
-  std::vector<std::string> libraries;  // scripts that it needs, in their order; none: no 3-D views
-  std::string library_notice;          // whose they are, with their license
+  std::vector<std::string> scripts;    // scripts of this toolkit, in order of execution
+  std::vector<std::string> libraries;  // required libraries, in order; empty: no 3-D views
+  std::string library_notice;          // authors and licenses of the libraries
   std::string version;                 // of this toolkit
 };
 
-// Scripts and style are let in by their hashes alone (Content-Security-Policy), so that nothing
-// that stands in the run's files can run.
+// Returns the page. A Content-Security-Policy allows only the hashes of these scripts and style, so
+// that content of the run's files is never executed.
 std::string report_page(const ReportContent& content, const PageAssets& assets);
 
-// The page with its pictures changed as little as keeps it below `max_bytes` (fit_picture). If not
-// even small pictures do, tables are cut to 100 rows. Throws Error naming the bound if it is still
-// too large.
+// Returns the page with the lowest image reduction (fit_picture) that keeps it within `max_bytes`.
+// If the highest level is not sufficient, tables are cut to 100 rows. Throws Error naming the bound
+// if the page is still too large.
 struct FittedPage {
   std::string html;
   int picture_level = 0;

@@ -23,8 +23,8 @@ struct FolderListing {
   std::vector<fs::path> folders;
 };
 
-// In natural order, without hidden names and links to folders, which may form circles. A folder
-// that cannot be read is empty.
+// Lists a folder in natural order, without hidden names and links to folders, which may be cyclic.
+// Empty if the folder cannot be read.
 FolderListing list_folder(const fs::path& folder) {
   FolderListing listing;
   std::error_code code;
@@ -46,7 +46,7 @@ FolderListing list_folder(const fs::path& folder) {
   return listing;
 }
 
-// Whether it contains the tiles of a map: a store, or the shares that were merged to one.
+// Returns true for tile stores and for folders with the shares of a map.
 bool is_folder_of_tiles(const fs::path& folder) {
   return folder.extension() == ".tiles" || folder.filename() == "tiles";
 }
@@ -78,7 +78,7 @@ bool has_extension(const fs::path& file, const std::set<fs::path>& extensions) {
   return extensions.contains(file.extension());
 }
 
-// Maps are known by their manifests.
+// Maps are identified by their manifests.
 bool is_map(const fs::path& file, const std::optional<Manifest>& manifest) {
   return manifest && has_extension(file, {".pcd", ".ply", ".csv", ".tiles"}) &&
          (manifest->command == "score" ||
@@ -86,7 +86,7 @@ bool is_map(const fs::path& file, const std::optional<Manifest>& manifest) {
            manifest->find_result("scored_voxels") != nullptr));
 }
 
-// "2_slopes_and_bumps" -> "2 Slopes and bumps".
+// Heading of a folder: "2_slopes_and_bumps" -> "2 Slopes and bumps".
 std::string heading_of(const fs::path& folder) {
   std::string heading = folder.filename().string();
   if (heading == "roc") return "ROC";
@@ -122,7 +122,7 @@ class Finder {
     return section;
   }
 
-  // The parameters of all maps side by side.
+  // Plans the comparison of the parameters of all maps.
   std::vector<PlannedItem> overview() const {
     if (maps_.empty()) return {};
     PlannedItem parameters{.kind = ItemKind::parameters};
@@ -134,7 +134,7 @@ class Finder {
     return {std::move(parameters)};
   }
 
-  // A case for each folder with a map: what lies in it and below, but for lower folders with maps.
+  // Plans one case per folder with a map: its outputs and those of subfolders without a map.
   std::vector<PlannedSection> running_times() const {
     PlannedItem timings{.kind = ItemKind::timings};
     std::set<fs::path> known;
@@ -158,19 +158,19 @@ class Finder {
     return found == maps_in_.end() ? 0 : found->second;
   }
 
-  // Read once: each map is compared with what lies beside it.
+  // Manifest of an output, cached because each map is compared with all files beside it.
   const std::optional<Manifest>& manifest_of(const fs::path& output) {
     const auto [place, added] = manifests_.try_emplace(output);
     if (!added) return place->second;
     try {
       place->second = read_manifest_of(output);
     } catch (const Error&) {
-      place->second.reset();  // such an output has none
+      place->second.reset();  // unreadable manifests are ignored
     }
     return place->second;
   }
 
-  // The nearest folder around `output` that has a map.
+  // Nearest parent folder of `output` with a map.
   fs::path folder_with_map_of(const fs::path& output) const {
     fs::path folder = output.parent_path();
     while (maps_in(folder) == 0 && folder != root_ && folder.has_relative_path())
@@ -182,7 +182,7 @@ class Finder {
     return folder == root_ ? root_name_.string() : folder.lexically_relative(root_).string();
   }
 
-  // A map by its folder; in the run's own, or beside others, by its name.
+  // Name of a map: its folder, or its path if it is in the run's folder or beside other maps.
   std::string place_of(const fs::path& map) const {
     const bool alone = map.parent_path() != root_ && maps_in(map.parent_path()) == 1;
     return alone ? name_of(map.parent_path()) : map.lexically_relative(root_).string();
@@ -206,7 +206,7 @@ class Finder {
     }
   }
 
-  // Of the trials of `grasp`: the folder's manifest says of each what came out.
+  // Adds the scenes of `grasp`. The folder's manifest contains the result of each trial.
   void add_scenes(const fs::path& folder, const FolderListing& listing, PlannedSection& section) {
     const auto& manifest = manifest_of(folder);
     if (!manifest || manifest->command != "grasp") return;
@@ -221,7 +221,7 @@ class Finder {
     }
   }
 
-  // The looked-up points whose manifest names this map.
+  // Table of look-ups whose manifest names this map; empty if there is none.
   fs::path lookup_of(const fs::path& map, const FolderListing& listing) {
     for (const fs::path& file : listing.files) {
       if (file.extension() != ".csv") continue;
@@ -233,11 +233,11 @@ class Finder {
     return {};
   }
 
-  // What a reader asks of a place first; the rest stands in the file.
+  // The most important columns of a table of look-ups.
   static TableColumns columns_of(const fs::path& lookup) {
     try {
       const Table table = read_report_table(lookup, {}, 1).table;
-      // Where the points brought verdicts of their own, the map's is `map_graspable`.
+      // If the points already had verdicts, the verdict of the map is `map_graspable`.
       const bool verdicts = table.find_column("map_graspable").has_value();
       const std::string& name = table.columns.front();
       TableColumns columns = {{name, name}};
@@ -253,8 +253,8 @@ class Finder {
     }
   }
 
-  // One that was made from this map, as its manifest says; a folder's only map is what one without
-  // a manifest shows.
+  // Image of the map according to the image's manifest. An image without a manifest is assigned to
+  // the only map of a folder.
   fs::path still_of(const fs::path& map, const FolderListing& listing, bool only_map) {
     const auto shows = [&](const fs::path& picture) {
       const auto& manifest = manifest_of(picture);
@@ -269,8 +269,7 @@ class Finder {
     return {};
   }
 
-  // One figure of all pictures and one a chart. A picture that is there as a drawing too is left
-  // out.
+  // Adds one figure with all images and one per chart. Images that also exist as SVG are omitted.
   static void add_pictures(const FolderListing& listing, PlannedSection& section) {
     PlannedItem pictures{.kind = ItemKind::picture};
     std::vector<PlannedItem> charts;
@@ -296,7 +295,7 @@ class Finder {
       pictures.files.push_back(file);
       pictures.labels.push_back(heading_of(file.stem()));
     }
-    // The names of several stand below each.
+    // Several images have labels, a single one has a caption only.
     for (const std::string& label : pictures.labels)
       pictures.caption += (pictures.caption.empty() ? "" : ", ") + label;
     if (!pictures.caption.empty()) pictures.caption += '.';
@@ -305,7 +304,7 @@ class Finder {
     for (PlannedItem& chart : charts) section.items.push_back(std::move(chart));
   }
 
-  // Without the look-ups that stand beside a map, and clouds.
+  // Adds tables, except clouds and look-ups that are shown with their map.
   static void add_tables(const FolderListing& listing, PlannedSection& section) {
     for (const fs::path& file : listing.files) {
       const bool beside_map =
@@ -330,7 +329,7 @@ class Finder {
   fs::path root_name_;
   std::vector<fs::path> maps_;
   std::map<fs::path, int> maps_in_;
-  std::map<fs::path, std::optional<Manifest>> manifests_;  // of the folder at hand
+  std::map<fs::path, std::optional<Manifest>> manifests_;  // cache for the current folder
 };
 
 }  // namespace
@@ -355,7 +354,7 @@ std::vector<ReportSource> manifests_below(const fs::path& folder, bool tiles) {
 PlannedSection plan_report(const fs::path& folder) {
   std::error_code code;
   if (!fs::is_directory(folder, code))
-    throw Error(fs::exists(folder, code) ? "is no folder" : "no such folder",
+    throw Error(fs::exists(folder, code) ? "not a folder" : "no such folder",
                 {.file = folder.string()});
   const fs::path name = (fs::absolute(folder) / "").lexically_normal().parent_path().filename();
   fs::path root = folder.lexically_normal();
@@ -363,7 +362,7 @@ PlannedSection plan_report(const fs::path& folder) {
   Finder finder(root, name);
   PlannedSection plan = finder.section_of(root, 0);
   if (plan.items.empty() && plan.sections.empty())
-    throw Error("contains nothing that a report could show: no map, picture, table or text",
+    throw Error("nothing to report: the folder contains no map, image, table or text",
                 {.file = folder.string()});
   plan.heading = name.empty() ? "Report" : heading_of(name);
   const std::vector<PlannedItem> overview = finder.overview();

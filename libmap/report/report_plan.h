@@ -1,4 +1,4 @@
-// The content of a report, found in the folder of a run: sections and the files that they show.
+// Finds the content of a report in the folder of a run: sections and their files.
 #pragma once
 
 #include <filesystem>
@@ -10,19 +10,19 @@
 
 namespace libmap {
 
-// What an item shows.
+// Type of an item's content.
 enum class ItemKind { picture, table, map, scene, parameters, timings, listing };
 
 struct PlannedItem {
   ItemKind kind = ItemKind::listing;
-  std::vector<std::filesystem::path> files{};  // of parameters: outputs
-  std::vector<std::string> labels{};           // none, or one per file
+  std::vector<std::filesystem::path> files{};  // parameters: outputs
+  std::vector<std::string> labels{};           // empty, or one per file
   std::string caption{};
-  // Of a map: a table of looked-up points, its columns with their headings, a picture of the map.
+  // Maps: table of look-ups, its shown columns with headings, image of the map.
   std::filesystem::path lookup{};
   TableColumns columns{};
   std::filesystem::path picture{};
-  // Of timings: outputs whose running times make one column, by its heading.
+  // Timings: heading and outputs of each column.
   std::vector<std::pair<std::string, std::vector<std::filesystem::path>>> cases{};
 };
 
@@ -32,20 +32,20 @@ struct PlannedSection {
   std::vector<PlannedItem> items{};  // before the first inner section
   std::vector<PlannedSection> sections{};
 
-  // Number of items of that kind, those of inner sections included.
+  // Number of items of a kind, including inner sections.
   std::size_t count(ItemKind kind) const;
 };
 
-// The plan of what is in `folder`, under the report's title: a section for each inner folder, with
-// its maps, scenes, pictures, tables and texts; the parameters of all maps side by side; the
-// running times. Throws Error: no such folder, or nothing in it that a report can show.
+// Plans the report on `folder`: parameters of all maps, one section per inner folder with its maps,
+// scenes, images, tables and texts, and the running times. The heading is the report's title.
+// Throws Error if the folder does not exist or contains nothing to show.
 PlannedSection plan_report(const std::filesystem::path& folder);
 
-// The outputs below `folder` that have a manifest, in natural order. Those in folders of tiles only
-// with `tiles`, those in tile stores never. No deeper than 12 levels.
+// Outputs with a manifest in `folder` and its subfolders (12 levels), in natural order. Folders of
+// tiles are included only with `tiles`, tile stores never.
 std::vector<ReportSource> manifests_below(const std::filesystem::path& folder, bool tiles);
 
-// "2_slopes" before "10_walls": digits are compared as numbers.
+// Natural order: digits are compared as numbers, "2_slopes" comes before "10_walls".
 bool natural_less(const std::string& a, const std::string& b);
 
 }  // namespace libmap

@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::uint64_t max_picture_bytes = std::uint64_t{64} << 20;
-// The commands whose running times are shown, in this order.
+// Commands whose running times are shown, in this order.
 constexpr std::array timed_commands = {
     "simulate scene", "simulate site", "simulate cameras", "fuse",   "mesh",     "crop",
     "resample",       "score",         "convert",          "lookup", "evaluate", "footholds",
@@ -32,7 +32,7 @@ struct FileHead {
   bool whole = true;
 };
 
-// Cut behind a line's end that is not within quotes.
+// Removes an incomplete last row: cuts at the last newline outside of quotes.
 void cut_at_row(std::string& text) {
   auto quotes = std::count(text.begin(), text.end(), '"');
   while (!text.empty()) {
@@ -80,7 +80,7 @@ class Reader {
   }
 
  private:
-  // As it is named in the report: relative to the run's folder.
+  // Name of a file in the report: its path relative to the run's folder.
   std::string name_of(const fs::path& path) const {
     return path.lexically_normal().lexically_relative(root_.lexically_normal()).string();
   }
@@ -90,7 +90,7 @@ class Reader {
     if (std::find(files_.begin(), files_.end(), file) == files_.end()) files_.push_back(file);
   }
 
-  // Reads a file by `reader`; an error becomes a gap.
+  // Calls `reader`; an Error becomes a gap.
   template <typename Body>
   void fill(ReportItem& item, const fs::path& path, const Body& reader) {
     try {
@@ -184,15 +184,15 @@ class Reader {
     std::optional<ReportTable> table;
     fill(item, plan.lookup, [&] {
       table = read_report_table(plan.lookup, plan.columns, options_.max_rows);
-      if (table->lines) throw Error("has too many rows for a view");
+      if (table->lines) throw Error("too many rows for a view");
       use(plan.lookup);
     });
     if (table && table->lines) table.reset();
     return table;
   }
 
-  // By the first column of the file. Where the points brought verdicts of their own, they are in
-  // `graspable`, and the map's in `map_graspable`.
+  // Labels markers by the first column. If the points already had verdicts, these are in
+  // `graspable` and those of the map in `map_graspable`.
   static void name_markers(const fs::path& path, ReportMap& map) {
     const Table all = read_csv(path);
     std::optional<std::size_t> verdict;
@@ -319,7 +319,7 @@ TimingTable timing_table(const std::vector<std::pair<std::string, std::vector<Ma
   TimingTable table;
   for (const auto& one : cases) table.cases.push_back(one.first);
   std::map<std::pair<std::string, std::string>, std::size_t> place_of;  // by command and step
-  std::map<std::string, std::size_t> rank_of;                           // of a command
+  std::map<std::string, std::size_t> rank_of;                           // by command
   for (std::size_t n = 0; n < cases.size(); ++n) {
     std::vector<unsigned>& threads = table.threads.emplace_back();
     for (const Manifest& manifest : cases[n].second) {
@@ -339,7 +339,7 @@ TimingTable timing_table(const std::vector<std::pair<std::string, std::vector<Ma
     }
     std::sort(threads.begin(), threads.end());
   }
-  // Those of a command together.
+  // Groups rows by command.
   std::stable_sort(table.rows.begin(), table.rows.end(), [&](const auto& a, const auto& b) {
     return rank_of.at(a.command) < rank_of.at(b.command);
   });

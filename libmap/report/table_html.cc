@@ -62,7 +62,7 @@ NumberStyle number_style(const std::vector<std::string>& cells) {
     largest = std::max(largest, std::abs(*number));
     if (!has_fraction(cell)) continue;
     fractions = true;
-    // Its shortest form, so that "0.10000000" has one.
+    // Decimals of the shortest form: "0.10000000" has one.
     const std::string text = to_text(*number);
     const std::size_t point = text.find('.');
     const bool exponent = text.find('e') != std::string::npos;
@@ -105,7 +105,7 @@ std::string table_html(const ReportTable& table, const std::string& row_attribut
     styles.push_back(number_style(cells));
   }
   const std::size_t rows = table.table.rows.size();
-  // A few rows more are not worth a fold.
+  // A few additional rows are not folded.
   const std::size_t open = rows <= open_rows + 5 || !row_attribute.empty() ? rows : open_rows;
   const std::string head = head_html(table, styles);
   std::string html =

@@ -19,7 +19,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// Of obstacles; no other color of the legends is violet.
+// Color of obstacles, distinct from all other colors of the legends.
 constexpr Color obstacle_color{122, 40, 140};
 
 struct Swatch {
@@ -41,10 +41,10 @@ std::vector<Swatch> swatches() {
   return all;
 }
 
-// Colors of the scale of forces.
+// Number of colors of the force scale.
 constexpr int scale_steps = 64;
 
-// Three 16-bit numbers a cell, little-endian, then a byte per cell.
+// Encodes cells: three little-endian 16-bit indices per cell, then one byte per cell.
 std::string cell_bytes(const MapView& view) {
   std::string bytes;
   bytes.reserve(view.cells.size() * 7);
@@ -62,7 +62,7 @@ Json markers_json(const MapView& view) {
   for (const MapMarker& marker : view.markers) {
     Json one;
     one["label"] = marker.label;
-    // To a tenth of a millimeter, from the lowest corner of the cells.
+    // Relative to the lowest corner of the cells, rounded to 0.1 mm.
     one["at"] = Json::array();
     for (Eigen::Index axis = 0; axis < 3; ++axis)
       one["at"].push_back(
@@ -93,7 +93,7 @@ std::string view_json(const MapView& view) {
   return escape_json_in_script(json.dump(-1, ' ', true, Json::error_handler_t::replace));
 }
 
-// No style of its own is allowed on an element, but a drawing may have any color.
+// Fill attribute of an SVG shape. The Content-Security-Policy forbids style attributes.
 std::string fill_of(const Color& color) {
   return fmt::format("fill=\"#{:02x}{:02x}{:02x}\"", color[0], color[1], color[2]);
 }
@@ -185,8 +185,8 @@ int index_size(const TriangleMesh& mesh) {
   return mesh.vertices.size() <= most_short_vertices ? 2 : 4;
 }
 
-// Little-endian: the triangles' corners; positions in steps from the lowest corner, 16 bits each;
-// colors.
+// Encodes a mesh, little-endian: vertex indices of the triangles; 16-bit positions in steps from
+// the lowest corner; vertex colors.
 std::string mesh_bytes(const TriangleMesh& mesh, const Eigen::Vector3d& corner, double step_m) {
   std::string bytes;
   bytes.reserve(scene_bytes(mesh));

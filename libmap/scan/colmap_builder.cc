@@ -17,7 +17,7 @@ bool holds(const Camera& camera, const Eigen::Vector2d& pixel) {
          pixel.y() < camera.height - 0.5;
 }
 
-// 0 outside the image and where nothing was measured.
+// Depth in m; 0 outside the image and for pixels without a measurement.
 double depth_at(const DepthImage& depth, int x, int y) {
   if (x < 0 || y < 0 || x >= depth.width || y >= depth.height) return 0.0;
   return static_cast<double>(depth.at(x, y));
@@ -36,7 +36,7 @@ DepthPixel depth_pixel(const CameraView& view, const Eigen::Vector2d& ray) {
   return {round(pixel.x(), view.depth.width), round(pixel.y(), view.depth.height)};
 }
 
-// No edge runs here, at which depth belongs to neither side.
+// True if no depth edge is at the pixel; depth at an edge belongs to neither side.
 bool is_smooth(const DepthImage& depth, const DepthPixel& pixel, double tolerance) {
   const double here = depth_at(depth, pixel.x, pixel.y);
   for (const auto& [dx, dy] : {std::pair{-1, 0}, {1, 0}, {0, -1}, {0, 1}})
@@ -45,7 +45,7 @@ bool is_smooth(const DepthImage& depth, const DepthPixel& pixel, double toleranc
   return true;
 }
 
-// Where the image shows the point, unless it is hidden or outside.
+// Returns the pixel of a point; nullopt if it is occluded or outside the image.
 std::optional<Eigen::Vector2d> observe(const CameraView& view, const Eigen::Vector3d& point,
                                        double tolerance) {
   const Camera& camera = view.color_camera;
@@ -55,7 +55,7 @@ std::optional<Eigen::Vector2d> observe(const CameraView& view, const Eigen::Vect
   const DepthPixel place = depth_pixel(view, ray);
   const double depth = depth_at(view.depth, place.x, place.y);
   if (!(depth > 0.0) || !(std::abs(depth - point.z()) <= tolerance * depth)) return std::nullopt;
-  // Beyond the lens's field of view its distortion may lead back into the image.
+  // Beyond the lens's field of view, the distortion can map a point back into the image.
   const auto back = pixel_to_ray(camera, *pixel);
   if (!back || !(*back - ray).isZero(1e-6)) return std::nullopt;
   return pixel;
@@ -65,9 +65,9 @@ std::optional<Eigen::Vector2d> observe(const CameraView& view, const Eigen::Vect
 
 void bind(ParameterTable& table, ColmapBuilderOptions& options) {
   table.add("point_spacing_px", options.point_spacing_px, {1.0, 10000.0},
-            "of the points that an image's depth gives to a model of COLMAP");
+            "spacing of the COLMAP model's points in each depth image, pixels");
   table.add("point_depth_tolerance", options.depth_tolerance, {0.0, 1.0, true, false},
-            "share of the depth within which two images measure the same point of that model");
+            "share of the depth within which two images observe the same COLMAP point");
 }
 
 ColmapBuilder::ColmapBuilder(const ColmapBuilderOptions& options) : options_(options) {

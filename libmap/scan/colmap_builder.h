@@ -1,4 +1,4 @@
-// A scan as a model of COLMAP, with points that its depth images measured.
+// Conversion of a scan to a COLMAP model, with points from its depth images.
 #pragma once
 
 #include <cstddef>
@@ -15,21 +15,21 @@
 namespace libmap {
 
 struct ColmapBuilderOptions {
-  int point_spacing_px = 16;      // > 0: of an image's points, in both directions
-  double depth_tolerance = 0.02;  // > 0, share of the depth: two measurements of the same point
+  int point_spacing_px = 16;      // > 0, spacing of an image's points in both directions
+  double depth_tolerance = 0.02;  // > 0, share of the depth within which points are identical
 };
 void bind(ParameterTable& table, ColmapBuilderOptions& options);
 
-// Points come from the first image that shows them: one in the middle of each square of the
-// spacing, where depth is smooth and no earlier point lies. Later images observe them where their
-// depth agrees, at the pixel to which they project, so that reprojection errors are 0 by
-// construction (ERROR is -1: not known). Images with equal cameras share one.
+// Each image adds points on a grid of the spacing, at pixels with smooth depth and in cells without
+// an earlier point. Later images observe a point at its projection if their depth agrees, so that
+// reprojection errors are 0 by construction (ERROR is -1: unknown). Images with equal cameras share
+// a camera.
 class ColmapBuilder {
  public:
   explicit ColmapBuilder(const ColmapBuilderOptions& options = {});  // an empty model
 
-  // Image ids count from 1 in this order. Without depth the image gets neither points nor features.
-  // Throws Error: COLMAP has no such camera.
+  // Adds an image; ids start at 1 in the order of calls. An image without depth gets no points and
+  // no features. Throws Error if COLMAP has no equivalent camera model.
   void add_image(const std::string& name, const CameraView& view, const Pose& world_from_camera);
 
   const ColmapModel& model() const { return model_; }
@@ -37,7 +37,8 @@ class ColmapBuilder {
  private:
   int add_camera(const ColmapCamera& camera);
   void add_observation(int id, std::int64_t point, const Eigen::Vector2d& pixel);
-  // Squares of the spacing that hold an observation are not 0 in `taken`.
+  // Sets the pixels of `taken` (one per cell of the grid) to non-zero for cells with an
+  // observation.
   void observe_points(int id, const CameraView& view, GrayImage& taken);
   void add_points(int id, const CameraView& view, const Pose& world_from_camera,
                   const GrayImage& taken);

@@ -52,7 +52,7 @@ int integer_in(const Table& table, std::size_t row, const char* column, int miss
   return *value;
 }
 
-// Numbers with spaces between them.
+// Parses numbers separated by spaces.
 std::vector<double> numbers_in(const Table& table, std::size_t row, const char* column) {
   const std::string cell = cell_of(table, row, column);
   std::vector<double> numbers;
@@ -70,7 +70,7 @@ std::optional<std::array<double, 6>> six_in(const Table& table, std::size_t row,
                                             const char* column) {
   const std::vector<double> numbers = numbers_in(table, row, column);
   if (numbers.empty()) return std::nullopt;
-  if (numbers.size() != 6) throw wrong_cell("not six numbers", table, row, column);
+  if (numbers.size() != 6) throw wrong_cell("must have six numbers", table, row, column);
   std::array<double, 6> six{};
   std::copy(numbers.begin(), numbers.end(), six.begin());
   return six;
@@ -79,7 +79,7 @@ std::optional<std::array<double, 6>> six_in(const Table& table, std::size_t row,
 GraphNode node_in(const Table& table, std::size_t row) {
   GraphNode node;
   node.id = integer_in(table, row, "node", 0);
-  if (node.id <= 0) throw wrong_cell("no number of a node", table, row, "node", "> 0");
+  if (node.id <= 0) throw wrong_cell("not a node number", table, row, "node", "> 0");
   node.session = integer_in(table, row, "session", 0);
   node.weight = integer_in(table, row, "weight", 0);
   node.stamp_s = table.optional_number(row, table.column("stamp_s")).value_or(0.0);
@@ -101,7 +101,7 @@ std::vector<std::string> split_names(const std::string& cell) {
   return names;
 }
 
-// "depth" or "color", by the first image that is there: depth has one channel of 16 bits.
+// True if the file is a depth image, which has one channel of 16 bits.
 bool is_depth_image(const fs::path& file) {
   const std::optional<ImageInfo> info = read_image_info(read_whole_file(file));
   return info && info->channels == 1 && info->bits == 16;
@@ -113,7 +113,8 @@ Pose between(const Pose& a, const Pose& b, double share) {
                    Eigen::Quaterniond(a.linear()).slerp(share, Eigen::Quaterniond(b.linear())));
 }
 
-// `trajectory` by ascending stamp.
+// Returns the pose at a stamp; nullopt if none is near. `trajectory` is in ascending order of
+// stamps.
 std::optional<Pose> pose_at(const Trajectory& trajectory, double stamp_s, double tolerance_s) {
   const auto after = std::lower_bound(
       trajectory.begin(), trajectory.end(), stamp_s,
@@ -140,13 +141,13 @@ DepthImage read_depth(const std::string& bytes, double depth_unit_m) {
   return depth;
 }
 
-// At the size of the depth image.
+// Registers depth to the color camera, at the size of the depth image.
 void register_to_color(RgbdFrame& frame, const Camera& depth_camera) {
   if (frame.cameras.size() != 1 || !frame.stereo.empty())
-    throw Error("a depth camera belongs to one color camera",
+    throw Error("depth_calibration requires frames with one color camera",
                 {.value = std::to_string(frame.cameras.size()) + " cameras"});
   if (frame.depth.width != depth_camera.width || frame.depth.height != depth_camera.height)
-    throw Error("has another size than its camera",
+    throw Error("size differs from the calibration",
                 {.value = size_text(frame.depth.width, frame.depth.height),
                  .bound = size_text(depth_camera.width, depth_camera.height)});
   RgbdFrame only_depth;
@@ -157,7 +158,7 @@ void register_to_color(RgbdFrame& frame, const Camera& depth_camera) {
                                target.base_from_camera.inverse() * depth_camera.base_from_camera);
 }
 
-// Depth that is registered to color covers the same view.
+// Throws Error if the aspect ratios differ: registered depth covers the same view as color.
 void require_aspect_of_color(const RgbdFrame& frame) {
   constexpr double max_difference = 0.03;
   double width = frame.color.width;
@@ -172,7 +173,7 @@ void require_aspect_of_color(const RgbdFrame& frame) {
   const double ratio = frame.depth.width * height / (frame.depth.height * width);
   if (width > 0.0 && std::abs(std::log(ratio)) > max_difference)
     throw Error(
-        "has another aspect ratio than color; it is turned, or of a depth camera of its own",
+        "aspect ratio differs from color; the image is rotated or of a separate depth camera",
         {.value = size_text(frame.depth.width, frame.depth.height),
          .bound = "as " + size_text(static_cast<int>(width), static_cast<int>(height)) +
                   ", or depth_calibration in " + frame_folder_files::options});
@@ -184,14 +185,14 @@ std::string count_of(std::size_t count, const std::string& what) {
 
 }  // namespace
 
-// Images and when they were taken.
+// Images with their stamps.
 struct FrameFolder::Listing {
   std::vector<double> stamps;
   std::vector<std::string> names;
 
   void add(const TextLine& line, std::size_t first, const std::string& file) {
     if (line.words.size() < first + 2)
-      throw wrong_columns("no stamp and file", line, file, ">= " + std::to_string(first + 2));
+      throw wrong_columns("needs stamp and file", line, file, ">= " + std::to_string(first + 2));
     stamps.push_back(numbers_of(line, first, 1, file).front());
     names.emplace_back(line.words[first + 1]);
   }
@@ -211,14 +212,14 @@ std::vector<std::pair<std::string, PoseFrame>> pose_frame_names() {
 
 void bind(ParameterTable& table, FrameFolderOptions& options) {
   table.add("depth_unit_m", options.depth_unit_m, positive,
-            "meters a unit of the depth images; 0.0002: TUM RGB-D, 0.001: millimeters");
-  table.add("calibration", options.calibration, "the camera's intrinsics");
+            "meters per unit of the depth images; 0.0002: TUM RGB-D, 0.001: millimeters");
+  table.add("calibration", options.calibration, "camera file with the intrinsics");
   table.add("depth_calibration", options.depth_calibration,
-            "camera file of a separate depth camera; empty: depth is registered to color");
+            "camera file of a separate depth camera; empty: depth is already registered to color");
   table.add("pose_frame", options.pose_frame, pose_frame_names(),
-            "whose poses the files contain: the camera's optical frame, or the base");
+            "frame of the poses in the files: the camera's optical frame, or the base");
   table.add("pairing_tolerance_s", options.pairing_tolerance_s, not_negative,
-            "greatest difference in time of what belongs together");
+            "maximum time difference between paired color, depth and poses, s");
 }
 
 FrameFolder::FrameFolder(const fs::path& path, const FrameFolderOptions& defaults)
@@ -242,11 +243,11 @@ FrameFolder::FrameFolder(const fs::path& path, const FrameFolderOptions& default
 
 fs::path FrameFolder::calibration_file(const std::string& name) const {
   fs::path file = path_ / name;
-  std::error_code code;  // a list may hold names that no file can have
+  std::error_code code;  // lists can contain invalid file names
   if (!fs::exists(file, code))
     throw Error(
-        "no such file: the scan needs its camera's intrinsics, as a calibration "
-        "writes them; the key calibration of scan.yaml names another file",
+        "no such file: the scan needs the camera's intrinsics in this file; set "
+        "calibration in scan.yaml to use another file",
         {.file = file.string()});
   return file;
 }
@@ -272,7 +273,7 @@ void FrameFolder::read_nodes() {
     for (const std::string& name : split_names(cell_of(table, row, "calibration")))
       of_node.cameras.push_back(add_camera(name));
     if (!of_node.baselines_m.empty() && of_node.cameras.size() != 2 * of_node.baselines_m.size())
-      throw wrong_cell("each stereo pair has two cameras", table, row, "calibration");
+      throw wrong_cell("each stereo pair needs two cameras", table, row, "calibration");
     if (!files_.emplace(node.id, std::move(of_node)).second)
       throw wrong_cell("is a duplicate", table, row, "node");
     graph_.nodes.push_back(std::move(node));
@@ -293,7 +294,7 @@ void FrameFolder::read_images() {
       first.add(line, 0, associations.string());
       second.add(line, 2, associations.string());
     }
-    // Both orders are in use.
+    // Files with both orders of the columns exist.
     bool depth_first = false;
     for (std::size_t i = 0; i < first.names.size(); ++i) {
       std::error_code code;
@@ -306,7 +307,7 @@ void FrameFolder::read_images() {
     if (fs::exists(path_ / files::color_list)) first = Listing::read(path_ / files::color_list);
     add_images(first, Listing::read(depth_list));
   } else {
-    throw Error("is no scan: a folder of frames contains " + std::string(files::associations) +
+    throw Error("is not a scan: a folder of frames needs " + std::string(files::associations) +
                     ", or " + files::color_list + " and " + files::depth_list,
                 {.file = path_.string()});
   }
@@ -314,8 +315,8 @@ void FrameFolder::read_images() {
 
 namespace {
 
-// Stamps of arrival jitter by several milliseconds, while the phase of two free-running cameras
-// drifts slowly: the median of the differences of neighbors in time that are near each one's own.
+// Medians of neighboring time differences. Arrival stamps jitter by several milliseconds, but the
+// phase of two free-running cameras drifts slowly.
 std::vector<double> smoothed_differences(const std::vector<double>& stamps,
                                          const std::vector<double>& differences) {
   constexpr double window_s = 1.5;
@@ -360,7 +361,7 @@ void FrameFolder::add_images(const Listing& color, const Listing& depth) {
     if (color.names.empty() || !color_of_depth[j].empty()) order.push_back(j);
   const std::string tolerance = to_text(options_.pairing_tolerance_s) + " s";
   if (order.empty())
-    throw Error("no color image lies within " + tolerance + " of a depth image",
+    throw Error("no color image is within " + tolerance + " of a depth image",
                 {.file = path_.string()});
   if (order.size() < depth.names.size())
     warnings_.push_back(count_of(depth.names.size() - order.size(), "depth image") +
@@ -417,7 +418,7 @@ void FrameFolder::read_poses() {
         use(node, to_base_pose(node, *pose));
         ++found;
       }
-      if (found == 0) warnings_.push_back(std::string(name) + ": no pose belongs to a node");
+      if (found == 0) warnings_.push_back(std::string(name) + ": no pose matches a node");
       return;
     }
   };
@@ -435,7 +436,7 @@ void FrameFolder::read_links() {
   if (!fs::exists(file)) return;
   if (options_.pose_frame != PoseFrame::base) {
     warnings_.push_back(std::string(files::links) +
-                        ": not read: links are between bases, the folder's poses of cameras");
+                        ": ignored: links connect bases, but the folder's poses are of cameras");
     return;
   }
   std::size_t dangling = 0;
@@ -452,7 +453,7 @@ void FrameFolder::read_links() {
   }
   if (dangling > 0)
     warnings_.push_back(std::string(files::links) + ": " + count_of(dangling, "link") +
-                        " of nodes that are not there");
+                        " of missing nodes");
   if (to_itself > 0)
     warnings_.push_back(std::string(files::links) + ": " + count_of(to_itself, "link") +
                         " of a node to itself");

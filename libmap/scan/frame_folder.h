@@ -1,23 +1,23 @@
-// A scan as a folder of plain files: the layout of the TUM RGB-D benchmark (Sturm et al. 2012), and
-// the one that FrameFolderWriter writes, which holds all that a scan has.
+// Reader of a scan stored as a folder of plain files, in the layout of the TUM RGB-D benchmark
+// (Sturm et al. 2012) or the complete layout of FrameFolderWriter.
 //
-//   scan.yaml               FrameFolderOptions; may be missing
-//   associations.txt        "stamp color stamp depth" a line, or depth before color; else
-//   rgb.txt, depth.txt      "stamp file" a line, paired by time; depth.txt alone will do
+//   scan.yaml               FrameFolderOptions; optional
+//   associations.txt        lines "stamp color stamp depth", or depth before color; else
+//   rgb.txt, depth.txt      lines "stamp file", paired by time; rgb.txt is optional
 //   calibration.yaml        the camera (camera_io.h)
 //   groundtruth.txt         true poses as TUM lines, or poses_ground_truth.tum
 //   poses.tum               odometry, or poses_odometry.tum
 //   poses_stored.tum        optimized poses
 //   links.g2o               links between nodes; its vertices are not used
-//   nodes.csv               in place of associations.txt: node, session, weight, stamp_s, label,
+//   nodes.csv               instead of associations.txt: node, session, weight, stamp_s, label,
 //                           color, depth, right, calibration, baseline_m, velocity, gps; files
-//                           relative to the folder; several calibrations with spaces between
-//                           them, and as many baselines as there are stereo pairs
+//                           relative to the folder; several calibrations separated by spaces, and
+//                           one baseline per stereo pair
 //   color/ depth/ right/ calibration/
 //
-// Without nodes.csv nodes count from 1 in the order of time and have the stamp of their depth.
-// Poses belong to the node that they name or, without nodes, to the stamps: between two poses that
-// lie within the tolerance they are interpolated, else the nearest within it is taken.
+// Without nodes.csv, nodes are numbered from 1 in the order of time and have the stamp of their
+// depth image. Poses are assigned by node or, without nodes, by stamp: a pose is interpolated
+// between two poses within the tolerance, else the nearest pose within the tolerance is used.
 #pragma once
 
 #include <filesystem>
@@ -54,26 +54,26 @@ inline constexpr const char* calibration_folder = "calibration";
 
 }  // namespace frame_folder_files
 
-// What a file of poses moves: the camera's optical frame, or the base.
+// Frame of the poses in a file: the camera's optical frame, or the base.
 enum class PoseFrame { camera, base };
 std::vector<std::pair<std::string, PoseFrame>> pose_frame_names();
 
 // Defaults are those of the TUM benchmark.
 struct FrameFolderOptions {
-  double depth_unit_m = 0.0002;  // meters a unit of the 16-bit depth images
+  double depth_unit_m = 0.0002;  // meters per unit of the 16-bit depth images
   std::string calibration = "calibration.yaml";
-  // Of a depth camera at another place, whose images are registered to color when they are read;
-  // its local_transform is base_from_depth. Empty: they are registered.
+  // Calibration of a separate depth camera, whose images are registered to color on reading; its
+  // local_transform is base_from_depth. Empty: the images are registered already.
   std::string depth_calibration{};
-  PoseFrame pose_frame = PoseFrame::camera;  // whose poses the files hold: the optical frame's
+  PoseFrame pose_frame = PoseFrame::camera;  // frame of the poses in the files
   double pairing_tolerance_s = 0.02;
 };
 void bind(ParameterTable& table, FrameFolderOptions& options);
 
 class FrameFolder : public ScanSource {
  public:
-  // scan.yaml stands over `defaults`. Throws Error: no such folder, neither of the lists of images,
-  // no calibration, a list that is broken.
+  // scan.yaml overrides `defaults`. Throws Error if the folder, the list of images or the
+  // calibration is missing, or a list is invalid.
   explicit FrameFolder(const std::filesystem::path& path, const FrameFolderOptions& defaults = {});
 
   const std::filesystem::path& path() const override { return path_; }
@@ -82,18 +82,18 @@ class FrameFolder : public ScanSource {
   RgbdFrame read_frame(int node, FrameParts parts = {}) const override;
 
   const FrameFolderOptions& options() const { return options_; }
-  // Images without a partner, poses and links that belong to no node.
+  // Reports unpaired images, and poses and links without a node.
   const std::vector<std::string>& warnings() const override { return warnings_; }
 
  private:
-  // Names in the folder; empty where there is no such image.
+  // File names in the folder; empty for missing images.
   struct Files {
     std::string color{};
     std::string depth{};
     std::string right{};
     double depth_later_s = 0.0;          // RgbdFrame::depth_later_s
-    std::vector<std::size_t> cameras{};  // indices; of stereo pairs left, right, left, ...
-    std::vector<double> baselines_m{};   // of stereo pairs; else empty
+    std::vector<std::size_t> cameras{};  // indices; stereo pairs: left, right, left, ...
+    std::vector<double> baselines_m{};   // baselines of stereo pairs; else empty
   };
   struct Listing;
 
@@ -116,8 +116,8 @@ class FrameFolder : public ScanSource {
   std::vector<std::string> warnings_;
 };
 
-// The folder as a scan; `defaults` stand where it has no scan.yaml. Throws Error naming the file
-// that is missing or broken.
+// Opens a folder as a scan; `defaults` apply to keys that scan.yaml does not set. Throws as the
+// constructor of FrameFolder does.
 std::unique_ptr<ScanSource> open_frame_folder(const std::filesystem::path& path,
                                               const FrameFolderOptions& defaults = {});
 

@@ -37,11 +37,12 @@ void make_folder(const fs::path& folder) {
   std::error_code code;
   fs::create_directory(folder, code);
   if (code)
-    throw Error("cannot be made: " + code.message(), {.file = folder.string()}, ErrorKind::failed);
+    throw Error("cannot be created: " + code.message(), {.file = folder.string()},
+                ErrorKind::failed);
 }
 
-// Whether stamps tell apart the poses of a trajectory, of which some nodes may have none: then the
-// poses of others must lie too far off in time to stand in for it.
+// True if stamps identify the poses of a trajectory. Nodes without a pose must be too far in time
+// from the poses of other nodes to be assigned one.
 bool do_stamps_tell_nodes(const PoseGraph& graph, const Trajectory& trajectory) {
   const double pairing_tolerance_s = FrameFolderOptions().pairing_tolerance_s;
   std::set<double> stamps;
@@ -81,7 +82,7 @@ std::string FrameFolderWriter::write_image(const char* folder, int node, const s
 }
 
 std::string FrameFolderWriter::write_camera(const Camera& camera) {
-  // One file for all nodes that have the same camera.
+  // Nodes with equal cameras share a file.
   const std::string key = to_yaml({.camera = camera});
   const auto known = cameras_.find(key);
   if (known != cameras_.end()) return known->second;
@@ -111,7 +112,7 @@ void FrameFolderWriter::add_frame(const RgbdFrame& frame, const StoredImages& st
                                 stored.right.empty() ? encode_png(frame.right) : stored.right);
     ++counts_.right_images;
   }
-  // Of stereo pairs they are the left ones.
+  // In stereo pairs, these are the left cameras.
   if (frame.stereo.empty())
     for (const Camera& camera : frame.cameras)
       of_node.calibrations = join(of_node.calibrations, write_camera(camera));
@@ -180,7 +181,7 @@ FrameFolderCounts FrameFolderWriter::finish(const PoseGraph& graph) {
   FrameFolderOptions options;
   options.depth_unit_m = 0.001;
   options.pose_frame = PoseFrame::base;
-  // For readers that know associations.txt alone.
+  // For readers that support associations.txt only.
   if (!cameras_.empty())
     options.calibration = std::string(files::calibration_folder) + "/camera_1.yaml";
   ParameterTable table;

@@ -1,5 +1,5 @@
-// Writes a scan as a folder of plain files that FrameFolder reads back (frame_folder.h): color and
-// depth images, calibrations, poses, links.
+// Writer of a scan as a folder of plain files for FrameFolder (frame_folder.h): color and depth
+// images, calibrations, poses, links.
 #pragma once
 
 #include <cstddef>
@@ -13,10 +13,10 @@
 
 namespace libmap {
 
-// What may stand in such a folder, files and folders.
+// Names of all files and folders that the writer can create.
 std::vector<std::string> frame_folder_names();
 
-// Image files to be kept as they are; empty: the frame's image becomes a PNG.
+// Encoded images to store unchanged; empty: the frame's image is encoded as PNG.
 struct StoredImages {
   std::string color{};  // JPEG or PNG
   std::string depth{};  // PNG of 16-bit millimeters
@@ -33,14 +33,15 @@ struct FrameFolderCounts {
 
 class FrameFolderWriter {
  public:
-  // `folder` is there, and holds nothing of a scan. Throws Error (failed).
+  // Writes to `folder`, which must exist and contain no scan. Throws Error (failed), as all calls
+  // do if a file cannot be written.
   explicit FrameFolderWriter(std::filesystem::path folder);
 
-  // Images and calibrations go to files at once: color/000012.jpg for node 12. Depth is rounded to
-  // whole millimeters; 0 beyond 65.534 m.
+  // Writes the images and calibrations of a frame, e.g. color/000012.jpg for node 12. Depth is
+  // rounded to whole millimeters; 0 beyond 65.534 m.
   void add_frame(const RgbdFrame& frame, const StoredImages& stored = {});
 
-  // The nodes, with the files of those whose frames were added; poses, links, scan.yaml.
+  // Writes nodes, poses, links and scan.yaml, and returns the numbers of files.
   FrameFolderCounts finish(const PoseGraph& graph);
 
  private:
@@ -61,7 +62,7 @@ class FrameFolderWriter {
   std::filesystem::path folder_;
   FrameFolderCounts counts_;
   std::map<int, Files> files_;                  // by node
-  std::map<std::string, std::string> cameras_;  // file by its text
+  std::map<std::string, std::string> cameras_;  // file name by content
 };
 
 }  // namespace libmap

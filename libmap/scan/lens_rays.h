@@ -1,4 +1,4 @@
-// Rays of the pixels of a lens, computed once.
+// Cache of the pixel rays of a lens.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,19 +10,19 @@
 
 namespace libmap {
 
-// Whether the pixels of both cameras have the same rays.
+// True if both cameras have equal size, intrinsics and distortion, and therefore equal rays.
 inline bool same_lens(const Camera& a, const Camera& b) {
   return a.width == b.width && a.height == b.height && a.fx == b.fx && a.fy == b.fy &&
          a.cx == b.cx && a.cy == b.cy && a.distortion_model == b.distortion_model &&
          a.distortion == b.distortion;
 }
 
-// Keeps the table of the last lens: most scans have one lens. May be used from several threads.
+// Keeps the table of the last lens, because most scans have one lens. Thread-safe.
 class LensRays {
  public:
   using Table = std::vector<Eigen::Vector2d>;
 
-  // ray_table of this camera.
+  // Returns ray_table(camera).
   std::shared_ptr<const Table> rays_of(const Camera& camera) {
     const std::lock_guard lock(mutex_);
     if (rays_ == nullptr || !same_lens(camera, lens_)) {

@@ -34,17 +34,17 @@ std::vector<CameraView> read_pictures(const ScanSource& scan, int node, FramePar
   const RgbdFrame frame = scan.read_frame(node, parts);
   const std::string name = "node " + std::to_string(node);
   if (frame.color.empty())
-    throw Error("it has no color image", {.file = scan.path().string(), .field = name});
+    throw Error("has no color image", {.file = scan.path().string(), .field = name});
   if (frame.cameras.empty())
-    throw Error("it has no calibration", {.file = scan.path().string(), .field = name});
+    throw Error("has no calibration", {.file = scan.path().string(), .field = name});
   return camera_views(frame);
 }
 
 void bind(ParameterTable& table, ViewSelectionOptions& options) {
   table.add("radius_m", options.radius_m, not_negative,
-            "of two pictures nearer than this that look the same way one is kept");
+            "distance within which only one of several similar images is kept, m");
   table.add("angle_deg", options.angle_deg, {0.0, 180.0},
-            "pictures look the same way within this angle");
+            "maximum angle between the optical axes of similar images, degrees");
 }
 
 namespace {
@@ -87,7 +87,7 @@ std::string row_of(const Eigen::Vector3d& numbers) {
 std::string to_bundle_text(const std::vector<BundlerView>& views) {
   std::string text = "# Bundle file v0.3\n" + std::to_string(views.size()) + " 0\n";
   for (const BundlerView& view : views) {
-    // Half a turn about x: from x right, y down, z forward to x right, y up, z backward.
+    // Half a turn about x, from x right, y down, z forward to x right, y up, z backward.
     const Eigen::Vector3d half_turn(1.0, -1.0, -1.0);
     const Pose camera_from_world = view.world_from_camera.inverse();
     const Eigen::Matrix3d rotation = half_turn.asDiagonal() * camera_from_world.linear();

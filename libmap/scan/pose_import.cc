@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// One camera's pose in the file's own units.
+// Pose of a camera in the file's units.
 struct CameraPose {
   int node = 0;
   double stamp_s = 0.0;
@@ -27,7 +27,7 @@ struct CameraPose {
   Pose base_from_camera = Pose::Identity();
 };
 
-// What of an image's name binds it.
+// Parts of an image's name that identify its node.
 struct ImageName {
   std::string file;
   std::string stem;
@@ -36,14 +36,14 @@ struct ImageName {
 ImageName split_name(const std::string& name) {
   std::string file = name.substr(name.find_last_of("/\\") + 1);
   const std::size_t point = file.find_last_of('.');
-  // What follows the last point of a stamp are its decimals.
+  // The digits after the last point of a stamp are decimals, not an extension.
   const bool has_extension =
       point != std::string::npos && file.find_first_not_of("0123456789", point + 1) != file.npos;
   std::string stem = has_extension ? file.substr(0, point) : file;
   return {std::move(file), std::move(stem)};
 }
 
-// "12", "000012", "000012_1": node and camera.
+// Parses node and camera of "12", "000012", "000012_1".
 std::optional<std::pair<int, std::size_t>> node_in_name(const std::string& stem,
                                                         const PoseGraph& graph) {
   const std::size_t bar = stem.find('_');
@@ -62,7 +62,7 @@ std::optional<std::pair<int, std::size_t>> node_in_name(const std::string& stem,
 
 using NodeCameras = std::vector<std::pair<std::size_t, std::pair<int, std::size_t>>>;
 
-// Images, by their index, and the node and camera of each.
+// Returns the node and camera of images, by index of the image.
 NodeCameras cameras_of_images(const std::vector<ImagePose>& images, const ScanSource& scan) {
   const PoseGraph& graph = scan.graph();
   std::map<std::string, int> node_of_file;
@@ -94,21 +94,21 @@ Pose base_from_camera(const ScanSource& scan, int node, std::size_t camera) {
   const std::vector<Camera> cameras =
       scan.read_frame(node, {.color = false, .depth = false}).cameras;
   if (camera >= cameras.size())
-    throw Error("has no such camera", {.file = scan.path().string(),
-                                       .field = "node " + std::to_string(node),
-                                       .value = "camera " + std::to_string(camera),
-                                       .bound = "< " + std::to_string(cameras.size())});
+    throw Error("no such camera", {.file = scan.path().string(),
+                                   .field = "node " + std::to_string(node),
+                                   .value = "camera " + std::to_string(camera),
+                                   .bound = "< " + std::to_string(cameras.size())});
   return cameras[camera].base_from_camera;
 }
 
-// Adds the poses whose cameras are known; of the others a warning.
+// Adds a pose if its camera exists; otherwise, appends a warning.
 void add_camera(const ScanSource& scan, CameraPose pose, std::vector<CameraPose>& poses,
                 std::vector<std::string>& warnings) {
   try {
     pose.base_from_camera = base_from_camera(scan, pose.node, pose.camera);
     poses.push_back(pose);
   } catch (const Error& error) {
-    warnings.push_back(std::string(error.what()) + "; its pose is left out");
+    warnings.push_back(std::string(error.what()) + "; its pose is dropped");
   }
 }
 
@@ -121,7 +121,7 @@ std::vector<CameraPose> poses_of_images(const std::vector<ImagePose>& images,
     const auto& [node, camera] = place;
     const auto [earlier, is_new] = known.emplace(place, images[index].image);
     if (!is_new)
-      throw Error("two images of one camera of node " + std::to_string(node),
+      throw Error("two images belong to one camera of node " + std::to_string(node),
                   {.field = "image", .value = earlier->second + " and " + images[index].image});
     add_camera(
         scan,
@@ -129,10 +129,10 @@ std::vector<CameraPose> poses_of_images(const std::vector<ImagePose>& images,
         poses, warnings);
   }
   if (known.empty())
-    throw Error("no image's name is that of a node of the scan",
+    throw Error("no image name matches a node of the scan",
                 {.field = "image",
                  .value = images.front().image,
-                 .bound = "the scan's own name, the node's number or its stamp"});
+                 .bound = "the scan's file name, a node number or a stamp"});
   return poses;
 }
 
@@ -149,8 +149,8 @@ std::vector<CameraPose> poses_of_nodes(const NodeTrajectory& trajectory, const S
   return poses;
 }
 
-// The scan's own poses by node: odometry, which is metric, of the longest session, since each has
-// a frame of its own; else stored ones.
+// Returns the scan's poses by node: odometry of the longest session (metric; each session has its
+// own frame), else stored poses.
 std::map<int, Pose> own_poses(const PoseGraph& graph) {
   std::map<int, std::map<int, Pose>> sessions;
   for (const TrajectoryPose& pose : trajectory_of(graph, PoseSource::odometry))
@@ -186,7 +186,7 @@ double fitting_scale(const std::vector<CameraPose>& poses, const std::map<int, P
   }
   if (!(scale > 0.0) || !std::isfinite(scale))
     throw Error(
-        "the scale cannot be found: the scan has too few positions of its own to compare",
+        "the scale is undetermined: too few positions of the scan match; set poses_scale",
         {.field = "common positions", .value = std::to_string(given.size()), .bound = ">= 3"});
   return scale;
 }
@@ -223,11 +223,11 @@ void bind_to_nodes(const std::vector<CameraPose>& cameras, ImportedPoses& result
   }
 }
 
-// Motion between neighbors against the scan's own.
+// Compares the motion between neighbors with the scan's poses and adds warnings.
 void check_motion(const std::map<int, Pose>& own, ImportedPoses& result) {
   constexpr std::size_t fewest_steps = 5;
   constexpr double largest_ratio = 1.5;
-  constexpr double smallest_turn_rad = 0.05;  // a step; axes of smaller ones are noise
+  constexpr double smallest_turn_rad = 0.05;  // per step; axes of smaller rotations are noise
   constexpr double degrees = 180.0 / M_PI;
   double length_m = 0.0;
   double own_length_m = 0.0;
@@ -250,16 +250,14 @@ void check_motion(const std::map<int, Pose>& own, ImportedPoses& result) {
   if (steps < fewest_steps) return;
   const auto mean = [&](double sum) { return sum / static_cast<double>(steps); };
   if (length_m > largest_ratio * own_length_m || own_length_m > largest_ratio * length_m)
-    result.warnings.push_back("the poses are " + to_fixed_text(1e3 * mean(length_m), 0) +
-                              " mm apart on average, and " +
-                              to_fixed_text(1e3 * mean(own_length_m), 0) +
-                              " mm by the scan's own: are they meters (poses_scale)?");
+    result.warnings.push_back("the mean step is " + to_fixed_text(1e3 * mean(length_m), 0) +
+                              " mm, but " + to_fixed_text(1e3 * mean(own_length_m), 0) +
+                              " mm by the scan's poses; check the unit (poses_scale)");
   if (mean(turn_rad) > smallest_turn_rad && difference_rad > 0.5 * turn_rad)
-    result.warnings.push_back(
-        "from pose to pose they turn otherwise than the scan's own, by " +
-        to_fixed_text(degrees * mean(difference_rad), 1) + " of " +
-        to_fixed_text(degrees * mean(turn_rad), 1) +
-        " deg on average: are they in the axes of the base (poses_format, poses_of)?");
+    result.warnings.push_back("the mean rotation per step differs from the scan's poses by " +
+                              to_fixed_text(degrees * mean(difference_rad), 1) + " of " +
+                              to_fixed_text(degrees * mean(turn_rad), 1) +
+                              " deg; check the axes (poses_format, poses_of)");
 }
 
 }  // namespace
@@ -274,18 +272,18 @@ Pose with_quaternion_order(const Pose& read, QuaternionOrder order) {
 
 void bind(ParameterTable& table, PoseImportOptions& options) {
   table.add("poses_format", options.format, trajectory_format_names(),
-            "of a file of poses; auto: by extension, else by content. tum-motion-capture and "
-            "kitti-optical are RTAB-Map's formats 1 and 2, whose axes are others");
+            "format of the pose file; auto: by extension, else by content. tum-motion-capture and "
+            "kitti-optical are RTAB-Map's formats 1 and 2, which have other axes");
   table.add("poses_quaternion", options.quaternion,
             {{"xyzw", QuaternionOrder::xyzw}, {"wxyz", QuaternionOrder::wxyz}},
-            "order of the quaternions in a file of poses (TUM, g2o)");
+            "order of the quaternions in the pose file (TUM, g2o)");
   table.add(
       "poses_of", options.frame, pose_frame_names(),
-      "whose poses a file contains: the base's, or the first camera's optical frame's; those of "
-      "COLMAP, nerfstudio and Open3D are the cameras'");
+      "frame of the poses in the file: the base, or the first camera's optical frame; COLMAP, "
+      "nerfstudio and Open3D always use the camera's");
   table.add("poses_scale", options.scale, not_negative,
-            "meters a unit of a file's positions, COLMAP's being arbitrary; 0: the one that fits "
-            "the scan's odometry best");
+            "meters per unit of the file's positions (arbitrary for COLMAP); 0: the best fit to "
+            "the scan's odometry");
 }
 
 ImportedPoses import_poses(const fs::path& path, const ScanSource& scan,

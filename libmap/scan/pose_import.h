@@ -1,4 +1,4 @@
-// Poses of a file, of any format, for the frames of a scan.
+// Import of a pose file of any format for the frames of a scan.
 #pragma once
 
 #include <cstddef>
@@ -13,19 +13,19 @@
 
 namespace libmap {
 
-// Order of the numbers of a file's quaternions: that of its format, or w first.
+// Order of the quaternions in a file: the format's order, or w first.
 enum class QuaternionOrder { xyzw, wxyz };
-// The pose whose quaternion, read as x y z w, was written in `order`.
+// Corrects a pose whose quaternion was read as x y z w but was written in `order`.
 Pose with_quaternion_order(const Pose& read, QuaternionOrder order);
 
 struct PoseImportOptions {
   TrajectoryFormat format = TrajectoryFormat::automatic;
   QuaternionOrder quaternion = QuaternionOrder::xyzw;
-  // Whose poses the file holds: the base's, or those of the first camera's optical frame. Those of
-  // COLMAP are always the cameras'.
+  // Frame of the poses in the file: the base, or the first camera's optical frame. Poses of COLMAP
+  // are always of cameras.
   PoseFrame frame = PoseFrame::base;
-  // Meters a unit of the file's positions. 0: the one that fits the scan's own positions best
-  // (Umeyama 1991): its odometry's, else its stored ones.
+  // Meters per unit of the file's positions. 0: the least-squares scale to the scan's odometry,
+  // else to its stored poses (Umeyama 1991).
   double scale = 1.0;
 };
 void bind(ParameterTable& table, PoseImportOptions& options);
@@ -33,19 +33,18 @@ void bind(ParameterTable& table, PoseImportOptions& options);
 struct ImportedPoses {
   NodeTrajectory trajectory;
   std::size_t poses_in_file = 0;
-  double scale = 1.0;                    // that was taken
-  double largest_rig_deviation_m = 0.0;  // of the cameras of one node from their mean
-  // Poses left out since their node's calibration is of no use. Motion between neighbors that is
-  // not at all the scan's own: by another length (the scale), or about other axes (the format, the
-  // frame).
+  double scale = 1.0;                    // meters per unit, as applied
+  double largest_rig_deviation_m = 0.0;  // maximum deviation of a node's cameras from their mean
+  // Reports poses dropped because of an unusable calibration, and motion between neighbors that
+  // differs from the scan's in length (wrong scale) or axes (wrong format or frame).
   std::vector<std::string> warnings{};
 };
 
-// Poses are bound to nodes as assign_nodes does; images of COLMAP by their names, whatever their
-// folder: the name of the file that the scan itself reads, the node's number (`000012.jpg`, `12`;
-// `000012_1.jpg` is its second camera), or a stamp within 20 ms (`1305031102.175304.png`). A node
-// that several cameras of a rig see has the mean of the poses that they give. Throws Error naming
-// the file: none is a node's, two are of one node, the scale cannot be found.
+// Assigns poses to nodes as assign_nodes does. Images of COLMAP are assigned by name in any folder:
+// the scan's own file name, the node's number (`000012.jpg`, `12`; `000012_1.jpg` is its second
+// camera), or a stamp within 20 ms (`1305031102.175304.png`). If several cameras of a rig have a
+// pose, the node's pose is their mean. Throws Error naming the file if no pose matches a node, two
+// poses match the same camera, or the scale is undetermined.
 ImportedPoses import_poses(const std::filesystem::path& path, const ScanSource& scan,
                            const PoseImportOptions& options = {});
 

@@ -66,7 +66,7 @@ Camera intrinsics_of(const YAML::Node& map, const fs::path& folder) {
   for (const char* key : {"image_width", "image_height", "camera_matrix", "distortion_model",
                           "distortion_coefficients"})
     if (map[key])
-      throw Error("is given beside a calibration file that contains it", {.field = key});
+      throw Error("is also in the calibration file; remove one of them", {.field = key});
   return read_camera(folder / map["calibration"].Scalar()).camera;
 }
 
@@ -75,7 +75,7 @@ void read_pose(const YAML::Node& map, Camera& camera) {
   const YAML::Node angles = map["roll_pitch_yaw_deg"];
   if (map["robot_from_camera"]) {
     if (position || angles)
-      throw Error("is given beside position_m or roll_pitch_yaw_deg",
+      throw Error("cannot be combined with position_m or roll_pitch_yaw_deg",
                   {.field = "robot_from_camera"});
     camera.base_from_camera = pose_from_yaml(map["robot_from_camera"], "robot_from_camera");
     return;
@@ -94,7 +94,7 @@ void read_pose(const YAML::Node& map, Camera& camera) {
 }
 
 RigCamera camera_of(const YAML::Node& map, const RigCamera& defaults, const fs::path& folder) {
-  if (!map.IsMap()) throw Error("a camera is a map of keys and values");
+  if (!map.IsMap()) throw Error("a camera must be a map of keys and values");
   check_keys(map, camera_keys);
   RigCamera camera = defaults;
   if (!map["name"] || !map["name"].IsScalar()) throw Error("is missing", {.field = "name"});
@@ -113,7 +113,7 @@ Error at_camera(const Error& error, std::size_t index, const YAML::Node& map) {
 }
 
 CameraRig rig_of(const YAML::Node& root, const fs::path& folder) {
-  if (!root.IsMap()) throw Error("a rig is a map with the key 'cameras'");
+  if (!root.IsMap()) throw Error("a rig must be a map with the key 'cameras'");
   std::vector<std::string> known = limit_keys;
   known.emplace_back("cameras");
   check_keys(root, known);
@@ -142,7 +142,7 @@ void check_camera(const RigCamera& camera) {
   const std::string& name = camera.name;
   if (name.empty() || name == "." || name == ".." || name.find('/') != std::string::npos ||
       name.find('\0') != std::string::npos)
-    throw Error("cannot name a folder",
+    throw Error("not a valid folder name",
                 {.field = "name", .value = name, .bound = "a name without '/'"});
   if (!(camera.depth_scale_m > 0) || !std::isfinite(camera.depth_scale_m))
     refuse("depth_scale_m", camera.depth_scale_m, "> 0");
@@ -157,7 +157,7 @@ std::string number_text(double value) {
   return std::isinf(value) ? (value > 0 ? ".inf" : "-.inf") : to_text(value);
 }
 
-// The camera file's lines without its head, as an entry of the list.
+// Returns the lines of a camera file without its head, as an entry of the list.
 std::string camera_entry(const RigCamera& camera) {
   std::istringstream lines(to_yaml(CameraFile{camera.name, camera.camera}));
   std::string text;
@@ -209,14 +209,14 @@ namespace {
 namespace fs = std::filesystem;
 using State = SynchronizedSet::Camera::State;
 
-// File names have whole microseconds.
+// File names have a resolution of microseconds.
 constexpr double stamp_rounding_s = 1e-6;
 constexpr std::uint16_t saturated = 65535;
 
 double stamp_of(const std::string& text, const std::string& file, const std::string& field) {
   const std::optional<double> stamp = parse_double(text);
   if (!stamp || !std::isfinite(*stamp))
-    throw Error("is no time stamp",
+    throw Error("not a time stamp",
                 {.file = file, .field = field, .value = text, .bound = "a number of seconds"});
   return *stamp;
 }
@@ -229,7 +229,7 @@ void append_folder(const fs::path& folder, std::size_t camera, std::vector<RigIm
   if (code) throw Error("cannot be read: " + code.message(), {.file = folder.string()});
   for (const fs::directory_entry& entry : entries) {
     const fs::path& file = entry.path();
-    // Hidden files are other programs' own.
+    // Hidden files belong to other programs.
     if (!is_png(file) || file.filename().string().starts_with(".")) continue;
     images.push_back({camera, stamp_of(file.stem().string(), file.string(), "name"), file});
   }
@@ -269,7 +269,7 @@ bool is_fuller(const SynchronizedSet& set, const SynchronizedSet& best) {
   return sum_of_offsets(set) < sum_of_offsets(best);
 }
 
-// Of each camera its images among `candidates`, which ascend in time.
+// Candidate images of each camera, ascending in time.
 using ImagesByCamera = std::vector<std::vector<std::size_t>>;
 ImagesByCamera by_camera(const std::vector<RigImage>& images,
                          const std::vector<std::size_t>& candidates, std::size_t camera_count) {
@@ -287,7 +287,7 @@ std::vector<std::size_t> in_order_of_time(const std::vector<RigImage>& images) {
   return order;
 }
 
-// The first of those nearest to `stamp_s`; of none, none.
+// Returns the first image nearest to `stamp_s`; nullopt if there are no images.
 std::optional<std::size_t> nearest_of(const std::vector<RigImage>& images,
                                       const std::vector<std::size_t>& of_camera, double stamp_s) {
   const auto first_from = [&](double stamp) {
@@ -302,7 +302,7 @@ std::optional<std::size_t> nearest_of(const std::vector<RigImage>& images,
   return after == of_camera.end() || offset(before) <= offset(after) ? *before : *after;
 }
 
-// Of each camera the image nearest to `stamp_s` within the reach.
+// Returns the set of each camera's image nearest to `stamp_s` within the tolerance.
 SynchronizedSet set_of(const std::vector<RigImage>& images, const ImagesByCamera& candidates,
                        double stamp_s, double reach_s) {
   SynchronizedSet set;
@@ -324,13 +324,13 @@ std::string rig_image_name(const std::string& camera, double stamp_s) {
 
 std::vector<RigImage> list_rig_images(const fs::path& folder, const CameraRig& rig) {
   if (!fs::is_directory(folder))
-    throw Error(fs::exists(folder) ? "is no folder" : "no such folder", {.file = folder.string()});
+    throw Error(fs::exists(folder) ? "not a folder" : "no such folder", {.file = folder.string()});
   std::vector<RigImage> images;
   if (fs::exists(folder / rig_images_file_name)) {
     images = images_of_table(folder, rig);
   } else {
     for (std::size_t n = 0; n < rig.cameras.size(); ++n) {
-      std::error_code code;  // a camera may have a name that no folder can have
+      std::error_code code;  // a camera's name can be invalid as a folder name
       if (fs::is_directory(folder / rig.cameras[n].name, code))
         append_folder(folder / rig.cameras[n].name, n, images);
     }
@@ -350,7 +350,7 @@ Image<std::uint16_t> read_rig_units(const RigImage& image, const RigCamera& came
       in_file(image.file, [&] { return decode_gray16(read_whole_file(image.file)); });
   const Camera& calibrated = camera.camera;
   if (units.width != calibrated.width || units.height != calibrated.height)
-    throw Error("does not fit the calibration of " + camera.name,
+    throw Error("does not match the calibration of " + camera.name,
                 {.file = image.file.string(),
                  .field = "image size",
                  .value = size_text(units.width, units.height),
@@ -393,7 +393,7 @@ SynchronizedSet synchronized_set_at(const std::vector<RigImage>& images, std::si
 
 SynchronizedSet fullest_synchronized_set(const std::vector<RigImage>& images,
                                          std::size_t camera_count, double tolerance_s) {
-  if (images.empty()) throw Error("there are no images to choose a moment from");
+  if (images.empty()) throw Error("there are no images to synchronize");
   const std::vector<std::size_t> order = in_order_of_time(images);
   const ImagesByCamera all = by_camera(images, order, camera_count);
   SynchronizedSet best;
@@ -418,7 +418,7 @@ std::vector<SynchronizedSet> synchronized_sets(const std::vector<RigImage>& imag
       if (images[waiting[n]].stamp_s > start + 2 * reach) break;
       if (!taken[waiting[n]]) near.push_back(waiting[n]);
     }
-    // The first image belongs to the set, whatever others its camera took.
+    // The first image belongs to the set, even if its camera has others.
     ImagesByCamera candidates = by_camera(images, near, camera_count);
     candidates[images[near.front()].camera].resize(1);
     SynchronizedSet best;

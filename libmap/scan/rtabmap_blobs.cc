@@ -20,14 +20,14 @@ std::string to_bytes(const std::array<T, N>& numbers) {
   return bytes;
 }
 
-// Of the nine numbers from the nearest rotation: float32 of old versions is off by 1e-4.
+// Maximum Frobenius distance to the nearest rotation; old versions have errors of 1e-4.
 constexpr double max_rotation_error = 0.05;
 
 template <typename T, std::size_t N>
 std::array<T, N> numbers_of(std::string_view bytes, const char* what) {
   std::array<T, N> numbers{};
   if (bytes.size() != sizeof numbers)
-    throw Error(std::string(what) + " of another length",
+    throw Error(std::string(what) + " has a wrong length",
                 {.value = std::to_string(bytes.size()) + " bytes",
                  .bound = std::to_string(sizeof numbers)});
   std::memcpy(numbers.data(), bytes.data(), sizeof numbers);
@@ -89,11 +89,11 @@ void require_optimized_poses(const std::string& ids_blob, const std::string& pos
   const StoredMatrix ids = read_matrix_header(ids_blob);
   const StoredMatrix poses = read_matrix_header(poses_blob);
   if (ids.element != MatrixElement::int32 || poses.element != MatrixElement::float32)
-    throw Error("matrices of other types than int32 and float32");
+    throw Error("the matrices are not of int32 and float32");
   constexpr std::uint64_t pose_numbers = pose_bytes / sizeof(float);
   if (elements_of(poses) % pose_numbers != 0 ||
       elements_of(poses) / pose_numbers != elements_of(ids))
-    throw Error("other numbers of ids and poses",
+    throw Error("the numbers of ids and poses differ",
                 {.value = std::to_string(elements_of(ids)) + " and " +
                           std::to_string(elements_of(poses) / pose_numbers)});
 }
@@ -105,14 +105,14 @@ std::optional<Pose> decode_pose(std::string_view bytes) {
   using RowMajor = Eigen::Matrix<float, 3, 4, Eigen::RowMajor>;
   const Eigen::Matrix<double, 3, 4> stored =
       Eigen::Map<const RowMajor>(numbers.data()).cast<double>();
-  if (!stored.allFinite()) throw Error("pose that is not finite");
+  if (!stored.allFinite()) throw Error("pose is not finite");
   if (stored.col(3).cwiseAbs().maxCoeff() > max_position_m)
-    throw Error("pose that lies beyond 1e8 m of the origin");
+    throw Error("pose is more than 1e8 m from the origin");
   Pose pose = Pose::Identity();
   pose.linear() = nearest_rotation(stored.leftCols<3>());
   pose.translation() = stored.col(3);
   if ((pose.linear() - stored.leftCols<3>()).norm() > max_rotation_error)
-    throw Error("pose whose matrix is no rotation");
+    throw Error("matrix of the pose is not a rotation");
   return pose;
 }
 
@@ -121,7 +121,7 @@ Matrix6d decode_information(std::string_view bytes) {
   using RowMajor = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
   Matrix6d information = Eigen::Map<const RowMajor>(numbers.data());
   if (!(information.cwiseAbs().array() <= max_information).all())
-    throw Error("information matrix that is not finite, or beyond 1e300");
+    throw Error("information matrix is not finite or exceeds 1e300");
   return information;
 }
 
@@ -140,7 +140,7 @@ std::optional<GpsFix> decode_gps(std::string_view bytes) {
   if (std::all_of(numbers.begin(), numbers.end(), [](double number) { return number == 0; }))
     return std::nullopt;
   if (!std::all_of(numbers.begin(), numbers.end(), [](double n) { return std::isfinite(n); }))
-    throw Error("gps that is not finite");
+    throw Error("gps is not finite");
   return GpsFix{numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], numbers[5]};
 }
 

@@ -1,4 +1,4 @@
-// Numbers as an RTAB-Map database holds them, little-endian.
+// Little-endian binary formats of an RTAB-Map database.
 #pragma once
 
 #include <array>
@@ -12,39 +12,42 @@
 
 namespace libmap {
 
-// RTAB-Map takes shorter blobs for absent (DBDriverSqlite3.cpp).
+// RTAB-Map treats blobs of at most this size as absent (DBDriverSqlite3.cpp).
 inline constexpr std::size_t absent_blob_bytes = 4;
 inline bool is_absent(std::string_view blob) { return blob.size() <= absent_blob_bytes; }
 
-// 12 float32, the rows of [R|t].
+// Format of a pose: 12 float32, the rows of [R|t].
 inline constexpr std::size_t pose_bytes = 48;
 std::string to_blob(const Pose& pose);
 std::string null_pose_blob();
-// 36 float64, row by row: the symmetric part. g2o rejects a whole graph for one asymmetric bit.
+// Encodes the symmetric part as 36 float64 in row-major order. g2o rejects a whole graph for one
+// asymmetric bit.
 std::string to_blob(const Matrix6d& information);
-// 6 float32.
+// Encodes a velocity as 6 float32.
 std::string to_blob(const std::array<double, 6>& velocity);
-// 6 float64: stamp, longitude, latitude, altitude, error, bearing.
+// Encodes a fix as 6 float64: stamp, longitude, latitude, altitude, error, bearing.
 std::string to_blob(const GpsFix& fix);
 
-// 48 bytes of float32, rows of [R|t]; nothing for all zeros, RTAB-Map's null. The rotation becomes
-// the nearest proper one. Throws Error: another length, not finite, no rotation at all.
+// Decodes a pose with the nearest proper rotation; nullopt for all zeros, RTAB-Map's null. Throws
+// Error if the length is not 48 bytes, or the numbers are not finite or far from a rotation.
 std::optional<Pose> decode_pose(std::string_view bytes);
-// 288 bytes of float64. Throws Error: another length, not finite.
+// Decodes 36 float64. Throws Error if the length is not 288 bytes or a number is not finite.
 Matrix6d decode_information(std::string_view bytes);
-// 24 bytes of float32; nothing if it is not known (all zeros or not finite).
+// Decodes 6 float32; nullopt if the velocity is unknown (all zeros or not finite). Throws Error if
+// the length is not 24 bytes.
 std::optional<std::array<double, 6>> decode_velocity(std::string_view bytes);
-// 48 bytes of float64; nothing for all zeros.
+// Decodes 6 float64; nullopt for all zeros. Throws Error if the length is not 48 bytes or a number
+// is not finite.
 std::optional<GpsFix> decode_gps(std::string_view bytes);
 
-// Admin.opt_ids and Admin.opt_poses.
+// Content of Admin.opt_ids and Admin.opt_poses.
 struct OptimizedPoseBlobs {
   std::string ids;
   std::string poses;
 };
 OptimizedPoseBlobs to_blobs(const std::map<int, Pose>& map_from_base);
-// Throws Error unless Admin.opt_ids and Admin.opt_poses are matrices of int32 and of 12 float32 for
-// each of them. Goes by what the blobs say of themselves: neither is inflated.
+// Throws Error unless Admin.opt_ids and Admin.opt_poses are matrices of int32 and of 12 float32 per
+// id. Checks the headers of the blobs without inflating them.
 void require_optimized_poses(const std::string& ids_blob, const std::string& poses_blob);
 
 }  // namespace libmap

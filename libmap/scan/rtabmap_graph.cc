@@ -34,7 +34,7 @@ class Warnings {
     if (++count_ <= max_warnings) list_.push_back(text);
   }
 
-  // The value, or nothing and a warning.
+  // Returns make(); on Error, adds a warning and returns nullopt.
   template <typename Make>
   auto attempt(const std::string& what, const Make& make) -> decltype(make()) {
     try {
@@ -93,16 +93,16 @@ void read_nodes(const SqliteFile& file, const RtabmapColumns& columns, PoseGraph
   file.each_row("SELECT " + list + " FROM Node ORDER BY id", {}, [&](const SqliteRow& row) {
     const std::optional<int> id = as_id(row.integer(0));
     if (!id || *id <= 0)
-      warnings.add(node_text(row.integer(0)) + ": is left out: ids begin at 1");
+      warnings.add(node_text(row.integer(0)) + ": dropped: ids start at 1");
     else
       graph.nodes.push_back(node_in(row, *id, warnings));
   });
-  // SQLite's order is another one where the column holds texts.
+  // SQLite's order differs if the column contains texts.
   std::stable_sort(graph.nodes.begin(), graph.nodes.end(),
                    [](const GraphNode& a, const GraphNode& b) { return a.id < b.id; });
   const auto is_again = [&](const GraphNode& a, const GraphNode& b) {
     if (a.id != b.id) return false;
-    warnings.add(node_text(a.id) + ": is there more than once; the first is taken");
+    warnings.add(node_text(a.id) + ": occurs more than once; the first is used");
     return true;
   };
   graph.nodes.erase(std::unique(graph.nodes.begin(), graph.nodes.end(), is_again),
@@ -114,9 +114,9 @@ void read_nodes(const SqliteFile& file, const RtabmapColumns& columns, PoseGraph
 Matrix6d information_of(double rotation_variance, double translation_variance) {
   if (!(rotation_variance > 0) || !(translation_variance > 0) ||
       !std::isfinite(rotation_variance) || !std::isfinite(translation_variance))
-    throw Error("variance that is not above 0");
+    throw Error("variance is not > 0");
   if (1 / translation_variance > max_information || 1 / rotation_variance > max_information)
-    throw Error("variance so small that its reciprocal is beyond 1e300");
+    throw Error("reciprocal of the variance exceeds 1e300");
   Matrix6d information = Matrix6d::Zero();
   information.diagonal() << Eigen::Vector3d::Constant(1 / translation_variance),
       Eigen::Vector3d::Constant(1 / rotation_variance);
@@ -156,18 +156,18 @@ class LinkReader {
     try {
       if (const std::optional<PoseLink> link = link_in(row)) keep(*link);
     } catch (const Error& error) {
-      warnings_.add(what + ": is left out: " + error.what());
+      warnings_.add(what + ": dropped: " + error.what());
     }
   }
 
-  // Nothing for a null transform, which RTAB-Map stores where odometry was lost.
+  // Returns nullopt for a null transform, which RTAB-Map stores after a loss of odometry.
   std::optional<PoseLink> link_in(const SqliteRow& row) const {
     const std::optional<int> from = as_id(row.integer(0));
     const std::optional<int> to = as_id(row.integer(1));
     const std::optional<int> type = as_id(row.integer(2));
-    if (!from || !to || !type) throw Error("its numbers are no ids");
+    if (!from || !to || !type) throw Error("ids or type are not valid");
     PoseLink link{.from = *from, .to = *to, .type = static_cast<LinkType>(*type)};
-    // Before 0.7.4 types were neighbor, loop closure and child.
+    // Before 0.7.4, the types were neighbor, loop closure and child.
     if (form_ == InformationForm::none && *type != 0) link.type = LinkType::global_closure;
     check_ends(link);
     const std::optional<Pose> pose = decode_pose(row.bytes(3));
@@ -182,14 +182,14 @@ class LinkReader {
   }
 
   void check_ends(const PoseLink& link) const {
-    if (graph_.find_node(link.from) == nullptr) throw Error(node_text(link.from) + " is not there");
+    if (graph_.find_node(link.from) == nullptr) throw Error(node_text(link.from) + " is missing");
     if (link.type != LinkType::landmark && graph_.find_node(link.to) == nullptr)
-      throw Error(node_text(link.to) + " is not there");
+      throw Error(node_text(link.to) + " is missing");
     if (link.from == link.to && !is_absolute(link))
       throw Error("a " + to_text(link.type) + " link to itself");
   }
 
-  // Rows come by ascending `from`: the direction from the lower node comes first.
+  // Rows are in ascending order of `from`, so the direction from the lower node is first.
   void keep(const PoseLink& link) {
     const auto [low, high] = std::minmax(link.from, link.to);
     links_.try_emplace({low, high, static_cast<int>(link.type)}, link);
@@ -217,7 +217,7 @@ std::map<int, Pose> decode_optimized_poses(const std::string& ids_blob,
     const auto pose = warnings.attempt(node_text(list[i]) + ": Admin.opt_poses", [&] {
       return decode_pose(std::string_view(poses.bytes).substr(i * pose_bytes, pose_bytes));
     });
-    // Others are landmarks, and nodes that were deleted since.
+    // Other ids are landmarks and deleted nodes.
     if (pose && graph.find_node(list[i]) != nullptr) map_from_base.emplace(list[i], *pose);
   }
   return map_from_base;

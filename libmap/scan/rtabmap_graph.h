@@ -1,4 +1,4 @@
-// Nodes, links and optimized poses of an RTAB-Map database.
+// Reader of the nodes, links and optimized poses of an RTAB-Map database.
 #pragma once
 
 #include <optional>
@@ -15,13 +15,12 @@ class SqliteFile;
 
 struct RtabmapGraph {
   PoseGraph graph;
-  // What was left out, and why: nodes and links that cannot be used, poses that are broken. At most
-  // 100, then how many more.
+  // Dropped nodes, links and poses with the reason; at most 100, then the number of further ones.
   std::vector<std::string> warnings;
 };
 
-// Each link once: where both directions are stored, the one from the lower node; where one is, that
-// one. Throws Error naming the file.
+// Reads the graph. Each link is contained once; if both directions are stored, the one from the
+// lower node. Throws Error naming the file if a table cannot be read.
 RtabmapGraph read_rtabmap_graph(const SqliteFile& file, const RtabmapColumns& columns);
 
 }  // namespace libmap

@@ -18,13 +18,13 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr const char* unknown_part = " is not known and is not read";
-// Enough for the frame header of a JPEG that cameras make.
+constexpr const char* unknown_part = " is unknown and ignored";
+// Size sufficient for the frame header of a camera's JPEG.
 constexpr std::size_t header_bytes = 4096;
 
 std::string or_empty(std::string blob) { return is_absent(blob) ? std::string() : std::move(blob); }
 
-// Where images and calibration stand: in Data, or before 0.10 in Image and Depth.
+// Columns of images and calibration: in Data, or before 0.10 in Image and Depth.
 struct ImageColumns {
   std::string from;
   std::string id;
@@ -71,8 +71,8 @@ std::string calibration_list(const ImageColumns& of) {
          ", " + of.center_y + ", " + of.local_transform;
 }
 
-// Columns `first`...: calibration fx fy cx cy local_transform; the last five before 0.10. A second
-// focal length below 1 is the baseline of a stereo pair (DBDriverSqlite3.cpp).
+// Reads columns from `first`: calibration fx fy cx cy local_transform; the last five before 0.10.
+// An fy below 1 is the baseline of a stereo pair (DBDriverSqlite3.cpp).
 std::string calibration_in(const SqliteRow& row, int first) {
   if (!row.is_null(first)) return or_empty(row.bytes(first));
   if (row.is_null(first + 1)) return {};
@@ -96,7 +96,7 @@ std::string version_of(const SqliteFile& file, const RtabmapColumns& columns) {
 
 void require_scan(const fs::path& path, const RtabmapColumns& columns) {
   const auto refuse = [&](const std::string& why) {
-    throw Error("is an SQLite file but no scan of RTAB-Map: " + why, {.file = path.string()});
+    throw Error("is an SQLite file but not an RTAB-Map database: " + why, {.file = path.string()});
   };
   if (!columns.has_table("Node")) refuse("it has no table Node");
   if (!columns.has("Node", "id")) refuse("its table Node has no column id");
@@ -113,13 +113,13 @@ void require_scan(const fs::path& path, const RtabmapColumns& columns) {
 
 RgbdFrame decode_frame(const FrameBlobs& blobs, FrameParts parts) {
   RgbdFrame frame;
-  // Of the image that the cameras belong to.
+  // Size of the image that the cameras belong to.
   int width = 0;
   int height = 0;
   if (!blobs.image.empty())
     in_field("image", [&] {
       const std::optional<ImageInfo> info = read_image_info(blobs.image);
-      if (!info) throw Error("image ends in its header");
+      if (!info) throw Error("the image's header is truncated");
       width = info->width;
       height = info->height;
       if (parts.color) frame.color = decode_color(blobs.image);
@@ -151,7 +151,7 @@ RtabmapDatabase::RtabmapDatabase(const fs::path& path)
   graph_ = std::move(read.graph);
   warnings_ = std::move(read.warnings);
   if (!columns_.has_table("Data") && !columns_.has_table("Image"))
-    warnings_.push_back("it has no table Data: there are no images");
+    warnings_.push_back("no table Data: the scan has no images");
   for (const std::string& name : columns_.unknown()) warnings_.push_back(name + unknown_part);
 }
 
@@ -161,12 +161,12 @@ RtabmapDatabase::~RtabmapDatabase() = default;
 
 FrameBlobs RtabmapDatabase::read_blobs(int node, FrameParts parts) const {
   if (graph_.find_node(node) == nullptr)
-    throw Error("there is no such node",
+    throw Error("no such node",
                 {.file = path_.string(), .field = "node", .value = std::to_string(node)});
   FrameBlobs blobs;
   if (!columns_.has_table("Data") && !columns_.has_table("Image")) return blobs;
   const ImageColumns of = image_columns(columns_);
-  // Where an image is not asked for, its header still says the size of cameras that store none.
+  // The header of an image that is not requested is read for cameras that do not store their size.
   const auto part = [&](const std::string& column, bool is_wanted) {
     return is_wanted ? column : "substr(" + column + ", 1, " + std::to_string(header_bytes) + ")";
   };
@@ -184,7 +184,7 @@ FrameBlobs RtabmapDatabase::read_blobs(int node, FrameParts parts) const {
 RgbdFrame RtabmapDatabase::read_frame(int node, FrameParts parts) const {
   FrameBlobs blobs = read_blobs(node, parts);
   try {
-    // A header longer than the bytes that were read.
+    // The header is longer than the bytes read.
     if (!parts.color && !blobs.image.empty() && !read_image_info(blobs.image))
       blobs.image = read_blobs(node).image;
     RgbdFrame frame = decode_frame(blobs, parts);
@@ -198,7 +198,7 @@ RgbdFrame RtabmapDatabase::read_frame(int node, FrameParts parts) const {
 }
 
 std::map<std::string, std::string> RtabmapDatabase::parameters() const {
-  // In 0.11.8 to 0.11.10 they stand in Statistics.
+  // In 0.11.8 to 0.11.10, they are in Statistics.
   const std::string table = columns_.has("Info", "parameters") ? "Info" : "Statistics";
   std::map<std::string, std::string> parameters;
   if (!columns_.has(table, "parameters")) return parameters;
@@ -306,10 +306,10 @@ void RtabmapDatabase::each_content(const std::function<void(const NodeContent&)>
 
 namespace {
 
-// Materials one after the other: the number of polygons, then their indices.
+// Counts polygons. Each material is stored as its number of polygons, then their indices.
 std::size_t count_polygons(const std::string& blob, std::int64_t corners) {
   std::size_t count = 0;
-  std::uint64_t left = 0;  // indices of the material
+  std::uint64_t left = 0;  // remaining indices of the material
   each_matrix_piece(blob, [&](std::string_view bytes) {
     for (; bytes.size() >= sizeof(std::int32_t); bytes.remove_prefix(sizeof(std::int32_t))) {
       if (left > 0) {
@@ -319,12 +319,12 @@ std::size_t count_polygons(const std::string& blob, std::int64_t corners) {
       std::int32_t polygons = 0;
       std::memcpy(&polygons, bytes.data(), sizeof polygons);
       if (polygons < 0 || corners < 1 || corners > std::numeric_limits<std::int32_t>::max())
-        throw Error("mesh of no valid size");
+        throw Error("mesh has an invalid size");
       count += static_cast<std::size_t>(polygons);
       left = static_cast<std::uint64_t>(polygons) * static_cast<std::uint64_t>(corners);
     }
   });
-  if (left > 0) throw Error("mesh ends before its last polygon");
+  if (left > 0) throw Error("mesh is truncated");
   return count;
 }
 

@@ -1,9 +1,9 @@
-// RTAB-Map databases of every schema from 0.10 to 0.23 (and images of older ones), without
+// Reader of RTAB-Map databases of all schemas from 0.10 to 0.23 (and images of older ones), without
 // RTAB-Map.
 //
-// A schema is recognized by its columns, never refused for its version. The file is never written
-// to, nothing appears beside it, and another program may have it open (see SqliteFile). Nodes,
-// links and poses are read at once, images one node at a time.
+// The schema is recognized by its columns, not by its version. The reader does not write to the
+// file or its folder, and another program can have the file open (see SqliteFile). Nodes, links and
+// poses are read on opening, images one node at a time.
 #pragma once
 
 #include <cstddef>
@@ -27,21 +27,21 @@ namespace libmap {
 
 class SqliteFile;
 
-// What a node's row of images holds, by the first bytes of each.
+// Content of a node's row of images, by the headers of the images.
 struct NodeContent {
   int node = 0;
   std::optional<ImageInfo> color{};
   std::optional<DepthInfo> depth{};
-  std::optional<ImageInfo> right{};  // of a stereo pair, in place of depth
+  std::optional<ImageInfo> right{};  // right image of a stereo pair, instead of depth
   std::size_t color_bytes = 0;
   std::size_t depth_bytes = 0;
   Calibration calibration{};
   std::size_t laser_scan_bytes = 0;
   std::size_t user_data_bytes = 0;
-  std::vector<std::string> faults{};  // "image: ...": headers that cannot be read
+  std::vector<std::string> faults{};  // unreadable headers: "image: ..."
 };
 
-// What RTAB-Map keeps of the whole map; 0 or nothing where not stored.
+// Map data stored by RTAB-Map; 0 or nullopt if not stored.
 struct StoredMap {
   int grid_width = 0;  // cells
   int grid_height = 0;
@@ -53,41 +53,41 @@ struct StoredMap {
   std::optional<Pose> last_localization_map_from_base{};
 };
 
-// A node's images and calibration as stored; empty where absent.
+// Stored images and calibration of a node; empty if absent.
 struct FrameBlobs {
   std::string image;
   std::string depth;
   std::string calibration;
 };
-// Node and stamp are left 0. Throws Error naming "image", "depth" or "calibration".
+// Decodes a frame; its node and stamp are 0. Throws Error naming "image", "depth" or "calibration".
 RgbdFrame decode_frame(const FrameBlobs& blobs, FrameParts parts = {});
 
 class RtabmapDatabase : public ScanSource {
  public:
-  // Throws Error: not an SQLite file, not a scan, broken.
+  // Throws Error if the file is not an SQLite file, not an RTAB-Map database, or damaged.
   explicit RtabmapDatabase(const std::filesystem::path& path);
   ~RtabmapDatabase() override;
 
   const std::filesystem::path& path() const override { return path_; }
   const PoseGraph& graph() const override { return graph_; }
-  // Grayscale becomes color; the depth column's image is `right` where it is no depth.
+  // Converts grayscale to color. An image in the depth column that is not depth becomes `right`.
   RgbdFrame read_frame(int node, FrameParts parts = {}) const override;
 
-  // As the file says (Admin.version), empty if it does not; and as its columns say.
+  // Version stored in the file (Admin.version; empty if missing), and version by its columns.
   const std::string& version() const { return version_; }
   std::string recognized_version() const { return columns_.recognized_version(); }
-  // What could not be used of nodes, links and poses, and what no known version has.
+  // Reports dropped nodes, links and poses, and unknown tables and columns.
   const std::vector<std::string>& warnings() const override { return warnings_; }
 
-  // RTAB-Map's parameters when it last wrote the file.
+  // Returns RTAB-Map's parameters of its last write.
   std::map<std::string, std::string> parameters() const;
   std::size_t word_count() const;
   std::size_t feature_count() const;
   StoredMap stored_map() const;
-  // Nodes in ascending order, from headers alone.
+  // Calls `use` for each node in ascending order; reads headers only.
   void each_content(const std::function<void(const NodeContent&)>& use) const;
 
-  // The image is a file of its own: JPEG or PNG.
+  // Returns a node's stored images; the color image is a JPEG or PNG file.
   FrameBlobs read_blobs(int node) const { return read_blobs(node, {}); }
 
   const SqliteFile& file() const { return *file_; }
@@ -104,8 +104,8 @@ class RtabmapDatabase : public ScanSource {
   std::vector<std::string> warnings_;
 };
 
-// Whether a warning of warnings() is about a table or column that RTAB-Map got after this was
-// written: nothing is broken.
+// True if a warning is about an unknown table or column of a later RTAB-Map version, which is not a
+// fault.
 bool is_about_unknown_part(const std::string& warning);
 
 }  // namespace libmap

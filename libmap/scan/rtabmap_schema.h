@@ -1,4 +1,4 @@
-// The tables of an RTAB-Map database of schema 0.23.
+// Schema of RTAB-Map databases: the columns of a file, and the statements that create schema 0.23.
 #pragma once
 
 #include <map>
@@ -12,30 +12,30 @@ class SqliteFile;
 
 class RtabmapColumns {
  public:
-  // Reads the schema. Throws Error if the file holds none.
+  // Reads the schema. Throws Error if it cannot be read.
   explicit RtabmapColumns(const SqliteFile& file);
 
   bool has_table(const std::string& table) const { return columns_.contains(table); }
-  // Whether the table is there and has the column.
+  // True if the table exists and has the column.
   bool has(const std::string& table, const std::string& column) const;
-  // `column` where the table has it, else "NULL", for a query's list.
+  // Returns `column` if the table has it, else "NULL", for the list of a query.
   std::string or_null(const std::string& table, const std::string& column) const;
 
-  // The first RTAB-Map version whose schema has the newest of the columns that are there, e.g.
-  // "0.18.0"; "before 0.10.0" where images stand in tables of their own.
+  // Returns the first RTAB-Map version with the newest column of the file, e.g. "0.18.0"; "before
+  // 0.10.0" if images are in separate tables.
   std::string recognized_version() const;
-  // Tables, and columns "TABLE.COLUMN" of known tables, that no version up to 0.23 has.
+  // Returns tables, and columns "TABLE.COLUMN" of known tables, that no version up to 0.23 has.
   std::vector<std::string> unknown() const;
 
  private:
   std::map<std::string, std::set<std::string>> columns_;  // by table
 };
 
-// The oldest version with these tables: every RTAB-Map 0.23 opens the file, and later ones do.
+// Schema version of written files, which RTAB-Map 0.23 and later can open.
 inline constexpr const char* rtabmap_schema_version = "0.23.0";
 
-// CREATE statements of the tables, and of the indices and triggers upon them. The triggers put the
-// present time into the rows that are inserted.
+// CREATE statements of the tables, indices and triggers. The triggers set the current time in
+// inserted rows.
 std::string rtabmap_table_statements();
 std::string rtabmap_index_statements();
 std::string rtabmap_trigger_statements();

@@ -26,7 +26,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// Nothing becomes NULL. `blob` lives until the statement has run.
+// Binds an empty blob as NULL. `blob` must outlive the statement's execution.
 void bind_blob(SQLite::Statement& statement, int index, const std::string& blob) {
   if (blob.empty())
     statement.bind(index);
@@ -43,7 +43,8 @@ void run_once(SQLite::Statement& statement) {
 constexpr const char* rtabmap_link_insert =
     "INSERT INTO Link (from_id, to_id, type, information_matrix, transform) VALUES (?,?,?,?,?)";
 
-// In both directions with the same matrix, as RTAB-Map does; priors, gravity and landmarks in one.
+// Inserts both directions with the same matrix, as RTAB-Map does; priors, gravity and landmarks
+// once.
 void insert_link(SQLite::Statement& insert, const PoseLink& link) {
   const auto run = [&](int from, int to, const Pose& from_from_to) {
     const std::string information = to_blob(link.information);
@@ -65,7 +66,7 @@ std::string to_optional_blob(const std::optional<T>& value) {
   return value ? to_blob(*value) : std::string();
 }
 
-// SQLite's own errors as ours: the disk, not the input, went wrong.
+// Converts SQLite's errors to Errors of kind failed, because they concern the output.
 template <typename Action>
 auto guarded(const fs::path& path, const Action& action) {
   try {
@@ -85,7 +86,7 @@ StereoCalibrationRecord record_of(const StereoCamera& camera) {
   const Eigen::Vector3d translation = camera.right_from_left.translation();
   record.r.assign(rotation.data(), rotation.data() + 9);
   record.t.assign(translation.data(), translation.data() + 3);
-  // A rectified pair: the baseline stands in the right camera's projection.
+  // A rectified pair stores the baseline in the right camera's projection.
   if (record.right.p.size() == 12) record.right.p[3] = -camera.right.fx * camera.baseline_m;
   return record;
 }
@@ -93,7 +94,7 @@ StereoCalibrationRecord record_of(const StereoCamera& camera) {
 std::string encode_cameras(const RgbdFrame& frame) {
   Calibration calibration;
   for (const StereoCamera& pair : frame.stereo) calibration.stereo.push_back(record_of(pair));
-  // Of stereo pairs they are the left ones.
+  // In stereo pairs, these are the left cameras.
   if (calibration.stereo.empty())
     for (const Camera& camera : frame.cameras) calibration.cameras.push_back(record_of(camera));
   return calibration.empty() ? std::string() : encode_calibration(calibration);
@@ -140,7 +141,7 @@ struct RtabmapWriter::Parts {
 };
 
 void RtabmapWriter::Parts::begin() {
-  // The file is of use as a whole only: nothing to roll back to, no journal to leave.
+  // An incomplete file is useless, so no journal is needed for rolling back.
   database.exec(
       "PRAGMA page_size = 4096; PRAGMA encoding = 'UTF-8'; PRAGMA locking_mode = EXCLUSIVE; "
       "PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF; PRAGMA temp_store = MEMORY; "
@@ -159,7 +160,7 @@ void RtabmapWriter::Parts::begin() {
 }
 
 void RtabmapWriter::Parts::write_node(const GraphNode& node) {
-  // An unknown odometry pose is all zero, an unknown true one NULL, as RTAB-Map writes them.
+  // As in RTAB-Map, an unknown odometry pose is all zeros, an unknown true pose NULL.
   const std::string pose =
       node.odometry_from_base ? to_blob(*node.odometry_from_base) : null_pose_blob();
   const std::string truth = to_optional_blob(node.truth_from_base);
@@ -216,7 +217,7 @@ void RtabmapWriter::Parts::write_admin() {
 }
 
 RtabmapWriter::RtabmapWriter(const fs::path& path, const RtabmapWriterOptions& options) {
-  // Bytes of an earlier attempt must not be taken for a database.
+  // Removes bytes of an earlier attempt, which SQLite would read as a database.
   write_text(path, {});
   guarded(path, [&] {
     parts_ = std::make_unique<Parts>(path, options);
@@ -242,7 +243,7 @@ void RtabmapWriter::add_link(const PoseLink& link) {
 void RtabmapWriter::finish() {
   guarded(parts_->path, [&] {
     parts_->write_admin();
-    // Last: they would put the present time into the rows.
+    // Triggers are added last, because they would set the current time in the rows.
     parts_->database.exec(rtabmap_trigger_statements());
     parts_->node_statement.reset();
     parts_->data_statement.reset();
@@ -265,7 +266,7 @@ struct StoredPoses {
   }
 };
 
-// Empty where they are broken: they are replaced all the same.
+// Returns the stored poses; empty if they are damaged, because they are replaced anyway.
 StoredPoses stored_poses(const RtabmapDatabase& scan) {
   std::string ids;
   std::string poses;
@@ -287,9 +288,9 @@ StoredPoses stored_poses(const RtabmapDatabase& scan) {
   }
 }
 
-// The node at whose optimized pose the last localisation stands.
+// Returns the node whose optimized pose equals the last localization.
 std::optional<int> node_of_localization(const StoredPoses& stored) {
-  // From the back: RTAB-Map localises at the last node.
+  // Backwards, because RTAB-Map localizes at the last node.
   for (std::size_t i = stored.ids.size(); i-- > 0;)
     if (stored.pose(i) == stored.localization) return stored.ids[i];
   return std::nullopt;
@@ -319,22 +320,22 @@ std::map<int, Pose> with_landmarks(const StoredPoses& stored, const std::vector<
 void require_columns(const RtabmapDatabase& scan, bool adds_links) {
   const ErrorContext file{.file = scan.path().string()};
   if (!scan.columns().has("Admin", "opt_ids") || !scan.columns().has("Admin", "opt_poses"))
-    throw Error("has no place for optimized poses: it was made by RTAB-Map before 0.13", file);
+    throw Error("cannot store optimized poses: created by RTAB-Map before 0.13", file);
   if (adds_links && !scan.columns().has("Link", "information_matrix"))
-    throw Error("has no place for links with information matrices: RTAB-Map before 0.13 made it",
+    throw Error("cannot store information matrices of links: created by RTAB-Map before 0.13",
                 file);
   std::int64_t rows = 0;
   scan.file().each_row("SELECT COUNT(*) FROM Admin", {},
                        [&](const SqliteRow& row) { rows = row.integer(0); });
   if (rows != 1)
-    throw Error("is no RTAB-Map database", {.file = file.file,
-                                            .field = "rows of table Admin",
-                                            .value = std::to_string(rows),
-                                            .bound = "1"});
+    throw Error("not an RTAB-Map database", {.file = file.file,
+                                             .field = "rows of table Admin",
+                                             .value = std::to_string(rows),
+                                             .bound = "1"});
 }
 
-// A grid, cloud or mesh of the earlier poses, which RTAB-Map would show beside the new ones; where
-// there is none it makes one anew. So do its own tools that change a graph.
+// Removes a grid, cloud or mesh of the earlier poses, which RTAB-Map would show with the new poses.
+// RTAB-Map's own tools that change a graph remove them too.
 void clear_stored_map(SQLite::Database& database, const RtabmapColumns& columns) {
   std::string changes;
   for (const char* column :
@@ -376,7 +377,7 @@ void add_links(SQLite::Database& database, const std::vector<PoseLink>& links) {
 void write_calibration(SQLite::Database& database, const RtabmapDatabase& scan,
                        const CameraFile& calibration) {
   if (!scan.columns().has("Data", "calibration"))
-    throw Error("has no place for calibrations", {.file = scan.path().string()});
+    throw Error("cannot store calibrations", {.file = scan.path().string()});
   SQLite::Statement update(database, "UPDATE Data SET depth = ?, calibration = ? WHERE id = ?");
   for (const GraphNode& node : scan.graph().nodes) {
     const FrameBlobs blobs = scan.read_blobs(node.id);

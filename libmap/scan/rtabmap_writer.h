@@ -1,4 +1,4 @@
-// Writes scans as RTAB-Map databases of schema 0.23 that RTAB-Map's own tools open.
+// Writer of scans as RTAB-Map databases of schema 0.23 for RTAB-Map's own tools.
 #pragma once
 
 #include <filesystem>
@@ -18,31 +18,31 @@ namespace libmap {
 
 struct RtabmapWriterOptions {
   DepthFormat depth = DepthFormat::rvl;   // rvl and png16: whole millimeters up to 65.534 m
-  ImageFormat color = ImageFormat::jpeg;  // of the right image of a stereo pair too
+  ImageFormat color = ImageFormat::jpeg;  // also for the right image of a stereo pair
 };
 
-// The depth image as RTAB-Map stores it; empty for an empty one.
+// Encodes a depth image in RTAB-Map's format; empty for an empty image.
 std::string encode_depth(const DepthImage& depth, DepthFormat format);
 
-// The same calls in the same order give the same bytes: where RTAB-Map writes the present time, the
-// stamps of the nodes stand.
+// Equal calls in equal order write equal files: the stamps of the nodes replace the current time
+// that RTAB-Map writes.
 class RtabmapWriter {
  public:
-  // Makes a new file at `path`, which callers give as an OutputFile's temporary path; what stood
-  // there is lost. Throws Error, as all calls do where the file cannot be written.
+  // Creates or replaces the file `path`; pass the temporary path of an OutputFile. Throws Error
+  // (failed), as all calls do if the file cannot be written.
   explicit RtabmapWriter(const std::filesystem::path& path,
                          const RtabmapWriterOptions& options = {});
   ~RtabmapWriter();
   RtabmapWriter(const RtabmapWriter&) = delete;
   RtabmapWriter& operator=(const RtabmapWriter&) = delete;
 
-  // One node with its images, in any order of ids; poses are kept as float32.
+  // Adds a node with its images, in any order of ids; poses are stored as float32.
   void add_node(const GraphNode& node, const RgbdFrame& frame);
-  // Stored in both directions, the inverse with the same information matrix, as RTAB-Map does;
-  // priors, gravity and landmarks in one. The nodes may come later.
+  // Adds a link in both directions with the same information matrix, as RTAB-Map does; priors,
+  // gravity and landmarks in one direction. The nodes can be added later.
   void add_link(const PoseLink& link);
-  // Writes what is left and closes the file: no journal is left beside it. A writer that goes away
-  // without it leaves a file that is no whole scan.
+  // Completes and closes the file, without a journal next to it. Without this call, the file is not
+  // a valid scan.
   void finish();
 
  private:
@@ -50,15 +50,15 @@ class RtabmapWriter {
   std::unique_ptr<Parts> parts_;
 };
 
-// `source` copied to `target`, whatever stood there, with other optimized poses (Admin.opt_ids,
-// opt_poses) of its nodes; everything else stays as it is, row for row. Where the last localisation
-// stood at an optimized pose it moves with its node, else it is dropped; landmarks among the
-// optimized poses move with the first node that sees them. A grid, cloud or mesh that RTAB-Map
-// stored with the earlier poses goes: it makes them anew. `links` between its nodes are added, in
-// both directions, where the two have no link yet. With a calibration the camera and the depth
-// images of all nodes become what apply_calibration makes of them, depth in the format that it has.
-// `source` may be open elsewhere. Throws Error: no database of RTAB-Map 0.13 or later, or a node
-// whose camera is another.
+// Copies `source` to `target`, replacing it, with new optimized poses (Admin.opt_ids, opt_poses).
+// All other rows are unchanged, except:
+//   - A last localization at an optimized pose moves with its node; otherwise, it is dropped.
+//     Optimized landmarks move with the first node that sees them.
+//   - A grid, cloud or mesh of the earlier poses is removed; RTAB-Map computes it again.
+//   - `links` are added in both directions between nodes that have no link yet.
+//   - With a calibration, apply_calibration changes cameras and depth images, in their format.
+// `source` can be open in other programs. Throws Error if it is not a database of RTAB-Map 0.13 or
+// later, or the calibration does not fit a node.
 void copy_with_optimized_poses(const std::filesystem::path& source,
                                const std::filesystem::path& target,
                                const std::map<int, Pose>& map_from_base,

@@ -40,7 +40,7 @@ std::unique_ptr<ScanSource> open_scan(const std::filesystem::path& path) {
   if (std::filesystem::file_size(path) == 0)
     throw Error("is empty: 0 bytes", {.file = path.string()});
   if (!is_sqlite_file(path))
-    throw Error("is no scan: neither a database of RTAB-Map nor a folder of images",
+    throw Error("is not a scan: neither an RTAB-Map database nor a folder of images",
                 {.file = path.string()});
   return std::make_unique<RtabmapDatabase>(path);
 }
@@ -54,7 +54,7 @@ class JoinedScan : public ScanSource {
     for (std::size_t n = 0; n < scans_.size(); ++n) add(n);
   }
 
-  // Of the first.
+  // Path of the first scan.
   const std::filesystem::path& path() const override { return scans_.front()->path(); }
   const PoseGraph& graph() const override { return graph_; }
   const std::vector<std::string>& warnings() const override { return warnings_; }
@@ -74,7 +74,7 @@ class JoinedScan : public ScanSource {
   const ScanSource& of(int node) const {
     const auto scan = static_cast<std::size_t>(node / step_);
     if (node < 0 || scan >= scans_.size())
-      throw Error("the scan has no such node",
+      throw Error("no such node",
                   {.file = path().string(), .field = "node", .value = std::to_string(node)});
     return *scans_[scan];
   }
@@ -135,7 +135,7 @@ void JoinedScan::add(std::size_t scan) {
 }  // namespace
 
 std::unique_ptr<ScanSource> join_scans(std::vector<std::unique_ptr<ScanSource>> scans) {
-  if (scans.empty()) throw Error("no scan is given");
+  if (scans.empty()) throw Error("at least one scan is required");
   if (scans.size() == 1) return std::move(scans.front());
   for (std::size_t a = 0; a < scans.size(); ++a)
     for (std::size_t b = 0; b < a; ++b)
@@ -152,7 +152,7 @@ std::unique_ptr<ScanSource> open_scans(const std::vector<std::filesystem::path>&
 
 namespace {
 
-constexpr double max_step = 0.03;  // of depth between pixels of one surface
+constexpr double max_step = 0.03;  // share of depth between pixels of one surface
 constexpr double max_miss_px = 0.5;
 constexpr double close_px = 0.03;
 constexpr int search_rounds = 5;
@@ -175,7 +175,7 @@ class CalibratedScan : public ScanSource {
   mutable LensRays rays_;
 };
 
-// Depth at a place between pixels whose four neighbors are of one surface, else at the nearest.
+// Interpolated depth if the four pixels are of one surface, else depth of the nearest pixel.
 double depth_between(const DepthImage& depth, const Eigen::Vector2d& at) {
   const int left = std::clamp(static_cast<int>(std::floor(at.x())), 0, depth.width - 2);
   const int top = std::clamp(static_cast<int>(std::floor(at.y())), 0, depth.height - 2);
@@ -190,8 +190,8 @@ double depth_between(const DepthImage& depth, const Eigen::Vector2d& at) {
   return (1.0 - v) * ((1.0 - u) * row[0] + u * row[1]) + v * ((1.0 - u) * below[0] + u * below[1]);
 }
 
-// Searches for the measurement that falls on the ray of a pixel of the color image. A miss moves
-// the search by as many pixels as it has pitches of the rays around the pixel.
+// Iterative search for the depth measurement on the ray of a color pixel. Each step moves by the
+// residual, in pixels by the local pitch of the rays.
 class DepthSearch {
  public:
   DepthSearch(const DepthImage& taken, const LensRays::Table& rays, const Pose& color_from_depth)
@@ -200,13 +200,13 @@ class DepthSearch {
         rotation_(color_from_depth.linear()),
         shift_(color_from_depth.translation()) {}
 
-  // The depth that the color camera sees at x, y; 0: none. Begins at `source`, which becomes the
-  // position of the measurement.
+  // Returns the depth in the color camera at x, y; 0 if there is none. Starts at `source` and sets
+  // it to the position of the measurement.
   double find(int x, int y, Eigen::Vector2d& source) const {
     const Eigen::Vector2d wanted = rays_[taken_.index(x, y)];
     const int left = std::max(x - 1, 0);
     const int top = std::max(y - 1, 0);
-    Eigen::Matrix2d pitch;  // of the rays, by columns and rows
+    Eigen::Matrix2d pitch;  // ray differences per column and per row
     pitch << rays_[taken_.index(left + 1, y)] - rays_[taken_.index(left, y)],
         rays_[taken_.index(x, top + 1)] - rays_[taken_.index(x, top)];
     const Eigen::Matrix2d pixels_of_pitch = pitch.inverse();
@@ -237,7 +237,7 @@ class DepthSearch {
   Eigen::Vector3d shift_;
 };
 
-// The depth image as the color camera sees it.
+// Returns the depth image registered to the color camera.
 DepthImage registered_depth(const RgbdFrame& frame, const Pose& color_from_depth, LensRays& rays) {
   const DepthImage& taken = frame.depth;
   DepthImage seen(taken.width, taken.height);
@@ -248,7 +248,7 @@ DepthImage registered_depth(const RgbdFrame& frame, const Pose& color_from_depth
   const auto table = rays.rays_of(camera_views(depth_only).front().depth_camera);
   const DepthSearch search(taken, *table, color_from_depth);
   for (int y = 0; y < taken.height; ++y) {
-    Eigen::Vector2d offset = Eigen::Vector2d::Zero();  // of the pixel before
+    Eigen::Vector2d offset = Eigen::Vector2d::Zero();  // offset of the previous pixel
     for (int x = 0; x < taken.width; ++x) {
       Eigen::Vector2d source = Eigen::Vector2d(x, y) + offset;
       double z = search.find(x, y, source);
@@ -263,19 +263,19 @@ DepthImage registered_depth(const RgbdFrame& frame, const Pose& color_from_depth
 void apply(RgbdFrame& frame, const CameraFile& calibration, LensRays& rays) {
   if (frame.cameras.empty() && frame.stereo.empty()) return;
   if (frame.cameras.size() != 1 || !frame.stereo.empty())
-    throw Error("a calibration is of one camera",
+    throw Error("a calibration requires frames with one camera",
                 {.field = "cameras",
                  .value = std::to_string(frame.cameras.size() + 2 * frame.stereo.size()),
                  .bound = "1"});
   Camera& camera = frame.cameras.front();
   const Camera& known = calibration.camera;
   if (camera.width != known.width || camera.height != known.height)
-    throw Error("the calibration is of another size",
+    throw Error("size differs from the calibration",
                 {.field = "camera",
                  .value = size_text(camera.width, camera.height),
                  .bound = size_text(known.width, known.height)});
   const Pose base_from_camera = camera.base_from_camera;
-  // By the stored camera, as it was estimated.
+  // Uses the stored camera, for which the transform was estimated.
   const Pose color_from_depth = calibration.color_from_depth_at(frame.stamp_s, frame.depth_later_s);
   if (!color_from_depth.matrix().isIdentity(0.0))
     frame.depth = registered_depth(frame, color_from_depth, rays);

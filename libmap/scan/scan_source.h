@@ -1,5 +1,4 @@
-// A scan as all later stages see it, whatever file it comes from: poses and links at once, frames
-// one by one.
+// Format-independent access to a scan: poses and links on opening, frames one at a time.
 #pragma once
 
 #include <filesystem>
@@ -13,13 +12,13 @@
 
 namespace libmap {
 
-// Which images of a frame to decode. Cameras are always read.
+// Images of a frame to decode. Cameras are always read.
 struct FrameParts {
   bool color = true;
   bool depth = true;
 };
 
-// What a node is in the file that it comes from.
+// File of a node and its number in that file.
 struct SourceNode {
   std::filesystem::path path;
   int node = 0;
@@ -29,49 +28,46 @@ class ScanSource {
  public:
   virtual ~ScanSource() = default;
 
-  // As the user named it.
+  // Path as given by the user.
   virtual const std::filesystem::path& path() const = 0;
-  // Read when the scan was opened.
+  // Poses and links, read on opening.
   virtual const PoseGraph& graph() const = 0;
-  // What was left out when it was opened, and why.
+  // Warnings of opening: dropped data with the reason.
   virtual const std::vector<std::string>& warnings() const {
     static const std::vector<std::string> none;
     return none;
   }
-  // Of several scans that were joined, each has a path and numbers of its own.
+  // Returns the file and original number of a node of joined scans.
   virtual SourceNode source_of(int node) const { return {path(), node}; }
-  // The name of the file of the node's color image, without its folder; empty where images are not
+  // Returns the file name of the node's color image without its folder; empty if images are not
   // files.
   virtual std::string image_name([[maybe_unused]] int node) const { return {}; }
-  // May be called from several threads at once. Images that are not stored are left empty. Throws
-  // Error naming the file, the node and the part that is broken.
+  // Reads a frame; images that are not stored are empty. Thread-safe. Throws Error naming file,
+  // node and part if a part is damaged or there is no such node.
   virtual RgbdFrame read_frame(int node, FrameParts parts = {}) const = 0;
 };
 
-// An RTAB-Map database, a folder in the layout of the TUM RGB-D benchmark, or a folder of
-// databases, joined in the order of their names (join_scans). Throws Error if the path is none of
-// them.
+// Opens an RTAB-Map database, a folder in the layout of the TUM RGB-D benchmark, or a folder of
+// databases, joined in the order of their names (join_scans). Throws Error for other paths.
 std::unique_ptr<ScanSource> open_scan(const std::filesystem::path& path);
 
-// Several scans as one, such as those of different days: each session stays in a frame of its own.
-// Nodes of the n-th scan, from 0, are numbered n * step higher, where step is the lowest power of
-// ten above all numbers: node 12 of the second of two small scans is 112. Sessions and landmarks
-// are told apart in the same way; optimized poses are left out, since each scan's are in another
-// frame. A single scan is returned as it is. Throws Error: no scan, too large numbers, or the same
-// file twice.
+// Joins several scans, for example of different days; each session keeps its own frame. Node
+// numbers of scan n (from 0) increase by n * step, where step is the smallest power of ten above
+// all numbers: node 12 of the second of two small scans becomes 112. Sessions and landmarks are
+// renumbered likewise. Optimized poses are dropped, because their frames differ. A single scan is
+// returned unchanged. Throws Error for no scan, too large numbers, or a file given twice.
 std::unique_ptr<ScanSource> join_scans(std::vector<std::unique_ptr<ScanSource>> scans);
 
-// Opens and joins all; of one path as open_scan does.
+// Opens and joins scans; opens a single path as open_scan does.
 std::unique_ptr<ScanSource> open_scans(const std::vector<std::filesystem::path>& paths);
 
-// The frame with the focal lengths, principal point and distortion of `calibration`, and its depth
-// corrected and registered; where the camera is mounted stays, and pictures keep their rolling
-// shutter. Throws Error for a frame of several cameras, of a
-// stereo pair, or of another size than the calibration's.
+// Replaces the focal lengths, principal point and distortion of the frame's camera, and corrects
+// and registers its depth. The mounting pose and the rolling shutter are unchanged. Throws Error
+// for a frame of several cameras or a stereo pair, or if its size differs from the calibration.
 void apply_calibration(RgbdFrame& frame, const CameraFile& calibration);
 
-// `scan` with the calibration applied to each frame; read_frame throws Error naming the node where
-// that is not possible.
+// Returns `scan` with the calibration applied to each frame; read_frame throws Error naming the
+// node as apply_calibration does.
 std::unique_ptr<ScanSource> with_calibration(std::unique_ptr<ScanSource> scan,
                                              const CameraFile& calibration);
 

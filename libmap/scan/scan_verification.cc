@@ -30,7 +30,7 @@ struct LaserFormat {
   int channels;
 };
 
-// By RTAB-Map's numbers.
+// Laser scan formats, by RTAB-Map's numbers.
 constexpr std::size_t unknown_format = 0;
 constexpr std::array<LaserFormat, 13> laser_formats{{{"unknown", 0},
                                                      {"XY", 2},
@@ -48,15 +48,15 @@ constexpr std::array<LaserFormat, 13> laser_formats{{{"unknown", 0},
 
 std::size_t format_of(float number) {
   if (!(number >= 0) || number > 12 || number != std::floor(number))
-    throw Error("laser scan of an unknown format", {.value = to_text(number)});
+    throw Error("unknown format of laser scan", {.value = to_text(number)});
   return static_cast<std::size_t>(number);
 }
 
-// Checks the description; the format that it states.
+// Checks the description and returns its format.
 std::size_t format_of_info(std::string_view info) {
   if (info.empty()) return unknown_format;
   if (info.size() != 76 && info.size() != 60 && info.size() != 56)
-    throw Error("scan_info of an unknown length",
+    throw Error("unknown length of scan_info",
                 {.value = std::to_string(info.size()) + " bytes", .bound = "56, 60 or 76"});
   std::vector<float> numbers(info.size() / sizeof(float));
   std::memcpy(numbers.data(), info.data(), info.size());
@@ -65,7 +65,7 @@ std::size_t format_of_info(std::string_view info) {
                                                  : unknown_format;
   const float points = numbers[info.size() == 76 ? 6 : 0];
   if (!(points >= 0 && points <= 2e9F))
-    throw Error("scan_info contains no number of points", {.value = to_text(points)});
+    throw Error("invalid number of points in scan_info", {.value = to_text(points)});
   decode_pose(info.substr(info.size() - pose_bytes));
   return format;
 }
@@ -75,21 +75,20 @@ std::size_t format_of_info(std::string_view info) {
 void check_laser_scan(std::string_view scan, std::string_view info) {
   const std::size_t format = format_of_info(info);
   const StoredMatrix matrix = decode_matrix(scan);
-  if (matrix.element != MatrixElement::float32) throw Error("laser scan that is not of float32");
-  // Before 0.16.1 the format is not stored: those versions used 2 to 7 channels.
+  if (matrix.element != MatrixElement::float32) throw Error("laser scan is not of float32");
+  // Versions before 0.16.1 do not store the format; they used 2 to 7 channels.
   if (format == unknown_format && (matrix.channels < 2 || matrix.channels > 7))
-    throw Error("laser scan of an unknown number of channels",
+    throw Error("unknown number of channels of laser scan",
                 {.value = std::to_string(matrix.channels)});
   if (format != unknown_format && matrix.channels != laser_formats[format].channels)
-    throw Error(
-        "laser scan " + std::string(laser_formats[format].name) + " of another number of channels",
-        {.value = std::to_string(matrix.channels),
-         .bound = std::to_string(laser_formats[format].channels)});
+    throw Error("wrong number of channels of laser scan " + std::string(laser_formats[format].name),
+                {.value = std::to_string(matrix.channels),
+                 .bound = std::to_string(laser_formats[format].channels)});
 }
 
 namespace {
 
-// Of scans and frames that are decoded side by side.
+// Memory budget of scans and frames that are decoded in parallel.
 constexpr std::uint64_t decoded_bytes = std::uint64_t{1} << 28;
 
 void check_pose(const std::string& blob) { decode_pose(blob); }
@@ -108,21 +107,21 @@ void check_depth(const std::string& blob) {
     decode_gray(blob);
 }
 
-// Three float64 for each sensor.
+// Checks the length: three float64 per sensor.
 void check_sensors(const std::string& blob) {
   if (blob.size() % 24 != 0)
-    throw Error("env_sensors of another length",
+    throw Error("wrong length of env_sensors",
                 {.value = std::to_string(blob.size()) + " bytes", .bound = "a multiple of 24"});
 }
 
 struct BlobColumn {
   const char* table;
-  const char* node;  // column of the node's id, or nullptr
+  const char* node;  // column of the node's id; nullptr if there is none
   const char* column;
   void (*check)(const std::string&);
 };
 
-// All but those of Data, and those whose length another column says.
+// All blobs, except those of Data and those whose length is in another column.
 constexpr std::array<BlobColumn, 21> blob_columns{{
     {"Node", "id", "pose", check_pose},
     {"Node", "id", "ground_truth_pose", check_pose},
@@ -147,7 +146,7 @@ constexpr std::array<BlobColumn, 21> blob_columns{{
     {"Admin", nullptr, "preview_image", check_image},
 }};
 
-// Collects from several threads.
+// Thread-safe collection of results.
 class Findings {
  public:
   explicit Findings(ScanVerificationResult& result) : result_(result) {}
@@ -163,7 +162,7 @@ class Findings {
     result_.bytes += blob.size();
   }
 
-  // One blob of Data, where a few bytes mean none; whether it is sound.
+  // Checks a blob of Data, in which a few bytes mean NULL. Returns true if it is valid.
   template <typename Check>
   bool check(int node, const std::string& part, const std::string& blob, const Check& use) {
     return is_absent(blob) || check_present(node, part, blob, use);
@@ -199,7 +198,7 @@ std::string part_of(const char* table, const char* column) {
   return std::string(table) + "." + column;
 }
 
-// What decoding takes at most, by what the blobs say of themselves; what is broken takes nothing.
+// Maximum memory for decoding, by the headers of the blobs; 0 for damaged ones.
 std::uint64_t scan_bytes(const std::string& blob) {
   const StoredMatrix size = read_matrix_header(blob);
   return static_cast<std::uint64_t>(size.rows) * static_cast<std::uint64_t>(size.columns) *
@@ -207,7 +206,7 @@ std::uint64_t scan_bytes(const std::string& blob) {
 }
 
 std::uint64_t frame_bytes(const FrameBlobs& blobs) {
-  constexpr std::uint64_t pixel_bytes = 16;  // stored and as a camera's view
+  constexpr std::uint64_t pixel_bytes = 16;  // in the frame and in a camera's view
   std::uint64_t pixels = 0;
   const auto add = [&](int width, int height) {
     pixels += static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height);
@@ -253,13 +252,13 @@ class DatabaseVerification {
                             const std::string blob = row.bytes(1);
                             const std::string part = part_of(of.table, of.column);
                             if (row.is_text(1) && !blob.empty())
-                              findings_.add(node_in(row, 0), part, Error("is a text, not a blob"));
+                              findings_.add(node_in(row, 0), part, Error("is text, not a blob"));
                             else if (!blob.empty())
                               findings_.check_present(node_in(row, 0), part, blob, of.check);
                           });
   }
 
-  // Plain text before 0.15.
+  // Statistics were plain text before 0.15.
   void check_statistics() {
     if (!scan_.columns().has("Statistics", "data")) return;
     scan_.file().each_row("SELECT id, data FROM Statistics", {}, [&](const SqliteRow& row) {
@@ -269,7 +268,7 @@ class DatabaseVerification {
     });
   }
 
-  // descriptor_size bytes or as many float32.
+  // Descriptors have descriptor_size bytes or float32.
   void check_descriptors(const char* table) {
     const RtabmapColumns& columns = scan_.columns();
     if (!columns.has(table, "descriptor") || !columns.has(table, "descriptor_size")) return;
@@ -282,7 +281,7 @@ class DatabaseVerification {
       result_.bytes += static_cast<std::uint64_t>(bytes);
       if (size > 0 && (bytes == size || (bytes % 4 == 0 && bytes / 4 == size))) return;
       findings_.add(node_in(row, 0), part_of(table, "descriptor"),
-                    Error("another length than it says",
+                    Error("length differs from descriptor_size",
                           {.value = std::to_string(bytes) + " bytes",
                            .bound = std::to_string(size) + ", or 4 times as many"}));
     };
@@ -314,7 +313,7 @@ class DatabaseVerification {
         findings_.add(node.id, table, Error("the node has no row"));
   }
 
-  // The blobs of Data that belong to no frame.
+  // Checks the blobs of Data that are not part of a frame.
   void check_data(int node, std::int64_t id) {
     static constexpr std::array<const char*, 5> matrices{
         "depth_confidence", "ground_cells", "obstacle_cells", "empty_cells", "user_data"};
@@ -348,7 +347,7 @@ class DatabaseVerification {
     }
   }
 
-  // Each part by itself, so that one that is broken does not hide another.
+  // Decodes each part separately, so that one fault does not hide another.
   void list_faults(int node, const FrameBlobs& blobs, const Error& first) {
     bool is_listed = false;
     const auto check = [&](const char* part, const std::string& blob, auto use) {
@@ -387,7 +386,7 @@ ScanVerificationResult verify_scan(const ScanSource& scan, Progress& progress) {
     DatabaseVerification(*database, result, progress).run();
   else
     verify_frames(scan, result, progress);
-  // What the graph had to leave out, unless its blob is listed.
+  // Data that the graph dropped, unless the blob is listed.
   for (const std::string& warning : scan.warnings()) {
     if (is_about_unknown_part(warning)) continue;
     const bool is_listed =

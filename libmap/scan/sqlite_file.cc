@@ -31,7 +31,7 @@ SQLite::Column column_of(const void* statement, int column) {
 
 fs::path beside(const fs::path& path, const char* suffix) { return fs::path(path).concat(suffix); }
 
-// As a URI's path (RFC 3986), absolute: "//" at its beginning would name a host.
+// Returns the absolute path as a URI's path (RFC 3986); a leading "//" would denote a host.
 std::string uri_of(const fs::path& path) {
   static constexpr std::string_view hex = "0123456789ABCDEF";
   std::string uri = "file:";
@@ -51,7 +51,7 @@ std::string uri_of(const fs::path& path) {
 
 struct OpenMode {
   std::string uri;
-  const char* file_system = nullptr;  // SQLite's name of it; nullptr: the usual one
+  const char* file_system = nullptr;  // SQLite's name of the VFS; nullptr: the default
   bool exclusive = false;
 };
 
@@ -62,21 +62,21 @@ OpenMode open_mode(const fs::path& path, std::string_view header) {
   const bool has_index = fs::exists(beside(path, "-shm"));
   if (has_wal && has_index) return {.uri = uri + "?mode=ro"};
   if (!has_wal) return {.uri = uri + "?immutable=1"};
-  // In exclusive mode SQLite keeps the index of the -wal in memory; the lock for it cannot be had
-  // on a file that is open for reading, and is not needed where no other program is.
+  // In exclusive mode, SQLite keeps the index of the -wal in memory. Its lock is not possible on a
+  // file that is open for reading, and not needed without other programs.
   return {.uri = uri + "?mode=ro", .file_system = "unix-none", .exclusive = true};
 }
 
 Error read_error(const fs::path& path, const SQLite::Exception& error) {
   std::string reason = std::string("cannot be read as SQLite: ") + error.what();
   if (error.getErrorCode() == SQLITE_BUSY)
-    reason = "another program has locked it; " + std::to_string(busy_timeout_ms / 1000) +
-             " s were waited";
+    reason = "another program has locked it for more than " +
+             std::to_string(busy_timeout_ms / 1000) + " s";
   const int code = error.getExtendedErrorCode();
   if (code == SQLITE_READONLY_ROLLBACK || code == SQLITE_READONLY_RECOVERY)
     reason =
-        "an interrupted write left its journal beside the file; roll it back by opening it once "
-        "with a program that may write, e.g. `sqlite3 FILE .tables`";
+        "an interrupted write left its journal next to the file; roll it back by opening the file "
+        "with write access, e.g. `sqlite3 FILE .tables`";
   return Error(reason, {.file = path.string()});
 }
 
@@ -86,16 +86,16 @@ struct SqliteFile::Connection {
   Connection(const OpenMode& mode, std::uint64_t file_bytes)
       : database(mode.uri, SQLite::OPEN_READONLY | SQLite::OPEN_URI, busy_timeout_ms,
                  mode.file_system == nullptr ? "" : mode.file_system) {
-    // No value is longer than the file, but what an expression of its schema makes up.
+    // No value is longer than the file, except results of expressions in its schema.
     constexpr std::uint64_t min_length = 1U << 20U;
     constexpr std::uint64_t max_length = 1'000'000'000;  // SQLite's own
     sqlite3_limit(database.getHandle(), SQLITE_LIMIT_LENGTH,
                   static_cast<int>(std::min(file_bytes + min_length, max_length)));
-    // What a schema from elsewhere may do when it is queried.
+    // Restricts the effects of an untrusted schema.
     database.exec(
         "PRAGMA trusted_schema = OFF; PRAGMA query_only = ON; PRAGMA temp_store = MEMORY");
     if (mode.exclusive) database.exec("PRAGMA locking_mode = EXCLUSIVE");
-    // Else a -wal without a sound frame is deleted when the connection closes.
+    // Otherwise, a -wal without a valid frame is deleted when the connection closes.
     sqlite3_db_config(database.getHandle(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
   }
 
@@ -130,7 +130,7 @@ SqliteFile::SqliteFile(const fs::path& path) : path_(path) {
   if (header.empty()) throw Error("is empty: 0 bytes", {.file = path.string()});
   if (!header.starts_with(signature)) throw Error("is not an SQLite file", {.file = path.string()});
   if (header.size() < 100)
-    throw Error("is an SQLite file that ends in its header", {.file = path.string()});
+    throw Error("is an SQLite file with a truncated header", {.file = path.string()});
   std::uint64_t bytes = fs::file_size(path);
   std::error_code missing;
   const std::uintmax_t wal_bytes = fs::file_size(beside(path, "-wal"), missing);
@@ -163,12 +163,12 @@ void SqliteFile::copy_to(const fs::path& target) const {
   write_text(target, {});
   try {
     SQLite::Database copy(target.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
-    // The copy is of use as a whole only: nothing to roll back to, no journal to leave.
+    // An incomplete copy is useless, so no journal is needed for rolling back.
     copy.exec("PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF;");
     if (SQLite::Backup(copy, connection_->database).executeStep() != SQLITE_DONE)
       throw Error("another program keeps writing to it", {.file = path_.string()},
                   ErrorKind::failed);
-    // The copy of a file in WAL mode would call for a -wal of its own.
+    // The copy of a file in WAL mode would require its own -wal.
     copy.exec("PRAGMA locking_mode = EXCLUSIVE; PRAGMA journal_mode = DELETE;");
   } catch (const SQLite::Exception& error) {
     throw copy_error(path_, target, error);

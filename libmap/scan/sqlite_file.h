@@ -1,4 +1,4 @@
-// An SQLite file that is read and never changed.
+// Read-only access to SQLite files.
 #pragma once
 
 #include <cstdint>
@@ -17,32 +17,30 @@ namespace libmap {
 
 class Error;
 
-// One row of a query; columns count from 0.
+// One row of a query; columns are numbered from 0.
 class SqliteRow {
  public:
   explicit SqliteRow(const void* statement) : statement_(statement) {}
 
-  bool is_null(int column) const;          // of the row's column, counted from 0
-  std::int64_t integer(int column) const;  // 0 where NULL
-  double real(int column) const;           // NaN where NULL
-  std::string bytes(int column) const;     // of a blob or a text
-  bool is_text(int column) const;          // neither number, blob nor NULL
+  bool is_null(int column) const;          // true for NULL
+  std::int64_t integer(int column) const;  // 0 for NULL
+  double real(int column) const;           // NaN for NULL
+  std::string bytes(int column) const;     // bytes of a blob or a text
+  bool is_text(int column) const;          // false for numbers, blobs and NULL
 
  private:
   const void* statement_;
 };
 
-// Opened read-only, and so that nothing appears beside the file: no journal, no -wal, no -shm.
-//   - A file in rollback mode is read under SQLite's locks; it waits up to 10 s for a writer.
-//   - A file in WAL mode whose -wal and -shm lie beside it is read with them, so what another
-//     program has committed is seen.
-//   - With a -wal alone (its program died) the -wal is read, into memory.
-//   - With neither, nobody has it open, and it is read as a file that does not change.
-// A journal that an interrupted write left behind is an Error: only a program that may write can
-// roll it back.
+// Opens a file read-only without creating files next to it: no journal, no -wal, no -shm. - A file
+// in rollback mode is read with SQLite's locks; it waits up to 10 s for a writer. - A file in WAL
+// mode with a -wal and a -shm is read with both, so that data committed by another program are
+// visible. - With a -wal only (its program crashed), the -wal is read into memory. - With neither,
+// no program has the file open, and it is read as an unchanging file. A journal of an interrupted
+// write is an Error: only a program with write access can roll it back.
 class SqliteFile {
  public:
-  // Throws Error: no SQLite file, broken or not readable.
+  // Throws Error if the file is not an SQLite file, damaged or not readable.
   explicit SqliteFile(const std::filesystem::path& path);
   ~SqliteFile();
   SqliteFile(const SqliteFile&) = delete;
@@ -50,16 +48,16 @@ class SqliteFile {
 
   const std::filesystem::path& path() const { return path_; }
 
-  // Calls `use` for each row, with the arguments in place of the query's '?'. One query runs at a
-  // time, whatever the thread. Throws Error naming the file.
+  // Calls `use` for each row of a query with `arguments` for its '?'. Thread-safe; one query runs
+  // at a time. Throws Error naming the file.
   void each_row(const std::string& query, const std::vector<std::int64_t>& arguments,
                 const std::function<void(const SqliteRow&)>& use) const;
 
-  // Every page, of one state of the file, to `target`: what stood there is lost. The copy is in
-  // rollback mode. Throws Error: another program keeps writing, or the disk is full.
+  // Copies a consistent state of the file to `target`, replacing it. The copy is in rollback mode.
+  // Throws Error if another program keeps writing, or the disk is full.
   void copy_to(const std::filesystem::path& target) const;
 
-  // The names of all tables; of the columns of one, empty if it is not there.
+  // Names of all tables, and of the columns of a table (empty if it does not exist).
   std::set<std::string> tables() const;
   std::set<std::string> columns(const std::string& table) const;
 
@@ -69,11 +67,11 @@ class SqliteFile {
   std::unique_ptr<Connection> connection_;
 };
 
-// Whether the file begins as every SQLite file does.
+// True if the file begins with SQLite's signature.
 bool is_sqlite_file(const std::filesystem::path& path);
 
-// Why a copy of `source` could not be made, or not be changed: what SQLite finds broken in it came
-// from the source (bad input); all else is a failed write of `target`.
+// Converts an exception of copying `source` or changing the copy. Corruption reported by SQLite is
+// an error of `source` (bad input); all others are failed writes of `target`.
 Error copy_error(const std::filesystem::path& source, const std::filesystem::path& target,
                  const SQLite::Exception& error);
 

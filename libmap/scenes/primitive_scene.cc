@@ -23,35 +23,35 @@ struct ParameterAdder {
   ParameterTable& table;
 
   void operator()(Sphere& sphere) const {
-    table.add("radius_m", sphere.radius_m, size_range, "radius");
+    table.add("radius_m", sphere.radius_m, size_range, "radius, m");
   }
   void operator()(Capsule& capsule) const {
-    table.add("radius_m", capsule.radius_m, size_range, "radius: half the width");
-    table.add("length_m", capsule.length_m, size_range, "length along x with the round ends");
+    table.add("radius_m", capsule.radius_m, size_range, "radius, half the width, m");
+    table.add("length_m", capsule.length_m, size_range, "length along x with the round ends, m");
   }
   void operator()(Cone& cone) const {
-    table.add("radius_m", cone.radius_m, size_range, "radius of the base");
-    table.add("height_m", cone.height_m, size_range, "height of the apex over the base");
+    table.add("radius_m", cone.radius_m, size_range, "radius of the base, m");
+    table.add("height_m", cone.height_m, size_range, "height of the apex above the base, m");
   }
   void operator()(Cylinder& cylinder) const {
-    table.add("radius_m", cylinder.radius_m, size_range, "radius");
-    table.add("height_m", cylinder.height_m, size_range, "height over the base");
+    table.add("radius_m", cylinder.radius_m, size_range, "radius, m");
+    table.add("height_m", cylinder.height_m, size_range, "height above the base, m");
   }
   void operator()(Box& box) const {
-    table.add("size_x_m", box.size_x_m, size_range, "length along x");
-    table.add("size_y_m", box.size_y_m, size_range, "length along y");
-    table.add("size_z_m", box.size_z_m, size_range, "height over the base");
+    table.add("size_x_m", box.size_x_m, size_range, "length along x, m");
+    table.add("size_y_m", box.size_y_m, size_range, "length along y, m");
+    table.add("size_z_m", box.size_z_m, size_range, "height above the base, m");
   }
   void operator()(Plane& plane) const {
-    table.add("size_x_m", plane.size_x_m, size_range, "length along x");
-    table.add("size_y_m", plane.size_y_m, size_range, "length along y");
+    table.add("size_x_m", plane.size_x_m, size_range, "length along x, m");
+    table.add("size_y_m", plane.size_y_m, size_range, "length along y, m");
   }
   void operator()(Bump& bump) const {
-    table.add("height_m", bump.height_m, Range{-1e4, 1e4}, "height; negative for a hollow");
-    table.add("radius_m", bump.radius_m, size_range, "radius");
+    table.add("height_m", bump.height_m, Range{-1e4, 1e4}, "height, m; negative: a hollow");
+    table.add("radius_m", bump.radius_m, size_range, "radius, m");
     table.add("profile", bump.profile,
               {{"cosine", BumpProfile::cosine}, {"gaussian", BumpProfile::gaussian}},
-              "cosine: cos^2, ends at the radius; gaussian: the radius is three deviations");
+              "profile; cosine: cos^2 up to the radius; gaussian: radius is 3 standard deviations");
   }
 };
 
@@ -63,18 +63,18 @@ Error shape_error(std::size_t i, const SceneShape& shape, const Error& error) {
 void check_shape(const SceneShape& shape) {
   if (const auto* capsule = std::get_if<Capsule>(&shape.geometry)) {
     if (capsule->length_m < 2.0 * capsule->radius_m)
-      throw Error("shorter than wide", {.field = "length_m",
-                                        .value = to_text(capsule->length_m),
-                                        .bound = ">= " + to_text(2.0 * capsule->radius_m)});
+      throw Error("length below the diameter", {.field = "length_m",
+                                                .value = to_text(capsule->length_m),
+                                                .bound = ">= " + to_text(2.0 * capsule->radius_m)});
   }
   if (std::holds_alternative<Plane>(shape.geometry)) {
     const double up = shape.placement.pose().linear()(2, 2);
     if (up < 1e-6)
       throw Error(
-          "the plane does not face up (a box can stand or overhang)",
+          "the plane does not face up; use a box for a vertical or overhanging face",
           {.field = "roll_deg, pitch_deg",
            .value = to_text(shape.placement.roll_deg) + ", " + to_text(shape.placement.pitch_deg),
-           .bound = "less than 90 degrees from upright"});
+           .bound = "tilt < 90 degrees"});
   }
 }
 
@@ -107,15 +107,15 @@ ShapeGeometry make_shape_geometry(const std::string& kind) {
 
 ParameterTable shape_parameters(SceneShape& shape) {
   ParameterTable table;
-  table.add("name", shape.name, "free text");
+  table.add("name", shape.name, "name of the shape");
   std::visit(ParameterAdder{table}, shape.geometry);
   Placement& placement = shape.placement;
-  table.add("x_m", placement.x_m, position_range, "position");
-  table.add("y_m", placement.y_m, position_range, "position");
-  table.add("z_m", placement.z_m, position_range, "position");
-  table.add("roll_deg", placement.roll_deg, angle_range, "turn about the scene's x, first");
-  table.add("pitch_deg", placement.pitch_deg, angle_range, "turn about the scene's y, second");
-  table.add("yaw_deg", placement.yaw_deg, angle_range, "turn about the scene's z, third");
+  table.add("x_m", placement.x_m, position_range, "x in the scene, m");
+  table.add("y_m", placement.y_m, position_range, "y in the scene, m");
+  table.add("z_m", placement.z_m, position_range, "z in the scene, m");
+  table.add("roll_deg", placement.roll_deg, angle_range, "first rotation, about x, degrees");
+  table.add("pitch_deg", placement.pitch_deg, angle_range, "second rotation, about y, degrees");
+  table.add("yaw_deg", placement.yaw_deg, angle_range, "third rotation, about z, degrees");
   return table;
 }
 
@@ -132,7 +132,7 @@ void PrimitiveScene::check() const {
     }
   }
   if (shapes.empty()) throw Error("a scene needs at least one shape", {.field = "shapes"});
-  if (has_bump && !has_plane) throw Error("bumps need a plane that they bend", {.field = "shapes"});
+  if (has_bump && !has_plane) throw Error("bumps require a plane", {.field = "shapes"});
 }
 
 namespace {
@@ -160,12 +160,12 @@ SceneShape parse_shape(const YAML::Node& node) {
   std::sort(known.begin(), known.end());
   for (const std::string& key : known)
     if (!optional_keys.contains(key) && !node[key])
-      throw Error("a " + shape_kind(shape) + " needs it", {.field = key});
+      throw Error("required for a " + shape_kind(shape), {.field = key});
   return shape;
 }
 
 PrimitiveScene parse_root(const YAML::Node& root) {
-  if (!root.IsMap()) throw Error("a scene is a map with the key 'shapes'");
+  if (!root.IsMap()) throw Error("not a scene: must be a map with the key 'shapes'");
   check_keys(root, {"shapes"});
   const YAML::Node list = root["shapes"];
   if (!list) throw Error("is missing", {.field = "shapes"});

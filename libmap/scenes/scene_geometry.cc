@@ -45,7 +45,7 @@ double ProfileSegment::area() const { return area_between(0.0, 1.0); }
 double ProfileSegment::area_between(double t0, double t1) const {
   const Eigen::Vector2d p0 = point(t0);
   const Eigen::Vector2d p1 = point(t1);
-  // Archimedes: a zone of a sphere has the area of the cylinder around it.
+  // Archimedes: a zone of a sphere has the area of its circumscribed cylinder.
   if (is_arc) return 2.0 * pi * radius * (p0.y() - p1.y());
   return pi * (p0.x() + p1.x()) * length() * (t1 - t0);
 }
@@ -67,7 +67,7 @@ double ProfileSegment::curvature_along() const { return is_arc ? 1.0 / radius : 
 double ProfileSegment::curvature_around(const Eigen::Vector2d& at) const {
   if (is_arc) return 1.0 / radius;
   const double normal_rho = normal_at(at).x();
-  // Meusnier: the circle of radius rho, seen under the angle of its normal to the surface's.
+  // Meusnier: 1 / rho times the cosine between the normals of circle and surface.
   return normal_rho == 0.0 ? 0.0 : normal_rho / at.x();
 }
 
@@ -118,7 +118,7 @@ namespace {
 
 using std::numbers::pi;
 
-// Probe length along a normal, and what counts as touching; meters.
+// Probe length along a normal, and tolerance of touching surfaces, m.
 constexpr double probe_m = 1e-6;
 constexpr double touching_m = 1e-9;
 
@@ -147,7 +147,7 @@ Profile profile_of(const Cylinder& cylinder) {
           ProfileSegment::line({r, 0.0}, {0.0, 0.0})};
 }
 
-// solid_from_face of the face of a box that looks along `axis` times `sign`.
+// solid_from_face of the face of a box with the normal `sign` * `axis`.
 Pose box_face_pose(int axis, double sign, double distance) {
   Pose pose = Pose::Identity();
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
@@ -161,7 +161,7 @@ Pose box_face_pose(int axis, double sign, double distance) {
   return pose;
 }
 
-// Sets `solid` up from the geometry and its pose; one overload a kind.
+// Initializes `solid` from a geometry and its pose; one overload per kind.
 struct SolidMaker {
   SceneSolid& solid;
   const Pose& pose;
@@ -208,7 +208,7 @@ struct SolidMaker {
   void operator()(const Bump&) const {}
 };
 
-// h(r), h'(r) / r and h''(r).
+// Radial height function: h(r), h'(r) / r and h''(r).
 struct RadialHeight {
   double value = 0.0;
   double slope_over_r = 0.0;
@@ -231,7 +231,7 @@ RadialHeight radial_height(const Bump& bump, double r) {
   return {h * cosine * cosine, -0.5 * h * k * k * sinc, -0.5 * h * k * k * std::cos(angle)};
 }
 
-// Principal curvatures of a height field, ascending, positive where it is convex seen from above:
+// Principal curvatures of a height field, ascending, positive if convex as seen from above: the
 // eigenvalues of the shape operator in an orthonormal frame of the tangent plane.
 std::pair<double, double> height_field_curvatures(const GroundHeight& ground) {
   const Eigen::Vector2d& g = ground.gradient;
@@ -248,7 +248,7 @@ std::pair<double, double> height_field_curvatures(const GroundHeight& ground) {
   return {mean - spread, mean + spread};
 }
 
-// A box's signed distance from its per-axis excesses; exact (negative inside).
+// Signed distance to a box from the excess along each axis; exact, negative inside.
 double box_distance(const Eigen::Vector3d& excess) {
   const double inside = excess.maxCoeff();
   return inside <= 0.0 ? inside : excess.cwiseMax(0.0).norm();

@@ -23,9 +23,9 @@ namespace {
 
 using std::numbers::pi;
 
-using TriangleSoup = TriangleMesh;  // vertices and triangles alone, from outside
+using TriangleSoup = TriangleMesh;  // only vertices and triangles
 
-// What counts as lying on a surface, meters.
+// Tolerance of points on a surface, m.
 constexpr double on_surface_m = 1e-9;
 
 std::uint32_t as_index(std::size_t i) { return static_cast<std::uint32_t>(i); }
@@ -39,7 +39,7 @@ std::size_t pieces(double length, double step, std::size_t at_least) {
   return std::max(at_least, static_cast<std::size_t>(std::ceil(length / step - 1e-9)));
 }
 
-// The largest circle of a segment decides the step of the whole solid around its axis.
+// Maximum radius of a profile, which determines the step of the solid around its axis.
 double widest(const Profile& profile) {
   double rho = 0.0;
   for (const ProfileSegment& segment : profile)
@@ -52,7 +52,7 @@ struct Ring {
   std::uint32_t size = 1;  // 1: a pole
 };
 
-// Triangles between a ring and the one below it, whose sizes may differ.
+// Adds the triangles between two adjacent rings, whose sizes may differ.
 void stitch(const Ring& upper, const Ring& lower, std::vector<Triangle>& triangles) {
   std::uint32_t i = 0;
   std::uint32_t j = 0;
@@ -96,7 +96,7 @@ TriangleSoup tessellate_profile(const SceneGeometry& geometry, const SceneSolid&
   Ring above = add_ring(geometry, solid, 0, 0.0, step, soup.vertices);
   for (std::size_t s = 0; s < solid.profile.size(); ++s) {
     const ProfileSegment& segment = solid.profile[s];
-    // An even number, so that a ball's equator is a ring.
+    // An even number, so that the equator of a sphere is a ring.
     const std::size_t rows =
         2 * pieces(0.5 * segment.length(), segment_step(segment, step, options), 1);
     for (std::size_t row = 1; row <= rows; ++row) {
@@ -109,7 +109,7 @@ TriangleSoup tessellate_profile(const SceneGeometry& geometry, const SceneSolid&
   return soup;
 }
 
-// The quads of a lattice of columns x rows, each as two triangles; at(i, j) is a vertex.
+// Adds two triangles per quad of a lattice of columns x rows; at(i, j) returns a vertex.
 template <typename At>
 void add_quads(std::size_t columns, std::size_t rows, const At& at,
                std::vector<Triangle>& triangles) {
@@ -142,7 +142,7 @@ TriangleSoup tessellate_plane(const SceneGeometry& geometry, const SceneSolid& s
   return soup;
 }
 
-// The six faces share the vertices of one lattice along their common edges.
+// The six faces share the lattice vertices on their common edges.
 TriangleSoup tessellate_box(const SceneSolid& solid, const SceneMeshOptions& options) {
   TriangleSoup soup;
   std::array<std::size_t, 3> counts{};
@@ -163,7 +163,7 @@ TriangleSoup tessellate_box(const SceneSolid& solid, const SceneMeshOptions& opt
   };
   for (const std::size_t axis : {0U, 1U, 2U}) {
     for (const bool upper : {false, true}) {
-      // The other two axes in the order that makes the face look outward.
+      // The order of the other two axes determines that the face is oriented outward.
       const std::size_t u = (axis + (upper ? 1 : 2)) % 3;
       const std::size_t v = (axis + (upper ? 2 : 1)) % 3;
       const auto at = [&](std::size_t i, std::size_t j) {
@@ -192,8 +192,8 @@ Eigen::Vector3d gradient_of(const SceneGeometry& geometry, const SceneSolid& sol
   return gradient;
 }
 
-// The point of both surfaces next to `point`: Newton with the least-norm step. The start if that
-// does not converge within `reach`, as where the surfaces only touch.
+// Nearest point on both surfaces, by Newton's method with minimum-norm steps. Returns `start` if it
+// does not converge within `reach`, for example if the surfaces only touch.
 Eigen::Vector3d onto_both(const SceneGeometry& geometry, const SceneSolid& a, const SceneSolid& b,
                           const Eigen::Vector3d& start, double reach) {
   Eigen::Vector3d point = start;
@@ -214,7 +214,7 @@ Eigen::Vector3d onto_both(const SceneGeometry& geometry, const SceneSolid& a, co
   return converged ? point : start;
 }
 
-// Where the edge from a point outside `other` to one inside passes its surface.
+// Intersection of an edge with the surface of `other`, by bisection.
 Eigen::Vector3d crossing(const SceneGeometry& geometry, const SceneSolid& other,
                          Eigen::Vector3d outside, Eigen::Vector3d inside) {
   for (int step = 0; step < 60; ++step) {
@@ -224,8 +224,8 @@ Eigen::Vector3d crossing(const SceneGeometry& geometry, const SceneSolid& other,
   return 0.5 * (outside + inside);
 }
 
-// Cuts the surface of `solid` along `other` and drops what that hides. New vertices lie on both
-// surfaces, and triangles that share an edge share the vertex that cuts it.
+// Cuts the surface of `solid` along `other` and drops its hidden part. New vertices are on both
+// surfaces; adjacent triangles share the vertex on their common edge.
 class Cutter {
  public:
   Cutter(const SceneGeometry& geometry, const TriangleSoup& soup, const SceneSolid& solid,
@@ -270,13 +270,13 @@ class Cutter {
       result_.triangles.push_back({polygon[0], polygon[k - 1], polygon[k]});
   }
 
-  // Of a triangle that lies on the other solid's surface.
+  // Visibility of a triangle on the surface of the other solid.
   bool is_hidden(const Triangle& triangle) const {
     const Eigen::Vector3d& a = soup_.vertices[triangle[0]];
     const Eigen::Vector3d& b = soup_.vertices[triangle[1]];
     const Eigen::Vector3d& c = soup_.vertices[triangle[2]];
     const Eigen::Vector3d normal = (b - a).cross(c - a).normalized();
-    // The center of a chord triangle lies within a round solid: back to its surface.
+    // The center of a triangle is inside a round solid: projects it onto the surface.
     Eigen::Vector3d center = (a + b + c) / 3.0;
     for (int step = 0; step < 3; ++step)
       center -= geometry_.signed_distance(solid_, center) * normal;
@@ -307,7 +307,7 @@ class Cutter {
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> cuts_;
 };
 
-// The whole surface of a solid, closed but for a plane's outline.
+// Complete surface of a solid, closed except for a plane.
 TriangleSoup tessellate(const SceneGeometry& geometry, const SceneSolid& solid,
                         const SceneMeshOptions& options) {
   if (!solid.profile.empty()) return tessellate_profile(geometry, solid, options);
@@ -315,7 +315,7 @@ TriangleSoup tessellate(const SceneGeometry& geometry, const SceneSolid& solid,
                         : tessellate_box(solid, options);
 }
 
-// About how many triangles tessellate() makes.
+// Estimated number of triangles of tessellate().
 double estimated_triangles(const SceneSolid& solid, const SceneMeshOptions& options) {
   double triangles = 0.0;
   if (!solid.profile.empty()) {
@@ -342,7 +342,7 @@ using Triangulation =
 
 using Edge = std::pair<std::uint32_t, std::uint32_t>;
 
-// Edges with one triangle only.
+// Border edges: edges with one triangle.
 std::vector<Edge> open_edges(const std::vector<Triangle>& triangles) {
   std::map<Edge, int> uses;
   for (const Triangle& triangle : triangles)
@@ -353,7 +353,7 @@ std::vector<Edge> open_edges(const std::vector<Triangle>& triangles) {
   return open;
 }
 
-// What of one solid is seen, without unused vertices.
+// Visible part of a solid, without unused vertices.
 TriangleSoup visible_part(const SceneGeometry& geometry, const SceneSolid& solid,
                           const SceneMeshOptions& options) {
   TriangleSoup soup = tessellate(geometry, solid, options);
@@ -368,7 +368,7 @@ TriangleSoup visible_part(const SceneGeometry& geometry, const SceneSolid& solid
   return soup;
 }
 
-// The ground, triangulated around the edges at which the other solids' meshes meet it.
+// Triangulates the ground, constrained by the edges at which other solids meet it.
 class GroundMesher {
  public:
   GroundMesher(const SceneGeometry& geometry, const SceneMeshOptions& options, TriangleMesh& mesh)
@@ -387,7 +387,7 @@ class GroundMesher {
     }
   }
 
-  // Appends the visible ground to the mesh; `shapes` gets the shape of each triangle.
+  // Appends the visible ground to the mesh and the shape of each triangle to `shapes`.
   void finish(std::vector<double>& shapes) {
     insert_grid();
     for (auto face = triangulation_.finite_faces_begin(); face != triangulation_.finite_faces_end();
@@ -405,7 +405,7 @@ class GroundMesher {
  private:
   using Handle = Triangulation::Vertex_handle;
 
-  // On the top of the ground, and not on a side beneath its outline.
+  // Returns true for points on the top of the ground, not on the sides below its outline.
   bool is_on_ground(const Eigen::Vector3d& point) const {
     const Eigen::Vector3d local = ground_.solid_from_scene * point;
     if (std::abs(local.x()) > face_.half_x || std::abs(local.y()) > face_.half_y) return false;
@@ -420,7 +420,7 @@ class GroundMesher {
     return handle;
   }
 
-  // A grid, without the points that are hidden or crowd a footprint.
+  // Inserts a grid without points that are hidden or close to a footprint.
   void insert_grid() {
     const std::size_t columns = pieces(2.0 * face_.half_x, options_.edge_length_m, 1);
     const std::size_t rows = pieces(2.0 * face_.half_y, options_.edge_length_m, 1);

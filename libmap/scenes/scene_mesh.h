@@ -1,4 +1,4 @@
-// The visible surface of a scene of primitive shapes as triangles.
+// Triangle mesh of the visible surface of a scene of primitive shapes.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,20 +11,19 @@
 namespace libmap {
 
 struct SceneMeshOptions {
-  double edge_length_m =
-      0.01;  // > 0: longest edge along a row or ring; diagonals are up to 1.5 times
-  double chord_error_m = 0.0002;  // > 0: of round shapes (bent ground follows edge_length_m alone)
-  std::uint64_t max_triangles = 20'000'000;  // more is an Error
+  double edge_length_m = 0.01;    // > 0: maximum along rows and rings; diagonals up to 1.5 times
+  double chord_error_m = 0.0002;  // > 0: for round shapes; bumps depend on edge_length_m only
+  std::uint64_t max_triangles = 20'000'000;
 };
 
-// The visible surface as triangles oriented outward, with the face field "shape"; vertices lie on
-// the exact surface. Triangles are cut where they enter another solid, with the new vertices on
-// both surfaces. Solids share those vertices with the ground: the thesis's scene has no edge with
-// one triangle but the outline of its plane. Where two solids, or a solid and a second plane,
-// overlap each other, their cut edges agree to within the sag of a chord of edge_length_m, not by
-// vertices; parts thinner than edge_length_m can be missed. Where a solid reaches over the outline
-// of the ground, the ground's last triangles are kept or dropped whole.
-// Throws Error: a bad scene, or too many triangles.
+// Meshes the visible surface with the face field "shape". Triangles are oriented outward; vertices
+// are on the exact surface. Triangles that intersect another solid are cut, with the new vertices
+// on both surfaces. Solids share these vertices with the ground: the only border of the thesis's
+// scene is the outline of its plane. Where two solids, or a solid and a second plane, overlap,
+// their cut edges agree to within the sag of a chord of edge_length_m but share no vertices; parts
+// thinner than edge_length_m may be missed. Where a solid extends beyond the outline of the ground,
+// border triangles of the ground are kept or dropped as a whole. Throws Error: an invalid scene, or
+// more than max_triangles.
 TriangleMesh scene_mesh(const PrimitiveScene& scene, const SceneMeshOptions& options);
 
 }  // namespace libmap

@@ -23,7 +23,7 @@ double steps_of(double length, double spacing) {
   return std::max(1.0, std::round(length / spacing));
 }
 
-// One face of one solid: a segment of a profile, or a flat (for the ground: bent) rectangle.
+// A face of a solid: a segment of a profile, or a rectangle (flat, or ground with bumps).
 struct Patch {
   const SceneSolid* solid = nullptr;
   std::size_t segment = 0;
@@ -55,7 +55,7 @@ class Sampler {
   }
 
  private:
-  // The place of one sample in a cell of the grid, as a share of the cell.
+  // Relative position of a sample in its grid cell, 0 to 1.
   double place(RandomStream& random) const { return 0.5 + jitter_ * (random.uniform() - 0.5); }
 
   void draw_segment(const Patch& patch, RandomStream& random,
@@ -75,7 +75,7 @@ class Sampler {
     }
   }
 
-  // Bent ground is cut into tiles of about twelve spacings, so that each follows the slope.
+  // Ground with bumps is divided into tiles of about twelve spacings, to follow the slope.
   void draw_face(const Patch& patch, RandomStream& random,
                  std::vector<SurfaceTruth>& samples) const {
     const FlatFace& face = *patch.face;
@@ -83,7 +83,7 @@ class Sampler {
     const double tiles_x = bent ? steps_of(2.0 * face.half_x, 12.0 * spacing_) : 1.0;
     const double tiles_y = bent ? steps_of(2.0 * face.half_y, 12.0 * spacing_) : 1.0;
     const Eigen::Vector2d tile(2.0 * face.half_x / tiles_x, 2.0 * face.half_y / tiles_y);
-    double owed = 0.0;  // points that rounding to whole rows has left out so far
+    double owed = 0.0;  // points missing so far because of rounding to whole rows
     for (double j = 0.0; j < tiles_y; j += 1.0)
       for (double i = 0.0; i < tiles_x; i += 1.0)
         draw_tile(patch, {i * tile.x() - face.half_x, j * tile.y() - face.half_y}, tile, random,
@@ -94,7 +94,7 @@ class Sampler {
                  RandomStream& random, std::vector<SurfaceTruth>& samples, double& owed) const {
     const Stretch stretch = stretch_of(patch, corner, tile);
     const double wanted = tile.prod() * stretch.area / spacing_ / spacing_ + owed;
-    // The longer side takes up what rounding leaves.
+    // The longer side compensates the rounding of the shorter one.
     const bool is_wide = tile.x() > tile.y();
     const double across =
         steps_of(is_wide ? tile.y() * stretch.along_y : tile.x() * stretch.along_x, spacing_);
@@ -111,7 +111,7 @@ class Sampler {
     }
   }
 
-  // How much longer the surface is than its plane, and how much larger; means over a tile.
+  // Ratio of lengths and areas on the surface to those in the plane, mean over a tile.
   struct Stretch {
     double along_x = 1.0;
     double along_y = 1.0;
@@ -142,7 +142,7 @@ class Sampler {
   double jitter_;
 };
 
-// Marks the samples that are seen from outside.
+// Visibility of each sample from outside.
 std::vector<char> visible_of(const SceneGeometry& geometry, const SceneSolid& solid,
                              const std::vector<SurfaceTruth>& samples) {
   std::vector<char> visible(samples.size());
@@ -173,7 +173,7 @@ struct PatchAreas {
   double visible = 0.0;
 };
 
-// The visible share is measured with about `points` samples.
+// Estimates the visible area with about `points` samples.
 PatchAreas measure_areas(const SceneGeometry& geometry, const std::vector<Patch>& patches,
                          double points) {
   PatchAreas areas;
@@ -235,8 +235,8 @@ SceneSamples sample_scene(const PrimitiveScene& scene, const SceneSamplingOption
   double spacing = options.spacing_m;
   const PatchAreas areas = measure_areas(geometry, patches, 20'000.0);
   if (options.count > 0) spacing = std::sqrt(areas.visible / wanted);
-  // Hidden points are drawn before they are dropped: a scene that hides most of itself is refused
-  // at ten times the limit.
+  // Hidden points are drawn before they are dropped, so their number is limited, too: to ten times
+  // max_points.
   const double points = areas.visible / spacing / spacing;
   const double drawn = 0.1 * areas.whole / spacing / spacing;
   require_count(std::max(points, drawn), options.max_points, "points",

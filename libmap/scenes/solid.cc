@@ -17,7 +17,7 @@ namespace {
 
 using Edge = std::pair<std::uint32_t, std::uint32_t>;
 
-// A convex polyhedron by its faces, which is cut down plane by plane.
+// A convex polyhedron, represented by its faces, that is clipped by one plane after another.
 class ConvexBody {
  public:
   explicit ConvexBody(double bound_m) {
@@ -33,7 +33,7 @@ class ConvexBody {
     for (const Eigen::Vector3d& vertex : vertices_)
       distances_.push_back(half_space.normal.dot(vertex) - half_space.offset_m);
     crossings_.clear();
-    std::map<std::uint32_t, std::uint32_t> rim;  // of the new face, against its direction
+    std::map<std::uint32_t, std::uint32_t> rim;  // edges of the new face, in reverse direction
     std::vector<Face> kept;
     for (const Face& face : faces_) {
       Face clipped{clip(face.corners, rim), face.label};
@@ -46,7 +46,7 @@ class ConvexBody {
     for (std::size_t n = 0; n < rim.size(); ++n) {
       cap.corners.push_back(corner);
       const auto next = rim.find(corner);
-      if (next == rim.end()) throw Error("half-spaces meet in a degenerate point");
+      if (next == rim.end()) throw Error("the intersection of the half-spaces is degenerate");
       corner = next->second;
     }
     std::reverse(cap.corners.begin(), cap.corners.end());
@@ -87,7 +87,7 @@ class ConvexBody {
     return vertex;
   }
 
-  // What of a face lies within; the edge along which it is cut goes to the rim.
+  // Part of a face inside the half-space. Its cut edge is added to `rim`.
   std::vector<std::uint32_t> clip(const std::vector<std::uint32_t>& corners,
                                   std::map<std::uint32_t, std::uint32_t>& rim) {
     std::vector<std::uint32_t> kept;
@@ -122,14 +122,14 @@ Solid convex_solid(const std::vector<HalfSpace>& half_spaces, double bound_m) {
   for (std::size_t n = 0; n < half_spaces.size(); ++n)
     body.cut(half_spaces[n], static_cast<int>(n));
   Solid solid = body.solid();
-  if (solid.triangles.empty()) throw Error("half-spaces have nothing in common");
+  if (solid.triangles.empty()) throw Error("the intersection of the half-spaces is empty");
   if (std::find(solid.labels.begin(), solid.labels.end(), -1) != solid.labels.end())
-    throw Error("half-spaces enclose nothing within " + to_text(bound_m) + " m");
+    throw Error("the intersection of the half-spaces exceeds " + to_text(bound_m) + " m");
   return solid;
 }
 
 Solid ellipsoid_solid(const Eigen::Vector3d& radii_m, double edge_length_m) {
-  // Each face of an octahedron as a triangular grid, blown up to the sphere.
+  // A triangular grid on each face of an octahedron is projected onto the sphere.
   const double quarter = 0.5 * M_PI * radii_m.maxCoeff();
   const auto steps = static_cast<int>(std::max(3.0, std::ceil(quarter / edge_length_m)));
   Solid solid;
@@ -138,7 +138,7 @@ Solid ellipsoid_solid(const Eigen::Vector3d& radii_m, double edge_length_m) {
     const auto [entry, is_new] =
         numbers.emplace(grid, static_cast<std::uint32_t>(solid.vertices.size()));
     if (is_new) {
-      // The sine of equal angles spreads the vertices more evenly than the octahedron itself.
+      // Equal angles give a more uniform vertex spacing than equal lengths.
       Eigen::Vector3d direction;
       for (std::size_t axis = 0; axis < 3; ++axis)
         direction[static_cast<Eigen::Index>(axis)] = std::sin(0.5 * M_PI * grid[axis] / steps);
@@ -217,7 +217,7 @@ Solid in_order(const Solid& solid) {
 }
 
 Eigen::Vector2d HeightGrid::at(std::size_t column, std::size_t row) const {
-  // The last point lies on the outline exactly.
+  // The last point is exactly on the outline.
   const double u = static_cast<double>(column) / static_cast<double>(columns - 1);
   const double v = static_cast<double>(row) / static_cast<double>(rows - 1);
   return {size_x_m * (u - 0.5), size_y_m * (v - 0.5)};

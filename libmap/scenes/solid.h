@@ -1,4 +1,4 @@
-// Closed surfaces of triangles from which sites are built.
+// Closed triangle surfaces, and operations on them for building sites.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,8 +8,8 @@
 
 namespace libmap {
 
-// A closed surface without self-intersections, oriented outward, that may have several parts. Each
-// triangle has a label, which every operation here hands on.
+// A closed surface without self-intersections, oriented outward, of one or several parts. Each
+// triangle has a label; all operations preserve the labels.
 struct Solid {
   std::vector<Eigen::Vector3d> vertices;
   std::vector<Triangle> triangles;
@@ -22,15 +22,14 @@ struct HalfSpace {
   double offset_m = 0.0;
 };
 
-// What the half-spaces have in common, labeled by the half-space in which a face lies. Throws
-// Error if that is empty or reaches farther than `bound_m` from the origin along an axis.
+// Intersection of half-spaces; the label of a face is the index of its half-space. Throws Error if
+// it is empty, degenerate or extends farther than `bound_m` from the origin along an axis.
 Solid convex_solid(const std::vector<HalfSpace>& half_spaces, double bound_m);
 
-// An ellipsoid about the origin, its edges about `edge_length_m` long, with label 0.
+// An ellipsoid around the origin with edges of about `edge_length_m` and label 0.
 Solid ellipsoid_solid(const Eigen::Vector3d& radii_m, double edge_length_m);
 
-// Ground: a block under the heights z(x, y) of a grid. Heights go row by row, x fastest; x and y
-// run from -size/2 to size/2; the base is flat, at z = base_m. Label 0 on top, -1 below.
+// Heights z(x, y) on a grid, row by row, x fastest. x and y range from -size/2 to size/2.
 struct HeightGrid {
   double size_x_m = 0.0;
   double size_y_m = 0.0;
@@ -39,24 +38,23 @@ struct HeightGrid {
   std::vector<double> heights_m;
   Eigen::Vector2d at(std::size_t column, std::size_t row) const;  // x and y of a grid point
 };
+// A block below a height grid with a flat base at z = base_m. Label 0 on top, -1 on sides and base.
 Solid block_solid(const HeightGrid& top, double base_m);
 
-// Leaves the vertices that the triangles use, in the order of their first use.
+// Removes vertices that no triangle uses; the others are in the order of their first use.
 void drop_unused_vertices(std::vector<Eigen::Vector3d>& vertices, std::vector<Triangle>& triangles);
 
-// The same surface in an order that follows from its geometry alone: vertices by x, y, z, triangles
-// by their vertices. CGAL goes through triangulations in the order of addresses in memory; what
-// leaves it is put in this order, so that equal input gives equal bytes.
+// Sorts vertices by x, y, z and triangles by their vertices. The order of CGAL's results depends on
+// memory addresses; sorting them makes equal input give equal bytes.
 Solid in_order(const Solid& solid);
 
-// The same surface with each flat region of one label cut into even triangles; regions keep their
-// outline, and their edges stay where they are.
+// Remeshes each flat region of one label with edges of about `edge_length_m`. The outlines of the
+// regions do not change. Throws Error if corners coincide because a region is not flat.
 Solid refine_facets(const Solid& solid, double edge_length_m);
 
-// Unions and differences of solids in general position (CGAL's corefinement with exact
-// predicates). Throws Error if the result is no manifold.
-// Without the splinters that cuts leave: edges shorter than `min_edge_m` are collapsed where the
-// surface stays a manifold and no triangle turns over.
+// Union and difference of solids in general position (CGAL's corefinement with exact predicates).
+// Edges of a union that are shorter than `min_edge_m` are collapsed unless that would flip a
+// triangle or make the surface non-manifold. Throws Error if the result is not a manifold.
 Solid unite(const std::vector<Solid>& solids, double min_edge_m = 0.0);
 Solid subtract(const Solid& solid, const Solid& removed);
 

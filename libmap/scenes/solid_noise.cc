@@ -21,7 +21,7 @@ Cell cell_of(const Eigen::Vector3d& point) {
           static_cast<std::int64_t>(std::floor(point.z()))};
 }
 
-// Of a lattice point: 21 bits of each coordinate, then mixed with the seed.
+// Random bits of a lattice point and a seed.
 std::uint64_t lattice_bits(std::int64_t x, std::int64_t y, std::int64_t z, std::uint64_t seed) {
   std::uint64_t bits = static_cast<std::uint64_t>(x) * 0x9e3779b97f4a7c15U;
   bits ^= static_cast<std::uint64_t>(y) * 0xc2b2ae3d27d4eb4fU;
@@ -32,7 +32,7 @@ std::uint64_t lattice_bits(std::int64_t x, std::int64_t y, std::int64_t z, std::
   return bits ^ (bits >> 29);
 }
 
-// The directions to the middles of a cube's edges.
+// Directions to the edge centers of a cube.
 constexpr std::array<std::array<double, 3>, 12> directions = {{{1, 1, 0},
                                                                {-1, 1, 0},
                                                                {1, -1, 0},
@@ -46,7 +46,7 @@ constexpr std::array<std::array<double, 3>, 12> directions = {{{1, 1, 0},
                                                                {0, 1, -1},
                                                                {0, -1, -1}}};
 
-// One of them by chance, times the offset. By a table: branches would be guessed wrong.
+// Scalar product of a random direction and the offset. A table avoids mispredicted branches.
 double directional(std::uint64_t bits, double x, double y, double z) {
   const auto& direction = directions[(bits >> 32) % 12];
   return direction[0] * x + direction[1] * y + direction[2] * z;

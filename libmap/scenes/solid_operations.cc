@@ -38,7 +38,7 @@ void append(Mesh& mesh, const Solid& solid) {
     const Face face = mesh.add_face(Mesh::Vertex_index(first + triangle[0]),
                                     Mesh::Vertex_index(first + triangle[1]),
                                     Mesh::Vertex_index(first + triangle[2]));
-    if (face == Mesh::null_face()) throw Error("a solid's surface is no manifold");
+    if (face == Mesh::null_face()) throw Error("the surface of a solid is not a manifold");
     labels[face] = solid.labels[n];
   }
 }
@@ -64,7 +64,7 @@ Solid to_solid(Mesh& mesh) {
   return in_order(solid);
 }
 
-// Hands the labels of faces on to their parts and copies.
+// Copies the labels of faces to their parts and copies.
 class LabelKeeper : public processing::Corefinement::Default_visitor<Mesh> {
  public:
   void before_subface_creations(Face split, Mesh& mesh) { label_ = labels_of(mesh)[split]; }
@@ -81,11 +81,11 @@ void unite_into(Mesh& mesh, Mesh& other) {
   if (!processing::corefine_and_compute_union(mesh, other, mesh,
                                               processing::parameters::visitor(LabelKeeper()),
                                               processing::parameters::default_values()))
-    throw Error("the union of two solids is no manifold: they touch along an edge or in a point");
+    throw Error("the union of two solids is not a manifold: they touch at an edge or a point");
 }
 
-// Whether no triangle about the edge turns by more than 30 degrees, and none about its ends
-// vanishes, when its source moves onto its target.
+// Returns true if moving the edge's source onto its target rotates no adjacent triangle by more
+// than 30 degrees and degenerates none.
 bool may_collapse(const Mesh& mesh, Mesh::Halfedge_index edge) {
   const auto moved = mesh.source(edge);
   const auto& target = mesh.point(mesh.target(edge));
@@ -110,7 +110,7 @@ void collapse_short_edges(Mesh& mesh, double min_edge_m) {
     return CGAL::squared_distance(mesh.point(mesh.source(edge)), mesh.point(mesh.target(edge))) <
            min_edge_m * min_edge_m;
   };
-  // In an order, and each in a direction, that follows from the places of its ends.
+  // Order and direction of the edges depend only on the positions of their ends.
   std::vector<Mesh::Halfedge_index> edges;
   const auto ends = [&](Mesh::Halfedge_index edge) {
     return std::pair(mesh.point(mesh.source(edge)), mesh.point(mesh.target(edge)));
@@ -138,11 +138,11 @@ bool overlap(const Bounds3d& a, const Bounds3d& b) {
 
 }  // namespace
 
-// CGAL goes through its two operands in the order of their addresses: the meshes lie in one array,
-// so that the result does not depend on where memory happens to be.
+// CGAL processes its two operands in the order of their addresses. The meshes are in one array, so
+// that the result does not depend on memory allocation.
 Solid unite(const std::vector<Solid>& solids, double min_edge_m) {
   if (solids.empty()) return {};
-  // All but the first are gathered into meshes of parts that do not meet, the fewer the better.
+  // All solids except the first are grouped into few meshes of disjoint parts.
   std::vector<Mesh> meshes;
   meshes.reserve(solids.size());
   append(meshes.emplace_back(), solids.front());
@@ -174,7 +174,7 @@ Solid subtract(const Solid& solid, const Solid& removed) {
   if (!processing::corefine_and_compute_difference(meshes[0], meshes[1], meshes[0],
                                                    processing::parameters::visitor(LabelKeeper()),
                                                    processing::parameters::default_values()))
-    throw Error("the difference of two solids is no manifold");
+    throw Error("the difference of two solids is not a manifold");
   return to_solid(meshes[0]);
 }
 
@@ -185,7 +185,7 @@ struct VertexInfo {
   std::uint32_t vertex = no_vertex;
 };
 struct FaceInfo {
-  int depth = -1;  // outlines crossed on the way from outside
+  int depth = -1;  // number of outlines between the face and the outside
 };
 using VertexBase = CGAL::Triangulation_vertex_base_with_info_2<VertexInfo, Kernel>;
 using FaceBase =
@@ -199,10 +199,10 @@ using Edge = std::pair<std::uint32_t, std::uint32_t>;
 
 struct Region {
   std::vector<std::size_t> triangles;
-  std::vector<Edge> outline;  // region on the left
+  std::vector<Edge> outline;  // the region is on the left
 };
 
-// Regions by label, in the order of the labels.
+// Triangles and outline of each label.
 std::map<int, Region> regions_of(const Solid& solid) {
   std::map<Edge, int> label_of;
   for (std::size_t n = 0; n < solid.triangles.size(); ++n)
@@ -245,7 +245,7 @@ class FacetRefiner {
     return entry->second;
   }
 
-  // The points of an edge from end to end, the same for both of its regions.
+  // Points of an edge in order, shared by both of its regions.
   const std::vector<std::uint32_t>& chain(const Edge& edge) {
     const Edge key = std::minmax(edge.first, edge.second);
     auto found = chains_.find(key);
@@ -309,7 +309,7 @@ class FacetRefiner {
     return handle;
   }
 
-  // A grid of equilateral triangles, clear of the outline.
+  // Inserts a grid of equilateral triangles, except close to the outline.
   void insert_inner_points(Triangulation& triangulation) const {
     Eigen::AlignedBox2d box;
     for (const Segment& segment : outline_) box.extend(segment.from);
@@ -348,11 +348,11 @@ class FacetRefiner {
     });
   }
 
-  // Faces behind an odd number of outlines.
+  // Sets the depth of all faces. Faces of odd depth are inside.
   static void mark_depths(Triangulation& triangulation) {
     std::vector<std::pair<Triangulation::Face_handle, int>> open = {
         {triangulation.infinite_face(), 0}};
-    // Faces of one depth before those of the next.
+    // Faces are visited in ascending order of depth.
     for (std::size_t depth = 0; !open.empty(); ++depth) {
       std::vector<std::pair<Triangulation::Face_handle, int>> deeper;
       while (!open.empty()) {
@@ -398,7 +398,7 @@ class FacetRefiner {
   Solid result_;
   std::map<std::uint32_t, std::uint32_t> corners_;
   std::map<Edge, std::vector<std::uint32_t>> chains_;
-  // Of the region at hand.
+  // State of the current region.
   Eigen::Vector3d origin_;
   Eigen::Vector3d axis_u_;
   Eigen::Vector3d axis_v_;

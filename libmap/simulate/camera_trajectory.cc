@@ -19,10 +19,10 @@ namespace {
 using std::numbers::pi;
 
 constexpr double first_stamp_s = 1.7e9;
-constexpr double pace_step = 1e-3;  // of a loop, for its length
+constexpr double pace_step = 1e-3;  // integration step of the path length, loops
 
-// A smooth random function of time with mean 0 and standard deviation 1 over long times: waves of a
-// band of frequencies with random phases.
+// Smooth random function of time with mean 0 and standard deviation 1: a sum of waves with random
+// frequencies in a band and random phases.
 class Wander {
  public:
   Wander(std::uint64_t seed, std::uint64_t key, double low_hz, double high_hz) {
@@ -55,16 +55,16 @@ Eigen::Vector3d at(const Wander3& wander, double time_s) {
   return {wander[0].at(time_s), wander[1].at(time_s), wander[2].at(time_s)};
 }
 
-// Where zeros of the options are replaced.
+// Parameters of the loops, with defaults filled in.
 struct Way {
-  Eigen::Vector3d center;  // on the ground
+  Eigen::Vector3d center;  // at ground height
   Eigen::Vector3d target;
   double radius = 0.0, last_radius = 0.0;
   double height = 0.0, last_height = 0.0;
   double start_deg = 0.0, sweep_deg = 0.0;
 };
 
-// The level direction in which a wall faces; nothing for ground and for closed surfaces.
+// Horizontal direction that a wall faces; nullopt for ground and closed surfaces.
 std::optional<Eigen::Vector2d> facing_of_wall(const TriangleMesh& mesh) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const Triangle& triangle : mesh.triangles) sum += 0.5 * area_normal(mesh, triangle);
@@ -101,7 +101,7 @@ Way way_of(const TriangleMesh& mesh, const CameraTrajectoryOptions& options) {
   return way;
 }
 
-// 0 on the first loop, 1 on the last; turns smoothly into the next within +-15 % of a loop.
+// 0 on the first loop, 1 on the last. The transition between loops takes +-15 % of a loop.
 double loop_share(double loop, int loops) {
   if (loops < 2) return 0.0;
   const double nearest_end = std::clamp(std::round(loop), 1.0, loops - 1.0);
@@ -109,7 +109,7 @@ double loop_share(double loop, int loops) {
   return (nearest_end - 1.0 + t * t * (3.0 - 2.0 * t)) / (loops - 1.0);
 }
 
-// The way without the hand's unrest; `loop` counts loops from the start.
+// Position on the path without sway; `loop` is the number of loops from the start.
 Eigen::Vector3d position_on(const Way& way, const CameraTrajectoryOptions& options, double loop) {
   const double share = loop_share(loop, options.loops);
   const double radius = way.radius + share * (way.last_radius - way.radius);
@@ -123,7 +123,7 @@ Eigen::Vector3d position_on(const Way& way, const CameraTrajectoryOptions& optio
   return way.center + Eigen::Vector3d(radius * std::cos(angle), radius * std::sin(angle), height);
 }
 
-// Body axes with x toward the target and y level.
+// Body axes with x toward the target and y horizontal.
 Eigen::Matrix3d look_at(const Eigen::Vector3d& position, const Eigen::Vector3d& target) {
   Eigen::Vector3d forward = target - position;
   if (forward.norm() < 1e-9) forward = -Eigen::Vector3d::UnitZ();
@@ -136,7 +136,7 @@ Eigen::Matrix3d look_at(const Eigen::Vector3d& position, const Eigen::Vector3d& 
   return axes;
 }
 
-// Places of the frames on the way, the same length of way apart.
+// Loop parameters of the frames, at equal path lengths.
 std::vector<double> paced_loops(const Way& way, const CameraTrajectoryOptions& options) {
   const auto steps = static_cast<std::size_t>(std::lround(options.loops / pace_step));
   std::vector<double> lengths{0.0};
@@ -146,7 +146,7 @@ std::vector<double> paced_loops(const Way& way, const CameraTrajectoryOptions& o
     lengths.push_back(lengths.back() + (here - last).norm());
     last = here;
   }
-  // The last frame stands one step before the end, where a closed loop begins again.
+  // The last frame is one step before the end, where a closed loop begins again.
   const double step_m = lengths.back() / options.frames;
   std::vector<double> loops;
   std::size_t i = 0;
@@ -160,10 +160,10 @@ std::vector<double> paced_loops(const Way& way, const CameraTrajectoryOptions& o
   return loops;
 }
 
-// How a hand holds a camera: its pose from where it is and looks.
+// Adds sway, tremor and gaze variation to a camera pose.
 class Hand {
  public:
-  // A hand sways with the steps of a walk; a look wanders in some ten seconds.
+  // Sway and tremor have the frequencies of steps; gaze has periods of about ten seconds.
   Hand(const CameraTrajectoryOptions& options, double gaze_m, std::uint64_t seed)
       : sway_m_(options.sway_m),
         tremor_deg_(options.tremor_deg),
@@ -174,7 +174,7 @@ class Hand {
 
   Pose pose(const Eigen::Vector3d& way, const Eigen::Vector3d& target, double time_s) const {
     const Eigen::Vector3d position = way + sway_m_ * at(sway_, time_s);
-    // The look wanders over the ground more than up and down.
+    // The gaze varies less in height than over the ground.
     const Eigen::Vector3d looked_at =
         target + gaze_m_ * Eigen::Vector3d(1.0, 1.0, 0.3).cwiseProduct(at(gaze_, time_s));
     Pose pose = make_pose_from_rpy(position, Eigen::Vector3d::Zero());
@@ -207,7 +207,7 @@ class Serpentine {
   }
 
   double length() const { return lanes_ * straight_ + (lanes_ - 1) * pi * radius_; }
-  // At a length of way from the start; beyond the ends straight on.
+  // Position at a path length from the start; extrapolated straight beyond both ends.
   Eigen::Vector2d at(double way_m) const {
     const double period = straight_ + pi * radius_;
     const int lane =
@@ -230,7 +230,7 @@ class Serpentine {
     return swapped_ ? Eigen::Vector2d(xy.y(), xy.x()) : xy;
   }
 
-  bool swapped_ = false;  // lanes along y
+  bool swapped_ = false;  // lanes are along y
   Eigen::Vector2d low_ = Eigen::Vector2d::Zero();
   int lanes_ = 1;
   double radius_ = 0.0;
@@ -240,11 +240,11 @@ class Serpentine {
 }  // namespace
 
 void bind(ParameterTable& table, SerpentineOptions& options) {
-  table.add("lane_m", options.lane_m, positive, "between lanes of a serpentine at most, m");
+  table.add("lane_m", options.lane_m, positive, "maximum distance between serpentine lanes, m");
   table.add("border_m", options.border_m, not_negative,
-            "between a serpentine and the border of the ground, m");
+            "distance between a serpentine and the border of the ground, m");
   table.add("ahead_m", options.ahead_m, positive,
-            "distance along a serpentine at which the ground is looked at, m");
+            "distance along a serpentine of the ground point that the camera looks at, m");
 }
 
 void bind(ParameterTable& table, CameraTrajectoryOptions& options) {
@@ -252,33 +252,33 @@ void bind(ParameterTable& table, CameraTrajectoryOptions& options) {
             {{"auto", CameraPath::automatic},
              {"loops", CameraPath::loops},
              {"serpentine", CameraPath::serpentine}},
-            "way of the camera; auto: loops around a mesh, a serpentine over a folder of clouds");
+            "camera path; auto: loops around a mesh, a serpentine over a folder of clouds");
   bind(table, options.serpentine);
   table.add("frames", options.frames, {1.0, 1e6}, "number of poses");
   table.add("loops", options.loops, {1.0, 1000.0}, "number of loops around the site");
   table.add("radius_m", options.radius_m, not_negative,
-            "distance from the site's center on the first loop, m; 0: fitted to the mesh");
+            "radius of the first loop around the site's center, m; 0: fitted to the mesh");
   table.add("last_radius_m", options.last_radius_m, not_negative,
-            "the same on the last loop, m; 0: 0.7 times the first");
+            "radius of the last loop, m; 0: 0.7 times the first radius");
   table.add("height_m", options.height_m, not_negative,
-            "height above the ground on the first loop, m; 0: 0.6 times its radius");
+            "camera height above the ground on the first loop, m; 0: 0.6 times its radius");
   table.add("last_height_m", options.last_height_m, not_negative,
-            "the same on the last loop, m; 0: 0.8 times the first radius");
+            "camera height on the last loop, m; 0: 0.8 times the first radius");
   table.add(
       "start_deg", options.start_deg, any_number,
-      "where the first loop begins, counter-clockwise from x; of a wall: from where it begins by "
-      "itself");
+      "direction of the start of the first loop, degrees counter-clockwise from x; at a wall: "
+      "offset from the default start");
   table.add(
       "sweep_deg", options.sweep_deg, {-360.0, 360.0},
-      "of each loop, degrees; less than a full circle: every other loop goes back; 0: 360 around "
-      "ground, 120 before a wall");
+      "angle of each loop, degrees; every other loop runs backwards if it is below 360; 0: 360, "
+      "at a wall 120");
   table.add("gaze_deg", options.gaze_deg, {0.0, 45.0},
-            "how far the look wanders from the target, degrees");
+            "standard deviation of the view direction from the target, degrees");
   table.add("sway_m", options.sway_m, not_negative,
-            "standard deviation of the hand about its way in each axis, m");
+            "standard deviation of the camera position from its path, per axis, m");
   table.add("tremor_deg", options.tremor_deg, not_negative,
-            "standard deviation of the hand's turns about each axis, degrees");
-  table.add("frame_interval_s", options.frame_interval_s, positive, "between two poses, s");
+            "standard deviation of the camera rotation about each axis, degrees");
+  table.add("frame_interval_s", options.frame_interval_s, positive, "time between two poses, s");
 }
 
 double surrounding_ground_height(const TriangleMesh& mesh) {
@@ -331,7 +331,7 @@ CameraMotion motion_through(Trajectory poses) {
   return [poses = std::move(poses)](std::size_t frame, double after_s) {
     const Pose& here = poses.at(frame).world_from_base;
     if (after_s == 0.0 || poses.size() < 2) return here;
-    // Towards the next pose; from the last one as from the one before it.
+    // Interpolates to the next pose; the motion of the last interval continues after the end.
     const std::size_t from = std::min(frame, poses.size() - 2);
     const double share = after_s / (poses[from + 1].stamp_s - poses[from].stamp_s);
     const Pose motion = poses[from].world_from_base.inverse() * poses[from + 1].world_from_base;
@@ -358,10 +358,9 @@ Trajectory numbered(Trajectory poses, double frame_interval_s) {
     pose.node = static_cast<int>(n) + 1;
     if (!stamped) pose.stamp_s = first_stamp_s + static_cast<double>(n) * frame_interval_s;
     if (n > 0 && !(pose.stamp_s > poses[n - 1].stamp_s))
-      throw Error("poses are not in the order of time",
-                  {.field = "stamp of pose " + std::to_string(n + 1),
-                   .value = to_text(pose.stamp_s),
-                   .bound = "> " + to_text(poses[n - 1].stamp_s)});
+      throw Error("stamps of poses must ascend", {.field = "stamp of pose " + std::to_string(n + 1),
+                                                  .value = to_text(pose.stamp_s),
+                                                  .bound = "> " + to_text(poses[n - 1].stamp_s)});
   }
   return poses;
 }

@@ -1,4 +1,4 @@
-// The way of a camera that is carried by hand around a site or over ground, or along given poses.
+// Trajectories of a hand-held camera: around a site, over ground, or along given poses.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,66 +14,65 @@
 
 namespace libmap {
 
-// automatic: loops around a mesh, a serpentine over ground of any size.
+// automatic: loops around a mesh, a serpentine over terrain.
 enum class CameraPath { automatic, loops, serpentine };
 
-// Lanes to and fro over the ground, along its longer side, joined by half circles; the look is
-// towards the ground further along the way.
+// Parallel lanes along the longer side of the ground, in alternating direction and joined by half
+// circles. The camera looks at the ground ahead.
 struct SerpentineOptions {
-  double lane_m = 1.5;    // between lanes, at most
-  double border_m = 0.5;  // between the way and the border of the ground
-  double ahead_m = 1.5;   // what is looked at
+  double lane_m = 1.5;    // maximum distance between lanes
+  double border_m = 0.5;  // distance between the path and the border of the ground
+  double ahead_m = 1.5;   // distance along the path of the point that the camera looks at
 };
 void bind(ParameterTable& table, SerpentineOptions& options);
 
-// Loops about the vertical through the middle of the mesh. Where the sweep is less than a full
-// circle, every other loop goes back. Radius and height change from loop to loop, smoothly, around
-// the loop's end. Before a wall (a surface that mostly faces a level direction) loops are arcs.
+// Loops about the vertical axis through the center of the mesh. If the sweep is less than a full
+// circle, every other loop runs backwards. Radius and height change smoothly at the end of each
+// loop. In front of a wall (a surface that mostly faces horizontally), loops are arcs.
 struct CameraTrajectoryOptions {
   CameraPath path = CameraPath::automatic;
   SerpentineOptions serpentine{};
   int frames = 60;
   int loops = 2;
-  double radius_m = 0.0;       // of the first loop; 0: 4/3 of half the mesh's smaller side (of a
-                               // wall: its length), 0.8 to 2 m
+  double radius_m = 0.0;       // of the first loop; 0: 4/3 of half the mesh's smaller side (wall:
+                               // larger side), 0.8 to 2 m
   double last_radius_m = 0.0;  // of the last loop; 0: 0.7 times the first
-  double height_m = 0.0;       // above the ground on the first loop; 0: 0.6 times its radius; of a
-                               // serpentine: above the mean ground, 0: 1.4 m
+  double height_m = 0.0;       // above the ground on the first loop; 0: 0.6 times its radius.
+                               // Serpentine: above the local mean ground; 0: 1.4 m
   double last_height_m = 0.0;  // on the last loop; 0: 0.8 times the first radius
-  double start_deg = 0.0;      // where the first loop begins, counter-clockwise from x; of a wall:
-                               // from where it begins by itself
-  double sweep_deg = 0.0;      // of each loop; negative: clockwise; 0: 360, or 120 before a wall
-  std::optional<Eigen::Vector3d> target;  // what is looked at; nothing: the ground in the middle of
-                                          // the site, or the middle of the wall
-  double gaze_deg = 8.0;                  // how far the look wanders from the target
-  double sway_m = 0.01;           // standard deviation of the hand about its way, in each axis
-  double tremor_deg = 1.0;        // and of its turns about each axis
-  double frame_interval_s = 1.0;  // between two poses
+  double start_deg = 0.0;      // direction of the first loop's start, counter-clockwise from x;
+                               // wall: relative to the default start
+  double sweep_deg = 0.0;      // angle of each loop; negative: clockwise; 0: 360, at a wall 120
+  std::optional<Eigen::Vector3d> target;  // point that the camera looks at; default: the ground at
+                                          // the center of the site, or the center of the wall
+  double gaze_deg = 8.0;          // standard deviation of the view direction from the target
+  double sway_m = 0.01;           // standard deviation of the position from the path, per axis
+  double tremor_deg = 1.0;        // standard deviation of the rotation about each axis
+  double frame_interval_s = 1.0;  // time between two poses
 };
-// All but the target.
+// Binds all fields except the target.
 void bind(ParameterTable& table, CameraTrajectoryOptions& options);
 
 // Height of the ground around a site: median height of the vertices in the outer tenth of the
-// mesh's length and width.
+// mesh's length and width. Throws Error for a mesh without vertices.
 double surrounding_ground_height(const TriangleMesh& mesh);
 
-// Pose of the camera's body (x forward, y left, z up) in the mesh's frame, a time after that of the
-// frame, which counts from 0. Throws Error for a mesh without vertices.
+// Pose of the camera's body (x forward, y left, z up) in the mesh's frame, `after_s` seconds after
+// the stamp of frame `frame` (from 0).
 using CameraMotion = std::function<Pose(std::size_t frame, double after_s)>;
+// Loops around a mesh. Throws Error for a mesh without vertices.
 CameraMotion camera_motion(const TriangleMesh& mesh, const CameraTrajectoryOptions& options,
                            std::uint64_t seed);
-
-// The same of a serpentine over the ground. Throws Error without points.
+// A serpentine over the ground. Throws Error if `ground` is empty.
 CameraMotion serpentine_motion(const GroundHeights& ground, const CameraTrajectoryOptions& options,
                                std::uint64_t seed);
-// Through the poses at their stamps, between them at constant speed and turn.
+// Interpolates given poses at constant velocity and angular velocity between their stamps.
 CameraMotion motion_through(Trajectory poses);
 
-// Poses at the frames; nodes from 1. Stamps begin at 1,700,000,000 s. The hand's motions are smooth
-// in time; the same seed gives the same.
+// Poses at all frames. Nodes begin at 1, stamps at 1,700,000,000 s.
 Trajectory poses_of_motion(const CameraMotion& motion, const CameraTrajectoryOptions& options);
-// Numbers the poses from 1 on, and stamps them as poses_of_motion does if no pose has a stamp.
-// Throws Error where a stamp is not later than the one before.
+// Numbers the poses from 1, and stamps them as poses_of_motion does if no pose has a stamp. Throws
+// Error unless stamps are strictly ascending.
 Trajectory numbered(Trajectory poses, double frame_interval_s);
 
 }  // namespace libmap

@@ -23,17 +23,17 @@ namespace {
 
 constexpr std::size_t rows_a_task = 8;
 constexpr double radians = std::numbers::pi / 180.0;
-// The band before the largest angle in which ever more measurements are lost.
+// Band below max_incidence_deg over which the loss of measurements increases.
 constexpr double grazing_band_deg = 10.0;
 
-// Most of the light comes from all over the sky, the rest from one side.
+// Diffuse and directional light.
 constexpr float sky_light = 0.7F;
 constexpr float side_light = 0.4F;
 const Eigen::Vector3f& toward_light() {
   static const Eigen::Vector3f direction = Eigen::Vector3f(0.4F, -0.5F, 0.75F).normalized();
   return direction;
 }
-// What stands behind the mesh: a plain wall.
+// Color of pixels without a surface.
 const Eigen::Vector3f background(0.62F, 0.64F, 0.66F);
 
 std::vector<Eigen::Vector2d> lattice_rays(const Camera& camera, int width, int height,
@@ -98,7 +98,7 @@ VisibleSurface::Seen VisibleSurface::Part::look(const RayHit& hit, const Eigen::
                             static_cast<float>(hit.v) * mesh.vertex_normals[t[2]])
                                .normalized();
   if (!normal.allFinite()) normal = flat.cast<float>();
-  // Meshes that are not closed are seen from behind as well.
+  // Open meshes are also visible from behind.
   if (cosine > 0) normal = -normal;
   const float light = sky_light * (0.75F + 0.25F * normal.z()) +
                       side_light * std::max(0.0F, normal.dot(toward_light()));
@@ -135,7 +135,7 @@ VisibleSurface::VisibleSurface(const TriangleMesh& mesh, TextureSource texture,
   const auto part = std::make_shared<Part>(Part{RayCaster(mesh), mesh, texture_seed});
   std::vector<Color>& colors = part->mesh.vertex_colors;
   if (texture == TextureSource::mesh && colors.empty())
-    throw Error("the mesh has no colors of its own");
+    throw Error("the mesh has no vertex colors");
   const bool plain = std::all_of(colors.begin(), colors.end(),
                                  [&](const Color& color) { return color == colors.front(); });
   if (texture == TextureSource::rock || (texture == TextureSource::automatic && plain))
@@ -143,7 +143,7 @@ VisibleSurface::VisibleSurface(const TriangleMesh& mesh, TextureSource texture,
   if (normals == ShadingNormals::estimated)
     part->mesh.vertex_normals = estimate_vertex_normals(mesh);
   else if (mesh.vertex_normals.empty())
-    throw Error("the mesh has no normals of its own");
+    throw Error("the mesh has no vertex normals");
   part->mesh.vertex_fields.clear();
   part->mesh.face_fields.clear();
   parts_ = {part};
@@ -203,35 +203,35 @@ SurfaceView VisibleSurface::view(const ViewRays& rays, const PoseOfRow& world_fr
 
 void bind_noise(ParameterTable& table, DepthSensorOptions& options) {
   table.add("noise_m", options.noise_m, not_negative,
-            "standard deviation of the depth noise along the ray at range 0, m");
+            "standard deviation of depth noise along the ray: constant term, m");
   table.add("noise_of_range", options.noise_of_range, not_negative,
-            "what that deviation grows by, m a m of range");
+            "standard deviation of depth noise: term proportional to range, m per m");
   table.add("noise_of_square", options.noise_of_square, not_negative,
-            "and by the square of the range, as of stereo cameras, 1/m");
-  table.add("depth_offset_m", options.depth_offset_m, any_number, "added to every range, m");
+            "standard deviation of depth noise: term proportional to squared range, 1/m");
+  table.add("depth_offset_m", options.depth_offset_m, any_number, "offset added to every range, m");
   table.add("max_incidence_deg", options.max_incidence_deg, {0.0, 90.0},
-            "surfaces seen flatter give nothing, degrees from the normal; 90: none is too flat");
+            "maximum angle between ray and normal of measured surfaces, degrees; 90: no limit");
   table.add("edge_gap_m", options.edge_gap_m, positive,
-            "a larger jump of depth within one pixel is an edge, m");
+            "minimum depth discontinuity within a pixel for it to be an edge pixel, m");
   table.add("flying_pixels", options.flying_pixels, zero_to_one,
-            "share of the edge pixels that lie between front and back");
+            "share of edge pixels measured between foreground and background");
   table.add("edge_dropouts", options.edge_dropouts, zero_to_one,
-            "share of the edge pixels that give nothing");
+            "share of edge pixels without depth");
 }
 
 void bind(ParameterTable& table, DepthSensorOptions& options) {
   bind_noise(table, options);
   table.add("depth_step_m", options.depth_step_m, not_negative,
-            "depths are multiples of it, m; 0: not rounded");
-  table.add("near_m", options.near_m, not_negative, "smallest depth that is measured, m");
-  table.add("far_m", options.far_m, positive, "largest depth that is measured, m");
+            "resolution of depth, m; 0: not rounded");
+  table.add("near_m", options.near_m, not_negative, "minimum measured depth, m");
+  table.add("far_m", options.far_m, positive, "maximum measured depth, m");
 }
 
 void bind(ParameterTable& table, PhotoOptions& options) {
   table.add("vignetting", options.vignetting, zero_to_one,
-            "how much darker the picture's corners are");
+            "loss of brightness in the corners of color images, 0 to 1");
   table.add("color_noise", options.color_noise, not_negative,
-            "standard deviation of the colors, of 255");
+            "standard deviation of color noise, 0 to 255");
 }
 
 DepthSensorOptions ideal_depth_sensor(double near_m, double far_m) {
@@ -249,19 +249,19 @@ DepthSensorOptions ideal_depth_sensor(double near_m, double far_m) {
 
 void DepthSensorOptions::check() const {
   if (!(far_m > near_m))
-    throw Error("nothing lies between near_m and far_m",
+    throw Error("the depth range is empty",
                 {.field = "far_m", .value = to_text(far_m), .bound = "> " + to_text(near_m)});
   if (!(flying_pixels + edge_dropouts <= 1.0))
-    throw Error("more edge pixels than there are", {.field = "flying_pixels + edge_dropouts",
-                                                    .value = to_text(flying_pixels + edge_dropouts),
-                                                    .bound = "<= 1"});
+    throw Error("shares exceed all edge pixels", {.field = "flying_pixels + edge_dropouts",
+                                                  .value = to_text(flying_pixels + edge_dropouts),
+                                                  .bound = "<= 1"});
 }
 
 namespace {
 
 struct PixelDepths {
   double center = 0.0;
-  std::array<double, 4> corners{};  // opposite ones follow each other
+  std::array<double, 4> corners{};  // opposite corners are adjacent
 };
 
 PixelDepths depths_of(const SurfaceView& view, int x, int y) {
@@ -272,9 +272,9 @@ PixelDepths depths_of(const SurfaceView& view, int x, int y) {
           {corner(0, 0), corner(1, 1), corner(1, 0), corner(0, 1)}};
 }
 
-// Whether depth jumps within the pixel. On a plane inverse depth is linear in the image: however
-// flat it is seen, the harmonic mean of opposite corners is the center's depth. A jump by g leaves
-// the center at least g / 2 from one of the two means.
+// Returns true if depth is discontinuous within the pixel. On a plane, inverse depth is linear in
+// the image, so the harmonic mean of opposite corners is the center's depth at any incidence. With
+// a discontinuity g, the center deviates by at least g / 2 from one of the two means.
 bool is_edge(const PixelDepths& depths, double gap) {
   for (std::size_t k = 0; k < 4; k += 2) {
     const double a = depths.corners[k];
@@ -285,7 +285,7 @@ bool is_edge(const PixelDepths& depths, double gap) {
   return false;
 }
 
-// The share of surfaces seen at this angle that gives nothing.
+// Probability of a missing depth at this incidence.
 double grazing_loss(double incidence_cos, double max_incidence_deg) {
   if (max_incidence_deg >= 90.0) return 0.0;
   const double angle = std::acos(std::clamp(incidence_cos, 0.0, 1.0)) / radians;
@@ -294,7 +294,7 @@ double grazing_loss(double incidence_cos, double max_incidence_deg) {
 
 enum class PixelKind { nothing, plain, edge, flying };
 
-// What the sensor says of one pixel, 0 if nothing.
+// Measured depth of one pixel, 0 if there is none.
 std::pair<double, PixelKind> measure_pixel(const PixelDepths& depths, double incidence_cos,
                                            double range_of_depth, const DepthSensorOptions& options,
                                            RandomStream random) {

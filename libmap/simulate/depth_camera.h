@@ -1,7 +1,7 @@
-// A time-of-flight depth camera with a registered color camera, looking at a triangle mesh.
+// Simulates a time-of-flight depth camera with a registered color camera that observes a mesh.
 //
-// First what an ideal camera sees, then what the sensor makes of it. Every pixel has random numbers
-// of its own: the same seed gives the same image at any thread count.
+// An ideal view is rendered first, then sensor errors are applied. Each pixel has its own random
+// numbers, so that the same seed gives the same image for any number of threads.
 #pragma once
 
 #include <Eigen/Core>
@@ -23,7 +23,7 @@ namespace libmap {
 
 class RayCaster;
 
-// x/z, y/z of the rays through a camera's pixels and their corners; NaN where there is no ray.
+// Rays (x/z, y/z) through the centers and corners of a camera's pixels; NaN if there is no ray.
 struct ViewRays {
   int width = 0;
   int height = 0;
@@ -32,47 +32,47 @@ struct ViewRays {
 };
 ViewRays make_view_rays(const Camera& camera);
 
-// One view without noise. Depths are 0 where there is no surface.
+// A view without sensor errors. Depth (z, m) is 0 if there is no surface.
 struct SurfaceView {
-  DepthImage depth;              // at the pixels' centers
-  DepthImage corner_depth;       // at their corners, as ViewRays::corners
-  Image<float> incidence_cos;    // of the angle between ray and normal at the center
-  Image<Eigen::Vector3f> color;  // 0 to 1: half the center's, an eighth of each corner's
+  DepthImage depth;              // at pixel centers
+  DepthImage corner_depth;       // at pixel corners, indexed as ViewRays::corners
+  Image<float> incidence_cos;    // cosine of the angle between ray and normal at the center
+  Image<Eigen::Vector3f> color;  // 0 to 1; weights: 1/2 for the center, 1/8 for each corner
 };
 
-// Where colors come from: the mesh's vertices, or rock_color(); automatic: the vertices, unless
-// they have no colors or all the same.
+// Source of colors: the vertex colors, or rock_color(). automatic: vertex colors if there are any
+// and they differ.
 enum class TextureSource { automatic, mesh, rock };
 
-// Where the normals that light falls on come from: the mesh's vertices must have them.
+// Source of the normals for shading: estimated from the mesh, or its vertex normals.
 enum class ShadingNormals { estimated, of_vertices };
 
-// Meshes ready to be looked at; copies share them. Light comes from the sky and a little more from
-// one side.
+// One or several meshes prepared for rendering; copies share them. Light is diffuse from above with
+// a directional part.
 class VisibleSurface {
  public:
-  // Throws Error as RayCaster does, and where the mesh's own colors are asked for and there are
-  // none. The mesh may go away afterwards.
+  // Copies the mesh. Throws Error as RayCaster does, and if `texture` or `normals` require vertex
+  // colors or normals that the mesh does not have.
   explicit VisibleSurface(const TriangleMesh& mesh,
                           TextureSource texture = TextureSource::automatic,
                           std::uint64_t texture_seed = 1,
                           ShadingNormals normals = ShadingNormals::estimated);
-  // All parts together; where several are equally near, the first is seen.
+  // Union of several surfaces. The first is visible if several have the same depth.
   explicit VisibleSurface(std::span<const VisibleSurface> parts);
 
-  // Rows in parallel. May be called from several threads at once. Without `with_color` the view's
-  // color is empty.
+  // Renders a view, parallel over rows. May be called from several threads. The view's color is
+  // empty unless `with_color` is set.
   SurfaceView view(const ViewRays& rays, const Pose& world_from_camera,
                    bool with_color = true) const;
-  // The same of a camera that moves while it reads its rows one after the other; row -0.5 is the
-  // upper border of the first.
+  // Renders the view of a rolling-shutter camera with a pose per row; row -0.5 is the upper border
+  // of the first row.
   using PoseOfRow = std::function<Pose(double row)>;
   SurfaceView view(const ViewRays& rays, const PoseOfRow& world_from_camera,
                    bool with_color = true) const;
 
-  // Of the first part.
+  // Ray caster and mesh (with vertex normals) of the first part.
   const RayCaster& caster() const;
-  const TriangleMesh& mesh() const;  // with vertex normals
+  const TriangleMesh& mesh() const;
 
  private:
   struct Part;
@@ -84,25 +84,25 @@ class VisibleSurface {
   std::vector<std::shared_ptr<const Part>> parts_;
 };
 
-// Defaults: the Kinect v2's limits (0.5 to 4.5 m, whole millimeters) and the noise of the scans
-// that this toolkit is tested on, 2 mm and 0.5 % of range.
+// Defaults: the limits of the Kinect v2 (0.5 to 4.5 m, whole millimeters) and the noise of this
+// toolkit's test scans, 2 mm and 0.5 % of range.
 struct DepthSensorOptions {
-  double noise_m = 0.002;         // standard deviation along the ray at range 0 ...
-  double noise_of_range = 0.005;  // ... and what it grows by, m a m of range
-  double noise_of_square = 0.0;   // ... and of range squared, as of stereo cameras, 1/m
+  double noise_m = 0.002;         // standard deviation along the ray: constant term
+  double noise_of_range = 0.005;  // term proportional to range, m per m
+  double noise_of_square = 0.0;   // term proportional to squared range (stereo cameras), 1/m
   double depth_offset_m = 0.0;    // added to every range
-  double depth_step_m = 0.001;    // depths are multiples of it; 0: not rounded
-  double near_m = 0.5;            // of the measured depth
+  double depth_step_m = 0.001;    // depth resolution; 0: not rounded
+  double near_m = 0.5;            // minimum and maximum measured depth
   double far_m = 4.5;
-  double max_incidence_deg = 80.0;  // surfaces seen flatter give nothing; 90: all give something
-  double edge_gap_m = 0.05;         // a larger jump of depth within one pixel is an edge
-  double flying_pixels = 0.35;      // share of the edge pixels that lie between front and back
-  double edge_dropouts = 0.35;      // share of the edge pixels that give nothing
+  double max_incidence_deg = 80.0;  // maximum angle between ray and normal; 90: no limit
+  double edge_gap_m = 0.05;         // minimum depth discontinuity within an edge pixel
+  double flying_pixels = 0.35;      // share of edge pixels measured between front and back
+  double edge_dropouts = 0.35;      // share of edge pixels without depth
 
-  void check() const;  // throws Error naming the first field that cannot be
+  void check() const;  // throws Error naming the first invalid field
 };
 void bind(ParameterTable& table, DepthSensorOptions& options);
-// All but step and limits.
+// Binds all fields except resolution and limits.
 void bind_noise(ParameterTable& table, DepthSensorOptions& options);
 // No noise, no losses, no rounding.
 DepthSensorOptions ideal_depth_sensor(double near_m, double far_m);
@@ -110,21 +110,22 @@ DepthSensorOptions ideal_depth_sensor(double near_m, double far_m);
 struct DepthMeasurement {
   DepthImage depth;
   std::size_t measured = 0;  // pixels with a depth
-  std::size_t edges = 0;     // pixels that see a jump of depth
-  std::size_t flying = 0;    // of these, measured between front and back
+  std::size_t edges = 0;     // pixels with a depth discontinuity
+  std::size_t flying = 0;    // edge pixels measured between front and back
 };
 
-// Grazing measurements are lost more and more over the last 10 degrees before max_incidence_deg.
+// Applies sensor errors to a view. The probability of a missing depth rises from 0 to 1 over the
+// last 10 degrees before max_incidence_deg.
 DepthMeasurement measure_depth(const SurfaceView& view, const ViewRays& rays,
                                const DepthSensorOptions& options, std::uint64_t seed);
 
 struct PhotoOptions {
-  double vignetting = 0.25;  // how much darker the image's corners are, 0 to 1
-  double color_noise = 2.0;  // standard deviation, of 255
+  double vignetting = 0.25;  // loss of brightness in the corners, 0 to 1
+  double color_noise = 2.0;  // standard deviation, 0 to 255
 };
 void bind(ParameterTable& table, PhotoOptions& options);
 
-// The photograph of the view: shaded texture, vignetting, noise drawn from `seed`.
+// Photograph of a view: shaded texture with vignetting and noise drawn from `seed`.
 ColorImage take_photo(const SurfaceView& view, const PhotoOptions& options, std::uint64_t seed);
 
 }  // namespace libmap

@@ -20,12 +20,12 @@ namespace libmap {
 namespace {
 
 constexpr double hard_slope_deg = 60.0;
-// Shares of the normals' spread (eigenvalues of their mean outer product, which add up to 1).
+// Thresholds of the eigenvalues of the normals' mean outer product, whose sum is 1.
 constexpr double arc_share = 0.05;  // an edge of 26 degrees
 constexpr double tip_share = 0.04;
-constexpr double hollow_share = 0.06;  // of the radius: mean depth below the neighbors' planes
+constexpr double hollow_share = 0.06;  // mean depth below the neighbors' planes, in radii
 
-// Triangles that are reached over the surface without leaving a ball around the vertex.
+// Triangles connected to the vertex within a ball around it.
 std::vector<std::uint32_t> triangles_within(const TriangleMesh& mesh, const VertexTriangles& around,
                                             std::uint32_t vertex, double radius_m) {
   std::vector<std::uint32_t> found;
@@ -49,7 +49,7 @@ std::vector<std::uint32_t> triangles_within(const TriangleMesh& mesh, const Vert
   return found;
 }
 
-// Kind and mean normal of the surroundings.
+// Sets kind and mean normal of the vertex's neighborhood.
 void look_around(const TriangleMesh& mesh, const VertexTriangles& around, std::uint32_t vertex,
                  double radius_m, FieldPoint& point) {
   Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
@@ -83,10 +83,10 @@ void look_around(const TriangleMesh& mesh, const VertexTriangles& around, std::u
 
 const ScalarField& rock_field(const TriangleMesh& mesh) {
   if (const ScalarField* field = find_field(mesh.face_fields, "rock")) return *field;
-  throw Error("the mesh does not say which triangles are which rock's", {.field = "rock"});
+  throw Error("the mesh has no such face field: use a mesh of simulate site", {.field = "rock"});
 }
 
-// The rock of each vertex whose triangles are all that rock's, else 0.
+// Rock of each vertex; 0 unless all of its triangles belong to one rock.
 std::vector<int> vertex_rocks(const TriangleMesh& mesh) {
   const ScalarField& field = rock_field(mesh);
   constexpr int unseen = -1;
@@ -104,7 +104,7 @@ struct Candidate {
   FieldPoint point;
 };
 
-// One vertex of the rocks in each cell of half the radius: the first.
+// The first rock vertex in each cubic cell with a side of half the radius, if it is high enough.
 std::vector<Candidate> candidates_of(const RockSite& site, const TriangleMesh& mesh) {
   const FieldPointOptions& options = site.field_points;
   const GroundRelief relief(site);
@@ -148,14 +148,14 @@ class Chooser {
         by_rock_(site.rocks.size(), 0),
         spacing_m_(site.field_points.radius_m) {}
 
-  // Nothing is left: false.
+  // Returns false if no candidate is left.
   bool choose_next() {
     const std::optional<int> rock = min_used_rock();
     if (!rock) return false;
     const auto is_open = [&](std::size_t n) {
       return candidates_[n].point.rock == *rock && distances_[n] >= spacing_m_;
     };
-    // The kind that is rarest so far on the rock, then on the site; then easy or hard.
+    // Prefers the rarest kind on the rock, then on the site, then the rarer difficulty.
     std::optional<std::size_t> best;
     for (std::size_t n = 0; n < candidates_.size(); ++n)
       if (is_open(n) && (!best || is_better(n, *best))) best = n;
@@ -225,7 +225,7 @@ std::vector<FieldPoint> choose_field_points(const RockSite& site, const Triangle
   Chooser chooser(site, candidates_of(site, mesh));
   for (int n = 0; n < site.field_points.count; ++n) {
     if (!chooser.choose_next())
-      throw Error("the rocks have too few places high enough",
+      throw Error("too few suitable locations on the rocks",
                   {.field = "field_points.count",
                    .value = std::to_string(site.field_points.count),
                    .bound = "at most " + std::to_string(n) + " here"});

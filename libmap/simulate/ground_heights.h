@@ -1,5 +1,5 @@
-// Heights of ground that is given by points, in a coarse grid over the plan: where someone who
-// walks over it goes, and how much of it lies where.
+// Coarse grid of ground heights from points, for camera paths over terrain and for the extent and
+// density of its parts. Lengths are in meters.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -15,17 +15,17 @@ class GroundHeights {
  public:
   static constexpr double cell_m = 0.5;
 
-  // Points, finite, in any order.
+  // Adds points, which must be finite, in any order.
   void add(std::span<const Eigen::Vector3d> points);
 
   bool empty() const { return cells_.empty(); }
   const Eigen::AlignedBox2d& box() const { return box_; }
-  // Mean height of the cells about the place, weighted by a Gaussian of cell_m; far from all points
-  // the mean of all cells. 0 without points.
+  // Mean height of the cells around a position, weighted by a Gaussian with a standard deviation of
+  // cell_m; the mean of all cells if no point is near, 0 without points.
   double height(const Eigen::Vector2d& place) const;
-  // Between points, as if they were a grid over the cells that have any; 0 without points.
+  // Mean point spacing over the occupied cells; 0 without points.
   double spacing_m() const;
-  // Of the points of the cells that meet the rectangle: empty where there is none.
+  // Bounding box of the points of all cells that intersect the rectangle; empty if there are none.
   Eigen::AlignedBox3d extent(const Eigen::AlignedBox2d& rectangle) const;
 
  private:

@@ -21,7 +21,7 @@ Image<std::uint16_t> to_units(const DepthImage& depth, double depth_scale_m) {
   Image<std::uint16_t> units(depth.width, depth.height);
   for (std::size_t i = 0; i < units.pixels.size(); ++i) {
     const double value = std::round(static_cast<double>(depth.pixels[i]) / depth_scale_m);
-    // 65535 is what sensors write where they are saturated.
+    // Sensors report saturation as 65535.
     units.pixels[i] = value < 65535.0 ? static_cast<std::uint16_t>(value) : std::uint16_t{0};
   }
   return units;
@@ -34,8 +34,8 @@ void bind(ParameterTable& table, RobotCamerasOptions& options) {
   bind(table, options.faults);
   table.add("stamp_s", options.stamp_s, not_negative, "time of the images, s");
   table.add("stamp_spread_s", options.stamp_spread_s, not_negative,
-            "how far apart the cameras' stamps lie at most, s");
-  table.add("seed", options.seed, not_negative, "of noise and stamps");
+            "maximum difference between the stamps of the cameras, s");
+  table.add("seed", options.seed, not_negative, "random seed of noise and stamps");
 }
 
 std::vector<RobotCameraImage> simulate_robot_cameras(const TriangleMesh& mesh, const CameraRig& rig,
@@ -71,7 +71,7 @@ double ground_height(const TriangleMesh& mesh, double x_m, double y_m) {
   const double above = bounds_of(mesh.vertices).max.z() + 1.0;
   const auto hit = caster.cast({x_m, y_m, above}, {0.0, 0.0, -1.0});
   if (!hit)
-    throw Error("the mesh has no ground beneath the robot",
+    throw Error("the mesh has no surface at this position",
                 {.field = "x, y", .value = to_text(x_m) + ", " + to_text(y_m)});
   return above - hit->distance;
 }

@@ -1,4 +1,4 @@
-// What the depth cameras of a robot see from a given pose on a mesh.
+// Simulates the depth images of a robot's cameras at a given pose on a mesh.
 #pragma once
 
 #include <cstddef>
@@ -16,24 +16,24 @@
 namespace libmap {
 
 struct RobotCamerasOptions {
-  // Its limits and its step are not used: they are the rig's.
+  // Limits and resolution are not used; the rig determines them.
   DepthSensorOptions sensor = ideal_depth_sensor(0.0, 1.0);
   DepthFaults faults{};
   double stamp_s = 0.0;
-  double stamp_spread_s = 0.004;  // cameras that are not triggered together: each stamp lies this
-                                  // much around stamp_s, in all
+  double stamp_spread_s = 0.004;  // cameras without a common trigger: stamps are between stamp_s
+                                  // and this much later
   std::uint64_t seed = 1;
 };
 void bind(ParameterTable& table, RobotCamerasOptions& options);
 
 struct RobotCameraImage {
   double stamp_s = 0.0;
-  Image<std::uint16_t> depth;  // in the camera's depth scale; 0 where nothing was measured
+  Image<std::uint16_t> depth;  // in the camera's depth scale; 0: no measurement
   DepthMeasurement measurement;
 };
 
-// One image for each of the rig's cameras. The robot stands still. Throws Error for a mesh
-// without triangles; an image may be empty.
+// Returns one image per camera of the rig, which does not move. An image may have no depth at all.
+// Throws Error for a mesh without triangles.
 std::vector<RobotCameraImage> simulate_robot_cameras(const TriangleMesh& mesh, const CameraRig& rig,
                                                      const Pose& world_from_robot,
                                                      const RobotCamerasOptions& options);

@@ -21,7 +21,7 @@ namespace {
 constexpr Range rock_size_range{0.01, 10.0};
 constexpr Range ground_size_range{0.1, 100.0};
 
-// To a whole number of 1/steps.
+// Rounds to a multiple of 1 / steps.
 double rounded(double value, double steps) { return std::round(value * steps) / steps; }
 
 // A rectangle on the ground.
@@ -34,7 +34,7 @@ struct Footprint {
   double reach(const Eigen::Vector2d& direction) const {
     return std::abs(axis_x.dot(direction)) * half.x() + std::abs(axis_y.dot(direction)) * half.y();
   }
-  // Separating axes: whether the two are at least `gap` apart along one of them.
+  // Separating axis test: true if the two are at least `gap` apart along one axis.
   bool is_apart(const Footprint& other, double gap) const {
     const std::array<Eigen::Vector2d, 4> axes = {axis_x, axis_y, other.axis_x, other.axis_y};
     return std::any_of(axes.begin(), axes.end(), [&](const Eigen::Vector2d& axis) {
@@ -80,52 +80,56 @@ bool is_hold(RockShape shape) {
 
 ParameterTable rock_parameters(SiteRock& rock) {
   ParameterTable table;
-  table.add("name", rock.name, "free text");
-  table.add("shape", rock.shape, rock_shape_names(), "its kind");
-  table.add("x_m", rock.x_m, Range{-100.0, 100.0}, "place on the ground");
-  table.add("y_m", rock.y_m, Range{-100.0, 100.0}, "place on the ground");
-  table.add("height_m", rock.height_m, rock_size_range, "top over the ground");
-  table.add("width_m", rock.width_m, rock_size_range, "size along its own x");
-  table.add("depth_m", rock.depth_m, rock_size_range, "size along its own y");
-  table.add("yaw_deg", rock.yaw_deg, Range{-360.0, 360.0}, "turn about z");
-  table.add("sides", rock.sides, Range{4.0, 12.0}, "walls of a block");
-  table.add("ledges", rock.ledges, Range{0.0, 3.0}, "lower blocks grown together with it");
+  table.add("name", rock.name, "name of the rock");
+  table.add("shape", rock.shape, rock_shape_names(), "shape of the rock");
+  table.add("x_m", rock.x_m, Range{-100.0, 100.0}, "x on the ground, m");
+  table.add("y_m", rock.y_m, Range{-100.0, 100.0}, "y on the ground, m");
+  table.add("height_m", rock.height_m, rock_size_range, "height of the top above the ground, m");
+  table.add("width_m", rock.width_m, rock_size_range, "size along the rock's x axis, m");
+  table.add("depth_m", rock.depth_m, rock_size_range, "size along the rock's y axis, m");
+  table.add("yaw_deg", rock.yaw_deg, Range{-360.0, 360.0}, "rotation about z, degrees");
+  table.add("sides", rock.sides, Range{4.0, 12.0}, "number of walls of a block");
+  table.add("ledges", rock.ledges, Range{0.0, 3.0}, "number of lower blocks merged with a block");
   table.add("overhang_deg", rock.overhang_deg, Range{0.0, 35.0},
-            "how far a third of the walls lean outward");
-  table.add("cleft_m", rock.cleft_m, Range{0.0, 10.0}, "depth of a wedge cut into the top");
-  table.add("roughness", rock.roughness, Range{0.0, 1.5}, "of the surface");
-  table.add("seed", rock.seed, not_negative, "of its form and colors");
+            "outward tilt of a third of the walls, degrees");
+  table.add("cleft_m", rock.cleft_m, Range{0.0, 10.0}, "depth of a wedge cut into the top, m");
+  table.add("roughness", rock.roughness, Range{0.0, 1.5}, "relative amplitude of surface relief");
+  table.add("seed", rock.seed, not_negative, "random seed of shape and colors");
   return table;
 }
 
 ParameterTable ground_parameters(SiteGround& ground) {
   ParameterTable table;
-  table.add("size_x_m", ground.size_x_m, ground_size_range, "length along x");
-  table.add("size_y_m", ground.size_y_m, ground_size_range, "length along y");
-  table.add("unevenness_m", ground.unevenness_m, Range{0.0, 1.0}, "height of the random relief");
-  table.add("tilt_deg", ground.tilt_deg, Range{0.0, 135.0}, "0: level, 90: an upright wall");
+  table.add("size_x_m", ground.size_x_m, ground_size_range, "length along x, m");
+  table.add("size_y_m", ground.size_y_m, ground_size_range, "length along y, m");
+  table.add("unevenness_m", ground.unevenness_m, Range{0.0, 1.0},
+            "maximum height of random relief, m");
+  table.add("tilt_deg", ground.tilt_deg, Range{0.0, 135.0},
+            "tilt of the ground, degrees; 90: a wall");
   table.add("texture", ground.texture,
             {{"soil", GroundTexture::soil},
              {"rock", GroundTexture::rock},
              {"panel", GroundTexture::panel}},
-            "colors");
+            "colors of the ground");
   return table;
 }
 
 ParameterTable layout_parameters(SiteLayout& layout) {
   ParameterTable table;
-  table.add("site_size_m", layout.site_size_m, ground_size_range, "square in which rocks stand");
-  table.add("free_square_m", layout.free_square_m, Range{0.0, 100.0}, "square without rocks");
-  table.add("gap_m", layout.gap_m, Range{0.0, 10.0}, "least distance of two rocks");
+  table.add("site_size_m", layout.site_size_m, ground_size_range, "side of the site's square, m");
+  table.add("free_square_m", layout.free_square_m, Range{0.0, 100.0},
+            "side of the square without rocks, m");
+  table.add("gap_m", layout.gap_m, Range{0.0, 10.0}, "minimum distance between two rocks, m");
   return table;
 }
 
 ParameterTable field_point_parameters(FieldPointOptions& options) {
   ParameterTable table;
-  table.add("count", options.count, Range{1.0, 10'000.0}, "number of places");
-  table.add("min_height_m", options.min_height_m, not_negative, "least height above the ground");
+  table.add("count", options.count, Range{1.0, 10'000.0}, "number of locations");
+  table.add("min_height_m", options.min_height_m, not_negative,
+            "minimum height of locations above the ground, m");
   table.add("radius_m", options.radius_m, Range{0.005, 1.0},
-            "of the surroundings that are looked at");
+            "radius of the neighborhood that determines the kind of a location, m");
   return table;
 }
 
@@ -137,11 +141,11 @@ void RockSite::check() const {
     } catch (const Error& error) {
       throw error.in_field(rock_place(n, copy), ".");
     }
-    // The outline of the ground stays whole.
+    // Rocks must not interrupt the outline of the ground.
     constexpr double margin_m = 0.05;
     if (!is_within(footprint_of(rocks[n]), 0.5 * ground.size_x_m - margin_m,
                    0.5 * ground.size_y_m - margin_m))
-      throw Error("reaches over the edge of the ground",
+      throw Error("the rock extends beyond the ground",
                   {.field = rock_place(n, rocks[n]) + ".x_m, y_m",
                    .value = to_text(rocks[n].x_m) + ", " + to_text(rocks[n].y_m),
                    .bound = "5 cm within " + to_text(ground.size_x_m) + " x " +
@@ -161,7 +165,7 @@ SiteRock draw_rock(RockShape shape, double height_m, std::uint64_t seed) {
   rock.shape = shape;
   rock.height_m = height_m;
   rock.seed = seed;
-  // High rocks are slender, low ones flat.
+  // High rocks are slender, low rocks are flat.
   double width = height_m * std::clamp(1.75 - 1.25 * height_m, 0.85, 1.5) * draw.uniform(0.9, 1.1);
   double depth = width * draw.uniform(0.75, 1.0);
   if (shape == RockShape::cobble) width = height_m * draw.uniform(1.35, 1.7);
@@ -216,7 +220,7 @@ void place_rocks(RockSite& site, std::vector<RockToPlace> rocks) {
                   });
     }
     if (!is_placed)
-      throw Error("no room is left for it between the free square and the site's edge",
+      throw Error("no free position for this rock: enlarge site_size_m or reduce free_square_m",
                   {.field = rock_place(one.rock, rock),
                    .value = to_text(rock.width_m) + " x " + to_text(rock.depth_m) + " m"});
     taken.push_back(footprint_of(rock));
@@ -245,7 +249,7 @@ namespace {
 
 constexpr std::size_t max_entries = 10'000;
 
-// The keys that the node gives.
+// Sets the table from the node and returns the keys that were set.
 std::vector<std::string> set_from_node(const ParameterTable& table, const YAML::Node& node) {
   if (!node.IsMap()) throw Error("not a map of keys and values");
   return set_from_yaml(table, YAML::Dump(node), {});
@@ -317,11 +321,11 @@ void parse_part(const YAML::Node& root, const std::string& key, const ParameterT
 }
 
 RockSite parse_root(const YAML::Node& root, std::optional<std::uint64_t> seed) {
-  if (!root.IsMap()) throw Error("a site is a map with keys such as 'rocks'");
+  if (!root.IsMap()) throw Error("not a site: must be a map with keys such as 'rocks'");
   check_keys(root, {"seed", "ground", "layout", "field_points", "bumps", "rocks"});
   RockSite site;
   ParameterTable own;
-  own.add("seed", site.seed, not_negative, "seed");
+  own.add("seed", site.seed, not_negative, "random seed");
   if (const YAML::Node node = root["seed"]) {
     if (!node.IsScalar()) throw Error("not a single number", {.field = "seed"});
     own.set("seed", node.Scalar());
@@ -334,7 +338,7 @@ RockSite parse_root(const YAML::Node& root, std::optional<std::uint64_t> seed) {
              [&](const YAML::Node& node) { site.bumps.push_back(parse_bump(node)); });
   std::vector<RockToPlace> to_place;
   parse_list(root, "rocks", [&](const YAML::Node& node) {
-    // Short enough to be read in a file.
+    // At most six digits, to be readable in a file.
     const std::uint64_t rock_seed = mix_bits(site.seed, 1000 + site.rocks.size()) % 1'000'000;
     ParsedRock parsed = parse_rock(node, rock_seed);
     if (!parsed.has_place) to_place.push_back({site.rocks.size(), parsed.has_yaw});

@@ -27,8 +27,8 @@ double smooth_step(double low, double high, double value) {
 
 Tone blend(const Tone& a, const Tone& b, double share) { return a + share * (b - a); }
 
-// The point shifted by noise of that wavelength, by up to a share of it, and turned out of the
-// lattice's axes: marks drawn there have ragged outlines.
+// Displaces the point by noise of wavelength `length_m`, up to a share of it, and rotates it off
+// the lattice axes, so that marks have ragged outlines.
 Eigen::Vector3d ragged(const Eigen::Vector3d& point, std::uint64_t seed, double length_m,
                        double share) {
   const Eigen::Vector3d at = point / length_m;
@@ -40,12 +40,12 @@ Eigen::Vector3d ragged(const Eigen::Vector3d& point, std::uint64_t seed, double 
           -0.8 * moved.y() + 0.6 * moved.z()};
 }
 
-// 1 on thin sheets where noise changes sign, 0 off them.
+// 1 on thin sheets where noise changes sign, 0 elsewhere.
 double cracks(const Eigen::Vector3d& point, std::uint64_t seed, double width) {
   return 1.0 - smooth_step(0.35 * width, width, std::abs(gradient_noise(point, seed)));
 }
 
-// Round marks, one in each cell at most, in that share of the cells.
+// Round marks: at most one per cell, in a given share of the cells.
 struct Mark {
   double strength = 0.0;
   std::uint64_t kind = 0;
@@ -61,7 +61,7 @@ Mark marks(const Eigen::Vector3d& point, std::uint64_t seed, double share, doubl
 
 Color rock_color(const Eigen::Vector3d& point, std::uint64_t seed) {
   const auto own = [seed](std::uint64_t n) { return mix_bits(seed, n); };
-  // The stone's own tone, then patches of it.
+  // Base tone of the stone, then patches.
   const double warmth = unit_noise(seed, 100);
   const double light = 0.9 + 0.3 * unit_noise(seed, 101);
   const Tone pale = light * blend(Tone(172, 168, 162), Tone(188, 164, 136), warmth);

@@ -1,6 +1,5 @@
-// Colors of rock, soil and climbing walls as functions of space, so that every surface that is
-// drawn through them has them: no images, no seams. Marks of 1 to 10 cm give image features
-// something to hold on to.
+// Procedural colors of rock, soil and climbing walls as functions of position and seed, without
+// images or seams. Marks of 1 to 10 cm provide image features.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,7 +9,7 @@
 
 namespace libmap {
 
-// Weathered rock at a point, meters: tones, grain, cracks, lichen and crystals. A seed is a stone.
+// Weathered rock at a point (m): tones, grain, cracks, lichen and crystals. One seed per stone.
 Color rock_color(const Eigen::Vector3d& point, std::uint64_t seed);
 
 // Dry soil with gravel.
@@ -19,7 +18,7 @@ Color soil_color(const Eigen::Vector3d& point, std::uint64_t seed);
 // A painted wooden panel with scuff marks; `point` in the panel's frame, z out of the wall.
 Color panel_color(const Eigen::Vector3d& point, std::uint64_t seed);
 
-// A climbing hold of cast resin, speckled; the seed chooses its color.
+// A speckled climbing hold of cast resin; the seed determines its color.
 Color hold_color(const Eigen::Vector3d& point, std::uint64_t seed);
 
 }  // namespace libmap

@@ -15,9 +15,9 @@ const Eigen::Vector3d stone_radii(0.15, 0.12, 0.1);
 constexpr double stone_shift_m = 0.4;
 constexpr double ceiling_m = 2.5;
 constexpr double ceiling_half_m = 8.0;
-constexpr double upward_deg = -100.0;  // about y, from a look at the ground
+constexpr double upward_deg = -100.0;  // rotation about y from a view of the ground
 
-// Whether `frame`, from 0, is one of `count` from `first` on, from 1.
+// Returns true if `frame` (from 0) is one of `count` frames beginning with `first` (from 1).
 bool is_within(std::size_t frame, int first, double count) {
   const double after = static_cast<double>(frame) + 1.0 - first;
   return first > 0 && after >= 0.0 && after < count;
@@ -35,7 +35,7 @@ Pose at_place(const Eigen::Vector3d& place) {
   return make_pose_from_rpy(place, Eigen::Vector3d::Zero());
 }
 
-// Checked clothes: a color of its own, and features.
+// A checkered pattern: distinct colors with image features.
 TriangleMesh walker() {
   TriangleMesh mesh = ellipsoid(walker_radii);
   for (const Eigen::Vector3d& p : mesh.vertices) {
@@ -58,16 +58,16 @@ TriangleMesh ceiling() {
 
 void bind(ParameterTable& table, ScanEvents& events) {
   table.add("walker_first_frame", events.walker_first_frame, not_negative,
-            "from this frame on a person walks across the site; 0: nobody");
-  table.add("walker_frames", events.walker_frames, {1}, "frames that it takes");
+            "first frame of a person walking across the site; 0: no person");
+  table.add("walker_frames", events.walker_frames, {1}, "number of frames with the person");
   table.add("stone_moved_frame", events.stone_moved_frame, not_negative,
-            "from this frame on a loose stone lies elsewhere; 0: no stone");
+            "first frame after a loose stone has moved; 0: no stone");
   table.add("sun_first_frame", events.sun_first_frame, not_negative,
-            "from this frame on sunlight limits the range; 0: never");
-  table.add("sun_far_m", events.sun_far_m, positive, "largest depth that is measured then, m");
+            "first frame with sunlight that limits the depth range; 0: never");
+  table.add("sun_far_m", events.sun_far_m, positive, "maximum measured depth in sunlight, m");
   table.add("ceiling_first_frame", events.ceiling_first_frame, not_negative,
-            "from this frame on the camera looks up at a plain ceiling; 0: never");
-  table.add("ceiling_frames", events.ceiling_frames, {1}, "frames that it does");
+            "first frame in which the camera views a plain ceiling; 0: never");
+  table.add("ceiling_frames", events.ceiling_frames, {1}, "number of frames with the ceiling");
 }
 
 bool ScanEvents::looks_up(std::size_t frame) const {

@@ -18,11 +18,11 @@ namespace libmap {
 namespace {
 
 constexpr double degrees = 180.0 / std::numbers::pi;
-// Frames that are drawn at the same time.
+// Number of frames that are rendered in parallel.
 constexpr std::size_t batch = 8;
-constexpr double far_deviations = 6.0;  // of depth's noise, beyond the largest depth
+constexpr double far_deviations = 6.0;  // rendered margin beyond far_m, in deviations of noise
 
-// Keys of the random numbers; frames take those from `frame_key` on, four each.
+// Keys of the random streams; each frame uses four keys from `frame_key` on.
 constexpr std::uint64_t trajectory_key = 1;
 constexpr std::uint64_t odometry_key = 2;
 constexpr std::uint64_t closure_key = 3;
@@ -32,7 +32,7 @@ constexpr std::uint64_t frame_key = 1000;
 
 double turn_of(const Pose& motion) { return Eigen::AngleAxisd(motion.linear()).angle(); }
 
-// A link whose error is drawn from the covariance that it states.
+// A link with an error drawn from the covariance of its information matrix.
 PoseLink noisy_link(int from, int to, LinkType type, const Pose& true_motion, double error_m,
                     double error_deg, RandomStream random) {
   PoseLink link{.from = from, .to = to, .type = type};
@@ -48,7 +48,7 @@ PoseLink noisy_link(int from, int to, LinkType type, const Pose& true_motion, do
   return link;
 }
 
-// The nodes before `last` that are near in place and view, nearest first.
+// Earlier nodes close to node `last` in position and orientation, nearest first.
 std::vector<std::size_t> closures_of(const Trajectory& truth, std::size_t last,
                                      const LoopClosureOptions& options) {
   const Pose& here = truth[last].world_from_base;
@@ -88,7 +88,7 @@ Camera at_depth_size(const Camera& camera, const CalibrationFaults& faults) {
   return camera_views(frame).front().depth_camera;
 }
 
-// Takes the frames of a scan.
+// Renders the frames of a scan.
 class ScanCamera {
  public:
   ScanCamera(const ScanScene& scene, const ScanSimulationOptions& options)
@@ -102,7 +102,7 @@ class ScanCamera {
 
   DepthMeasurement take(std::size_t n, const VisibleSurface& surface, RgbdFrame& frame) const;
 
-  // Where a frame looks from, and how far.
+  // Camera poses of a frame, and the range of its view.
   std::vector<Pose> world_from_cameras(std::size_t n) const;
   ViewRange range() const;
 
@@ -161,8 +161,7 @@ std::vector<Pose> ScanCamera::world_from_cameras(std::size_t n) const {
   return poses;
 }
 
-// What is measured nearer than far_m, by whatever noise and faults, in the picture of either
-// camera.
+// View of both cameras up to the largest true depth that noise and faults may measure as far_m.
 ViewRange ScanCamera::range() const {
   const DepthFaults& faults = options_.faults.depth;
   const double far_m = options_.depth.far_m;
@@ -232,22 +231,23 @@ DepthMeasurement ScanCamera::take(std::size_t n, const VisibleSurface& surface,
 
 void bind(ParameterTable& table, OdometryOptions& options) {
   table.add("odometry_error_of_distance", options.error_of_distance, not_negative,
-            "standard deviation of a motion in each axis, m a m of way");
+            "standard deviation of odometry in each axis, m per m of distance");
   table.add("odometry_error_of_turn", options.error_of_turn, not_negative,
-            "standard deviation of a motion about each axis, degrees a degree of turn");
+            "standard deviation of odometry about each axis, degrees per degree of turn");
   table.add("odometry_turn_of_distance_deg", options.turn_of_distance_deg, not_negative,
-            "and degrees a m of way");
+            "standard deviation of odometry about each axis, degrees per m of distance");
 }
 
 void bind(ParameterTable& table, LoopClosureOptions& options) {
-  table.add("closures", options.closures, "add loop closures between places that are near");
+  table.add("closures", options.closures, "add loop closures between poses that are close");
   table.add("closure_distance_m", options.distance_m, not_negative,
-            "between the two places at most, m");
+            "maximum distance between the poses of a closure, m");
   table.add("closure_angle_deg", options.angle_deg, {0.0, 180.0},
-            "between the two views at most, degrees");
-  table.add("closure_node_gap", options.node_gap, {2.0, 1e6}, "nodes between the two at least");
+            "maximum angle between the poses of a closure, degrees");
+  table.add("closure_node_gap", options.node_gap, {2.0, 1e6},
+            "minimum difference between the node indices of a closure");
   table.add("closures_per_node", options.closures_per_node, {1.0, 1e6},
-            "to earlier nodes at most, the nearest first");
+            "maximum number of closures to earlier nodes, nearest first");
   table.add("closure_shift_error_m", options.shift_error_m, positive,
             "standard deviation of a closure in each axis, m");
   table.add("closure_turn_error_deg", options.turn_error_deg, positive,
@@ -361,7 +361,7 @@ ScanSimulationResult simulate_scan(const ScanScene& scene, const ScanSimulationO
   }
   progress.end();
   if (result.measured_pixels == 0)
-    throw Error("no frame sees any of the mesh within the depth camera's range");
+    throw Error("no frame sees the mesh within the depth range; check poses and far_m");
   return result;
 }
 

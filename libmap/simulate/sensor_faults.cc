@@ -19,12 +19,12 @@ namespace {
 
 constexpr int grid_px = 6;
 constexpr int bounces = 64;
-// By which rays begin off the surface that they leave.
+// Distance of ray origins from their surface.
 constexpr double lift_m = 1e-4;
-// Direct light at least, however flat the surface is seen.
+// Minimum of the cosine that attenuates direct light, for grazing incidence.
 constexpr double min_cosine = 0.1;
 
-// Unit vectors about z whose density is the cosine to it: a spiral, even on the disc below them.
+// Unit vectors with a density proportional to their cosine with z: a uniform spiral on the disc.
 const std::vector<Eigen::Vector3d>& cosine_directions() {
   static const std::vector<Eigen::Vector3d> all = [] {
     std::vector<Eigen::Vector3d> list;
@@ -48,7 +48,7 @@ class Reflections {
         camera_(camera),
         reflectance_(reflectance) {}
 
-  // What is added to the range in this direction; NaN where there is no surface.
+  // Range error in this direction, m; NaN if there is no surface.
   double range_error(const Eigen::Vector3d& direction) const {
     const auto hit = caster_.cast(camera_, direction);
     if (!hit) return std::numeric_limits<double>::quiet_NaN();
@@ -71,8 +71,8 @@ class Reflections {
   }
 
  private:
-  // Light from the camera by way of what is seen from a point in a direction: of the way to that
-  // point, and how strong it is for a reflectance of 1.
+  // Light from the camera that reaches a point via another surface: path length, and strength for a
+  // reflectance of 1.
   struct Bounce {
     double way_m = 0.0;
     double light = 0.0;
@@ -101,7 +101,7 @@ class Reflections {
   double reflectance_;
 };
 
-// The mean of the four nodes around a place, by nearness; 0 where none is known.
+// Bilinear interpolation over the finite nodes around a position; 0 if there are none.
 double error_between(const Image<double>& grid, double x, double y) {
   const int left = std::clamp(static_cast<int>(x), 0, grid.width - 2);
   const int top = std::clamp(static_cast<int>(y), 0, grid.height - 2);
@@ -137,7 +137,7 @@ void add_multipath(SurfaceView& view, const VisibleSurface& surface, const ViewR
                    const Pose& world_from_camera, double reflectance) {
   if (!(reflectance > 0.0)) return;
   const Reflections reflections(surface, world_from_camera.translation(), reflectance);
-  // One node more than reaches over the image.
+  // The grid extends beyond the image by up to one node.
   Image<double> grid((rays.width - 1) / grid_px + 2, (rays.height - 1) / grid_px + 2,
                      std::numeric_limits<double>::quiet_NaN());
   parallel_each(static_cast<std::size_t>(grid.height), [&](std::size_t row) {
@@ -161,7 +161,7 @@ using std::numbers::pi;
 constexpr int hole_spacing_px = 24;
 constexpr double hole_radius_px = 8.0;
 constexpr int max_blur_steps = 64;
-// Of the slow waves by which exposure and white balance wander, in frames.
+// Periods of exposure and white balance drift, frames.
 constexpr double exposure_period = 9.0;
 constexpr double balance_period = 23.0;
 
@@ -177,59 +177,63 @@ Eigen::Vector3d random_direction(RandomStream& random) {
 
 void bind(ParameterTable& table, DepthFaults& faults) {
   table.add("depth_scale_percent", faults.scale_percent, {-50.0, 50.0},
-            "fault: added to depth, percent of it");
-  table.add("depth_wiggle_m", faults.wiggle_m, any_number,
-            "fault: amplitude of a wave over depth (time of flight: Lindner and Kolb 2006), m");
-  table.add("depth_wiggle_period_m", faults.wiggle_period_m, positive, "its period, m");
+            "fault: scale error of depth, percent");
+  table.add(
+      "depth_wiggle_m", faults.wiggle_m, any_number,
+      "fault: amplitude of a periodic depth error (time of flight: Lindner and Kolb 2006), m");
+  table.add("depth_wiggle_period_m", faults.wiggle_period_m, positive,
+            "period of the periodic depth error over depth, m");
   table.add("depth_corner_m", faults.corner_m, any_number,
-            "fault: added to depth in the image's corners, growing with the squared radius "
+            "fault: depth error in the image corners, proportional to the squared radius "
             "(Teichman et al. 2013), m");
   table.add("depth_holes", faults.holes, zero_to_one,
             "fault: share of the image in discs without depth");
   table.add("multipath", faults.multipath, zero_to_one,
-            "fault: reflectance of surfaces that mirror the light of a time-of-flight camera onto "
-            "others, which rounds concave edges (Fuchs 2010)");
+            "fault: reflectance of surfaces for multipath interference of a time-of-flight camera, "
+            "which rounds concave edges (Fuchs 2010)");
 }
 
 void bind(ParameterTable& table, PhotoFaults& faults) {
   table.add("exposure_drift", faults.exposure_drift, zero_to_one,
-            "fault: brightness wanders between 1 - and 1 + this");
+            "fault: relative amplitude of brightness drift");
   table.add("white_balance_drift", faults.white_balance_drift, zero_to_one,
-            "fault: red against blue wanders between 1 - and 1 + this");
+            "fault: relative amplitude of white balance drift (red against blue)");
   table.add("exposure_s", faults.exposure_s, not_negative,
-            "fault: pictures blur along the true motion of this time, s");
-  table.add("blurred_frames", faults.blurred_frames, zero_to_one, "share of the frames that blur");
+            "fault: exposure time of motion blur, s");
+  table.add("blurred_frames", faults.blurred_frames, zero_to_one,
+            "share of frames with motion blur, if exposure_s is above 0");
   table.add("jpeg_quality", faults.jpeg_quality, {0, 100},
-            "fault: quality of the pictures' first compression; 0: none");
+            "fault: JPEG quality of a compression of color images before storing; 0: none");
 }
 
 void bind(ParameterTable& table, CalibrationFaults& faults) {
   table.add("stored_focal_percent", faults.focal_percent, {-50.0, 50.0},
-            "fault: by how much the stored focal lengths are too large, percent");
+            "fault: error of the stored focal lengths, percent");
   table.add("stored_cx_px", faults.cx_px, any_number,
-            "fault: by how much the stored principal point is too far right, px");
-  table.add("stored_cy_px", faults.cy_px, any_number, "fault: and too far down, px");
+            "fault: error of the stored principal point in x, pixels");
+  table.add("stored_cy_px", faults.cy_px, any_number,
+            "fault: error of the stored principal point in y, pixels");
   table.add("registration_shift_mm", faults.depth_shift_mm, not_negative,
-            "fault: length of the error of depth registered to color, mm");
+            "fault: translation error of the registration of depth to color, mm");
   table.add("registration_turn_deg", faults.depth_turn_deg, {0.0, 45.0},
-            "fault: its angle, degrees; directions are drawn from the seed");
+            "fault: rotation error of the registration of depth to color, degrees");
   table.add("depth_baseline_mm", faults.depth_baseline_mm, any_number,
-            "place of the depth camera to the right of the color camera, mm; 0: the same place");
+            "distance of the depth camera to the right of the color camera, mm");
   table.add("depth_width_px", faults.depth_width_px, {0, 16384},
-            "width of depth images, which cover what color does; 0: color's");
-  table.add("depth_height_px", faults.depth_height_px, {0, 16384}, "their height; 0: color's");
+            "width of depth images (field of view as color), pixels; 0: width of color images");
+  table.add("depth_height_px", faults.depth_height_px, {0, 16384},
+            "height of depth images, pixels; 0: height of color images");
   table.add("depth_delay_s", faults.depth_delay_s, any_number,
-            "fault: depth is taken this much after color, s");
+            "fault: delay of depth after color, s");
   table.add("rolling_shutter_s", faults.rolling_shutter_s, not_negative,
-            "fault: time from the first to the last row of a picture (RealSense D435: about 20 ms; "
-            "its depth is global), s");
+            "fault: time from the first to the last row of a color image, s (RealSense D435: about "
+            "0.02); depth has a global shutter");
 }
 
 void bind(ParameterTable& table, RecordingFaults& faults) {
-  table.add("dropped_frames", faults.dropped_frames, zero_to_one,
-            "fault: share of the frames after the first that are missing");
+  table.add("dropped_frames", faults.dropped_frames, zero_to_one, "fault: share of missing frames");
   table.add("duplicated_frames", faults.duplicated_frames, zero_to_one,
-            "fault: share of the frames that repeat the images of the frame before");
+            "fault: share of frames that repeat the images of the previous frame");
   table.add("stamp_error_s", faults.stamp_error_s, not_negative,
             "fault: standard deviation of the stored stamps, s");
 }
@@ -289,7 +293,7 @@ void distort_depth(SurfaceView& view, const DepthFaults& faults) {
   if (!faults.changes_depth()) return;
   const int w = view.depth.width;
   const int h = view.depth.height;
-  // Corners lie half a pixel before the pixels.
+  // Corner (x, y) is half a pixel before pixel (x, y).
   const auto distort = [&](DepthImage& depth, double shift) {
     for (int y = 0; y < depth.height; ++y)
       for (int x = 0; x < depth.width; ++x)
@@ -305,7 +309,7 @@ void distort_depth(SurfaceView& view, const DepthFaults& faults) {
 
 std::size_t punch_holes(DepthImage& depth, const DepthFaults& faults, std::uint64_t seed) {
   if (!(faults.holes > 0.0)) return 0;
-  // A disc for each square of a lattice, with the probability that gives the wanted share.
+  // One disc per square of a lattice, with a probability for the requested share of the image.
   const double share_of_disc =
       pi * hole_radius_px * hole_radius_px / (hole_spacing_px * hole_spacing_px);
   const double probability = faults.holes / share_of_disc;
@@ -334,7 +338,7 @@ std::size_t punch_holes(DepthImage& depth, const DepthFaults& faults, std::uint6
 void blur_by_motion(SurfaceView& view, const Camera& camera,
                     const std::function<Pose(double time_s)>& now_from_later, double exposure_s) {
   const Image<Eigen::Vector3f> sharp = view.color;
-  // The picture moves evenly over so short a time: where a point is at the two ends tells the rest.
+  // Image motion is assumed to be uniform during the exposure: two projections per point suffice.
   const Pose first_from_now = now_from_later(-0.5 * exposure_s).inverse();
   const Pose last_from_now = now_from_later(0.5 * exposure_s).inverse();
   const double far_away = 1e3;
@@ -351,7 +355,7 @@ void blur_by_motion(SurfaceView& view, const Camera& camera,
       const Eigen::Vector2d way = *last - *first;
       const int steps = std::clamp(static_cast<int>(std::ceil(way.norm())) + 1, 1, max_blur_steps);
       Eigen::Vector3f sum = Eigen::Vector3f::Zero();
-      // What passes this pixel lies as far before it as the point goes on.
+      // Samples the points that pass this pixel during the exposure.
       for (int n = 0; n < steps; ++n) {
         const Eigen::Vector2d from = Eigen::Vector2d(x, y) + ((n + 0.5) / steps - 0.5) * way;
         sum += bilinear_color(sharp, from.x(), from.y());

@@ -30,7 +30,7 @@ HalfSpace through(const Eigen::Vector3d& normal, const Eigen::Vector3d& point) {
   return {unit, unit.dot(point)};
 }
 
-// A direction at `heading` over the ground that rises by `rise` (radians).
+// Unit vector with azimuth `heading` and elevation `rise` (radians).
 Eigen::Vector3d direction(double heading, double rise) {
   return {std::cos(heading) * std::cos(rise), std::sin(heading) * std::cos(rise), std::sin(rise)};
 }
@@ -42,7 +42,7 @@ struct BlockSize {
   double bottom_m = 0.0;
 };
 
-// Distance of a wall at `heading` from the center: between an ellipse and a rectangle.
+// Distance of a wall from the center at azimuth `heading`: between an ellipse and a rectangle.
 double wall_distance(const Eigen::Vector2d& half, double heading) {
   const double x = half.x() * std::cos(heading);
   const double y = half.y() * std::sin(heading);
@@ -67,7 +67,7 @@ std::vector<HalfSpace> block_half_spaces(const BlockSize& size, const SiteRock& 
     planes.push_back(through(direction(heading, rise), center + distance * direction(heading, 0.0) +
                                                            Eigen::Vector3d(0.0, 0.0, level)));
   }
-  // Shoulders cut from the top's rim.
+  // Shoulders are cut from the rim of the top.
   const int shoulders = 2 + static_cast<int>(draw.uniform(0.0, 3.0));
   for (int n = 0; n < shoulders; ++n) {
     const double heading = draw.uniform(0.0, 2.0 * pi);
@@ -83,7 +83,7 @@ std::vector<HalfSpace> block_half_spaces(const BlockSize& size, const SiteRock& 
   return planes;
 }
 
-// The half-spaces and, for most sharp edges, one more that chips the edge off.
+// Adds a half-space for most sharp edges that chips the edge off.
 void chip_edges(std::vector<HalfSpace>& planes, double chip_m, double bound_m, RandomStream& draw) {
   const Solid solid = convex_solid(planes, bound_m);
   std::map<std::pair<int, int>, Eigen::Vector3d> middles;
@@ -108,11 +108,11 @@ void chip_edges(std::vector<HalfSpace>& planes, double chip_m, double bound_m, R
   }
 }
 
-// A wedge whose sharp edge runs into the rock `depth_m` below its top.
+// A wedge whose sharp edge runs into the rock at cleft_m below the top.
 std::vector<HalfSpace> cleft_half_spaces(const SiteRock& rock, RandomStream& draw) {
   const double heading = draw.uniform(0.0, 2.0 * pi);
   const double opening =
-      radians_per_degree * draw.uniform(9.0, 16.0);  // of each flank to the vertical
+      radians_per_degree * draw.uniform(9.0, 16.0);  // between each flank and the vertical
   const double lean = radians_per_degree * draw.uniform(-12.0, 12.0);
   const Eigen::Vector3d along = direction(heading, radians_per_degree * draw.uniform(5.0, 25.0));
   const Eigen::Vector3d across(-std::sin(heading), std::cos(heading), 0.0);
@@ -124,7 +124,7 @@ std::vector<HalfSpace> cleft_half_spaces(const SiteRock& rock, RandomStream& dra
     const double angle = opening + side * lean;
     return through(side * std::cos(angle) * across - std::sin(angle) * up, apex);
   };
-  // It opens on one side of the rock and ends within it, or runs through.
+  // The wedge is open on one side of the rock and ends inside it, or passes through.
   const double end = draw.uniform(0.1, 0.6) * reach;
   return {flank(1.0), flank(-1.0), through(-along, -end * along),
           through(along, 3.0 * (rock.width_m + rock.depth_m) * along),
@@ -136,7 +136,7 @@ Solid with_labels_from(Solid solid, int first) {
   return solid;
 }
 
-// Extents above the ground.
+// Bounding box of the part above the ground.
 Eigen::AlignedBox3d box_above_ground(const Solid& solid) {
   Eigen::AlignedBox3d box;
   for (const Eigen::Vector3d& vertex : solid.vertices)
@@ -158,8 +158,8 @@ void fit(Solid& solid, const SiteRock& rock) {
   }
 }
 
-// Bends space by relief in four octaves. Their heights are small against their lengths, so that
-// space does not fold and the surface does not run into itself.
+// Displaces all vertices by noise in four octaves. Amplitudes are small against wavelengths, so
+// that the surface does not intersect itself.
 void roughen(Solid& solid, const SiteRock& rock) {
   const double size = std::min({rock.width_m, rock.depth_m, rock.height_m});
   struct Octave {
@@ -236,7 +236,7 @@ Solid rounded(const SiteRock& rock, double edge_length_m) {
     case RockShape::pinch:
       return ellipsoid({w, d, 0.6 * h}, {0.0, 0.0, 0.4 * h});
     case RockShape::jug:
-      // The bowl is cut from above, behind the lip; a hair off the axes, in general position.
+      // The bowl is cut from above, behind the lip, slightly off the axes for general position.
       return subtract(ellipsoid({w, d, 0.8 * h}, {0.0, 0.0, 0.2 * h}),
                       ellipsoid({0.72 * w, 0.75 * d, 0.5 * h}, {0.011 * w, 0.72 * d, 0.3713 * h}));
     default:
@@ -256,9 +256,9 @@ Solid rock_solid(const SiteRock& rock, double edge_length_m, double sink_m) {
 
 namespace {
 
-constexpr double base_depth_m = 0.2;  // of rocks below the lowest ground beneath them
+constexpr double base_depth_m = 0.2;  // depth of rocks below the lowest ground under them
 
-constexpr double splinter_share = 0.004;  // of the edge length: shorter edges are collapsed
+constexpr double splinter_share = 0.004;  // minimum edge length, relative to edge_length_m
 
 double edge_length_of(const SiteRock& rock, double edge_length_m) {
   return std::min(edge_length_m,
@@ -293,13 +293,13 @@ Solid ground_solid(const RockSite& site, const GroundRelief& relief, double edge
     }
   });
   const double lowest = *std::min_element(grid.heights_m.begin(), grid.heights_m.end());
-  // Below every rock, so that none reaches through the base.
+  // The base is below all rocks.
   double reach = 0.0;
   for (const SiteRock& rock : site.rocks) reach = std::max(reach, rock.height_m);
   return block_solid(grid, lowest - 2.0 * base_depth_m - reach);
 }
 
-// The rock on the ground, in the ground's frame, its triangles labeled with its number.
+// The rock in the ground frame; triangles are labeled with `number`.
 Solid placed_rock(const SiteRock& rock, int number, const GroundRelief& relief,
                   double edge_length_m) {
   const double foot = relief.height(rock.x_m, rock.y_m);
@@ -319,7 +319,7 @@ Solid placed_rock(const SiteRock& rock, int number, const GroundRelief& relief,
   return solid;
 }
 
-// The triangles that `keep` names and the vertices that they use.
+// The triangles for which `keep` returns true, and their vertices.
 template <typename Keep>
 Solid select(const Solid& solid, const Keep& keep) {
   Solid kept;
@@ -333,8 +333,8 @@ Solid select(const Solid& solid, const Keep& keep) {
   return kept;
 }
 
-// The part that holds the ground's base. Hollows without a way out are dropped; a part that bears
-// a rock's outside is a rock in the air.
+// The connected part that contains the ground's base. Enclosed cavities are dropped. Throws Error
+// if another part contains the outside of a rock, which then does not touch the ground.
 Solid part_of_ground(const Solid& solid, const RockSite& site) {
   TriangleMesh mesh;
   mesh.vertices = solid.vertices;

@@ -1,4 +1,4 @@
-// A test site as triangles.
+// Triangle mesh of a test site.
 #pragma once
 
 #include <cstdint>
@@ -9,21 +9,21 @@
 
 namespace libmap {
 
-// The rock in its own frame: the ground at its foot is z = 0, its top at height_m exactly; above
-// the ground it is width_m long in x and depth_m in y, about the origin. It reaches down to about
-// -sink_m (cobbles and holds: as their form has it). Labels are 0.
+// Solid of a rock in the rock frame: the ground is z = 0, the top is at height_m exactly. Above the
+// ground, the extent is width_m in x and depth_m in y, centered on the origin. The solid extends
+// down to about -sink_m; for cobbles and holds, the shape determines its depth. Labels are 0.
 Solid rock_solid(const SiteRock& rock, double edge_length_m, double sink_m);
 
 struct SiteMeshOptions {
-  double edge_length_m = 0.008;              // about; small rocks and holds are meshed finer
-  bool closed = false;                       // with the sides and the base of the ground's block
-  std::uint64_t max_triangles = 10'000'000;  // more is an Error
+  double edge_length_m = 0.008;  // approximate; small rocks and holds have shorter edges
+  bool closed = false;           // include the sides and the base of the ground
+  std::uint64_t max_triangles = 10'000'000;
 };
 
-// Rocks united with the ground (CGAL), in the site's frame, with vertex colors and the face field
-// "rock": 0 on the ground, n on the n-th rock. Open, it is one surface without holes but its
-// outline, the ground's; closed, the surface of one solid.
-// Throws Error: a bad option or site, too many triangles, a rock that does not touch the ground.
+// Union of rocks and ground (CGAL) in the site frame, with vertex colors and the face field "rock":
+// 0 on the ground, n on the n-th rock. The open mesh is one surface whose only border is the
+// outline of the ground; the closed mesh is the surface of one solid. Throws Error: an invalid
+// option or site, more than max_triangles, or a rock that does not touch the ground.
 TriangleMesh site_mesh(const RockSite& site, const SiteMeshOptions& options);
 
 }  // namespace libmap

@@ -16,19 +16,19 @@ namespace libmap {
 namespace {
 
 using std::numbers::pi;
-constexpr double rock_cell_m = 1.0;    // rocks are drawn cell by cell
-constexpr double bucket_m = 0.25;      // and found by buckets
-constexpr double power_index = 2.65;   // of heights (Michikami et al. 2019)
-constexpr double cobble_share = 0.25;  // of the rocks
+constexpr double rock_cell_m = 1.0;    // cells in which rocks are drawn
+constexpr double bucket_m = 0.25;      // buckets for searching rocks
+constexpr double power_index = 2.65;   // of rock heights (Michikami et al. 2019)
+constexpr double cobble_share = 0.25;  // share of cobbles among the rocks
 constexpr double roughness_length_m = 0.16;
-constexpr double rounding_m = 1e-6;    // of places on the borders of buckets
-constexpr double largest_reach = 2.4;  // of a rock, in its heights
-// Streams of random numbers, one for each purpose.
+constexpr double rounding_m = 1e-6;    // tolerance at the borders of buckets
+constexpr double largest_reach = 2.4;  // maximum reach of a rock, in rock heights
+// Keys of the random streams.
 constexpr std::uint64_t relief_stream = 11;
 constexpr std::uint64_t roughness_stream = 12;
 constexpr std::uint64_t rocks_stream = 13;
 
-// Truncated power law: the share of rocks higher than h goes with h^-power_index.
+// Truncated power law: the share of rocks higher than h is proportional to h^-power_index.
 double draw_height(const RockyTerrainOptions& options, RandomStream& draw) {
   const double low = std::pow(options.min_rock_m, -power_index);
   const double high = std::pow(options.max_rock_m, -power_index);
@@ -42,20 +42,20 @@ std::int64_t cell_below(double place_m, double cell_m) {
 }  // namespace
 
 void bind(ParameterTable& table, RockyTerrainOptions& options) {
-  table.add("seed", options.seed, not_negative, "another terrain of the kind");
-  table.add("relief_m", options.relief_m, Range{0.0, 100.0}, "height of the ground's waves, m");
+  table.add("seed", options.seed, not_negative, "random seed of the terrain");
+  table.add("relief_m", options.relief_m, Range{0.0, 100.0}, "maximum height of the relief, m");
   table.add("relief_length_m", options.relief_length_m, Range{0.1, 10'000.0},
-            "length of the longest of them, m");
+            "longest wavelength of the relief, m");
   table.add("roughness_m", options.roughness_m, Range{0.0, 1.0},
-            "height of the surface's unevenness, m");
-  table.add("rocks_per_m2", options.rocks_per_m2, Range{0.0, 100.0}, "rocks a square meter");
-  table.add("min_rock_m", options.min_rock_m, Range{0.01, 5.0}, "height of the lowest rocks, m");
-  table.add("max_rock_m", options.max_rock_m, Range{0.01, 5.0}, "height of the highest, m");
+            "maximum height of the surface roughness, m");
+  table.add("rocks_per_m2", options.rocks_per_m2, Range{0.0, 100.0}, "rocks per square meter");
+  table.add("min_rock_m", options.min_rock_m, Range{0.01, 5.0}, "minimum height of rocks, m");
+  table.add("max_rock_m", options.max_rock_m, Range{0.01, 5.0}, "maximum height of rocks, m");
 }
 
 void RockyTerrainOptions::check() const {
   if (max_rock_m < min_rock_m)
-    throw Error("the highest rocks are lower than the lowest",
+    throw Error("maximum height below the minimum",
                 {.field = "max_rock_m",
                  .value = to_text(max_rock_m),
                  .bound = ">= min_rock_m, " + to_text(min_rock_m)});
@@ -79,13 +79,13 @@ double RockyTerrain::ground(double x_m, double y_m) const {
   return options_.relief_m * fractal_noise(place, mix_bits(options_.seed, relief_stream), 4);
 }
 
-// Walls that lean back, shoulders and a top that is nearly flat.
+// A block with inward sloping walls, shoulders and a nearly flat top.
 RockyTerrain::Rock RockyTerrain::draw_block(double height_m, std::uint64_t seed) const {
   const SiteRock form = draw_rock(RockShape::block, height_m, seed);
   RandomStream draw(seed, 2);
   Rock rock;
   const double yaw = form.yaw_deg * radians_per_degree;
-  // z of the plane through a point at `distance` along `heading` and at `level`.
+  // Adds the plane through the point at `distance` along `heading` and height `level`.
   const auto add = [&](double heading, double slope, double distance, double level) {
     const double steepness = std::tan(slope);
     rock.facets.push_back({steepness * std::cos(heading + yaw), steepness * std::sin(heading + yaw),
@@ -115,7 +115,7 @@ RockyTerrain::Rock RockyTerrain::draw_cobble(double height_m, std::uint64_t seed
   const SiteRock form = draw_rock(RockShape::cobble, height_m, seed);
   Rock rock;
   rock.height_m = height_m;
-  // Its outline on the ground lies at sqrt(3)/2 of the half-axes.
+  // The outline on the ground is at sqrt(3)/2 of the half-axes.
   const double root3 = std::sqrt(3.0);
   rock.unit_from_plan = Eigen::Vector2d(root3 / form.width_m, root3 / form.depth_m).asDiagonal() *
                         Eigen::Rotation2Dd(-form.yaw_deg * radians_per_degree).toRotationMatrix();
@@ -167,7 +167,7 @@ double RockyTerrain::height_over_foot(const Rock& rock, const Eigen::Vector2d& p
   if (offset.squaredNorm() > rock.reach_m * rock.reach_m) return -HUGE_VAL;
   if (rock.facets.empty()) {
     const double squared = (rock.unit_from_plan * offset).squaredNorm();
-    // Half of the ellipsoid's upper half stands out of the ground.
+    // The ground intersects the ellipsoid at half the height of its upper half.
     return squared >= 1.0 ? -HUGE_VAL : rock.height_m * (2.0 * std::sqrt(1.0 - squared) - 1.0);
   }
   double height = HUGE_VAL;
@@ -193,13 +193,13 @@ double RockyTerrain::height(double x_m, double y_m) const {
 namespace {
 
 constexpr std::uint64_t points_stream = 21;
-constexpr double flat_jitter = 0.5;  // of a square's side, where it holds one point
+constexpr double flat_jitter = 0.5;  // jitter of a cell's only point, relative to the cell's side
 
 std::int64_t cells_in(double length_m, double spacing_m) {
   return std::max<std::int64_t>(1, std::llround(length_m / spacing_m));
 }
 
-// A run of cells along one axis: first .. last - 1.
+// A range of cells along one axis: first .. last - 1.
 struct CellRange {
   std::int64_t first = 0;
   std::int64_t last = 0;
@@ -211,7 +211,7 @@ CellRange cells_of_piece(std::int64_t place, double size_m, const TerrainPiecesO
   return {std::min(place * side, end), std::min((place + 1) * side, end)};
 }
 
-// Draws the points of one square of the plan.
+// Draws the points of one cell of the plan.
 class CellSampler {
  public:
   CellSampler(const RockyTerrain& terrain, const TerrainPiecesOptions& options)
@@ -235,7 +235,7 @@ class CellSampler {
     const int count =
         std::max(1, static_cast<int>(std::floor(area_ratio(corners) + draw.uniform())));
     for (int n = 0; n < count; ++n) {
-      // Evenly up a slope; in the middle of a square that is all but flat.
+      // Stratified along the slope; near the center if the cell has one point.
       double along = (n + draw.uniform()) / count;
       double across = draw.uniform();
       if (count == 1) {
@@ -250,7 +250,7 @@ class CellSampler {
   }
 
  private:
-  // Surface over plan, by the two triangles of the corners.
+  // Ratio of surface area to plan area, from the two triangles of the corners.
   double area_ratio(const double (&corners)[4]) const {
     const auto triangle = [&](double rise_x, double rise_y) {
       return 0.5 * Eigen::Vector3d(rise_x / spacing_m_, rise_y / spacing_m_, 1.0).norm();
@@ -276,7 +276,7 @@ class CellSampler {
 }  // namespace
 
 void bind(ParameterTable& table, TerrainPiecesOptions& options) {
-  table.add("spacing_m", options.spacing_m, Range{1e-4, 10.0}, "between points, about, m");
+  table.add("spacing_m", options.spacing_m, Range{1e-4, 10.0}, "mean point spacing, m");
   table.add("piece_m", options.piece_m, Range{1e-3, 1000.0}, "side of a piece, m");
   bind(table, options.terrain);
 }
@@ -292,7 +292,7 @@ void TerrainPiecesOptions::check() const {
   const double cells = piece_m / spacing_m;
   if (cells < 1.0 || cells * cells > 1e8)
     throw Error(
-        "a piece has too few or too many points",
+        "too few or too many points per piece",
         {.field = "piece_m", .value = to_text(piece_m), .bound = "1 to 10,000 times spacing_m"});
   if (std::ceil(size_x_m / piece_m) * std::ceil(size_y_m / piece_m) > 1e6)
     throw Error("too many pieces", {.field = "piece_m",
@@ -317,7 +317,7 @@ PointCloud sample_piece(const TerrainPiecesOptions& options, const XyTile& piece
   const auto place = [&](std::int64_t a, std::int64_t b) {
     return Eigen::Vector2d(static_cast<double>(a) * spacing, static_cast<double>(b) * spacing);
   };
-  // One cell more: slopes are taken forward.
+  // One additional cell, because slopes are forward differences.
   const RockyTerrain terrain(options.terrain,
                              {place(x.first, y.first), place(x.last + 1, y.last + 1)});
   const CellSampler sampler(terrain, options);

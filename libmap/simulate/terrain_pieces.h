@@ -1,5 +1,5 @@
-// Unbounded rocky ground as a height field, a function of position and seed, and its points piece
-// by piece: squares of one size that count from the origin on.
+// Unbounded procedural rocky terrain, a height field as a function of position and seed, and its
+// points in square pieces indexed from the origin.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -15,11 +15,11 @@ namespace libmap {
 
 struct RockyTerrainOptions {
   std::uint64_t seed = 1;
-  double relief_m = 0.25;         // largest height of the ground's waves
-  double relief_length_m = 10.0;  // length of the longest of them
-  double roughness_m = 0.015;     // largest height of the surface's unevenness
+  double relief_m = 0.25;         // maximum height of the ground's relief
+  double relief_length_m = 10.0;  // longest wavelength of the relief
+  double roughness_m = 0.015;     // maximum height of the small-scale roughness
   double rocks_per_m2 = 1.2;
-  double min_rock_m = 0.15;  // heights of the rocks
+  double min_rock_m = 0.15;  // minimum and maximum height of the rocks
   double max_rock_m = 0.7;
 
   // Throws Error naming the field, its value and its bound.
@@ -27,22 +27,22 @@ struct RockyTerrainOptions {
 };
 void bind(ParameterTable& table, RockyTerrainOptions& options);
 
-// The terrain over a rectangle: it holds the rocks that reach into it. Waves and unevenness are
-// fractal noise; rocks are blocks of facets and rounded cobbles without overhangs that stand where
-// chance puts them, through one another too. Their heights follow a power law with a cumulative
-// index of -2.65, that of Ryugu's boulders (Michikami et al. 2019).
+// The terrain over a rectangle. Relief and roughness are fractal noise. Rocks are faceted blocks
+// and rounded cobbles without overhangs at random positions; they may overlap. Their heights follow
+// a power law with a cumulative index of -2.65, as of the boulders on Ryugu (Michikami et al.
+// 2019).
 class RockyTerrain {
  public:
-  // Draws all rocks that reach into the rectangle.
+  // Draws all rocks that intersect the rectangle.
   RockyTerrain(const RockyTerrainOptions& options, const Eigen::AlignedBox2d& rectangle_m);
 
-  // At a place in the rectangle; the same in any rectangle that holds the place.
+  // Height (m) at a position in the rectangle. It does not depend on the rectangle.
   double height(double x_m, double y_m) const;
 
   std::size_t rocks() const { return rocks_.size(); }
 
  private:
-  // Height over the rock's foot: c - a x - b y about its center.
+  // Height above the rock's foot: c - a x - b y relative to its center.
   struct Facet {
     double a = 0.0;
     double b = 0.0;
@@ -50,10 +50,10 @@ class RockyTerrain {
   };
   struct Rock {
     Eigen::Vector2d center = Eigen::Vector2d::Zero();
-    double foot_m = 0.0;   // height of the ground beneath its center
-    double reach_m = 0.0;  // farther off there is none of it
-    std::vector<Facet> facets{};
-    // A cobble: facets are empty.
+    double foot_m = 0.0;          // height of the ground at the center
+    double reach_m = 0.0;         // maximum distance of the rock from its center
+    std::vector<Facet> facets{};  // empty for a cobble
+    // Cobbles only.
     double height_m = 0.0;
     Eigen::Matrix2d unit_from_plan = Eigen::Matrix2d::Identity();  // to a circle of radius 1
   };
@@ -67,33 +67,33 @@ class RockyTerrain {
   RockyTerrainOptions options_;
   Eigen::AlignedBox2d rectangle_m_;
   std::vector<Rock> rocks_;
-  // The rocks of each square of the rectangle, row by row.
+  // Rocks per square bucket of the rectangle, row by row.
   std::size_t columns_ = 0;
   std::vector<std::vector<std::uint32_t>> buckets_;
 };
 
 struct TerrainPiecesOptions {
-  double size_x_m = 100.0;  // from 0 on
+  double size_x_m = 100.0;  // extent of the terrain, from 0
   double size_y_m = 100.0;
   double piece_m = 10.0;
   double spacing_m = 0.01;
   RockyTerrainOptions terrain;
 
-  // Throws Error naming the field, its value and its bound: more than 10^6 pieces, or a piece of
-  // more than 10^8 cells.
+  // Throws Error naming the field, its value and its bound: a field out of range, more than 10^6
+  // pieces, or more than 10^8 cells per piece.
   void check() const;
 };
-// All but the size.
+// Binds all fields except the size.
 void bind(ParameterTable& table, TerrainPiecesOptions& options);
 
-// The pieces that cover the terrain, ascending.
+// Pieces that cover the terrain, ascending. Throws Error as TerrainPiecesOptions::check does.
 std::vector<XyTile> terrain_pieces(const TerrainPiecesOptions& options);
 
-// The points of one piece, with normals, in meters, z up: the plan is cut into squares of
-// `spacing_m`, and each holds a point for each spacing_m^2 of its surface, by chance rounded up or
-// down, at least one. A piece depends on its place, the seed, the spacing and the terrain alone;
-// one that the size cuts off holds the same points as the whole one as far as it goes. Sizes are
-// rounded to whole spacings.
+// Points of one piece with normals, m, z up. Each square cell of the plan with side `spacing_m`
+// contains one point per spacing_m^2 of its surface, randomly rounded up or down, at least one. A
+// piece depends only on its index, the seed, the spacing and the terrain; a piece cropped by the
+// terrain's size is a subset of the complete one. Sizes are rounded to multiples of the spacing.
+// Throws Error as TerrainPiecesOptions::check does.
 PointCloud sample_piece(const TerrainPiecesOptions& options, const XyTile& piece);
 
 }  // namespace libmap

@@ -20,8 +20,8 @@ using VertexBase = CGAL::Triangulation_vertex_base_with_info_2<std::uint32_t, Ke
 using Triangulation =
     CGAL::Delaunay_triangulation_2<Kernel, CGAL::Triangulation_data_structure_2<VertexBase>>;
 
-constexpr double range_margin_m = 0.05;  // of squares in view
-constexpr double margin_radii = 4.0;     // as triangulate_plan says
+constexpr double range_margin_m = 0.05;  // of the view frustum
+constexpr double margin_radii = 4.0;     // margin of triangulate_plan
 
 double circumradius(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c) {
   const Eigen::Vector2d ab = b - a;
@@ -30,7 +30,7 @@ double circumradius(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Ei
   return 0.5 * ab.norm() * ac.norm() * (c - b).norm() / std::abs(twice_area);
 }
 
-// Whether a camera may see some of the box: false only if all of it is beyond one side of the view.
+// Returns false only if all corners of the box are outside of one side of the view frustum.
 bool may_see(const Eigen::AlignedBox3d& box, const Pose& camera_from_world,
              const ViewRange& range) {
   std::array<int, 6> beyond{};
@@ -76,7 +76,7 @@ TriangleMesh triangulate_plan(const std::vector<Eigen::Vector3d>& points,
     if (circumradius(place(0), place(1), place(2)) <= max_radius_m)
       mesh.triangles.push_back(triangle);
   }
-  // Of all triangles, those beyond the rectangle too.
+  // Normals include triangles outside of the rectangle.
   mesh.vertex_normals = estimate_vertex_normals(mesh);
   std::vector<bool> is_kept;
   for (const Triangle& triangle : mesh.triangles) {
@@ -107,7 +107,7 @@ Eigen::AlignedBox2d TerrainSurface::rectangle_of(const Place& place) const {
 
 std::vector<TerrainSurface::Place> TerrainSurface::places_in_view(
     const std::vector<Pose>& world_from_camera, const ViewRange& range) const {
-  // Around the camera, as far as it sees along the rays in the corners of its picture.
+  // Radius around the camera: range along the rays in the image corners.
   const Eigen::Vector2d widest = range.rays.min().cwiseAbs().cwiseMax(range.rays.max().cwiseAbs());
   const double reach = range.far_m * widest.homogeneous().norm();
   std::vector<Place> places;
@@ -161,7 +161,7 @@ std::size_t TerrainSurface::points_in_memory() const {
   return points;
 }
 
-// The squares that were not in view for the longest time, until few enough points are left.
+// Drops the least recently used squares until at most kept_points are left.
 void TerrainSurface::forget() {
   std::size_t points = points_in_memory();
   while (points > options_.kept_points) {
@@ -188,7 +188,7 @@ std::vector<VisibleSurface> TerrainSurface::seen_from(
   for (const Place& place : all)
     if (const auto known = squares_.find(place); known != squares_.end())
       known->second.last_use = uses_;
-  forget();  // before more is loaded
+  forget();  // before loading more squares
   load(all);
   std::vector<VisibleSurface> surfaces;
   for (const std::vector<Place>& places : of_camera) {

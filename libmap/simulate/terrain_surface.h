@@ -1,6 +1,5 @@
-// Ground of any size, given by points, as cameras see it: the points of a height field triangulated
-// in the plan (Delaunay), square by square. The squares that cameras can see are in memory, and
-// some of those that were seen before.
+// Renders terrain of any size from points: a height field, triangulated in the plan (Delaunay) in
+// squares. Only squares in view are in memory, and a cache of earlier ones.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -18,47 +17,47 @@
 
 namespace libmap {
 
-// What a camera can see: rays between two of x/z, y/z, up to a depth.
+// View frustum of a camera: bounds of the rays (x/z, y/z), and maximum depth.
 struct ViewRange {
   Eigen::AlignedBox2d rays;
   double far_m = 0.0;
 };
 ViewRange view_range(const ViewRays& rays, double far_m);
 
-// The triangles over the plan that meet the rectangle and whose circumcircles have at most that
-// radius, with normals at their vertices: wider gaps stay open. They are the same for any set of
-// points that holds all within 4 `max_radius_m` of the rectangle, but where points form squares,
-// which may be cut along either diagonal.
+// Delaunay triangulation in the plan, with vertex normals: the triangles that intersect the
+// rectangle and have a circumradius of at most `max_radius_m`, so that wider gaps stay open. The
+// result is the same for any point set that contains all points within 4 `max_radius_m` of the
+// rectangle, except for the diagonals of squares.
 TriangleMesh triangulate_plan(const std::vector<Eigen::Vector3d>& points,
                               const Eigen::AlignedBox2d& rectangle, double max_radius_m);
 
 struct TerrainSurfaceOptions {
-  double square_spacings = 256.0;     // width of a square in spacings of the points; rounded to
-                                      // whole cells of the heights
-  double gap_spacings = 5.0;          // gaps in the plan wider than about twice this stay open
-  std::size_t kept_points = 500'000;  // in memory, unless cameras see more at once
+  double square_spacings = 256.0;     // side of a square in point spacings; rounded to a multiple
+                                      // of GroundHeights::cell_m
+  double gap_spacings = 5.0;          // maximum circumradius of triangles in point spacings
+  std::size_t kept_points = 500'000;  // maximum in memory, unless more are in view at once
   std::uint64_t texture_seed = 1;
 };
 
 class TerrainSurface {
  public:
-  // `points` and `heights` are of the same points, and outlive it.
+  // `points` and `heights` must contain the same points and outlive this object.
   TerrainSurface(const PointTileStore& points, const GroundHeights& heights,
                  const TerrainSurfaceOptions& options = {});
 
-  // What each of several cameras can see of it from its poses, for as long as the result lives:
-  // all squares within their range, whatever was asked for before.
+  // Returns the surface in view of each of several cameras from all its poses. The result does not
+  // depend on earlier calls and stays valid after later ones.
   std::vector<VisibleSurface> seen_from(const std::vector<std::vector<Pose>>& world_from_camera,
                                         const ViewRange& range);
 
-  // Squares that were triangulated so far, and points of those in memory.
+  // Number of triangulations so far, and of points in memory.
   std::size_t squares_made() const { return made_; }
   std::size_t points_in_memory() const;
 
  private:
   using Place = std::pair<std::int64_t, std::int64_t>;
   struct Square {
-    std::optional<VisibleSurface> surface;  // nothing where there is no triangle
+    std::optional<VisibleSurface> surface;  // nullopt if there is no triangle
     std::size_t points = 0;
     std::uint64_t last_use = 0;
   };

@@ -24,17 +24,17 @@ using Eigen::Vector2d;
 
 constexpr double unseen = -1.0;
 constexpr double max_band_cells = 4e6;
-constexpr double min_contrast = 40.0;  // of 255, of white from what is usual
+constexpr double min_contrast = 40.0;  // of 255, between white and the median
 constexpr std::size_t max_lines = 10;  // white lines in one direction
 constexpr double max_size_error = 0.05;
 
-// What is white, seen from above.
+// Image from above of the white level.
 struct Picture {
   Vector2d corner = Vector2d::Zero();
   double cell = 0.0;
-  Image<double> levels;  // mean of the least of red, green and blue; `unseen` where no point is
+  Image<double> levels;  // mean over points of min(red, green, blue); `unseen` without points
 
-  // Between the centers of the cells around, those that are seen.
+  // Bilinear interpolation between the seen cells around a position.
   double at(const Vector2d& place) const {
     const Vector2d index = (place - corner) / cell - Vector2d::Constant(0.5);
     const Vector2d low(std::floor(index.x()), std::floor(index.y()));
@@ -58,7 +58,7 @@ struct Picture {
 };
 
 Picture take_picture(const PointCloud& cloud, const BorderBandOptions& options) {
-  if (!cloud.has_colors()) throw Error("there are no colors to find a white border in");
+  if (!cloud.has_colors()) throw Error("no colors for detecting a white border");
   std::vector<std::size_t> used;
   Vector2d low = Vector2d::Constant(std::numeric_limits<double>::infinity());
   Vector2d high = -low;
@@ -70,7 +70,7 @@ Picture take_picture(const PointCloud& cloud, const BorderBandOptions& options) 
     high = high.cwiseMax(point.head<2>());
   }
   if (used.empty())
-    throw Error("no point lies at the heights of a border band",
+    throw Error("no points at the heights of a border band",
                 {.field = "height",
                  .bound = to_text(options.min_z_m) + " to " + to_text(options.max_z_m) + " m"});
   Picture picture;
@@ -104,22 +104,23 @@ double white_level_of(const Picture& picture, const BorderBandOptions& options) 
   const double usual = seen[seen.size() / 2];
   const double brightest = seen[seen.size() - 1 - seen.size() / 200];
   if (brightest - usual < min_contrast)
-    throw Error("nothing is white enough: no border band",
-                {.field = "brightest half percent",
+    throw Error("too little contrast for a white border band; set white_level",
+                {.field = "99.5 % quantile of the brightness",
                  .value = to_fixed_text(brightest, 0),
                  .bound = ">= " + to_fixed_text(usual + min_contrast, 0) + " of 255, " +
-                          to_fixed_text(min_contrast, 0) + " above what is usual"});
+                          to_fixed_text(min_contrast, 0) + " above the median"});
   return (usual + brightest) / 2.0;
 }
 
-// White places in a frame that is turned by a yaw, counted in bins along one of its axes.
+// White line parallel to an axis of the rotated frame.
 struct Line {
-  double across = 0.0;      // where it lies on the axis
-  std::vector<int> sums{};  // bins along the line with white near it, summed from the first on
+  double across = 0.0;      // coordinate on the perpendicular axis
+  std::vector<int> sums{};  // cumulative number of bins along the line with white
 };
 
+// Histogram of white cells along an axis of the rotated frame.
 struct Axis {
-  double first = 0.0;  // of the bins
+  double first = 0.0;  // start of the first bin
   double bin = 0.0;
   std::vector<double> counts{};
 
@@ -141,7 +142,7 @@ Axis make_axis(const std::vector<Vector2d>& places, Eigen::Index axis, double bi
   return result;
 }
 
-// The bins with the most white, none beside a fuller one.
+// Centers of the max_lines largest local maxima, in ascending order.
 std::vector<double> peaks_of(const Axis& axis) {
   std::vector<std::size_t> peaks;
   const auto& counts = axis.counts;
@@ -185,11 +186,11 @@ double share_seen(const Line& line, const Axis& along, double from, double to) {
 struct Frame {
   double score = 0.0;
   double yaw_deg = 0.0;
-  Vector2d min = Vector2d::Zero();  // in axes turned by the yaw
+  Vector2d min = Vector2d::Zero();  // in the rotated frame
   Vector2d max = Vector2d::Zero();
 };
 
-// The rectangle along axes turned by the yaw with the longest white sides.
+// Finds the rectangle with the longest white sides in the frame rotated by `yaw_deg`.
 Frame best_frame(const std::vector<Vector2d>& white, double yaw_deg, double bin,
                  const BorderBandOptions& options) {
   const Eigen::Rotation2Dd turn(-yaw_deg * std::numbers::pi / 180.0);
@@ -229,7 +230,7 @@ Frame find_frame(const Picture& picture, double white_level, const BorderBandOpt
       if (picture.levels.at(x, y) >= white_level)
         white.push_back(picture.corner + picture.cell * Vector2d(x + 0.5, y + 0.5));
   if (white.empty())
-    throw Error("nothing is white: no border band",
+    throw Error("no white cells, no border band; reduce white_level",
                 {.field = "white_level", .value = to_text(white_level)});
   const double bin = 2.0 * picture.cell;
   std::vector<Frame> frames(180);
@@ -239,13 +240,13 @@ Frame find_frame(const Picture& picture, double white_level, const BorderBandOpt
   Frame best = *std::max_element(frames.begin(), frames.end(),
                                  [](const Frame& a, const Frame& b) { return a.score < b.score; });
   if (!(best.score > 0.0))
-    throw Error("no white band with four sides lies on the ground",
-                {.field = "white along the shortest-seen side",
+    throw Error("no white band with four sides on the ground",
+                {.field = "share of white along each side",
                  .bound = ">= " + to_text(100.0 * options.min_seen) + " %"});
   return best;
 }
 
-// A side of the area: from one corner to the next, counter-clockwise, so that the inside is left.
+// Side of the area between two corners, counter-clockwise: the inside is on the left.
 struct Side {
   Vector2d from = Vector2d::Zero();
   Vector2d to = Vector2d::Zero();
@@ -255,7 +256,7 @@ struct Side {
   Vector2d inward() const { return {-along().y(), along().x()}; }
 };
 
-// How far inward of the side the white that lies on it ends, at one place along it.
+// Distance of the inner end of the white from the side, inwards, at a position along the side.
 std::optional<double> inner_edge(const Picture& picture, const Side& side, double along,
                                  double white_level, double max_width) {
   const double step = picture.cell;
@@ -263,7 +264,7 @@ std::optional<double> inner_edge(const Picture& picture, const Side& side, doubl
   const auto level = [&](int n) {
     return picture.at(side.from + along * side.along() + n * step * side.inward());
   };
-  // From the white nearest to the side, whichever way it lies.
+  // Starts at the white cell nearest to the side in either direction.
   int start = 0;
   while (start <= count && level(start) < white_level && level(-start) < white_level) ++start;
   if (start > count) return std::nullopt;
@@ -280,8 +281,8 @@ std::optional<double> inner_edge(const Picture& picture, const Side& side, doubl
   return step * (n + (white - white_level) / (white - dark));
 }
 
-// across = result[0] + result[1] * along: Theil (1950) and Sen (1968), then least squares with
-// Tukey's weights.
+// Fits across = result[0] + result[1] * along by Theil (1950) and Sen (1968), then by least squares
+// with Tukey's weights.
 Vector2d fit_line(const std::vector<Vector2d>& edges) {
   std::vector<double> slopes;
   for (std::size_t a = 0; a < edges.size(); ++a)
@@ -316,7 +317,7 @@ void move_to_inner_edge(Side& side, const Picture& picture, double white_level,
                         const BorderBandOptions& options) {
   const double length = (side.to - side.from).norm();
   const double step = std::max(2.0 * picture.cell, length / 400.0);
-  // The bands of the neighboring sides end it.
+  // The bands of the neighboring sides are excluded.
   const double rim = std::min(options.max_width_m, length / 4.0);
   std::vector<Vector2d> edges;
   int slices = 0;
@@ -325,7 +326,7 @@ void move_to_inner_edge(Side& side, const Picture& picture, double white_level,
       edges.emplace_back(along, *edge);
   side.seen = static_cast<double>(edges.size()) / std::max(slices, 1);
   if (edges.size() < 5 || side.seen < options.min_seen)
-    throw Error("the white band's inner edge is not seen along enough of a side",
+    throw Error("the inner edge of the white band is not visible along enough of a side",
                 {.field = "share of the side",
                  .value = to_fixed_text(100.0 * side.seen, 0) + " %",
                  .bound = ">= " + to_text(100.0 * options.min_seen) + " %"});
@@ -353,14 +354,17 @@ std::array<Vector2d, 4> corners_of(const std::array<Side, 4>& sides) {
 
 void bind(ParameterTable& table, BorderBandOptions& options) {
   table.add("white_level", options.white_level, {0.0, 255.0},
-            "border: least of red, green, blue of white, 0 to 255; 0: from the colors");
-  table.add("max_band_width_m", options.max_width_m, positive, "border: width of the band, m");
-  table.add("min_band_side_m", options.min_side_m, positive, "border: side of the area, m");
+            "border: minimum of red, green and blue of white, 0 to 255; 0: from the colors");
+  table.add("max_band_width_m", options.max_width_m, positive,
+            "border: maximum width of the band, m");
+  table.add("min_band_side_m", options.min_side_m, positive,
+            "border: minimum side of the area inside the band, m");
   table.add("min_band_seen", options.min_seen, {0.0, 1.0, true, false},
-            "border: share of each side along which white must be found");
-  table.add("band_cell_m", options.cell_m, positive, "border: cell of the picture from above, m");
-  table.add("min_band_z_m", options.min_z_m, any_number, "border: heights of the band, m");
-  table.add("max_band_z_m", options.max_z_m, any_number, "border: heights of the band, m");
+            "border: minimum share of each side's length with white");
+  table.add("band_cell_m", options.cell_m, positive,
+            "border: cell size of the image from above, m");
+  table.add("min_band_z_m", options.min_z_m, any_number, "border: minimum height of the band, m");
+  table.add("max_band_z_m", options.max_z_m, any_number, "border: maximum height of the band, m");
 }
 
 BorderBand find_border_band(const PointCloud& level_cloud, double margin_m,
@@ -374,7 +378,7 @@ BorderBand find_border_band(const PointCloud& level_cloud, double margin_m,
                                      Vector2d(frame.min.x(), frame.max.y())};
   for (Vector2d& corner : corners) corner = turn * corner;
   std::array<Side, 4> sides;
-  // Twice: the second time along the direction that each side really has.
+  // The second round uses the directions of the sides that the first round found.
   for (int round = 0; round < 2; ++round) {
     for (std::size_t n = 0; n < 4; ++n) {
       sides[n] = {corners[n], corners[(n + 1) % 4], 0.0};
@@ -415,14 +419,14 @@ BorderScale scale_by_border(const BorderBand& band, const Vector2d& inner_size_m
     std::string sides;
     for (const double side : measured)
       sides += (sides.empty() ? "" : ", ") + to_fixed_text(side, 3);
-    throw Error("the white band has another size",
+    throw Error("the size does not match that of the white band",
                 {.field = "border_size",
                  .value = to_text(inner_size_m.x()) + "x" + to_text(inner_size_m.y()),
                  .bound = "within " + to_text(100.0 * max_size_error) +
                           " % of the sides found: " + sides + " m"});
   }
   const double ratio = size.dot(measured) / size.squaredNorm();
-  const double variance = (measured - ratio * size).squaredNorm() / 3.0;  // of a side, m^2
+  const double variance = (measured - ratio * size).squaredNorm() / 3.0;  // per side, m^2
   return {1.0 / ratio, std::sqrt(2.0 * variance / size.squaredNorm()) / (ratio * ratio)};
 }
 

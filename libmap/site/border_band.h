@@ -1,4 +1,4 @@
-// A white band on the ground, of boards or tape, that frames the test area.
+// Detects a white band of boards or tape that frames the test area on the ground.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,44 +11,44 @@
 namespace libmap {
 
 struct BorderBandOptions {
-  double cell_m = 0.01;  // > 0: of the picture from above that the band is looked for in
-  // 0..255: a place is white if the least of its red, green and blue is at least this. 0: half way
-  // from what is usual to the brightest half percent.
+  double cell_m = 0.01;  // > 0: cell size of the image from above in which the band is detected
+  // 0 to 255: minimum of red, green and blue of a white cell. 0: the mean of the median and the
+  // 99.5 % quantile of all cells.
   double white_level = 0.0;
-  double max_width_m = 0.25;  // > 0: of the band
-  double min_side_m = 0.5;    // > 0: of the area inside
-  double min_seen = 0.4;      // (0, 1]: share of each side's length along which white was found
-  double min_z_m = -0.1;      // heights at which the band may lie
+  double max_width_m = 0.25;  // > 0: maximum width of the band
+  double min_side_m = 0.5;    // > 0: minimum side of the area inside
+  double min_seen = 0.4;      // (0, 1]: minimum share of each side's length with white
+  double min_z_m = -0.1;      // range of heights of the band
   double max_z_m = 0.15;
 };
 void bind(ParameterTable& table, BorderBandOptions& options);
 
 struct BorderBand {
   std::vector<Eigen::Vector2d> corners;  // of the area inside the band, counter-clockwise
-  std::array<double, 4> sides_m{};       // the same without the margin: of the band's inner edge
-  double seen = 0.0;                     // least share of a side along which white was found
-  double white_level = 0.0;
+  std::array<double, 4> sides_m{};       // lengths of the band's inner edge, without the margin
+  double seen = 0.0;                     // minimum share of a side's length with white
+  double white_level = 0.0;              // level that was used
 };
 
-// The quadrilateral inside the band. A first search tries every direction and pairs of white lines
-// along and across it, and takes the rectangle with the most white along all four sides; then each
-// side's inner edge, where white ends, is found slice by slice and a line is fitted to it robustly,
-// so that gaps in the band and white rocks that touch it do no harm. Sides need not be parallel.
-// `level_cloud`: colored points, ground at z = 0, spread more densely than cell_m. Each side lies
-// `margin_m` inside the edge found. Throws Error: no colors, no white, no band.
+// Finds the quadrilateral inside the band. A first search over all directions and pairs of white
+// lines finds the rectangle with the most white along its four sides. Then the inner edge of each
+// side is detected slice by slice, and a line is fitted to it robustly, so that gaps in the band
+// and white rocks that touch it are tolerated. Sides need not be parallel. `level_cloud` contains
+// colored points with the ground at z = 0 and a spacing below cell_m. `corners` are `margin_m`
+// inside the detected edges. Throws Error: no colors, no point at the band's heights, no band.
 BorderBand find_border_band(const PointCloud& level_cloud, double margin_m = 0.0,
                             const BorderBandOptions& options = {});
 
-// What lengths are to be multiplied by.
+// Correction of a map's scale.
 struct BorderScale {
-  double factor = 1.0;
-  // Standard deviation of the factor, by the scatter of the sides. Opposite sides end at the same
-  // two edges: the four count as two. An error that all edges share is not in it.
+  double factor = 1.0;  // true length per length in the map
+  // Standard deviation of the factor, from the scatter of the sides. Opposite sides are correlated,
+  // so the four count as two. Errors that all edges share are not included.
   double deviation = 0.0;
 };
 
-// By least squares, from the true lengths of the band's inner edge in either order. Throws Error if
-// a side differs from its length by more than 5 %: the band is another one.
+// Estimates the scale by least squares from the true side lengths of the band's inner edge, in
+// either order. Throws Error if a side differs from its true length by more than 5 %.
 BorderScale scale_by_border(const BorderBand& band, const Eigen::Vector2d& inner_size_m);
 
 }  // namespace libmap

@@ -43,24 +43,24 @@ std::vector<Vector2d> seen_from_above(const std::vector<Vector3d>& points) {
   return places;
 }
 
-// Where the map goes, and how it is cut.
+// Motion of the map and the shape of the cut.
 struct Plan {
-  Pose cut_from_map = Pose::Identity();   // the frame in which it is cut
-  Pose site_from_cut = Pose::Identity();  // the identity but for a box or polygon in the map
+  Pose cut_from_map = Pose::Identity();   // the cut is made in the frame `cut`
+  Pose site_from_cut = Pose::Identity();  // identity unless a box or polygon is in the map frame
   ExtrudedPolygon prism;
   CropReport report;
 };
 
-// What the plan is made from, of a cloud or a mesh.
+// Input of the plan, from a cloud or a mesh.
 struct Source {
   std::vector<Vector3d> ground_points;
   std::vector<Eigen::Vector3f> normals;
-  Vector2d middle = Vector2d::Zero();  // about which a given yaw turns
-  // The map seen from above in the level frame, densely.
+  Vector2d middle = Vector2d::Zero();  // center of rotation for a given yaw
+  // Points of the map in the level frame; for a mesh, samples with a spacing of about `cell`.
   std::function<PointCloud(const Pose& level_from_map, double cell)> view;
 };
 
-// The mean direction of the sides, modulo a right angle, weighted by their lengths.
+// Mean direction of the sides modulo 90 degrees, weighted by their lengths.
 double yaw_of(const std::vector<Vector2d>& corners) {
   double sine = 0.0;
   double cosine = 0.0;
@@ -95,7 +95,7 @@ Pose level_frame(const Source& source, const CropOptions& options, CropReport& r
   return level_from_map(*report.ground);
 }
 
-// The rectangle that was asked for by its size, in the frame turned so that it lies straight.
+// Plans the cut along a rectangle of a given size, parallel to the axes unless a yaw is given.
 void lay_rectangle(const Source& source, const CropOptions& options, const Pose& level,
                    Plan& plan) {
   const PointCloud view = source.view(level, options.rectangle.cell_m);
@@ -129,7 +129,7 @@ void lay_border(const Source& source, const CropOptions& options, const Pose& le
   plan.prism.polygon = PlanPolygon(moved(corners, turn));
 }
 
-// A box or polygon that the user gave.
+// Plans the cut along the given box or polygon.
 void lay_given(const Source& source, const CropOptions& options, const Pose& level, Plan& plan) {
   const Pose turned = options.yaw_deg ? turn_about(source.middle, *options.yaw_deg) * level : level;
   if (options.frame == CropFrame::map)
@@ -143,7 +143,7 @@ void lay_given(const Source& source, const CropOptions& options, const Pose& lev
   plan.prism.max_z = options.box.max.z();
 }
 
-// x = y = 0 in the middle of the outline's box.
+// Moves the center of the outline's bounding box to x = y = 0.
 void center_outline(const CropOptions& options, Plan& plan) {
   const PlanPolygon& outline = *plan.prism.polygon;
   const Vector2d middle = (outline.min() + outline.max()) / 2.0;
@@ -163,16 +163,16 @@ void center_outline(const CropOptions& options, Plan& plan) {
 void require_sound(const CropOptions& options) {
   const bool found = options.region == CropRegion::size || options.region == CropRegion::border;
   if (options.rectangle.margin_m > 0.0 && !found)
-    throw Error("a margin is kept from what is found: it goes with a size or a border",
+    throw Error("a margin requires a size or a border",
                 {.field = "margin_m", .value = to_text(options.rectangle.margin_m)});
   if (options.frame == CropFrame::map && found)
-    throw Error("sites are found in the level frame",
-                {.field = "frame", .value = "map", .bound = "level with a size or a border"});
+    throw Error("a size or a border requires the level frame",
+                {.field = "frame", .value = "map", .bound = "level"});
   if (options.yaw_deg && !std::isfinite(*options.yaw_deg))
     throw Error("not an angle", {.field = "yaw", .value = to_text(*options.yaw_deg)});
   if (options.region == CropRegion::box &&
       !(options.box.min.array() < options.box.max.array()).all())
-    throw Error("the box is inside out or empty", {.field = "box"});
+    throw Error("a minimum of the box is not below its maximum", {.field = "box"});
 }
 
 Plan make_plan(const Source& source, const CropOptions& options) {
@@ -191,8 +191,8 @@ Plan make_plan(const Source& source, const CropOptions& options) {
   return plan;
 }
 
-// What is done with a cut cloud or mesh: into the site, centered if the outline was not.
-// bounds(pose) are those of what was cut, moved.
+// Moves a cut cloud or mesh to the site frame, and centers it if the outline was not centered.
+// bounds_moved(pose) returns the bounds of the cut data moved by `pose`.
 template <typename Bounds, typename Move>
 void finish(Plan& plan, const CropOptions& options, const Bounds& bounds_moved, const Move& move) {
   CropReport& report = plan.report;
@@ -215,16 +215,17 @@ Error nothing_inside(const Eigen::AlignedBox3d& bounds, const char* what) {
     return to_fixed_text(p.x(), 2) + ", " + to_fixed_text(p.y(), 2) + ", " +
            to_fixed_text(p.z(), 2);
   };
-  return Error(std::string("nothing of the ") + what + " lies inside the cut: it reaches from " +
-               text(bounds.min()) + " to " + text(bounds.max()));
+  return Error(std::string("nothing of the ") + what +
+               " is inside the crop region; it extends from " + text(bounds.min()) + " to " +
+               text(bounds.max()));
 }
 
-// A triangle seen from above, by its first corner and the sides to the two others.
+// Projection of a triangle to the x-y plane: its first corner and the two sides from it.
 struct FlatTriangle {
   Vector2d a, ab, ac;
 
   double length() const { return ab.norm() + ac.norm() + (ac - ab).norm(); }
-  // Where it begins and ends along x at the height `y` over its first corner.
+  // Range of x of the triangle at `y`, both relative to the first corner.
   std::array<double, 2> reach_at(double y) const {
     std::array<double, 2> reach = {HUGE_VAL, -HUGE_VAL};
     const std::array<Vector2d, 3> corners = {Vector2d::Zero(), ab, ac};
@@ -256,8 +257,9 @@ void view_sides(const FlatTriangle& triangle, std::uint32_t n, double cell,
   for (double k = 0.0; k < on_ac; ++k) samples.push_back({n, 0.0, 1.0 - k / on_ac});
 }
 
-// Row by row, and in each only where the triangle is: one aslant fills little of its box. Steps are
-// counted from its corner, since far from the origin a step may not change a coordinate.
+// Samples each row within the triangle only, because an oblique triangle covers little of its
+// bounding box. Steps are relative to the corner: far from the origin, a step may be below
+// rounding.
 void view_inside(const FlatTriangle& triangle, std::uint32_t n, double cell,
                  std::vector<TrianglePoint>& samples) {
   const auto& [a, ab, ac] = triangle;
@@ -279,8 +281,8 @@ void view_inside(const FlatTriangle& triangle, std::uint32_t n, double cell,
   }
 }
 
-// The surface seen from above: a sample in each cell that a triangle covers, its corners, and its
-// sides, which are all that is seen of an upright one. Cells are larger where those were too many.
+// Samples of the surface from above: one in each cell that a triangle covers, and samples along its
+// sides, for vertical triangles. The cell size is increased to limit the number of samples.
 PointCloud view_of(const EachMesh& each, const Pose& level_from_map, double cell) {
   double area = 0.0;
   double length = 0.0;
@@ -339,7 +341,7 @@ PointCloud finite_part(const PointCloud& cloud) {
 
 void bind(ParameterTable& table, CropOptions& options) {
   bind(table, options.ground);
-  table.add("center", options.center, "x = y = 0 in the middle of the outline");
+  table.add("center", options.center, "move the center of the outline to x = y = 0");
   bind(table, options.rectangle);
   bind(table, options.band);
 }
@@ -347,7 +349,7 @@ void bind(ParameterTable& table, CropOptions& options) {
 CropCloudResult crop_cloud(const PointCloud& cloud, const CropOptions& options) {
   cloud.check();
   PointCloud kept = finite_part(cloud);
-  if (kept.empty()) throw Error("there are no points to crop");
+  if (kept.empty()) throw Error("the cloud has no finite points to crop");
   Source source{kept.positions, kept.normals, middle_of(kept.positions), {}};
   source.view = [&](const Pose& level_from_map, double) {
     return transform_cloud(kept, level_from_map);

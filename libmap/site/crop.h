@@ -1,4 +1,4 @@
-// From a map to the test site: levelled, turned and cut.
+// Levels, rotates and crops a map to the test site.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,44 +17,44 @@
 
 namespace libmap {
 
-// What is kept. whole: all of it, levelled only. size: the rectangle of a given size that lies best
-// centered in the data (site_rectangle). border: what a white band frames (border_band).
+// Part of the map that is kept. whole: everything, only leveled. size: the best-centered rectangle
+// of a given size (site_rectangle). border: the area inside a white band (border_band).
 enum class CropRegion { whole, box, polygon, size, border };
 
-// Frame of a box or polygon. level: ground at z = 0, x and y near the map's, turned by yaw_deg.
-// map: as the map came.
+// Frame of a box or polygon. level: ground at z = 0, x and y near those of the map, rotated by
+// yaw_deg. map: the frame of the input.
 enum class CropFrame { level, map };
 
 struct CropOptions {
-  bool level = true;  // false: the map's z is up and its ground stays where it is
-  std::optional<Eigen::Vector3d> up = std::nullopt;  // none: by the normals (up_of_normals)
-  GroundPlaneOptions ground{};                       // its `up` is overwritten
+  bool level = true;  // false: the map's z axis is up, and the heights are kept
+  std::optional<Eigen::Vector3d> up = std::nullopt;  // in the map; none: from normals
+  GroundPlaneOptions ground{};                       // `up` is ignored
   CropRegion region = CropRegion::whole;
   CropFrame frame = CropFrame::level;
   Bounds3d box{};  // z may be infinite
   std::vector<Eigen::Vector2d> polygon{};
   Eigen::Vector2d size_m = Eigen::Vector2d::Zero();
-  SiteRectangleOptions rectangle{};  // its margin_m counts for the border too
+  SiteRectangleOptions rectangle{};  // margin_m also applies to the border
   BorderBandOptions band{};
-  // Not bound. True size of the area inside the band, without the margin: determines the scale.
+  // Not bound. True size of the area inside the band, without the margin, for estimating the scale.
   std::optional<Eigen::Vector2d> border_size_m = std::nullopt;
-  // Turn about z. None: with size and border, that which lays the rectangle's sides along x and y
-  // by the least turn, else none.
+  // Rotation about z. None: with size and border, the smallest rotation that makes the rectangle's
+  // sides parallel to x and y, otherwise no rotation.
   std::optional<double> yaw_deg = std::nullopt;
-  bool center = false;  // x = y = 0 in the middle of the outline's box, else where the map has it
+  bool center = false;  // true: x = y = 0 is the center of the outline's bounding box
 };
-// ground, rectangle, band and center.
+// Binds ground, rectangle, band and center.
 void bind(ParameterTable& table, CropOptions& options);
 
 struct CropReport {
   Pose site_from_map = Pose::Identity();
-  Eigen::Vector3d up = Eigen::Vector3d::UnitZ();  // in the map, for finding the ground
-  std::optional<UpOfNormals> up_of_normals{};     // if that determined `up`
-  std::optional<GroundPlane> ground{};            // in the map; none if it was not levelled
+  Eigen::Vector3d up = Eigen::Vector3d::UnitZ();  // in the map, used for finding the ground
+  std::optional<UpOfNormals> up_of_normals{};     // set if `up` comes from normals
+  std::optional<GroundPlane> ground{};            // in the map; none without leveling
   std::vector<Eigen::Vector2d> outline{};         // in the site, counter-clockwise; may be empty
   std::optional<SiteRectangle> rectangle{};       // in the level frame
   std::optional<BorderBand> band{};               // in the level frame
-  std::optional<BorderScale> border_scale{};      // of the map; it is not applied
+  std::optional<BorderScale> border_scale{};      // of the map; not applied
 };
 
 struct CropCloudResult {
@@ -66,15 +66,15 @@ struct CropMeshResult {
   CropReport report;
 };
 
-// The ground is found among the points, for a mesh among samples spread evenly over its surface.
-// Meshes are cut along the outline (mesh_cutting.h), of clouds the points inside and on the border
-// are kept. Throws Error: options out of their ranges, nothing to crop, no ground, no site, nothing
-// inside.
+// Finds the ground among the points of a cloud, or among even samples of a mesh. Keeps the points
+// inside and on the border, or cuts the mesh along the outline (mesh_cutting.h). Throws Error:
+// options out of their ranges, nothing to crop, no ground, no site, nothing inside.
 CropCloudResult crop_cloud(const PointCloud& cloud, const CropOptions& options);
 CropMeshResult crop_mesh(const TriangleMesh& mesh, const CropOptions& options);
 
-// The same of a mesh in pieces: each(use) calls use(piece) for all of them, in one order, whenever
-// it is called. `use` takes what is left of each, in that order; nothing is an empty mesh.
+// Crops a mesh in pieces. each(use) must call use(piece) for every piece, in the same order on
+// every call. `use` receives the cropped pieces in this order; a piece may be empty. Throws as
+// crop_mesh.
 using UseMesh = std::function<void(const TriangleMesh& mesh)>;
 using EachMesh = std::function<void(const UseMesh& use)>;
 CropReport crop_mesh_pieces(const EachMesh& each, const CropOptions& options,

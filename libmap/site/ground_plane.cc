@@ -20,11 +20,11 @@ namespace {
 
 using Points = std::vector<Eigen::Vector3d>;
 
-constexpr std::size_t max_drawn = 20000;  // points that hypotheses are drawn from
-constexpr std::size_t first_look = 2000;  // of them, that every hypothesis is counted on
-constexpr std::size_t second_look = 20;   // hypotheses that are counted on all of them
-constexpr int max_rounds = 10;            // planes that are looked for, walls included
-constexpr std::uint64_t points_stream = 0, hypotheses_stream = 1;  // of random numbers
+constexpr std::size_t max_drawn = 20000;  // points for RANSAC
+constexpr std::size_t first_look = 2000;  // points that evaluate every hypothesis
+constexpr std::size_t second_look = 20;   // best hypotheses, evaluated on all points
+constexpr int max_rounds = 10;            // maximum number of planes, walls included
+constexpr std::uint64_t points_stream = 0, hypotheses_stream = 1;  // random number streams
 
 double degrees_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b)) * 180.0 / std::numbers::pi;
@@ -55,7 +55,7 @@ std::size_t count_near(const Points& points, std::size_t count, const Plane& pla
   return near;
 }
 
-// Planes through three points each that do not lie steeper than allowed.
+// Random planes through three points each, within max_tilt_deg of up.
 std::vector<Plane> draw_hypotheses(const Points& points, const GroundPlaneOptions& options,
                                    const Eigen::Vector3d& up, RandomStream& random) {
   const auto draw = [&] { return random.below(points.size()); };
@@ -73,7 +73,7 @@ std::vector<Plane> draw_hypotheses(const Points& points, const GroundPlaneOption
   return planes;
 }
 
-// The hypothesis with the most points, fitted to them.
+// Finds the hypothesis with the most inliers and fits it to them; nullopt if there is none.
 std::optional<Plane> best_plane(const Points& points, const GroundPlaneOptions& options,
                                 const Eigen::Vector3d& up, RandomStream& random) {
   const std::vector<Plane> planes = draw_hypotheses(points, options, up, random);
@@ -107,7 +107,7 @@ std::optional<Plane> best_plane(const Points& points, const GroundPlaneOptions& 
 
 struct Candidate {
   Plane plane;
-  Points points;  // that lie on it
+  Points points;  // inliers
 };
 
 std::vector<Candidate> find_candidates(Points points, const GroundPlaneOptions& options,
@@ -123,11 +123,11 @@ std::vector<Candidate> find_candidates(Points points, const GroundPlaneOptions& 
     for (const Eigen::Vector3d& point : points) {
       const double height = std::abs(plane->height(point));
       if (height <= options.tolerance_m) candidate.points.push_back(point);
-      // What lies just beside a plane is its own noise.
+      // Points slightly beyond the tolerance are noise of the plane.
       if (height > 2.0 * options.tolerance_m) rest.push_back(point);
     }
     points = std::move(rest);
-    // One that turned to the wall or slope that it had cut into.
+    // The fit rotated towards a wall or slope that intersects the plane.
     if (degrees_between(plane->normal, up) > options.max_tilt_deg) continue;
     const double share = static_cast<double>(candidate.points.size()) / total;
     largest_share = std::max(largest_share, share);
@@ -144,21 +144,21 @@ double share_above(const Plane& plane, const Points& points) {
   return static_cast<double>(above) / static_cast<double>(points.size());
 }
 
-// Whether `other` is the ground below `ground`, which holds more points.
+// True if `other` is below `ground`, the plane with more points.
 bool lies_under(const Candidate& other, const Candidate& ground, const Eigen::Vector3d& up,
                 double tolerance) {
   const double above_other = share_above(other.plane, ground.points);
   const double above_ground = share_above(ground.plane, other.points);
   if (std::abs(above_other - above_ground) > 0.25) return above_other > above_ground;
-  // Both rise from, or fall off, a line between them.
+  // The planes meet in a ridge or a valley.
   const double tilt_of_other = degrees_between(other.plane.normal, up);
   const double tilt_of_ground = degrees_between(ground.plane.normal, up);
   if (std::abs(tilt_of_other - tilt_of_ground) > 5.0) return tilt_of_other < tilt_of_ground;
   return up.dot(ground.plane.center - other.plane.center) > tolerance;
 }
 
-// Iterated least squares with Tukey's biweight (Beaton and Tukey 1974); its scale is that of the
-// inliers' median deviation.
+// Iterated least squares with Tukey's biweight (Beaton and Tukey 1974). The scale is the median
+// deviation of the inliers.
 Plane fit_robustly(const Points& points, Plane plane, const Eigen::Vector3d& up, double tolerance) {
   Points near;
   for (const Eigen::Vector3d& point : points)
@@ -193,10 +193,10 @@ Plane fit_robustly(const Points& points, Plane plane, const Eigen::Vector3d& up,
 void require_ranges(const GroundPlaneOptions& options) {
   check_parameters(options);
   if (!options.up.allFinite() || !(options.up.norm() > 0.0))
-    throw Error("not a direction", {.field = "up", .bound = "finite, of some length"});
+    throw Error("not a direction", {.field = "up", .bound = "finite and not zero"});
 }
 
-// Evenly drawn points in random order.
+// Random sample of at most max_drawn points, in random order.
 Points drawn_points(const Points& points, std::uint64_t seed) {
   RandomStream random(seed, points_stream);
   Points drawn;
@@ -215,12 +215,12 @@ void require_plane_spread(const Points& points) {
                 {.field = "points", .value = std::to_string(points.size()), .bound = ">= 3"});
   const PlaneSpread spread = weighted_spread(points, points.front(), points_per_chunk,
                                              [](const Eigen::Vector3d&) { return 1.0; });
-  if (!is_plane(spread)) throw Error("all points lie on one line: there is no ground plane");
+  if (!is_plane(spread)) throw Error("all points are on one line: no ground plane");
 }
 
 std::string percent(double share) { return to_fixed_text(100.0 * share, 1) + " %"; }
 
-// The option with which there is a ground plane: natural terrain is rougher than a floor.
+// Suggests an option with which there is a ground plane, for example a larger tolerance.
 std::string remedy(const Points& points, const GroundPlaneOptions& options,
                    const Eigen::Vector3d& up) {
   GroundPlaneOptions rougher = options;
@@ -228,9 +228,9 @@ std::string remedy(const Points& points, const GroundPlaneOptions& options,
   for (int doubling = 0; doubling < 5; ++doubling) {
     rougher.tolerance_m *= 2.0;
     if (!find_candidates(drawn_points(points, options.seed), rougher, up, share).empty())
-      return "natural terrain needs --plane-tolerance " + to_text(rougher.tolerance_m);
+      return "for natural terrain use --plane-tolerance " + to_text(rougher.tolerance_m);
   }
-  // Ground that leans more, or a frame whose z is not up.
+  // The ground may be steeper, or z may not be up.
   const Eigen::Vector3d normal =
       plane_of(weighted_spread(points, points.front(), points_per_chunk,
                                [](const Eigen::Vector3d&) { return 1.0; }),
@@ -238,10 +238,10 @@ std::string remedy(const Points& points, const GroundPlaneOptions& options,
           .normal;
   if (!find_candidates(drawn_points(points, options.seed), options, normal, share).empty()) {
     const auto text = [](double value) { return to_fixed_text(value, 2); };
-    return "--up " + text(normal.x()) + "," + text(normal.y()) + "," + text(normal.z()) +
-           " (or its opposite) is the normal of the points";
+    return "use the normal of the points, --up " + text(normal.x()) + "," + text(normal.y()) + "," +
+           text(normal.z()) + ", or its opposite";
   }
-  return "--level none with --box or --polygon keeps the frame's z";
+  return "use --level none with --box or --polygon to keep the frame's z";
 }
 
 }  // namespace
@@ -249,16 +249,16 @@ std::string remedy(const Points& points, const GroundPlaneOptions& options,
 void bind(ParameterTable& table, GroundPlaneOptions& options) {
   constexpr Range share{0.0, 1.0, true, false};
   table.add("plane_tolerance_m", options.tolerance_m, positive,
-            "points this near to a plane lie on it, m");
+            "maximum distance of the points of a plane, m");
   table.add("max_tilt_deg", options.max_tilt_deg, {0.0, 90.0, true, true},
-            "of the ground from up, degrees");
+            "maximum angle between the ground's normal and up, degrees");
   table.add("min_ground_share", options.min_share, share,
-            "of all points (of a mesh: of its area) that the ground must contain");
+            "minimum share of the points (of a mesh: of the area) on the ground");
   table.add("min_share_of_largest", options.min_share_of_largest, share,
-            "of the largest plane's points that a lower plane must contain to be the ground");
+            "minimum size of a lower plane to be the ground, relative to the largest plane");
   table.add("plane_hypotheses", options.hypotheses, {1.0, 1e6},
-            "planes through three points that are tried for each plane");
-  table.add("seed", options.seed, not_negative, "of what is drawn at random");
+            "number of random planes through three points that are tried for each plane");
+  table.add("seed", options.seed, not_negative, "random seed");
 }
 
 GroundPlane find_ground_plane(const std::vector<Eigen::Vector3d>& points,
@@ -273,7 +273,7 @@ GroundPlane find_ground_plane(const std::vector<Eigen::Vector3d>& points,
     throw Error("no plane within " + to_text(options.max_tilt_deg) + " degrees of up, (" +
                     to_text(up.x()) + ", " + to_text(up.y()) + ", " + to_text(up.z()) +
                     "), is large enough to be the ground: " + remedy(points, options, up),
-                {.field = "share of the points on the largest",
+                {.field = "share of the points on the largest plane",
                  .value = percent(largest_share),
                  .bound = ">= " + percent(options.min_share)});
   const Candidate* ground = &candidates.front();

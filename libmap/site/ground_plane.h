@@ -1,4 +1,4 @@
-// The plane of the ground under rocks, walls and tables.
+// Finds the plane of the ground under rocks, walls and tables.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,19 +13,17 @@
 namespace libmap {
 
 struct GroundPlaneOptions {
-  // Which way is up, of any length.
-  Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
-  double tolerance_m = 0.02;   // > 0: points this near to a plane lie on it
-  double max_tilt_deg = 40.0;  // > 0, < 90: of the ground's normal from `up`
-  // Of all points, a plane must hold at least this share to be one, (0, 1].
-  double min_share = 0.05;
-  // Of the points of the largest plane, another must hold this share to be taken for the ground
-  // because it lies lower, (0, 1].
+  Eigen::Vector3d up = Eigen::Vector3d::UnitZ();  // approximate up direction, of any length
+  double tolerance_m = 0.02;                      // > 0: maximum distance of the inliers of a plane
+  double max_tilt_deg = 40.0;  // > 0, < 90: maximum angle between the ground's normal and `up`
+  double min_share = 0.05;     // (0, 1]: minimum share of the points on a plane
+  // (0, 1]: minimum number of points on a lower plane to be the ground, relative to the largest
+  // plane.
   double min_share_of_largest = 0.2;
-  int hypotheses = 3000;  // > 0: planes through three points that are tried for each plane
+  int hypotheses = 3000;  // > 0: number of RANSAC hypotheses per plane
   std::uint64_t seed = 1;
 };
-// All but `up`: ground_tolerance_m, max_tilt_deg, min_ground_share, ...
+// Binds all fields except `up`.
 void bind(ParameterTable& table, GroundPlaneOptions& options);
 
 struct GroundPlane {
@@ -34,22 +32,21 @@ struct GroundPlane {
   Eigen::Vector3d center = Eigen::Vector3d::Zero();   // of the inliers, on the plane
   double rmse_m = 0.0;                                // of the inliers
   std::size_t inliers = 0;                            // points within the tolerance
-  double share = 0.0;                                 // of all points
-  double tilt_deg = 0.0;                              // of the normal from `up`
+  double share = 0.0;                                 // inliers as a share of all points
+  double tilt_deg = 0.0;                              // angle between the normal and `up`
 };
 
-// The lowest large plane within max_tilt_deg of up. Planes are found one after the other, each by
-// RANSAC (Fischler and Bolles 1981) among the points that the ones before do not hold; the ground
-// is the one that the others lie above. It is then fitted to its inliers by least squares with
-// Tukey's weights until it stands still, so that the feet of rocks do not lift it. Every point
-// counts alike: give finite points that are spread evenly over the surface. The same for any number
-// of threads. Throws Error: options out of their ranges, fewer than three points, all on one line,
-// no plane.
+// Finds the lowest large plane within max_tilt_deg of up. Planes are extracted one after the other
+// by RANSAC (Fischler and Bolles 1981). The ground is the plane below the others. It is refined by
+// iterated least squares with Tukey's weights, so that the feet of rocks do not lift it. Points
+// must be finite and evenly distributed over the surface, because all have equal weight. The result
+// does not depend on the number of threads. Throws Error: options out of their ranges, fewer than
+// three points, all points on a line, no plane.
 GroundPlane find_ground_plane(const std::vector<Eigen::Vector3d>& points,
                               const GroundPlaneOptions& options = {});
 
-// Carries the plane to z = 0 by the least rotation, about `center`: x and y of the ground stay as
-// near as that allows.
+// Transform that moves the plane to z = 0, with the smallest rotation. x and y of `center` are
+// kept.
 Pose level_from_map(const GroundPlane& plane);
 
 }  // namespace libmap

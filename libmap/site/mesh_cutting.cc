@@ -22,17 +22,17 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double snap_m = 1e-7;           // a vertex this near to a cut is moved onto it
-constexpr double reach_m = 4.0 * snap_m;  // by which boxes are widened
+constexpr double snap_m = 1e-7;  // vertices within this distance of a cut are moved onto it
+constexpr double reach_m = 4.0 * snap_m;  // margin of bounding boxes
 constexpr std::uint32_t none = 0xffffffff;
 
-// A part of the triangle `source` of the mesh that is cut.
+// Part of the triangle `source` of the original mesh.
 struct Piece {
   Triangle corners{};
   std::uint32_t source = 0;
 };
 
-// One edge of a polygon, seen from above, or a height.
+// Vertical plane through an edge of the polygon, or horizontal plane.
 class Cut {
  public:
   static Cut along(const Vector2d& from, const Vector2d& to) {
@@ -55,13 +55,13 @@ class Cut {
     const Vector2d offset = p.head<2>() - from_;
     return direction_.x() * offset.y() - direction_.y() * offset.x();
   }
-  // Whether a point on the line through the edge lies on the edge.
+  // True if a point on the line through the edge is on the edge.
   bool reaches(const Vector3d& p) const {
     if (level_) return true;
     const double along = direction_.dot(p.head<2>() - from_);
     return along >= -snap_m && along <= length_ + snap_m;
   }
-  // Moves a point that is near to the cut onto it, exactly where the cut runs along an axis.
+  // Moves a point onto the cut, exactly if the cut is parallel to an axis.
   void place(Vector3d& p) const {
     if (level_) {
       p.z() = z_;
@@ -97,12 +97,12 @@ class MeshCutter {
       : mesh_(mesh), fixed_(mesh.vertices.size(), 0), pieces_(std::move(pieces)) {}
 
   void cut(const Cut& cut);
-  // Makes the place on the ground a vertex of every piece that lies over it.
+  // Inserts a vertex at the corner's x and y into every piece above or below it.
   void insert_corner(const Vector2d& corner);
   const std::vector<Piece>& pieces() const { return pieces_; }
 
  private:
-  // Vertices on edges, by the edges' ends.
+  // Vertices on edges, by the end vertices of the edge.
   using EdgeVertices = std::unordered_map<std::uint64_t, std::uint32_t>;
 
   static std::uint64_t key(std::uint32_t a, std::uint32_t b) {
@@ -121,7 +121,7 @@ class MeshCutter {
   bool insert_inside(std::size_t piece, const Vector2d& corner);
 
   TriangleMesh& mesh_;
-  std::vector<char> fixed_;  // vertices that are on the border already
+  std::vector<char> fixed_;  // vertices on the border
   std::vector<Piece> pieces_;
 };
 
@@ -149,7 +149,7 @@ std::uint32_t MeshCutter::vertex_on(EdgeVertices& vertices, std::uint32_t a, std
     entry->second = append_vertex_between(mesh_, a, b, t);
     fixed_.push_back(0);
     Vector3d& p = mesh_.vertices.back();
-    // Between two vertices of an earlier cut it stands on that cut to the last bit.
+    // Between two vertices of an earlier cut, the vertex is exactly on that cut.
     for (Eigen::Index axis = 0; axis < 3; ++axis)
       if (at(a)[axis] == at(b)[axis]) p[axis] = at(a)[axis];
     place(p);
@@ -159,7 +159,7 @@ std::uint32_t MeshCutter::vertex_on(EdgeVertices& vertices, std::uint32_t a, std
 
 void MeshCutter::cut_edge(const Cut& cut, std::uint32_t a, std::uint32_t b,
                           EdgeVertices& vertices) {
-  // From the same end, whichever triangle asks: both get the same answer.
+  // The order of the ends is fixed, so that both triangles at the edge get the same vertex.
   if (a > b) std::swap(a, b);
   const double from = cut.distance(at(a));
   const double to = cut.distance(at(b));
@@ -170,7 +170,7 @@ void MeshCutter::cut_edge(const Cut& cut, std::uint32_t a, std::uint32_t b,
         cut.is_level() ? 0 : 1;
 }
 
-// Replaces a piece by those that the vertices on its edges make of it.
+// Splits a piece at the vertices on its edges.
 void MeshCutter::split_at(std::size_t piece, const EdgeVertices& vertices) {
   const std::uint32_t source = pieces_[piece].source;
   const Triangle corners = pieces_[piece].corners;
@@ -186,7 +186,7 @@ void MeshCutter::split_at(std::size_t piece, const EdgeVertices& vertices) {
     pieces_[piece].corners = first;
     for (const Triangle& other : others) pieces_.push_back({other, source});
   };
-  // Turned so that the edge that stands alone, cut or uncut, is the last.
+  // Rotated so that the only cut or the only uncut edge is the last.
   std::size_t last = 0;
   while (count < 3 && (on[last] != none) != (count == 1)) ++last;
   const std::uint32_t a = corners[(last + 1) % 3];
@@ -321,7 +321,7 @@ Place place_of(const TriangleMesh& mesh, const Triangle& corners, const Extruded
   return across ? Place::on_border : Place::inside;
 }
 
-// The mesh of those triangles, with the face fields of their sources.
+// Mesh of the kept pieces, with the face fields of their sources.
 TriangleMesh mesh_of(TriangleMesh mesh, std::vector<Piece> kept) {
   std::stable_sort(kept.begin(), kept.end(),
                    [](const Piece& a, const Piece& b) { return a.source < b.source; });
@@ -357,7 +357,7 @@ TriangleMesh cut_mesh(TriangleMesh mesh, const ExtrudedPolygon& prism) {
     for (std::size_t n = 0; n < corners.size(); ++n)
       cutter.cut(Cut::along(corners[n], corners[(n + 1) % corners.size()]));
   }
-  // No piece reaches over the border any more: one of its inner points speaks for all of it.
+  // No piece crosses the border any more, so an inner point decides.
   ExtrudedPolygon widened = prism;
   widened.min_z -= snap_m;
   widened.max_z += snap_m;

@@ -1,4 +1,4 @@
-// Meshes cut along a polygon of the x-y plane and at heights.
+// Cuts meshes along a polygon of the x-y plane and at two heights.
 #pragma once
 
 #include "libmap/core/triangle_mesh.h"
@@ -6,13 +6,13 @@
 
 namespace libmap {
 
-// The surface inside the prism. New vertices stand where the surface crosses its border, at its
-// corners too; x and y of a border that runs along an axis are exact, on others within rounding. A
-// vertex within 1e-7 m of the border is moved onto it, so that no slivers arise. Triangles that
-// share an edge are cut at the same vertex: a mesh without T-junctions stays without. Normals,
-// colors and fields of vertices are interpolated (mesh_parts.h), those of faces kept. Surfaces of
-// any form will do: open, not manifold, overhanging, upright. Nothing inside: an empty mesh. Throws
-// Error: arrays that do not fit, a vertex of a triangle that is not finite.
+// Returns the surface inside the prism, an empty mesh if there is none. New vertices are created
+// where the surface crosses the border and its corners, with exact x or y on borders parallel to an
+// axis. To avoid slivers, vertices within 1e-7 m of the border are moved onto it. Triangles that
+// share an edge are cut at the same vertex, so that no T-junctions arise. Normals, colors and
+// fields of vertices are interpolated (mesh_parts.h); those of faces are kept. Surfaces may be
+// open, non-manifold, overhanging or vertical. Throws Error: arrays of inconsistent sizes, a vertex
+// of a triangle that is not finite.
 TriangleMesh cut_mesh(TriangleMesh mesh, const ExtrudedPolygon& prism);
 
 }  // namespace libmap

@@ -25,7 +25,7 @@ double distance_to_segment(const Vector2d& point, const Vector2d& a, const Vecto
   return (point - a - t * along).norm();
 }
 
-// -1, 0 or 1: on which side of the line through a and b.
+// Returns 1 if the point is left of the line from a to b, -1 if right, 0 if on it within rounding.
 int side_of(const Vector2d& a, const Vector2d& b, const Vector2d& point) {
   const double turn = cross(b - a, point - a);
   const double exact = 1e-14 * (b - a).norm() * (point - a).norm();
@@ -58,7 +58,7 @@ std::string corner_name(std::size_t n) { return "corner " + std::to_string(n + 1
 PlanPolygon::PlanPolygon(std::vector<Vector2d> corners) : corners_(std::move(corners)) {
   for (std::size_t n = 0; n < corners_.size(); ++n)
     if (!corners_[n].allFinite())
-      throw Error("not a place", {.field = corner_name(n), .value = place(corners_[n])});
+      throw Error("not a position", {.field = corner_name(n), .value = place(corners_[n])});
   if (corners_.size() > 3 && corners_.front() == corners_.back()) corners_.pop_back();
   if (corners_.size() < 3)
     throw Error("the outline has too few corners",
@@ -68,7 +68,7 @@ PlanPolygon::PlanPolygon(std::vector<Vector2d> corners) : corners_(std::move(cor
   for (std::size_t n = 0; n < corners_.size(); ++n) {
     const Vector2d& next = corners_[(n + 1) % corners_.size()];
     if ((next - corners_[n]).norm() <= on_border_m)
-      throw Error("two corners of the outline lie in one place",
+      throw Error("duplicate corner of the outline",
                   {.field = corner_name(n), .value = place(corners_[n])});
     twice += cross(corners_[n] - corners_.front(), next - corners_.front());
     min_ = min_.cwiseMin(corners_[n]);
@@ -105,7 +105,7 @@ void PlanPolygon::require_simple() const {
   const auto crossing = [&](std::uint32_t a, std::uint32_t b) {
     return Error("the outline crosses or touches itself",
                  {.field = "edge from " + place(corners_[a]) + " to " + place(end(a)),
-                  .value = "meeting that from " + place(corners_[b]) + " to " + place(end(b))});
+                  .value = "meeting the edge from " + place(corners_[b]) + " to " + place(end(b))});
   };
   for (const std::vector<std::uint32_t>& strip : strips_)
     for (std::size_t i = 0; i < strip.size(); ++i)
@@ -133,7 +133,7 @@ bool PlanPolygon::contains(const Vector2d& point) const {
     const Vector2d& a = corners_[n];
     const Vector2d& b = corners_[(n + 1) % corners_.size()];
     if (distance_to_segment(point, a, b) <= on_border_m) return true;
-    // Each edge with its lower end and without its upper one.
+    // An edge includes its lower end and excludes its upper end.
     if ((a.y() > point.y()) == (b.y() > point.y())) continue;
     const bool left = cross(b - a, point - a) > 0.0;
     if (left == (b.y() > a.y())) inside = !inside;
@@ -156,7 +156,7 @@ std::vector<std::uint32_t> PlanPolygon::edges_near(const Vector2d& box_min,
       if ((a.cwiseMax(b).array() < box_min.array()).any() ||
           (a.cwiseMin(b).array() > box_max.array()).any())
         continue;
-      // The box lies on one side of the edge's line.
+      // Skips edges whose line does not intersect the box.
       const Vector2d normal(a.y() - b.y(), b.x() - a.x());
       if (std::abs(normal.dot(center - a)) > normal.cwiseAbs().dot(half) * (1.0 + 1e-9)) continue;
       edges.push_back(n);

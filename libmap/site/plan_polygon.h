@@ -11,15 +11,16 @@
 
 namespace libmap {
 
-// z of the cross product: twice the signed area of the triangle (0, a, b), counter-clockwise > 0.
+// z of the cross product: twice the signed area of the triangle (0, a, b), > 0 if
+// counter-clockwise.
 inline double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   return a.x() * b.y() - a.y() * b.x();
 }
 
 class PlanPolygon {
  public:
-  // Corners in order, either way round; a last one equal to the first is dropped. Throws Error:
-  // fewer than three, not finite, two in one place, edges that cross or touch, no area.
+  // Takes corners in either orientation. Drops a last corner equal to the first. Throws Error:
+  // fewer than three corners, not finite, two at one position, edges that cross or touch, no area.
   explicit PlanPolygon(std::vector<Eigen::Vector2d> corners);
 
   // Counter-clockwise.
@@ -28,10 +29,10 @@ class PlanPolygon {
   Eigen::Vector2d min() const { return min_; }
   Eigen::Vector2d max() const { return max_; }
 
-  // Inside, or within 1e-9 m of the border.
+  // True for points inside or within 1e-9 m of the border.
   bool contains(const Eigen::Vector2d& point) const;
 
-  // The edges, each named by its first corner, that come near the box, ascending.
+  // Candidates for edges that intersect the box, by the index of their first corner, ascending.
   std::vector<std::uint32_t> edges_near(const Eigen::Vector2d& box_min,
                                         const Eigen::Vector2d& box_max) const;
 
@@ -44,13 +45,13 @@ class PlanPolygon {
   Eigen::Vector2d min_ = Eigen::Vector2d::Zero();
   Eigen::Vector2d max_ = Eigen::Vector2d::Zero();
   double area_m2_ = 0.0;
-  std::vector<std::vector<std::uint32_t>> strips_;  // edges by where they are along y
+  std::vector<std::vector<std::uint32_t>> strips_;  // edges by interval of y
 };
 
 // The rectangle from min to max.
 PlanPolygon make_rectangle(const Eigen::Vector2d& min, const Eigen::Vector2d& max);
 
-// A polygon extruded between two heights. Without a polygon: everything between the heights.
+// Polygon extruded between two heights. Without a polygon, it contains all points between them.
 struct ExtrudedPolygon {
   std::optional<PlanPolygon> polygon{};
   double min_z = -std::numeric_limits<double>::infinity();
@@ -62,7 +63,7 @@ struct ExtrudedPolygon {
   }
 };
 
-// The points inside and on the border, with their normals, colors and fields.
+// Returns the points inside and on the border, with their normals, colors and fields.
 PointCloud clip_cloud(const PointCloud& cloud, const ExtrudedPolygon& prism);
 
 }  // namespace libmap

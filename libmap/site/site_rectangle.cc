@@ -23,9 +23,9 @@ using Mask = Image<std::uint8_t>;
 
 constexpr double max_cells = 1e6;
 constexpr double max_on_a_side = 20000.0;
-constexpr double min_on_a_site = 20.0;  // cells along its shorter side
+constexpr double min_on_a_site = 20.0;  // cells along the shorter side of the site
 
-// Sums of a mask over rectangles in constant time (Crow 1984).
+// Summed-area table: sums of a mask over rectangles in constant time (Crow 1984).
 class AreaTable {
  public:
   explicit AreaTable(const Mask& mask) : sums_(mask.width + 1, mask.height + 1) {
@@ -40,7 +40,8 @@ class AreaTable {
   int width() const { return sums_.width - 1; }
   int height() const { return sums_.height - 1; }
 
-  // Of the columns x to x + width - 1 and rows y to y + height - 1, which lie in the mask.
+  // Sum over the columns x to x + width - 1 and rows y to y + height - 1, which must be in the
+  // mask.
   std::uint32_t sum(int x, int y, int width, int height) const {
     return sums_.at(x + width, y + height) - sums_.at(x, y + height) - sums_.at(x + width, y) +
            sums_.at(x, y);
@@ -54,7 +55,7 @@ class AreaTable {
   Image<std::uint32_t> sums_;
 };
 
-// Data seen from above, in cells.
+// Mask of the data in the x-y plane.
 struct Ground {
   Vector2d corner = Vector2d::Zero();
   double cell = 0.0;
@@ -80,7 +81,7 @@ Ground make_ground(const std::vector<Vector2d>& points, const SiteRectangleOptio
   const double area = (high - low).x() * (high - low).y();
   ground.cell = std::max(
       {options.cell_m, std::sqrt(area / max_cells), (high - low).maxCoeff() / max_on_a_side});
-  // A closing of this many cells on each side fills gaps of twice as many.
+  // A closing by `reach` cells in each direction fills gaps of 2 * reach cells.
   const int reach = static_cast<int>(std::ceil(options.max_gap_m / ground.cell / 2.0));
   const int rim = reach + 2;
   ground.corner = low - Vector2d::Constant((rim + 0.5) * ground.cell);
@@ -101,11 +102,11 @@ Ground make_ground(const std::vector<Vector2d>& points, const SiteRectangleOptio
 }
 
 struct Fit {
-  int growth = 0;  // cells on every side; negative: the rectangle is too large
+  int growth = 0;  // clearance in cells; negative: the rectangle is too large
   Vector2d center = Vector2d::Zero();
 };
 
-// The data seen along axes that are turned by yaw.
+// Mask of the data along axes rotated by a yaw.
 class TurnedGround {
  public:
   TurnedGround(const Ground& ground, double yaw_deg, double cell)
@@ -123,8 +124,8 @@ class TurnedGround {
     table_ = AreaTable(mask);
   }
 
-  // The best centered place of a rectangle of so many cells, if it fits somewhere when each side is
-  // as small as one cell.
+  // Best-centered position of a rectangle of `size` cells, with negative growth if it does not fit;
+  // nullopt if not even the smallest one fits.
   std::optional<Fit> best(const Eigen::Vector2i& size) const {
     int least = -(size.minCoeff() - 1) / 2;
     if (!fits(size, least)) return std::nullopt;
@@ -154,7 +155,7 @@ class TurnedGround {
     visit_places(size, growth, [&](const Vector2d&) { return !(found = true); });
     return found;
   }
-  // Of the equally good ones, that nearest to their mean.
+  // Among all positions that fit, the one nearest to their mean.
   Vector2d middle_place(const Eigen::Vector2i& size, int growth) const {
     std::vector<Vector2d> places;
     Vector2d mean = Vector2d::Zero();
@@ -198,8 +199,8 @@ std::vector<Direction> try_directions(const Ground& ground, const Vector2d& size
   return directions;
 }
 
-// Among the best the one that is not turned, else the middle of the least turned and the equally
-// good ones beside it.
+// Chooses the best direction: 0 if it is among the best, otherwise the middle of the interval of
+// best directions that contains the smallest rotation.
 const Direction& choose(const std::vector<Direction>& directions) {
   int most = growth_of(directions.front());
   for (const Direction& direction : directions) most = std::max(most, growth_of(direction));
@@ -239,7 +240,7 @@ void require_ranges(const Vector2d& size_m, const SiteRectangleOptions& options)
                                .bound = "> 0 and finite"});
 }
 
-// The gap with which a site fits into sparse data. Nothing for gaps of a quarter of the site.
+// Suggests a larger --max-gap if the site fits with it; empty for more than a quarter of the site.
 std::string gap_remedy(const std::vector<Vector2d>& points, const Vector2d& size_m,
                        SiteRectangleOptions options) {
   options.max_gap_m = std::max(2.0 * options.max_gap_m, options.cell_m);
@@ -255,20 +256,21 @@ std::string gap_remedy(const std::vector<Vector2d>& points, const Vector2d& size
 }  // namespace
 
 void bind(ParameterTable& table, SiteRectangleOptions& options) {
-  table.add("site_cell_m", options.cell_m, positive, "to which the data's border is known, m");
+  table.add("site_cell_m", options.cell_m, positive,
+            "cell size for finding the site in the data, m");
   table.add("max_gap_m", options.max_gap_m, not_negative,
-            "holes that no square of this size fits into count as data, m");
+            "holes that contain no square of this size count as data, m");
   table.add("margin_m", options.margin_m, not_negative,
-            "that the site keeps from holes, from the data's border and from the border band, m");
+            "minimum distance of the site from holes, data borders and the border band, m");
 }
 
 SiteRectangle find_site_rectangle(const std::vector<Vector2d>& points, const Vector2d& size_m,
                                   const SiteRectangleOptions& options) {
   require_ranges(size_m, options);
-  if (points.empty()) throw Error("there are no data to lay a site into");
+  if (points.empty()) throw Error("no data to find a site in");
   const Ground ground = make_ground(points, options);
   if (ground.cell > std::max(options.cell_m, size_m.minCoeff() / min_on_a_site))
-    throw Error("the data reach too far for a site of this size: are there stray points?",
+    throw Error("the data extend too far for a site of this size; remove stray points",
                 {.field = "size of the data",
                  .value = to_fixed_text(ground.cell * ground.mask.width, 0) + " x " +
                           to_fixed_text(ground.cell * ground.mask.height, 0) + " m"});
@@ -277,7 +279,7 @@ SiteRectangle find_site_rectangle(const std::vector<Vector2d>& points, const Vec
       std::max(ground.cell, std::min(4.0 * ground.cell, size_m.minCoeff() / 8.0));
   const Direction coarse =
       choose(try_directions(ground, size_m, coarse_cell, steps(-quarter, quarter, 1.0)));
-  // Not turned, or turned by what is best.
+  // Yaw 0 is tried as well as the neighborhood of the best yaw.
   std::vector<double> fine = steps(coarse.yaw_deg - 1.5, coarse.yaw_deg + 1.5, 0.125);
   if (coarse.yaw_deg != 0.0) fine.insert(fine.begin(), 0.0);
   const Direction best = choose(try_directions(ground, size_m, ground.cell, fine));

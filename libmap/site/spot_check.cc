@@ -15,13 +15,13 @@
 namespace libmap {
 
 void bind(ParameterTable& table, SpotCheckOptions& options) {
-  table.add("places", options.places, {1.0, 10000.0}, "places along each edge");
-  table.add("inset_m", options.inset_m, not_negative, "distance of the places from the edge");
+  table.add("places", options.places, {1.0, 10000.0}, "number of positions along each edge");
+  table.add("inset_m", options.inset_m, not_negative, "distance of the positions from the edge");
 }
 
 namespace {
 
-// Andrew's monotone chain (1979); counter-clockwise.
+// Convex hull, counter-clockwise, by Andrew's monotone chain (1979).
 std::vector<Eigen::Vector2d> convex_hull(std::vector<Eigen::Vector2d> points) {
   std::sort(points.begin(), points.end(), [](const auto& a, const auto& b) {
     return std::pair(a.x(), a.y()) < std::pair(b.x(), b.y());
@@ -35,7 +35,7 @@ std::vector<Eigen::Vector2d> convex_hull(std::vector<Eigen::Vector2d> points) {
         hull.pop_back();
       hull.push_back(point);
     }
-    // It begins the other side.
+    // The last point is the first of the other side.
     hull.pop_back();
     std::reverse(points.begin(), points.end());
   }
@@ -43,7 +43,7 @@ std::vector<Eigen::Vector2d> convex_hull(std::vector<Eigen::Vector2d> points) {
 }
 
 struct TurnedBox {
-  double angle = 0.0;  // of its first axis from x
+  double angle = 0.0;  // of its first axis relative to x, rad
   Eigen::Vector2d min = Eigen::Vector2d::Zero();
   Eigen::Vector2d max = Eigen::Vector2d::Zero();
   double area() const { return (max - min).prod(); }
@@ -61,7 +61,7 @@ TurnedBox box_at(const std::vector<Eigen::Vector2d>& points, double angle) {
   return box;
 }
 
-// One side of the least rectangle lies along the hull (Freeman and Shapira 1975).
+// One side of the smallest rectangle contains an edge of the hull (Freeman and Shapira 1975).
 TurnedBox min_box(const std::vector<Eigen::Vector2d>& hull) {
   constexpr double quarter = std::numbers::pi / 2;
   TurnedBox best = box_at(hull, 0.0);
@@ -91,7 +91,7 @@ SiteCorners corners_of(const TurnedBox& box) {
 }  // namespace
 
 SiteCorners bounding_corners(const std::vector<Eigen::Vector3d>& points, bool turned) {
-  if (points.empty()) throw Error("there is no point to lie a site around");
+  if (points.empty()) throw Error("no points to place a site around");
   std::vector<Eigen::Vector2d> places;
   places.reserve(points.size());
   for (const Eigen::Vector3d& point : points) places.emplace_back(point.head<2>());
@@ -147,7 +147,7 @@ void check(const SpotCheckOptions& options, const SiteCorners& site) {
   const double least = std::min((site.corners[1] - site.corners[0]).norm(),
                                 (site.corners[2] - site.corners[1]).norm());
   if (!(2.0 * options.inset_m < least))
-    throw Error("no place lies so far inside the site",
+    throw Error("positions are not inside the site",
                 {.field = "inset_m",
                  .value = to_text(options.inset_m),
                  .bound = "< " + to_text(static_cast<float>(least / 2)) + ", half a side"});
@@ -173,7 +173,7 @@ void summarize(SpotCheckResult& result) {
     sum += of_edge;
     result.measured += count;
   }
-  if (result.measured == 0) throw Error("no place along the site's edges has data and ground");
+  if (result.measured == 0) throw Error("no position along the site's edges has data and ground");
   result.mean_abs_error_m = sum / static_cast<double>(result.measured);
   result.mean_error_m /= static_cast<double>(result.measured);
 }

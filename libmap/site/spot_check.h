@@ -1,4 +1,4 @@
-// Heights checked at places along the edges of a site, as in table B 2-2 of "Graspable Target
+// Height errors of a surface along the edges of a site, as in table B 2-2 of "Graspable Target
 // Detection for Hexapod Robots" (2023).
 #pragma once
 
@@ -15,32 +15,33 @@
 
 namespace libmap {
 
-// The corners counter-clockwise, seen from above, from the one with the least x and y on. Edge a
-// (y = min) runs from the first to the second, b (x = max) to the third, c (y = max) to the fourth,
-// d (x = min) back.
+// Corners counter-clockwise in the x-y plane, starting at the minimum of x and y. Edge a (y = min)
+// leads from the first to the second corner, b (x = max) to the third, c (y = max) to the fourth,
+// d (x = min) to the first.
 struct SiteCorners {
   std::array<Eigen::Vector2d, 4> corners{};
 };
 
-// The least rectangle around the points: along the axes, or `turned` by up to 45 degrees so that
-// its area is least. Throws Error if there is no point or the rectangle has no area.
+// Smallest rectangle around the points: parallel to the axes, or with `turned` rotated by up to 45
+// degrees for minimum area. Throws Error if there is no point or the rectangle has no area.
 SiteCorners bounding_corners(const std::vector<Eigen::Vector3d>& points, bool turned);
+// Corners of the rectangle from min to max. Throws Error if it has no area.
 SiteCorners corners_of(const Eigen::Vector2d& min, const Eigen::Vector2d& max);
 
-// The height of a surface at a place, m; nothing where there is none.
+// Height of a surface at a position in the x-y plane, m; nullopt if there is no surface.
 using HeightFunction = std::function<std::optional<double>(const Eigen::Vector2d& place)>;
 
-// Of a mesh: where a vertical ray from `from_z` downwards meets it first.
+// Height of the first intersection of a mesh with a vertical ray downwards from `from_z`.
 HeightFunction heights_of(const TriangleMesh& mesh,
                           double from_z = std::numeric_limits<double>::infinity());
-// Of a cloud: the median z of the points within `radius_m` of the vertical through the place;
-// nothing where there are fewer than `min_points`.
+// Median z of the points of a cloud within a horizontal distance of `radius_m`; nullopt if there
+// are fewer than `min_points`.
 HeightFunction heights_of(const std::vector<Eigen::Vector3d>& points, double radius_m,
                           int min_points);
 
 struct SpotCheckOptions {
-  int places = 7;         // along each edge, in the middles of as many equal parts; >= 1
-  double inset_m = 0.05;  // of the places from the edge; >= 0
+  int places = 7;         // >= 1: positions per edge, at the centers of as many equal parts
+  double inset_m = 0.05;  // >= 0: distance of the positions from the edge
 };
 void bind(ParameterTable& table, SpotCheckOptions& options);
 
@@ -49,7 +50,7 @@ struct SpotCheckPlace {
   std::optional<double> height_m{};
   std::optional<double> ground_m{};
 
-  // Height above the ground, where both are known.
+  // Height above the ground; nullopt unless both are known.
   std::optional<double> error_m() const {
     if (!height_m || !ground_m) return std::nullopt;
     return *height_m - *ground_m;
@@ -58,16 +59,16 @@ struct SpotCheckPlace {
 
 struct SpotCheckResult {
   std::array<std::vector<SpotCheckPlace>, 4> edges;  // a, b, c, d
-  std::array<std::optional<double>, 4> mean_m;       // of the sizes of each edge's errors
-  std::size_t measured = 0;                          // places with an error
-  std::size_t missing = 0;                           // and without
-  double mean_abs_error_m = 0.0;                     // of all errors' sizes
-  double mean_error_m = 0.0;                         // with their signs
+  std::array<std::optional<double>, 4> mean_m;       // mean absolute error by edge
+  std::size_t measured = 0;                          // positions with an error
+  std::size_t missing = 0;                           // positions without
+  double mean_abs_error_m = 0.0;                     // over all positions
+  double mean_error_m = 0.0;                         // signed
   double max_abs_error_m = 0.0;
 };
 
-// Throws Error: options out of their ranges, an inset of half a side or more, no place with an
-// error.
+// Compares `surface` with `ground` at positions along the site's edges. Throws Error: options out
+// of their ranges, an inset of half a side or more, no position where both have a height.
 SpotCheckResult check_edges(const SiteCorners& site, const HeightFunction& surface,
                             const HeightFunction& ground, const SpotCheckOptions& options = {});
 

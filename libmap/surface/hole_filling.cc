@@ -26,34 +26,33 @@ namespace processing = CGAL::Polygon_mesh_processing;
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using Mesh = CGAL::Surface_mesh<Kernel::Point_3>;
 
-// A boundary of more edges is left open: its triangulation may take the square of them.
+// Longer boundaries stay open: the time of triangulation may grow with the square of the edges.
 constexpr std::size_t max_hole_edges = 5000;
 
-// Rings of triangles around a hole that its patch is fitted to; the curvature at the boundary
-// needs one.
+// Rings of triangles around a hole that its patch is fitted to; curvature at the boundary needs
+// one.
 constexpr int rings = 2;
 
-// Larger holes are triangulated over their Delaunay triangulation alone: the search over all
-// triangulations takes the cube of the number of edges.
+// Larger holes are triangulated only over their Delaunay triangulation, because the time of a
+// search over all triangulations grows with the cube of the number of edges.
 constexpr std::size_t max_cubic_edges = 150;
 
-// The surface that closes a hole.
+// Type of a patch.
 enum class PatchShape {
-  faired,        // as smooth as the surface around it: tangent planes continued (C1)
-  refined,       // triangles as large as those around the hole
+  faired,        // continues the tangent planes of the surface around it (C1)
+  refined,       // triangles of the size of those around the hole
   triangulated,  // no new vertices
 };
 constexpr std::array<PatchShape, 3> shapes = {PatchShape::faired, PatchShape::refined,
                                               PatchShape::triangulated};
 
-// Indices below `vertices` of the mesh that was given are its own; the others are those of
-// `new_vertices` behind them.
+// Patch of a hole. Indices count the vertices of the surroundings, then `new_vertices`.
 struct HolePatch {
   std::vector<Eigen::Vector3d> new_vertices;
-  std::vector<Triangle> triangles;  // empty: none was found
+  std::vector<Triangle> triangles;  // empty: no patch was found
 };
 
-// Whether all of it could be entered.
+// Adds vertices and triangles to `mesh`. Returns false if they are not manifold.
 bool enter(const std::vector<Eigen::Vector3d>& vertices, const std::vector<Triangle>& triangles,
            Mesh& mesh) {
   for (const Eigen::Vector3d& v : vertices) mesh.add_vertex({v.x(), v.y(), v.z()});
@@ -103,9 +102,9 @@ HolePatch patch_from(const Mesh& mesh, const std::vector<Mesh::Face_index>& face
 }
 
 // Triangulates the boundary (Liepa 2003, "Filling holes in meshes"; over a Delaunay triangulation
-// where that holds a solution), refines and fairs it. `surroundings` are the triangles near the
-// hole, an oriented manifold; the half-edge from `from` to `to` is one of the hole's. Never throws
-// for geometry that cannot be filled.
+// if that contains a solution), refines and fairs it. `surroundings` are the triangles near the
+// hole, an oriented manifold with the boundary half-edge from `from` to `to`. Returns an empty
+// patch if the hole cannot be filled.
 HolePatch patch_hole(const std::vector<Eigen::Vector3d>& vertices,
                      const std::vector<Triangle>& surroundings, std::uint32_t from,
                      std::uint32_t to, PatchShape shape) {
@@ -119,7 +118,7 @@ HolePatch patch_hole(const std::vector<Eigen::Vector3d>& vertices,
     if (!mesh.is_border(border)) return {};
     return patch_from(mesh, fill(mesh, border, shape), vertices.size());
   } catch (const std::exception&) {
-    // CGAL reports geometry that it cannot take by exceptions of several kinds.
+    // CGAL throws several types of exceptions for unsuitable geometry.
     return {};
   }
 }
@@ -143,7 +142,7 @@ struct Reach {
   double of_component_m = 0.0;
 };
 
-// Whether each loop is its component's outer boundary.
+// For each loop, true if it is the outer boundary of its component.
 std::vector<bool> outer_boundaries(const TriangleMesh& mesh, const MeshComponents& components,
                                    const std::vector<BoundaryLoop>& loops,
                                    const std::optional<PlanBox>& known) {
@@ -180,14 +179,14 @@ std::vector<bool> outer_boundaries(const TriangleMesh& mesh, const MeshComponent
   return is_outer;
 }
 
-// A patch with the indices of its surroundings: below `vertices.size()` those of the mesh.
+// A patch whose indices below `vertices.size()` refer to `vertices`, which are indices of the mesh.
 struct PlacedPatch {
   std::vector<std::uint32_t> vertices;
   HolePatch patch;
   bool found() const { return !patch.triangles.empty(); }
 };
 
-// Numbers of the vertices that triangles name, ascending.
+// Vertices of the triangles, ascending.
 std::vector<std::uint32_t> named_vertices(const std::vector<Triangle>& triangles) {
   std::vector<std::uint32_t> vertices;
   for (const Triangle& t : triangles) vertices.insert(vertices.end(), t.begin(), t.end());
@@ -243,7 +242,7 @@ class HolePatcher {
     return triangles;
   }
 
-  // Each edge of the patch has two triangles, none of them degenerate.
+  // True if each edge of the patch has two triangles, and no triangle is degenerate.
   bool stands(const std::vector<Eigen::Vector3d>& positions, const std::vector<Triangle>& around,
               const HolePatch& patch) const {
     TriangleMesh joined;
@@ -270,7 +269,7 @@ class HolePatcher {
   double lowest_height_;
 };
 
-// A new vertex at `position` with the values of the boundary's vertices.
+// Appends a vertex with values interpolated from the vertices of the boundary.
 void append_patch_vertex(TriangleMesh& mesh, const Eigen::Vector3d& position,
                          const std::vector<std::uint32_t>& boundary) {
   std::vector<double> weights;
@@ -299,7 +298,7 @@ void append_patch_vertex(TriangleMesh& mesh, const Eigen::Vector3d& position,
       field.values[added] = mean([&](std::uint32_t v) { return field.values[v]; });
 }
 
-// The triangle at that of the boundary's edges that is nearest to `place`.
+// Triangle at the edge of the boundary nearest to `place`.
 std::uint32_t nearest_triangle(const TriangleMesh& mesh, const BoundaryLoop& loop,
                                const Eigen::Vector3d& place) {
   double nearest = std::numeric_limits<double>::infinity();
@@ -334,7 +333,7 @@ void append_patch(TriangleMesh& mesh, const BoundaryLoop& loop, const PlacedPatc
   }
 }
 
-// Whether each patch meets no triangle but its neighbors.
+// For each patch, true if it intersects no triangle except its neighbors.
 std::vector<bool> free_patches(const TriangleMesh& base, const std::vector<BoundaryLoop>& holes,
                                const std::vector<PlacedPatch>& patches) {
   TriangleMesh trial;
@@ -381,7 +380,7 @@ std::vector<BoundaryLoop> find_holes(const TriangleMesh& mesh, double max_hole_m
     Eigen::AlignedBox3d box;
     for (const Eigen::Vector3d& p : positions) box.extend(p);
     if (known && !known->contains(PlanBox(box.min().head<2>(), box.max().head<2>()))) continue;
-    // The box's longest side is no longer than the diameter, its diagonal no shorter.
+    // The longest side of the box is a lower bound of the diameter, its diagonal an upper bound.
     if (box.sizes().maxCoeff() > max_hole_m) continue;
     if (box.diagonal().norm() <= max_hole_m || diameter_of(positions) <= max_hole_m)
       holes.push_back(std::move(loops[n]));

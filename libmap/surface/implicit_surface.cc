@@ -21,13 +21,14 @@ constexpr int block_cells = 8;
 constexpr int block_corners = block_cells + 1;
 constexpr std::size_t corners_per_block =
     std::size_t{block_corners} * block_corners * block_corners;
-// A vertex keeps this share of an edge away from its ends, so that triangles have an area.
+// Minimum distance of a vertex from the ends of its edge, per edge length, so that triangles have
+// an area.
 constexpr double min_share = 0.01;
-// Of the reach: how far aside of their weighted mean a place is. On the straight border of evenly
-// spread samples it is 0.26.
+// Maximum tangential distance from the weighted mean of the samples, per reach. It is 0.26 at the
+// straight border of evenly distributed samples.
 constexpr double max_aside = 0.4;
 
-// Corners of a cube and its edges, in the order of PCL's tables.
+// Corners and edges of a cube, in the order of PCL's tables.
 constexpr std::array<std::array<int, 3>, 8> corner_offsets = {
     {{0, 0, 0}, {1, 0, 0}, {1, 0, 1}, {0, 0, 1}, {0, 1, 0}, {1, 1, 0}, {1, 1, 1}, {0, 1, 1}}};
 constexpr std::array<std::array<int, 2>, 12> edge_corners = {{{0, 1},
@@ -45,16 +46,16 @@ constexpr std::array<std::array<int, 2>, 12> edge_corners = {{{0, 1},
 
 constexpr std::uint32_t unnumbered = 0xffffffff;
 
-// Sums over the samples around a corner; lengths in cells.
+// Weighted sums over the samples around a corner, in cells.
 struct Corner {
   double weight = 0.0;
   double height = 0.0;  // offset . normal
-  double square = 0.0;  // of the offset
+  double square = 0.0;  // squared offset
   double reach = 0.0;
-  Vector3d offset = Vector3d::Zero();  // from the samples
+  Vector3d offset = Vector3d::Zero();  // position relative to the corner
   Vector3d normal = Vector3d::Zero();
 
-  // Guennebaud and Gross 2007, eq. 5 to 7, about the corner: u_0 of the fitted sphere.
+  // u_0 of the fitted sphere relative to the corner (Guennebaud and Gross 2007, eq. 5 to 7).
   double value() const {
     const Vector3d mean = offset / weight;
     const Vector3d mean_normal = normal / weight;
@@ -64,7 +65,7 @@ struct Corner {
     return mean.dot(mean_normal + 2.0 * bend * mean) - bend * square / weight;
   }
 
-  // Whether samples are all around it, not only on one side.
+  // True if there are samples on all sides, not only on one.
   bool is_known() const {
     if (!(weight > 0.0)) return false;
     const double length = normal.squaredNorm();
@@ -75,35 +76,35 @@ struct Corner {
 };
 
 struct Block {
-  Vector3i begin;                      // its first cell
-  std::vector<std::uint32_t> samples;  // whose support reaches it, ascending
+  Vector3i begin;                      // first cell
+  std::vector<std::uint32_t> samples;  // samples whose support reaches the block, ascending
 };
 
-// The corners of one block's cubes.
+// Corners of the cubes of one block.
 struct BlockGrid {
   std::vector<Corner> corners = std::vector<Corner>(corners_per_block);
   std::vector<double> values;
-  // Of the block's part: on the edges from each corner along the axes.
+  // Vertices of the block's part on the three edges from each corner.
   std::vector<std::uint32_t> vertex_on =
       std::vector<std::uint32_t>(3 * corners_per_block, unnumbered);
 };
 
 struct Cube {
-  Vector3i place;                   // in its block
-  std::array<std::size_t, 8> at{};  // its corners
-  unsigned inside = 0;              // a bit a corner
+  Vector3i place;                   // position in the block
+  std::array<std::size_t, 8> at{};  // indices of the corners
+  unsigned inside = 0;              // one bit per corner
 };
 
-// What one block adds to the surface.
+// Part of the surface in one block.
 struct Part {
   struct Vertex {
     Vector3d position;
-    std::uint64_t corner = 0;  // packed: the lower corner of its edge
-    std::size_t axis = 0;      // of its edge
-    bool is_shared = false;    // the edge is one of other blocks, too
+    std::uint64_t corner = 0;  // packed lower corner of the vertex's edge
+    std::size_t axis = 0;      // direction of the edge
+    bool is_shared = false;    // true if other blocks contain the edge, too
   };
   std::vector<Vertex> vertices;
-  std::vector<Triangle> triangles;  // of these vertices
+  std::vector<Triangle> triangles;  // indices of `vertices`
 };
 
 class ImplicitSurface {
@@ -119,7 +120,7 @@ class ImplicitSurface {
   }
 
  private:
-  // In cells.
+  // Radius of a sample's support, in cells.
   double reach_of(const SurfaceSample& sample) const {
     return support_cells_ * std::max(1.0, static_cast<double>(sample.spacing_m) / cell_m_);
   }
@@ -209,7 +210,8 @@ void ImplicitSurface::march(const Block& block, Part& part) const {
       }
 }
 
-// Whether the surface passes through the cube, with samples all around; finds its corners.
+// Sets the corners of the cube. Returns true if the surface intersects it, with samples on all
+// sides.
 bool ImplicitSurface::is_crossed(const BlockGrid& grid, Cube& cube) {
   for (std::size_t c = 0; c < cube.at.size(); ++c) {
     const auto& offset = corner_offsets[c];
@@ -243,14 +245,14 @@ void ImplicitSurface::add_cube(const Block& block, const Cube& cube, BlockGrid& 
     }
     numbers[e] = known;
   }
-  // PCL's table turns triangles toward the inside.
+  // PCL's table orients triangles inwards.
   for (const int* edge = pcl::triTable[cube.inside]; *edge >= 0; edge += 3)
     part.triangles.push_back({numbers[static_cast<std::size_t>(edge[0])],
                               numbers[static_cast<std::size_t>(edge[1])],
                               numbers[static_cast<std::size_t>(edge[2])]});
 }
 
-// A share of the way along the edge from a corner of the block.
+// Vertex on the edge from a corner of the block, at the given share of its length.
 Part::Vertex ImplicitSurface::vertex_of(const Block& block, const Vector3i& in_block, int axis,
                                         double share) const {
   const Vector3i corner = block.begin + in_block;
@@ -268,7 +270,7 @@ TriangleMesh ImplicitSurface::joined() const {
   std::size_t triangles = 0;
   for (const Part& part : parts_) triangles += part.triangles.size();
   mesh.triangles.reserve(triangles);
-  // Of the shared vertices, by the axis of their edge.
+  // Shared vertices by the axis of their edge.
   std::array<VoxelIndex, 3> edges;
   std::array<std::vector<std::uint32_t>, 3> on_edges;
   std::vector<std::uint32_t> numbers;

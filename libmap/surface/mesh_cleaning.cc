@@ -21,7 +21,7 @@ namespace libmap {
 
 namespace {
 
-// Of the mesh's size: the tolerance for vertices that are one.
+// Default merge distance relative to the mesh's size.
 constexpr double merge_share = 1e-7;
 
 std::vector<bool> inverse(std::vector<bool> marks) {
@@ -32,11 +32,11 @@ std::vector<bool> inverse(std::vector<bool> marks) {
 constexpr int closing_rounds = 4;
 constexpr int max_rounds = 30;
 
-// Fields that only this file sees, while it works: no file has fields of such names.
+// Temporary fields, with names that do not occur in files.
 constexpr std::string_view boundary_field = "\x01on a boundary before";
 constexpr std::string_view component_field = "\x01component";
 
-// `filled` while this works: what was marked before keeps apart from what is put in now.
+// Temporary value of `filled` that distinguishes earlier from new triangles.
 constexpr double filled_before = 2.0;
 
 void erase_field(std::vector<ScalarField>& fields, std::string_view name) {
@@ -55,8 +55,8 @@ std::vector<bool> bad_faces(const TriangleMesh& mesh) {
   return marks;
 }
 
-// The pieces that removing triangles of `removed_m2` has cut off: smaller than that, and not the
-// largest piece of what was one component. `component_field` names the component of each triangle.
+// Drops fragments that the removal of triangles of area `removed_m2` cut off: pieces that are
+// smaller and not the largest piece of a former component, which component_field contains.
 void drop_fragments(TriangleMesh& mesh, std::size_t components_before, double removed_m2) {
   const ScalarField& former = *find_field(mesh.face_fields, component_field);
   const MeshComponents pieces = connected_components(mesh);
@@ -77,7 +77,7 @@ void drop_fragments(TriangleMesh& mesh, std::size_t components_before, double re
   if (count_of(keep) < keep.size()) mesh = select_triangles(mesh, keep);
 }
 
-// Loops that touch no boundary that was there before.
+// Boundary loops without vertices of an earlier boundary.
 std::vector<BoundaryLoop> new_loops(const TriangleMesh& mesh) {
   const std::vector<double>& before = find_field(mesh.vertex_fields, boundary_field)->values;
   std::vector<BoundaryLoop> loops = loops_of(mesh);
@@ -112,12 +112,12 @@ void remove_triangles(TriangleMesh& mesh, std::vector<bool> marks, int rings, do
   erase_field(mesh.face_fields, component_field);
 }
 
-// In rounds: triangles that meet others (self_intersections) or are degenerate are removed with a
-// ring of triangles around them, fragments that this cuts off as well, and the holes that it makes,
-// unless they reach a boundary that was there before, are closed (hole_filling; marked `filled`).
-// Each round takes one more ring. What still meets others after four rounds is removed alone and
-// stays open; vertices that this separates are `min_gap_m` apart (make_manifold). The mesh must be
-// an oriented manifold, and is one afterwards.
+// Removes intersecting (self_intersections) and degenerate triangles in rounds, with the rings of
+// triangles around them and the fragments that are cut off. Resulting holes that do not touch an
+// earlier boundary are closed (hole_filling) and marked `filled`. Each round removes one more ring.
+// Triangles that still intersect after four rounds are removed without a ring, and their holes stay
+// open. Separated vertices are `min_gap_m` apart (make_manifold). The mesh must be an oriented
+// manifold and stays one.
 void repair_intersections(double min_gap_m, MeshCleaningResult& result) {
   TriangleMesh& mesh = result.mesh;
   result.remaining_intersecting_triangles = 0;
@@ -147,7 +147,7 @@ constexpr double pass_band = 0.02;                            // k_PB = 1 / lamb
 constexpr double outward = 1.0 / (pass_band - 1.0 / inward);  // mu
 constexpr std::size_t vertices_grain = 4096;
 
-// The neighbors of each vertex that may move; those that stay have none.
+// Neighbors of each vertex; none for fixed vertices.
 struct Neighbors {
   std::vector<std::uint32_t> first;
   std::vector<std::uint32_t> vertices;
@@ -196,10 +196,9 @@ void smoothing_step(const Neighbors& neighbors, double share,
 }
 
 // Taubin 1995, "A signal processing approach to fair surface design": each iteration moves every
-// vertex by 0.5 of the way to the mean of its neighbors, weighted by the inverse of the edge's
-// length (Fujiwara), then by -0.505 of it: waves longer than the edges by far pass unchanged. The
-// vertices of boundaries and non-manifold edges stay. Positions alone change. The same for any
-// number of threads.
+// vertex by 0.5 of the way to the mean of its neighbors, weighted by the inverse edge length
+// (Fujiwara), then by -0.505 of it, which preserves waves much longer than the edges. Vertices of
+// boundaries and non-manifold edges are fixed. Only positions change.
 void smooth_mesh(TriangleMesh& mesh, int iterations) {
   if (iterations <= 0 || mesh.triangles.empty()) return;
   const Neighbors neighbors = neighbors_of(mesh);
@@ -210,7 +209,7 @@ void smooth_mesh(TriangleMesh& mesh, int iterations) {
   }
 }
 
-// Each edge has at most two triangles, in opposite senses, each vertex one fan.
+// True if each edge has at most two triangles, in opposite directions, and each vertex one fan.
 bool is_oriented_manifold(const TriangleMesh& mesh) {
   const MeshReport report = report_mesh(mesh, {.self_intersections = false});
   return report.is_manifold() && report.is_oriented() &&
@@ -232,8 +231,9 @@ class Cleaning {
       step("manifold", [&] { repair_manifold(); });
     } else if ((options_.max_hole_m > 0.0 || options_.decimation_error_m > 0.0) &&
                !is_oriented_manifold(mesh_())) {
-      throw Error("the mesh is no oriented manifold: holes and decimation need it repaired",
-                  {.field = "repair", .value = "false", .bound = "true"});
+      throw Error(
+          "the mesh is not an oriented manifold; hole filling and decimation require repair",
+          {.field = "repair", .value = "false", .bound = "true"});
     }
     step("islands", [&] { drop_islands(); });
     if (options_.repair) step("intersections", [&] { remove_intersections(); });
@@ -260,7 +260,7 @@ class Cleaning {
     progress_.end();
   }
 
-  // `cause` says what has taken all that there was.
+  // `cause` describes the removed triangles.
   void require_triangles(const TriangleMesh& mesh, const ErrorContext& cause) {
     if (mesh.triangles.empty() && !options_.known)
       throw Error("nothing is left of the mesh", cause);
@@ -299,7 +299,7 @@ class Cleaning {
     add(make_manifold(mesh_(), 2.0 * merge_distance()));
     const std::size_t caps = flip_caps(mesh_());
     result_.degenerate_triangles += caps;
-    // Caps dropped at a boundary may have left fans that touch in a vertex.
+    // Dropping caps at a boundary may leave fans that share only a vertex.
     if (caps > 0) add(make_manifold(mesh_(), 2.0 * merge_distance()));
     require_triangles(mesh_(), {.field = "triangles without area",
                                 .value = std::to_string(result_.degenerate_triangles)});
@@ -358,19 +358,19 @@ class Cleaning {
 
 void bind(ParameterTable& table, MeshCleaningOptions& options) {
   table.add("repair", options.repair,
-            "join vertices, drop bad triangles, cut what is no manifold, remove intersections");
+            "merge vertices, drop bad triangles, cut non-manifold edges, remove intersections");
   table.add("merge_distance_m", options.merge_distance_m, not_negative,
-            "vertices this near are one; 0: 1e-7 of the mesh's size");
+            "maximum distance of vertices that are merged; 0: 1e-7 of the mesh's size");
   table.add("min_island_area_m2", options.min_island_area_m2, not_negative,
-            "components with a smaller area are dropped");
+            "minimum area of a component, m2; smaller components are dropped");
   table.add("min_island_share", options.min_island_share, zero_to_one,
-            "components smaller than this share of the largest are dropped");
+            "minimum area of a component relative to the largest; smaller components are dropped");
   table.add("max_hole_m", options.max_hole_m, not_negative,
-            "holes up to this diameter are filled, the outer boundary never");
+            "maximum diameter of filled holes; outer boundaries stay open");
   table.add("smoothing_iterations", options.smoothing_iterations, not_negative,
-            "of Taubin's smoothing, which does not shrink");
+            "number of iterations of Taubin's smoothing, which does not shrink");
   table.add("decimation_error_m", options.decimation_error_m, not_negative,
-            "fewer triangles, nowhere farther than this from the surface before; 0: none");
+            "maximum distance between the decimated and the original surface; 0: no decimation");
 }
 
 MeshCleaningResult clean_mesh(const TriangleMesh& mesh, const MeshCleaningOptions& options,
@@ -383,8 +383,8 @@ MeshCleaningResult clean_mesh(const TriangleMesh& mesh, const MeshCleaningOption
 
 void describe(ResultTable& table, const MeshCleaningResult& result) {
   table.add("cut_edges", result.cut_edges, "edges that were cut: non-manifold or not orientable");
-  table.add("split_vertices", result.split_vertices, "copies of vertices of several fans");
-  table.add("degenerate_triangles", result.degenerate_triangles, "triangles removed without area");
+  table.add("split_vertices", result.split_vertices, "copies of vertices with several fans");
+  table.add("degenerate_triangles", result.degenerate_triangles, "removed triangles without area");
   table.add("islands", result.islands, "small components removed");
   table.add("island_area_m2", result.island_area_m2, "area of the small components removed");
   table.add("intersecting_triangles", result.intersecting_triangles,
@@ -392,7 +392,7 @@ void describe(ResultTable& table, const MeshCleaningResult& result) {
   table.add("remaining_intersecting_triangles", result.remaining_intersecting_triangles,
             "triangles that still intersect others");
   table.add("filled_holes", result.filling.holes, "holes filled");
-  table.add("filled_triangles", result.filling.triangles, "triangles that close holes");
+  table.add("filled_triangles", result.filling.triangles, "triangles that fill holes");
   table.add("filled_area_m2", result.filling.area_m2, "area of the holes filled");
   table.add("unfilled_holes", result.filling.unfilled, "holes that could not be filled");
   table.add("decimated_triangles", result.decimation.removed_triangles,

@@ -20,16 +20,15 @@ namespace libmap {
 
 namespace {
 
-// Attempts; in the later half the tolerance shrinks, should locking vertices not settle it.
+// In the second half of the attempts, the tolerance is reduced as well.
 constexpr int max_attempts = 12;
-// Of the error asked for, the tolerance for removed vertices, and what each of the later attempts
-// leaves of it. Between vertices the surfaces can be farther apart.
+// Tolerance for removed vertices relative to the maximum error, because the distance between
+// vertices can be larger, and its factor per later attempt.
 constexpr double tolerance_share = 0.7;
 constexpr double next_share = 0.7;
 constexpr double max_turn_deg = 30.0;
 constexpr float min_roundness = 0.2F;
-// Parts smaller than this share of what is allowed are not divided: what lies so near the bound
-// counts as above it.
+// Parts smaller than this share of the maximum error are not divided but regarded as above it.
 constexpr double smallest_part = 0.05;
 constexpr std::size_t triangles_grain = 1024;
 
@@ -43,7 +42,7 @@ struct Traits : OpenMesh::DefaultTraits {
 };
 using Mesh = OpenMesh::TriMesh_ArrayKernelT<Traits>;
 
-// About the first vertex: some of OpenMesh's modules reckon in single precision.
+// Relative to the first vertex, because some of OpenMesh's modules use single precision.
 bool enter(const TriangleMesh& from, const std::vector<bool>& locked, Mesh& mesh) {
   for (const Eigen::Vector3d& vertex : from.vertices) {
     const Eigen::Vector3d v = vertex - from.vertices.front();
@@ -100,8 +99,8 @@ using Corners = std::array<Eigen::Vector3d, 3>;
 constexpr std::uint32_t none = 0xffffffff;
 
 struct Deviation {
-  double bound_m = 0.0;                // infinite if a point is farther away than is allowed
-  std::uint32_t nearest_there = none;  // then the triangle nearest to such a place
+  double bound_m = 0.0;                // infinite if the distance exceeds the allowed one
+  std::uint32_t nearest_there = none;  // then the triangle of the other mesh nearest to the point
 };
 
 class DeviationBound {
@@ -169,8 +168,8 @@ double largest_of(const std::vector<Deviation>& deviations) {
   return largest;
 }
 
-// The larger of both ways. Vertices of the original at places where it is not allowed are locked,
-// with `rings` of triangles around.
+// Bound of the distance between both surfaces. Locks the vertices of the original where it exceeds
+// the allowed distance, with `rings` rings of triangles around them.
 double deviation(const TriangleMesh& original, const TriangleMesh& smaller, double allowed_m,
                  int rings, std::vector<bool>& locked) {
   const std::vector<Deviation> there = deviations(smaller, original, allowed_m);

@@ -20,11 +20,11 @@ namespace libmap {
 namespace {
 
 constexpr std::uint32_t no_vertex = 0xffffffff;
-// A row of caps may wait for its last one.
+// In a row of caps, each may depend on the next.
 constexpr std::size_t max_cap_passes = 1000;
-constexpr double max_coordinate = 1e30;  // its powers that areas and volumes need are finite
+constexpr double max_coordinate = 1e30;  // areas and volumes stay finite
 
-// A coordinate of 10^6 m still counts cells in whole numbers.
+// Cell indices of coordinates up to 10^6 m are exact.
 constexpr double min_cell_m = 3e-12;
 
 HalfEdge longest_edge(const TriangleMesh& mesh, std::uint32_t t) {
@@ -39,14 +39,14 @@ HalfEdge longest_edge(const TriangleMesh& mesh, std::uint32_t t) {
   return longest;
 }
 
-// Turns edges of an oriented manifold and keeps its adjacency.
+// Flips edges of an oriented manifold and updates its adjacency.
 class CapFlipper {
  public:
   explicit CapFlipper(TriangleMesh& mesh)
       : mesh_(mesh), opposite_(opposites_of(mesh)), keep_(mesh.triangles.size(), true) {}
 
-  // Whether anything was done: not if the triangle beyond is a cap that waits for another, or the
-  // new edge exists.
+  // Removes a cap. Returns false if the adjacent triangle is a cap that depends on another one, or
+  // if the new edge exists already.
   bool settle(std::uint32_t cap, const std::function<bool(std::uint32_t)>& is_cap) {
     const HalfEdge h = longest_edge(mesh_, cap);
     const HalfEdge across = opposite_[h];
@@ -63,13 +63,13 @@ class CapFlipper {
     return true;
   }
 
-  // The two triangles of the last flip.
+  // Triangles of the last flip.
   const std::array<std::uint32_t, 2>& touched() const { return touched_; }
   bool keeps(std::uint32_t t) const { return keep_[t]; }
   const std::vector<bool>& kept() const { return keep_; }
 
  private:
-  // Whether an edge leads from the vertex of this corner to `to`.
+  // True if an edge joins the vertex of this corner and `to`.
   bool is_edge(HalfEdge corner, std::uint32_t to) const {
     HalfEdge h = corner;
     for (std::size_t step = 0; step < mesh_.triangles.size(); ++step) {
@@ -81,7 +81,7 @@ class CapFlipper {
       if (!is_joined(across)) break;
       h = across;
     }
-    // The fan is open: the other way round, too.
+    // The fan is open: continues in the other direction.
     h = corner;
     for (std::size_t step = 0; step < mesh_.triangles.size() && is_joined(opposite_[h]); ++step) {
       h = next_in_triangle(opposite_[h]);
@@ -95,7 +95,7 @@ class CapFlipper {
     if (is_joined(b)) opposite_[b] = a;
   }
 
-  // a -> b with the corner c on one side and d on the other becomes c -- d.
+  // Replaces the edge a -- b between the corners c and d by c -- d.
   void flip(HalfEdge h) {
     const HalfEdge o = opposite_[h];
     const std::uint32_t t = h / 3;
@@ -115,7 +115,7 @@ class CapFlipper {
     join(3 * t + 2, over_ca);
     join(3 * u, over_db);
     join(3 * u + 1, over_bc);
-    // All of the area was the neighbor's.
+    // The cap takes the values of its neighbor, which had all the area.
     for (ScalarField& field : mesh_.face_fields) field.values[t] = field.values[u];
   }
 
@@ -140,9 +140,9 @@ void require_sound(const TriangleMesh& mesh) {
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
     for (int axis = 0; axis < 3; ++axis)
       if (!(std::abs(mesh.vertices[v][axis]) <= max_coordinate))
-        throw Error("it cannot be a place", {.field = "vertex " + std::to_string(v),
-                                             .value = std::to_string(mesh.vertices[v][axis]),
-                                             .bound = "within 1e30 m of the origin"});
+        throw Error("invalid position", {.field = "vertex " + std::to_string(v),
+                                         .value = std::to_string(mesh.vertices[v][axis]),
+                                         .bound = "within 1e30 m of the origin"});
 }
 
 double size_of(const TriangleMesh& mesh) {
@@ -170,11 +170,10 @@ std::vector<bool> degenerate_triangles(const TriangleMesh& mesh) {
 }
 
 std::size_t weld_vertices(TriangleMesh& mesh, double distance_m) {
-  // Most searches look into one or two cells. The odd factor keeps vertices of a lattice from the
-  // same slots.
+  // Most searches need one or two cells. The odd factor avoids hash collisions of lattice vertices.
   const double cell_m = std::max(4.1 * distance_m, min_cell_m);
   GrowingGrid grid(Eigen::Vector3d::Zero(), cell_m, mesh.vertices.size());
-  std::vector<std::uint32_t> kept;  // vertices by their number in the grid
+  std::vector<std::uint32_t> kept;  // vertices by their index in the grid
   std::vector<std::uint32_t> kept_of(mesh.vertices.size());
   const Eigen::Vector3d margin = Eigen::Vector3d::Constant(distance_m);
   for (std::uint32_t v = 0; v < mesh.vertices.size(); ++v) {
@@ -226,7 +225,7 @@ std::size_t flip_caps(TriangleMesh& mesh) {
   const auto is_cap = [&](std::uint32_t t) {
     return lowest_height(mesh, mesh.triangles[t]) <= lowest;
   };
-  // Each pass settles a cap that others wait for, or is the last one.
+  // Each pass but the last removes at least one cap that others depend on.
   for (std::size_t pass = 0; pass <= max_cap_passes; ++pass) {
     bool has_changed = false;
     std::vector<std::uint32_t> left;
@@ -236,7 +235,7 @@ std::size_t flip_caps(TriangleMesh& mesh) {
       if (flipper.keeps(cap)) left.push_back(cap);
       if (flipper.keeps(cap) && flipper.touched()[0] == cap) left.push_back(flipper.touched()[1]);
     }
-    std::sort(left.rbegin(), left.rend());  // each pass in the other direction than the one before
+    std::sort(left.rbegin(), left.rend());  // the order is reversed in each pass
     left.erase(std::unique(left.begin(), left.end()), left.end());
     if (pass % 2 == 1) std::reverse(left.begin(), left.end());
     caps = std::move(left);
@@ -251,14 +250,14 @@ std::size_t flip_caps(TriangleMesh& mesh) {
 
 namespace {
 
-// Of the way to the middle of its fan, by which a copy of a vertex moves away from the others.
+// Displacement of a copied vertex, per distance to the center of its fan.
 constexpr double gap = 0.01;
 constexpr double max_gap = 0.5;
 
-// Edges of more triangles than this are cut without looking for pairs.
+// Edges with more triangles are cut without searching for pairs.
 constexpr std::size_t max_paired = 16;
 
-// From the edge to the triangle's third corner, across the edge, of unit length.
+// Unit vector perpendicular to the edge, towards the triangle's third corner.
 Eigen::Vector3d wing_of(const TriangleMesh& mesh, HalfEdge h) {
   const Eigen::Vector3d& from = mesh.vertices[source_of(mesh.triangles, h)];
   const Eigen::Vector3d edge = along(mesh, h).normalized();
@@ -267,8 +266,8 @@ Eigen::Vector3d wing_of(const TriangleMesh& mesh, HalfEdge h) {
   return (to_apex - edge.dot(to_apex) * edge).normalized();
 }
 
-// Joins at most `max_pairs` pairs of the edge's half-edges, straightest first; opens the others.
-// Whether any was opened.
+// Joins at most `max_pairs` pairs of the edge's half-edges, straightest first, and opens the
+// others. Returns true if any was opened.
 bool pair_half_edges(const TriangleMesh& mesh, const HalfEdge* half, std::size_t count,
                      std::size_t max_pairs, std::vector<HalfEdge>& opposite) {
   for (std::size_t n = 0; n < count; ++n) opposite[half[n]] = open_edge;
@@ -292,7 +291,7 @@ bool pair_half_edges(const TriangleMesh& mesh, const HalfEdge* half, std::size_t
   return 2 * joined < count;
 }
 
-// Which triangles must be turned over; edges across which that cannot be settled are opened.
+// Finds the triangles to be reversed. Opens edges across which no consistent orientation exists.
 class Orientation {
  public:
   Orientation(const TriangleMesh& mesh, std::vector<HalfEdge>& opposite)
@@ -351,7 +350,7 @@ struct Fan {
   std::size_t ring_count = 0;
 };
 
-// The fans of one vertex: `corners` are all corners there.
+// Fans of one vertex; `corners` are all its corners.
 std::vector<Fan> fans_of(const TriangleMesh& mesh, const std::vector<HalfEdge>& fan_of_corner,
                          const std::vector<HalfEdge>& corners) {
   std::vector<Fan> fans;
@@ -371,7 +370,7 @@ std::vector<Fan> fans_of(const TriangleMesh& mesh, const std::vector<HalfEdge>& 
   return fans;
 }
 
-// Gives each fan a vertex of its own. How many vertices that adds.
+// Gives each fan its own vertex. Returns the number of added vertices.
 std::size_t split_vertices(TriangleMesh& mesh, const std::vector<HalfEdge>& fan_of_corner,
                            double min_gap_m) {
   std::vector<HalfEdge> first_fan(mesh.vertices.size(), open_edge);
@@ -384,7 +383,7 @@ std::size_t split_vertices(TriangleMesh& mesh, const std::vector<HalfEdge>& fan_
   const std::size_t vertices_before = mesh.vertices.size();
   if (std::find(is_split.begin(), is_split.end(), true) == is_split.end()) return 0;
   const VertexTriangles around = triangles_at_vertices(mesh.triangles, vertices_before);
-  std::vector<std::pair<HalfEdge, std::uint32_t>> copy_of_fan;  // applied when all are known
+  std::vector<std::pair<HalfEdge, std::uint32_t>> copy_of_fan;  // applied at the end
   for (std::uint32_t v = 0; v < vertices_before; ++v) {
     if (!is_split[v]) continue;
     std::vector<HalfEdge> corners;
@@ -415,7 +414,7 @@ std::size_t split_vertices(TriangleMesh& mesh, const std::vector<HalfEdge>& fan_
   return mesh.vertices.size() - vertices_before;
 }
 
-// Whether every edge was one of at most two triangles, in opposite senses, without cuts.
+// Returns true if every edge had at most two triangles, in opposite directions, before cutting.
 bool cut_and_orient(TriangleMesh& mesh, std::size_t max_pairs, double min_gap_m,
                     ManifoldCuts& cuts) {
   const MeshEdges edges = edges_of(mesh.triangles, mesh.vertices.size());
@@ -440,8 +439,8 @@ bool cut_and_orient(TriangleMesh& mesh, std::size_t max_pairs, double min_gap_m,
   return is_sound && cuts.edges == edges_before;
 }
 
-// Of each edge that is still one of more than two triangles, or of two in the same sense, all but
-// the first triangle go.
+// Drops all but the first triangle of edges that still have more than two triangles, or two in the
+// same direction.
 void drop_unsettled(TriangleMesh& mesh, ManifoldCuts& cuts) {
   const MeshEdges edges = edges_of(mesh.triangles, mesh.vertices.size());
   std::vector<bool> keep(mesh.triangles.size(), true);
@@ -463,8 +462,8 @@ void drop_unsettled(TriangleMesh& mesh, ManifoldCuts& cuts) {
 
 ManifoldCuts make_manifold(TriangleMesh& mesh, double min_gap_m) {
   ManifoldCuts cuts;
-  // A fan may pass one edge twice; splitting vertices does not part it there. The second round
-  // leaves such an edge one pair, the third none.
+  // A fan may contain an edge twice, which splitting vertices does not separate. The second round
+  // keeps one pair at such an edge, the third none.
   for (;;) {
     for (const std::size_t max_pairs : {max_paired, std::size_t{1}, std::size_t{0}, std::size_t{0}})
       if (cut_and_orient(mesh, max_pairs, min_gap_m, cuts)) return cuts;

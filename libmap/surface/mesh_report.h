@@ -1,4 +1,4 @@
-// What a triangle mesh is as a surface: its parts, boundaries, genus, and what is wrong with it.
+// Reports topology and defects of a triangle mesh: components, boundaries, genus, and errors.
 #pragma once
 
 #include <cstddef>
@@ -10,15 +10,14 @@
 namespace libmap {
 
 struct MeshReportOptions {
-  // Takes most of the time.
-  bool self_intersections = true;
+  bool self_intersections = true;  // true: counts them, which takes most of the time
 };
 
-// A closed chain of edges that have a triangle on one side alone.
+// Closed chain of edges with one triangle.
 struct MeshBoundary {
   std::size_t edges = 0;
   double length_m = 0.0;
-  double diameter_m = 0.0;  // largest distance between two of its vertices
+  double diameter_m = 0.0;  // largest distance between two vertices
 };
 
 struct EdgeLengths {
@@ -27,49 +26,48 @@ struct EdgeLengths {
   double max_m = 0.0;
 };
 
-// Triangles that name a vertex twice count as degenerate and stand outside of all else.
+// Triangles with a repeated vertex are degenerate and are excluded from all other counts.
 struct MeshReport {
   std::size_t vertices = 0;
-  std::size_t unused_vertices = 0;  // of no triangle
+  std::size_t unused_vertices = 0;
   std::size_t triangles = 0;
-  std::size_t filled_triangles = 0;      // of the face field `filled`
-  std::size_t degenerate_triangles = 0;  // a vertex twice, or lower than 1e-9 of the mesh's size
-  std::size_t duplicate_triangles = 0;   // the corners of an earlier one, in any order
+  std::size_t filled_triangles = 0;      // with the face field `filled`
+  std::size_t degenerate_triangles = 0;  // repeated vertex, or height below 1e-9 of the mesh's size
+  std::size_t duplicate_triangles = 0;   // with the corners of an earlier triangle, in any order
   double area_m2 = 0.0;
   double largest_component_area_m2 = 0.0;
-  std::size_t components = 0;  // connected over edges
+  std::size_t components = 0;  // connected by edges
   EdgeLengths edge_lengths;
 
   std::size_t edges = 0;
-  std::size_t non_manifold_edges = 0;     // of more than two triangles
-  std::size_t non_manifold_vertices = 0;  // whose triangles are not one fan, such edges apart
-  std::size_t misoriented_edges = 0;      // whose two triangles run along it in the same sense
+  std::size_t non_manifold_edges = 0;     // with more than two triangles
+  std::size_t non_manifold_vertices = 0;  // with more than one fan, not counting such edges
+  std::size_t misoriented_edges = 0;      // with two triangles of the same direction
   std::size_t boundary_edges = 0;
   std::vector<MeshBoundary> boundaries;  // longest first
-  // Pairs of triangles that meet in more than the corners or the edge that they share; 0 if they
-  // were not looked for.
+  // Pairs of triangles that intersect in more than their common corners or edge; 0 if not counted.
   std::size_t self_intersections = 0;
   bool self_intersections_counted = false;
 
   bool is_manifold() const { return non_manifold_edges == 0 && non_manifold_vertices == 0; }
   bool is_oriented() const { return misoriented_edges == 0; }
-  // Every edge has two triangles.
+  // True if every edge has two triangles.
   bool is_closed() const { return triangles > 0 && boundary_edges == 0 && non_manifold_edges == 0; }
-  // Closed, manifold, oriented, and as far as is known without self-intersections.
+  // True if closed, manifold, oriented and without known self-intersections.
   bool is_watertight() const {
     return is_closed() && is_manifold() && is_oriented() && self_intersections == 0;
   }
   long euler_characteristic = 0;  // used vertices - edges + triangles
-  // Of a manifold and oriented mesh, the sum over its components, each boundary closed by a disc:
-  // components - (euler_characteristic + boundaries) / 2. Else -1.
+  // Sum over the components, with each boundary closed by a disc: components -
+  // (euler_characteristic + boundaries) / 2. -1 unless manifold and oriented.
   long genus = -1;
-  // Enclosed by a mesh that is closed, manifold and oriented, else 0. Negative: inside out.
+  // Enclosed volume, negative for inward normals. 0 unless closed, manifold and oriented.
   double volume_m3 = 0.0;
 };
 void describe(ResultTable& table, const MeshReport& report);
 
-// Throws Error: an index out of range, a vertex that is not finite. A mesh without triangles has a
-// report of zeros. The same for any number of threads.
+// Reports on a mesh; all counts are 0 without triangles. The result does not depend on the number
+// of threads. Throws Error: an index out of range, a vertex that is not finite.
 MeshReport report_mesh(const TriangleMesh& mesh, const MeshReportOptions& options = {});
 
 }  // namespace libmap

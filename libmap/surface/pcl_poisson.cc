@@ -19,7 +19,7 @@ namespace libmap {
 
 namespace {
 
-// PCL reports each face that it drops by printf. Standard output belongs to the caller's data.
+// Redirects standard output and error, because PCL prints a line for each face that it drops.
 class Silence {
  public:
   Silence() {
@@ -58,7 +58,7 @@ pcl::PointCloud<pcl::PointNormal>::Ptr to_pcl(const std::vector<SurfaceSample>& 
   for (const SurfaceSample& sample : samples) {
     pcl::PointNormal point;
     point.getVector3fMap() = sample.position;
-    // Its length is the confidence.
+    // The length of the normal is the confidence.
     point.getNormalVector3fMap() = sample.weight * sample.normal;
     cloud->push_back(point);
   }

@@ -26,7 +26,7 @@ constexpr std::size_t triangles_grain = 1024;
 
 Point point_of(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
-// The corners of a triangle, those shared with another first.
+// Corners of a triangle, starting with those shared with another triangle.
 struct Corners {
   std::array<Point, 3> points;
   CGAL::Orientation side_of(const Point& p) const {
@@ -35,7 +35,7 @@ struct Corners {
   Kernel::Triangle_3 triangle() const { return {points[0], points[1], points[2]}; }
 };
 
-// Whether all of the points b[from..2] lie strictly on one side of a's plane.
+// True if the points b[from..2] are strictly on one side of a's plane.
 bool apart(const Corners& a, const Corners& b, std::size_t from) {
   const CGAL::Orientation side = a.side_of(b.points[from]);
   if (side == CGAL::COPLANAR) return false;
@@ -56,8 +56,8 @@ class PairTest {
     const Corners first = corners(a);
     const Corners second = corners(b);
     if (shared == 2) return overlap_at_edge(first, second);
-    // The triangles meet in a convex set; with a corner in common, it is that corner alone or
-    // reaches to the opposite side of one of them.
+    // The intersection is convex; with a common corner, it is that corner or extends to the
+    // opposite side of one of the triangles.
     if (apart(first, second, shared) || apart(second, first, shared)) return false;
     if (shared == 0) return CGAL::do_intersect(first.triangle(), second.triangle());
     return CGAL::do_intersect(Kernel::Segment_3(first.points[1], first.points[2]),
@@ -79,7 +79,7 @@ class PairTest {
     return shared;
   }
 
-  // Triangles with an edge in common overlap only if they lie in one plane, on one side of it.
+  // Triangles with a common edge overlap only if they are coplanar and on one side of the edge.
   static bool overlap_at_edge(const Corners& a, const Corners& b) {
     if (a.side_of(b.points[2]) != CGAL::COPLANAR) return false;
     return CGAL::coplanar_orientation(a.points[0], a.points[1], a.points[2], b.points[2]) ==
@@ -94,7 +94,7 @@ class PairTest {
   const TriangleMesh& mesh_;
 };
 
-// Of triangles, in single precision: no smaller than they are.
+// Conservative bounding box in single precision.
 struct Box {
   std::array<float, 3> low = {HUGE_VALF, HUGE_VALF, HUGE_VALF};
   std::array<float, 3> high = {-HUGE_VALF, -HUGE_VALF, -HUGE_VALF};
@@ -116,7 +116,7 @@ Box box_of(const TriangleMesh& mesh, std::uint32_t triangle) {
   for (const std::uint32_t v : mesh.triangles[triangle])
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const auto value = static_cast<float>(mesh.vertices[v][static_cast<Eigen::Index>(axis)]);
-      // More than what was rounded.
+      // Exceeds the rounding error.
       const float margin = std::numeric_limits<float>::epsilon() * std::abs(value) +
                            std::numeric_limits<float>::min();
       box.low[axis] = std::min(box.low[axis], value - margin);
@@ -125,7 +125,7 @@ Box box_of(const TriangleMesh& mesh, std::uint32_t triangle) {
   return box;
 }
 
-// Boxes of triangles in the order of a Z curve, joined in groups of eight, these again, and so on.
+// Bounding volume hierarchy: boxes of triangles in Z order, recursively joined in groups of eight.
 class BoxTree {
  public:
   BoxTree(const TriangleMesh& mesh, const std::vector<std::uint32_t>& triangles)
@@ -141,7 +141,7 @@ class BoxTree {
     } while (levels_.back().size() > 1);
   }
 
-  // visit(triangle) for those whose boxes meet this one.
+  // Calls visit(triangle) for triangles whose boxes intersect `box`.
   template <typename Visit>
   void each_near(const Box& box, const Visit& visit) const {
     each_group_near(box, 0, [&](std::size_t group) {
@@ -150,10 +150,10 @@ class BoxTree {
     });
   }
 
-  // Of triangles.
+  // Number of groups of eight triangles.
   std::size_t groups() const { return levels_[1].size(); }
-  // visit(a, b) for pairs whose boxes meet, one in the group; of all groups together, each pair
-  // once.
+  // Calls visit(a, b) for pairs with intersecting boxes and one triangle in the group; each pair
+  // occurs in one group only.
   template <typename Visit>
   void each_pair(std::size_t group, const Visit& visit) const {
     each_group_near(levels_[1][group], group, [&](std::size_t other) {
@@ -184,7 +184,7 @@ class BoxTree {
 
   std::size_t end_of(std::size_t group) const { return std::min(8 * group + 8, triangles_.size()); }
 
-  // visit(group) for groups from `first` on whose boxes meet this one.
+  // Calls visit(group) for groups from `first` on whose boxes intersect `box`.
   template <typename Visit>
   void each_group_near(const Box& box, std::size_t first, const Visit& visit) const {
     walk(levels_.size() - 1, 0, box, first, visit);
@@ -203,19 +203,19 @@ class BoxTree {
   }
 
   std::vector<std::uint32_t> triangles_;
-  std::vector<std::vector<Box>> levels_;  // of triangles, of groups of eight, of groups of these...
+  std::vector<std::vector<Box>> levels_;  // boxes of triangles, of groups of eight, and so on
 };
 
 bool is_collinear(const TriangleMesh& mesh, const Triangle& t) {
   const Eigen::Vector3d& a = mesh.vertices[t[0]];
   const double longest =
       std::max((mesh.vertices[t[1]] - a).squaredNorm(), (mesh.vertices[t[2]] - a).squaredNorm());
-  // The exact predicate is asked only where doubles cannot tell.
+  // The exact predicate is used only if double precision does not suffice.
   if (area_normal(mesh, t).norm() > 1e-12 * longest) return false;
   return CGAL::collinear(point_of(a), point_of(mesh.vertices[t[1]]), point_of(mesh.vertices[t[2]]));
 }
 
-// 1 for triangles with an area, of those that `only` marks.
+// 1 for triangles that `only` marks and that have an area.
 std::vector<char> find_marked(const TriangleMesh& mesh, const std::vector<bool>& only) {
   std::vector<char> marks(mesh.triangles.size(), 0);
   parallel_each(marks.size(), 4096, [&](std::size_t t) {
@@ -224,7 +224,7 @@ std::vector<char> find_marked(const TriangleMesh& mesh, const std::vector<bool>&
   return marks;
 }
 
-// find(n, part) for each number below `count`, the parts joined.
+// Calls find(n, part) for each n below `count` and concatenates the parts.
 template <typename Find>
 std::vector<TrianglePair> found_in_ranges(std::size_t count, std::size_t grain, const Find& find) {
   return parallel_reduce(

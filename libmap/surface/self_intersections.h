@@ -1,4 +1,4 @@
-// Triangles of a mesh that run through each other (CGAL's exact predicates).
+// Finds intersecting triangles of a mesh (CGAL's exact predicates).
 #pragma once
 
 #include <cstdint>
@@ -11,10 +11,11 @@ namespace libmap {
 
 using TrianglePair = std::pair<std::uint32_t, std::uint32_t>;
 
-// Pairs (lower, higher), ascending, of triangles that meet in more than the corners or the edge
-// which they share by index; pairs that share all three corners are not looked at, nor triangles
-// whose corners lie on one line exactly. If `only` is not empty, one of each pair has its mark.
-// Indices must be in range and vertices finite. The same for any number of threads.
+// Pairs (lower, higher), ascending, of triangles that intersect in more than the corners or the
+// edge that they share by index. Excludes pairs with three common corners and triangles with
+// exactly collinear corners. If `only` is not empty, at least one triangle of each pair is marked.
+// Indices must be in range and vertices finite. The result does not depend on the number of
+// threads.
 std::vector<TrianglePair> find_self_intersections(const TriangleMesh& mesh,
                                                   const std::vector<bool>& only = {});
 

@@ -22,25 +22,25 @@ namespace libmap {
 
 namespace {
 
-// Neighbors by which the distance between samples is estimated.
+// Number of neighbors for estimating the distance between samples.
 constexpr std::size_t spacing_neighbors = 8;
-// Smallest weight of a point.
+// Minimum weight of a point.
 constexpr double min_weight = 1.0 / 16;
-// The octree's cube against the samples' box, at least.
+// Minimum size of the octree's cube relative to the samples' bounding box.
 constexpr double cube_margin = 1.1;
 constexpr int min_depth = 3;
 constexpr double max_grid_cells = voxel_cell_limit;
-// Smallest second standard deviation of a cloud's positions, against its first, of a surface.
+// Minimum ratio of the second to the first standard deviation of the positions.
 constexpr double min_width = 1e-4;
 
-// No surface passes between normals whose neighbors face opposite sides more often.
+// Maximum share of neighbors whose normals face opposite sides.
 constexpr double max_mixed_sides = 0.4;
 
 constexpr std::size_t value_neighbors = 4;
-// Cells beyond which only the nearest point has a say in a vertex's values.
+// Maximum distance in cells up to which neighbors other than the nearest influence values.
 constexpr double max_value_cells = 12.0;
 
-// The first bits of a positive number: 64 steps an octave.
+// Bits dropped from a positive number for a histogram of 64 steps per octave.
 constexpr unsigned dropped_bits = 46;
 
 bool has_normal(const PointCloud& cloud, std::size_t n) {
@@ -48,18 +48,18 @@ bool has_normal(const PointCloud& cloud, std::size_t n) {
   return cloud.positions[n].allFinite() && std::isfinite(length) && length > 0.0F;
 }
 
-// Samples are nowhere farther from the surface, in cells.
+// Maximum distance of samples from the surface, in cells.
 double max_reach_cells(const SurfaceReconstructionOptions& options) {
   return options.support_cells * max_spacing_cells + 1.0;
 }
-// Larger distances between samples change nothing, in cells.
+// Distance between samples, in cells, above which the result does not change.
 double max_known_spacing(const SurfaceReconstructionOptions& options) {
   return std::max(max_spacing_cells, max_reach_cells(options) / options.trim_distance_cells);
 }
 
-// Each vertex takes the mean of the 4 nearest points, weighted by 1 / (d^2 + radius^2); fields of
-// whole numbers the nearest point's value. A NaN of one point counts for nothing. Replaces colors
-// and fields; `tree` holds the cloud's positions.
+// Sets colors and fields of the vertices to the mean over the 4 nearest points, weighted by
+// 1 / (d^2 + radius^2). Integer fields take the nearest point's value. NaN is ignored. `tree`
+// contains the cloud's positions.
 void carry_values(const PointCloud& cloud, const PointTree& tree, double cell_size_m,
                   TriangleMesh& mesh) {
   const double radius_m = 0.5 * cell_size_m;
@@ -113,7 +113,7 @@ struct UsedPoint {
 
 class Reconstruction {
  public:
-  // `survey` is of the whole cloud, of which `cloud` is a part; nullptr: it is the whole.
+  // `survey` describes the whole cloud of which `cloud` is a part; nullptr: `cloud` is the whole.
   Reconstruction(const PointCloud& cloud, const SurfaceSurvey* survey,
                  const SurfaceReconstructionOptions& options, Progress& progress)
       : cloud_(cloud), options_(options), progress_(progress), is_part_(survey != nullptr) {
@@ -175,13 +175,13 @@ class Reconstruction {
   std::vector<std::size_t> used_;
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
   double median_error_m_ = 0.0;
-  double area_m2_ = 0.0;  // by the number and spacing of the points; not of a part
+  double area_m2_ = 0.0;  // estimated from number and spacing of the points; not set for a part
   const ScalarField* errors_ = nullptr;
   PoissonProblem problem_;
-  std::vector<SurfaceSample> samples_;   // about the origin
-  std::vector<Eigen::Vector3d> places_;  // of the samples, so too
-  std::optional<PointTree> tree_;        // of these places
-  std::vector<double> spacings_m_;       // around the samples
+  std::vector<SurfaceSample> samples_;   // relative to the origin
+  std::vector<Eigen::Vector3d> places_;  // positions of the samples, relative to the origin
+  std::optional<PointTree> tree_;        // of places_
+  std::vector<double> spacings_m_;       // local distance between samples
   SurfaceReconstructionResult result_;
 };
 
@@ -195,11 +195,11 @@ void Reconstruction::choose_points() {
   if (survey_.points() == 0) throw Error("no point of the cloud has a normal");
   const double opposing = opposing_share(cloud_.positions, cloud_.normals);
   if (opposing > max_mixed_sides)
-    throw Error("the normals have no consistent sides: orient them, or use --normals estimate",
+    throw Error("the normals are not consistently oriented; use --normals estimate",
                 {.field = "neighbors whose normals face opposite sides",
                  .value = to_fixed_text(100.0 * opposing, 1) + " %",
                  .bound = "<= " + to_text(100.0 * max_mixed_sides) + " %"});
-  // By position, so that the order of the points has no influence.
+  // Sorted, so that the result does not depend on the order of the points.
   const auto& positions = cloud_.positions;
   const auto& normals = cloud_.normals;
   std::sort(used_.begin(), used_.end(), [&](std::size_t a, std::size_t b) {
@@ -220,7 +220,8 @@ void Reconstruction::choose_cell_size() {
     if (places.empty() || places.back() != cloud_.positions[n])
       places.push_back(cloud_.positions[n]);
   const auto too_thin = [&](const char* reason) {
-    return Error(reason, {.field = "points", .value = std::to_string(places.size()) + " places"});
+    return Error(reason,
+                 {.field = "points", .value = std::to_string(places.size()) + " positions"});
   };
   if (places.size() < 3) throw too_thin("too few points for a surface");
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
@@ -233,14 +234,14 @@ void Reconstruction::choose_cell_size() {
   }
   const Eigen::Vector3d spread = symmetric_eigen(moments).values;
   if (!(spread[1] > min_width * min_width * spread[2]))
-    throw too_thin("the points lie on a line: there is no surface through them");
+    throw too_thin("all points are on a line: no surface");
   const CloudSpacing spacing = point_spacing(places);
   result_.spacing_m = spacing.nearest_m;
   if (!(options_.cell_size_m > 0.0)) result_.cell_size_m = result_.spacing_m;
   area_m2_ = static_cast<double>(places.size()) * spacing.by_area_m * spacing.by_area_m;
 }
 
-// Measured on rolling ground of 1 million points, and on a site of 300,000 with Poisson.
+// Coefficients measured on rolling ground of 1 million points, with poisson on a site of 300,000.
 SurfaceWork Reconstruction::expected_work() const {
   const double points = static_cast<double>(used_.size());
   SurfaceWork work;
@@ -254,7 +255,7 @@ SurfaceWork Reconstruction::expected_work() const {
 void Reconstruction::check_cell_size() {
   const Bounds3d& bounds = survey_.bounds();
   const double extent = (bounds.max - bounds.min).maxCoeff();
-  // The surface is kept as far as cells reach: such ones would invent ground around the points.
+  // The surface extends by about a cell, so larger cells would create ground around the points.
   if (result_.cell_size_m > extent)
     throw Error("cells larger than the cloud",
                 {.field = "cell_size_m",
@@ -268,7 +269,7 @@ void Reconstruction::check_cell_size() {
   if (!(result_.cell_size_m >= min_cell_m))
     throw Error(is_poisson ? "the octree would be deeper than " + std::to_string(max_octree_depth) +
                                  " levels"
-                           : "too small for the distance between the points",
+                           : "cells too small for the distance between the points",
                 {.field = "cell_size_m",
                  .value = to_text(static_cast<float>(result_.cell_size_m)),
                  .bound = ">= " + to_text(static_cast<float>(min_cell_m)) + " m"});
@@ -296,7 +297,7 @@ void Reconstruction::make_samples() {
     const Eigen::Vector3d position = in_cells(cloud_.positions[n]);
     points.push_back({n, position.array().floor().cast<int>(), position});
   }
-  // Block by block, cell by cell: what is near in space is near in memory.
+  // By block, then by cell, so that neighbors in space are neighbors in memory.
   const auto place = [](const UsedPoint& point) {
     const Eigen::Vector3i& cell = point.cell;
     return std::tuple(cell.z() >> 3, cell.y() >> 3, cell.x() >> 3, cell.z(), cell.y(), cell.x());
@@ -312,7 +313,7 @@ void Reconstruction::make_samples() {
   result_.samples = samples_.size();
 }
 
-// One sample for each side of a cell's surface.
+// Adds one sample for each side of the surface in a cell.
 void Reconstruction::add_cell(const UsedPoint* begin, const UsedPoint* end) {
   const auto normal_of = [&](const UsedPoint& point) {
     return cloud_.normals[point.index].normalized();
@@ -354,7 +355,7 @@ void Reconstruction::find_spacings() {
     const auto neighbors = tree.nearest(places_[n], spacing_neighbors + 1);
     spacings_m_[n] = max_m;
     if (is_part_ && neighbors.size() <= spacing_neighbors) return;
-    // The disc that reaches the last of them holds so many.
+    // Number of samples in the disc up to the farthest neighbor.
     const double count = static_cast<double>(neighbors.size()) - 0.5;
     spacings_m_[n] =
         std::min(max_m, std::sqrt(std::numbers::pi * neighbors.back().square_m2 / count));
@@ -364,10 +365,10 @@ void Reconstruction::find_spacings() {
         static_cast<float>(std::min(spacings_m_[n], max_spacing_cells * result_.cell_size_m));
 }
 
-// Triangles that lie near samples, and on their side.
+// Keeps the triangles near samples that have the orientation of the samples.
 void Reconstruction::trim(TriangleMesh& surface) {
   const PointTree& tree = *tree_;
-  std::vector<std::uint32_t> sample_of(surface.vertices.size());  // that is near a vertex; or none
+  std::vector<std::uint32_t> sample_of(surface.vertices.size());  // sample near a vertex, or none
   constexpr std::uint32_t none = 0xffffffff;
   parallel_each(sample_of.size(), 1024, [&](std::size_t v) {
     const NeighborPoint nearest = tree.first_of_nearest(surface.vertices[v]);
@@ -416,7 +417,7 @@ double SurfaceSurvey::median_error_m() const {
   std::size_t below = 0;
   for (const auto& [bits, number] : errors_) {
     below += number;
-    // The middle of the step.
+    // Center of the histogram's step.
     if (2 * below > count) return std::bit_cast<double>((2 * bits + 1) << (dropped_bits - 1));
   }
   return 0.0;
@@ -427,17 +428,17 @@ void bind(ParameterTable& table, SurfaceReconstructionOptions& options) {
             {{"implicit", SurfaceMethod::implicit}, {"poisson", SurfaceMethod::poisson}},
             "implicit: algebraic point set surface; poisson: screened Poisson reconstruction");
   table.add("support_cells", options.support_cells, {1.5, 10.0},
-            "of a point with method implicit, in cells or in the points' spacing");
+            "implicit: radius of influence of a point, in cells or in the points' spacing");
   table.add("cell_size_m", options.cell_size_m, not_negative,
-            "of the finest cells, and edges; 0: the distance between the cloud's points");
+            "size of the finest cells and of edges; 0: the distance between the cloud's points");
   table.add("screening", options.screening, not_negative,
-            "how much the surface is held to the points against being smooth");
+            "poisson: weight of the points relative to smoothness");
   table.add("weigh_by_error", options.weigh_by_error,
-            "points count by the inverse square of their field expected_error");
+            "weight points by the inverse square of their field expected_error");
   table.add("samples_per_cell", options.samples_per_cell, positive,
-            "points in a cell; with fewer the cells are larger there");
+            "poisson: minimum number of points per cell; with fewer, cells are larger");
   table.add("trim_distance_cells", options.trim_distance_cells, positive,
-            "no surface farther than this from all points, in cells or in the points' spacing");
+            "maximum distance of the surface from all points, in cells or in the points' spacing");
 }
 
 SurfaceReconstructionResult reconstruct_surface(const PointCloud& cloud,
@@ -457,13 +458,13 @@ SurfaceReconstructionResult reconstruct_part(const PointCloud& part, const Surfa
 
 double surface_margin_m(const SurfaceReconstructionOptions& options) {
   if (options.method != SurfaceMethod::implicit)
-    throw Error("is not local, so that its surface cannot be made in parts",
+    throw Error("reconstruction in parts requires a local method",
                 {.field = "method", .value = "poisson", .bound = "implicit"});
   if (!(options.cell_size_m > 0.0))
-    throw Error("must be given for a surface that is made in parts",
+    throw Error("reconstruction in parts requires a cell size",
                 {.field = "cell_size_m", .value = to_text(options.cell_size_m), .bound = "> 0"});
-  // A vertex depends on samples that reach its cube, they on those around them and each on the
-  // points of its cell.
+  // A vertex depends on the samples that reach its cube. Each sample depends on its neighbors and
+  // on the points of its cell.
   const double around =
       max_known_spacing(options) *
       std::sqrt((static_cast<double>(spacing_neighbors) + 0.5) / std::numbers::pi);
@@ -473,12 +474,13 @@ double surface_margin_m(const SurfaceReconstructionOptions& options) {
 
 void describe(ResultTable& table, const SurfaceReconstructionResult& result) {
   table.add("dropped_points", result.dropped_points, "points without a normal");
-  table.add("cell_size_m", result.cell_size_m, "side of the cells of the surface");
+  table.add("cell_size_m", result.cell_size_m, "size of the cells of the surface");
   table.add("spacing_m", result.spacing_m, "median distance of neighboring points");
   table.add("samples", result.samples, "samples that the points were reduced to");
-  table.add("octree_depth", result.octree_depth, "depth of the octree of method poisson, else 0");
+  table.add("octree_depth", result.octree_depth,
+            "depth of the octree of method poisson, otherwise 0");
   table.add("trimmed_triangles", result.trimmed_triangles,
-            "triangles removed for their distance from all points");
+            "triangles removed because of their distance from all points");
 }
 
 }  // namespace libmap

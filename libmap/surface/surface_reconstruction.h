@@ -1,4 +1,4 @@
-// A surface from a cloud of oriented points, in cells of the wanted size: by an algebraic point
+// Reconstructs a surface from a cloud with normals, in cells of a given size: as an algebraic point
 // set surface (surface_solvers.h), or by PCL's screened Poisson reconstruction (Kazhdan and Hoppe
 // 2013).
 #pragma once
@@ -17,96 +17,97 @@
 
 namespace libmap {
 
-// implicit: algebraic point set surface; it ends with the points. poisson: one thread, ten times as
-// slow; it ends about a cell farther out.
+// implicit: algebraic point set surface, which ends at the border of the points. poisson: one
+// thread, several times slower, extends about one cell farther.
 enum class SurfaceMethod { implicit, poisson };
 
 struct SurfaceReconstructionOptions {
   SurfaceMethod method = SurfaceMethod::implicit;
-  double support_cells = 2.5;  // >= 1.5: of a sample, with `implicit`; see surface_solvers.h
-  // >= 0: of the grid, or of the octree's finest cells; edges of the mesh are about as long. 0: the
-  // median distance of points to their nearest neighbors (median_spacing).
+  double support_cells = 2.5;  // >= 1.5: implicit: support of a sample; see surface_solvers.h
+  // >= 0: size of the grid's or the octree's finest cells, and about the length of the mesh's
+  // edges. 0: the median distance of points to their nearest neighbors (median_spacing).
   double cell_size_m = 0.0;
-  // poisson, >= 0: how much the surface is held to the points against being smooth
-  double screening = 4.0;
-  // Points count by their field `expected_error` (m), where they have it: inverse squares, and none
-  // more than one of the median error.
+  double screening = 4.0;  // >= 0: poisson: weight of the points relative to smoothness
+  // Weights points by the inverse square of their field `expected_error` (m), if it exists; points
+  // with less than the median error have equal weights.
   bool weigh_by_error = true;
-  // poisson, > 0: points (or their weights) in a cell; with fewer the cells are larger there.
+  // > 0: poisson: minimum number (or weight) of points per cell; with fewer, cells are larger.
   double samples_per_cell = 2.15;
-  // > 0: no surface farther than this from all points, in cells or, where that is more, in the
-  // local distance between points.
+  // > 0: maximum distance of the surface from all points, in cells or in local distances between
+  // points, whichever is more.
   double trim_distance_cells = 1.5;
 };
 void bind(ParameterTable& table, SurfaceReconstructionOptions& options);
 
-// poisson: the octree goes no deeper: 2^12 cells along the longest side, a tenth of them margin.
-// PCL's tables grow with the square of that number.
+// Maximum depth of the octree of poisson: 2^12 cells along the longest side, a tenth of them
+// margin. The memory of PCL's tables grows with the square of that number.
 inline constexpr int max_octree_depth = 12;
 
-// What all parts of a surface have in common that are made of parts of a cloud. Clouds may be added
-// part by part, in any order.
+// Properties of a whole cloud, for reconstructing its surface in parts. The cloud may be added in
+// parts, in any order.
 class SurfaceSurvey {
  public:
   // Throws Error if the cloud has points but no normals.
   void add(const PointCloud& cloud, bool weigh_by_error);
 
-  std::size_t points() const { return points_; }           // with a normal
-  std::size_t dropped_points() const { return dropped_; }  // without
-  const Bounds3d& bounds() const { return bounds_; }       // of those with a normal
-  // By whole cells from there the grid counts.
+  std::size_t points() const { return points_; }           // points with a normal
+  std::size_t dropped_points() const { return dropped_; }  // points without a normal
+  const Bounds3d& bounds() const { return bounds_; }       // of the points with a normal
+  // Origin of the grid.
   Eigen::Vector3d origin() const { return (bounds_.min + bounds_.max) / 2; }
-  // To 1.6 %; 0 if no point has an expected error.
+  // Median of `expected_error`, accurate to 1.6 %; 0 if no point has an expected error.
   double median_error_m() const;
 
  private:
   std::size_t points_ = 0;
   std::size_t dropped_ = 0;
   Bounds3d bounds_;
-  std::map<std::uint64_t, std::size_t> errors_;  // by their first bits
+  std::map<std::uint64_t, std::size_t> errors_;  // histogram by their leading bits
 };
 
 struct SurfaceReconstructionResult {
-  // Unit vertex normals. Colors and fields carried over from the points around each vertex.
+  // Has unit vertex normals, and colors and fields from the points around each vertex.
   TriangleMesh mesh;
   double cell_size_m = 0.0;
-  double spacing_m = 0.0;          // median distance of nearest neighbors
-  std::size_t dropped_points = 0;  // whose normal is zero or not finite
-  std::size_t samples = 0;         // the points of one cell and side are one
-  int octree_depth = 0;            // poisson
+  double spacing_m = 0.0;          // median distance to the nearest neighbor
+  std::size_t dropped_points = 0;  // points whose normal is zero or not finite
+  std::size_t samples = 0;         // one per cell and side of the surface
+  int octree_depth = 0;            // of poisson
   std::size_t trimmed_triangles = 0;
   StageTimings timings_s;
 };
 void describe(ResultTable& table, const SurfaceReconstructionResult& result);
 
-// Estimated before the work, from the number and the spacing of the points.
+// Estimate of the work from the number and the spacing of the points.
 struct SurfaceWork {
   double triangles = 0.0;
-  double bytes = 0.0;    // of memory
+  double bytes = 0.0;    // memory
   double seconds = 0.0;  // on one thread
 };
 using AnnounceWork = std::function<void(const SurfaceWork& work)>;
 
-// Oriented; open where points end. What is not manifold is for clean_mesh, and with poisson the
-// holes of single faces that PCL leaves out. PCL runs on one thread, since its result depends on
-// their number, and what it prints is kept from standard output and error, whoever writes there
-// meanwhile. The same bytes for any number of threads and any order of the points, but where points
-// of equal position and normal differ; a shift of the cloud shifts the mesh, but for rounding.
-// Throws Error: no normals, no point with a normal, normals whose neighbors face opposite sides,
-// fewer than 3 places or places on a line, options out of their ranges, an octree deeper than
-// max_octree_depth.
+// Reconstructs an oriented surface that is open at the border of the points. It may have
+// non-manifold parts, and with poisson holes of single faces, which clean_mesh repairs. PCL runs on
+// one thread, because its result depends on the number of threads; during this time, standard
+// output and error of the process are discarded. The result does not depend on the number of
+// threads and the order of the points, except for different values at equal position and normal. A
+// shift of the cloud shifts the mesh, except for rounding. `announce` is called before the work.
+// Throws Error: no normals, no point with a normal, inconsistent normals, fewer than 3 positions,
+// positions on a line, options out of their ranges, cells larger than the cloud or too small for
+// its point spacing, an octree deeper than max_octree_depth, PCL failed.
 SurfaceReconstructionResult reconstruct_surface(const PointCloud& cloud,
                                                 const SurfaceReconstructionOptions& options = {},
                                                 Progress& progress = no_progress(),
                                                 const AnnounceWork& announce = {});
 
-// The same surface, but for rounding of the vertices' order, of a part of a cloud that `survey` has
-// seen whole: exactly so farther than surface_margin_m() inside of where points are missing. For
-// implicit surfaces with a cell size that is given; of too few points, nothing.
+// Reconstructs the surface of a part of the cloud of `survey`. At a distance of surface_margin_m()
+// from missing points, it equals the surface of the whole cloud, except for the order. Empty for
+// too few points. Throws Error as reconstruct_surface and surface_margin_m.
 SurfaceReconstructionResult reconstruct_part(const PointCloud& part, const SurfaceSurvey& survey,
                                              const SurfaceReconstructionOptions& options,
                                              Progress& progress = no_progress());
-// Throws Error naming the option that surfaces cannot be made in parts with.
+// Distance up to which points influence the surface, m. Throws Error unless the method is implicit
+// and a cell size is given.
 double surface_margin_m(const SurfaceReconstructionOptions& options);
 
 }  // namespace libmap

@@ -15,20 +15,20 @@ namespace libmap {
 
 namespace {
 
-// Cells that the repair of intersections may change around them.
+// Distance in cells around intersections that their repair may change.
 constexpr double repair_cells = 12.0;
-// By which a triangle may lie beyond its center, in cells.
+// Maximum extent of a triangle from its center, in cells.
 constexpr double triangle_cells = 2.0;
-// Vertices on which Taubin's smoothing lets one depend, each iteration, in cells.
+// Distance in cells of the vertices that influence a vertex in one iteration of Taubin's smoothing.
 constexpr double smoothing_cells = 4.0;
-// The diameter of a hole, its own place in a component twice as large: hole_filling.
+// The diameter of a hole, and twice that for a component around it (hole_filling).
 constexpr double hole_diameters = 3.0;
-// What files may move a coordinate by.
+// Maximum rounding error of coordinates in files.
 constexpr double max_rounding_m = 1e-5;
-// From the origin.
+// Maximum distance from the origin in tiles.
 constexpr double max_tiles = 1e15;
 
-// Around a square, the surface that decides on islands, holes and repairs in it.
+// Distance around a tile of the surface that influences islands, holes and repairs in it.
 double cleaning_margin_m(const SurfaceTileOptions& options) {
   const MeshCleaningOptions& cleaning = options.cleaning;
   return hole_diameters * cleaning.max_hole_m +
@@ -36,7 +36,7 @@ double cleaning_margin_m(const SurfaceTileOptions& options) {
              options.reconstruction.cell_size_m;
 }
 
-// The triangles whose centers `wanted` takes.
+// Marks the triangles for whose center wanted(x, y) is true.
 template <typename Wanted>
 std::vector<bool> triangles_at(const TriangleMesh& mesh, const Wanted& wanted) {
   std::vector<bool> marks(mesh.triangles.size());
@@ -56,7 +56,7 @@ SurfaceTile::Edge edge_of(const TriangleMesh& mesh, HalfEdge h) {
   return {a[0], a[1], a[2], b[0], b[1], b[2]};
 }
 
-// The marked triangles, and where they meet others.
+// Sets the mesh of the tile to the marked triangles, and its seams to their edges with others.
 void cut_out(const TriangleMesh& mesh, const std::vector<bool>& marks, SurfaceTile& made) {
   made.mesh = select_triangles(mesh, marks);
   const MeshComponents components = connected_components(made.mesh);
@@ -82,16 +82,16 @@ void cut_out(const TriangleMesh& mesh, const std::vector<bool>& marks, SurfaceTi
 void SurfaceTileOptions::check() const {
   if (!(tile_m > 0.0 && std::isfinite(tile_m)))
     throw Error("out of range", {.field = "tile_size_m", .value = to_text(tile_m), .bound = "> 0"});
-  // Each tile takes all points around it: with more, tiles would save neither memory nor time.
+  // Each tile reads all points around it. With a larger margin, tiles save neither memory nor time.
   constexpr double max_margin_tiles = 16.0;
   if (margin_m() > max_margin_tiles * tile_m)
-    throw Error("the surface of a tile depends on points too far around it",
+    throw Error("too small for the margin of points around a tile",
                 {.field = "tile_size_m",
                  .value = to_text(tile_m),
                  .bound = ">= " + to_text(margin_m() / max_margin_tiles) +
-                          ", by cell_size_m, trim_distance_cells and max_hole_m"});
+                          ", from cell_size_m, trim_distance_cells and max_hole_m"});
   if (cleaning.decimation_error_m > 0.0)
-    throw Error("needs the whole surface at once, which is made in tiles",
+    throw Error("decimation requires the whole surface, not tiles",
                 {.field = "decimation_error_m",
                  .value = to_text(cleaning.decimation_error_m),
                  .bound = "0"});
@@ -122,7 +122,7 @@ void add_surface_tiles(const PointCloud& cloud, const SurfaceTileOptions& option
   const double reach = surface_margin_m(options.reconstruction) + options.cleaning.max_hole_m;
   for (const Eigen::Vector3d& position : cloud.positions) {
     if (!(position.head<2>().cwiseAbs().maxCoeff() < max_tiles * options.tile_m))
-      throw Error("too small for so large coordinates",
+      throw Error("too small for the coordinates of the cloud",
                   {.field = "tile_size_m", .value = to_text(options.tile_m)});
     const Eigen::Vector2d place = position.head<2>();
     const XyTile low = xy_tile_at(place.array() - reach, options.tile_m);

@@ -1,5 +1,5 @@
-// A surface made square by square of the x-y plane, so that memory does not depend on its area. At
-// the seams the squares' triangles fit each other exactly: both sides have the same vertices.
+// Reconstructs and cleans a surface in tiles of the x-y plane, so that memory does not depend on
+// its area. Adjacent tiles have the same vertices on their seam.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -18,58 +18,59 @@
 namespace libmap {
 
 struct SurfaceTileOptions {
-  double tile_m = 5.0;  // > 0: side of a square
+  double tile_m = 5.0;  // > 0: side of a tile
   SurfaceReconstructionOptions reconstruction{};
   MeshCleaningOptions cleaning{};
 
-  // Throws Error naming an option that needs the whole surface at once: Poisson reconstruction,
-  // cells of no given size, decimation; or tile_size_m, if margin_m() is more than 16 times as
-  // large.
+  // Throws Error for an option that requires the whole surface (Poisson reconstruction, automatic
+  // cell size, decimation), or for tile_size_m if margin_m() is more than 16 times as large.
   void check() const;
-  // Points so far around a square have a say in its surface.
+  // Distance from a tile up to which points influence its surface, m.
   double margin_m() const;
 };
 
-// The square, grown.
+// Box of a tile, enlarged by a margin on each side.
 PlanBox plan_box_of(const XyTile& tile, double tile_m, double margin_m);
 
-// The squares that may have a part of the surface of `cloud`.
+// Counts, for each tile that may contain a part of the cloud's surface, the points near it. Throws
+// Error if tile_m is too small for the coordinates.
 void add_surface_tiles(const PointCloud& cloud, const SurfaceTileOptions& options,
                        std::map<XyTile, std::size_t>& points_in_tiles);
 
 struct SurfaceTile {
-  // The triangles whose centers are in the square. Positions are those of single precision where
-  // that moves them by less than 1e-5 m, so that files keep them exactly.
+  // Triangles whose centers are in the tile. Positions are rounded to single precision, as in
+  // files, if this changes them by at most 1e-5 m.
   TriangleMesh mesh;
-  std::vector<double> component_areas_m2;  // of `mesh`: connected_components
-  // Edges to triangles of other squares: their ends, and the component in `mesh`.
+  std::vector<double> component_areas_m2;  // of connected_components(mesh)
+  // Edges to triangles of other tiles: positions of the ends, and the component in `mesh`.
   using Edge = std::array<double, 6>;
   std::vector<std::pair<Edge, std::uint32_t>> seams;
-  SurfaceReconstructionResult reconstruction;  // these two without meshes, of all around the square
-  MeshCleaningResult cleaning;
+  SurfaceReconstructionResult reconstruction;  // of the tile with its margin, without mesh
+  MeshCleaningResult cleaning;                 // of the tile with its margin, without mesh
 };
 
-// `points` are those around the square by margin_m(), of a cloud that `survey` has seen whole. The
-// surface is that of reconstruct_surface() and clean_mesh(), but that islands are left which may go
-// on beyond: SurfaceIslands finds them. Components narrower than min_island_area_m2 / margin_m()
-// that do so may keep a hole beside them from being filled.
+// Makes the surface of one tile from the `points` within margin_m() of it; `survey` describes the
+// whole cloud. The surface is that of reconstruct_surface() and clean_mesh(), except for islands
+// that may continue beyond the margin, which SurfaceIslands finds. Such components, if narrower
+// than min_island_area_m2 / margin_m(), may prevent a hole beside them from being filled. Throws
+// Error as options.check(), reconstruct_part and clean_mesh.
 SurfaceTile make_surface_tile(const PointCloud& points, const SurfaceSurvey& survey,
                               const XyTile& tile, const SurfaceTileOptions& options,
                               Progress& progress = no_progress());
 
-// The mesh without some of its connected_components, ascending.
+// Returns the mesh without the given connected_components, which must be ascending.
 TriangleMesh without_components(const TriangleMesh& mesh,
                                 const std::vector<std::uint32_t>& components);
 
-// Joins the components of squares along their seams.
+// Finds islands across tiles by joining components along seams.
 class SurfaceIslands {
  public:
-  // The components of one square, by which those of its neighbors are joined.
+  // Adds the components of one tile.
   void add(const XyTile& tile, const SurfaceTile& made);
-  // The components of each square that belong to islands, ascending.
+  // Components that belong to islands, by tile, ascending.
   using Dropped = std::map<XyTile, std::vector<std::uint32_t>>;
   Dropped dropped(const MeshCleaningOptions& options);
-  std::size_t islands() const { return islands_; }  // known after dropped()
+  std::size_t islands() const { return islands_; }  // number of islands, valid after dropped()
 
  private:
   struct Part {
@@ -78,8 +79,8 @@ class SurfaceIslands {
     double area_m2 = 0.0;
   };
   std::vector<Part> parts_;
-  std::vector<std::pair<std::size_t, std::size_t>> joined_;  // parts
-  std::map<SurfaceTile::Edge, std::size_t> open_;            // seams met from one side, the part
+  std::vector<std::pair<std::size_t, std::size_t>> joined_;  // pairs of parts
+  std::map<SurfaceTile::Edge, std::size_t> open_;            // part by seam with one known side
   std::size_t islands_ = 0;
 };
 

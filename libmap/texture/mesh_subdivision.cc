@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::uint32_t no_vertex = 0xffffffff;
 constexpr std::size_t edges_per_chunk = 1024;
-// Of the largest coordinate: shorter sides are not halved, for their middles were rounded.
+// Relative to the largest coordinate. Shorter sides are not halved: rounding moves their middles.
 constexpr double min_side = 1e-12;
 
 double largest_coordinate(const TriangleMesh& mesh) {
@@ -29,7 +29,7 @@ bool is_long(const TriangleMesh& mesh, HalfEdge h, double max_side_m) {
   return along(mesh, h).squaredNorm() > max_side_m * max_side_m;
 }
 
-// Parts of a triangle that needs no cutting need none: `open` says which triangles still may.
+// Clears `open` of triangles that need no cutting; their parts need none either.
 void close_triangles(const TriangleMesh& mesh, double max_side_m, const NeedsCutting& needs_cutting,
                      std::vector<std::uint8_t>& open) {
   parallel_each(open.size(), edges_per_chunk, [&](std::size_t t) {
@@ -56,14 +56,14 @@ std::vector<std::uint32_t> edges_to_halve(const TriangleMesh& mesh, const MeshEd
   return found;
 }
 
-// Each middle of a triangle's side makes one more triangle.
+// Number of triangles added: one per halved side of each triangle.
 std::uint64_t new_triangles(const MeshEdges& edges, const std::vector<std::uint32_t>& halved) {
   std::uint64_t count = 0;
   for (const std::uint32_t e : halved) count += edges.count(e);
   return count;
 }
 
-// The vertex in the middle of each half-edge that is halved.
+// Adds the middle vertices. Returns the index of one per half-edge; no_vertex if it is not halved.
 std::vector<std::uint32_t> add_middles(TriangleMesh& mesh, const MeshEdges& edges,
                                        const std::vector<std::uint32_t>& halved) {
   std::vector<std::uint32_t> middles(3 * mesh.triangles.size(), no_vertex);
@@ -78,7 +78,7 @@ std::vector<std::uint32_t> add_middles(TriangleMesh& mesh, const MeshEdges& edge
   return middles;
 }
 
-// The parts of a triangle whose sides have these middles, in its own sense.
+// Splits a triangle at the middles of its sides. The orientation is kept.
 std::vector<Triangle> parts_of(const TriangleMesh& mesh, Triangle t,
                                std::array<std::uint32_t, 3> middles) {
   const auto count =
@@ -89,7 +89,7 @@ std::vector<Triangle> parts_of(const TriangleMesh& mesh, Triangle t,
             {middles[0], t[1], middles[1]},
             {middles[2], middles[1], t[2]},
             {middles[0], middles[1], middles[2]}};
-  // Turned so that side 0 is the only one with a middle, or side 2 the only one without.
+  // Rotates until only side 0 has a middle, or only side 2 has none.
   const auto turn = [&] {
     std::rotate(t.begin(), t.begin() + 1, t.end());
     std::rotate(middles.begin(), middles.begin() + 1, middles.end());
@@ -100,7 +100,7 @@ std::vector<Triangle> parts_of(const TriangleMesh& mesh, Triangle t,
   }
   while (middles[2] != no_vertex) turn();
   const Triangle tip = {middles[0], t[1], middles[1]};
-  // The quadrangle t0 m0 m1 t2, cut along its shorter diagonal.
+  // Splits the quadrangle t0 m0 m1 t2 along its shorter diagonal.
   const auto distance = [&mesh](std::uint32_t a, std::uint32_t b) {
     return (mesh.vertices[a] - mesh.vertices[b]).squaredNorm();
   };

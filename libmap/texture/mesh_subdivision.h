@@ -1,4 +1,4 @@
-// Finer triangles on the same surface. Private to libmap/texture.
+// Subdivides a mesh without changing its surface. Private to libmap/texture.
 #pragma once
 
 #include <cstdint>
@@ -11,17 +11,17 @@ namespace libmap {
 
 struct SubdivisionResult {
   TriangleMesh mesh;
-  double max_side_m = 0.0;            // what was aimed at in the end
-  std::vector<std::uint32_t> source;  // of each triangle: the one that it is a part of
+  double max_side_m = 0.0;            // maximum side length that was used
+  std::vector<std::uint32_t> source;  // index of the input triangle, one per triangle
 };
 
-// Whether a triangle with a long side, or parts of it, need to be cut. Asked from several threads.
+// Returns true if a triangle with a long side must be subdivided. Called from several threads.
 using NeedsCutting = std::function<bool(const TriangleMesh& mesh, const Triangle& triangle)>;
 
-// Halves sides longer than `max_side_m`, on all of their triangles, until no triangle that needs it
-// has one; vertices that there were keep their places. Where that would make more than
-// `max_triangles`, and more than twice those of the mesh, a longer side is aimed at. Values at new
-// vertices are interpolated, parts of a triangle have its fields.
+// Halves sides longer than `max_side_m`, in all adjacent triangles, until no triangle that needs
+// cutting has such a side. Existing vertices keep their index and position. If the result would
+// exceed both `max_triangles` and twice the input's triangles, a larger side length is used. Vertex
+// values are interpolated; the parts of a triangle inherit its face fields.
 SubdivisionResult split_long_sides(
     TriangleMesh mesh, double max_side_m, std::uint64_t max_triangles,
     const NeedsCutting& needs_cutting = [](const TriangleMesh&, const Triangle&) { return true; });

@@ -19,7 +19,7 @@ namespace {
 constexpr double min_scale = 1.0 / 64.0;
 constexpr double max_scale = 16.0;
 constexpr int max_rounds = 12;
-// Sides of pages are multiples of it where they are cut.
+// Cropped page sides are multiples of this number of pixels.
 constexpr int page_step = 4;
 
 Eigen::Vector2d pixel_of(const PhotoProjector& projector, const Eigen::Vector3d& point) {
@@ -75,10 +75,10 @@ class AtlasMaker {
   int padding_;
   bool any_neutral_ = false;
   double scale_ = 1.0;
-  std::vector<TextureChart> whole_charts_;  // before any is cut
+  std::vector<TextureChart> whole_charts_;  // before splitting
 };
 
-// Connected triangles of one photograph, by their first triangle.
+// Collects connected triangles of one photograph, ordered by their first triangle.
 void AtlasMaker::find_charts(const std::vector<HalfEdge>& opposite,
                              const std::vector<std::uint32_t>& label) {
   std::vector<bool> taken(label.size(), false);
@@ -112,7 +112,7 @@ std::array<Eigen::Vector2d, 3> AtlasMaker::corners_px(const TextureChart& chart,
           pixel_of(projector, mesh_.vertices[triangle[2]])};
 }
 
-// Texels a pixel that give texels of the wanted size on the mean.
+// Texels per pixel for a mean texel size of texel_size_m.
 double AtlasMaker::own_scale(const TextureChart& chart) const {
   if (!(options_.texel_size_m > 0.0)) return options_.texels_per_pixel;
   double area_m2 = 0.0;
@@ -126,7 +126,7 @@ double AtlasMaker::own_scale(const TextureChart& chart) const {
   return std::clamp(std::sqrt(area_m2 / area_px) / options_.texel_size_m, min_scale, max_scale);
 }
 
-// The chart with its size, or its parts where it does not fit on a page.
+// Appends the chart with its size, or its parts if it does not fit on a page.
 void AtlasMaker::fit(TextureChart chart, TextureAtlas& atlas) const {
   Extent extent;
   for (const std::uint32_t t : chart.triangles)
@@ -145,7 +145,7 @@ void AtlasMaker::fit(TextureChart chart, TextureAtlas& atlas) const {
       const double center = (corners[0] + corners[1] + corners[2])[axis] / 3.0;
       parts[center < middle ? 0 : 1].triangles.push_back(t);
     }
-    // Triangles may all have their centers on one side.
+    // All centers may be on one side: split by index then.
     for (std::size_t k = 0; k < 2; ++k) {
       if (!parts[k].triangles.empty()) continue;
       std::vector<std::uint32_t>& all = parts[1 - k].triangles;
@@ -162,7 +162,7 @@ void AtlasMaker::fit(TextureChart chart, TextureAtlas& atlas) const {
     chart.scale *= room / larger;
     ++atlas.shrunk_charts;
   }
-  // Rounding may carry a shrunk chart past what there is room for.
+  // Rounding must not make a scaled-down chart larger than the page.
   const auto texels = [&](double size_px) {
     return std::min(room, static_cast<int>(std::ceil(size_px * chart.scale))) + 1 + 2 * padding_;
   };
@@ -197,7 +197,7 @@ void AtlasMaker::pack(TextureAtlas& atlas) const {
   atlas.neutral_size = any_neutral_ ? 2 * padding_ + 2 : 0;
   if (any_neutral_) add(atlas.neutral_size, atlas.neutral_size);
 
-  // A smaller page than the largest that is allowed, where one is enough.
+  // Begins with a page smaller than texture_size that may contain all charts.
   int size = std::min(options_.texture_size,
                       rounded_up(std::max(largest, static_cast<int>(std::sqrt(area) * 1.02))));
   std::size_t pages = pack_rectangles(rectangles, size);
@@ -219,7 +219,7 @@ void AtlasMaker::pack(TextureAtlas& atlas) const {
     atlas.charts[i].page = static_cast<std::int32_t>(rectangles[i].page);
     atlas.charts[i].column = rectangles[i].column;
     atlas.charts[i].row = rectangles[i].row;
-    // The chart's own first texel lies inside the padding.
+    // The padding comes before the chart's first texel.
     atlas.charts[i].origin.array() -= padding_ / atlas.charts[i].scale;
   }
   if (any_neutral_) {
@@ -275,7 +275,7 @@ std::size_t pack_rectangles(std::vector<PackedRectangle>& rectangles, int page_s
     rectangle.h = rectangles[i].height;
     left.push_back(rectangle);
   }
-  // As many as columns: then places are not rounded.
+  // One node per column: stb_rect_pack then does not quantize widths.
   std::vector<stbrp_node> nodes(static_cast<std::size_t>(page_size));
   std::size_t pages = 0;
   for (; !left.empty(); ++pages) {
@@ -284,7 +284,7 @@ std::size_t pack_rectangles(std::vector<PackedRectangle>& rectangles, int page_s
     stbrp_pack_rects(&page, left.data(), static_cast<int>(left.size()));
     const auto packed = std::stable_partition(
         left.begin(), left.end(), [](const stbrp_rect& r) { return r.was_packed == 0; });
-    if (packed == left.end()) throw Error("a rectangle is larger than its page");
+    if (packed == left.end()) throw Error("a rectangle is larger than the page");
     for (auto r = packed; r != left.end(); ++r) {
       PackedRectangle& rectangle = rectangles[static_cast<std::size_t>(r->id)];
       rectangle.page = pages;

@@ -1,8 +1,8 @@
-// Charts of a mesh on the pages of a texture. Private to libmap/texture.
+// Packs the charts of a mesh onto texture pages. Private to libmap/texture.
 //
-// A chart is a connected set of triangles that one photograph shows; its shape is that of its
-// picture there, whole pixels apart, so that at a scale of 1 its texels are the photograph's
-// pixels.
+// A chart is a connected set of triangles that take their texture from one photograph. Its texture
+// coordinates are the triangles' projection into that photograph, shifted by whole pixels, so that
+// texels coincide with pixels at a scale of 1.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,23 +17,23 @@
 namespace libmap {
 
 struct TextureAtlasOptions {
-  int texture_size = 4096;        // pixels, 64 to 16384: no page is wider or higher
-  double texel_size_m = 0.0;      // 0: by texels_per_pixel
-  double texels_per_pixel = 1.5;  // along a side of a photograph's pixel
-  // More are made only where the padding around the charts alone needs them; charts are scaled down
-  // before. 0: any number.
+  int texture_size = 4096;        // maximum width and height of a page, pixels, 64 to 16384
+  double texel_size_m = 0.0;      // 0: determined by texels_per_pixel
+  double texels_per_pixel = 1.5;  // texels per photograph pixel, along one side
+  // Charts are scaled down to fit this number of pages. It is exceeded only if the padding alone
+  // needs more. 0: no limit.
   int max_pages = 64;
-  int padding_px = 3;  // texels around each chart that continue its colors; 1 to 64
+  int padding_px = 3;  // width of the extrapolated border of each chart, texels; 1 to 64
 };
 
-// A place of a page with the colors of some triangles.
+// A rectangle of a page that contains the colors of connected triangles.
 struct TextureChart {
   std::vector<std::uint32_t> triangles;              // ascending
   double scale = 1.0;                                // texels per pixel of the photograph
-  Eigen::Vector2d origin = Eigen::Vector2d::Zero();  // pixel of the photograph at texel (0, 0)
+  Eigen::Vector2d origin = Eigen::Vector2d::Zero();  // photograph pixel of texel (0, 0)
   std::uint32_t photo = 0;
   std::int32_t page = 0;
-  int column = 0;  // of its top left texel, padding included
+  int column = 0;  // of the top left texel, padding included
   int row = 0;
   int width = 0;  // texels, padding included
   int height = 0;
@@ -46,20 +46,21 @@ struct PageSize {
 
 struct TextureAtlas {
   std::vector<TextureChart> charts;
-  std::vector<PageSize> pages;  // cut to what is used
-  // A square of neutral_size texels of one color, for triangles that no photograph shows.
+  std::vector<PageSize> pages;  // cropped to the used area
+  // A square of one color, neutral_size texels wide, for triangles without a photograph.
   std::int32_t neutral_page = 0;
   Eigen::Vector2i neutral_corner = Eigen::Vector2i::Zero();
   int neutral_size = 0;
-  double scale = 1.0;             // of all charts, where they had to be made smaller for max_pages
-  std::size_t split_charts = 0;   // that were cut because they were larger than a page
-  std::size_t shrunk_charts = 0;  // of one triangle larger than a page: made smaller
+  double scale = 1.0;             // common scale of all charts; below 1 if reduced for max_pages
+  std::size_t split_charts = 0;   // charts that were split because they exceeded a page
+  std::size_t shrunk_charts = 0;  // single triangles larger than a page that were scaled down
 
-  // Pages, texture coordinates and page of each triangle. Pages are black.
+  // Returns `mesh` with black pages, and texture coordinates and page of each triangle.
   TexturedMesh make_model(const TriangleMesh& mesh, const TexturePhotos& photos) const;
 };
 
-// `label` is one photograph per triangle, or no_photo. Never fails for want of room.
+// Builds and packs the charts. `label` is one photograph index per triangle, or no_photo;
+// `opposite` is one per half-edge. Charts are split or scaled down if they do not fit.
 TextureAtlas make_texture_atlas(const TriangleMesh& mesh, const std::vector<HalfEdge>& opposite,
                                 const std::vector<std::uint32_t>& label,
                                 const TexturePhotos& photos, const TextureAtlasOptions& options);
@@ -73,11 +74,12 @@ struct PackedRectangle {
   int row = 0;
 };
 
-// Fills one page after the other (skyline, bottom left: stb_rect_pack). Pages are squares of
-// `page_size`. Returns the number of pages. Throws Error if a rectangle is larger than a page.
+// Packs rectangles onto square pages of side `page_size`, filling one page after the other
+// (skyline, bottom left: stb_rect_pack). Returns the number of pages. Throws Error if a rectangle
+// is larger than a page.
 std::size_t pack_rectangles(std::vector<PackedRectangle>& rectangles, int page_size);
 
-// Where a point lies on its chart's page: texels, (0, 0) the center of the page's first.
+// Returns the texel of a world point on its chart's page; (0, 0) is the center of the first texel.
 Eigen::Vector2d place_on_page(const TextureChart& chart, const PhotoProjector& projector,
                               const Eigen::Vector3d& point);
 

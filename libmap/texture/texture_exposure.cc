@@ -13,13 +13,13 @@ namespace {
 constexpr float darkest = 8.0F;
 constexpr float brightest = 250.0F;
 constexpr int rounds = 4;
-// ln(color): residuals beyond it count less and less.
+// Huber threshold of residuals of ln(color).
 constexpr double huber = 0.08;
-// Ties a photograph that overlaps no other to a gain of 1, as this many observations of it would.
+// Prior of a gain of 1, as a number of observations. Determines photographs without overlap.
 constexpr double prior_weight = 0.5;
-// Keeps a lens that few places tell of without darkening, as this many observations would.
+// Prior of a lens without vignetting, as a number of observations.
 constexpr double lens_prior_weight = 10.0;
-// Views of one place that are compared.
+// Maximum number of views of one point that are compared.
 constexpr std::size_t max_views = 24;
 
 struct Observation {
@@ -32,7 +32,7 @@ Eigen::Vector3d powers_of(double radius2) {
   return {radius2, radius2 * radius2, radius2 * radius2 * radius2};
 }
 
-// The observations of one place: observations[first] .. [last - 1].
+// The observations of one surface point: observations[first] .. [last - 1].
 struct Place {
   std::size_t first = 0;
   std::size_t last = 0;
@@ -48,14 +48,14 @@ class ExposureFit {
   double predicted(const Observation& seen, Eigen::Index channel) const {
     return gains_(seen.photo, channel) + vignetting_.dot(seen.powers);
   }
-  double weigh();  // anew from the residuals; returns their standard deviation
+  double weigh();  // updates the weights; returns the standard deviation of the residuals
   void fit_gains();
   void fit_vignetting();
 
   const ExposureOptions& options_;
   std::vector<Observation> observations_;
   std::vector<Place> places_;
-  std::vector<double> weights_;  // one an observation
+  std::vector<double> weights_;  // one per observation
   Eigen::MatrixX3d gains_;       // logarithms
   Eigen::Vector3d vignetting_ = Eigen::Vector3d::Zero();
 };
@@ -111,7 +111,7 @@ double ExposureFit::weigh() {
   return count > 0.0 ? std::sqrt(sum / count) : 0.0;
 }
 
-// Normal equations of the gains, each place's own color eliminated.
+// Solves the normal equations of the gains; the color of each point is eliminated.
 void ExposureFit::fit_gains() {
   const Eigen::Index photos = gains_.rows();
   std::vector<Eigen::Triplet<double>> terms;
@@ -180,7 +180,7 @@ TextureExposure ExposureFit::solve() {
   result.observations = observations_.size();
   result.spread_before = weigh();
   result.spread = result.spread_before;
-  // Gains and lens take turns: the two are nearly independent of each other.
+  // Gains and vignetting are nearly independent, so they are estimated alternately.
   for (int round = 0; round < rounds && !observations_.empty(); ++round) {
     if (options_.vignetting) fit_vignetting();
     if (options_.gains) fit_gains();

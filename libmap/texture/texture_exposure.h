@@ -1,5 +1,5 @@
-// How bright each photograph is against the others, and how a lens darkens towards its corners:
-// what colors are divided by before they are put side by side. Private to libmap/texture.
+// Relative exposure of photographs and vignetting of the lens, estimated from common observations.
+// Colors are divided by both before they are blended. Private to libmap/texture.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,14 +13,14 @@
 namespace libmap {
 
 struct TextureExposure {
-  std::vector<Eigen::Vector3f> gains;         // of each photograph and channel; 1 on the mean
+  std::vector<Eigen::Vector3f> gains;         // per photograph and channel, relative to their mean
   std::array<double, 3> vignetting{0, 0, 0};  // log of brightness: a r^2 + b r^4 + c r^6
   std::size_t observations = 0;
-  // Standard deviation of ln(color) between photographs of one place, before and after.
+  // Standard deviation of ln(color) of one surface point between photographs, before and after.
   double spread_before = 0.0;
   double spread = 0.0;
 
-  // What a color of `photo` is divided by; radius2 as in ColorObservation.
+  // Divisor of the colors of `photo`, per channel; radius2 as in ColorObservation.
   Eigen::Vector3f factor(std::size_t photo, double radius2) const;
 };
 
@@ -29,9 +29,10 @@ struct ExposureOptions {
   bool vignetting = true;
 };
 
-// Least squares over all places that several photographs show (Brown and Lowe 2007, equation 29, in
-// logarithms; the lens as in Goldman and Chen 2005), with Huber weights against colors that do not
-// belong together. `observations` may be in any order; those near black or saturated are left out.
+// Estimates exposure by least squares over all points seen in several photographs (Brown and Lowe
+// 2007, equation 29, in logarithms; vignetting as in Goldman and Chen 2005), with Huber weights
+// against outliers. `observations` may be in any order; dark and saturated colors are ignored.
+// Gains are 1 and vignetting is 0 without observations.
 TextureExposure even_out_exposure(std::span<const ColorObservation> observations,
                                   std::size_t photos, const ExposureOptions& options);
 

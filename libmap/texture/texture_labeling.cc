@@ -11,31 +11,31 @@ namespace libmap {
 
 namespace {
 
-// The share of the energy that a cycle must save for another to follow.
+// Minimum relative decrease of the energy in a cycle for another cycle to follow.
 constexpr double min_gain = 1e-2;
 constexpr int max_cycles = 12;
 constexpr int rounds_a_cycle = 2;
 constexpr int rounds_of_regions = 3;
 
-// One of the photographs that a node may get, and what it costs.
+// A candidate photograph of a node and its cost.
 struct Label {
   std::uint32_t photo = 0;
   float cost = 0.0F;  // m2
-  float sum = 0.0F;   // with the best labels of all nodes below in the tree
+  float sum = 0.0F;   // cost with the best labels of all descendants in the tree
 };
 
-// A neighbor of a node, and what a seam between the two costs.
+// A neighbor of a node and the cost of a seam between both.
 struct Neighbor {
   std::uint32_t node = 0;
   float cost = 0.0F;  // m2
 };
 
-// Triangles that are seen, or whole regions of them, and which of their labels are chosen.
+// Seen triangles, or regions of them, and the label chosen for each.
 struct Graph {
   std::vector<std::uint32_t> first_neighbor{0};
   std::vector<Neighbor> neighbors;
   std::vector<std::uint32_t> first_label{0};
-  std::vector<Label> labels;  // of each node, by ascending photograph; at least one
+  std::vector<Label> labels;  // at least one per node, by ascending photograph
   std::vector<std::uint32_t> chosen;
 
   std::size_t size() const { return chosen.size(); }
@@ -50,8 +50,8 @@ struct Graph {
   }
   std::uint32_t photo_of(std::uint32_t node) const { return labels[chosen[node]].photo; }
   void choose(std::uint32_t node, std::uint32_t photo);
-  double seams() const;   // their cost
-  double energy() const;  // with them
+  double seams() const;   // cost of all seams
+  double energy() const;  // cost of all labels and seams
 };
 
 void Graph::choose(std::uint32_t node, std::uint32_t photo) {
@@ -77,7 +77,7 @@ double Graph::energy() const {
   return sum;
 }
 
-// One forest of nodes after another.
+// Optimizes one forest of nodes after another.
 class ForestDescent {
  public:
   explicit ForestDescent(Graph& graph)
@@ -105,13 +105,13 @@ class ForestDescent {
   Graph& graph_;
   std::vector<std::uint32_t> order_;
   std::vector<std::uint8_t> in_forest_;
-  std::vector<std::uint32_t> from_root_;  // each tree's nodes, parents before children
+  std::vector<std::uint32_t> from_root_;  // nodes of all trees, parents before children
   std::vector<std::uint32_t> parent_;
-  std::vector<float> least_;  // of a node's sums
+  std::vector<float> least_;  // minimum of each node's sums
 };
 
-// As many nodes as can be taken one after another without closing a circle. Those that the last
-// forest left out come first.
+// Adds nodes one after another unless they close a cycle. Nodes outside the previous forest come
+// first.
 void ForestDescent::choose_forest() {
   std::stable_partition(order_.begin(), order_.end(),
                         [this](std::uint32_t node) { return in_forest_[node] == 0; });
@@ -147,7 +147,7 @@ void ForestDescent::root_trees() {
   }
 }
 
-// What each label of a node costs with the best labels of the nodes below it.
+// Computes the cost of each label of a node with the best labels of its descendants.
 void ForestDescent::gather(std::uint32_t node) {
   const auto own = graph_.labels_of(node);
   for (Label& label : own) label.sum = label.cost;
@@ -187,7 +187,7 @@ void ForestDescent::settle(std::uint32_t node) {
   graph_.chosen[node] = graph_.first_label[node] + static_cast<std::uint32_t>(best - own.begin());
 }
 
-// Connected nodes of one photograph as one node each. Its labels are those that all of them have.
+// Merges connected nodes of one photograph. The labels of a region are those common to its nodes.
 struct Regions {
   Graph graph;
   std::vector<std::uint32_t> of_node;
@@ -261,13 +261,13 @@ Regions regions_of(const Graph& graph) {
   return regions;
 }
 
-// What a view costs for each square meter: nothing for the best one, 1 for one of half its quality.
+// Cost of a view per square meter: 0 for the best view, 1 for a view of half its quality.
 double lack_of(const ViewQuality& view, const ViewQuality& best) {
   constexpr double most = 50.0;
   return std::min(most, static_cast<double>(best.quality / view.quality) - 1.0);
 }
 
-// The graph of the triangles that are seen, each with its best view; `node` is one a triangle.
+// Graph of the seen triangles, each with its best view chosen. `node_of` is one per triangle.
 Graph graph_of(const TriangleMesh& mesh, const std::vector<HalfEdge>& opposite,
                const ViewTable& views, double seam_cost_m,
                const std::vector<std::uint32_t>& node_of) {
@@ -312,7 +312,7 @@ TextureLabels label_triangles(const TriangleMesh& mesh, const std::vector<HalfEd
   std::uint32_t nodes = 0;
   for (std::size_t t = 0; t < node_of.size(); ++t)
     if (!views[t].empty()) node_of[t] = nodes++;
-  // Without a cost of seams their length is still to be known.
+  // The length of the seams is derived from their cost, so the cost must not be 0.
   const double seam_cost_m = std::max(options.seam_cost_m, 1e-9);
   Graph graph = graph_of(mesh, opposite, views, seam_cost_m, node_of);
   result.seams_before_m = graph.seams() / seam_cost_m;

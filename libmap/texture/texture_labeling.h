@@ -1,12 +1,12 @@
-// One photograph for each triangle, so that photographs are good and seams between them are few.
-// Private to libmap/texture.
+// Assigns one photograph to each triangle: good views with short seams between them. Private to
+// libmap/texture.
 //
-// The energy is that of Lempitsky and Ivanov 2007 (equation 1): what a triangle's view lacks
-// against its best one, plus the length of the seams. It is lowered by exact dynamic programming
-// over forests of triangles, one after another, while the triangles outside keep their labels
-// (block coordinate descent as in Thuerck et al. 2016, "A Fast, Massively Parallel Solver for
-// Large, Irregular Pairwise Markov Random Fields"), and in turn over forests of whole regions of
-// one photograph. Every step lowers the energy or keeps it.
+// The energy is that of Lempitsky and Ivanov 2007 (equation 1): the loss of view quality against
+// the best view of each triangle, plus the length of the seams. It is minimized by exact dynamic
+// programming over forests of triangles while all other triangles keep their labels (block
+// coordinate descent as in Thuerck et al. 2016, "A Fast, Massively Parallel Solver for Large,
+// Irregular Pairwise Markov Random Fields"), alternating with forests of regions of one photograph.
+// No step increases the energy.
 #pragma once
 
 #include <cstdint>
@@ -21,20 +21,20 @@ namespace libmap {
 constexpr std::uint32_t no_photo = 0xffffffff;
 
 struct LabelingOptions {
-  // A seam of 1 m costs as much as this times 1 m2 of triangles with views of half the best
-  // quality.
+  // Cost of a seam of 1 m, in m2 of triangles with views of half the best quality.
   double seam_cost_m = 0.1;
 };
 
 struct TextureLabels {
-  std::vector<std::uint32_t> photos;  // one a triangle; no_photo where none sees it
+  std::vector<std::uint32_t> photos;  // one per triangle; no_photo if no photograph sees it
   double energy_before = 0.0;         // m2, with the best view for every triangle
   double energy = 0.0;
-  double seams_before_m = 0.0;  // between triangles of different photographs
+  double seams_before_m = 0.0;  // length of edges between triangles of different photographs
   double seams_m = 0.0;
 };
 
-// `opposite` is one a half-edge (mesh_adjacency).
+// Minimizes the energy. `opposite` is one per half-edge (mesh_adjacency), `views` one row per
+// triangle.
 TextureLabels label_triangles(const TriangleMesh& mesh, const std::vector<HalfEdge>& opposite,
                               const ViewTable& views, const LabelingOptions& options);
 

@@ -16,19 +16,19 @@ namespace libmap {
 
 namespace {
 
-// Views of a triangle among which one is chosen.
+// Maximum number of candidate views per triangle.
 constexpr std::size_t views_a_triangle = 12;
-// Vertices whose colors are compared between all photographs; of each of many pieces at least.
+// Number of vertices whose colors are compared between photographs, and its minimum per piece.
 constexpr std::size_t observed_vertices = 20000;
 constexpr std::size_t min_observed_vertices = 200;
-// Of decoded photographs that are kept; a piece needs those near it alone.
+// Cache size of decoded photographs. A piece needs only photographs close to it.
 constexpr std::size_t max_image_bytes = std::size_t{400} << 20;
 constexpr std::size_t max_image_bytes_in_pieces = std::size_t{64} << 20;
-// Triangles that all photographs show smaller are not cut; nor are any where more would come out.
+// Triangles whose sides are shorter in all photographs are not subdivided.
 constexpr double min_cut_px = 16.0;
 constexpr std::uint64_t max_cut_triangles = 2'500'000;
 
-// Whether any photograph may show the triangle, or a part of it, so large that cutting it matters.
+// Returns true if a side of the triangle may be longer than min_cut_px in any photograph.
 bool is_shown(const TriangleMesh& mesh, const Triangle& t, const TexturePhotos& photos) {
   const Eigen::Vector3d center = center_of(mesh, t);
   double radius = 0.0;
@@ -71,7 +71,7 @@ class Texturing {
     return {part.triangles, views_a_triangle, static_cast<std::size_t>(options_.blend_views) + 1,
             0};
   }
-  // With all of its vertices, of which those of the margin belong to no triangle.
+  // The model keeps the vertices of the margin, which no triangle uses.
   TexturedMesh paint(MeshWithMargin part, TextureViews views, Progress& progress);
   void count_seen(const TriangleMesh& mesh, const std::vector<std::uint32_t>& label);
   void count_charts(const TextureAtlas& atlas, const TriangleMesh& mesh);
@@ -99,7 +99,7 @@ MeshWithMargin Texturing::cut_finely(MeshWithMargin part) const {
   SubdivisionResult fine = split_long_sides(
       std::move(part.mesh), options_.max_side_m, max_cut_triangles,
       [this](const TriangleMesh& mesh, const Triangle& t) { return is_shown(mesh, t, *photos_); });
-  // Parts take the place of their triangle.
+  // Triangles are ordered by their source, so the piece's own come first.
   const auto own = std::lower_bound(fine.source.begin(), fine.source.end(), part.triangles);
   return {std::move(fine.mesh), static_cast<std::size_t>(own - fine.source.begin())};
 }
@@ -180,7 +180,7 @@ TextureResult Texturing::whole(const TriangleMesh& mesh) {
   return {std::move(report_), std::move(model)};
 }
 
-// Of all pieces together.
+// Collects color observations from all pieces.
 std::vector<ColorObservation> Texturing::observe(MeshPieceIndex& index, double margin_m) {
   const std::size_t wanted = std::max(min_observed_vertices, observed_vertices / index.size());
   std::vector<ColorObservation> all;
@@ -210,7 +210,7 @@ PieceTexturing::Piece Texturing::piece(MeshWithMargin part) {
     return find_texture_views(part.mesh, *photos_, options_.views, views_of(part), no_progress());
   });
   TexturedMesh model = paint(std::move(part), std::move(views), no_progress());
-  // Makes room: a model takes most memory while it is encoded.
+  // Frees memory: the peak is reached while the model is encoded.
   photos_->forget_images();
   model.mesh = select_triangles(model.mesh, std::vector<bool>(model.mesh.triangles.size(), true));
   return {std::move(model), report_};
@@ -220,37 +220,37 @@ PieceTexturing::Piece Texturing::piece(MeshWithMargin part) {
 
 void bind(ParameterTable& table, TextureOptions& options) {
   table.add("texture_size_px", options.atlas.texture_size, {64, 16384},
-            "no page of the texture is wider or higher, pixels");
+            "maximum width and height of a texture page, pixels");
   table.add("texel_size_m", options.atlas.texel_size_m, not_negative,
-            "side of a texel on the surface, m; 0: by the photographs' own pixels");
+            "size of a texel on the surface, m; 0: determined by texels_per_pixel");
   table.add("texels_per_pixel", options.atlas.texels_per_pixel, {0.05, 8.0},
-            "with texel_size_m 0: texels along a side of the photographs' pixels");
+            "texels per photograph pixel along one side, used if texel_size_m is 0");
   table.add("max_pages", options.atlas.max_pages, not_negative,
-            "texels are made larger where more pages would be needed; 0: any number of pages");
+            "maximum number of texture pages; charts are scaled down to fit; 0: no limit");
   table.add("padding_px", options.atlas.padding_px, {1, 64},
-            "texels around each chart that continue its colors");
+            "width of the extrapolated border around each chart, texels");
   table.add("max_incidence_deg", options.views.max_incidence_deg, {0, 90, true, true},
-            "views that are more aslant are not used");
-  table.add(
-      "max_depth_m", options.views.max_depth_m, not_negative,
-      "photographs that see a surface from farther (z) are not used for it, m; 0: from anywhere");
+            "maximum angle between viewing ray and surface normal, degrees");
+  table.add("max_depth_m", options.views.max_depth_m, not_negative,
+            "maximum depth (z) at which a photograph is used for a surface, m; 0: no limit");
   table.add("occlusion_tolerance_m", options.views.occlusion_tolerance_m, not_negative,
-            "a surface is hidden that lies further behind another, m");
-  table.add("occlusion_margin_px", options.views.occlusion_margin_px, not_negative,
-            "so near to what stands before it a surface is better shown by another view, pixels");
+            "depth behind another surface from which a surface is occluded, m");
+  table.add(
+      "occlusion_margin_px", options.views.occlusion_margin_px, not_negative,
+      "distance from an occluder's silhouette within which other views are preferred, pixels");
   table.add("border_px", options.views.border_px, not_negative,
-            "border of each photograph that is not used, pixels");
+            "width of the unused border of each photograph, pixels");
   table.add("seam_cost_m", options.labeling.seam_cost_m, not_negative,
-            "larger: fewer seams and larger charts, of views that are not the best");
+            "cost of a seam per meter; larger values give fewer seams but lower view quality");
   table.add("blend_views", options.blend_views, {1, 16},
-            "photographs that are blended at a place; 1: one a triangle");
+            "maximum number of photographs blended at a point; 1: one per triangle");
   table.add("blend_exponent", options.blend_exponent, not_negative,
-            "how much the better of them count for more");
-  table.add("exposure", options.exposure.gains, "even out the brightness of the photographs");
-  table.add("vignetting", options.exposure.vignetting, "even out darkening towards their corners");
+            "exponent of the view quality in the blending weights");
+  table.add("exposure", options.exposure.gains, "equalize the brightness of the photographs");
+  table.add("vignetting", options.exposure.vignetting, "correct the vignetting of the photographs");
   table.add("max_side_m", options.max_side_m, not_negative,
-            "triangles with longer sides are cut where a photograph may show them, m; 0: none");
-  table.add("strict", options.strict, "a frame that cannot be used is an error");
+            "maximum side length of visible triangles before subdivision, m; 0: no subdivision");
+  table.add("strict", options.strict, "treat unusable frames as errors instead of skipping them");
 }
 
 TextureResult texture_mesh(const TriangleMesh& mesh, const ScanSource& scan,
@@ -299,19 +299,19 @@ void describe(ResultTable& table, const TextureCounts& counts) {
   table.add("seen_triangles", counts.seen_triangles, Merge::sum, "triangles with a photograph");
   table.add("unseen_triangles", counts.unseen_triangles, Merge::sum,
             "triangles without a photograph");
-  table.add("seen_m2", counts.seen_m2, Merge::sum, "area with a photograph");
-  table.add("unseen_m2", counts.unseen_m2, Merge::sum, "area without a photograph");
+  table.add("seen_m2", counts.seen_m2, Merge::sum, "area with a photograph, m2");
+  table.add("unseen_m2", counts.unseen_m2, Merge::sum, "area without a photograph, m2");
   table.add("charts", counts.charts, Merge::sum, "charts of the texture");
   table.add("split_charts", counts.split_charts, Merge::sum,
             "charts that were split to fit a page");
   table.add("shrunk_charts", counts.shrunk_charts, Merge::sum, "charts of reduced resolution");
   table.add("pages", counts.pages, Merge::sum, "pages of the texture");
-  table.add("texel_size_m", counts.texel_size_m(), "root of the mean area of a texel");
+  table.add("texel_size_m", counts.texel_size_m(), "square root of the mean area of a texel, m");
   table.add("atlas_scale", counts.atlas_scale, Merge::min,
             "scale of the charts to fit max_pages; 1: not reduced");
   table.add("seams_before_m", counts.seams_before_m, Merge::sum,
-            "length of seams with the best photograph for each triangle");
-  table.add("seams_m", counts.seams_m, Merge::sum, "length of seams between photographs");
+            "length of seams with the best photograph for each triangle, m");
+  table.add("seams_m", counts.seams_m, Merge::sum, "length of seams between photographs, m");
   table.add_hidden("texels", counts.texels, Merge::sum);
 }
 
@@ -320,15 +320,15 @@ void describe(ResultTable& table, const TextureReport& report) {
   std::vector<double> gains;
   for (const Eigen::Vector3f& gain : exposure.gains)
     for (const float channel : gain) gains.push_back(static_cast<double>(channel));
-  table.add("photographs", report.photos, "photographs");
+  table.add("photographs", report.photos, "number of photographs");
   table.add("skipped_frames", report.skipped.size(), "frames that could not be used");
   describe(table, static_cast<const TextureCounts&>(report));
   table.add("color_spread_before", exposure.spread_before,
-            "spread of a location's colors between photographs");
+            "standard deviation of the log color of a location between photographs");
   table.add("color_spread", exposure.spread,
-            "spread of a location's colors between photographs, exposure corrected");
+            "standard deviation of the log color of a location, exposure corrected");
   table.add("exposure_gains", gains, "gain of red, green and blue of each photograph");
-  table.add("vignetting", exposure.vignetting, "coefficients of vignetting");
+  table.add("vignetting", exposure.vignetting, "coefficients of the vignetting");
 }
 
 double TextureCounts::texel_size_m() const {
@@ -337,8 +337,8 @@ double TextureCounts::texel_size_m() const {
 
 void require_seen(const TextureReport& report) {
   if (report.seen_triangles == 0)
-    throw Error("none of its triangles is seen by any of " + std::to_string(report.photos) +
-                " photographs: mesh and poses may lie in different frames");
+    throw Error("no triangle is visible in any of the " + std::to_string(report.photos) +
+                " photographs; check that mesh and poses are in the same frame");
 }
 
 }  // namespace libmap

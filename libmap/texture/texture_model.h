@@ -1,9 +1,9 @@
-// A mesh with the colors of a scan's photographs.
+// Textures a mesh with the photographs of a scan.
 //
-// Which photographs see each triangle, and how well (texture_views); one of them for each triangle
-// with few seams between them (texture_labeling), whose picture gives the triangle its place on
-// the texture's pages (texture_atlas); what photographs differ by as a whole (texture_exposure);
-// the colors, from the few best photographs of each place (texture_painting).
+// Steps: rate the photographs that see each triangle (texture_views), assign one photograph per
+// triangle with short seams (texture_labeling), pack the resulting charts onto pages
+// (texture_atlas), estimate the relative exposure (texture_exposure), and blend the colors of the
+// best photographs of each surface point (texture_painting).
 #pragma once
 
 #include <cstddef>
@@ -32,22 +32,22 @@ struct TextureOptions {
   TextureViewOptions views{};
   LabelingOptions labeling{};
   ExposureOptions exposure{};
-  // Photographs that are blended at a place; 1: one a triangle.
+  // Maximum number of photographs blended at a surface point; 1: one photograph per triangle.
   int blend_views = 3;
-  // >= 0: how much the better of them count for more.
+  // Exponent of the view quality in the blending weights, >= 0.
   double blend_exponent = 1.0;
-  // Triangles with longer sides are cut where photographs may show them, so that each of these sees
-  // them whole or not; 0: none. Longer ones stay where that would make more than 2.5 million
-  // triangles, and more than twice those of the mesh.
+  // Triangles with longer sides are subdivided if a photograph may show them, so that photographs
+  // see most triangles completely or not at all; 0: never. Longer sides remain if the result would
+  // exceed both 2.5 million triangles and twice those of the mesh.
   double max_side_m = 0.05;
   Color unseen_color{128, 128, 128};
-  bool strict = false;  // a frame that cannot be used is an Error
+  bool strict = false;  // throw Error for an unusable frame instead of skipping it
 };
 void bind(ParameterTable& table, TextureOptions& options);
 
-// Of one model, or of several pieces together.
+// Statistics of one model, or of several pieces together.
 struct TextureCounts {
-  std::size_t cut_triangles = 0;  // more triangles than the mesh had
+  std::size_t cut_triangles = 0;  // triangles added by subdivision
   std::size_t seen_triangles = 0;
   std::size_t unseen_triangles = 0;
   double seen_m2 = 0.0;
@@ -56,19 +56,19 @@ struct TextureCounts {
   std::size_t split_charts = 0;
   std::size_t shrunk_charts = 0;
   std::size_t pages = 0;
-  double atlas_scale = 1.0;     // below 1 where charts were made smaller for max_pages; the least
-  double texels = 0.0;          // on triangles
+  double atlas_scale = 1.0;     // minimum scale of the charts; below 1 if reduced for max_pages
+  double texels = 0.0;          // texels covered by triangles
   double seams_before_m = 0.0;  // with the best photograph for every triangle
   double seams_m = 0.0;
 
-  // Root of the mean area of a texel on the surface.
+  // Square root of the mean area of a texel on the surface, m; 0 without texels.
   double texel_size_m() const;
 };
 void describe(ResultTable& table, const TextureCounts& counts);
 
 struct TextureReport : TextureCounts {
   std::size_t photos = 0;
-  std::vector<std::pair<int, Error>> skipped;  // frames, and what they lack
+  std::vector<std::pair<int, Error>> skipped;  // node and reason
   TextureExposure exposure;
   StageTimings timings_s;
 };
@@ -78,33 +78,33 @@ struct TextureResult : TextureReport {
   TexturedMesh model;
 };
 
-// `mesh` lies in the world of the poses. The same bytes for any number of threads. Throws Error:
-// options out of their ranges, a mesh that cannot be used, no photograph, no triangle that any
-// photograph sees.
+// Textures `mesh`, which is in the world frame of the poses. The result is the same for any number
+// of threads. Throws Error: options out of range, an invalid or empty mesh, no usable photograph,
+// or no triangle seen by any photograph.
 TextureResult texture_mesh(const TriangleMesh& mesh, const ScanSource& scan,
                            const Trajectory& world_from_base, const TextureOptions& options = {},
                            Progress& progress = no_progress());
 
-// The pieces of a mesh one by one, so that memory depends on the size of a piece. Errors as of
-// texture_mesh, but that no photograph may see a triangle of a piece.
+// Textures the pieces of a mesh one by one; memory depends on the size of a piece. Throws Error as
+// texture_mesh does, except for a piece that no photograph sees.
 class PieceTexturing {
  public:
-  // What is up to `margin_m` around a piece may hide it; what stands further away does not.
-  // `pieces`, `scan` and `progress` must outlive this.
+  // Only the mesh within `margin_m` of a piece is considered as an occluder. `pieces`, `scan` and
+  // `progress` must outlive this object.
   PieceTexturing(MeshPieceIndex& pieces, double margin_m, const ScanSource& scan,
                  const Trajectory& world_from_base, const TextureOptions& options,
                  Progress& progress = no_progress());
   ~PieceTexturing();
 
-  // One for all pieces: looks at each of them.
+  // Estimates the common exposure from all pieces.
   TextureExposure find_exposure();
   struct Piece {
     TexturedMesh model;
     TextureCounts counts;
   };
-  // With this exposure, of find_exposure.
+  // Textures one piece with the result of find_exposure.
   Piece make(std::size_t piece, const TextureExposure& exposure);
-  // Of the photographs, with the times until now.
+  // Report on the photographs, with the running times so far and empty counts.
   TextureReport report() const;
 
  private:
@@ -112,7 +112,7 @@ class PieceTexturing {
   std::unique_ptr<Work> work_;
 };
 
-// Throws Error if no triangle was seen by any of the photographs.
+// Throws Error if no photograph sees any triangle.
 void require_seen(const TextureReport& report);
 
 }  // namespace libmap

@@ -13,9 +13,9 @@ namespace libmap {
 namespace {
 
 constexpr std::int32_t nobody = -1;
-// Of a texel's side: a texel whose center is this far outside of a triangle still is its own.
+// Tolerance for a texel center outside of a triangle, texels.
 constexpr double edge_slack = 1e-9;
-constexpr int max_samples = 8;  // a texel's side
+constexpr int max_samples = 8;  // along the side of a texel
 
 Color to_color(const Eigen::Vector3f& color) {
   Color result{};
@@ -25,7 +25,7 @@ Color to_color(const Eigen::Vector3f& color) {
   return result;
 }
 
-// Barycentric coordinates of places in a triangle on a page.
+// Barycentric coordinates in a triangle on a page.
 class PlaneTriangle {
  public:
   explicit PlaneTriangle(const std::array<Eigen::Vector2d, 3>& corners) : corners_(corners) {
@@ -51,7 +51,7 @@ class PlaneTriangle {
   bool flat_ = false;
 };
 
-// A photograph of a triangle and its shares at the corners.
+// A photograph of a triangle and its blending weights at the corners.
 struct CornerShares {
   std::uint32_t photo = 0;
   Eigen::Vector3d at_corners = Eigen::Vector3d::Zero();
@@ -89,12 +89,12 @@ class ChartPainter {
   const TexturePaint& paint_;
   TexturedMesh& model_;
   std::vector<std::shared_ptr<const ColorImage>> images_;
-  // Of the chart at hand.
+  // State of the current chart.
   const TextureChart* chart_ = nullptr;
-  std::vector<std::int32_t> owners_;  // of each texel: a place in chart_->triangles, or nobody
-  std::vector<std::uint32_t> first_texel_;  // of each triangle in texels_
+  std::vector<std::int32_t> owners_;        // per texel: index in chart_->triangles, or nobody
+  std::vector<std::uint32_t> first_texel_;  // per triangle: index in texels_
   std::vector<std::uint32_t> texels_;
-  std::vector<CornerShares> shares_;  // of the triangle at hand
+  std::vector<CornerShares> shares_;  // of the current triangle
 };
 
 void ChartPainter::paint(const TextureChart& chart) {
@@ -110,7 +110,7 @@ void ChartPainter::paint(const TextureChart& chart) {
                     static_cast<std::size_t>(first_texel_[i + 1] - first_texel_[i])});
 }
 
-// In texels of the chart.
+// The triangle in texels of the chart.
 PlaneTriangle ChartPainter::on_chart(std::uint32_t triangle) const {
   std::array<Eigen::Vector2d, 3> corners;
   const Eigen::Vector2d corner_of_chart(chart_->column, chart_->row);
@@ -121,7 +121,7 @@ PlaneTriangle ChartPainter::on_chart(std::uint32_t triangle) const {
   return PlaneTriangle(corners);
 }
 
-// The texels whose centers lie in a triangle, and one for each triangle without.
+// Assigns texels to the triangle that contains their center; each triangle gets at least one.
 void ChartPainter::find_owners() {
   for (std::size_t i = 0; i < chart_->triangles.size(); ++i) {
     const PlaneTriangle triangle = on_chart(chart_->triangles[i]);
@@ -145,7 +145,7 @@ void ChartPainter::find_owners() {
   }
 }
 
-// Texels around the chart get the owner of a neighbor, ring by ring.
+// Assigns the remaining texels to the owner of a neighbor, ring by ring.
 void ChartPainter::spread_owners() {
   std::vector<std::array<int, 2>> ring;
   for (int row = 0; row < chart_->height; ++row)
@@ -282,7 +282,7 @@ BlendingShares share_views(const ViewTable& of_vertices, int views, double expon
 
 void paint_texture(const TextureAtlas& atlas, const TexturePaint& paint, TexturedMesh& model,
                    Progress& progress) {
-  // Charts of one photograph follow each other: they need nearly the same images.
+  // Charts of one photograph are painted together because they need nearly the same images.
   std::vector<std::size_t> order(atlas.charts.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {

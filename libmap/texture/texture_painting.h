@@ -1,4 +1,4 @@
-// The colors of a texture's pages from the photographs. Private to libmap/texture.
+// Paints the pages of a texture from the photographs. Private to libmap/texture.
 #pragma once
 
 #include <cstdint>
@@ -13,22 +13,22 @@
 
 namespace libmap {
 
-// A photograph's share in the color of a vertex.
+// Blending weight of a photograph at a vertex.
 struct ViewShare {
   std::uint32_t photo = 0;
   float share = 0.0F;
 };
 
-// Shares of each vertex, which add up to 1: those of vertex v are shares[first[v]] ..
-// [first[v + 1] - 1]; none where the vertex takes the photograph of its triangle.
+// Blending weights of all vertices: vertex v has shares[first[v]] .. [first[v + 1] - 1], which sum
+// up to 1. A vertex without weights uses the photograph of its triangle.
 struct BlendingShares {
   std::vector<ViewShare> shares;
   std::vector<std::uint32_t> first;
 };
 
-// The `views` best of each vertex by their quality to the power of `exponent`, less that of the
-// next best: shares change without a jump from vertex to vertex (masked photo blending, Callieri et
-// al. 2008). `views` of 1 gives no shares at all.
+// Weights of the best `views` photographs of each vertex: quality^exponent minus that of the next
+// best photograph, normalized, so that weights are continuous over the surface (masked photo
+// blending, Callieri et al. 2008). Returns no weights if `views` is 1.
 BlendingShares share_views(const ViewTable& of_vertices, int views, double exponent);
 
 struct TexturePaint {
@@ -38,9 +38,9 @@ struct TexturePaint {
   Color neutral{};
 };
 
-// Paints all charts of `atlas` into the pages of `model`, which atlas.make_model has made: texels
-// in triangles by where they lie on the surface, those around them as the nearest in the chart. The
-// same for any number of threads.
+// Paints all charts of `atlas` into the pages of `model`, the result of atlas.make_model. Texels
+// outside all triangles continue the colors of the nearest triangle of their chart. The result is
+// the same for any number of threads.
 void paint_texture(const TextureAtlas& atlas, const TexturePaint& paint, TexturedMesh& model,
                    Progress& progress);
 

@@ -14,15 +14,15 @@ namespace libmap {
 
 namespace {
 
-// Frames in memory at a time; not the number of threads, which results must not depend on.
+// Number of frames in memory. Independent of the number of threads, as results must be.
 constexpr std::size_t frames_in_flight = 8;
-// How much more than a pinhole a lens may enlarge.
+// Maximum magnification of a lens relative to a pinhole.
 constexpr double max_distortion = 2.0;
 constexpr std::size_t cells_per_chunk = 4096;
 
 std::size_t bytes_of(const ColorImage& image) { return image.pixels.size() * sizeof(Color); }
 
-// The largest x/z, y/z radius that the image shows, and a little more.
+// Maximum radius of (x/z, y/z) in the image, with a margin of 10 %.
 double largest_ray(const Camera& camera) {
   double largest = 0.0;
   for (int side = 0; side < 8; ++side) {
@@ -36,9 +36,9 @@ double largest_ray(const Camera& camera) {
 }
 
 Error no_photographs(const std::vector<std::pair<int, Error>>& skipped, std::size_t poses) {
-  if (poses == 0) return Error("no poses to texture by");
-  return Error("none of " + std::to_string(poses) + " frames has a photograph, the first because " +
-               (skipped.empty() ? "it has no camera" : skipped.front().second.what()));
+  if (poses == 0) return Error("no poses for texturing");
+  return Error("no usable photograph in " + std::to_string(poses) + " frames; the first frame: " +
+               (skipped.empty() ? "no camera" : skipped.front().second.what()));
 }
 
 }  // namespace
@@ -56,7 +56,7 @@ Eigen::Vector3d PhotoProjector::project(const Eigen::Vector3d& point_in_world) c
   const Eigen::Vector2d ray(p.x() / p.z(), p.y() / p.z());
   if (!distorted_)
     return {camera_.fx * ray.x() + camera_.cx, camera_.fy * ray.y() + camera_.cy, p.z()};
-  // Beyond it the lens's polynomial means nothing.
+  // The distortion polynomial is not valid beyond this radius.
   if (ray.norm() > max_ray_) return Eigen::Vector3d::Zero();
   const Eigen::Vector2d pixel = distort_to_pixel(camera_, ray);
   return {pixel.x(), pixel.y(), p.z()};
@@ -68,10 +68,10 @@ double PhotoProjector::max_pixels(const Eigen::Vector3d& center, double radius_m
   if (p.z() + radius_m <= 0.0) return 0.0;
   const double nearest = p.norm() - radius_m;
   if (!std::isfinite(max_ray_) || nearest <= 0.0) return std::numeric_limits<double>::infinity();
-  // Distance from the cone around the axis that holds all of the image's rays.
+  // Distance from the cone around the optical axis that contains all rays of the image.
   const double stretch = 1.0 + max_ray_ * max_ray_;
   if ((p.head<2>().norm() - max_ray_ * p.z()) / std::sqrt(stretch) > radius_m) return 0.0;
-  // A pinhole shows an angle largest along the radius: f / cos^2.
+  // The magnification of a pinhole is largest in radial direction: f / cos^2.
   return max_distortion * std::max(camera_.fx, camera_.fy) * stretch * length_m / nearest;
 }
 
@@ -113,7 +113,7 @@ bool OccluderCells::has_any_above(float x, float y, const Eigen::Vector3d& norma
          column <= std::min(columns_ - 1, middle_column + 1); ++column) {
       const std::size_t i = index(column, row);
       if (!std::isfinite(z_[i])) continue;
-      // Both are negative below the camera.
+      // Both terms are negative below the camera.
       if (normal.dot(rays_[i]) * static_cast<double>(z_[i]) - height_m > gap_m) return true;
     }
   return false;
@@ -148,17 +148,17 @@ Eigen::Vector3f sample_bicubic(const ColorImage& image, double x, double y) {
 struct TexturePhotos::Frame {
   std::vector<TexturePhoto> photos{};
   std::vector<ColorImage> images{};
-  std::optional<Error> fault{};  // none: it can be used
+  std::optional<Error> fault{};  // nullopt: usable
 };
 
 TexturePhotos::Frame TexturePhotos::read_frame(const TrajectoryPose& pose) const {
   Frame frame;
   const std::string name = "node " + std::to_string(pose.node);
   try {
-    if (!pose.world_from_base.matrix().allFinite()) throw Error(name + ": its pose is not finite");
+    if (!pose.world_from_base.matrix().allFinite()) throw Error(name + ": pose is not finite");
     const RgbdFrame read = scan_.read_frame(pose.node, {.color = true, .depth = false});
-    if (read.cameras.empty()) throw Error(name + ": it has no calibration");
-    if (read.color.empty()) throw Error(name + ": it has no color image");
+    if (read.cameras.empty()) throw Error(name + ": no calibration");
+    if (read.color.empty()) throw Error(name + ": no color image");
     std::vector<CameraView> views = camera_views(read);
     for (std::size_t i = 0; i < views.size(); ++i) {
       views[i].color_camera.check();

@@ -1,5 +1,5 @@
-// The photographs of a scan as a texture's source: where each was taken, how sharp it is, and its
-// pixels when they are needed. Private to libmap/texture.
+// The photographs of a scan: camera pose and sharpness of each, and its pixels on demand. Private
+// to libmap/texture.
 #pragma once
 
 #include <Eigen/Core>
@@ -19,10 +19,10 @@
 
 namespace libmap {
 
-// Points of the world in a photograph.
+// Projects world points into a photograph.
 class PhotoProjector {
  public:
-  // Of a picture that `camera` took from `world_from_camera`.
+  // Projects into a photograph taken by `camera` at `world_from_camera`.
   PhotoProjector(const Camera& camera, const Pose& world_from_camera);
 
   const Camera& camera() const { return camera_; }
@@ -31,13 +31,12 @@ class PhotoProjector {
     return camera_from_world_.transpose() * direction_in_camera;
   }
 
-  // Column and row, and z in meters; z is 0 where the camera cannot see such a direction. The pixel
-  // may lie outside the image.
+  // Returns column, row and z (m). z is 0 if the point is behind the camera or beyond the valid
+  // range of the lens model. The pixel may be outside the image.
   Eigen::Vector3d project(const Eigen::Vector3d& point_in_world) const;
 
-  // No length of so many meters within the ball takes more pixels in the photograph, if its lens
-  // nowhere enlarges more than twice what a pinhole does; 0 only where it shows no part of the
-  // ball.
+  // Upper bound, in pixels, of the projection of any segment of length `length_m` within the ball;
+  // 0 only if the ball is outside the photograph. Assumes that distortion enlarges at most twice.
   double max_pixels(const Eigen::Vector3d& center, double radius_m, double length_m) const;
 
  private:
@@ -45,31 +44,31 @@ class PhotoProjector {
   Eigen::Matrix3d camera_from_world_;
   Eigen::Vector3d position_;
   bool distorted_ = false;
-  double max_ray_ = 0.0;  // no x/z, y/z radius of the image is larger; infinite if not known
+  double max_ray_ = 0.0;  // maximum radius of (x/z, y/z) in the image; infinite if unknown
 };
 
 // One camera of one frame.
 struct TexturePhoto {
   int node = 0;
-  std::size_t camera = 0;  // of the frame's cameras
+  std::size_t camera = 0;  // index among the frame's cameras
   PhotoProjector projector;
   double sharpness = 1.0;  // relative to the median photograph
 };
 
-// The nearest depths in small squares of a photograph.
+// Minimum depth in each square cell of a photograph.
 class OccluderCells {
  public:
-  // Squares of so many pixels; 0: nothing is ever found.
+  // Side of a cell in pixels; 0 disables the search.
   explicit OccluderCells(int side_px) : side_px_(side_px) {}
 
-  // Forgets the photograph before.
+  // Clears all cells and begins a new photograph.
   void begin(const PhotoProjector& projector);
-  // A point of a surface by its pixel and z, m, in the camera's frame; none if z is not positive or
-  // the pixel is outside.
+  // Adds a surface point by its pixel and z (m) in the camera's frame. Ignored if z is not positive
+  // or the pixel is outside the photograph.
   void add(float x, float y, float z);
-  // Whether something in the square of the pixel or in the eight around it is more than `gap_m`
-  // above the plane: normal . (point - camera) = height_m in the world's axes, the normal toward
-  // the camera. The pixel must be inside the photograph.
+  // Returns true if a point in the pixel's cell or its eight neighbors is more than `gap_m` above
+  // the plane normal . (point - camera) = height_m. The normal is in world axes and faces the
+  // camera. The pixel must be inside the photograph.
   bool has_any_above(float x, float y, const Eigen::Vector3d& normal, double height_m,
                      double gap_m) const;
 
@@ -85,19 +84,19 @@ class OccluderCells {
   float height_px_ = 0.0F;
   int columns_ = 0;
   int rows_ = 0;
-  std::vector<float> z_;               // the least of the points in each square
-  std::vector<Eigen::Vector3d> rays_;  // through its middle, z = 1, world's axes; zero: none
+  std::vector<float> z_;               // minimum per cell
+  std::vector<Eigen::Vector3d> rays_;  // through cell centers, z = 1, world axes; zero: no ray
 };
 
-// As bilinear_color(), but bicubic: Keys 1981, a = -1/2.
+// Bicubic interpolation (Keys 1981, a = -1/2) at pixel (x, y), clamped to the image; 0 to 255.
 Eigen::Vector3f sample_bicubic(const ColorImage& image, double x, double y);
 
 class TexturePhotos {
  public:
-  // Reads each frame of `world_from_base` once, by ascending node. Frames without color, with a
-  // pose that is not finite or that cannot be decoded are skipped and listed; with `strict` they
-  // are an Error. Throws Error if no photograph is left. `scan` must outlive this. So many bytes of
-  // images are kept at most.
+  // Reads each frame of `world_from_base` once, by ascending node. Skips and lists frames that have
+  // no color image, no calibration or a pose that is not finite, or that cannot be decoded; with
+  // `strict` it throws Error for them. Throws Error if no photograph is left. At most
+  // `max_kept_bytes` of decoded images are cached. `scan` must outlive this object.
   TexturePhotos(const ScanSource& scan, const Trajectory& world_from_base, bool strict,
                 Progress& progress, std::size_t max_kept_bytes);
 
@@ -105,9 +104,9 @@ class TexturePhotos {
   const TexturePhoto& operator[](std::size_t photo) const { return photos_[photo]; }
   const std::vector<std::pair<int, Error>>& skipped() const { return skipped_; }
 
-  // Decoded anew where memory did not allow to keep it. May be called from several threads.
+  // Returns the pixels, decoded again unless cached. May be called from several threads.
   std::shared_ptr<const ColorImage> image(std::size_t photo) const;
-  // Frees the images that are kept.
+  // Clears the cache.
   void forget_images() const;
 
  private:
@@ -122,7 +121,7 @@ class TexturePhotos {
 
   mutable std::mutex mutex_;
   mutable std::vector<std::shared_ptr<const ColorImage>> images_;
-  mutable std::list<std::size_t> order_;  // of the images that are kept, the oldest first
+  mutable std::list<std::size_t> order_;  // cached images, oldest first
   mutable std::size_t kept_bytes_ = 0;
 };
 

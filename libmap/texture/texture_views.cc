@@ -18,24 +18,24 @@ namespace libmap {
 
 namespace {
 
-// Side of the cubes in which what no photograph shows is passed over.
+// Side of the cubes that are skipped as a whole if a photograph does not show them.
 constexpr double block_m = 0.5;
-// Of a photograph's smaller side: within it, towards the border, a view counts less and less.
+// Width of the band at the border in which quality decreases, relative to the smaller image side.
 constexpr double border_band = 0.15;
 constexpr double min_border_share = 0.05;
-// A triangle that is larger in the photograph is tested at its center too.
+// Triangles larger than this in the photograph are also tested at their center.
 constexpr float center_test_px = 6.0F;
 
-// What stands this much of the tolerance above a triangle's plane is no part of its own surface.
+// Minimum height of an occluder above a triangle's plane, in occlusion tolerances.
 constexpr double occluder_tolerances = 3.0;
-// Of the quality of a view beside an occluder.
+// Factor on the quality of a view beside an occluder.
 constexpr float beside_occluder = 0.02F;
 
-// A vertex in the photograph at hand.
+// A vertex in the current photograph.
 struct SeenVertex {
   float x = 0.0F;
   float y = 0.0F;
-  float z = 0.0F;  // m; 0 where the camera cannot see such a direction
+  float z = 0.0F;  // m; 0 if the point cannot be projected
   bool in_image = false;
   bool visible = false;
 };
@@ -91,11 +91,11 @@ class ViewFinder {
     Eigen::AlignedBox3d box{};  // of the vertices
     std::span<const std::uint32_t> vertices{};
     std::span<const std::uint32_t> rated{};
-    bool any_asked_in_image = false;  // of the photograph at hand
+    bool any_asked_in_image = false;  // in the current photograph
   };
 
   bool wants_views() const { return request_.views_a_vertex > 0 || request_.views_a_triangle > 0; }
-  // Whether the photograph at hand may show anything of the ball, and near enough.
+  // Returns true if the current photograph may show a part of the ball within max_depth_m.
   bool may_show(const Eigen::Vector3d& center, double radius_m) const {
     const double z =
         projector_->to_world(Eigen::Vector3d::UnitZ()).dot(center - projector_->position());
@@ -108,7 +108,7 @@ class ViewFinder {
   void project();
   bool is_beside_occluder(std::size_t triangle) const;
   void devalue_occluded_edges();
-  // Of the blocks in view, in parallel.
+  // Visits the blocks in view in parallel.
   template <typename Use>
   void each_block(const Use& use) const {
     parallel_each(in_view_.size(), [&](std::size_t n) { use(*in_view_[n]); });
@@ -142,18 +142,18 @@ class ViewFinder {
   VertexTriangles around_;
   double min_cos_;
   double max_depth_m_;
-  double longest_side_m_ = 0.0;  // of the triangles that decide on the vertices that are asked for
-  // Vertices whose views are asked for, a ball around them, and the triangles that decide on them.
+  double longest_side_m_ = 0.0;  // of the rated triangles
+  // Requested vertices, a ball around them, and the triangles that determine their quality.
   std::vector<bool> is_asked_;
   std::vector<std::uint32_t> observed_;
   Eigen::Vector3d center_ = Eigen::Vector3d::Zero();
   double radius_m_ = 0.0;
   std::vector<std::uint32_t> rated_;
-  std::vector<Eigen::Vector3d> normals_;  // of these
-  std::vector<std::uint32_t> place_of_;   // of a triangle, among the rated ones
-  std::vector<std::uint32_t> order_;      // of vertices, by blocks
+  std::vector<Eigen::Vector3d> normals_;  // one per rated triangle
+  std::vector<std::uint32_t> place_of_;   // per triangle: its index in rated_
+  std::vector<std::uint32_t> order_;      // vertices, by blocks
   std::vector<Block> blocks_;
-  // Of the photograph at hand; in other blocks nothing is in the image.
+  // State of the current photograph. Blocks that are not in view are outside the image.
   const PhotoProjector* projector_ = nullptr;
   std::vector<Block*> in_view_;
   std::vector<SeenVertex> vertices_;
@@ -204,7 +204,7 @@ void ViewFinder::make_blocks() {
     block_of[v] = cubes.find_or_add(pack(cube));
   }
   blocks_.resize(cubes.size());
-  // Numbers by their block, those of one block in their order.
+  // Stable sort of indices by block.
   const auto sort = [&](std::vector<std::uint32_t>& numbers, const auto& vertex_of, auto member) {
     std::vector<std::size_t> first(blocks_.size() + 1, 0);
     for (const std::uint32_t n : numbers) ++first[block_of[vertex_of(n)] + 1];
@@ -216,8 +216,7 @@ void ViewFinder::make_blocks() {
     for (std::size_t b = 0; b < blocks_.size(); ++b)
       blocks_[b].*member = std::span(numbers).subspan(first[b], first[b + 1] - first[b]);
   };
-  // All that may stand before a surface; for observations, which only ask whether it is hidden, the
-  // corners of the triangles.
+  // Views need all possible occluders; observations alone need only the corners of the triangles.
   std::vector<bool> is_needed(mesh_.vertices.size(), wants_views());
   for (const std::uint32_t t : rated_)
     for (const std::uint32_t v : mesh_.triangles[t]) is_needed[v] = true;
@@ -266,7 +265,7 @@ void ViewFinder::project() {
   });
 }
 
-// Whether something seen in the squares around the triangle stands before its plane.
+// Returns true if an occluder in the cells around the triangle is in front of its plane.
 bool ViewFinder::is_beside_occluder(std::size_t t) const {
   const SeenVertex& corner = vertices_[mesh_.triangles[t][0]];
   const Eigen::Vector3d& normal = normal_of(t);
@@ -287,7 +286,7 @@ void ViewFinder::devalue_occluded_edges() {
   });
 }
 
-// How well the photograph would show the triangle if nothing were before it.
+// Quality of the triangle's view, without occlusion; 0 if it is not in view.
 float ViewFinder::rate(std::size_t t, double sharpness) const {
   const Triangle& triangle = mesh_.triangles[t];
   double sum_z = 0.0;
@@ -318,7 +317,7 @@ void ViewFinder::rate_triangles(double sharpness) {
   each_rated([&](std::uint32_t t) { qualities_[t] = rate(t, sharpness); });
 }
 
-// In the order of the points.
+// Occlusion of each point.
 std::vector<bool> ViewFinder::hidden(const std::vector<Eigen::Vector3d>& points) const {
   const Eigen::Vector3d& origin = projector_->position();
   std::vector<Eigen::Vector3d> directions;
@@ -384,7 +383,7 @@ void ViewFinder::test_triangles() {
   });
 }
 
-// The least of its triangles; 0 where one is not seen. Triangles without area do not count.
+// Minimum quality of a vertex's triangles; 0 if one is not seen. Ignores triangles without area.
 float ViewFinder::quality_at(std::uint32_t v) const {
   if (!vertices_[v].visible) return 0.0F;
   float least = std::numeric_limits<float>::infinity();

@@ -1,4 +1,5 @@
-// Which photographs see which parts of a mesh, and how well. Private to libmap/texture.
+// Visibility and quality of a mesh's triangles and vertices in photographs. Private to
+// libmap/texture.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,30 +16,29 @@ namespace libmap {
 
 struct TextureViewOptions {
   double max_incidence_deg = 85.0;  // between the ray and the normal; > 0, < 90
-  // Photographs in which a triangle's center has a larger z are not used for it: as far as depth is
-  // fused by default, so that what was measured has a photograph that is near enough. 0: any z.
+  // Photographs in which a triangle's center has a larger z are not used for it. The default is the
+  // maximum depth of fusion. 0: no limit.
   double max_depth_m = 4.0;
-  // A surface is hidden that lies further behind another than this: the mesh's own error, and that
-  // of the poses.
+  // A surface further behind another than this is occluded. Covers errors of mesh and poses.
   double occlusion_tolerance_m = 0.01;
-  int border_px = 3;  // of each photograph are not used
-  // Where a surface is this near in the photograph to another that stands before it, the view
-  // counts for little: poses are not exact, and pixels mix.
+  int border_px = 3;  // width of the unused border of each photograph
+  // Views within this distance of an occluder's silhouette get a low quality, because of pose
+  // errors and mixed pixels.
   int occlusion_margin_px = 3;
 };
 
 struct ViewQuality {
   std::uint32_t photo = 0;
-  // Pixels a square meter of the surface, times what counts against the view: slant, the
-  // photograph's border, blur.
+  // Pixels per square meter of the surface, times factors <= 1 for slant and the photograph's
+  // border, and the photograph's sharpness.
   float quality = 0.0F;
 };
 
-// The best few views of each of many things, the best first; equally good ones by their photograph.
+// The best views of each row (a triangle or a vertex), best first; ties by photograph index.
 class ViewTable {
  public:
   ViewTable() = default;
-  // So many things, with `capacity` views each at most.
+  // At most `capacity` views per row.
   ViewTable(std::size_t rows, std::size_t capacity);
 
   std::size_t rows() const { return counts_.size(); }
@@ -54,34 +54,34 @@ class ViewTable {
   std::vector<std::uint16_t> counts_;
 };
 
-// What one photograph shows at one vertex.
+// Color of one vertex in one photograph.
 struct ColorObservation {
-  std::uint32_t vertex = 0;  // of those that are observed
+  std::uint32_t vertex = 0;  // index among the observed vertices
   std::uint32_t photo = 0;
-  float x = 0.0F;  // of its pixel
+  float x = 0.0F;  // pixel
   float y = 0.0F;
-  float radius2 = 0.0F;  // squared distance from the image's middle, 1 in its corners
+  float radius2 = 0.0F;  // squared distance from the image center, 1 in the corners
   Eigen::Vector3f color = Eigen::Vector3f::Zero();  // 0 to 255
 };
 
-// What is asked for of a mesh, and of which part.
+// Part of the mesh and number of views to find.
 struct TextureViewRequest {
-  // The first so many triangles and their vertices. The others may hide them, and decide with them
-  // how well their common vertices are seen.
+  // Views of the first `triangles` triangles and their vertices are found. The other triangles are
+  // occluders, and contribute to the quality of common vertices.
   std::size_t triangles = 0;
-  // 0 both: none, which takes much less time.
+  // Maximum number of views; both 0: no views, which takes much less time.
   std::size_t views_a_triangle = 0;
   std::size_t views_a_vertex = 0;
-  std::size_t observed_vertices = 0;  // about so many, at most twice as many
+  std::size_t observed_vertices = 0;  // approximate number, exceeded at most twofold
 };
 
 struct TextureViews {
-  // Of triangles that a photograph sees whole.
+  // One row per triangle: photographs that see it completely.
   ViewTable of_triangles;
-  // Of vertices of which a photograph sees all triangles whole: the least of their qualities. One
-  // row for each vertex up to the last one of the part, empty for those of other triangles alone.
+  // One row per vertex up to the last one of the part: photographs that see all its triangles, with
+  // the minimum of their qualities. Empty for vertices of other triangles only.
   ViewTable of_vertices;
-  // All views of some of the vertices, spread over the part; colors are not looked up yet.
+  // All views of a subset of vertices, spread over the part. Colors are not set yet.
   std::vector<ColorObservation> observations;
   std::size_t observed_vertices = 0;
 };
@@ -89,9 +89,9 @@ struct TextureViews {
 // Sets radius2 and color of all observations. Decodes each photograph once.
 void look_up_colors(const TexturePhotos& photos, std::vector<ColorObservation>& observations);
 
-// Corners and center of a triangle must be in the photograph and not be hidden (one ray each,
-// Embree). The same for any number of threads. The mesh must have a triangle, and no triangle large
-// against a photograph: it would be seen whole by none.
+// Finds the views of triangles and vertices. Corners and center of a triangle must be inside the
+// photograph and not occluded (one ray each, Embree). The mesh must not be empty; triangles larger
+// than a photograph have no view. The result is the same for any number of threads.
 TextureViews find_texture_views(const TriangleMesh& mesh, const TexturePhotos& photos,
                                 const TextureViewOptions& options,
                                 const TextureViewRequest& request, Progress& progress);

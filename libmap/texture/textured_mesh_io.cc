@@ -23,7 +23,7 @@ struct TextureCorner {
   Eigen::Vector2f coordinate = Eigen::Vector2f::Zero();
 };
 
-// Corners of one vertex and texture coordinate as one, in the order of their first use.
+// Merges corners of equal vertex and texture coordinate, in the order of their first use.
 struct UnitedCorners {
   std::vector<TextureCorner> corners;
   std::vector<std::array<std::uint32_t, 3>> of_triangle;
@@ -32,7 +32,7 @@ struct UnitedCorners {
 UnitedCorners unite_corners(const TexturedMesh& model) {
   UnitedCorners result;
   constexpr std::uint32_t none = 0xffffffff;
-  // The corners of a vertex are a list: few have more than two.
+  // Linked list of the corners of a vertex; few vertices have more than two.
   std::vector<std::uint32_t> newest(model.mesh.vertices.size(), none);
   std::vector<std::uint32_t> older;
   result.of_triangle.resize(model.mesh.triangles.size());
@@ -54,7 +54,7 @@ UnitedCorners unite_corners(const TexturedMesh& model) {
   return result;
 }
 
-// A page as the bytes of a picture.
+// Encodes a page as an image file.
 std::string encode_page(const ColorImage& page, const TexturedMeshWriteOptions& options) {
   return options.image_format == ImageFormat::png ? encode_png(page)
                                                   : encode_jpeg(page, options.jpeg_quality);
@@ -68,7 +68,7 @@ std::string material_name(std::int32_t page) {
   return page == no_page ? "plain" : "page_" + std::to_string(page);
 }
 
-// Wavefront MTL: the pictures are shown as they are.
+// Wavefront MTL without lighting.
 std::string materials_text(const fs::path& path, const TexturedMesh& model,
                            const TexturedMeshWriteOptions& options) {
   std::string text;
@@ -99,7 +99,7 @@ void write_textured_obj(const fs::path& path, const TexturedMesh& model, std::os
   for (const Eigen::Vector3d& vertex : model.mesh.vertices) out << "v" + numbers(vertex);
   const UnitedCorners united = unite_corners(model);
   for (const TextureCorner& corner : united.corners) {
-    // OBJ counts from the bottom.
+    // OBJ measures v from the bottom.
     const Eigen::Vector2d place = corner.coordinate.cast<double>();
     out << "vt" +
                numbers(Eigen::Vector2f(corner.coordinate.x(), static_cast<float>(1.0 - place.y())));
@@ -113,7 +113,7 @@ void write_textured_obj(const fs::path& path, const TexturedMesh& model, std::os
       std::string line = named ? "f" : "usemtl " + material_name(page) + "\nf";
       named = true;
       for (std::size_t k = 0; k < 3; ++k) {
-        // Indices count from 1.
+        // OBJ indices begin at 1.
         const std::string vertex = std::to_string(std::uint64_t{model.mesh.triangles[t][k]} + 1);
         line += " " + vertex + "/" + std::to_string(std::uint64_t{united.of_triangle[t][k]} + 1);
         if (has_normals) line += "/" + vertex;
@@ -129,7 +129,7 @@ Eigen::Vector3f unit(const Eigen::Vector3f& normal) {
                                                 : Eigen::Vector3f::UnitZ();
 }
 
-// The triangles of one page, with vertices of their own: one a texture corner.
+// The triangles of one page, with one vertex per distinct texture corner.
 ModelPart part_of(const TexturedMesh& model, const UnitedCorners& united, std::int32_t page) {
   ModelPart part;
   part.page = page;
@@ -155,16 +155,16 @@ ModelPart part_of(const TexturedMesh& model, const UnitedCorners& united, std::i
   return part;
 }
 
-// The lengths in the format's header have 32 bits; assimp does not check them.
+// glTF stores lengths in 32 bits. Assimp does not check them.
 void require_room_in_glb(const std::vector<ModelPart>& parts,
                          const std::vector<EncodedPicture>& pictures) {
-  std::size_t bytes = std::size_t{1} << 20;  // of the description
+  std::size_t bytes = std::size_t{1} << 20;  // JSON part
   for (const ModelPart& part : parts)
     bytes += part.mesh.vertices.size() * (3 + 3 + 2) * sizeof(float) +
              part.mesh.triangles.size() * 3 * sizeof(std::uint32_t);
   for (const EncodedPicture& picture : pictures) bytes += picture.bytes.size();
   if (bytes > std::numeric_limits<std::uint32_t>::max())
-    throw Error("too large for a .glb file",
+    throw Error("too large for .glb: write an .obj instead",
                 {.field = "size", .value = std::to_string(bytes) + " bytes", .bound = "< 4 GB"});
 }
 
@@ -214,7 +214,7 @@ bool is_textured_format(const fs::path& path) {
 
 void require_textured_format(const fs::path& path) {
   if (is_textured_format(path)) return;
-  throw Error("a textured mesh cannot be written so",
+  throw Error("unsupported format of a textured mesh",
               {.file = path.string(),
                .field = "extension",
                .value = format_of(path).empty() ? "missing" : format_of(path),
@@ -225,7 +225,7 @@ std::vector<ModelFile> textured_mesh_files(const fs::path& path, const TexturedM
                                            const TexturedMeshWriteOptions& options) {
   require_textured_format(path);
   model.check();
-  if (model.mesh.triangles.empty()) throw Error("a mesh without triangles cannot be textured");
+  if (model.mesh.triangles.empty()) throw Error("the mesh has no triangles");
   require_single_precision(model.mesh, format_of(path));
   std::vector<ModelFile> files;
   if (format_of(path) == ".glb") {

@@ -1,12 +1,12 @@
-// Textured meshes from and to files.
+// Reads and writes textured meshes.
 //
-//   .obj   MODEL.obj, MODEL.mtl and a picture per page, MODEL_0.png ...: doubles written, float32
-//   read .glb   glTF 2.0 in one file, pictures within, unlit (KHR_materials_unlit): float32; y up
-//   by its
-//          standard, this project z: writing and reading turn it about x
+// .obj: MODEL.obj, MODEL.mtl and one image per page, MODEL_0.png ...; coordinates are written as
+// doubles and read as float32.
+// .glb: glTF 2.0 in one file with its images, unlit (KHR_materials_unlit), float32. glTF is y-up
+// and this project z-up: writing and reading rotate the mesh about x.
 //
-// Vertex normals are kept; vertex colors and fields are not. float32 holds 24 bits (mesh_io.h says
-// what that means far from the origin).
+// Vertex normals are kept; vertex colors and fields are not. float32 has 24 bits of precision; for
+// meshes far from the origin see mesh_io.h.
 #pragma once
 
 #include <cstddef>
@@ -24,24 +24,24 @@ struct TexturedMeshWriteOptions {
   int jpeg_quality = 92;  // 1 to 100
 };
 
-// Files that a model with one page has beside its own; none for .glb.
+// Additional files of a model with one page (image and material); empty for .glb.
 std::vector<std::filesystem::path> companions_of_model(const std::filesystem::path& model,
                                                        const TexturedMeshWriteOptions& options);
 
-// One file of a model: writer(path) writes it, to a temporary path or its own.
+// One file of a model. `write` writes it to the given path, which may be temporary.
 struct ModelFile {
   std::filesystem::path path;
   std::function<void(const std::filesystem::path& temporary)> write;
 };
 
-// MODEL_0.png and so on, beside MODEL.obj.
+// Path of a page's image beside the model, e.g. MODEL_0.png for MODEL.obj.
 std::filesystem::path texture_page_path(const std::filesystem::path& model, std::size_t page,
                                         ImageFormat format);
 
-// The files of a model, its own last: put in place in this order, it never stands there without
-// what it names. The model must outlive the writers. Throws Error: an extension that is neither
-// .obj nor .glb, a model that does not fit together (TexturedMesh::check), one of no triangles, or
-// whose .glb would be larger than 4 GB.
+// Returns the files of a model in the order in which they must be committed: the model file is
+// last, after all files that it references. `model` must outlive the writers. Throws Error: an
+// extension other than .obj and .glb, an inconsistent model (TexturedMesh::check), no triangles, or
+// coordinates that float32 cannot represent. Writing throws Error for a .glb above 4 GB.
 std::vector<ModelFile> textured_mesh_files(const std::filesystem::path& path,
                                            const TexturedMesh& model,
                                            const TexturedMeshWriteOptions& options = {});
@@ -50,10 +50,10 @@ std::vector<ModelFile> textured_mesh_files(const std::filesystem::path& path,
 void require_textured_format(const std::filesystem::path& path);
 bool is_textured_format(const std::filesystem::path& path);
 
-// An .obj or .glb of any maker with its textures (PNG or JPEG, in the file or beside it); without
-// pages where it has none. Corners equal in place and normal become one vertex. Throws Error naming
-// the file: it cannot be read, is not of its format, holds no triangle, or names a picture that
-// cannot be read.
+// Reads an .obj or .glb from any program with its textures (PNG or JPEG, embedded or beside it).
+// The result has no pages if the file has no textures. Corners of equal position and normal are
+// merged into one vertex. Throws Error naming the file: it cannot be read or parsed, contains no
+// triangle, or references an unreadable image.
 TexturedMesh read_textured_mesh(const std::filesystem::path& path);
 
 }  // namespace libmap

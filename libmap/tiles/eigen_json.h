@@ -1,4 +1,5 @@
-// Eigen's types, and what an Error says, in nlohmann's JSON. Numbers come back bit for bit.
+// Conversion of Eigen's types and messages of Errors to and from nlohmann's JSON. Numbers are
+// preserved bit for bit.
 #pragma once
 
 #include <Eigen/Geometry>

@@ -8,7 +8,7 @@ namespace libmap {
 
 namespace {
 
-// A record: place in the order of all points, position, normal if there are any.
+// Size of a record without normal: sequence number of the point, position.
 constexpr std::size_t bare_record_bytes = sizeof(std::uint64_t) + sizeof(Eigen::Vector3d);
 
 template <typename T>
@@ -56,7 +56,7 @@ void PointTileStore::flush() {
     if (records.buffer.empty()) continue;
     records.written.push_back(
         {file_.append(records.buffer.data(), records.buffer.size()), records.buffer.size()});
-    std::vector<char>().swap(records.buffer);  // gives the memory back
+    std::vector<char>().swap(records.buffer);  // releases the memory
   }
   buffered_ = 0;
 }
@@ -84,7 +84,7 @@ void PointTileStore::for_tiles_in(const Eigen::Vector2d& low, const Eigen::Vecto
 PointCloud PointTileStore::points_in(const Eigen::Vector2d& low,
                                      const Eigen::Vector2d& high) const {
   PointCloud found;
-  std::vector<std::pair<std::uint64_t, std::size_t>> order;  // place, and index in `found`
+  std::vector<std::pair<std::uint64_t, std::size_t>> order;  // sequence number, index in `found`
   std::vector<char> bytes;
   for_tiles_in(low, high, [&](const Records& records) {
     read_tile(records, bytes);

@@ -1,4 +1,4 @@
-// Points of a large terrain in tiles on disk, for reading those of a rectangle without the others.
+// Points of a large terrain in tiles on disk, for reading the points of a rectangle only.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,25 +17,26 @@ namespace libmap {
 
 struct PointTileStoreOptions {
   double tile_m = 1.0;                                // side of a tile
-  bool has_normals = false;                           // of the points to come
-  std::size_t buffer_bytes = std::size_t{64} << 20U;  // of all tiles together
+  bool has_normals = false;                           // true to store the points' normals
+  std::size_t buffer_bytes = std::size_t{64} << 20U;  // total for all tiles
 };
 
 class PointTileStore {
  public:
-  // Takes 32 bytes of disk a point, 44 with normals, in a file without a name in `folder`: nothing
-  // is left of it, however the process ends. Throws Error (failed).
+  // Uses 32 bytes of disk per point, 44 with normals, in a TempFile in `folder`. All functions
+  // throw Error (failed) if it cannot be created, written or read.
   PointTileStore(const std::filesystem::path& folder, const PointTileStoreOptions& options);
 
-  // Positions must be finite and less than 2^40 tiles away from the origin.
+  // Adds points. Positions must be finite and less than 2^40 tiles away from the origin.
   void add(const PointCloud& cloud);
-  // Ends the adding.
+  // Writes the buffered points after the last add().
   void finish() { flush(); }
 
-  // The points with low <= (x, y) <= high, in the order in which they were added; a few whole
-  // tiles are read.
+  // Returns the points with low <= (x, y) <= high in the order of add(). Reads the tiles that
+  // intersect the rectangle.
   PointCloud points_in(const Eigen::Vector2d& low, const Eigen::Vector2d& high) const;
-  // How many there are at most: those of the tiles that points_in would read.
+  // Upper bound of the number of points in the rectangle: the points of the tiles that intersect
+  // it.
   std::size_t count_in(const Eigen::Vector2d& low, const Eigen::Vector2d& high) const;
   std::size_t size() const { return size_; }
 

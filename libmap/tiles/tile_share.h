@@ -1,4 +1,4 @@
-// Shares of the tiles: each of several runs makes one.
+// Shares of the tiles, for distributing the tiles over several runs.
 #pragma once
 
 #include <cstddef>
@@ -8,20 +8,20 @@
 
 namespace libmap {
 
-// Share `number` of `count`, from 1 on. All shares together are all tiles.
+// Share `number` (from 1) of `count`. The shares are disjoint and cover all tiles.
 struct TileShare {
   int number = 1;
   int count = 1;
 };
 
-// "K/N". parse_share throws Error naming --tile.
+// Conversion from and to "K/N". parse_share throws Error naming --tile.
 TileShare parse_share(const std::string& text);
 std::string to_text(const TileShare& share);
 
-// The share's first tile, and the one after its last. Throws Error naming `tile`.
+// Returns the index range [begin, end) of a share among `tiles` tiles. Throws Error naming `tile`.
 std::pair<std::size_t, std::size_t> share_range(std::size_t tiles, const TileShare& share);
 
-// A run of neighbors in the order of `tiles`. Throws as share_range.
+// Returns the consecutive tiles of a share. Throws as share_range does.
 template <typename Tile>
 std::vector<Tile> share_of(const std::vector<Tile>& tiles, const TileShare& share) {
   const auto [begin, end] = share_range(tiles.size(), share);

@@ -41,7 +41,7 @@ bool ends_in_a_line(const fs::path& path) {
 void make_folder(const fs::path& folder) {
   std::error_code code;
   fs::create_directories(folder, code);
-  if (code) throw system_failure(folder, "cannot be made", code.value());
+  if (code) throw system_failure(folder, "cannot be created", code.value());
 }
 
 FileLock lock_journal(const fs::path& journal, const fs::path& store, const TileShare& share) {
@@ -96,7 +96,7 @@ void TileStore::open() const {
     throw Error("is a file, not a tile store", {.file = folder_.string()});
   if (fs::exists(folder_) && !fs::is_empty(folder_) && !fs::exists(progress()) &&
       !fs::exists(index_path()))
-    throw Error("is not empty and is no tile store", {.file = folder_.string()});
+    throw Error("is not empty and is not a tile store", {.file = folder_.string()});
   for (const fs::path& folder : {folder_, progress(), tiles()}) make_folder(folder);
 }
 
@@ -123,7 +123,7 @@ void TileStore::write_plan(const std::string& text) const { write_whole_file(pla
 
 std::vector<fs::path> TileStore::journals() const {
   std::vector<fs::path> paths;
-  std::error_code ignored;  // another run may have removed the store
+  std::error_code ignored;  // another run can have removed the store
   for (const fs::directory_entry& entry : fs::directory_iterator(progress(), ignored))
     if (entry.path().extension() == ".jsonl") paths.push_back(entry.path());
   std::sort(paths.begin(), paths.end());
@@ -161,7 +161,7 @@ void TileStore::require_idle() const {
 }
 
 void TileStore::clear() const {
-  // What lists tiles as done goes first.
+  // First the files that list tiles as done.
   fs::remove(index_path());
   fs::remove(plan_path());
   for (const fs::path& path : journals()) fs::remove(path);
@@ -171,7 +171,7 @@ void TileStore::clear() const {
 
 void TileStore::remove_if_bare() const {
   if (fs::exists(plan_path())) return;
-  // Each only if it is empty by then.
+  // fs::remove removes empty folders only.
   std::error_code ignored;
   fs::remove(progress() / "lock", ignored);
   for (const fs::path& folder : {progress(), tiles(), folder_}) fs::remove(folder, ignored);

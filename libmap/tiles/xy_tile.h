@@ -10,21 +10,21 @@
 
 namespace libmap {
 
-// Index of a tile.
+// Index of a tile: x and y of its lower corner in units of its side.
 struct XyTile {
-  std::int64_t i = 0;  // x of its lower corner, in sides
+  std::int64_t i = 0;
   std::int64_t j = 0;
 
   auto operator<=>(const XyTile&) const = default;
 };
 
-// The tile with the side `tile_m` that contains the position.
+// Returns the tile of side `tile_m` that contains a position, m.
 XyTile xy_tile_at(const Eigen::Vector2d& position, double tile_m);
 
 std::string tile_file_name(const XyTile& tile, const std::string& extension);  // "piece_3_0.pcd"
 bool is_tile_file_name(const std::string& name);                               // any extension
 
-// The names of the tile files in `folder`; none if there is no such folder.
+// Returns the names of the tile files in `folder`, unsorted; none if there is no such folder.
 std::vector<std::string> tile_file_names(const std::filesystem::path& folder);
 
 }  // namespace libmap

@@ -13,12 +13,12 @@
 namespace libmap {
 namespace {
 
-// Files of Debian's fonts-dejavu-core. A font is chosen by file, not by name: fontconfig would
-// replace a missing one by another, and pictures would depend on the machine.
+// Files of Debian's fonts-dejavu-core. Fonts are loaded by file, not by name: fontconfig would
+// substitute a missing font, and images would depend on the machine.
 constexpr const char* plain_font = "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf";
 constexpr const char* bold_font = "/usr/share/fonts/truetype/dejavu/DejaVuSans-Bold.ttf";
 
-// Kept until the program ends: Cairo's cache of fonts refers to it.
+// The font is never freed because Cairo's font cache refers to it.
 cairo_font_face_t* load_font(const char* file) {
   FT_Library library = nullptr;
   FT_Face face = nullptr;
@@ -32,7 +32,7 @@ cairo_font_face_t* load_font(const char* file) {
 
 using ScaledFont = std::unique_ptr<cairo_scaled_font_t, void (*)(cairo_scaled_font_t*)>;
 
-// Without hinting, so that widths are proportional to the size.
+// A font without hinting, so that widths are proportional to the size.
 ScaledFont font_of(const TextStyle& style) {
   static cairo_font_face_t* const plain = load_font(plain_font);
   static cairo_font_face_t* const bold = load_font(bold_font);
@@ -49,7 +49,7 @@ ScaledFont font_of(const TextStyle& style) {
   return font;
 }
 
-// One line of text: control characters are blanks. Text that is not UTF-8 is shown as ASCII.
+// One line of text. Control characters become blanks; text that is not UTF-8 is shown as ASCII.
 struct TextLine {
   std::string text;
   std::vector<cairo_glyph_t> glyphs;  // one per character, from x = 0
@@ -80,7 +80,7 @@ TextLine lay_out(const std::string& text, cairo_scaled_font_t* font) {
   return line;
 }
 
-// Bytes of the first `count` characters of UTF-8 text.
+// Number of bytes of the first `count` characters of UTF-8 text.
 std::size_t bytes_of(const std::string& text, std::size_t count) {
   const auto is_first = [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; };
   std::size_t bytes = 0;
@@ -89,7 +89,7 @@ std::size_t bytes_of(const std::string& text, std::size_t count) {
   return bytes;
 }
 
-// The content of an XML element.
+// Escapes text for an XML element.
 std::string escaped(const std::string& text) {
   std::string result;
   for (const char c : text) result += c == '&' ? "&amp;" : c == '<' ? "&lt;" : std::string(1, c);
@@ -101,7 +101,7 @@ cairo_status_t append_to(void* target, const unsigned char* bytes, unsigned coun
   return CAIRO_STATUS_SUCCESS;
 }
 
-// Cairo's rows are of 32-bit numbers 0x00RRGGBB.
+// Cairo stores pixels as 32-bit numbers 0x00RRGGBB.
 std::uint32_t* pixel_row(cairo_surface_t* surface, int row) {
   return reinterpret_cast<std::uint32_t*>(cairo_image_surface_get_data(surface) +
                                           static_cast<std::ptrdiff_t>(row) *
@@ -189,7 +189,7 @@ void Canvas::text(const Eigen::Vector2d& position, const std::string& text,
   const double share = style.align == TextAlign::left     ? 0.0
                        : style.align == TextAlign::center ? 0.5
                                                           : 1.0;
-  constexpr double half_capital = 0.365;  // of the font size
+  constexpr double half_capital = 0.365;  // half height of capital letters, in font sizes
   cairo_t* context = context_.get();
   cairo_save(context);
   cairo_translate(context, position.x(), position.y());
@@ -198,7 +198,7 @@ void Canvas::text(const Eigen::Vector2d& position, const std::string& text,
   set_color(style.color);
   cairo_set_scaled_font(context, font.get());
   const int count = static_cast<int>(line.glyphs.size());
-  // SVG defines each letter once. In pixels, outlines are exact to parts of a pixel.
+  // Glyphs keep SVG files small. For pixels, outlines have subpixel accuracy.
   if (cairo_surface_get_type(cairo_get_target(context)) == CAIRO_SURFACE_TYPE_SVG) {
     cairo_show_glyphs(context, line.glyphs.data(), count);
   } else {
@@ -244,7 +244,7 @@ void Canvas::end_clip() { cairo_restore(context_.get()); }
 void Canvas::check() const {
   const cairo_status_t status = cairo_status(context_.get());
   if (status != CAIRO_STATUS_SUCCESS)
-    throw Error(std::string("Cairo could not draw the picture: ") + cairo_status_to_string(status),
+    throw Error(std::string("Cairo failed to draw the image: ") + cairo_status_to_string(status),
                 {}, ErrorKind::failed);
 }
 
@@ -265,7 +265,7 @@ ColorImage Canvas::pixels() const {
 std::string Canvas::svg(const std::string& title, const std::string& description) {
   check();
   cairo_surface_finish(cairo_get_target(context_.get()));
-  // Cairo numbers the surfaces of a process.
+  // The surface's id depends on earlier surfaces of the process, so it is removed.
   const std::string id = " id=\"surface";
   const std::size_t begin = svg_.find(id);
   if (begin != std::string::npos) svg_.erase(begin, svg_.find('"', begin + id.size()) + 1 - begin);

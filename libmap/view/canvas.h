@@ -1,5 +1,5 @@
-// Shapes, texts and images of a picture, drawn by Cairo: as pixels or as SVG. Coordinates are in
-// pixels from the top left corner.
+// Draws shapes, text and images with Cairo, as pixels or as SVG. Coordinates are in pixels from the
+// top left corner.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,7 +14,7 @@ struct _cairo;
 
 namespace libmap {
 
-enum class TextAlign { left, center, right };  // part of the text that is at its position
+enum class TextAlign { left, center, right };  // part of the text at the given position
 
 struct TextStyle {
   int size_px = 12;
@@ -27,17 +27,17 @@ struct TextStyle {
 // Width and line height of `text` in pixels. Throws Error (failed) if the font is not installed.
 Eigen::Vector2d text_size(const std::string& text, const TextStyle& style);
 
-// The longest prefix of `text`, followed by "..." if it is not the whole, that is at most
-// `width_px` wide; empty if not even the dots are.
+// `text`, or its longest prefix with "..." that is at most `width_px` wide; empty if "..." is
+// wider.
 std::string shortened_text(const std::string& text, const TextStyle& style, double width_px);
 
-// Result of a canvas: an image or an SVG document.
+// Output of a canvas: an image or an SVG document.
 enum class CanvasFormat { pixels, svg };
 
-// Each call covers what earlier calls have drawn.
+// A drawing surface. Later calls draw over earlier ones.
 class Canvas {
  public:
-  // A white page.
+  // Creates a white page; sizes are in pixels.
   Canvas(int width, int height, CanvasFormat format = CanvasFormat::pixels);
   Canvas(const Canvas&) = delete;
   Canvas& operator=(const Canvas&) = delete;
@@ -51,9 +51,10 @@ class Canvas {
                double opacity = 1.0);
   // `position` is the left end, center or right end of the text, at half of the letters' height.
   void text(const Eigen::Vector2d& position, const std::string& text, const TextStyle& style);
-  // Scaled to `rect`; unchanged if its edges are whole pixels and its size is that of the image.
+  // Draws an image scaled to `rect`. Pixels are unchanged if `rect` has integer edges and the
+  // image's size.
   void image(const ColorImage& image, const PixelRect& rect);
-  // Restricts what is drawn by `body` to `rect`.
+  // Restricts drawing by `body` to `rect`.
   template <typename Body>
   void clipped(const PixelRect& rect, const Body& body) {
     begin_clip(rect);
@@ -61,9 +62,10 @@ class Canvas {
     end_clip();
   }
 
-  // Of CanvasFormat::pixels. Throws Error (failed) if Cairo reports an error.
+  // Result in CanvasFormat::pixels. Throws Error (failed) if Cairo reports an error.
   ColorImage pixels() const;
-  // Of CanvasFormat::svg, once: letters are outlines, <title> and <desc> contain the given texts.
+  // Result in CanvasFormat::svg; may be called once. Text is stored as outlines; <title> and <desc>
+  // contain the given texts. Throws Error (failed) if Cairo reports an error.
   std::string svg(const std::string& title, const std::string& description);
 
  private:

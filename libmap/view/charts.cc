@@ -27,9 +27,9 @@ constexpr TextStyle title_style{.size_px = 22, .align = TextAlign::center};
 constexpr TextStyle axis_style{.size_px = 18, .align = TextAlign::center};
 constexpr TextStyle label_style{.size_px = 15};
 
-// Around the frame, in pixels; `left` grows with the numbers of the y axis.
+// Margins around the frame. The left one increases with the width of the y axis labels.
 constexpr double left_px = 105, right_px = 45, above_px = 82, below_px = 82;
-constexpr double edge_px = 5.0;  // beyond the frame
+constexpr double edge_px = 5.0;  // clipping margin beyond the frame
 constexpr int max_axis_ticks = 10;
 
 void check_numbers(const std::vector<double>& values, const std::string& field) {
@@ -45,10 +45,10 @@ void check_axis(const ChartAxis& axis, const std::string& field) {
   if (!std::isfinite(high - low) || !(low < high))
     throw Error("cannot be drawn", {.field = field,
                                     .value = to_text(low) + " to " + to_text(high),
-                                    .bound = "finite, its width too, and ascending"});
+                                    .bound = "finite and ascending, of finite width"});
 }
 
-// Low and high of what is drawn, widened to round numbers; 0 to 1 where nothing is.
+// Range of the values, widened to round numbers; 0 to 1 without values.
 std::pair<double, double> range_around(const std::vector<double>& values) {
   if (values.empty()) return {0.0, 1.0};
   const auto [low, high] = std::minmax_element(values.begin(), values.end());
@@ -81,14 +81,14 @@ std::pair<double, double> y_range(const Chart& chart, std::vector<double> values
     values.insert(values.end(), curve.y.begin(), curve.y.end());
   for (const ChartHistogram& histogram : chart.histograms) {
     values.insert(values.end(), histogram.heights.begin(), histogram.heights.end());
-    values.push_back(0.0);  // bars stand on zero
+    values.push_back(0.0);  // bars begin at zero
   }
   return range_around(values);
 }
 
 namespace {
 
-// Numbers low..high at the pixels from..to.
+// Linear map from the numbers low..high to the pixels from..to.
 struct PixelAxis {
   double low, high;
   double from_px, to_px;
@@ -131,7 +131,7 @@ class ChartDrawing {
                       {frame_.left, frame_.bottom()},
                       {frame_.right(), frame_.bottom()}},
                      1.5, axis_color);
-    // Lines and markers on the edge are seen whole.
+    // Lines and markers on the frame are not clipped.
     const PixelRect edge{frame_.left - edge_px, frame_.top - edge_px, frame_.width + 2 * edge_px,
                          frame_.height + 2 * edge_px};
     canvas_.clipped(edge, [&] {
@@ -171,7 +171,7 @@ class ChartDrawing {
                  shortened_text(chart_.y_axis.title, upward, frame_.height), upward);
   }
 
-  // Labels of the x axis that would touch the one before are left out.
+  // Labels of the x axis that would touch the previous label are omitted.
   void draw_ticks() {
     TextStyle style = label_style;
     style.align = TextAlign::center;
@@ -196,7 +196,7 @@ class ChartDrawing {
     }
   }
 
-  // Bars on zero, with an outline around all of them.
+  // Bars begin at zero and have a common outline.
   void draw_histogram(const ChartHistogram& histogram, const Color& color) {
     std::vector<Eigen::Vector2d> outline;
     for (std::size_t i = 0; i < histogram.heights.size(); ++i) {
@@ -290,7 +290,7 @@ void check(const Chart& chart, const ChartSize& size) {
                                     .bound = "from 200 to 16384 each"});
 }
 
-// For readers who search, or who cannot see the picture.
+// Text alternative of the chart.
 std::string description(const Chart& chart) {
   std::string text = chart.y_axis.title + " over " + chart.x_axis.title;
   for (const ChartHistogram& histogram : chart.histograms)
@@ -361,7 +361,7 @@ std::vector<double> round_ticks(double low, double high, int most) {
   if (!(low < high) || !std::isfinite(high - low) || most < 1) return ticks;
   const double min_step = (high - low) / most;
   const double power = std::floor(std::log10(min_step));
-  // The tick is a whole number times 10^exponent, divided or multiplied once, so that its text is
+  // Ticks are computed by one division or multiplication of an integer, so that their text is
   // short.
   const auto scaled = [&](double whole) {
     return power < 0 ? whole / std::pow(10.0, -power) : whole * std::pow(10.0, power);
@@ -372,8 +372,7 @@ std::vector<double> round_ticks(double low, double high, int most) {
     if (scaled(candidate) >= min_step * (1 - 1e-9)) break;
   }
   const double step = scaled(multiple);
-  // Numbers this close together have no short texts, and may not even differ by a step.
-  // Nor have steps so small that their power of ten is not finite.
+  // Steps this small have no short texts, may vanish in rounding, or have no finite power of ten.
   if (!(step > 0.0) || step < 1e-12 * std::max(std::abs(low), std::abs(high))) return ticks;
   const double slack = 1e-9;
   const double first = std::ceil(low / step - slack);
@@ -387,7 +386,7 @@ std::vector<std::string> tick_texts(const std::vector<double>& ticks) {
   texts.reserve(ticks.size());
   const double step = ticks.size() > 1 ? std::abs(ticks[1] - ticks[0]) : 1.0;
   const auto is_round = [](double value) { return std::abs(value - std::round(value)) < 1e-6; };
-  // Without the noise of sums; double where float would be infinite.
+  // float removes rounding errors of sums; double if float would be infinite.
   const auto short_text = [](double value) {
     return std::abs(value) < 1e38 ? to_text(static_cast<float>(value)) : to_text(value);
   };

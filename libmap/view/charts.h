@@ -1,4 +1,4 @@
-// Charts of curves and histograms, as an image and as SVG. No display is needed.
+// Draws charts of curves and histograms as images and as SVG. No display is required.
 #pragma once
 
 #include <optional>
@@ -11,17 +11,17 @@
 namespace libmap {
 
 struct ChartCurve {
-  std::string name{};  // in the legend; empty: not in it
+  std::string name{};  // legend entry; empty: none
   std::vector<double> x{};
   std::vector<double> y{};
-  std::optional<Color> color{};  // default: the next of a palette that color-blind people can tell
-                                 // apart (Okabe and Ito 2008)
+  std::optional<Color> color{};  // default: the next color of a palette for color-blind readers
+                                 // (Okabe and Ito 2008)
   double width_px = 2.5;
   bool dashed = false;
   bool markers = false;  // a dot at each point
 };
 
-// Bars side by side: bar i from first_edge + i * bin_width to the next.
+// Adjacent bars; bar i covers [first_edge + i * bin_width, first_edge + (i + 1) * bin_width].
 struct ChartHistogram {
   std::string name;
   double first_edge = 0.0;
@@ -35,7 +35,7 @@ struct ChartAxis {
   std::optional<std::pair<double, double>> range;  // default: round numbers around the data
 };
 
-// Where the legend stands in the chart.
+// Position of the legend in the chart.
 enum class LegendCorner { none, top_left, top_right, bottom_left, bottom_right };
 
 struct Chart {
@@ -51,7 +51,7 @@ struct Chart {
   void check() const;
 };
 
-// What an axis shows, low and high: its range, or round numbers around the data and `values`.
+// Range of an axis, low and high: the given one, or round numbers around the data and `values`.
 std::pair<double, double> x_range(const Chart& chart, std::vector<double> values = {});
 std::pair<double, double> y_range(const Chart& chart, std::vector<double> values = {});
 
@@ -60,23 +60,25 @@ struct ChartSize {
   int height_px = 700;
 };
 
-// The chart as a picture. Throws Error as Chart::check does.
+// Draws the chart as an image. Throws Error as Chart::check does, and if a side is not between 200
+// and 16384 pixels.
 ColorImage draw_chart(const Chart& chart, const ChartSize& size = {});
 
-// The same drawing as SVG. Letters are outlines, so that all viewers show them alike; <title> and
-// <desc> contain the names.
+// Draws the chart as SVG. Text is stored as outlines, so that it looks the same in all viewers.
+// <title> and <desc> contain the titles and names. Throws Error as draw_chart does.
 std::string chart_svg(const Chart& chart, const ChartSize& size = {});
 
-// Receiver operating characteristics, false positive rates on x, in one chart: 0 to 1 on both axes,
-// with the diagonal of a score without information. Curves of at most 50 points have markers.
+// Chart of receiver operating characteristics with the false positive rate on x. Both axes range
+// from 0 to 1; the diagonal is the curve of a random score. Curves of up to 50 points have markers.
 Chart roc_chart(std::vector<ChartCurve> curves, const std::string& title);
-// The size at which a ROC chart is square.
+// Size for a square ROC chart.
 inline constexpr ChartSize roc_chart_size{900, 900};
 
-// At most `most` + 1 round numbers (1, 2 or 5 times a power of ten apart) within low..high.
+// Round numbers within [low, high], at most `most` + 1, with a step of 1, 2 or 5 times a power of
+// ten. Empty unless low < high.
 std::vector<double> round_ticks(double low, double high, int most);
 
-// Round numbers in a row as texts with the same number of decimals.
+// Formats ticks with the same number of decimals.
 std::vector<std::string> tick_texts(const std::vector<double>& ticks);
 
 }  // namespace libmap

@@ -67,14 +67,14 @@ constexpr std::array<NamedColor, 10> named_colors{{
   for (const char* axis : {"x", "y", "z"}) known.emplace_back(axis);
   std::string bound = "one of";
   for (const std::string& candidate : known) bound += " " + candidate;
-  throw Error("there is no such field to color by" + did_you_mean(name, known),
+  throw Error("no such field" + did_you_mean(name, known),
               {.field = "field", .value = name, .bound = bound});
 }
 
 std::vector<double> values_of(const ColorSource& source, const std::string& name) {
   if (const ScalarField* field = find_field(source.fields, name)) {
     if (field->values.size() != source.positions.size())
-      throw Error("the field has not one value per point",
+      throw Error("not one value per point",
                   {.field = name,
                    .value = std::to_string(field->values.size()) + " values",
                    .bound = std::to_string(source.positions.size())});
@@ -88,8 +88,8 @@ std::vector<double> values_of(const ColorSource& source, const std::string& name
   return values;
 }
 
-// The 2nd and the 98th percentile, by nearest rank, or all values where these two are equal; of a
-// diverging scale as far below 0 as above.
+// The 2nd and 98th percentile (nearest rank), or the full range if both are equal; symmetric about
+// 0 for the diverging scale.
 std::pair<double, double> percentile_range(std::vector<double> values, ColorScale scale) {
   std::erase_if(values, [](double value) { return !std::isfinite(value); });
   if (values.empty()) return {0.0, 0.0};
@@ -101,7 +101,7 @@ std::pair<double, double> percentile_range(std::vector<double> values, ColorScal
     std::nth_element(values.begin(), values.begin() + rank, values.end());
     return values[static_cast<std::size_t>(rank)];
   };
-  // Where nearly all values are equal the few others shall be seen: of a flag, say.
+  // The full range makes rare values visible if nearly all values are equal, for example of a flag.
   const auto [least, greatest] = std::ranges::minmax(values);
   if (scale == ColorScale::diverging) {
     const double end = at(0.98) > 0.0 ? at(0.98) : greatest;
@@ -111,7 +111,7 @@ std::pair<double, double> percentile_range(std::vector<double> values, ColorScal
   return {least, greatest};
 }
 
-// Whites the points below the plane and says so in the legend; tells of missing values too.
+// Colors points below the zero plane white and adds a legend entry for them.
 void finish(const ColorSource& source, const Coloring& coloring, ColoredPoints& result) {
   bool any_below = false;
   for (std::size_t i = 0; i < result.colors.size(); ++i) {
@@ -131,7 +131,7 @@ constexpr const char* hold_probability = "hold_probability";
 
 bool is_score(const std::string& name) { return name == "score" || name == hold_probability; }
 
-// Forces with their unit, a probability with its load, other fields by their names.
+// Legend title: forces with their unit, a probability with its load, other fields by name.
 std::string title_of(std::string name, const Coloring& coloring) {
   if (name == hold_probability)
     return "probability to hold" + (coloring.load_n ? " " + to_text(*coloring.load_n) + " N" : "");
@@ -158,7 +158,7 @@ void color_by_field(const ColorSource& source, const Coloring& coloring, const s
                     const std::string& title, ColoredPoints& result) {
   if (!std::isfinite(coloring.range_min) || !std::isfinite(coloring.range_max) ||
       coloring.range_max < coloring.range_min)
-    throw Error("the range of colors is upside down or not finite",
+    throw Error("the color range is descending or not finite",
                 {.field = "range_max",
                  .value = to_text(coloring.range_max),
                  .bound = ">= range_min = " + to_text(coloring.range_min)});
@@ -166,7 +166,7 @@ void color_by_field(const ColorSource& source, const Coloring& coloring, const s
   auto [low, high] = std::pair{coloring.range_min, coloring.range_max};
   if (low == high) std::tie(low, high) = percentile_range(values, coloring.scale);
   for (const double value : values) {
-    // A constant field has the middle color.
+    // A constant field gets the middle color; NaN stays NaN.
     const double t = high > low ? (value - low) / (high - low) : value - value + 0.5;
     result.colors.push_back(color_at(coloring.scale, t));
   }
@@ -227,14 +227,14 @@ std::uint8_t to_byte(double share) {
   return static_cast<std::uint8_t>(std::lround(255.0 * std::clamp(share, 0.0, 1.0)));
 }
 
-// Between which of `count` evenly spaced colors t lies, and how far towards the upper one.
+// Index of the color below t among `count` evenly spaced ones, and the fraction to the next.
 std::pair<std::size_t, double> place_in(std::size_t count, double t) {
   const double place = std::clamp(t, 0.0, 1.0) * static_cast<double>(count - 1);
   const std::size_t below = std::min(static_cast<std::size_t>(place), count - 2);
   return {below, place - static_cast<double>(below)};
 }
 
-// At t between evenly spaced points, whose channels reach `full`.
+// Interpolates evenly spaced points, whose maximum channel value is `full`, at t.
 template <typename Points>
 Color interpolated(const Points& points, double full, double t) {
   if (std::isnan(t)) return no_value_color;
@@ -260,8 +260,7 @@ ColoredPoints color_points(const ColorSource& source, const Coloring& coloring) 
   switch (result.mode) {
     case ColorMode::own:
       if (source.own_colors.size() != source.positions.size())
-        throw Error("the data bring no colors of their own",
-                    {.field = "color mode", .value = "own"});
+        throw Error("the data contain no colors", {.field = "color mode", .value = "own"});
       result.colors = source.own_colors;
       result.legend = coloring.own_legend;
       break;

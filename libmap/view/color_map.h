@@ -1,4 +1,4 @@
-// What color a point of a map gets, and the legend that says so.
+// Colors of points and triangles by score, field, flag or height, with the matching legend.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,23 +14,23 @@
 
 namespace libmap {
 
-// automatic: the given field; else "hold_probability", else "score" in the classes of mode score,
-//   else own colors where they are not all the same, else height.
-// own:    the colors that the data bring.
+// automatic: the texture if there is one; else the given field; else "hold_probability" or "score"
+//   as in mode score; else own colors if they differ; else height.
+// own:    colors stored in the data.
 // score:  the seven classes of the graspability map's legend.
 // field:  any scalar field, or "x", "y", "z", on a color scale.
 // flags:  convex points blue, intersection ("graspable") dark green, obstacles (1 steep face, 2 out
-//   of reach) brown and ochre where there is such a field, the rest light gray.
-// height: z of the terrain frame on a color scale.
+//   of reach) brown and ochre if there is such a field, all other points light gray.
+// height: z in the terrain frame on a color scale.
 // single: one color.
-// texture: the pictures that a textured mesh brings; `automatic` where there are any.
+// texture: texture of a textured mesh.
 enum class ColorMode { automatic, own, score, field, flags, height, single, texture };
 
-// Colors of continuous values. diverging: blue below and red above the gray middle, for values
-// with a sign.
+// Color scale of continuous values. diverging: blue below and red above a gray center, for signed
+// values.
 enum class ColorScale { viridis, diverging };
 
-// One box of a legend, or the color at one value of a scalar bar.
+// A color of a legend and its meaning.
 struct LegendEntry {
   Color color{};
   std::string text;
@@ -38,8 +38,8 @@ struct LegendEntry {
   bool operator==(const LegendEntry&) const = default;
 };
 
-// Discrete classes from the best to the worst; before them a scalar bar from `min` to `max` if
-// `continuous`. Nothing at all where colors need no explanation.
+// A scalar bar from `min` to `max` if `continuous`, followed by discrete classes from best to
+// worst. Empty if the colors need no explanation.
 struct Legend {
   std::string title;
   bool continuous = false;
@@ -54,23 +54,23 @@ struct Legend {
 
 struct Coloring {
   ColorMode mode = ColorMode::automatic;
-  std::string field{};             // of mode `field`; another field than "score" in mode `score`
-  std::optional<double> load_n{};  // of hold_probability, for the legend
-  ColorScale scale = ColorScale::viridis;  // of the modes field and height
-  // Values at the ends of the scale. Both equal: the data's 2nd and 98th percentile; of a diverging
-  // scale plus and minus the 98th percentile of their sizes.
+  std::string field{};                     // mode `field`; replaces "score" in mode `score`
+  std::optional<double> load_n{};          // load of hold_probability, for the legend
+  ColorScale scale = ColorScale::viridis;  // modes `field` and `height`
+  // Values at the ends of the scale. If equal: the 2nd and 98th percentile of the data; for the
+  // diverging scale plus and minus the 98th percentile of the absolute values.
   double range_min = 0.0;
   double range_max = 0.0;
-  // Points with z below it are white in the modes score, field, flags and height.
+  // Points with smaller z are white in the modes score, field, flags and height.
   double zero_plane_m = -std::numeric_limits<double>::infinity();
-  std::string color = "#b0a89c";  // of mode `single`: "#rrggbb" or a name
-  Legend own_legend{};            // of mode `own`: what the colors mean
+  std::string color = "#b0a89c";  // mode `single`: "#rrggbb" or a name
+  Legend own_legend{};            // mode `own`: meaning of the colors
 };
 
-// Appends it, unless it is empty or among them already.
+// Appends a legend unless it is empty or already in the list.
 void add_legend(const Legend& legend, std::vector<Legend>& legends);
 
-// What is to be colored: points (or the centers of triangles) in the terrain frame, meters.
+// Points (or centers of triangles) to be colored, in the terrain frame, meters.
 struct ColorSource {
   const std::vector<Eigen::Vector3d>& positions;
   const std::vector<Color>& own_colors;  // may be empty
@@ -79,25 +79,27 @@ struct ColorSource {
 
 struct ColoredPoints {
   ColorMode mode = ColorMode::single;  // never `automatic`
-  std::vector<Color> colors;           // one a position
+  std::vector<Color> colors;           // one per position
   Legend legend;
 };
 
-// Throws Error: a field that is not there (with the nearest known one), a range upside down, own
-// colors asked of data without any, a color that is none.
+// Colors all points. Throws Error: a missing field (with the nearest known one) or one of wrong
+// length, a range that is descending or not finite, mode `own` without own colors, an invalid
+// color.
 ColoredPoints color_points(const ColorSource& source, const Coloring& coloring);
 
-// The classes of core/score_color.h.
+// Legend of the classes of core/score_color.h.
 Legend score_legend();
 
 // viridis (S. van der Walt and N. Smith, 2015, CC0) at t in 0..1, clamped; NaN is gray.
 Color viridis(double t);
 
-// Blue, gray, red (Moreland 2009, "Diverging Color Maps for Scientific Visualization"), likewise.
+// Blue, gray, red (Moreland 2009, "Diverging Color Maps for Scientific Visualization") at t in
+// 0..1, clamped; NaN is gray.
 Color diverging(double t);
 Color color_at(ColorScale scale, double t);
 
-// "#rrggbb", or white, black, gray, light-gray, dark-gray, red, green, blue, yellow, orange.
+// Parses "#rrggbb", or white, black, gray, light-gray, dark-gray, red, green, blue, yellow, orange.
 // Throws Error naming `field`.
 Color parse_color(std::string_view text, const std::string& field);
 

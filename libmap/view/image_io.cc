@@ -15,21 +15,20 @@
 namespace libmap {
 namespace {
 
-// libpng takes no more, and VTK leaves it to end the program by that.
+// Limit of libpng. VTK does not check it, so libpng would abort the program.
 constexpr int largest_side = 1'000'000;
 
 void check(const ColorImage& image) {
-  if (image.width <= 0 || image.height <= 0)
-    throw Error("an image without pixels cannot be written");
+  if (image.width <= 0 || image.height <= 0) throw Error("the image has no pixels");
   if (std::max(image.width, image.height) > largest_side)
-    throw Error("too large for a PNG",
+    throw Error("too large for PNG",
                 {.field = "size",
                  .value = size_text(image.width, image.height),
-                 .bound = "at most " + std::to_string(largest_side) + " a side"});
+                 .bound = "at most " + std::to_string(largest_side) + " per side"});
   const std::size_t pixels =
       static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
   if (image.pixels.size() != pixels)
-    throw Error("the image's pixels do not fit its size",
+    throw Error("the number of pixels does not match the image size",
                 {.field = "pixels",
                  .value = std::to_string(image.pixels.size()),
                  .bound = std::to_string(pixels)});
@@ -42,7 +41,7 @@ std::string to_png(const ColorImage& image) {
   vtkNew<vtkImageData> pixels;
   pixels->SetDimensions(image.width, image.height, 1);
   pixels->AllocateScalars(VTK_UNSIGNED_CHAR, 3);
-  // VTK's rows begin at the bottom.
+  // Rows of VTK begin at the bottom.
   const std::size_t row_bytes = 3 * static_cast<std::size_t>(image.width);
   auto* target = static_cast<unsigned char*>(pixels->GetScalarPointer());
   for (int row = 0; row < image.height; ++row) {
@@ -56,7 +55,7 @@ std::string to_png(const ColorImage& image) {
   writer->Write();
   vtkUnsignedCharArray* bytes = writer->GetResult();
   if (bytes == nullptr || bytes->GetNumberOfValues() == 0)
-    throw Error("the picture could not be encoded as PNG", {}, ErrorKind::failed);
+    throw Error("the image could not be encoded as PNG", {}, ErrorKind::failed);
   return {reinterpret_cast<const char*>(bytes->GetPointer(0)),
           static_cast<std::size_t>(bytes->GetNumberOfValues())};
 }

@@ -1,4 +1,4 @@
-// Pictures in memory and as PNG.
+// Encodes images as PNG.
 #pragma once
 
 #include <filesystem>
@@ -8,8 +8,8 @@
 
 namespace libmap {
 
-// The image as the bytes of a PNG file (8 bits RGB, no time stamp: equal images, equal bytes).
-// Throws Error if the size is 0 or does not fit the number of pixels.
+// Encodes an image as a PNG file (8-bit RGB without a time stamp: equal images give equal bytes).
+// Throws Error if the size is 0, too large for PNG, or does not match the number of pixels.
 std::string to_png(const ColorImage& image);
 
 }  // namespace libmap

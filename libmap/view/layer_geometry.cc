@@ -14,26 +14,26 @@ namespace {
 
 constexpr std::size_t spacing_samples = 2000;
 constexpr double min_width_px = 1.3;
-// Poisson-disk samples leave gaps of up to twice their spacing.
+// Gaps between Poisson-disk samples are up to twice their spacing.
 constexpr double square_per_spacing = 1.8;
-// Neighboring cubes overlap by a hair, so that rounding opens no gap between them.
+// Neighboring cubes overlap slightly, so that rounding causes no gaps.
 constexpr double cube_per_spacing = 1.005;
 constexpr double lone_point_size_m = 0.01;
-// A filler closes gaps of two missing cells, and lies behind neighbors two steps further away.
+// A filler closes gaps of two missing cells, and is behind neighbors up to two steps farther away.
 constexpr double filler_per_spacing = 3.0;
 constexpr double filler_depth_per_size = 2.75;
 
-// The value that the given share of the others does not exceed.
+// Quantile of the values.
 double quantile_of(std::vector<double> values, double share) {
   const auto rank = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
   std::nth_element(values.begin(), values.begin() + rank, values.end());
   return values[static_cast<std::size_t>(rank)];
 }
 
-// What surrounds some points spread over a cloud.
+// Neighborhoods of a sample of a cloud's points, without coincident points.
 struct Neighborhoods {
-  std::vector<Eigen::Vector3d> nearest;  // offsets to the nearest point that stands elsewhere
-  std::vector<double> eighth_m;  // distances to the eighth of these; infinite if there are fewer
+  std::vector<Eigen::Vector3d> nearest;  // offset to the nearest neighbor
+  std::vector<double> eighth_m;  // distance to the eighth neighbor; infinite if there are fewer
 };
 
 Neighborhoods look_around(const std::vector<Eigen::Vector3d>& positions) {
@@ -42,7 +42,7 @@ Neighborhoods look_around(const std::vector<Eigen::Vector3d>& positions) {
   const std::size_t step = std::max<std::size_t>(1, positions.size() / spacing_samples);
   for (std::size_t i = 0; i < positions.size(); i += step) {
     std::vector<NeighborPoint> neighbors = tree.nearest(positions[i], 12);
-    // Several points may be in one place.
+    // Points may coincide.
     std::erase_if(neighbors, [](const NeighborPoint& near) { return !(near.square_m2 > 0.0); });
     if (neighbors.empty()) continue;
     result.nearest.push_back(positions[neighbors[0].index] - positions[i]);
@@ -86,7 +86,7 @@ PreparedLayer prepare_cloud(const PointCloud& cloud, const SceneLayer& layer,
   return result;
 }
 
-// Whether the field that colors the mesh is one of its triangles, not of its vertices.
+// Returns true if the mesh is colored by a face field, not by a vertex field.
 bool colored_by_face(const TriangleMesh& mesh, const Coloring& coloring) {
   if (mesh.face_fields.empty()) return false;
   const auto only_faces = [&mesh](const std::string& name) {
@@ -111,7 +111,7 @@ bool colored_by_face(const TriangleMesh& mesh, const Coloring& coloring) {
   return false;
 }
 
-// The mesh without triangles that have a corner which is not finite.
+// The mesh without triangles that have corners with non-finite coordinates.
 TriangleMesh finite_part(const TriangleMesh& mesh) {
   std::vector<std::size_t> kept;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
@@ -200,7 +200,7 @@ PreparedLayer prepare_mesh(const TriangleMesh& input, const SceneLayer& layer,
   return result;
 }
 
-// The corners of a triangle, each for itself: texture coordinates differ along the charts' edges.
+// Adds a triangle with its own vertices, because texture coordinates differ at chart borders.
 void add_corners(const TexturedMesh& model, std::size_t t, const Pose& terrain_from_scene,
                  const std::vector<Eigen::Vector3f>& normals, PreparedLayer& layer) {
   const auto first = static_cast<std::uint32_t>(layer.positions.size());
@@ -215,14 +215,14 @@ void add_corners(const TexturedMesh& model, std::size_t t, const Pose& terrain_f
   layer.triangles.push_back({first, first + 1, first + 2});
 }
 
-// One layer a page, which refers to it; triangles with corners that are not finite are left out.
+// One layer per page, which refers to the page. Drops triangles with non-finite corners.
 std::vector<PreparedLayer> prepare_textured(const TexturedMesh& model, const SceneLayer& layer,
                                             const Pose& terrain_from_scene) {
   model.check();
   const bool shaded = layer.shading == Shading::full;
   const std::vector<Eigen::Vector3f> normals =
       shaded ? estimate_vertex_normals(model.mesh) : std::vector<Eigen::Vector3f>();
-  // The last is that of triangles without a page.
+  // The last part contains triangles without a page.
   std::vector<PreparedLayer> parts(model.pages.size() + 1);
   for (std::size_t page = 0; page < parts.size(); ++page) {
     parts[page].is_mesh = true;
@@ -250,8 +250,8 @@ Color darkened(const Color& color, double share) {
   return result;
 }
 
-// Lambert's law with some ambient light, from the upper left behind the camera; both sides of a
-// surface are lit. A point without a normal keeps its color.
+// Lambertian shading with ambient light. The light is at the upper left behind the camera; both
+// sides of a surface are lit. A point without a normal keeps its color.
 double shade_of(const Eigen::Vector3f& normal, const SceneCamera& camera) {
   const Eigen::Vector3d n = normal.cast<double>();
   if (n.isZero()) return 1.0;
@@ -266,7 +266,7 @@ class TriangleBuilder {
   TriangleBuilder(const Eigen::Vector3d& origin, ColoredTriangles& target)
       : origin_(origin), target_(target) {}
 
-  // The parallelogram around `center` with the half edges a and b.
+  // Adds the parallelogram around `center` with half edges a and b.
   void add_quad(const Eigen::Vector3d& center, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                 const Color& color) {
     const auto first = static_cast<std::uint32_t>(target_.vertices.size());
@@ -280,10 +280,10 @@ class TriangleBuilder {
     target_.triangles.push_back({first, first + 2, first + 3});
   }
 
-  // The sides of the cube around `center` that the camera sees.
+  // Adds the sides of the cube around `center` that face the camera.
   void add_cube(const Eigen::Vector3d& center, double half, const Color& color, bool shaded,
                 const SceneCamera& camera) {
-    // Seen along an axis a cube shows one side only, in its exact color.
+    // Seen along an axis, a cube has one visible side, which is drawn in its exact color.
     constexpr std::array<double, 3> side_shades{0.70, 0.84, 1.0};
     const Eigen::Vector3d toward =
         camera.perspective ? (camera.position - center).eval() : (-camera.forward).eval();
@@ -307,7 +307,7 @@ class TriangleBuilder {
   ColoredTriangles& target_;
 };
 
-// How far behind its point a filler lies, meters.
+// Distance of a filler behind its point, m.
 double filler_depth_m(const PreparedLayer& layer, const SceneCamera& camera) {
   const double usual = filler_depth_per_size * layer.point_size_m;
   if (camera.perspective || camera.forward.z() > -0.999) return usual;
@@ -337,7 +337,7 @@ std::vector<PreparedLayer> prepare_layers(const SceneLayer& layer, const Pose& t
   const bool has_texture = textured != nullptr && textured->has_texture();
   const ColorMode mode = layer.coloring.mode;
   if (mode == ColorMode::texture && !has_texture)
-    throw Error("the data bring no texture", {.field = "color mode", .value = "texture"});
+    throw Error("the data contain no texture", {.field = "color mode", .value = "texture"});
   if (has_texture && (mode == ColorMode::texture || mode == ColorMode::automatic))
     return prepare_textured(*textured, layer, terrain_from_scene);
   if (const auto* cloud = std::get_if<PointCloud>(&layer.shape))
@@ -353,7 +353,7 @@ PointSpacing estimate_spacing(const std::vector<Eigen::Vector3d>& positions) {
   if (around.nearest.empty()) return {};
   std::vector<double> distances;
   for (const Eigen::Vector3d& offset : around.nearest) distances.push_back(offset.norm());
-  // On a lattice some points at least have a neighbor straight beside them.
+  // On a lattice, some points have a neighbor at a distance of one pitch.
   const double pitch = quantile_of(distances, 0.1);
   const auto on_lattice = [pitch](const Eigen::Vector3d& offset) {
     const Eigen::Array3d steps = offset.array() / pitch;
@@ -362,7 +362,7 @@ PointSpacing estimate_spacing(const std::vector<Eigen::Vector3d>& positions) {
   const auto count = static_cast<std::ptrdiff_t>(distances.size());
   if (std::count_if(around.nearest.begin(), around.nearest.end(), on_lattice) * 20 < 19 * count)
     return {.distance_m = quantile_of(distances, 0.5), .lattice = false, .gaps = true};
-  // The eight cells around one of a closed surface touch it, at their corners at least.
+  // On a closed surface, the eight nearest cells share at least a corner with the center cell.
   const auto enclosed = [pitch](double eighth_m) { return eighth_m < 1.8 * pitch; };
   const auto closed = std::count_if(around.eighth_m.begin(), around.eighth_m.end(), enclosed);
   return {.distance_m = pitch, .lattice = true, .gaps = closed * 100 < 85 * count};

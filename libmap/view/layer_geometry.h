@@ -1,4 +1,4 @@
-// From the layers of a scene to colored triangles, as they are drawn.
+// Converts the layers of a scene to colored triangles for rendering.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,53 +13,52 @@
 
 namespace libmap {
 
-// A layer in the terrain frame, colored, with nothing in it that cannot be drawn.
+// A colored layer in the terrain frame without invalid points and triangles.
 struct PreparedLayer {
   std::vector<Eigen::Vector3d> positions;  // all finite
-  std::vector<Color> colors;               // one a position
-  std::vector<Eigen::Vector3f> normals;    // empty, or unit length (or zero) one a position
+  std::vector<Color> colors;               // one per position
+  std::vector<Eigen::Vector3f> normals;    // empty, or one per position of length 1 or 0
   std::vector<Triangle> triangles;         // of a mesh
   bool is_mesh = false;
   bool cubes = false;
-  bool shaded = false;         // by the normals; for cubes: by the side
+  bool shaded = false;         // by normals; cubes: by side
   double point_size_m = 0.0;   // 0 for a mesh
-  double filler_size_m = 0.0;  // of the squares that close gaps; 0: none
+  double filler_size_m = 0.0;  // size of the squares that close gaps; 0: none
   Legend legend;
-  // Of a page of a textured mesh: its colors are times `colors`.
+  // Page of a textured mesh, multiplied with `colors`.
   const ColorImage* texture = nullptr;
-  std::vector<Eigen::Vector2f> coordinates{};  // one a position, from the top left
+  std::vector<Eigen::Vector2f> coordinates{};  // one per position, from the top left
 };
 
-// One layer, but of a textured mesh that is to be shown so a layer a page, which must outlive it;
-// triangles without a page are of the color of untextured_color. Throws Error: arrays of a wrong
-// length, the texture asked of a layer without any, and what color_points throws.
+// Prepares a layer. A mesh shown with its texture gives one layer per page, which refers to the
+// page in `layer`; triangles without a page have untextured_color. All others give one layer.
+// Throws Error: arrays of wrong length, mode `texture` without a texture, and as color_points does.
 std::vector<PreparedLayer> prepare_layers(const SceneLayer& layer, const Pose& terrain_from_scene);
 
 inline constexpr Color untextured_color{128, 128, 128};
 
 struct PointSpacing {
-  // Meters, 0 if no two points are apart: on a lattice along the axes its pitch, else the median
-  // distance to the nearest other point.
+  // Pitch of the lattice along the axes, else the median distance of nearest neighbors; 0 if all
+  // points coincide.
   double distance_m = 0.0;
   bool lattice = false;
-  bool gaps = false;  // cells of a surface on the lattice are empty; always where there is none
+  bool gaps = false;  // surface cells of the lattice are empty; true without a lattice
 };
-// From the points themselves: their lattice, if they lie on one, else the median distance of
-// nearest neighbors.
+// Estimates the spacing, and whether the points are on a lattice along the axes.
 PointSpacing estimate_spacing(const std::vector<Eigen::Vector3d>& positions);
 
 struct ColoredTriangles {
-  std::vector<Eigen::Vector3f> vertices;  // meters from the `origin` that was given
-  std::vector<Color> colors;              // one a vertex
+  std::vector<Eigen::Vector3f> vertices;  // meters, relative to `origin`
+  std::vector<Color> colors;              // one per vertex
   std::vector<Triangle> triangles;
   const ColorImage* texture = nullptr;  // as in PreparedLayer
   std::vector<Eigen::Vector2f> coordinates{};
 };
 
-// Squares or the visible sides of cubes for a cloud, at least 1.3 pixels wide; a mesh as it is. The
-// fillers are larger squares behind the points, seen from the camera: what is seen through a gap is
-// the color of a point beside it. From above they lie below the whole layer, so that every column
-// shows its highest point; in other views they cover only what is far behind.
+// Triangles of a layer: a mesh unchanged, a cloud as squares or visible cube sides of at least 1.3
+// pixels. Fillers are larger squares behind the points, as seen from the camera; they show the
+// color of a neighboring point in gaps. Seen from above, they are below the whole layer, so that
+// each column shows its highest point. In other views they cover only surfaces far behind.
 ColoredTriangles triangles_of(const PreparedLayer& layer, const SceneCamera& camera,
                               const Eigen::Vector3d& origin);
 

@@ -35,7 +35,7 @@ using Clock = std::chrono::steady_clock;
 constexpr auto start_patience = std::chrono::seconds(30);
 constexpr auto stop_patience = std::chrono::seconds(5);
 
-// Whether the X server named by DISPLAY answers and speaks GLX.
+// Returns true if the X server in DISPLAY answers and supports GLX.
 bool display_answers() {
   const char* name = std::getenv("DISPLAY");
   if (name == nullptr || *name == '\0') return false;
@@ -62,18 +62,18 @@ std::string find_in_path(std::string_view program) {
   return {};
 }
 
-// In the child: only calls that are safe between fork and exec.
+// Runs in the child process: only calls that are safe between fork and exec.
 [[noreturn]] void become_server(const char* program, char* const* arguments, int number_pipe,
                                 pid_t parent) {
   constexpr int number_fd = 3;
   sigset_t none;
   sigemptyset(&none);
   sigprocmask(SIG_SETMASK, &none, nullptr);
-  setsid();  // Ctrl-C is for the program, which ends its server itself
+  setsid();  // Ctrl-C must not reach the server, which the program stops itself
   prctl(PR_SET_PDEATHSIG, SIGTERM);
   if (getppid() != parent) _exit(127);
   const int null = open("/dev/null", O_RDWR);
-  // First out of the way of 0 to 3, wherever the pipe happens to be.
+  // The pipe may have any descriptor: moves it above 0 to 3 first.
   const int pipe_copy = fcntl(number_pipe, F_DUPFD, number_fd + 1);
   for (int fd = 0; fd < number_fd; ++fd) dup2(null, fd);
   dup2(pipe_copy, number_fd);
@@ -82,7 +82,7 @@ std::string find_in_path(std::string_view program) {
   _exit(127);
 }
 
-// What the server writes once it is ready: its display number and a newline. Empty: it never did.
+// Reads the display number that the server writes when it is ready; empty after a timeout or error.
 std::string read_display_number(int number_pipe) {
   std::string text;
   const Clock::time_point end = Clock::now() + start_patience;
@@ -103,11 +103,11 @@ std::string read_display_number(int number_pipe) {
   return text.substr(0, text.find('\n'));
 }
 
-// Above it the multisampled buffers would take gigabytes.
+// Larger images are not multisampled, because the buffers would take gigabytes.
 constexpr double max_multisampled_pixels = 1.7e7;
 constexpr int multisamples = 4;
 
-// Takes VTK's messages off the console while it lives; the first error is kept.
+// Suppresses VTK's console messages and keeps the first error.
 class QuietOutput : public vtkOutputWindow {
  public:
   static QuietOutput* New();
@@ -132,7 +132,7 @@ class QuietScope {
       : former_(vtkOutputWindow::GetInstance()),
         verbosity_before_(vtkLogger::GetCurrentVerbosityCutoff()) {
     vtkOutputWindow::SetInstance(quiet_);
-    // VTK's log writes errors to the console beside the window.
+    // VTK's logger writes errors to the console in addition to the output window.
     vtkLogger::SetStderrVerbosity(vtkLogger::VERBOSITY_OFF);
   }
   ~QuietScope() {
@@ -156,8 +156,8 @@ ColorImage pixels_of(vtkRenderWindow& window, int width, int height) {
   const std::size_t row_bytes = 3 * static_cast<std::size_t>(width);
   const std::size_t bytes = row_bytes * static_cast<std::size_t>(height);
   if (static_cast<std::size_t>(pixels->GetNumberOfValues()) != bytes)
-    throw Error("the picture could not be read back from OpenGL", {}, ErrorKind::failed);
-  // OpenGL's rows begin at the bottom.
+    throw Error("the image could not be read back from OpenGL", {}, ErrorKind::failed);
+  // Rows of OpenGL begin at the bottom.
   for (std::size_t row = 0; row < static_cast<std::size_t>(height); ++row)
     std::memcpy(image.pixels.data() + row * static_cast<std::size_t>(width),
                 pixels->GetPointer(0) + (static_cast<std::size_t>(height) - 1 - row) * row_bytes,
@@ -182,9 +182,8 @@ VirtualDisplay::~VirtualDisplay() { stop(); }
 void VirtualDisplay::start() {
   const std::string program = find_in_path("Xvfb");
   if (program.empty())
-    throw Error("no X display answers and Xvfb is not installed (Debian package xvfb)", {},
-                ErrorKind::failed);
-  // The environment is the child's too.
+    throw Error("no X display and no Xvfb: install the Debian package xvfb", {}, ErrorKind::failed);
+  // The child process inherits the environment.
   set_variable("LIBGL_ALWAYS_SOFTWARE", "1");
   set_variable("GALLIUM_DRIVER", "llvmpipe");
 
@@ -196,7 +195,7 @@ void VirtualDisplay::start() {
 
   std::array<int, 2> number_pipe{};
   if (pipe2(number_pipe.data(), O_CLOEXEC) != 0)
-    throw Error(std::string("no pipe to Xvfb: ") + std::strerror(errno), {}, ErrorKind::failed);
+    throw Error(std::string("pipe to Xvfb failed: ") + std::strerror(errno), {}, ErrorKind::failed);
   const pid_t parent = getpid();
   const pid_t child = fork();
   if (child == 0) become_server(program.c_str(), arguments.data(), number_pipe[1], parent);
@@ -210,10 +209,10 @@ void VirtualDisplay::start() {
   const std::string number = read_display_number(number_pipe[0]);
   close(number_pipe[0]);
   if (number.empty())
-    throw Error("Xvfb did not come up (Debian package xvfb): " + program, {}, ErrorKind::failed);
+    throw Error("Xvfb did not start (Debian package xvfb): " + program, {}, ErrorKind::failed);
   set_variable("DISPLAY", ":" + number);
   if (!display_answers())
-    throw Error("Xvfb answers without OpenGL (Debian package libgl1-mesa-dri)", {},
+    throw Error("Xvfb has no OpenGL: install the Debian package libgl1-mesa-dri", {},
                 ErrorKind::failed);
 }
 
@@ -250,7 +249,7 @@ void VirtualDisplay::set_variable(const std::string& name, const std::string& va
 
 ColorImage draw_offscreen(int width, int height,
                           const std::function<void(vtkRenderWindow&)>& fill) {
-  // VTK's rendering and the environment are for one thread at a time.
+  // VTK's rendering and the environment are not thread-safe.
   static std::mutex one_at_a_time;
   const std::scoped_lock lock(one_at_a_time);
   const VirtualDisplay display;
@@ -267,12 +266,12 @@ ColorImage draw_offscreen(int width, int height,
     window->Render();
     return pixels_of(*window, width, height);
   };
-  // The window is closed before the display ends.
+  // The window must be closed before the display is stopped.
   ColorImage image = draw();
   if (!quiet.first_error().empty()) {
     std::string reason = quiet.first_error();
     std::replace(reason.begin(), reason.end(), '\n', ' ');
-    throw Error("VTK could not draw the picture: " + std::string(trim(reason)), {},
+    throw Error("VTK failed to render the image: " + std::string(trim(reason)), {},
                 ErrorKind::failed);
   }
   return image;

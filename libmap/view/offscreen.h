@@ -1,4 +1,4 @@
-// Drawing by VTK without a screen.
+// Offscreen rendering with VTK.
 #pragma once
 
 #include <functional>
@@ -13,20 +13,20 @@ class vtkRenderWindow;
 
 namespace libmap {
 
-// While it lives, DISPLAY names an X server that can draw with OpenGL. If the one that is set
-// answers, nothing happens; else an Xvfb of its own is started (Debian package xvfb) and ended in
-// the destructor, and Mesa's software renderer (libgl1-mesa-dri) is asked for, so that pictures do
-// not depend on the machine. Every X connection must be closed before the destructor runs. The
-// Xvfb ends by itself if the process, or the thread that started it, is killed.
+// Ensures an X server with OpenGL during its lifetime. If the server in DISPLAY does not answer, it
+// starts an Xvfb (Debian package xvfb) with Mesa's software renderer (libgl1-mesa-dri), so that
+// images do not depend on the machine, and sets DISPLAY. The destructor stops that Xvfb and
+// restores the environment; all X connections must be closed before. Xvfb also stops if the process
+// or the thread that started it is killed.
 class VirtualDisplay {
  public:
-  // Throws Error (failed) if Xvfb is not in PATH, naming the package, or does not come up.
+  // Throws Error (failed) naming the package if Xvfb is not in PATH or does not start.
   VirtualDisplay();
   ~VirtualDisplay();
   VirtualDisplay(const VirtualDisplay&) = delete;
   VirtualDisplay& operator=(const VirtualDisplay&) = delete;
 
-  // Whether an Xvfb was started, and its process id (0 if not).
+  // Returns true if an Xvfb was started, and its process id (0 if not).
   bool started() const { return server_ > 0; }
   int process_id() const { return server_; }
 
@@ -39,10 +39,9 @@ class VirtualDisplay {
   std::vector<std::pair<std::string, std::optional<std::string>>> former_variables_;
 };
 
-// The pixels of a window of that size, after `fill` has put its renderers in. Starts a
-// VirtualDisplay of its own if no display answers. Calls from several threads are run one after
-// the other. Throws Error (failed) if VTK cannot draw it, with VTK's reason, and what `fill`
-// throws.
+// Renders a window of the given size in pixels, to which `fill` adds the renderers. Creates a
+// VirtualDisplay for the call. Calls from several threads are serialized. Throws Error (failed)
+// with VTK's message if rendering fails, as VirtualDisplay does, and what `fill` throws.
 ColorImage draw_offscreen(int width, int height, const std::function<void(vtkRenderWindow&)>& fill);
 
 }  // namespace libmap

@@ -10,8 +10,8 @@
 namespace libmap {
 namespace {
 
-constexpr double pixels_a_font = 30.0;  // of a cell's width
-constexpr double caption_height = 2.0;  // in font sizes, as all below
+constexpr double pixels_a_font = 30.0;  // cell width in pixels per pixel of the font size
+constexpr double caption_height = 2.0;  // this and the following heights are in font sizes
 constexpr double title_height = 2.6;
 constexpr double gap = 0.8;  // between cells
 
@@ -24,7 +24,7 @@ void check_whole(const char* field, int value, int low, int high) {
 }
 
 void check(const std::vector<SheetCell>& cells, const PictureSheetOptions& options) {
-  if (cells.empty()) throw Error("a sheet without pictures cannot be drawn");
+  if (cells.empty()) throw Error("the sheet has no cells");
   check_whole("columns", options.columns, 0, 1000);
   check_whole("cell_width_px", options.cell_width_px, 16, max_side_px);
   if (options.cell_height_px != 0)
@@ -35,7 +35,7 @@ void check(const std::vector<SheetCell>& cells, const PictureSheetOptions& optio
 void check_titles(const char* field, std::size_t titles, int bands) {
   if (titles > static_cast<std::size_t>(bands))
     throw Error(
-        "more titles than there are of them",
+        "more titles than rows or columns",
         {.field = field, .value = std::to_string(titles), .bound = "<= " + std::to_string(bands)});
 }
 
@@ -63,7 +63,7 @@ bool any_scene(const std::vector<SheetCell>& cells) {
                      [](const SheetCell& cell) { return bool(cell.scene); });
 }
 
-// The rows of cells from `top` on, with what stands before and below them. Returns where they end.
+// Places the rows of cells from `top`, with titles, captions and scale bars. Returns their bottom.
 double plan_rows(const std::vector<SheetCell>& cells, const PictureSheetOptions& options,
                  double left, double top, int cell_height, SheetLayout& layout) {
   const double f = layout.font_px;
@@ -95,7 +95,7 @@ double plan_rows(const std::vector<SheetCell>& cells, const PictureSheetOptions&
   return y;
 }
 
-// Beside the cells, in the font of the sheet or a smaller one.
+// Places the legend to the right of the cells.
 void plan_legend(const std::vector<Legend>& legends, double left, double top, double bottom,
                  SheetLayout& layout) {
   if (legends.empty()) {
@@ -109,10 +109,10 @@ void plan_legend(const std::vector<Legend>& legends, double left, double top, do
   layout.height = std::max(layout.height, static_cast<int>(std::ceil(layout.legend->bottom())));
 }
 
-// --- what the cells show ----------------------------------------------------------------------
+// --- content of the cells ---------------------------------------------------------------------
 
 struct Contents {
-  std::vector<std::optional<Bounds3d>> extents;  // one a cell
+  std::vector<std::optional<Bounds3d>> extents;  // one per cell; nullopt for an image
   std::vector<Legend> legends;
 };
 
@@ -125,7 +125,7 @@ bool same_scale(const Legend& a, const Legend& b) {
   return a.continuous && b.continuous && a.title == b.title && a.scale == b.scale;
 }
 
-// A legend that differs from one of them in its range alone widens that range.
+// Adds a legend, or widens the range of a legend that differs only in its range.
 void join_legend(const Legend& legend, std::vector<Legend>& legends) {
   for (Legend& known : legends) {
     if (!same_scale(legend, known)) continue;
@@ -151,7 +151,7 @@ Contents look_at(const std::vector<SheetCell>& cells, const PictureSheetOptions&
   return contents;
 }
 
-// Of a cell's content in its view, height over width; nothing in perspective.
+// Height over width of a cell's content in its view; nullopt for a perspective view.
 std::optional<double> aspect_of(const SheetCell& cell, const std::optional<Bounds3d>& extent) {
   if (!extent)
     return cell.picture.width > 0 ? std::optional(1.0 * cell.picture.height / cell.picture.width)
@@ -180,7 +180,7 @@ double common_aspect(const std::vector<SheetCell>& cells, const Contents& conten
   return aspect > 0.0 ? std::clamp(aspect, 0.25, 2.0) : 0.75;
 }
 
-// The boxes that the cells' views are fitted to: those that share a view hold all of it.
+// View extents of the cells: the union of the extents in each group of a shared view.
 std::vector<std::optional<Bounds3d>> shared_extents(const Contents& contents, int columns,
                                                     SharedView shared) {
   std::vector<std::optional<Bounds3d>> result = contents.extents;
@@ -208,7 +208,7 @@ void share_ranges(const std::vector<Legend>& legends, Scene& scene) {
 
 // --- pixels ------------------------------------------------------------------------------------
 
-// In the middle of `cell`, whole pixels; made smaller where it is larger.
+// Centers an image in `cell`, in whole pixels, and scales it down if it is larger.
 PixelRect fitted(const ColorImage& image, const PixelRect& cell) {
   const double scale = std::min({1.0, cell.width / image.width, cell.height / image.height});
   const double width = std::max(1.0, std::round(scale * image.width));
@@ -252,7 +252,7 @@ void draw_page(const std::vector<SheetCell>& cells, const PictureSheetOptions& o
 
 struct DrawnScene {
   ColorImage image;
-  std::optional<SceneCamera> camera;  // of an orthographic view
+  std::optional<SceneCamera> camera;  // orthographic views only
 };
 
 DrawnScene draw_scene(const SheetCell& cell, const PixelRect& rect,
@@ -311,7 +311,7 @@ SheetLayout plan_sheet(const std::vector<SheetCell>& cells, const PictureSheetOp
   if (layout.width > max_side_px || layout.height > max_side_px)
     throw Error("the sheet would have " + std::to_string(layout.width) + " x " +
                     std::to_string(layout.height) + " pixels, more than " +
-                    std::to_string(max_side_px) + " a side",
+                    std::to_string(max_side_px) + " per side",
                 {.field = "cell_width_px", .value = std::to_string(options.cell_width_px)});
   return layout;
 }
@@ -335,7 +335,7 @@ ColorImage draw_sheet(const std::vector<SheetCell>& cells, const PictureSheetOpt
                          layout.font_px);
     const ColorImage& image = cells[i].scene ? drawn.image : cells[i].picture;
     canvas.image(image, fitted(image, layout.cells[i]));
-    // The bar of a row is below its first scene that has one.
+    // The scale bar of a row is that of its first orthographic scene.
     const std::size_t row = i / static_cast<std::size_t>(layout.columns);
     const bool wanted = options.shared_view == SharedView::sheet ? bars == 0 : bars <= row;
     if (!drawn.camera || layout.scale_bars.empty() || !wanted) continue;

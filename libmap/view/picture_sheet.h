@@ -1,5 +1,4 @@
-// Several scenes or pictures side by side on one page, in rows and columns, with captions and one
-// legend for all.
+// Arranges scenes and images in a grid on one page, with captions and a common legend.
 #pragma once
 
 #include <functional>
@@ -15,32 +14,32 @@
 
 namespace libmap {
 
-// A scene is made when it is needed, twice, so that memory holds one at a time. A picture is shown
-// whole, made smaller where it is larger than its cell.
+// A scene or an image. Scenes are created on demand, twice each, so that only one is in memory.
+// Images are scaled down if they are larger than the cell.
 struct SheetCell {
   std::string caption;
-  std::function<Scene()> scene{};  // empty: the picture is shown
+  std::function<Scene()> scene{};  // empty: show `picture`
   Viewpoint view = Viewpoint::top;
   ColorImage picture{};
 };
 
-// Which scenes are shown at the same scale and place, so that they can be compared cell by cell.
+// Group of scenes with the same view extent: the whole sheet, or each row.
 enum class SharedView { sheet, row };
 
 struct PictureSheetOptions {
-  int columns = 0;  // 0: the fewest that make the page at least as wide as it is high
+  int columns = 0;  // 0: minimum number with a page at least as wide as high
   int cell_width_px = 480;
-  int cell_height_px = 0;  // 0: from what the cells show
+  int cell_height_px = 0;  // 0: from the aspect ratio of the cells' content
   std::string title;
   std::vector<std::string> column_titles;  // above the columns; may be empty
   std::vector<std::string> row_titles;     // before the rows; may be empty
   SharedView shared_view = SharedView::sheet;
   std::string background = "#5f6b7a";  // of scenes
   bool scale_bar = true;
-  std::vector<Legend> legends;  // before those of the scenes
+  std::vector<Legend> legends;  // shown before the legends of the scenes
 };
 
-// Where everything goes, whole pixels from the top left corner.
+// Rectangles of all parts, whole pixels from the top left corner.
 struct SheetLayout {
   int width = 0;
   int height = 0;
@@ -48,21 +47,22 @@ struct SheetLayout {
   int font_px = 12;
   std::optional<PixelRect> title;
   std::optional<PixelRect> legend;
-  std::vector<PixelRect> cells;     // one a cell, row by row
-  std::vector<PixelRect> captions;  // below them; empty if no cell has one
+  std::vector<PixelRect> cells;     // one per cell, row by row
+  std::vector<PixelRect> captions;  // below the cells; empty if no cell has a caption
   std::vector<PixelRect> column_titles;
   std::vector<PixelRect> row_titles;
-  std::vector<PixelRect> scale_bars;  // one a row, or one; empty if there is none
+  std::vector<PixelRect> scale_bars;  // one per row, or one, or none
 };
 
-// `aspect` is the height of a cell over its width where the options leave it open. Throws Error: no
-// cell, a number of columns or a size out of its bound, more titles than rows or columns.
+// Plans the layout. `aspect` is the height of a cell over its width, used if the options do not set
+// the height. Throws Error: no cell, columns, a size or the sheet out of bounds, an invalid
+// background, more titles than rows or columns.
 SheetLayout plan_sheet(const std::vector<SheetCell>& cells, const PictureSheetOptions& options,
                        const std::vector<Legend>& legends, double aspect);
 
-// Continuous colors whose range the scenes leave open share one: from the least to the largest
-// that each would have had. Throws Error as plan_sheet and render_scene do, and what a cell's
-// `scene` throws; (failed) if no picture can be drawn here.
+// Draws the sheet. Continuous color scales with the same title share one range, which covers the
+// ranges of all scenes. Throws Error as plan_sheet and render_scene do, and what a cell's `scene`
+// throws; (failed) if rendering is not possible.
 ColorImage draw_sheet(const std::vector<SheetCell>& cells, const PictureSheetOptions& options);
 
 }  // namespace libmap

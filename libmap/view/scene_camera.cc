@@ -13,7 +13,7 @@ namespace libmap {
 namespace {
 
 constexpr double oblique_field_of_view_deg = 30.0;
-constexpr double free_border = 0.05;  // of the plot, on every side
+constexpr double free_border = 0.05;  // border on each side, relative to the plot
 
 void orient(SceneCamera& camera, const Eigen::Vector3d& forward, const Eigen::Vector3d& up) {
   camera.forward = forward.normalized();
@@ -49,9 +49,9 @@ void fit_orthographic(SceneCamera& camera, const std::vector<Eigen::Vector3d>& p
                     (depth.min - back_off) * camera.forward;
 }
 
-// One image direction of the perspective fit. A point at offset a along it and f along the view is
-// inside for the camera at offset c, a distance d back, if |a - c| <= (f + d) t: d t +- c bounds
-// a maximum over the points each.
+// One image direction of the perspective fit. A point at offset a in this direction and f along the
+// view is visible from the camera at offset c and distance d if |a - c| <= (f + d) t. Thus d t + c
+// and d t - c each have a lower bound, a maximum over all points.
 struct HalfPlanes {
   double plus = -std::numeric_limits<double>::infinity();   // max(a - f t)
   double minus = -std::numeric_limits<double>::infinity();  // max(-a - f t)
@@ -62,8 +62,7 @@ struct HalfPlanes {
   double distance(double t) const { return (plus + minus) / (2.0 * t); }
 };
 
-// The offset that the fit allows at the distance d and that leaves as much free before the first
-// point as behind the last.
+// The feasible offset at distance d that centers the projected points.
 double centered_offset(const std::vector<Eigen::Vector2d>& offsets_and_depths,
                        const HalfPlanes& bounds, double d, double t) {
   double c = (bounds.plus - bounds.minus) / 2.0;
@@ -95,7 +94,7 @@ void fit_perspective(SceneCamera& camera, const std::vector<Eigen::Vector3d>& po
     along.add(offsets_along.back().x(), f, radius_m, tangent_along);
     depth.add(f);
   }
-  // Never nearer than the nearest point.
+  // The camera must be in front of the nearest point.
   const double distance = std::max({across.distance(tangent_across), along.distance(tangent_along),
                                     -depth.min + 2.0 * radius_m + 1e-9});
   camera.position =
@@ -114,7 +113,7 @@ void place(SceneCamera& camera, const CameraPlacement& placement) {
                 {.field = "camera up"});
   const double angle = placement.field_of_view_deg;
   if (!(angle > 0.0 && angle < 180.0))
-    throw Error("no camera has this field of view",
+    throw Error("invalid field of view",
                 {.field = "field_of_view_deg", .value = to_text(angle), .bound = "> 0 and < 180"});
   orient(camera, view, placement.up);
   camera.position = placement.position;

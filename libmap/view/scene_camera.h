@@ -1,4 +1,4 @@
-// The views of a scene, and where its points fall in the picture.
+// Cameras of a scene's views, and the projection of points into the image.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,11 +12,11 @@ namespace libmap {
 // front:   orthographic along +y; x to the right, z up.
 // side:    orthographic along -x; y to the right, z up.
 // oblique: perspective from the front left above.
-// camera:  perspective from a given place.
+// camera:  perspective from a given position.
 enum class Viewpoint { top, oblique, front, side, camera };
 std::vector<std::pair<std::string, Viewpoint>> viewpoint_names();
 
-// A rectangle of pixels: left and top edge from the picture's top left corner.
+// A rectangle in pixels; left and top edge are relative to the image's top left corner.
 struct PixelRect {
   double left = 0.0;
   double top = 0.0;
@@ -34,12 +34,12 @@ struct PixelRect {
   }
 };
 
-// Of Viewpoint::camera, in the frame of the points; `up` need not be orthogonal to the view.
+// Pose of Viewpoint::camera in the frame of the points. `up` need not be orthogonal to the view.
 struct CameraPlacement {
   Eigen::Vector3d position{-2.0, -4.0, 3.0};
   Eigen::Vector3d focal_point = Eigen::Vector3d::Zero();
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
-  double field_of_view_deg = 30.0;  // from the lower to the upper edge, > 0 and < 180
+  double field_of_view_deg = 30.0;  // vertical, > 0 and < 180
 };
 
 struct SceneCamera {
@@ -48,20 +48,20 @@ struct SceneCamera {
   Eigen::Vector3d up = Eigen::Vector3d::UnitY();
   Eigen::Vector3d forward = -Eigen::Vector3d::UnitZ();
   bool perspective = false;
-  double scale_px = 1.0;  // orthographic: pixels a meter; perspective: the focal length in pixels
-  PixelRect plot;         // its middle is the optical axis
+  double scale_px = 1.0;  // orthographic: pixels per meter; perspective: focal length in pixels
+  PixelRect plot;         // centered on the optical axis
 
-  // Meters in front of the camera's plane; negative behind it.
+  // Depth in meters; negative behind the camera.
   double depth_of(const Eigen::Vector3d& point) const { return (point - position).dot(forward); }
   double pixels_per_m(double depth_m) const { return perspective ? scale_px / depth_m : scale_px; }
-  // From the picture's top left corner. In perspective only for points with a positive depth.
+  // Pixel relative to the image's top left corner. In perspective, the depth must be positive.
   Eigen::Vector2d pixel_of(const Eigen::Vector3d& point) const;
 };
 
-// The camera whose `plot` shows all `points` (at least one, all finite), each with a margin of
-// `radius_m` around it, and a twentieth of the plot free on every side; Viewpoint::camera stands
-// where it is told to. Throws Error if the camera's place and focal point coincide, `up` is
-// parallel to the view or the field of view is out of its bound.
+// Camera whose `plot` contains all `points` (at least one, all finite) with a radius of `radius_m`
+// and a border of a twentieth of the plot on each side. Viewpoint::camera has the pose of
+// `placement`. Throws Error if that position and focal point coincide, `up` is parallel to the
+// view, or the field of view is out of range.
 SceneCamera fit_camera(Viewpoint view, const CameraPlacement& placement,
                        const std::vector<Eigen::Vector3d>& points, double radius_m,
                        const PixelRect& plot);

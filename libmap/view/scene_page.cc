@@ -16,23 +16,23 @@ namespace {
 constexpr Color ink{25, 28, 32};
 constexpr Color paper{255, 255, 255};
 constexpr Color frame_color{90, 96, 104};
-constexpr double row_height = 1.55;       // of the legend, in font sizes, as all below
+constexpr double row_height = 1.55;       // of the legend; this and the following are in font sizes
 constexpr double title_row_height = 1.9;  // a legend's title
 constexpr double bar_height = 13.0;       // the scalar bar
 constexpr double bar_width = 1.3;
 constexpr double swatch = 1.05;
 constexpr double legend_gap = 1.2;  // between two legends
 constexpr int max_ticks = 6;
-constexpr std::size_t many_markers = 5000;  // from here on they are downsampled
+constexpr std::size_t many_markers = 5000;  // more markers are downsampled
 
-// Where no round number lies between the ends, the ends.
+// Round numbers within the legend's range, or its ends if there are fewer than two.
 std::vector<double> ticks_of(const Legend& legend) {
   std::vector<double> ticks = round_ticks(legend.min, legend.max, max_ticks);
   if (ticks.size() < 2) ticks = {legend.min, legend.max};
   return ticks;
 }
 
-// Texts that stand beside the swatches or the bar.
+// Texts beside the scalar bar and the swatches.
 std::vector<std::string> texts_of(const Legend& legend) {
   std::vector<std::string> texts;
   if (legend.continuous) texts = tick_texts(ticks_of(legend));
@@ -40,7 +40,7 @@ std::vector<std::string> texts_of(const Legend& legend) {
   return texts;
 }
 
-// Sets the legend's column if there is a font size at which it fits.
+// Sets the legend's rectangle if it fits at any font size.
 void plan_legend(const SceneViewOptions& options, const std::vector<Legend>& legends,
                  double title_height, ScenePage& page) {
   if (!options.legend || legends.empty()) return;
@@ -99,7 +99,7 @@ void draw_scalar_bar(const Legend& legend, double left, double top, int font, Ca
   constexpr int strips = 128;
   for (int strip = 0; strip < strips; ++strip) {
     const double share = static_cast<double>(strip) / strips;
-    // Each reaches up to the next ones, so that no seam shows.
+    // Strips overlap, so that no seams are visible.
     canvas.rectangle({bar.left, bar.top, bar.width, height * (1.0 - share)},
                      color_at(legend.scale, (strip + 0.5) / strips));
   }
@@ -149,8 +149,7 @@ std::vector<SeenMarker> seen_markers(const ScenePage& page, const SceneCamera& c
   return seen;
 }
 
-// Keeps the markers whose labels are drawn, and of the others of one verdict in each square of that
-// side the first.
+// Keeps markers with drawn labels, and the first of all others per verdict and square.
 void thin_markers(double side_px, bool labeled, std::vector<SeenMarker>& seen) {
   std::set<std::tuple<Verdict, long, long>> taken;
   std::erase_if(seen, [&](const SeenMarker& one) {
@@ -163,7 +162,7 @@ void thin_markers(double side_px, bool labeled, std::vector<SeenMarker>& seen) {
   });
 }
 
-// Labels that would cover more than the plot, were they as narrow as they are high, are of no use.
+// Returns false if square labels of this height would cover more than the plot.
 bool have_room_for_labels(const std::vector<SeenMarker>& seen, const PixelRect& plot,
                           double height_px) {
   const auto labels = std::count_if(
@@ -172,7 +171,7 @@ bool have_room_for_labels(const std::vector<SeenMarker>& seen, const PixelRect& 
 }
 
 constexpr int rings = 9;
-// To the right first, then left, above, below and the corners.
+// Directions of labels in order of preference.
 constexpr std::array<std::array<double, 2>, 8> directions{{{1.0, 0.0},
                                                            {-1.0, 0.0},
                                                            {0.0, -1.0},
@@ -188,7 +187,7 @@ double overlap_area(const PixelRect& a, const PixelRect& b) {
   return width > 0.0 && height > 0.0 ? width * height : 0.0;
 }
 
-// The box whose edge or corner toward the point is `gap` pixels away from it.
+// Box whose edge or corner toward the point is at a distance of `gap` pixels.
 PixelRect box_beside(const LabelRequest& request, const std::array<double, 2>& direction,
                      double gap) {
   const Eigen::Vector2d toward(direction[0], direction[1]);
@@ -198,7 +197,7 @@ PixelRect box_beside(const LabelRequest& request, const std::array<double, 2>& d
   return {middle.x() - half.x(), middle.y() - half.y(), request.width_px, request.height_px};
 }
 
-// Area of `box` that lies on taken boxes or points, or outside the bounds.
+// Area of `box` that overlaps occupied rectangles or is outside the bounds.
 double covered_area(const PixelRect& box, const std::vector<PixelRect>& taken,
                     const PixelRect& bounds) {
   double area = box.width * box.height - overlap_area(box, bounds);
@@ -313,7 +312,7 @@ void draw_axes(const ScenePage& page, const SceneCamera& camera, Canvas& canvas)
   const Eigen::Vector2d middle(page.axes->left + page.axes->width / 2.0,
                                page.axes->top + page.axes->height / 2.0);
   const Eigen::Vector2d origin = middle - (low + high) / 2.0;
-  // Away from the viewer first: the nearer covers the farther.
+  // Axes are drawn from back to front.
   std::array<std::size_t, 3> order{0, 1, 2};
   std::sort(order.begin(), order.end(), [&camera](std::size_t a, std::size_t b) {
     return camera.forward[static_cast<Eigen::Index>(a)] >
@@ -328,7 +327,7 @@ void draw_axes(const ScenePage& page, const SceneCamera& camera, Canvas& canvas)
       canvas.text(origin + tips[k] + 0.6 * f * tips[k].normalized(), names[k], style);
       continue;
     }
-    // Along the view: a ring with a dot toward the viewer, without away from it.
+    // An axis along the view is a ring, with a dot if it points toward the viewer.
     canvas.disc(origin, 0.38 * f, colors[k]);
     canvas.disc(origin, 0.38 * f - std::max(1.0, 0.1 * f), paper);
     if (camera.forward[static_cast<Eigen::Index>(k)] < 0.0)

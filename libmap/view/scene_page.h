@@ -1,4 +1,4 @@
-// The page around a scene: title, legends, axes and scale bar, and where the scene itself goes.
+// Layout and drawing of the page around a scene: title, legends, axes, scale bar and markers.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,7 +13,7 @@
 
 namespace libmap {
 
-inline constexpr int max_side_px = 16384;  // of a picture
+inline constexpr int max_side_px = 16384;  // of an image
 inline constexpr int min_font_px = 10;
 
 struct ScenePage {
@@ -26,23 +26,24 @@ struct ScenePage {
   int legend_font_px = 12;
 };
 
-// Leaves out, in this order, legend, axes, scale bar and title where they would leave the scene
-// less than half of the width or 0.55 of the height.
+// Plans the page. Omits legend, axes, scale bar and title, in this order, until the scene has at
+// least half of the width and 0.55 of the height.
 ScenePage plan_page(const SceneViewOptions& options, const std::vector<Legend>& legends);
 
-// The longest length of 1, 2 or 5 times a power of ten meters that is at most `longest_m`.
+// Largest length of 1, 2 or 5 times a power of ten meters that is at most `longest_m`.
 double round_length_m(double longest_m);
-// "50 m", "2 cm", "5 mm".
+// A length with its unit, e.g. "50 m", "2 cm", "5 mm".
 std::string length_text(double length_m);
 
-// Pixels that legends one below the other take, wide and high.
+// Width and height in pixels of legends in one column.
 Eigen::Vector2d legends_size(const std::vector<Legend>& legends, int font_px);
 
-// Title, legends and axes at their places on the page.
+// Draw title, legends and axes into their rectangles, if the page has them.
 void draw_title(const ScenePage& page, const std::string& title, Canvas& canvas);
 void draw_legends(const ScenePage& page, const std::vector<Legend>& legends, Canvas& canvas);
 void draw_axes(const ScenePage& page, const SceneCamera& camera, Canvas& canvas);
-// In perspective the bar is true at `reference`, and says so.
+// In perspective, the scale is that at the depth of `reference`, and the bar is labeled
+// accordingly.
 void draw_scale_bar(const ScenePage& page, const SceneCamera& camera,
                     const Eigen::Vector3d& reference, Canvas& canvas);
 struct LabelRequest {
@@ -51,20 +52,20 @@ struct LabelRequest {
   double height_px = 0.0;
 };
 
-// A box for each request, in their order: beside its point if there is room, else further out; on
-// no other point, on no other box and inside `bounds` wherever that is possible, else where the
-// least is covered. `point_radius_px` is what is kept free around every point.
+// Returns one box per request, in their order: beside its point, or farther away if there is no
+// room. Boxes avoid the points (of radius `point_radius_px`), each other and the outside of
+// `bounds`; if that is impossible, the covered area is minimized.
 std::vector<PixelRect> place_labels(const std::vector<LabelRequest>& requests,
                                     double point_radius_px, const PixelRect& bounds);
 
-// Markers and dimension lines in the terrain frame. Where the plot has no room for the markers'
-// labels, not even if each were as narrow as high, none is drawn, and of thousands of markers that
-// cover each other one in each square of a disc's radius.
+// Draws markers in the terrain frame. Labels are omitted if the plot is too small for all of them.
+// More than 5000 markers are downsampled to one per verdict and square with a disc's radius as
+// side.
 void draw_markers(const ScenePage& page, const SceneCamera& camera,
                   const std::vector<Marker>& markers, Canvas& canvas);
 
-// Their texts keep off the ends of the lines: above a line that lies, to the right of one that
-// stands.
+// Draws dimension lines in the terrain frame. The text is above a horizontal line and to the right
+// of a vertical one.
 void draw_dimension_lines(const ScenePage& page, const SceneCamera& camera,
                           const std::vector<DimensionLine>& lines, Canvas& canvas);
 

@@ -35,16 +35,15 @@ namespace {
 void check(const SceneViewOptions& options) {
   const auto check_side = [](const char* name, int value) {
     if (value < 1 || value > max_side_px)
-      throw Error("no picture can have this size",
-                  {.field = name,
-                   .value = std::to_string(value),
-                   .bound = ">= 1 and <= " + std::to_string(max_side_px)});
+      throw Error("invalid image size", {.field = name,
+                                         .value = std::to_string(value),
+                                         .bound = ">= 1 and <= " + std::to_string(max_side_px)});
   };
   check_side("width", options.width);
   check_side("height", options.height);
   parse_color(options.background, "background");
   if (options.extent && !((options.extent->max - options.extent->min).minCoeff() >= 0.0))
-    throw Error("an empty box cannot be shown", {.field = "extent"});
+    throw Error("the box is empty", {.field = "extent"});
 }
 
 // A scene ready to be drawn, in the terrain frame.
@@ -55,7 +54,7 @@ struct Setup {
   std::vector<Legend> legends;
   std::vector<Eigen::Vector3d> in_view;  // all finite
   Eigen::Vector3d center = Eigen::Vector3d::Zero();
-  double radius_m = 0.0;  // of the largest point
+  double radius_m = 0.0;  // radius of the largest point
   ScenePage page;
   SceneCamera camera;
 };
@@ -72,7 +71,7 @@ Setup gather(const Scene& scene) {
       setup.layers.push_back(std::move(prepared));
     }
   }
-  if (positions.empty()) throw Error("there is nothing to draw: no point with finite coordinates");
+  if (positions.empty()) throw Error("nothing to draw: no point has finite coordinates");
   for (Marker marker : scene.markers) {
     marker.position = scene.terrain_from_scene * marker.position;
     setup.markers.push_back(marker);
@@ -122,7 +121,7 @@ Setup set_up(const Scene& scene, const SceneViewOptions& options) {
   return setup;
 }
 
-// VTK counts rows and coordinates from the bottom: given from the top, both fit together.
+// VTK measures rows and coordinates from the bottom. Both are passed from the top, so they match.
 vtkSmartPointer<vtkFloatArray> coordinates_of(const ColoredTriangles& triangles) {
   auto array = vtkSmartPointer<vtkFloatArray>::New();
   array->SetNumberOfComponents(2);
@@ -189,7 +188,7 @@ vtkSmartPointer<vtkActor> actor_of(const ColoredTriangles& triangles) {
     data->GetPointData()->SetTCoords(coordinates_of(triangles));
     actor->SetTexture(texture_of(*triangles.texture));
   }
-  // Shades are in the colors already.
+  // Colors already include shading.
   actor->GetProperty()->LightingOff();
   return actor;
 }
@@ -206,7 +205,7 @@ void aim(const Setup& setup, vtkCamera& target) {
       farthest = std::max(farthest, depth);
     }
   }
-  // Fillers may lie as far behind the last point as that behind the first.
+  // Fillers may extend the depth range behind the last point by its length.
   farthest += farthest - nearest + 8.0 * setup.radius_m + 0.01 * std::abs(farthest) + 1e-6;
   nearest = std::max(nearest - 3.0 * setup.radius_m - 0.01 * farthest, 1e-3 * farthest);
   const double distance = std::max(camera.depth_of(setup.center), nearest);
@@ -223,7 +222,7 @@ void aim(const Setup& setup, vtkCamera& target) {
   target.SetClippingRange(nearest, farthest);
 }
 
-// The scene alone, as it fills the page's plot.
+// Renders the scene at the size of the page's plot.
 ColorImage draw_plot(const Setup& setup, const Color& background) {
   const PixelRect& plot = setup.page.plot;
   return draw_offscreen(
@@ -251,47 +250,49 @@ void bind(ParameterTable& table, SceneLayer& layer) {
              {"height", ColorMode::height},
              {"single", ColorMode::single},
              {"texture", ColorMode::texture}},
-            "what colors show");
-  table.add("field", coloring.field, "field that is shown with color: field or automatic");
+            "quantity shown by colors");
+  table.add("field", coloring.field, "scalar field for color modes field and automatic");
   table.add("load_n", coloring.load_n, positive,
-            "load of hold_probability, for the legend, N; auto: the map's own");
+            "load of hold_probability in the legend, N; auto: load of the map");
   table.add("color_scale", coloring.scale,
             {{"viridis", ColorScale::viridis}, {"diverging", ColorScale::diverging}},
-            "colors of continuous values; diverging: blue below and red above 0");
-  table.add("range_min", coloring.range_min, any_number, "value at the lower end of the colors");
+            "color scale of continuous values; diverging: blue below and red above 0");
+  table.add("range_min", coloring.range_min, any_number,
+            "value at the lower end of the color scale");
   table.add("range_max", coloring.range_max, any_number,
-            "value at their upper end; equal to range_min: from the data");
-  table.add("single_color", coloring.color, "color with color: single, #rrggbb");
+            "value at the upper end of the color scale; equal to range_min: from the data");
+  table.add("single_color", coloring.color, "color for color mode single, #rrggbb or a name");
   table.add("point_shape", layer.point_shape,
             {{"automatic", PointShape::automatic},
              {"cube", PointShape::cube},
              {"square", PointShape::square}},
-            "shape of a point");
+            "shape of points");
   table.add("point_size_m", layer.point_size_m, not_negative,
-            "edge of a point, m; 0: from their spacing");
+            "side length of points, m; 0: from the point spacing");
   table.add("shading", layer.shading,
             {{"automatic", Shading::automatic}, {"none", Shading::none}, {"full", Shading::full}},
-            "where light falls");
+            "shading of surfaces");
 }
 
 void bind(ParameterTable& table, SceneViewOptions& options) {
-  table.add("view", options.view, viewpoint_names(), "from where");
-  table.add("title", options.title, "above the scene");
+  table.add("view", options.view, viewpoint_names(), "viewpoint");
+  table.add("title", options.title, "title above the scene");
   table.add("scale_bar", options.scale_bar, "show the scale bar");
-  table.add("background", options.background, "#rrggbb or a name");
+  table.add("background", options.background, "background color, #rrggbb or a name");
 }
 
 void bind_single(ParameterTable& table, SceneViewOptions& options) {
   const Range pixels{1.0, max_side_px};
-  table.add("width_px", options.width, pixels, "width of the picture, pixels");
-  table.add("height_px", options.height, pixels, "height of the picture, pixels");
+  table.add("width_px", options.width, pixels, "width of the image, pixels");
+  table.add("height_px", options.height, pixels, "height of the image, pixels");
   table.add("legend", options.legend, "show the legend");
   table.add("axes", options.axes, "show the axes");
 }
 
 ColorImage render_scene(Scene scene, const SceneViewOptions& options) {
   const Setup setup = set_up(scene, options);
-  // Only the pages of textures are not copied; drawing takes hundreds of bytes per point itself.
+  // Frees memory for rendering, which takes hundreds of bytes per point. Setup copies all but
+  // texture pages.
   for (SceneLayer& layer : scene.layers)
     if (!std::holds_alternative<TexturedMesh>(layer.shape)) layer.shape = PointCloud();
   Canvas canvas(options.width, options.height);

@@ -1,4 +1,4 @@
-// Offscreen pictures of clouds, meshes and graspability maps.
+// Renders images of clouds, meshes and graspability maps offscreen.
 #pragma once
 
 #include <Eigen/Core>
@@ -18,41 +18,41 @@
 
 namespace libmap {
 
-// automatic: cubes where the points lie on a lattice, else squares.
-// cube:      axis-aligned in the terrain frame.
+// automatic: cubes if the points are on a lattice, else squares.
+// cube:      aligned with the axes of the terrain frame.
 // square:    facing the camera.
 enum class PointShape { automatic, cube, square };
 
-// automatic: meshes, the sides of cubes, and clouds of one color (by their normals) are shaded;
-//            all else has exactly the colors of the legend, or those of its texture.
-// none:      exact colors everywhere.
-// full:      squares of a cloud with normals and textures are shaded too.
+// automatic: meshes, cubes, and clouds of one color with normals are shaded; all others have the
+//            exact colors of the legend or texture.
+// none:      exact colors.
+// full:      clouds with normals and textured meshes are shaded, too.
 enum class Shading { automatic, none, full };
 
-// One cloud or mesh; a textured mesh that has no pages is a mesh. Points that are not finite are
-// left out, as are triangles with such corners.
+// A cloud or mesh; a textured mesh without pages is drawn as a mesh. Non-finite points, and
+// triangles with non-finite corners, are dropped.
 struct SceneLayer {
   std::variant<PointCloud, TriangleMesh, TexturedMesh> shape{};
   Coloring coloring{};
   PointShape point_shape = PointShape::automatic;
   Shading shading = Shading::automatic;
-  double point_size_m = 0.0;  // side of a cube or square; 0: from the spacing, gaps closed
+  double point_size_m = 0.0;  // side of a cube or square; 0: from the spacing, with gaps closed
 };
-// All but the shape, the height of the zero plane and the legend of own colors.
+// Binds all fields except the shape, the zero plane and the legend of own colors.
 void bind(ParameterTable& table, SceneLayer& layer);
 
-// What is known of a marked place: green, red, or dark before there is a verdict.
+// Verdict on a marked location: dark, green or red.
 enum class Verdict { none, pass, fail };
 
-// A labeled point, drawn over everything. One that the view does not contain is left out.
+// A labeled point, drawn over the scene. Markers outside of the view are omitted.
 struct Marker {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  // scene frame, meters
   std::string label{};                                 // may be empty
   Verdict verdict = Verdict::none;
 };
 
-// A measure as technical drawings give it: a line with an arrow head at both ends and its text
-// beside its middle, drawn over everything.
+// A dimension as in technical drawings: a line with arrow heads at both ends and a text beside its
+// center, drawn over the scene.
 struct DimensionLine {
   Eigen::Vector3d from = Eigen::Vector3d::Zero();  // scene frame, meters
   Eigen::Vector3d to = Eigen::Vector3d::Zero();
@@ -71,41 +71,41 @@ struct SceneViewOptions {
   int width = 1600;   // pixels, 1 to 16384
   int height = 1200;  // pixels, 1 to 16384
   Viewpoint view = Viewpoint::top;
-  CameraPlacement camera;  // of Viewpoint::camera, in the scene's frame
+  CameraPlacement camera;  // for Viewpoint::camera, in the scene's frame
   std::string title;
   bool axes = true;
   bool scale_bar = true;
   bool legend = true;
-  int font_px = 0;                     // of the texts, pixels; 0: from the size of the picture
+  int font_px = 0;                     // font size, pixels; 0: from the image size
   std::string background = "#5f6b7a";  // behind the scene: "#rrggbb" or a name
-  // What the view is fitted to, meters in the terrain frame, so that several scenes are shown
-  // alike; default: all that is drawn.
+  // Box that the view is fitted to, meters in the terrain frame, for equal views of several scenes;
+  // default: the bounding box of the scene.
   std::optional<Bounds3d> extent{};
-  // On the page around the scene lie title, legend, axes and scale bar; parts for which a small
-  // picture has no room are left out.
+  // Title, legend, axes and scale bar are beside the scene. They are omitted if the image is too
+  // small.
 };
-// The keys of any picture; and those of one of a single scene: its size, legend and axes.
+// Keys for all images; and keys only for images of a single scene: size, legend and axes.
 void bind(ParameterTable& table, SceneViewOptions& options);
 void bind_single(ParameterTable& table, SceneViewOptions& options);
 
-// The picture of `scene`, whose clouds and meshes are freed before they are drawn; the same scene
-// and options give the same bytes on the same machine. Starts a VirtualDisplay of its own if no
-// display answers: hold one around several calls to start only one. Calls from several threads are
-// run one after the other. Throws Error: no point to draw, a size or color or camera that cannot
-// be, a layer whose arrays do not fit each other, and what color_points throws; (failed) if no
-// picture can be drawn here.
+// Renders `scene`; equal scenes and options give equal bytes on one machine. Clouds and meshes are
+// freed as soon as they are prepared. Each call starts a VirtualDisplay if no display answers;
+// create one before several calls to start it once. Calls from several threads are serialized.
+// Throws Error: nothing to draw, an invalid size, color or camera, a layer with inconsistent
+// arrays, and as color_points does; (failed) if rendering is not possible.
 ColorImage render_scene(Scene scene, const SceneViewOptions& options);
 
-// Of a scene, before it is drawn: the box in the terrain frame that its view is fitted to, with the
-// widths of its points, and the legends of its layers, each once. Throws as render_scene does.
+// Bounding box of a scene in the terrain frame, including the size of its points, and the distinct
+// legends of its layers. Throws Error as render_scene does.
 struct SceneContents {
   Bounds3d extent;
   std::vector<Legend> legends;
 };
 SceneContents contents_of(const Scene& scene);
 
-// The part of the picture that shows the scene, and the camera that does: where a point falls is
-// camera.pixel_of(terrain_from_scene * point). Needs no display.
+// Camera that render_scene uses: camera.pixel_of(terrain_from_scene * point) is the pixel of a
+// point and camera.plot the part of the image with the scene. Requires no display. Throws Error as
+// render_scene does.
 SceneCamera camera_of(const Scene& scene, const SceneViewOptions& options);
 
 }  // namespace libmap

@@ -6,7 +6,7 @@
 
 namespace graspmap_test {
 
-// Those that the processor has.
+// Returns the instruction sets that the processor supports.
 inline std::vector<libmap::InstructionSet> instruction_sets() {
   using libmap::InstructionSet;
   std::vector<libmap::InstructionSet> all;

@@ -1,5 +1,5 @@
-// The counts of match_voxels by the plain triple loop of listing A.6, over a dense array of the
-// whole box, one thread: the oracle of the tests and the baseline of the benchmarks.
+// Computes the counts of match_voxels by the plain triple loop of listing A.6, over a dense array
+// of the whole box, single-threaded. Oracle of the tests and baseline of the benchmarks.
 #pragma once
 
 #include <cstddef>

@@ -19,7 +19,7 @@ constexpr float black = 25;
 constexpr float white = 225;
 
 float intensity(const PaintedBoard& board, double x, double y) {
-  // In squares, from the outer corner of the first one.
+  // Position in squares from the outer corner of the first square.
   const double column = x / board.square_m + 1;
   const double row = y / board.square_m + 1;
   const double columns = board.columns + 1;
@@ -48,7 +48,7 @@ bool is_inside(const Camera& camera, const PaintedBoard& board, const Pose& pose
   return true;
 }
 
-// One row or column, its ends repeated.
+// Filters one row or column; its ends are repeated.
 void blur_line(libmap::Image<float>& image, const std::vector<float>& weights, bool along_rows) {
   const libmap::Image<float> before = image;
   const int reach = static_cast<int>(weights.size() / 2);

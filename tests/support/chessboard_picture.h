@@ -1,4 +1,4 @@
-// Pictures of a chessboard by a camera that is known exactly.
+// Renders images of a chessboard by an exactly known camera.
 #pragma once
 
 #include <cstdint>
@@ -15,18 +15,18 @@ struct PaintedBoard {
   double square_m = 0.03;
 };
 
-// The first inner corner lies at the board's origin, x along the rows, y along the columns; a white
-// margin of one square goes around.
+// Paints a board with a white margin of one square. Its first inner corner is at the board's
+// origin, x along the rows, y along the columns.
 class ChessboardPainter {
  public:
-  // `samples` x `samples` rays a pixel.
+  // Uses `samples` x `samples` rays per pixel.
   ChessboardPainter(const libmap::Camera& camera, int samples);
 
-  // Intensities 0 to 255. What is not board is gray.
+  // Returns intensities 0 to 255; the background is gray.
   libmap::Image<float> paint(const PaintedBoard& board,
                              const libmap::Pose& camera_from_board) const;
 
-  // Where the inner corners are, row by row.
+  // Returns the pixel positions of the inner corners, row by row.
   std::vector<Eigen::Vector2d> corners(const PaintedBoard& board,
                                        const libmap::Pose& camera_from_board) const;
 
@@ -36,12 +36,12 @@ class ChessboardPainter {
   std::vector<Eigen::Vector2d> rays_;
 };
 
-// Boards in front of the camera, tilted by up to `max_tilt_deg` about any axis, all corners at
-// least `margin_px` inside the image; drawn from random_engine().
+// Returns random poses of boards in front of the camera, drawn from random_engine(), tilted by up
+// to `max_tilt_deg` about any axis, with all corners at least `margin_px` inside the image.
 std::vector<libmap::Pose> board_poses(const libmap::Camera& camera, const PaintedBoard& board,
                                       int count, double max_tilt_deg, double margin_px = 12);
 
-// A Gaussian blur of `blur_px`, then Gaussian noise of `noise` gray levels, then rounding.
+// Applies a Gaussian blur of `blur_px`, Gaussian noise of `noise` gray levels, and rounding.
 libmap::GrayImage photographed(const libmap::Image<float>& picture, double blur_px, double noise);
 
 }  // namespace graspmap_test

@@ -6,7 +6,7 @@
 
 namespace graspmap_test {
 
-// Of all entries of `folder`, sorted.
+// Returns the sorted names of all entries of `folder`.
 std::vector<std::string> names_in(const std::filesystem::path& folder);
 
 }  // namespace graspmap_test

@@ -1,4 +1,4 @@
-// Lower limits on what the test's own process may take, while they live.
+// Lowers resource limits of the test's process during the lifetime of an object.
 #pragma once
 
 #include <sys/resource.h>
@@ -26,7 +26,7 @@ class LowerLimit {
   rlimit before_{};
 };
 
-// A disk that is full after so many bytes of each file.
+// Simulates a full disk: writes beyond this number of bytes per file fail.
 class FileSizeLimit {
  public:
   explicit FileSizeLimit(rlim_t bytes)

@@ -1,5 +1,5 @@
-// Readers of the exact outputs of the author's program, in the folder that GRASPMAP_REFERENCE
-// names. Each throws std::runtime_error naming a file that cannot be read.
+// Readers of the exact outputs of the author's program, in the folder GRASPMAP_REFERENCE. All throw
+// std::runtime_error naming a file that cannot be read.
 #pragma once
 
 #include <Eigen/Core>
@@ -52,7 +52,7 @@ struct ReferenceFrame {
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
   Eigen::Vector3d min_of_voxelized = Eigen::Vector3d::Zero();
   std::vector<Eigen::Vector3f> transformed;  // the first points
-  // Zeros and empty where the set was not interpolated.
+  // Zero and empty if the set was not interpolated.
   double grid_spacing = 0;
   double x_width = 0;
   double y_width = 0;

@@ -1,4 +1,4 @@
-// Programs of this project run as a user runs them: as processes of their own.
+// Runs programs of this project in separate processes.
 #pragma once
 
 #include <filesystem>

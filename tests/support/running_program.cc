@@ -16,8 +16,7 @@ namespace graspmap_test {
 
 namespace {
 
-// A file without a name that takes one of the program's output streams: unlike a pipe it never
-// blocks, however much is written.
+// An unnamed file for one of the program's output streams. Unlike a pipe, it never blocks.
 class Capture {
  public:
   Capture() : file_(std::tmpfile(), &std::fclose) {

@@ -1,4 +1,4 @@
-// A program of this project that runs beside the test.
+// A program of this project that runs during the test.
 #pragma once
 
 #include <sys/types.h>
@@ -18,14 +18,14 @@ class RunningProgram {
   // started.
   explicit RunningProgram(const std::vector<std::string>& words,
                           const ProgramSurroundings& surroundings = {}, bool own_group = false);
-  // Kills it if it still runs.
+  // Kills the program if it still runs.
   ~RunningProgram();
   RunningProgram(const RunningProgram&) = delete;
   RunningProgram& operator=(const RunningProgram&) = delete;
 
-  // Its number, as long as wait() was not called.
+  // Returns the process id; valid until wait() is called.
   pid_t process() const;
-  // Whether it has ended.
+  // Returns true if the program has ended.
   bool has_ended() const;
   ProgramResult wait();
 

@@ -1,5 +1,4 @@
-// Whether this program runs under the address or the thread sanitizer: GCC defines macros, clang
-// has features.
+// Detects the address and the thread sanitizer, by macros of GCC and features of clang.
 #pragma once
 
 #if defined(__SANITIZE_ADDRESS__)
@@ -27,7 +26,7 @@ inline constexpr bool has_thread_sanitizer = true;
 inline constexpr bool has_thread_sanitizer = false;
 #endif
 
-// The sanitizers take much memory themselves, and end a program that asks for more than there is.
+// Memory limits do not work with sanitizers, which need much memory and end the program.
 inline constexpr bool memory_can_be_limited = !has_address_sanitizer && !has_thread_sanitizer;
 
 }  // namespace graspmap_test

@@ -23,13 +23,13 @@ double uniform(double low, double high) {
 
 namespace {
 
-// Removes the scratch folder of a test that passed; a failed test's files stay to be looked at.
+// Removes the scratch folder of a test that passed; files of a failed test are kept.
 class ScratchCleaner : public testing::EmptyTestEventListener {
  public:
   fs::path folder;
   void OnTestEnd(const testing::TestInfo& info) override {
     if (!folder.empty() && info.result()->Passed()) fs::remove_all(folder);
-    // The folder of this process, if this was the last in it.
+    // Removes the folder of this process if it is empty.
     std::error_code not_empty;
     if (!folder.empty()) fs::remove(folder.parent_path(), not_empty);
     folder.clear();

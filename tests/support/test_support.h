@@ -1,4 +1,4 @@
-// What every test program shares.
+// Functions for all test programs.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -13,11 +13,11 @@
 
 namespace graspmap_test {
 
-// A random engine that is seeded anew, with the same seed, before each test.
+// Random engine with the same seed at the start of each test.
 std::mt19937_64& random_engine();
 double uniform(double low, double high);
 
-// An empty folder of this test alone, removed when the test ends well.
+// Returns an empty folder for this test only, which is removed if the test passes.
 std::filesystem::path scratch_folder();
 
 // The project's source folder and build folder.
@@ -28,7 +28,7 @@ std::filesystem::path build_folder();
 std::filesystem::path data_folder();
 std::filesystem::path reference_folder();
 
-// The Error that `action` throws; a failed test if it throws none.
+// Returns the Error that `action` throws; the test fails if it throws none.
 libmap::Error error_of(const std::function<void()>& action);
 
 std::string read_text(const std::filesystem::path& path);
@@ -36,7 +36,7 @@ void write_text(const std::filesystem::path& path, const std::string& text);
 
 }  // namespace graspmap_test
 
-// At the top of a test on real data: skips it, by name, where the folder is not set.
+// Skips a test on real data, naming the variable, if the folder is not set.
 #define GRASPMAP_REQUIRE_DATA() \
   if (graspmap_test::data_folder().empty()) GTEST_SKIP() << "GRASPMAP_DATA is not set"
 #define GRASPMAP_REQUIRE_REFERENCE() \

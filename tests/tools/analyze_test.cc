@@ -101,7 +101,7 @@ TEST(Analyze, MapsWithoutAManifestAndStarts) {
   const auto result =
       graspmap({"analyze", "map.csv", "-o", "out", "--no-pictures", "--stride", "0.11"});
   ASSERT_TRUE(succeeded(result));
-  EXPECT_NE(result.standard_error.find("no manifest beside it"), std::string::npos);
+  EXPECT_NE(result.standard_error.find("has no manifest"), std::string::npos);
   EXPECT_NE(result.standard_error.find("2 regions"), std::string::npos);
   auto regions = json_of("out/summary.json").at("regions");
   EXPECT_EQ(regions.at("groups"), 1);

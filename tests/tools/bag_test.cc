@@ -61,7 +61,7 @@ ProgramResult check(const std::vector<std::string>& words) {
 const char* const camera_names[] = {"front", "front_left", "rear_left",
                                     "rear",  "rear_right", "front_right"};
 
-// What six small cameras around a robot see of a ball on the ground, as a folder `run`.
+// Writes images of a ball on the ground by six small cameras around a robot to the folder `run`.
 void write_run(const std::string& stamp = "5", const std::string& scale = "0") {
   std::string rig = "near_m: 0.28\nfar_m: 1.5\ncameras:\n";
   for (int n = 0; n < 6; ++n)
@@ -101,7 +101,7 @@ TEST(BagCommand, ImagesIntoABagAndBackGiveTheSamePanorama) {
   EXPECT_EQ(manifest["results"]["cameras_of_fullest_moment"], 6);
   EXPECT_EQ(manifest["results"]["rear.topic"], "/rear/depth/image_raw");
   EXPECT_EQ(manifest["frame"], "robot");
-  // The way on: a map.
+  // The cloud can be scored.
   ASSERT_TRUE(succeeded(graspmap({"score", "back.pcd", "-o", "map.pcd", "--up", "0,0,1"})));
   EXPECT_GT(libmap::read_cloud(scratch("map.pcd")).cloud.size(), 1000U);
 }
@@ -208,7 +208,7 @@ TEST(BagCommand, AMapsBagAsPythonReadsIt) {
     EXPECT_EQ(topic["latching"], 1) << name;
     EXPECT_EQ(topic["stamp"], 1600000000.5) << name;
   }
-  // Of ROS Noetic's message definitions.
+  // MD5 sums of ROS Noetic's message definitions.
   EXPECT_EQ(topics["/graspability_map"]["md5sum"], "1158d486dd51d683ce2f1be655c3c181");
   EXPECT_EQ(topics["/footholds"]["md5sum"], "d155b9ce5188fbaf89745847fd5882d7");
   EXPECT_EQ(topics["/foothold_poses"]["md5sum"], "916c28c5764443f268b296bb671b9d97");
@@ -325,15 +325,15 @@ TEST(BagCommand, BadBagsOfRos2AreOneLine) {
     words.insert(words.begin(), "convert");
     EXPECT_TRUE(bad_input(graspmap(words), parts));
   };
-  says({"map.csv", "-o", "out.db3"}, {"out.db3", "is no format of a bag", ".mcap"});
+  says({"map.csv", "-o", "out.db3"}, {"out.db3", "not a bag format", ".mcap"});
   says({"map.csv", "-o", "out.zip"}, {"out.zip", ".zip"});
   says({"map.csv", "-o", "out", "--cell-size", "1", "--compression", "lz4"},
        {"compression", "must be none"});
   says({"map.csv", "-o", "out.mcap", "--cell-size", "1", "--compression", "bz2"}, {"bz2", "zstd"});
   says({"map.csv", "-o", "out.mcap", "--cell-size", "1", "--stamp", "4000000000"},
-       {"ROS has no such time", "2^31"});
+       {"outside ROS's range of time", "2^31"});
   says({"map.csv", "-o", "out", "--cell-size", "-1"}, {"--cell-size"});
-  says({"good.mcap", "-o", "out.mcap"}, {"something else than a bag"});
+  says({"good.mcap", "-o", "out.mcap"}, {"cannot both be bags"});
   says({"good.mcap", "-o", "out"}, {"topics of images is none"});
   fs::create_directory(scratch("open"));
   fs::copy(scratch("good/bag_0.db3"), scratch("open/bag_0.db3"));
@@ -343,7 +343,7 @@ TEST(BagCommand, BadBagsOfRos2AreOneLine) {
   write_text(scratch("open/bag_0.db3"), content("good/bag_0.db3").substr(0, 5000));
   EXPECT_TRUE(bad_input(graspmap({"info", "open"}), {"open/bag_0.db3"}));
   write_text(scratch("open/cut.mcap"), content("good.mcap").substr(0, 500));
-  EXPECT_TRUE(bad_input(graspmap({"info", "open/cut.mcap"}), {"open/cut.mcap", "is cut off"}));
+  EXPECT_TRUE(bad_input(graspmap({"info", "open/cut.mcap"}), {"open/cut.mcap", "is truncated"}));
   fs::remove_all(scratch("open"));
   EXPECT_EQ(graspmap_test::names_in_scratch(), before);
 }
@@ -388,7 +388,7 @@ TEST(BagCommand, InfoListsTheTopics) {
       << text.standard_output;
 }
 
-// What of a command line makes it one of a bag; of all else nothing becomes a bag by mistake.
+// Input and output determine whether a command line reads or writes a bag.
 TEST(BagCommand, WhatIsABagIsDecidedByInputAndOutput) {
   write_text(scratch("map.csv"), "x,y,z,score\n0,0,0,0.9\n");
   write_text(scratch("cloud.csv"), "x,y,z\n0,0,0\n");
@@ -410,19 +410,19 @@ TEST(BagCommand, WhatIsABagIsDecidedByInputAndOutput) {
   };
   // A scan stays a scan, and never becomes a bag.
   says({"scan.db", "-o", "out"}, {"scan.db"});
-  says({"scan.db", "-o", "out.bag"}, {"out.bag", "not of a scan"});
+  says({"scan.db", "-o", "out.bag"}, {"out.bag", "not a scan"});
   says({"folder", "-o", "out"}, {"folder"});
   says({"folder", "-o", "out.mcap"}, {"folder: a bag is made of", "rig.yaml"});
   for (const char* other : {"rig.yaml", "recording.mcap"}) {
     fs::create_directory(scratch("both"));
     write_text(scratch("both/depth.txt"), "");
     write_text(scratch("both") / other, "");
-    says({"both", "-o", "out"}, {"both: is a scan by its depth.txt"});
+    says({"both", "-o", "out"}, {"both: contains depth.txt of a scan"});
     fs::remove_all(scratch("both"));
   }
-  // The folder of a rig becomes a bag alone.
+  // The folder of a rig can only become a bag.
   says({"rig", "-o", "out"}, {"rig/rig.yaml", "cameras"});
-  says({"rig", "-o", "out.pcd"}, {"out.pcd", "is no format of a bag"});
+  says({"rig", "-o", "out.pcd"}, {"out.pcd", "not a bag format"});
   // Without an extension: one map becomes a bag; several files and poses do not.
   says({"cloud.csv", "-o", "out"}, {"cloud.csv: score", "an output without an extension is a bag"});
   says({"map.csv", "map.ply", "-o", "out"}, {"error: out: extension is missing"});
@@ -433,7 +433,7 @@ TEST(BagCommand, WhatIsABagIsDecidedByInputAndOutput) {
   EXPECT_EQ(graspmap_test::names_in_scratch(), before);
 }
 
-// A map in the terrain's frame and the panorama in the robot's: RViz needs to know how they lie.
+// With a map in the terrain frame and a panorama in the robot's frame, RViz needs the transform.
 TEST(BagCommand, FramesAreTiedTogether) {
   REQUIRE_ROS();
   write_run();
@@ -487,27 +487,27 @@ TEST(BagCommand, BadInputIsOneLineAndLeavesNothing) {
   says({"good.bag", "-o", "out.pcd", "--topic", "/graspabilty_map"},
        {"did you mean '/graspability_map'"});
   says({"good.bag", "-o", "out.pcd", "--topic", "/graspability_map", "--topic", "/curvature_map"},
-       {"--topic: a cloud comes from one topic"});
+       {"--topic", "a single topic"});
   says({"good.bag", "-o", "out.xyz"}, {"out.xyz"});
-  says({"good.bag", "-o", "out.bag"}, {"something else than a bag"});
+  says({"good.bag", "-o", "out.bag"}, {"cannot both be bags"});
   says({"good.bag", "-o", "out", "--stamp", "noon"}, {"noon"});
-  says({"terrain.pcd", "-o", "out"}, {"terrain.pcd: score: no such field", "bag of ROS 2"});
+  says({"terrain.pcd", "-o", "out"}, {"terrain.pcd: score: ", "bag of ROS 2"});
   says({"terrain.pcd", "-o", "out.bag"}, {"terrain.pcd: score: no such field"});
   says({"map.csv", "-o", "out.bag", "--footholds", "map.csv"}, {"approach_x"});
   says({"map.csv", "-o", "out.bag", "--footholds", "f.csv"}, {"approach of foothold 1"});
-  says({"map.csv", "-o", "out.bag", "--stamp", "-1"}, {"ROS has no such time"});
+  says({"map.csv", "-o", "out.bag", "--stamp", "-1"}, {"outside ROS's range of time"});
   says({"map.csv", "-o", "out.bag", "--compression", "zip"}, {"zip", "lz4"});
-  says({"map.csv", "-o", "out.bag", "--topic", "/a"}, {"--topic", "not for a map"});
-  says({"map.csv", "-o", "out.bag", "--rig", "r"}, {"--rig", "not for a map"});
-  says({"good.bag", "-o", "out.pcd", "--terrain", "terrain.pcd"}, {"--terrain", "is written"});
-  says({"good.bag", "-o", "out.pcd", "--rig", "r"}, {"--rig", "not for a cloud"});
+  says({"map.csv", "-o", "out.bag", "--topic", "/a"}, {"--topic", "with a map"});
+  says({"map.csv", "-o", "out.bag", "--rig", "r"}, {"--rig", "with a map"});
+  says({"good.bag", "-o", "out.pcd", "--terrain", "terrain.pcd"}, {"--terrain", "requires a bag"});
+  says({"good.bag", "-o", "out.pcd", "--rig", "r"}, {"--rig", "cloud output"});
   fs::create_directory(scratch("rig"));
   says({"rig", "-o", "out.bag", "--stamp", "5"}, {"--stamp", "--stamp-offset"});
-  says({"rig", "-o", "out.bag", "--terrain", "t"}, {"--terrain", "not for a rig's folder"});
+  says({"rig", "-o", "out.bag", "--terrain", "t"}, {"--terrain", "a rig's folder"});
   fs::remove(scratch("rig"));
   write_text(scratch("cut.bag"), content("good.bag").substr(0, 5000));
-  says({"cut.bag", "-o", "out"}, {"cut.bag: is broken or cut off"});
-  EXPECT_TRUE(bad_input(graspmap({"info", "cut.bag"}), {"cut.bag: is broken or cut off"}));
+  says({"cut.bag", "-o", "out"}, {"cut.bag: is damaged or truncated"});
+  EXPECT_TRUE(bad_input(graspmap({"info", "cut.bag"}), {"cut.bag: is damaged or truncated"}));
   fs::remove(scratch("cut.bag"));
   EXPECT_EQ(graspmap_test::names_in_scratch(), before);
 }

@@ -119,7 +119,7 @@ TEST(Calibrate, GoesOnWithoutPicturesThatItCannotRead) {
   EXPECT_EQ(results.at("images_used"), 6);
   const libmap::Table images = libmap::read_csv(scratch("report") / "images.csv");
   EXPECT_EQ(images.rows[1][images.column("used")], "unreadable");
-  // The first picture that can be read says what size they all have.
+  // The first readable image determines the size of all images.
   fs::remove(scratch("shots/00.png"));
   EXPECT_TRUE(succeeded(graspmap({"calibrate", "shots", "-o", "camera.yaml"})));
   // Too few remain.
@@ -157,9 +157,9 @@ TEST(Calibrate, BadInputIsOneLineAndLeavesNothing) {
                         {"large.png: image size is 4097 x 4096: too large", "<= 16777216 pixels"}));
   EXPECT_TRUE(bad_input(graspmap({"calibrate", "shots", "-o", "camera.txt"}),
                         {"camera.txt: a camera is written as YAML", "a name.yaml"}));
-  // The same picture again and again tells nothing more.
+  // Repeated images add no information.
   EXPECT_TRUE(bad_input(run({"shots/00.png", "shots/00.png", "shots/00.png", "shots/00.png"}),
-                        {"pictures is 1", "places of its own"}));
+                        {"pictures is 1", "distinct images"}));
   EXPECT_TRUE(bad_input(graspmap({"calibrate", "shots", "-o", "shots/00.png"}), {"is the input"}));
   EXPECT_FALSE(fs::exists(scratch("camera.yaml")));
 }

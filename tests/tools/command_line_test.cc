@@ -1,4 +1,4 @@
-// What all commands share: help, usage errors, parameters in force, overwriting, manifests.
+// Functions of all commands: help, usage errors, effective parameters, overwriting, manifests.
 #include <gtest/gtest.h>
 
 #include "libmap/core/manifest.h"
@@ -66,8 +66,7 @@ TEST(CommandLine, MissingAndSurplusArguments) {
   EXPECT_TRUE(wrong_usage(graspmap({"score", "-o", "m.pcd"}), {"TERRAIN", "required"}));
   EXPECT_TRUE(
       wrong_usage(graspmap({"texture", "m.ply", "-o", "m.glb"}), {"--scan", "is required"}));
-  EXPECT_TRUE(wrong_usage(graspmap({"convert", "s.db"}),
-                          {"nothing to write", "-o, --bundler or --colmap"}));
+  EXPECT_TRUE(wrong_usage(graspmap({"convert", "s.db"}), {"-o, --bundler or --colmap"}));
   EXPECT_TRUE(wrong_usage(graspmap({"score", "a", "b", "-o", "m.pcd"}), {"too many: b"}));
   EXPECT_TRUE(wrong_usage(graspmap({"score", "a", "-o", "m.pcd", "--method"}), {"--method"}));
   EXPECT_TRUE(wrong_usage(graspmap({"convert", "a"}), {"--output", "required"}));
@@ -227,7 +226,7 @@ TEST(CommandLine, AFolderThatCannotBeMadeIsAnError) {
   const ProgramResult result = graspmap({"evaluate", "t.csv", "-o", "t.csv/inner/out"});
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_EQ(result.standard_error,
-            "graspmap evaluate: error: t.csv/inner: cannot be made: Not a directory\n");
+            "graspmap evaluate: error: t.csv/inner: cannot be created: Not a directory\n");
 }
 
 TEST(CommandLine, WhatStandsInAFileReachesTheTerminalAsPlainText) {

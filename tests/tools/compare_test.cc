@@ -56,7 +56,7 @@ TEST(Compare, DistancesAndCompleteness) {
   EXPECT_TRUE(names_in_scratch() == (std::vector<std::string>{"points.ply", "square.ply"}));
 }
 
-// Points 1, 2 and 3 mm above the square, each of which states 1.4 mm.
+// Points 1, 2 and 3 mm above the square, each with an expected error of 1.4 mm.
 TEST(Compare, SharesWithinStatedDeviations) {
   write_square_and_points();
   EXPECT_FALSE(compared({}).contains("within_one_deviation"));
@@ -215,7 +215,7 @@ TEST(Compare, IcpFindsTheMotion) {
                       .at(static_cast<std::size_t>(column)),
                   motion.inverse().matrix()(row, column), 1e-6);
   EXPECT_GT(compared_as_json({"moved.csv", "hills.ply"}).at("rmse_m"), 0.01);
-  // What it prints can be given again, and so can the matrix.
+  // The printed transform and the matrix are valid values of --transform.
   const auto plain = graspmap({"compare", "moved.csv", "hills.ply", "--icp", "-o", "out.ply"});
   ASSERT_TRUE(succeeded(plain));
   const std::size_t begin = plain.standard_output.find("transform: ") + 11;
@@ -360,8 +360,8 @@ TEST(Compare, BadInput) {
   EXPECT_TRUE(bad_input(run({"--transform", "1,2,3"}), {"--transform", "1,2,3", "X,Y,Z"}));
   EXPECT_TRUE(bad_input(run({"--transform", "1,2,3,4,5,nan"}), {"--transform"}));
   EXPECT_TRUE(bad_input(run({"--transform", "1,2,3,4,5,6,7"}), {"--transform"}));
-  EXPECT_TRUE(bad_input(run({"--box", "1,0,0,0,1,1"}), {"--box", "inside out"}));
-  EXPECT_TRUE(bad_input(run({"--box", "5,5,5,6,6,6"}), {"points.ply", "no point lies in the box"}));
+  EXPECT_TRUE(bad_input(run({"--box", "1,0,0,0,1,1"}), {"--box is 1,0,0,0,1,1"}));
+  EXPECT_TRUE(bad_input(run({"--box", "5,5,5,6,6,6"}), {"points.ply", "--box", "no point"}));
   EXPECT_TRUE(bad_input(run({"--within", "0"}), {"--within"}));
   EXPECT_TRUE(bad_input(run({"-o", "square.ply"}), {"square.ply"}));
   EXPECT_TRUE(bad_input(graspmap({"compare", "none.ply", "square.ply"}), {"none.ply"}));

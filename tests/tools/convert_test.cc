@@ -91,7 +91,7 @@ TEST(Convert, ManifestOfAMapIsPassedOn) {
   EXPECT_EQ(to.at("frame"), from.at("frame"));
   EXPECT_EQ(to.at("transforms"), from.at("transforms"));
   EXPECT_EQ(to.at("command"), "convert");
-  // What analyses of the map ask for.
+  // Values that analyses of the map need.
   EXPECT_EQ(to.at("parameters").at("zero_plane_m"), from.at("parameters").at("zero_plane_m"));
   EXPECT_EQ(to.at("results").at("lattice_origin_m"), from.at("results").at("lattice_origin_m"));
   const auto evaluated = [](const char* map) {
@@ -111,7 +111,7 @@ TEST(Convert, AMapTakesEveryEncoding) {
   ASSERT_TRUE(succeeded(graspmap({"convert", "map.pcd", "-o", "same.pcd"})));
   EXPECT_EQ(content("same.pcd"), content("map.pcd"));
   EXPECT_TRUE(bad_input(graspmap({"convert", "map.pcd", "same.pcd", "-o", "two.pcd"}),
-                        {"map.pcd", "no share of a map"}));
+                        {"map.pcd", "not a share of a map"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("two.pcd")));
 }
 
@@ -128,9 +128,9 @@ TEST(Convert, WhatAFormatHasNoPlaceForIsSaid) {
     return result.standard_error;
   };
   EXPECT_EQ(told("m.vtp"), "");
-  EXPECT_NE(told("m.stl").find(".stl has no place for: colors, seen"), std::string::npos);
+  EXPECT_NE(told("m.stl").find(".stl cannot store: colors, seen"), std::string::npos);
   EXPECT_NE(told("m.stl").find("off by up to 100 mm"), std::string::npos);
-  EXPECT_NE(told("m.obj").find(".obj has no place for: seen"), std::string::npos);
+  EXPECT_NE(told("m.obj").find(".obj cannot store: seen"), std::string::npos);
   EXPECT_EQ(told("m.obj").find("single precision"), std::string::npos);
 }
 
@@ -149,7 +149,7 @@ TEST(Convert, TexturesGoFromModelToModel) {
   ASSERT_EQ(read.pages.size(), 1U);
   EXPECT_EQ(read.pages[0].pixels, model.pages[0].pixels);
   EXPECT_EQ(read.mesh.vertices, model.mesh.vertices);
-  // Where there is no place for it, or its picture is gone, the shape alone goes on.
+  // Only the mesh is converted if the format has no textures or the image is missing.
   const auto plain = graspmap({"convert", "a.obj", "-o", "d.ply"});
   ASSERT_TRUE(succeeded(plain));
   EXPECT_NE(plain.standard_error.find("texture is left out"), std::string::npos);
@@ -159,7 +159,7 @@ TEST(Convert, TexturesGoFromModelToModel) {
   EXPECT_NE(broken.standard_error.find("a_0.png"), std::string::npos) << broken.standard_error;
 }
 
-// Everything that reads clouds or meshes says so in the same words.
+// All commands report unreadable clouds and meshes by the same messages.
 TEST(Convert, VtpIsWrittenOnly) {
   graspmap_test::write_terrain();
   std::filesystem::create_directory(scratch("in"));

@@ -99,7 +99,7 @@ TEST(Crop, TransformStandsBesideTheOutput) {
     for (int column = 0; column < 4; ++column) text >> matrix(row, column);
   EXPECT_TRUE(text.good());
   EXPECT_EQ(matrix, transform_of("site.csv").matrix()) << "the same to the last bit";
-  // It carries the map's points onto those of the site.
+  // The transform maps the map's points to those of the site.
   const libmap::PointCloud map = libmap::read_cloud(scratch("map.pcd")).cloud;
   const libmap::PointCloud site = libmap::read_cloud(scratch("site.csv")).cloud;
   const libmap::Pose site_from_map = transform_of("site.csv");
@@ -192,12 +192,12 @@ TEST(Crop, BadInput) {
   EXPECT_TRUE(bad_input(with({"--level", "none", "--up", "1,0,0", "--box", "0,0,1,1"}),
                         {"--up is 1,0,0", "--level none"}));
   EXPECT_TRUE(bad_input(with({"--box", "1,2,3,4,5"}), {"--box"}));
-  EXPECT_TRUE(bad_input(with({"--box", "1,2,0,3"}), {"--box", "inside out"}));
+  EXPECT_TRUE(bad_input(with({"--box", "1,2,0,3"}), {"--box is 1,2,0,3"}));
   EXPECT_TRUE(bad_input(with({"--box", "nan,0,1,1"}), {"--box"}));
   EXPECT_TRUE(bad_input(with({"--size", "3"}), {"map.ply", "3.00 x 3.00 m", "at most"}));
   EXPECT_TRUE(bad_input(with({"--size", "0x3"}), {"--size", "0x3"}));
   EXPECT_TRUE(bad_input(with({"--size", "1xtwo"}), {"--size", "WIDTHxHEIGHT"}));
-  EXPECT_TRUE(bad_input(with({"--size", "1x1", "--border"}), {"more than one way", "--polygon"}));
+  EXPECT_TRUE(bad_input(with({"--size", "1x1", "--border"}), {"several regions", "--polygon"}));
   EXPECT_TRUE(bad_input(with({"--border"}), {"map.ply", "white"}));
   EXPECT_TRUE(bad_input(with({"--level", "none"}), {"nothing to do"}));
   EXPECT_TRUE(bad_input(with({"--level", "some"}), {"--level"}));
@@ -212,12 +212,12 @@ TEST(Crop, BadInput) {
   EXPECT_TRUE(bad_input(graspmap({"crop", "none.ply", "-o", "new.ply"}), {"none.ply"}));
   EXPECT_TRUE(wrong_usage(graspmap({"crop", "map.ply"}), {"--output"}));
   EXPECT_EQ(names_in_scratch(), (Words{"map.ply"}));
-  // A file of the user's own where the transform would stand.
+  // A file of the user has the name of the transform's file.
   write_text(scratch("new.site_from_map.txt"), "mine");
   EXPECT_TRUE(bad_input(with({}), {"new.site_from_map.txt", "--force"}));
   EXPECT_EQ(content("new.site_from_map.txt"), "mine");
   EXPECT_TRUE(succeeded(with({"--force"})));
-  // That of an earlier run whose site is gone.
+  // The transform is of an earlier run whose site was removed.
   std::filesystem::remove(scratch("new.ply"));
   EXPECT_TRUE(succeeded(with({})));
 }
@@ -262,7 +262,7 @@ TEST(Crop, PointsOfTheMapAreFoundOnTheScoredSite) {
   ASSERT_TRUE(succeeded(graspmap({"crop", "map.pcd", "--size", "0.5x0.5", "-o", "site.pcd"})));
   ASSERT_TRUE(succeeded(graspmap({"convert", "site.pcd", "-o", "site.ply"})));
   EXPECT_EQ(transform_of("site.ply").matrix(), transform_of("site.pcd").matrix());
-  // Three places on the ground as the map has them, one beside the site.
+  // Three locations on the ground in the map's frame, and one outside the site.
   std::ostringstream points;
   points << "x,y,z\n";
   for (const Vector3d& place :
@@ -293,7 +293,7 @@ TEST(Crop, PointsOfTheMapAreFoundOnTheScoredSite) {
         succeeded(graspmap({"render", map, "--points", "points.csv", "--points-frame", "map",
                             "--width", "64", "--height", "64", "-o", frame + ".png"})));
   }
-  // The same answers whichever frame the map is written in.
+  // The results do not depend on the frame of the map.
   EXPECT_EQ(json_of("terrain.csv.json").at("results").at("found"), 3);
 }
 

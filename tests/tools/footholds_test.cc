@@ -29,8 +29,8 @@ TEST(Footholds, OfAMapInEitherFrame) {
   const PointCloud input = libmap::read_cloud(scratch("input.ply")).cloud;
   ASSERT_GT(terrain.size(), 5U);
   ASSERT_EQ(terrain.size(), input.size());
-  // The same places, turned: slopes are against the same plane, but of the voxels around a place
-  // equally near ones may be chosen otherwise.
+  // Rotated locations: slopes are relative to the same plane, but among equally near voxels around
+  // a location others may be selected.
   for (std::size_t n = 0; n < terrain.size(); ++n)
     EXPECT_NEAR(terrain.find_field("slope_deg")->values[n],
                 input.find_field("slope_deg")->values[n], 5.0);
@@ -50,7 +50,7 @@ TEST(Footholds, EdgesThatAreLeftOutAreSaid) {
   EXPECT_EQ(libmap::read_cloud(scratch("e.csv")).cloud.size(), 1U);
 }
 
-// Round hills of 7 cm on a plain, and a map of it on which a place in the plain is best.
+// Round hills of 7 cm on a plane, and a map whose best location is on the plane.
 void write_hills() {
   libmap::TriangleMesh mesh;
   libmap::PointCloud map;
@@ -95,7 +95,7 @@ TEST(Footholds, TestedOnAMesh) {
     EXPECT_LT(values("holding_force_low_n")[n], values("holding_force_n")[n]);
     EXPECT_GT(values("holding_force_high_n")[n], values("holding_force_n")[n]);
     EXPECT_GT(values("parameter_spread")[n], 0.0);
-    // Of the 17 limits the least is at most what half of the trials hold in any direction.
+    // The least of the 17 limits is at most the force that half of the trials hold.
     double least = values("pull_away_n")[n];
     for (const char* tilt : {"45", "90"})
       for (int azimuth = 0; azimuth < 360; azimuth += 45)

@@ -51,7 +51,7 @@ TEST(GraspScenes, OneForEachPlace) {
   const std::string result = json_of("scenes.json").at("results").at("A_B.ply");
   EXPECT_NE(result.find("hold"), std::string::npos);
   EXPECT_NE(result.find("the load is 5 N"), std::string::npos);
-  // The same bytes for any number of threads.
+  // The bytes do not depend on the number of threads.
   ASSERT_TRUE(succeeded(grasp({"--scenes", "again", "--threads", "1"})));
   for (const std::string name : {"A_B.ply", "P1.ply", "P2.ply"})
     EXPECT_TRUE(content("scenes/" + name) == content("again/" + name)) << name;
@@ -95,7 +95,7 @@ TEST(GraspScenes, AreDrawnAndShownInTheReport) {
   ASSERT_TRUE(succeeded(grasp({"--scenes", "run/scenes", "--scene-of", "P1"})));
   ASSERT_TRUE(succeeded(graspmap({"render", "run/scenes/P1.ply", "--view", "oblique", "--width",
                                   "400", "--height", "300", "-o", "p.png"})));
-  // A mesh of the user's own in the folder is no scene.
+  // Another mesh in the folder is not a scene.
   std::filesystem::copy_file(scratch("run/scenes/P1.ply"), scratch("run/scenes/other.ply"));
   ASSERT_TRUE(succeeded(graspmap({"report", "run"})));
   const std::string html = content("run/report.html");
@@ -106,7 +106,7 @@ TEST(GraspScenes, AreDrawnAndShownInTheReport) {
   EXPECT_NE(html.find("OrbitControls"), std::string::npos);
   ASSERT_TRUE(succeeded(graspmap({"report", "run", "--no-3d", "-o", "flat.html"})));
   EXPECT_EQ(content("flat.html").find("<canvas"), std::string::npos);
-  // What cannot be shown is said.
+  // A broken scene is reported.
   graspmap_test::write_text(scratch("run/scenes/P1.ply"), "ply\n");
   ASSERT_TRUE(succeeded(graspmap({"report", "run", "-o", "broken.html"})));
   EXPECT_NE(content("broken.html").find("P1.ply</code> cannot be shown"), std::string::npos);

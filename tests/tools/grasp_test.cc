@@ -206,7 +206,7 @@ TEST(GraspCommand, EveryVoxelOfAMap) {
   const libmap::PointCloud held = libmap::read_cloud(scratch("held.pcd")).cloud;
   EXPECT_EQ(held.positions, map.positions);
   EXPECT_EQ(held.colors, map.colors);
-  // What the map predicted is replaced; its score is not.
+  // Predictions of the map are replaced; its score is not.
   ASSERT_EQ(held.fields.size(), map.fields.size() + 3);
   const std::set<std::string> replaced = {"hold_probability",    "holding_force_n",
                                           "holding_force_low_n", "holding_force_high_n",
@@ -223,7 +223,7 @@ TEST(GraspCommand, EveryVoxelOfAMap) {
   const auto value = [&](const char* name, std::size_t n) {
     return held.find_field(name)->values[n];
   };
-  // The same as at the voxels' centers in the mesh's frame.
+  // The results equal those at the voxels' centers in the mesh's frame.
   const auto manifest = libmap::read_manifest_of(scratch("held.pcd"));
   const libmap::Pose* terrain_from_input = manifest->find_transform("terrain_from_input");
   ASSERT_NE(terrain_from_input, nullptr);
@@ -293,8 +293,8 @@ std::vector<std::filesystem::path> tiles_in(const std::string& store) {
   return files;
 }
 
-// The words on the same map in dozens of tiles: a run is still busy when its first two are there,
-// however late another process on a busy machine notices them.
+// Arguments for the same map in dozens of tiles, so that a run has not ended when a test notices
+// its first two tiles, even on a busy machine.
 std::vector<std::string> on_many_tiles(std::vector<std::string> words) {
   EXPECT_TRUE(succeeded(graspmap({"score", "terrain.pcd", "--voxel-size", "0.04", "--up", "0,0,1",
                                   "--tile-size", "0.12", "-o", "map.tiles", "--force"})));
@@ -337,7 +337,7 @@ TEST(GraspCommand, MapsAreTheSameForThreadsAndAfterAKill) {
   EXPECT_FALSE(std::filesystem::exists(scratch("killed.pcd")));
   auto tiles = tiles_in(progress);
   ASSERT_GE(tiles.size(), 2u);
-  // A tile that is not whole is made again, another is not.
+  // Only a truncated tile is made again.
   const std::string whole = graspmap_test::read_text(tiles[0]);
   write_text(tiles[0], whole.substr(0, whole.size() / 2));
   ASSERT_TRUE(succeeded(graspmap(words)));
@@ -386,8 +386,8 @@ TEST(GraspCommand, SharesOfAMapAreTheMap) {
   EXPECT_EQ(content("merged.pcd"), content("seed.pcd"));
 }
 
-// A mesh in pieces: gripper and ground at a seam are those of the whole mesh, and the tiles of the
-// map have no influence.
+// For a mesh in tiles, gripper and ground at a seam are those of the whole mesh, and the result
+// does not depend on the tiles of the map.
 TEST(GraspCommand, OnAMeshInPieces) {
   write_map();
   const libmap::TriangleMesh whole = libmap::read_mesh(scratch("ground.ply")).mesh;
@@ -433,7 +433,7 @@ TEST(GraspCommand, MapsInAllFormats) {
     EXPECT_TRUE(bad_input(graspmap(quick_words(name)), {name, ".pcd, .ply, .csv or .vtp"}));
 }
 
-// The error of a mesh, as fuse and mesh leave it, and a constant one: by shares as in one run.
+// The error of a mesh made by fuse and mesh, and a constant error, in shares and in one run.
 TEST(GraspCommand, SurfaceError) {
   write_map();
   libmap::TriangleMesh mesh = libmap::read_mesh(scratch("ground.ply")).mesh;

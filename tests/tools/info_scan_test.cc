@@ -69,7 +69,7 @@ TEST(InfoScan, Plainly) {
     EXPECT_NE(result.standard_output.find(line), std::string::npos) << line;
 }
 
-// Exit code 3 and one line on stderr; what was found stands on stdout.
+// Exit code 3 and one line on stderr; stdout has the list of faults.
 void expect_broken(const ProgramResult& result, const std::string& what,
                    const std::string& scan = "a.db") {
   EXPECT_EQ(result.exit_code, 3);
@@ -101,7 +101,7 @@ TEST(InfoScan, VerifyListsWhatTheGraphLeavesOut) {
   const ProgramResult result = graspmap({"info", "a.db", "--verify"});
   expect_broken(result, "3 parts are broken, in 3 nodes");
   for (const char* line :
-       {"node 1, part Node.pose", "node 2, part Node.env_sensors, reason is a text",
+       {"node 1, part Node.pose", "node 2, part Node.env_sensors, reason is text",
         "node 3, part Data, reason the node has no row"})
     EXPECT_NE(result.standard_output.find(line), std::string::npos) << line;
   // Without --verify such a scan can still be looked at.
@@ -126,7 +126,7 @@ TEST(InfoScan, SessionsAndErrorsOfTheirOdometry) {
           "velocity, NULL, gps, env_sensors, NULL FROM Node");
   const Json json = info("a.db");
   EXPECT_EQ(json.at("sessions").size(), 2U);
-  // The way from one session to the other is none.
+  // The distance between sessions does not count.
   EXPECT_NEAR(json.at("poses").at("odometry").at("path_length_m"), 4 * std::hypot(0.5, 0.125),
               1e-6);
   EXPECT_TRUE(json.at("trajectory_error").contains("odometry 0"));
@@ -137,7 +137,7 @@ TEST(InfoScan, WhatIsNoScan) {
   write_text(scratch("empty.db"), "");
   EXPECT_TRUE(bad_input(graspmap({"info", "empty.db"}), {"empty.db: is empty: 0 bytes"}));
   write_text(scratch("text.db"), "hello");
-  EXPECT_TRUE(bad_input(graspmap({"info", "text.db"}), {"text.db: is no scan"}));
+  EXPECT_TRUE(bad_input(graspmap({"info", "text.db"}), {"text.db: is not a scan"}));
   execute(scratch("other.db"), "CREATE TABLE T (id INTEGER)");
   EXPECT_TRUE(bad_input(graspmap({"info", "other.db"}), {"other.db", "no table Node"}));
   EXPECT_TRUE(bad_input(graspmap({"info", "none.db"}), {"none.db: no such file"}));

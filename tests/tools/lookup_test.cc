@@ -307,8 +307,8 @@ TEST_F(LookupBadInput, ColumnsThatCannotBe) {
   };
   fails_with("a=scor",
              "map.csv: --column is scor: the map has no such field (did you mean 'score'");
-  fails_with("name=score", "points.csv: --column is name: the points have this column already");
-  fails_with("a=score,a=ssv", "points.csv: --column is a: the points have this column already");
+  fails_with("name=score", "points.csv: --column is name: the points already have this column");
+  fails_with("a=score,a=ssv", "points.csv: --column is a: the points already have this column");
   EXPECT_FALSE(std::filesystem::exists(scratch("out.csv")));
 }
 

@@ -1,4 +1,4 @@
-// The commands that read a tile store say of it what they say of the map in one file.
+// Commands have the same results for a tile store and the map in one file.
 #include <gtest/gtest.h>
 
 #include "libmap/core/table.h"
@@ -160,7 +160,7 @@ TEST(MapTiles, DamageIsNamed) {
   all_refuse("cut off");
   fs::remove(scratch(tile));
   all_refuse("missing");
-  // One byte of a score: the hash tells.
+  // The hash reveals a changed byte of a score.
   std::string changed = whole;
   changed[changed.size() - 30] = static_cast<char>(changed[changed.size() - 30] ^ 1);
   write_text(scratch(tile), changed);
@@ -172,7 +172,7 @@ TEST(MapTiles, DamageIsNamed) {
   EXPECT_TRUE(bad_input(graspmap({"info", "map.tiles"}), {"index.json"}));
   EXPECT_TRUE(bad_input(graspmap({"info", "none.tiles"}), {"none.tiles"}));
   EXPECT_TRUE(bad_input(graspmap({"convert", "map.tiles", "map.pcd", "-o", "merged.pcd"}),
-                        {"map.tiles", "by itself"}));
+                        {"map.tiles", "cannot be merged with other files"}));
 }
 
 // Its positions are made from its voxels.

@@ -61,19 +61,19 @@ TEST(MeshShares, TogetherAreTheFolderOfOneRun) {
   EXPECT_TRUE(bad_input(graspmap(mesh_words("shared", {"--tile", "4/3"})), {"--tile", "4/3"}));
   ASSERT_TRUE(succeeded(graspmap(mesh_words("shared", {"--tile", "2/3"}))));
   expect_same_pieces("shared", "whole");
-  // Again, as a queue does that lost sight of a task.
+  // A share is run again, as by a queue that lost a task.
   const auto again = graspmap(mesh_words("shared", {"--tile", "1/3"}));
   ASSERT_TRUE(succeeded(again));
-  EXPECT_NE(again.standard_error.find("all pieces are there"), std::string::npos);
+  EXPECT_NE(again.standard_error.find("all tiles are complete"), std::string::npos);
   expect_same_pieces("shared", "whole");
-  // A run of all pieces begins anew with other parameters.
+  // A run of all tiles replaces tiles of other parameters.
   ASSERT_TRUE(succeeded(graspmap(mesh_words("other", {"--tile", "1/2"}))));
   ASSERT_TRUE(succeeded(graspmap(mesh_words("other", {"--smoothing-iterations", "1"}))));
   EXPECT_FALSE(pieces_in("other") == pieces_in("whole"));
   EXPECT_FALSE(fs::exists(scratch("other.progress")));
 }
 
-// The files of those that are done and not empty.
+// Files of completed tiles that are not empty.
 std::vector<fs::path> done_pieces(const std::string& progress) {
   std::vector<fs::path> pieces;
   std::error_code ignored;
@@ -85,7 +85,7 @@ std::vector<fs::path> done_pieces(const std::string& progress) {
   return pieces;
 }
 
-// The file itself, not one of the same content.
+// Identifies a file, to distinguish it from a copy with the same content.
 ino_t inode_of(const fs::path& path) {
   struct stat status {};
   return stat(path.c_str(), &status) == 0 ? status.st_ino : 0;

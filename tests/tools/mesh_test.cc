@@ -75,10 +75,9 @@ TEST(Mesh, MissingNormalsAreEstimatedAndItIsSaid) {
   write_ball(ball(false));
   const auto result = graspmap({"mesh", "ball.ply", "-o", "mesh.ply"});
   ASSERT_TRUE(succeeded(result));
-  EXPECT_THAT(
-      result.standard_error,
-      HasSubstr("normals estimated, since the cloud has none, their sides chosen by a minimum "
-                "spanning tree"));
+  EXPECT_THAT(result.standard_error,
+              HasSubstr("normals estimated, because the cloud has none, oriented by a minimum "
+                        "spanning tree"));
   EXPECT_GT(libmap::signed_volume(libmap::read_mesh(scratch("mesh.ply")).mesh), 0.03);
   EXPECT_EQ(json_of("mesh.ply.json").at("results").at("normals_oriented_by"),
             "a minimum spanning tree");

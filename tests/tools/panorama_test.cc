@@ -87,14 +87,14 @@ TEST(PanoramaCommand, LateAndMissingCamerasAreNamed) {
   write_image("camera_4", 12.055);
   const auto result = graspmap({"fuse", "run", "-o", "cloud.pcd"});
   ASSERT_TRUE(succeeded(result));
-  EXPECT_NE(result.standard_error.find("camera_2: no image"), std::string::npos);
+  EXPECT_NE(result.standard_error.find("camera_2: has no image"), std::string::npos);
   EXPECT_NE(result.standard_error.find("camera_4: its nearest image is"), std::string::npos);
   EXPECT_NE(result.standard_error.find("ms late"), std::string::npos);
   EXPECT_EQ(json_of("cloud.pcd.json").at("results").at("camera_2.state"), "missing");
   ASSERT_TRUE(succeeded(graspmap({"fuse", "run", "-o", "cloud.pcd", "--tolerance", "0.06"})));
   EXPECT_EQ(json_of("cloud.pcd.json").at("results").at("cameras_seen"), 5);
-  EXPECT_TRUE(
-      bad_input(graspmap({"fuse", "run", "-o", "c.pcd", "--strict"}), {"run: camera_2: no image"}));
+  EXPECT_TRUE(bad_input(graspmap({"fuse", "run", "-o", "c.pcd", "--strict"}),
+                        {"run: camera_2: has no image"}));
   EXPECT_FALSE(fs::exists(scratch("c.pcd")));
 }
 
@@ -158,7 +158,7 @@ TEST(PanoramaCommand, BrokenImagesOfAllCamerasAreAnError) {
   EXPECT_EQ(result.exit_code, 3);
   EXPECT_NE(result.standard_error.find("camera_5 is left out\n"), std::string::npos);
   EXPECT_TRUE(result.standard_error.ends_with(
-      "graspmap fuse: error: run: no image of that time can be read\n"))
+      "graspmap fuse: error: run: no image of this time can be read\n"))
       << result.standard_error;
   EXPECT_FALSE(fs::exists(scratch("cloud.pcd")));
 }
@@ -172,7 +172,7 @@ TEST(PanoramaCommand, BadInputIsOneLineAndLeavesNothing) {
     return graspmap({"fuse", folder, "-o", "cloud.pcd", "--strict"});
   };
   EXPECT_TRUE(bad_input(run("none"), {"none: no such file"}));
-  EXPECT_TRUE(bad_input(run("run/rig.yaml"), {"run/rig.yaml: is no scan"}));
+  EXPECT_TRUE(bad_input(run("run/rig.yaml"), {"run/rig.yaml: is not a scan"}));
   EXPECT_TRUE(bad_input(graspmap({"fuse", "run", "-o", "cloud.xyz"}), {"cloud.xyz"}));
   EXPECT_TRUE(bad_input(graspmap({"fuse", "run", "-o", "c.pcd", "--rig", "no.yaml"}),
                         {"no.yaml: no such file"}));

@@ -1,4 +1,4 @@
-// Commands whose outputs are folders of pieces.
+// Commands whose outputs are folders of tiles.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -49,7 +49,7 @@ TEST(Pieces, FromTerrainToMap) {
   const nlohmann::json parts = json_of("surface.json").at("results");
   for (const char* name : {"points", "triangles"}) EXPECT_EQ(parts.at(name), whole.at(name));
   EXPECT_NEAR(parts.at("area_m2"), whole.at("area_m2"), 1e-6);
-  // A folder of pieces is read as one mesh, vertices on seams twice.
+  // A folder of tiles is read as one mesh, with duplicate vertices on seams.
   EXPECT_EQ(libmap::read_mesh(scratch("surface")).mesh.vertices.size(), parts.at("vertices"));
   EXPECT_GT(parts.at("vertices"), whole.at("vertices"));
   EXPECT_EQ(json_of("surface.json").at("inputs").size(), 12U);
@@ -148,7 +148,7 @@ TEST(Pieces, OneModelPerPiece) {
     ASSERT_TRUE(succeeded(graspmap(words)));
   }
   graspmap_test::expect_same_pieces("shared", "model");
-  // In one picture, as the model in one file.
+  // The image equals that of the model in one file.
   texture.back() = "model.glb";
   ASSERT_TRUE(succeeded(graspmap(texture)));
   for (const std::string name : {"model", "model.glb"})

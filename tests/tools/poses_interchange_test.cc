@@ -1,4 +1,4 @@
-// Poses of other programs' files in, and out.
+// Reads and writes files of poses of other programs.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -76,7 +76,7 @@ TEST(ExtractColmap, CamerasPicturesAndPoints) {
   EXPECT_TRUE(second.camera_from_world.inverse().isApprox(world_from_camera, 1e-6));
   const libmap::Camera& lens = scan.frames.at(5).cameras[1];
   EXPECT_EQ(model.cameras.at(second.camera).parameters[0], lens.fx);
-  // Of 8 x 6 squares; those at the right and below lie on the last pixels of the smaller depth.
+  // 8 x 6 squares, of which the right and lower ones are on the last pixels of the smaller depth.
   EXPECT_EQ(second.observations.size(), 7U * 5U);
   for (const libmap::ColmapObservation& feature : second.observations) {
     const Eigen::Vector3d point =
@@ -98,7 +98,7 @@ TEST(ExtractColmap, CamerasPicturesAndPoints) {
 
 TEST(ExtractColmap, IsReadAsPosesAgain) {
   write_example();
-  // Both cameras of node 5 speak for it.
+  // Both cameras of node 5 contribute.
   ASSERT_TRUE(succeeded(graspmap({"convert", "scan.db", "--colmap", "one"})));
   const auto result = graspmap({"convert", "scan.db", "--colmap", "two", "--poses", "one"});
   ASSERT_TRUE(succeeded(result));
@@ -246,7 +246,8 @@ TEST(ConvertPoses, RtabmapsFormatsThereAndBack) {
   fs::create_directory(scratch("model"));
   libmap::write_colmap_model(scratch("model"), {.cameras = {{1, {"PINHOLE", 6, 4, {1, 1, 1, 1}}}},
                                                 .images = {{1, {1, "3.jpg"}}}});
-  EXPECT_TRUE(bad_input(graspmap({"convert", "model/images.txt", "-o", "b.tum"}), {"photographs"}));
+  EXPECT_TRUE(
+      bad_input(graspmap({"convert", "model/images.txt", "-o", "b.tum"}), {"poses of cameras"}));
 }
 
 // Each is one line on stderr that names the file and, where there is one, the line.

@@ -179,7 +179,7 @@ TEST(Raster, PiecesInAStoreAreTheWholeDem) {
                        "dem.tif", "pieces/0.tif"});
   EXPECT_TRUE(bad_input(
       graspmap(with(with({"score", "pieces", "--append", "-o", "map.tiles"}, score), plane)),
-      {"map.tiles", "first piece"}));
+      {"map.tiles", "first file"}));
 }
 
 TEST(Raster, ADemIsAMeshForGrasp) {

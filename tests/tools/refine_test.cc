@@ -47,7 +47,7 @@ TEST(Refine, DriftIsGone) {
   EXPECT_NEAR(report.at("stages").front().at("absolute_error").at("rmse_m"), 0.0423, 0.0002);
   EXPECT_NEAR(report.at("stages").back().at("absolute_error").at("rmse_m"), error.rmse_m, 1e-6);
   EXPECT_EQ(report.at("nodes").size(), 40U);
-  // Odometry claims far more than its error; the closures of features are what it is measured by.
+  // Stated deviations of odometry exceed its errors, which feature links determine.
   EXPECT_LT(report.at("stages").at(2).at("links").at("neighbor").at("rotation_deviation_scale"),
             0.5);
   const libmap::TrajectoryFile graph = libmap::read_trajectory(scratch("links.g2o"));
@@ -89,7 +89,7 @@ TEST(Refine, SameBytesForThreadsAndSeed) {
   EXPECT_EQ(content("1.json"), content("2.json"));
 }
 
-// A scan as a TUM RGB-D folder of pictures and depth, the truth beside it for the report alone.
+// A scan as a TUM RGB-D folder of color and depth images, with true poses for the report only.
 void extract_plain_folder(const std::string& scan, const std::string& folder) {
   namespace fs = std::filesystem;
   ASSERT_TRUE(succeeded(graspmap({"convert", scan, "-o", "whole"})));
@@ -155,7 +155,7 @@ TEST(RefineWithoutPoses, NullPosesInADatabase) {
                         {"null.db", "stored"}));
 }
 
-// Odometry that drifts by 42 mm on purpose is not asked.
+// Odometry with a drift of 42 mm is not used.
 TEST(RefineWithoutPoses, PicturesAloneDriftLittle) {
   GRASPMAP_REQUIRE_DATA();
   ASSERT_TRUE(succeeded(
@@ -181,7 +181,7 @@ TEST(RefineWithoutPoses, BarePicturesAreBadInput) {
   libmap::write_text(scratch("images/rgb.txt"), list);
   libmap::write_text(scratch("images/color/bare.png"), bare);
   EXPECT_TRUE(bad_input(graspmap({"refine", "images", "-o", "poses.tum"}),
-                        {"images", "no two of them could be matched"}));
+                        {"images", "frames is ", "no two of its pictures match"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("poses.tum")));
 }
 
@@ -203,7 +203,7 @@ TEST(Refine, FeaturesAreKeptBesideTheOutput) {
   EXPECT_FALSE(std::filesystem::exists(scratch("q.tum.features")));
 }
 
-// What raised the cost of what was held out is rejected; both reports say the same.
+// A stage that raises the held-out cost is rejected; both reports have the same content.
 TEST(Refine, ReportsInJsonAndInText) {
   GRASPMAP_REQUIRE_DATA();
   ASSERT_TRUE(succeeded(graspmap({"refine", scan_file("site_tiny_q.db"), "-o", "p.tum", "--report",
@@ -227,7 +227,7 @@ TEST(Refine, ReportsInJsonAndInText) {
     EXPECT_NE(text.find(words), std::string::npos) << words;
 }
 
-// A camera that the scan stores wrongly is found, written, and applied by what reads the scan.
+// A wrong stored camera is corrected, written, and applied by commands that read the scan.
 TEST(RefineCalibration, IsWrittenAndApplied) {
   libmap::Camera camera{
       .width = 320, .height = 264, .fx = 228, .fy = 228, .cx = 159.5, .cy = 131.5};
@@ -259,12 +259,12 @@ TEST(RefineCalibration, IsWrittenAndApplied) {
   const ProgramResult fused = graspmap({"fuse", "scan.db", "--poses", "poses.tum", "--calibration",
                                         "found.yaml", "--voxel-size", "0.05", "-o", "cloud.ply"});
   ASSERT_TRUE(succeeded(fused));
-  // What was found about the sensor goes with the calibration.
+  // Findings about the sensor are stored with the calibration.
   for (const std::string& output :
        {fused.standard_error, graspmap({"info", "found.yaml"}).standard_output,
         graspmap({"info", "found.db"}).standard_output})
     for (const std::string words : {"stored focal length 1.", "depth bends by ",
-                                    "scale comes from the depth camera alone, +- 0."})
+                                    "scale is from the depth camera only, +- 0."})
       EXPECT_NE(output.find(words), std::string::npos) << words << output;
   // The poses name their camera, and so do those that fuse corrects.
   const auto fuse = [&](const std::string& scan, const std::string& calibration,
@@ -297,10 +297,10 @@ TEST(RefineCalibration, IsWrittenAndApplied) {
   libmap::write_text(scratch("other.yaml"), libmap::to_yaml({.camera = camera}));
   EXPECT_TRUE(bad_input(
       graspmap({"fuse", "scan.db", "--calibration", "other.yaml", "-o", "c.ply", "--quiet"}),
-      {"camera is 320 x 264: the calibration is of another size (must be 321 x 264)"}));
+      {"camera is 320 x 264: size differs from the calibration (must be 321 x 264)"}));
 }
 
-// One link that cannot be used does not end it, nor does a node without a calibration.
+// Invalid links and nodes without a calibration do not end refinement.
 TEST(Refine, UnusableLinksAndFramesAreLeftOutAndNamed) {
   GRASPMAP_REQUIRE_DATA();
   std::filesystem::copy_file(scan_file("site_tiny_q.db"), scratch("scan.db"));
@@ -390,7 +390,7 @@ TEST(RefineScans, BoardsThatAreNotThereAreBadInput) {
   EXPECT_TRUE(bad_input(refined({"--board", "8x6:0.03"}),
                         {"a.db", "board is 8x6:0.03", "pictures of 0 nodes"}));
   EXPECT_TRUE(bad_input(refined({"--board", "8x6:0.03", "--known-length", "1:20:60-1:100:60.5=1"}),
-                        {"board", "known lengths determine the scale already"}));
+                        {"board", "known lengths"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("p.tum")));
 }
 

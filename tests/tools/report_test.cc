@@ -36,7 +36,7 @@ TEST(Report, OfARun) {
   EXPECT_NE(html.find("Permission is hereby granted"), std::string::npos);
   EXPECT_EQ(html.find("src=\"http"), std::string::npos);
   EXPECT_EQ(json_of("run/report.html.json").at("results").at("bytes"), html.size());
-  // The same bytes, and the first report is no part of the second.
+  // The bytes are equal, and the first report is not part of the second.
   ASSERT_TRUE(succeeded(graspmap({"report", "run", "--title", "A & B", "--threads", "1"})));
   EXPECT_EQ(content("run/report.html"), html);
 }
@@ -78,7 +78,7 @@ TEST(Report, AStoreIsShownAsItsMap) {
 TEST(Report, TheRemovedOutlineNamesTheNewWay) {
   make_run();
   EXPECT_TRUE(wrong_usage(graspmap({"report", "run", "--outline", "study", "-o", "r.html"}),
-                          {"--outline", "shows what its folder contains"}));
+                          {"--outline", "was removed"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("r.html")));
 }
 
@@ -94,7 +94,7 @@ TEST(Report, WithoutThreeJs) {
 TEST(Report, BadInputIsSaid) {
   EXPECT_TRUE(bad_input(graspmap({"report", "none", "-o", "r.html"}), {"none", "no such folder"}));
   std::filesystem::create_directory(scratch("empty"));
-  EXPECT_TRUE(bad_input(graspmap({"report", "empty"}), {"empty", "nothing that a report could"}));
+  EXPECT_TRUE(bad_input(graspmap({"report", "empty"}), {"empty", "nothing to report"}));
   graspmap_test::write_text(scratch("empty/a.txt"), "text");
   EXPECT_TRUE(bad_input(graspmap({"report", "empty", "-o", "r.pdf"}), {"r.pdf", ".html"}));
   EXPECT_TRUE(bad_input(graspmap({"report", "empty", "--max-size-mb", "0.1"}), {"--max-size-mb"}));

@@ -1,4 +1,4 @@
-// What `graspmap score` cannot use: exit code 3, one line that names it, no output.
+// Invalid inputs of `graspmap score`: exit code 3, one line that names the input, no output.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -155,10 +155,10 @@ TEST_F(ScoreBadInput, VoxelSizes) {
     EXPECT_TRUE(bad_input(with_size(method, "-0.01"), {"--voxel-size is -0.01", "> 0"}));
     EXPECT_TRUE(bad_input(with_size(method, "nan"), {"--voxel-size is nan"}));
     EXPECT_TRUE(bad_input(with_size(method, "10"),
-                          {"error: voxel_size_m is 10", "mask would have", "voxels a side"}));
+                          {"error: voxel_size_m is 10", "mask would have", "voxels per side"}));
     // A mask of 0.27 x 0.27 x 0.09 m holds some 6e15 voxels of that size.
     EXPECT_TRUE(bad_input(with_size(method, "1e-6"),
-                          {"error: voxel_size_m is 1e-06", "its mask alone would take", "GiB"}));
+                          {"error: voxel_size_m is 1e-06", "its mask would take", "GiB"}));
     EXPECT_TRUE(bad_input(with_size(method, "1e-300"), {"error: voxel_size_m is 1e-300"}));
   }
 }

@@ -1,5 +1,5 @@
-// Shares of a map, scored in processes of their own and merged, are the map, byte for byte; neither
-// threads nor tiles change a byte of it.
+// Merged shares of a map, scored in separate processes, equal the map byte for byte, for any number
+// of threads and tiles.
 #include <gtest/gtest.h>
 
 #include <algorithm>

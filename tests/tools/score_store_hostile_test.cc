@@ -1,4 +1,4 @@
-// What `graspmap score` makes of a store whose plan was changed by hand, and of tiles without end.
+// `graspmap score` with a store whose plan was edited, and with too many tiles.
 #include <gtest/gtest.h>
 
 #include <functional>
@@ -58,8 +58,8 @@ TEST_F(ScoreStoreHostile, APlanOfOtherTiles) {
   const auto expect_refused = [](const std::function<void(nlohmann::json & index)>& change) {
     const std::string plan = content("m.tiles/progress/plan.json");
     change_plan([&](nlohmann::json& json) { change(json.at("index")); });
-    EXPECT_TRUE(bad_input(
-        score(), {"m.tiles/progress/plan.json: tile_voxels and lattice", "--force starts again"}));
+    EXPECT_TRUE(
+        bad_input(score(), {"m.tiles/progress/plan.json: tile_voxels and lattice", "--force"}));
     write_text(scratch("m.tiles/progress/plan.json"), plan);
   };
   expect_refused([](nlohmann::json& index) { index.at("tile_voxels") = 21; });

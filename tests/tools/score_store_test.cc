@@ -1,5 +1,5 @@
-// A map in tiles is the map in one file, byte for byte, however the terrain is cut into files and
-// tiles, and however often the run was killed.
+// A map in tiles equals the map in one file, byte for byte, for any division of the terrain into
+// files and tiles and any number of killed runs.
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/wait.h>
@@ -94,7 +94,7 @@ std::map<std::string, std::string> files_in(const std::string& folder) {
   return files;
 }
 
-// What a finished store holds for those who read it.
+// Files of a finished store, without those of its progress.
 std::map<std::string, std::string> map_files(const std::string& store) {
   std::map<std::string, std::string> files = files_in(store);
   std::erase_if(files, [](const auto& file) { return file.first.starts_with("progress/"); });
@@ -319,14 +319,14 @@ TEST_F(ScoreStoreAgain, DamagedIndexAndJournalAreMended) {
   const auto files = map_files("m.tiles");
   graspmap_test::write_text(scratch("m.tiles/index.json"), "{\"format\"");
   std::string journal = content("m.tiles/progress/1_of_1.jsonl");
-  // The last line is torn, and one in the middle is not JSON.
+  // The last line is truncated, and one in the middle is not JSON.
   journal.resize(journal.size() - 20);
   journal.replace(journal.find("\"sha256\""), 3, "???");
   graspmap_test::write_text(scratch("m.tiles/progress/1_of_1.jsonl"), journal);
   ASSERT_TRUE(succeeded(score("in", "m.tiles")));
   EXPECT_EQ(map_files("m.tiles"), files);
   EXPECT_EQ(journal_lines("m.tiles"), 51u);
-  // Without the plan nothing says what the tiles are of.
+  // Without the plan the inputs of the tiles are unknown.
   graspmap_test::write_text(scratch("m.tiles/progress/plan.json"), "{}");
   EXPECT_TRUE(bad_input(score("in", "m.tiles"), {"plan.json"}));
   fs::remove_all(scratch("m.tiles/progress"));
@@ -352,7 +352,7 @@ TEST_F(ScoreStoreAgain, ForeignFoldersAreNotTouched) {
   fs::create_directories(scratch("m.tiles"));
   graspmap_test::write_text(scratch("m.tiles/diary.txt"), "dear");
   for (const Words& flags : {Words{}, Words{"--force"}})
-    EXPECT_TRUE(bad_input(score("in", "m.tiles", flags), {"m.tiles", "no tile store"}));
+    EXPECT_TRUE(bad_input(score("in", "m.tiles", flags), {"m.tiles", "not a tile store"}));
   EXPECT_EQ(files_in("m.tiles").size(), 1u);
   graspmap_test::write_text(scratch("n.tiles"), "a file");
   EXPECT_TRUE(bad_input(score("in", "n.tiles"), {"n.tiles", "is a file"}));
@@ -391,7 +391,7 @@ TEST_F(ScoreStoreAgain, ReadersSayWhatIsMissing) {
     return std::string(graspmap_test::error_of([&] { index_of(store); }).what());
   };
   EXPECT_NE(error_of_reading("m.tiles").find("16 of 49 tiles"), std::string::npos);
-  EXPECT_NE(error_of_reading("in").find("no tile store"), std::string::npos);
+  EXPECT_NE(error_of_reading("in").find("not a tile store"), std::string::npos);
   EXPECT_NE(error_of_reading("none.tiles").find("no such"), std::string::npos);
   EXPECT_THROW(libgtd::finish_tile_store(scratch("m.tiles")), libmap::Error);
   ASSERT_TRUE(succeeded(score("in", "m.tiles")));
@@ -402,8 +402,8 @@ TEST_F(ScoreStoreAgain, ReadersSayWhatIsMissing) {
   EXPECT_EQ(map_files("m.tiles"), files);
 }
 
-// Starts `graspmap score in -o m.tiles` and kills it as soon as `is_time` says so. False if it
-// ended by itself.
+// Starts `graspmap score in -o m.tiles` and kills it when `is_time` returns true. Returns false if
+// it ended before.
 template <typename IsTime>
 bool score_killed(const IsTime& is_time) {
   const std::string program = (graspmap_test::build_folder() / "graspmap").string();
@@ -431,7 +431,7 @@ TEST_F(ScoreStoreAgain, KilledAtAnyMoment) {
   ASSERT_TRUE(succeeded(score("in", "n.tiles", {"--points-at-once", "2500"})));
   const auto files = map_files("n.tiles");
   fs::remove_all(scratch("m.tiles"));
-  // While it plans, then after more and more tiles; each run goes on where the last was killed.
+  // Killed while it plans, then after more and more tiles; each run resumes the last one.
   int killed = 0;
   killed += score_killed([] { return fs::exists(scratch("m.tiles")); }) ? 1 : 0;
   killed += score_killed([] { return fs::exists(scratch("m.tiles/progress/plan.json")); }) ? 1 : 0;
@@ -441,7 +441,7 @@ TEST_F(ScoreStoreAgain, KilledAtAnyMoment) {
   EXPECT_FALSE(fs::exists(scratch("m.tiles/index.json")));
   ASSERT_TRUE(succeeded(score("in", "m.tiles", {"--points-at-once", "2500"})));
   EXPECT_EQ(map_files("m.tiles"), files);
-  // No tile that was done was done again.
+  // No completed tile was made again.
   EXPECT_EQ(journal_lines("m.tiles"), 49u);
 }
 
@@ -488,7 +488,7 @@ TEST(ScoreStoreBadInput, LeavesNoFolderBehind) {
   EXPECT_TRUE(graspmap_test::bad_input(score("empty.csv", "m.tiles"), {"empty.csv", "no points"}));
   EXPECT_TRUE(graspmap_test::bad_input(score("bad.pcd", "m.tiles"), {"bad.pcd"}));
   EXPECT_TRUE(
-      bad_input(score("line.csv", "m.tiles"), {"error: line.csv: all points lie on a line"}));
+      bad_input(score("line.csv", "m.tiles"), {"error: line.csv: all points are on a line"}));
   EXPECT_EQ(graspmap_test::names_in_scratch(), before);
 }
 

@@ -1,4 +1,4 @@
-// Sheets of several files, tables of several maps and the sections of mask, as a user calls them.
+// Sheets of several files, tables of several maps, and sections of masks by the commands.
 #include <gtest/gtest.h>
 
 #include "libgtd/gripper/gripper_io.h"
@@ -53,8 +53,8 @@ TEST(Sheet, BadInputIsOneLine) {
   for (const auto& [flag, name] :
        {std::pair{"--no-legend", "--legend"}, std::pair{"--no-axes", "--axes"},
         std::pair{"--width=300", "--width"}, std::pair{"--camera-target=1,2,3", "--camera-target"}})
-    EXPECT_TRUE(
-        bad_input(graspmap({"render", "a.pcd", "a.pcd", "-o", "s.png", flag}), {name, "one file"}));
+    EXPECT_TRUE(bad_input(graspmap({"render", "a.pcd", "a.pcd", "-o", "s.png", flag}),
+                          {name, "a single file"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("s.png")));
 }
 

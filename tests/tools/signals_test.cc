@@ -1,6 +1,5 @@
-// Commands that a signal tells to end: they leave nothing half made, their earlier outputs whole,
-// no process behind, and the status that the signal gives. A run that is done before the signal
-// comes is as good.
+// Commands ended by a signal: they leave no partial outputs and no processes, do not change earlier
+// outputs, and have the exit status of the signal. Runs that end before the signal count too.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -100,7 +99,7 @@ ProgramResult run_and_tell(const Words& words, const Told& one, Clock::duration 
   return result;
 }
 
-// How many of the runs a signal has ended.
+// Returns the number of runs that a signal ended.
 int tell_all_moments(const Words& words) {
   const Clock::time_point start = Clock::now();
   EXPECT_TRUE(succeeded(graspmap(words)));
@@ -192,7 +191,7 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"bag", make_bag, {"convert", "rig.bag", "-o", "o", "--quiet"}}),
     [](const auto& one) { return one.param.name; });
 
-// A part of a tile store is no harm: the same command goes on.
+// A partial tile store is valid and can be resumed.
 TEST(EndedBySignal, AStoreOfTilesIsGoneOnWith) {
   make_terrain();
   const Words words = {"score", "t.pcd", "-o", "o.tiles", "--tile-size", "0.1", "--quiet"};
@@ -213,7 +212,7 @@ TEST(EndedBySignal, AStoreOfTilesIsGoneOnWith) {
   EXPECT_TRUE(graspmap_test::content("told.pcd") == graspmap_test::content("undisturbed.pcd"));
 }
 
-// As nohup and a shell's background jobs start it.
+// Signals are ignored like under nohup and in a shell's background jobs.
 TEST(EndedBySignal, AnIgnoredSignalStaysIgnored) {
   make_terrain();
   const std::string program = (graspmap_test::build_folder() / "graspmap").string();
@@ -227,17 +226,18 @@ TEST(EndedBySignal, AnIgnoredSignalStaysIgnored) {
   EXPECT_TRUE(fs::exists(scratch("o.pcd")));
 }
 
-// Signals come through a pipe: without one nothing is begun.
+// Signals use a pipe; a command without one does not start.
 TEST(Signals, NoFileLeftToOpenForThem) {
   const std::string program = (graspmap_test::build_folder() / "graspmap").string();
   const ProgramResult result = graspmap_test::run_program(
       {"/bin/sh", "-c", "exec 3>&-; ulimit -n 4; exec \"$0\" \"$@\"", program, "info", "none.pcd"},
       {.folder = scratch("")});
   EXPECT_EQ(result.exit_code, 1);
-  // Sanitizers lack the files, too, and say more.
+  // Sanitizers need files, too, and print more.
   EXPECT_THAT(
       result.standard_error,
-      testing::HasSubstr("graspmap info: error: no pipe for signals: Too many open files\n"));
+      testing::HasSubstr("graspmap info: error: cannot create a pipe for signals: Too many open "
+                         "files\n"));
 }
 
 }  // namespace signals_test

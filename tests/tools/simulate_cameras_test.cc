@@ -129,7 +129,7 @@ TEST(SimulateCamerasCommand, UnitsTooFineForTheRangeAreRefused) {
     return graspmap(cameras(more));
   };
   EXPECT_TRUE(bad_input(run({}), {"error: far.yaml: depth_scale_m is 1e-05: 16-bit images cannot "
-                                  "represent what camera front measures",
+                                  "represent the range of camera front",
                                   "(must be >= far_m / 65534, 2.2888882e-05)"}));
   EXPECT_TRUE(bad_input(run({"--depth-scale", "0.00002"}),
                         {"error: depth_scale_m is 2e-05: 16-bit images"}));
@@ -139,8 +139,8 @@ TEST(SimulateCamerasCommand, UnitsTooFineForTheRangeAreRefused) {
 
 TEST(SimulateCamerasCommand, BadInputIsOneLine) {
   write_ground();
-  EXPECT_TRUE(
-      bad_input(graspmap(cameras({"-o", "rig", "--x", "9"})), {"ground.ply", "no ground", "9, 0"}));
+  EXPECT_TRUE(bad_input(graspmap(cameras({"-o", "rig", "--x", "9"})),
+                        {"ground.ply", "no surface", "9, 0"}));
   EXPECT_TRUE(bad_input(graspmap(cameras({"-o", "rig", "--rig", "scare"})), {"scar-e"}));
   write_text(scratch("bad.yaml"), "cameras: []\n");
   EXPECT_TRUE(bad_input(graspmap(cameras({"-o", "rig", "--rig", "bad.yaml"})), {"bad.yaml"}));
@@ -148,7 +148,7 @@ TEST(SimulateCamerasCommand, BadInputIsOneLine) {
   // Above all it sees: images without a measurement, and a warning.
   const auto high = graspmap(cameras({"-o", "rig", "--absolute-z", "--z", "30"}));
   ASSERT_TRUE(succeeded(high));
-  EXPECT_NE(high.standard_error.find("nothing within its range"), std::string::npos);
+  EXPECT_NE(high.standard_error.find("no measurements within its range"), std::string::npos);
 }
 
 }  // namespace simulate_cameras_test

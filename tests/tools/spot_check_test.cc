@@ -81,7 +81,7 @@ TEST(SpotCheckCommand, GroundIsZeroOfALevelledSiteElseFitted) {
   const nlohmann::json fitted = checked({"map.ply"});
   EXPECT_EQ(fitted.at("ground"), "fitted plane");
   EXPECT_LT(fitted.at("mean_m"), 1e-5) << "the slope is the plane's";
-  // What crop says of a levelled site.
+  // Manifest that crop writes for a levelled site.
   libmap::write_cloud(scratch("site.ply"), site_cloud());
   graspmap_test::write_text(
       scratch("site.ply.json"),
@@ -180,7 +180,7 @@ TEST(SpotCheckCommand, BadInput) {
   EXPECT_EQ(graspmap_test::names_in_scratch(), (Words{"empty.ply", "mesh.ply", "site.ply"}));
 }
 
-// The wanted error on the demo site is of its ground as it is: see libmap/mesh/README.md.
+// The target of the error on the demo site is relative to its real ground (libmap/mesh/README.md).
 TEST(SpotCheckCommand, TrueMeshOfTheTestSite) {
   GRASPMAP_REQUIRE_DATA();
   const std::string mesh = graspmap_test::data_folder() / "scans/site_ground_truth_mesh.ply";

@@ -52,7 +52,7 @@ void write_site_part(const std::string& name) {
 Words texture_words(const std::string& output) {
   return {"texture", "site.ply", "--scan", scan_file(), "--poses", "six.tum", "-o", output};
 }
-// Exit code 3, and these parts in the last line: a warning about nodes without poses stands before.
+// Exit code 3, and these parts in the last line, after a warning about nodes without poses.
 testing::AssertionResult refused(const graspmap_test::ProgramResult& result,
                                  const std::vector<std::string>& parts) {
   graspmap_test::ProgramResult last = result;
@@ -66,7 +66,7 @@ Words operator+(Words words, const Words& more) {
   return words;
 }
 
-// Those of a frame of the scan, where it sees the surface.
+// Expects the colors of a frame of the scan on the surface that it shows.
 void expect_colors_of_photographs(const libmap::TexturedMesh& model) {
   const auto scan = libmap::open_scan(scan_file());
   const auto& node = scan->graph().nodes[14];
@@ -159,7 +159,7 @@ TEST(Texture, SmallPagesAndOldOnes) {
       graspmap(texture_words("m.obj") +
                Words{"--texture-size", "256", "--max-pages", "2", "--image-format", "jpeg"});
   ASSERT_TRUE(succeeded(result));
-  EXPECT_NE(result.standard_error.find("times as large as wanted"), std::string::npos);
+  EXPECT_NE(result.standard_error.find("times as large as requested"), std::string::npos);
   EXPECT_EQ(libmap::read_textured_mesh(scratch("m.obj")).pages.size(), 2U);
   EXPECT_EQ(names_in_scratch(),
             (Words{"m.mtl", "m.obj", "m.obj.json", "m_0.jpg", "m_1.jpg", "site.ply", "six.tum"}));
@@ -195,7 +195,7 @@ TEST(Texture, BadInput) {
   libmap::write_trajectory(scratch("far.tum"), {poses, {}}, true);
   EXPECT_TRUE(refused(graspmap({"texture", "site.ply", "--scan", scan_file(), "--poses", "far.tum",
                                 "-o", "m.obj", "--quiet"}),
-                      {"site.ply", "none of its triangles is seen by any of 3 photographs"}));
+                      {"site.ply", "no triangle is visible in any of the 3 photographs"}));
   EXPECT_EQ(names_in_scratch(), (Words{"far.tum", "site.ply", "six.tum"}));
   ASSERT_TRUE(succeeded(graspmap(texture_words("m.obj") + Words{"--dry-run"})));
   EXPECT_EQ(names_in_scratch(), (Words{"far.tum", "site.ply", "six.tum"}));
@@ -209,8 +209,9 @@ TEST(Texture, PosesThatTheScanLacksAreNamed) {
     return graspmap(Words{"texture", "site.ply", "--scan", "scan.db", "-o", "m.glb"} + more);
   };
   graspmap_test::execute(scan, "UPDATE Node SET ground_truth_pose = NULL WHERE id = 1");
-  EXPECT_TRUE(refused(texture({"--frame", "ground-truth"}),
-                      {"error: scan.db: common poses is 2: too few poses", "(must be >= 3)"}));
+  EXPECT_TRUE(
+      refused(texture({"--frame", "ground-truth"}),
+              {"error: scan.db: common poses is 2: the trajectories have too", "(must be >= 3)"}));
   graspmap_test::execute(scan, "UPDATE Node SET ground_truth_pose = NULL");
   EXPECT_TRUE(refused(texture({"--frame", "ground-truth"}),
                       {"error: scan.db: --frame is ground-truth: the scan has no ground truth"}));
@@ -252,10 +253,10 @@ TEST(Texture, CroppedSitesCarryThePosesWithThem) {
   words[1] = "cropped.ply";
   const auto result = graspmap(words);
   ASSERT_TRUE(succeeded(result));
-  EXPECT_NE(result.standard_error.find("carried into the site's frame"), std::string::npos);
+  EXPECT_NE(result.standard_error.find("transformed to the site's frame"), std::string::npos);
   EXPECT_EQ(json_of("part.glb.json").at("frame"), "site");
   EXPECT_TRUE(json_of("part.glb.json").at("transforms").contains("site_from_map"));
-  // The same places have the same colors.
+  // Colors at equal positions are equal.
   const auto whole = libmap::read_textured_mesh(scratch("whole.glb"));
   const auto part = libmap::read_textured_mesh(scratch("part.glb"));
   const libmap::SurfaceDistance surface(whole.mesh);

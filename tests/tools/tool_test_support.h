@@ -1,4 +1,4 @@
-// Helpers of the tests that run `graspmap` as a user does.
+// Helpers for tests that run the `graspmap` program.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -15,19 +15,19 @@
 
 namespace graspmap_test {
 
-// `graspmap WORDS...`, run in the test's scratch folder, so that files go by their plain names.
+// Runs `graspmap WORDS...` in the test's scratch folder; file names are relative to it.
 ProgramResult graspmap(std::vector<std::string> words,
                        const std::map<std::string, std::string>& environment = {});
 
-// Ended well; says what the program said if not.
+// Success for exit code 0; else a failure with the program's messages.
 testing::AssertionResult succeeded(const ProgramResult& result);
 
-// Ended with exit code 3 and one line on stderr that begins with "graspmap COMMAND: error: " and
-// holds each of `parts`.
+// Success for exit code 3 and one line on stderr that begins with "graspmap COMMAND: error: " and
+// contains each of `parts`.
 testing::AssertionResult bad_input(const ProgramResult& result,
                                    const std::vector<std::string>& parts);
 
-// The same of exit code 2: wrong usage.
+// Success for exit code 2 (wrong usage) and such a line.
 testing::AssertionResult wrong_usage(const ProgramResult& result,
                                      const std::vector<std::string>& parts);
 
@@ -37,13 +37,13 @@ std::vector<std::string> names_in_scratch();
 std::string content(const std::string& name);
 nlohmann::json json_of(const std::string& name);
 
-// The files of a folder in the scratch folder, by their names.
+// Returns the contents of the files of a folder in the scratch folder, by name.
 std::map<std::string, std::string> pieces_in(const std::string& folder);
-// Expects the same pieces and results in both, and nothing left of their making.
+// Expects equal tiles and results in both folders, and no temporary files.
 void expect_same_pieces(const std::string& folder, const std::string& whole);
 
-// Gently bumpy ground of 0.6 x 0.6 m about (0, 0), z up, a point each 5 mm and the same for every
-// call. Coordinates are multiples of 2^-20 m: any format holds them exactly.
+// Returns gently bumpy ground of 0.6 x 0.6 m about (0, 0), z up, with a point spacing of 5 mm, the
+// same for every call. Coordinates are multiples of 2^-20 m, which any format stores exactly.
 libmap::PointCloud bumpy_terrain(double size_m = 0.6);
 
 // Writes it as terrain.pcd and returns that name.

@@ -1,4 +1,4 @@
-// Two runs at the same time into the same output: the second says so at once and harms nothing.
+// Two simultaneous runs with the same output: the second fails at once and changes nothing.
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/wait.h>
@@ -37,7 +37,7 @@ std::vector<std::string> temporaries() {
   return names;
 }
 
-// Whether the manifest in the making is there, which is what the run's outputs are claimed with.
+// Returns true if the temporary manifest exists, which claims the outputs of the run.
 bool claims() {
   const auto names = temporaries();
   return std::any_of(names.begin(), names.end(),
@@ -52,7 +52,7 @@ bool wait_for_claim(const RunningProgram& program) {
   return false;
 }
 
-// Whether the program was stopped in the midst of its work: a short one may be done before.
+// Returns true if the program was stopped during its work; a short run may end before.
 bool stopped_at_work(const RunningProgram& program) {
   if (!wait_for_claim(program)) return false;
   std::this_thread::sleep_for(5ms);
@@ -110,7 +110,7 @@ TEST(TwoRuns, OfAReport) {
   expect_one_of_two({"report", ".", "-o", "o.html", "--no-3d", "--quiet"}, "o.html");
 }
 
-// A store whose shares others score is not begun anew.
+// A store that other shares use is not replaced.
 TEST(TwoRuns, IntoAStoreOfTiles) {
   libmap::write_cloud(scratch("t.pcd"), graspmap_test::bumpy_terrain(0.6));
   const Words share = {"score", "t.pcd", "-o", "m.tiles", "--tile", "1/2", "--quiet"};
@@ -130,7 +130,7 @@ TEST(TwoRuns, IntoAStoreOfTiles) {
   EXPECT_TRUE(succeeded(graspmap({"score", "t.pcd", "-o", "m.tiles", "--force", "--quiet"})));
 }
 
-// What a killed run leaves blocks nobody.
+// Leftovers of a killed run do not block later runs.
 TEST(TwoRuns, AKilledRunHoldsNothing) {
   libmap::write_cloud(scratch("t.pcd"), graspmap_test::bumpy_terrain(1.2));
   const Words words = {"score", "t.pcd", "-o", "o.pcd", "--quiet"};

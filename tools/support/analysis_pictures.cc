@@ -27,14 +27,14 @@ constexpr std::size_t max_labels = 8;
 
 double percent(double part, double whole) { return whole > 0.0 ? 100.0 * part / whole : 0.0; }
 
-// Level ground is light, upright ground dark.
+// Gray that gets darker with slope.
 Color ground_color(float slope_deg) {
   const double slope = std::isnan(slope_deg) ? 0.0 : static_cast<double>(slope_deg);
   const auto gray = static_cast<std::uint8_t>(std::lround(228.0 - 110.0 * slope / 90.0));
   return {gray, gray, gray};
 }
 
-// In the terrain frame.
+// The voxels' surface points in the terrain frame.
 libmap::PointCloud cloud_of(const libgtd::VoxelMap& map, const libgtd::MapSurface& surface) {
   libmap::PointCloud cloud;
   cloud.positions.reserve(map.size());
@@ -48,8 +48,8 @@ libmap::PointCloud cloud_of(const libgtd::VoxelMap& map, const libgtd::MapSurfac
   return cloud;
 }
 
-// In its own colors; the legend has the known ones among them and those of the `rest` of the
-// ground.
+// Coloring by the cloud's own colors. The legend shows those of the known colors that occur, and
+// the grays of the `rest` of the ground.
 libmap::Coloring own_colors(const libmap::PointCloud& cloud, const std::string& title,
                             const std::vector<libmap::LegendEntry>& known,
                             const std::string& rest) {
@@ -154,7 +154,7 @@ libmap::Chart ground_chart(const std::vector<libgtd::GroundBin>& bins,
   double highest = 0.0;
   for (const std::vector<double>* values : {&bars.heights, &line.y})
     for (const double value : *values) highest = std::max(highest, value);
-  // Room for the legend.
+  // Leaves room for the legend.
   if (highest > 0.0) chart.y_axis.range = std::pair(0.0, 1.25 * highest);
   if (!bins.empty()) {
     bars.first_edge = bins.front().low;
@@ -198,7 +198,7 @@ libmap::ColorImage draw_change(const MapPicture& picture, const libgtd::MapChang
   };
   for (const libgtd::VoxelPair& pair : change.pairs)
     paint(pair.map, libgtd::class_of(picture.map, other, pair));
-  // Between lattices many voxels have no partner by chance: that says nothing of the ground.
+  // Between different lattices, many voxels have no partner by chance.
   if (change.matching == libgtd::VoxelMatching::lattice) {
     for (const std::uint32_t n : change.only_map) paint(n, ChangeClass::only_map);
     for (const std::uint32_t n : change.only_other) {
@@ -208,8 +208,8 @@ libmap::ColorImage draw_change(const MapPicture& picture, const libgtd::MapChang
   }
   libmap::Coloring coloring = own_colors(cloud, "graspable",
                                          {{reachable_color, "in both maps"},
-                                          {gained_color, "in OTHER alone"},
-                                          {lost_color, "in MAP alone"},
+                                          {gained_color, "in OTHER only"},
+                                          {lost_color, "in MAP only"},
                                           {only_one_color, "ground of one map"},
                                           {libmap::below_plane_color, "below zero plane"}},
                                          "neither");

@@ -1,4 +1,4 @@
-// The pictures and charts of an analysis of maps.
+// Images and charts of an analysis of maps.
 #pragma once
 
 #include <string>
@@ -12,10 +12,10 @@
 
 namespace graspmap_tools {
 
-// Bars of the evaluated voxels in the legend's colors, and a line for all voxels.
+// Score histogram: bars of the evaluated voxels in the legend's colors, and a line for all voxels.
 libmap::Chart histogram_chart(const libgtd::MapAnalysis& analysis, const std::string& title);
 
-// Bars: which share of the ground in a bin can be held. Line: which share of all ground is in it.
+// Ground by a property: bars are the graspable share of a bin, a line its share of all ground.
 libmap::Chart ground_chart(const std::vector<libgtd::GroundBin>& bins,
                            const std::string& axis_title, const std::string& title);
 
@@ -25,17 +25,17 @@ struct MapPicture {
   std::string title;
 };
 
-// From above, ground the darker the steeper; regions by whether they can be reached, the largest
-// ones with their numbers.
+// Draws the map from above: regions colored by reachability, the largest ones numbered, other
+// ground darker with slope.
 libmap::ColorImage draw_regions(const MapPicture& picture, const libgtd::MapRegionResult& regions,
                                 const libgtd::RegionReach& reach);
 
-// From above: where the two maps agree, and where only one of them says that it can be held.
+// Draws the map from above, with voxels that are graspable in both maps or in one only.
 libmap::ColorImage draw_change(const MapPicture& picture, const libgtd::MapChange& change,
                                const libgtd::VoxelMap& other,
                                const libmap::Pose& map_terrain_from_other_terrain);
 
-// The same with the difference of the scores.
+// Draws the map from above, colored by the difference of both scores.
 libmap::ColorImage draw_score_change(const MapPicture& picture, const libgtd::MapChange& change,
                                      const libgtd::VoxelMap& other);
 

@@ -73,10 +73,10 @@ class Silent : public libmap::Progress {
   void end() override {}
 };
 
-// After so long, what was done says how long the rest takes.
+// Minimum elapsed time for an estimate of the remaining time.
 constexpr double min_elapsed_s = 2.0;
 
-// Counts steps and shows each whole percent once, with the time left.
+// Counts steps and shows each whole percent once, with the remaining time.
 class Counting : public libmap::Progress {
  public:
   void begin(std::string_view stage, std::size_t total) override {
@@ -155,8 +155,9 @@ class JsonLines : public Counting {
   }
 };
 
-// "auto": a bar if stderr is a terminal, else nothing; "json": one JSON line per step; "none".
-// Shows the time left for stages of more than a few seconds. Throws Error for another name.
+// Returns the progress display of a style. "auto": a bar if stderr is a terminal, else nothing;
+// "json": one JSON line per step; "none". Stages of more than a few seconds show the remaining
+// time. Throws Error for another style.
 std::unique_ptr<libmap::Progress> make_progress(const std::string& style) {
   if (style == "json") return std::make_unique<JsonLines>();
   if (style == "auto" && isatty(STDERR_FILENO) == 1) return std::make_unique<Bar>();
@@ -190,7 +191,7 @@ struct Command::Parts {
   CLI::Option* output_option = nullptr;
   std::vector<std::string> overrides;                            // --set
   std::vector<std::pair<std::string, std::string>> flag_values;  // key, text
-  std::vector<std::pair<std::string, std::string>> configured;   // the same, by --config
+  std::vector<std::pair<std::string, std::string>> configured;   // key, text from --config
 
   fs::path config_file() const {
     return config_resolver ? config_resolver(config) : fs::path(config);
@@ -199,7 +200,7 @@ struct Command::Parts {
   void add_parameter_flags();
   void apply_parameters();
   libmap::Error placed(const libmap::Error& error) const;
-  // An exit code if there is nothing more to do.
+  // Returns the exit code if the command is complete, for example after --help.
   std::optional<int> parse(int argc, char** argv);
   void work(const std::function<void(Run&)>& body);
   std::map<std::string, std::string> former_flags;
@@ -256,20 +257,19 @@ void Command::config_resolver(std::function<fs::path(const std::string&)> resolv
 
 void Command::Parts::add_common_options() {
   if (!table.parameters().empty()) {
-    app.add_option("--config", config, "YAML file of parameters; flags are stronger")
+    app.add_option("--config", config, "YAML file of parameters; flags take precedence")
         ->type_name("FILE.yaml");
-    app.add_option("--set", overrides, "KEY=VALUE: any key of --config (repeatable)")
+    app.add_option("--set", overrides, "value of a key of --config (repeatable)")
         ->type_name("KEY=VALUE")
         ->allow_extra_args(false);
-    app.add_flag("--print-config", print_config,
-                 "print the parameters in force as YAML and do nothing else");
+    app.add_flag("--print-config", print_config, "print the effective parameters as YAML and exit");
   }
-  app.add_flag("--dry-run", run_options.dry_run, "check everything, write nothing");
+  app.add_flag("--dry-run", run_options.dry_run, "check everything and write nothing");
   app.add_flag("--force", run_options.force, "overwrite outputs that graspmap did not write");
   app.add_option("--threads", threads, "number of threads, 0 for all")->type_name("N");
-  app.add_option("--progress", progress, "auto|json|none")->type_name("STYLE");
-  app.add_flag("--quiet", run_options.quiet, "warnings and errors only");
-  app.add_flag("--verbose", run_options.verbose, "also the time of each step");
+  app.add_option("--progress", progress, "progress display: auto|json|none")->type_name("STYLE");
+  app.add_flag("--quiet", run_options.quiet, "print warnings and errors only");
+  app.add_flag("--verbose", run_options.verbose, "also print the time of each step");
 }
 
 void Command::Parts::add_parameter_flags() {
@@ -318,7 +318,7 @@ void Command::Parts::apply_parameters() {
   }
 }
 
-// The same error naming the file of --config if what it finds fault with came from there.
+// Adds the file of --config to an error about a value from that file.
 libmap::Error Command::Parts::placed(const libmap::Error& error) const {
   const libmap::Parameter* parameter = table.find(error.context().field);
   if (parameter == nullptr) return error;
@@ -328,8 +328,8 @@ libmap::Error Command::Parts::placed(const libmap::Error& error) const {
   return is_configured ? error.in_file(config_file().string()) : error;
 }
 
-// Long flags that the command does not have, wherever they stand: CLI11 would first ask for
-// arguments that are missing.
+// Returns an error text for the first unknown or former long flag. CLI11 alone would report missing
+// arguments first.
 std::optional<std::string> Command::Parts::unknown_flag(int argc, char** argv) const {
   std::vector<std::string> flags;
   for (const CLI::Option* option : app.get_options())
@@ -347,13 +347,13 @@ std::optional<std::string> Command::Parts::unknown_flag(int argc, char** argv) c
 }
 
 int Command::Parts::usage_error(const std::string& message) const {
-  return report(name, message + "; graspmap " + name + " --help shows what it takes", exit_usage);
+  return report(name, message + "; graspmap " + name + " --help shows the usage", exit_usage);
 }
 
 std::optional<int> Command::Parts::parse(int argc, char** argv) {
   add_parameter_flags();
   add_common_options();
-  // --print-config needs no inputs: only the parameters are asked for.
+  // --print-config needs no inputs.
   const auto asks_for_config = [&] {
     return std::any_of(argv, argv + argc,
                        [](const char* word) { return std::string(word) == "--print-config"; });
@@ -414,7 +414,7 @@ int Command::run(int argc, char** argv, const std::function<void(Run&)>& body) {
     return report(name, parts_->placed(error).what(),
                   error.kind() == libmap::ErrorKind::bad_input ? exit_bad_input : exit_failed);
   } catch (const fs::filesystem_error& error) {
-    // A path that leads nowhere, such as a link to itself, or the machine's own trouble.
+    // Invalid paths, such as a link to itself, are bad input; other errors are failures.
     const bool is_path = error.code() == std::errc::too_many_symbolic_link_levels ||
                          error.code() == std::errc::filename_too_long ||
                          error.code() == std::errc::permission_denied ||

@@ -1,5 +1,5 @@
-// What all commands share on the command line: inputs, the output, one flag for each parameter,
-// --config, --print-config, --dry-run, one-line errors and exit codes.
+// Command line of all commands: inputs, the output, one flag per parameter, --config,
+// --print-config, --dry-run, one-line errors and exit codes.
 //
 //   int main(int argc, char** argv) {
 //     ScoreOptions options;
@@ -15,26 +15,27 @@
 
 namespace graspmap_tools {
 
-// What the command line lacks before any file is looked at: exit code 2.
+// Wrong usage, found before any file is read: exit code 2.
 class UsageError : public libmap::Error {
  public:
   using Error::Error;
 };
 
-// Throws Error with the flag of the first parameter of `bind` that is not as it is by default.
+// Throws Error with the flag of the first parameter of `bind` that differs from its default.
 template <typename Options>
 void refuse_set(const Options& options, void (*bind)(libmap::ParameterTable&, Options&),
                 const std::string& reason) {
   if (const auto key = libmap::changed_key(options, bind))
     throw libmap::Error(reason, {.field = libmap::flag_of(*key)});
 }
-// The same of options that are no parameters: flags, each with whether it was given.
+// Throws Error with the first flag whose value is true, which marks it as given; for options that
+// are not parameters.
 void refuse_given(const std::vector<std::pair<const char*, bool>>& flags,
                   const std::string& reason);
 
 class Command {
  public:
-  // The description is that of commands.h, unless the command has several usages.
+  // The default description is that of commands.h; commands with several usages set their own.
   explicit Command(const std::string& name, const std::string& description = {});
   ~Command();
   Command(const Command&) = delete;
@@ -46,24 +47,25 @@ class Command {
               const std::string& description);
   // -o, --output.
   void output(std::string& path, const std::string& description, bool required = true);
-  // Flags and options that are no parameters of a stage, such as --json or --tile.
+  // Flags and options that are not parameters of a stage, such as --json or --tile.
   void flag(const std::string& name, bool& value, const std::string& description);
   void option(const std::string& name, const std::string& value_name, std::string& value,
               const std::string& description, bool required = false);
-  // A flag of earlier versions: the error of its use names `now` instead.
+  // Declares a flag of earlier versions; its use is an error that names `now` instead.
   void former_flag(const std::string& name, const std::string& now);
   void option(const std::string& name, const std::string& value_name,
               std::vector<std::string>& values, const std::string& description);
 
-  // The parameters of the stages that the command runs: each becomes a flag and a key of --config
-  // and --print-config. --set KEY=VALUE reaches them too.
+  // Parameters of the command's stages. Each becomes a flag, a key of --config and --print-config,
+  // and a KEY of --set KEY=VALUE.
   libmap::ParameterTable& parameters();
 
-  // Resolves the value of --config, e.g. a scenario's name to a file. Default: a path.
+  // Sets the function from the value of --config to its file, e.g. from a scenario's name. By
+  // default the value is a path.
   void config_resolver(std::function<std::filesystem::path(const std::string&)> resolver);
 
-  // Parses, applies --config and then the flags, runs `body`. Returns the exit code: 0 done,
-  // 1 failed, 2 wrong usage, 3 bad input.
+  // Parses, applies --config and then the flags, and runs `body`. Errors become one line on stderr.
+  // Returns the exit code: 0 done, 1 failed, 2 wrong usage, 3 bad input.
   int run(int argc, char** argv, const std::function<void(Run&)>& body);
 
  private:
@@ -71,8 +73,8 @@ class Command {
   std::unique_ptr<Parts> parts_;
 };
 
-// A command of several usages, each with a Command and options of its own: runs the one that was
-// chosen. --help of the first shows all.
+// Runs the chosen usage of a command with several usages, each with its own Command and options.
+// --help of the first usage shows all. Returns the exit code.
 using Usage = int(int argc, char** argv);
 int run_usage(int argc, char** argv, std::initializer_list<Usage*> usages, Usage* chosen);
 

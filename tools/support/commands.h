@@ -1,6 +1,5 @@
-// The commands of graspmap: the one place that describes them. `graspmap --help`, each command's
-// own
-// --help, completion, man pages and the manual's table come from here.
+// Names and summaries of the commands, for `graspmap --help`, each command's --help, completion,
+// man pages and the manual's table.
 #pragma once
 
 #include <string_view>
@@ -15,15 +14,15 @@ struct CommandEntry {
 
 constexpr CommandEntry commands[] = {
     {"Scan", "simulate", "simulate terrains, sites, scans and robot cameras with known truth"},
-    {"Scan", "calibrate", "calibrate a camera from pictures of a chessboard"},
+    {"Scan", "calibrate", "calibrate a camera from images of a chessboard"},
     {"Scan", "refine", "refine the poses of a scan: loop closures, pose graph, bundle adjustment"},
     {"Scan", "fuse", "fuse the depth images of a scan or a camera rig into one cloud"},
     {"Surface", "mesh", "reconstruct a surface from a cloud"},
-    {"Surface", "texture", "texture a mesh with the photographs of its scan"},
+    {"Surface", "texture", "texture a mesh with the images of its scan"},
     {"Surface", "crop", "level a cloud or mesh and crop it to the test site"},
     {"Surface", "resample", "sample a surface evenly (Poisson disk)"},
     {"Surface", "compare", "measure distances between surfaces, or heights along a site's edges"},
-    {"Map", "mask", "write the mask of a gripper as text, cloud or picture"},
+    {"Map", "mask", "write the mask of a gripper as text, cloud or image"},
     {"Map", "score", "compute the graspability map of a terrain, tile by tile"},
     {"Map", "analyze", "analyze a map, compare it with another, or tabulate several maps"},
     {"Map", "footholds", "list the best footholds of a map for a step planner"},
@@ -38,7 +37,7 @@ constexpr CommandEntry commands[] = {
      "convert scans, poses, clouds, meshes, maps and ROS bags; merge tiles"},
 };
 
-// The command's summary; empty if there is none of this name.
+// Returns the command's summary; empty for an unknown name.
 constexpr std::string_view summary_of(std::string_view name) {
   for (const CommandEntry& command : commands)
     if (command.name == name) return command.summary;

@@ -19,12 +19,12 @@ namespace graspmap_tools {
 
 namespace {
 
-// Signal handlers have nothing but what is global. The pipe is open as long as the process lives.
+// Signal handlers use global variables only. The pipe remains open until the process ends.
 int told_end = -1;
 std::atomic<bool> is_told = false;
 static_assert(std::atomic<bool>::is_always_lock_free);
 
-// Removing files takes more than a handler may call: it tells a thread.
+// Notifies a thread, because a signal handler may not remove files.
 extern "C" void tell(int signal) {
   const int code = errno;
   is_told = true;
@@ -33,7 +33,7 @@ extern "C" void tell(int signal) {
   errno = code;
 }
 
-// POSIX has no exit status for "ended by a signal" but the signal itself.
+// Ends the process by the signal, because POSIX has no other exit status for it.
 [[noreturn]] void end_by(int signal) {
   std::signal(signal, SIG_DFL);
   sigset_t only;
@@ -69,10 +69,10 @@ void take(int signal) {
 void end_cleanly_on_signals() {
   int ends[2];
   if (pipe2(ends, O_CLOEXEC) != 0)
-    throw libmap::Error(std::string("no pipe for signals: ") + std::strerror(errno), {},
-                        libmap::ErrorKind::failed);
+    throw libmap::Error(std::string("cannot create a pipe for signals: ") + std::strerror(errno),
+                        {}, libmap::ErrorKind::failed);
   told_end = ends[1];
-  // A process that is forked while a thread begins inherits what that thread has locked, for ever.
+  // Waits until the thread has begun, because a process forked before would inherit its locks.
   std::promise<void> begun;
   const std::future<void> has_begun = begun.get_future();
   std::thread(wait_for_a_signal, ends[0], std::move(begun)).detach();

@@ -28,11 +28,11 @@ using libgtd::StoredTile;
 using libgtd::TileNumber;
 
 constexpr std::size_t kept_pieces = 3;
-// More than offset, tilt and blur of a pose move a gripper, whose size counts twice.
+// Margin for offset, tilt and uncertainty of a pose, in addition to twice the gripper's size.
 constexpr double extra_margin_m = 0.2;
 
 constexpr std::size_t field_count = 9;
-using Values = std::array<double, field_count>;  // of one voxel, as grasp_fields
+using Values = std::array<double, field_count>;  // fields of one voxel, in order of grasp_fields
 constexpr Values no_candidate = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0};
 
 Values values_of(const libgtd::LocationResult& result) {
@@ -47,7 +47,7 @@ Values values_of(const libgtd::LocationResult& result) {
           static_cast<double>(result.trials)};
 }
 
-// Each location of a tile is a step of the whole map.
+// Progress of a tile whose locations count as steps of the whole map.
 class StepsOfTile : public libmap::Progress {
  public:
   explicit StepsOfTile(libmap::Progress& whole) : whole_(whole) {}
@@ -59,7 +59,7 @@ class StepsOfTile : public libmap::Progress {
   libmap::Progress& whole_;
 };
 
-// A map by its tiles: those of a store, or of one file that is cut.
+// A map by tiles, from a tile store or by splitting one file.
 class TiledMap {
  public:
   explicit TiledMap(const std::string& file) {
@@ -74,7 +74,7 @@ class TiledMap {
   const libgtd::TileStoreIndex& index() const { return index_; }
   bool has_manifest() const { return has_manifest_; }
 
-  // Of index().tiles.
+  // Returns the points of a tile, given by its position in index().tiles.
   libmap::PointCloud load(std::size_t tile) const {
     return store_ ? store_->load_checked(tile)
                   : libmap::select_points(cloud_, points_.at(index_.tiles[tile].number));
@@ -122,7 +122,7 @@ class TiledMap {
   bool has_manifest_ = true;
   std::optional<MapTiles> store_;
   libmap::PointCloud cloud_;
-  std::map<TileNumber, std::vector<std::size_t>> points_;  // of cloud_
+  std::map<TileNumber, std::vector<std::size_t>> points_;  // indices in cloud_
 };
 
 class MapGrasping {
@@ -140,7 +140,7 @@ class MapGrasping {
     carry_facts(map_.index().manifest, run);
     in_file(input.map_file, [&] { require_usable(); });
     if (!map_.has_manifest())
-      run.warn(input.map_file + ": no manifest beside it: it is taken in the mesh's frame");
+      run.warn(input.map_file + ": has no manifest; its frame is assumed to be that of the mesh");
   }
 
   void grasp() {
@@ -166,7 +166,7 @@ class MapGrasping {
     for (std::size_t n = 0; n < tiles.size(); ++n) {
       const libmap::PointCloud points = map_.load(n);
       if (points.find_field("grasp_trials") != nullptr)
-        throw libmap::Error("the map has this field already", {.field = "grasp_trials"});
+        throw libmap::Error("the map already has this field", {.field = "grasp_trials"});
       voxels += points.size();
       for (const auto& [piece, members] : by_piece(points))
         for (const std::size_t voxel : members)
@@ -186,8 +186,8 @@ class MapGrasping {
                 on_mesh, voxels, options_.max_distance_m);
   }
 
-  // The plan that is there, if it is of the same mesh, map and parameters; else a new one. The
-  // caller holds the lock.
+  // Resumes the store's plan if it is of the same mesh, map and parameters, else writes a new one.
+  // The caller must have locked the store.
   void agree_on_plan() {
     const bool is_forced = run_.options().force && is_store();
     const auto earlier = is_forced ? std::nullopt : store_.plan();
@@ -196,14 +196,14 @@ class MapGrasping {
     plan_.index.manifest = run_.manifest();
     plan_.index.manifest.timings_s.clear();
     plan_.index.manifest.threads = 0;
-    // A map's frame is in its manifest alone.
+    // The map's frame is stored only in its manifest, which is not hashed.
     plan_.key = libmap::sha256_of(libmap::key_of(run_.manifest()) + input_.parameters_hash +
                                   libmap::to_text(mesh_from_map_.matrix().sum()));
     if (earlier && earlier->key == plan_.key) return;
     if (earlier && is_store())
       throw libmap::Error(
-          "contains tiles of another mesh, map, gripper or of other parameters: --force starts "
-          "again",
+          "contains tiles of another mesh, map or gripper or of other parameters: --force "
+          "replaces them",
           {.file = input_.output});
     if (!earlier && !is_forced) require_no_index(store_);
     store_.require_idle();
@@ -232,7 +232,7 @@ class MapGrasping {
     run_.progress().end();
   }
 
-  // The numbers of the points on each piece of the ground.
+  // Indices of the points on each tile of the ground.
   std::map<std::size_t, std::vector<std::size_t>> by_piece(const libmap::PointCloud& points) const {
     std::map<std::size_t, std::vector<std::size_t>> members;
     for (std::size_t n = 0; n < points.size(); ++n)
@@ -240,7 +240,7 @@ class MapGrasping {
     return members;
   }
 
-  // Of the points of these numbers, those where the gripper is closed; nothing of the others.
+  // Returns one entry per member: its position if it is a candidate, else nullopt.
   std::vector<std::optional<Eigen::Vector3d>> candidates_of(
       const GroundPieces::Piece& piece, const libmap::PointCloud& points,
       const std::vector<std::size_t>& members) const {
@@ -248,7 +248,7 @@ class MapGrasping {
     constexpr std::size_t grain = 256;
     libmap::parallel_each(members.size(), grain, [&](std::size_t n) {
       const Eigen::Vector3d place = mesh_from_map_ * points.positions[members[n]];
-      // Along a normal the gripper comes from anywhere.
+      // The filter is valid only for approach from above.
       if (options_.approach == libgtd::ApproachDirection::up && !piece.from_above.may_hold(place))
         return;
       if (piece.ground.distance(place, options_.max_distance_m)) candidates[n] = place;
@@ -279,17 +279,17 @@ class MapGrasping {
     return points;
   }
 
-  // Whoever comes last writes the index, or the map in one file.
+  // The last share writes the index or the map in one file.
   void finish(std::size_t tested) {
     std::optional<libmap::FileLock> lock = store_.lock();
     const libgtd::MapTileStore::Completion completion = store_.complete(plan_);
     if (!completion.index) {
-      run_.say("{} tiles tested; {} of {} are there", tested, completion.done, completion.tiles);
+      run_.say("{} tiles tested; {} of {} are complete", tested, completion.done, completion.tiles);
       return;
     }
     if (is_store()) {
       store_.write_index(*completion.index, run_.manifest());
-      run_.say("{} of {} tiles tested, all are there", tested, completion.tiles);
+      run_.say("{} of {} tiles tested; all are complete", tested, completion.tiles);
       return;
     }
     const MapTiles tiles(store_.folder(), *completion.index);
@@ -397,7 +397,7 @@ const std::vector<std::string>& grasp_fields() {
 void require_map_output(const GraspMapInput& input, Run& run) {
   if (!libgtd::is_tile_store_name(input.output)) {
     if (input.share.count > 1)
-      throw libmap::Error("fills a tile store, MAP.tiles",
+      throw libmap::Error("requires a tile store, MAP.tiles, as output",
                           {.file = input.output, .field = "--tile"});
     libmap::require_cloud_format(input.output);
     run.claim_output(input.output, {input.mesh_file, input.map_file});
@@ -405,9 +405,9 @@ void require_map_output(const GraspMapInput& input, Run& run) {
   }
   if (fs::exists(input.output) && fs::exists(input.map_file) &&
       fs::equivalent(input.output, input.map_file))
-    throw libmap::Error("is the input: the output needs another name", {.file = input.output});
+    throw libmap::Error("is the input: choose another output name", {.file = input.output});
   if (run.options().force && input.share.count > 1)
-    throw libmap::Error("removes the tiles of all shares: use it without --tile",
+    throw libmap::Error("deletes the tiles of all shares and cannot be combined with --tile",
                         {.field = "--force"});
 }
 

@@ -1,4 +1,4 @@
-// `graspmap grasp --map`: the virtual field test at the candidates among a map's voxels.
+// `graspmap grasp --map`: virtual field test at candidate voxels of a map.
 #pragma once
 
 #include <Eigen/Core>
@@ -19,27 +19,27 @@
 
 namespace graspmap_tools {
 
-// The ground of the virtual field test: a mesh in one file, or in a folder of pieces of which a few
-// are in memory.
+// Ground of the virtual field test: a mesh in one file, or in a folder of tiles, with few of them
+// in memory.
 class GroundPieces {
  public:
-  // A piece and the mesh around it, as far as a gripper on the piece may come.
+  // A tile with the mesh around it within reach of a gripper on the tile.
   struct Piece {
     const libmap::TriangleMesh mesh;
-    const libgtd::Ground ground;  // of `mesh`
+    const libgtd::Ground ground;  // ground of `mesh`
     const libgtd::GripCandidates from_above;
   };
   using MakeGround = std::function<libgtd::Ground(const libmap::TriangleMesh& mesh)>;
 
-  // Throws Error naming the file that cannot be read, or the gripper's missing section.
+  // Throws Error naming the unreadable file or the gripper's missing section.
   GroundPieces(const std::string& mesh, const libgtd::Gripper& gripper, double start_height_m,
                MakeGround make_ground);
 
-  // The piece whose middle is nearest among those at the place, or nearest to it, in x and y.
-  // It depends on the pieces alone.
+  // Returns the index of the tile at the position, by x and y; of several, the one with the nearest
+  // center. Returns the nearest tile if none is there.
   std::size_t piece_at(const Eigen::Vector3d& place) const;
 
-  // It stays until two others have been asked for.
+  // Returns the tile with this index; the reference is valid until two other tiles are requested.
   const Piece& piece(std::size_t number);
 
  private:
@@ -53,8 +53,8 @@ class GroundPieces {
   double margin_m_ = 0.0;
   MakeGround make_ground_;
   std::vector<std::filesystem::path> files_;
-  std::optional<libmap::MeshPieceIndex> index_;  // of several files
-  std::list<Kept> kept_;                         // the last used first
+  std::optional<libmap::MeshPieceIndex> index_;  // only for several files
+  std::list<Kept> kept_;                         // last used first
 };
 
 struct GraspMapInput {
@@ -65,16 +65,16 @@ struct GraspMapInput {
   std::string parameters_hash;  // of gripper and options
 };
 
-// The fields that the output has more than the map.
+// Names of the fields that are added to the map.
 const std::vector<std::string>& grasp_fields();
 
-// Before any work. Throws Error: the output is no map's file or tile store, or cannot be written.
+// Checks and claims the output. Throws Error for another format or if it cannot be written.
 void require_map_output(const GraspMapInput& input, Run& run);
 
-// Writes the map with the fields. Tiles are done one after the other in a tile store, the output or
-// OUTPUT.progress, which goes when the map in one file is there: a run that was killed is resumed.
-// The run's manifest has the inputs. Throws Error: the map is empty or has one of the fields, or
-// none of its voxels is on the mesh, or the store is of something else.
+// Writes the map with the added fields. Tiles are processed in a tile store, so that a killed run
+// can be resumed: in the output or in OUTPUT.progress, which is removed once the map in one file is
+// written. The run's manifest must have the inputs. Throws Error if the map is empty or already has
+// a field, none of its voxels is on the mesh, or the store is of other inputs.
 void grasp_map(const GraspMapInput& input, GroundPieces& ground, const libgtd::Gripper& gripper,
                const libgtd::GraspOptions& options, Run& run);
 

@@ -26,7 +26,7 @@ using libmap::RtabmapDatabase;
 using libmap::ScanSource;
 using libmap::Trajectory;
 
-// Phones give each image its own focal length.
+// Limit, because phones store a focal length per image.
 constexpr std::size_t max_listed_cameras = 8;
 
 Json sessions_json(const libmap::PoseGraph& graph) {
@@ -68,7 +68,7 @@ Json links_json(const libmap::PoseGraph& graph) {
   return json;
 }
 
-// The trajectory cut where a session ends: nothing connects its poses with the next one's.
+// Splits the trajectory into sessions, whose relative poses are unknown.
 std::map<int, Trajectory> by_session(const libmap::PoseGraph& graph, const Trajectory& trajectory) {
   std::map<int, Trajectory> parts;
   for (const libmap::TrajectoryPose& pose : trajectory)
@@ -103,7 +103,7 @@ void add_error(Json& json, const std::string& name, const Trajectory& estimate,
   try {
     json[name] = error_json(estimate, truth);
   } catch (const libmap::Error&) {
-    // Fewer than three poses in common.
+    // There are fewer than three common poses.
   }
 }
 
@@ -111,7 +111,7 @@ Json errors_json(const libmap::PoseGraph& graph) {
   const Trajectory truth = trajectory_of(graph, PoseSource::ground_truth);
   if (truth.empty()) return nullptr;
   Json json = Json::object();
-  // Odometry starts again with each session.
+  // The odometry of each session has its own frame.
   const auto sessions = by_session(graph, trajectory_of(graph, PoseSource::odometry));
   for (const auto& [session, part] : sessions)
     add_error(json, sessions.size() == 1 ? "odometry" : fmt::format("odometry {}", session), part,
@@ -163,7 +163,7 @@ Json camera_json(const Camera& camera) {
           {"distortion", distortion_text(camera)}};
 }
 
-// Counts of nodes for each text of what they hold, in the order of the texts.
+// Number of nodes by the description of their content.
 using Counts = std::map<std::string, std::size_t>;
 
 std::string image_text(const libmap::ImageInfo& info) {
@@ -272,7 +272,7 @@ Json stored_map_json(const libmap::StoredMap& map) {
           {"last_localization", map.last_localization_map_from_base.has_value()}};
 }
 
-// `warnings` gets what cannot be read.
+// Adds unreadable parts to `warnings`.
 Json database_json(const RtabmapDatabase& scan, std::vector<std::string>& warnings) {
   ContentSummary summary;
   scan.each_content([&](const NodeContent& content) { summary.add(content); });
@@ -289,7 +289,7 @@ Json database_json(const RtabmapDatabase& scan, std::vector<std::string>& warnin
   return json;
 }
 
-// Of any other scan the first frame stands for all.
+// Describes a scan of another format by its first frame.
 Json frames_json(const ScanSource& scan, std::vector<std::string>& warnings) {
   Json cameras = Json::array();
   Json json = Json::object();

@@ -1,4 +1,4 @@
-// What `graspmap info` says of a scan.
+// Description of scans and camera files for `graspmap info`.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -9,14 +9,15 @@
 
 namespace graspmap_tools {
 
-// Whether the path can only be a scan: *.db, a folder, or an SQLite file.
+// Returns true if the path can only be a scan: *.db, a folder, or an SQLite file.
 bool may_be_scan(const std::string& path);
 
 struct ScanInfo {
   nlohmann::ordered_json json;
   std::vector<libmap::ScanFault> faults;  // found with `verify`
 };
-// Of a camera file.
+// Describe a camera file and a scan. Throw Error if the file cannot be read. `verify` checks all
+// data of the scan and lists the faults.
 nlohmann::ordered_json camera_info(const std::string& path);
 ScanInfo scan_info(const std::string& path, bool verify, libmap::Progress& progress);
 

@@ -32,12 +32,12 @@ std::vector<Eigen::Vector3d> positions_of(const libmap::Table& table) {
 
 namespace {
 
-// A folder's manifest stands beside it, with or without '/' at the end of its name.
+// Reads the manifest of a file or folder; the folder's name may end with '/'.
 std::optional<libmap::Manifest> manifest_of(const std::filesystem::path& path) {
   return libmap::read_manifest_of(path.has_filename() ? path : path.parent_path());
 }
 
-// As the look-up was told, or as the points of a map or of its footholds lie.
+// Frame of points by their manifest: the parameter points_frame of a look-up, else the frame.
 PointFrame recorded_frame(const libmap::Manifest& points) {
   const libmap::ManifestValue* value = points.find_parameter("points_frame");
   const auto* recorded = value == nullptr ? nullptr : std::get_if<std::string>(value);
@@ -54,7 +54,7 @@ void require_same_terrain_frame(const libmap::Manifest& points, const std::strin
   const auto of_map = manifest_of(map);
   const libmap::Pose* others = terrain_from_input_of(of_map);
   if (others == nullptr || own->matrix() != others->matrix())
-    throw libmap::Error("its places lie in the terrain frame of another map",
+    throw libmap::Error("its points are in the terrain frame of another map",
                         {.file = file,
                          .field = "--points-frame",
                          .value = "auto",
@@ -152,17 +152,17 @@ libmap::Pose map_from_points(const std::string& map, PointFrame points_frame, Ru
   if (points_frame == PointFrame::map) {
     if (!manifest || manifest->find_transform(site_from_map_name) == nullptr)
       throw libmap::Error(
-          manifest ? "was made neither from what `graspmap crop` nor from what `graspmap simulate "
-                     "cameras` wrote: it does not know of the map before it"
-                   : "no manifest beside it says how it lies in the map",
+          manifest ? "its manifest has no transform site_from_map: it was not made from outputs of "
+                     "`graspmap crop` or `graspmap simulate cameras`"
+                   : "has no manifest with the transform site_from_map",
           {.file = map, .field = "--points-frame", .value = "map", .bound = "input or terrain"});
     return *site_from_map_of(map);
   }
   if (!manifest) {
-    run.warn(map + ": no manifest beside it: listed points are taken in its own frame");
+    run.warn(map + ": has no manifest; listed points are assumed to be in its frame");
     return libmap::Pose::Identity();
   }
-  // Clouds and meshes that were never scored have one frame alone.
+  // Clouds and meshes that were not scored have one frame only.
   const libmap::Pose* terrain_from_input = manifest->find_transform(terrain_from_input_name);
   const bool map_in_terrain = manifest->frame == "terrain";
   const bool points_in_terrain = points_frame == PointFrame::terrain;

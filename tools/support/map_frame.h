@@ -1,4 +1,4 @@
-// Points that a user lists, carried into the frame of a map.
+// Frames of listed points and maps, and transforms between them from manifests.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,72 +9,73 @@
 
 namespace graspmap_tools {
 
-// Which frame listed points are in: that of the cloud that was scored, the terrain frame, or that
-// of the map that `graspmap crop` made the site from or in which a simulated robot stood.
+// Frame of listed points. input: the cloud that was scored; terrain: the terrain frame; map: the
+// map before `graspmap crop`, or the map of a simulated robot; automatic: by the manifest of the
+// points' file, else input.
 enum class PointFrame { input, terrain, map, automatic };
-// Without `automatic`, for what comes from no file.
+// Names without `automatic`, for points that are not from a file.
 using PointFrameNames = std::vector<std::pair<std::string, PointFrame>>;
 PointFrameNames point_frame_names();
-// With it: as the manifest beside the file of points says, else `input`.
+// Names with `automatic`.
 PointFrameNames listed_point_frame_names();
 
-// The frame of the points in the file `points`: `asked`, unless that is automatic. The run's
-// parameter points_frame becomes what was found. Throws Error if the points lie in the terrain
-// frame of another map than `map`.
+// Returns the frame of the points in the file `points`: `asked`, unless that is automatic. Sets the
+// run's parameter points_frame to the result. Throws Error if the points are in the terrain frame
+// of another map than `map`.
 PointFrame frame_of_points(const std::string& points, PointFrame asked, const std::string& map,
                            Run& run);
 
-// The columns x, y, z, in meters. Throws Error naming the file, the row and the column, and for a
-// table without rows.
+// Returns the columns x, y, z, in meters. Throws Error naming the file, row and column of a missing
+// or invalid value, and for a table without rows.
 std::vector<Eigen::Vector3d> positions_of(const libmap::Table& table);
 
-// The transform of what was scored; nullptr if the manifest has none.
+// Returns the transform from the scored cloud to the terrain frame; nullptr if there is none.
 inline constexpr const char* terrain_from_input_name = "terrain_from_input";
 const libmap::Pose* terrain_from_input_of(const std::optional<libmap::Manifest>& manifest);
 
-// The name of the transform that `crop` and `simulate cameras` make and that others carry on. It
-// always leads from the map as it was before the first of them.
+// Name of the transform that `crop` and `simulate cameras` write and later commands copy. It always
+// starts from the map before the first of them.
 inline constexpr const char* site_from_map_name = "site_from_map";
 
-// From the map before it was cropped, or in which a simulated robot stood, to the points in `file`,
-// as the file's manifest says; nothing if it says nothing.
+// Returns the transform from the map before `crop`, or the map of a simulated robot, to the points
+// in `file`, from the file's manifest; nullopt if there is none.
 std::optional<libmap::Pose> site_from_map_of(const std::string& file);
 std::optional<libmap::Pose> site_from_map_of(const libmap::Manifest& manifest);
 
-// The name of the transform of what lies in the frame of a scan's true poses, or was made from
-// that.
+// Name of the transform to the frame of a scan's true poses.
 inline constexpr const char* truth_from_poses_name = "ground_truth_from_poses";
 
-// Whether `file`, or what it was made from, lies in the frame of true poses, as its manifest says.
+// Returns true if, by its manifest, `file` or its source is in the frame of true poses.
 bool is_from_true_frame(const std::string& file);
 
-// For an output in the frame of `input`: its manifest gets the input's site_from_map,
-// ground_truth_from_poses and georeference, those that it has.
+// Copies site_from_map, ground_truth_from_poses and georeference from the input's manifest to the
+// run's, for an output in the frame of `input`.
 void carry_transforms(const std::string& input, Run& run);
-// The same and the frame's name.
+// Also copies the frame's name.
 void carry_frame(const std::string& input, Run& run);
-// For a map made of a map: frame, transforms, and the parameters and results that the run's
-// manifest does not have itself, such as its zero plane, lattice and method.
+// For a map made from a map: copies frame, transforms, georeference, and the parameters and results
+// that the run's manifest does not have, such as zero plane, lattice and method.
 void carry_facts(const libmap::Manifest& source, Run& run);
-// One of them alone; a DEM (.tif) is a georeference itself.
+// Copy one of them only; the georeference of a DEM (.tif) is read from the file itself.
 void carry_truth_transform(const std::string& input, Run& run);
 void carry_georeference(const std::string& input, Run& run);
 
-// For an output in the terrain frame of `map`: its manifest gets the map's terrain_from_input.
+// Copies terrain_from_input from the map's manifest to the run's, for an output in the terrain
+// frame of `map`.
 void carry_terrain_transform(const std::string& map, Run& run);
 
-// From the frame of listed points to that of the points in `map`, as its manifest says; the
-// identity, with a warning, if it has none. Throws Error if points are in the frame of a map that
-// was not cropped.
+// Returns the transform from the frame of listed points to that of the points in `map`, from its
+// manifest; the identity, with a warning, if it has none. Throws Error if `points_frame` is map and
+// the manifest has no site_from_map.
 libmap::Pose map_from_points(const std::string& map, PointFrame points_frame, Run& run);
 
-// From the cloud that was scored to the points of a map, and from these to its terrain frame, as
-// the map's manifest says; the identity if it says nothing.
+// Return the transforms from the scored cloud to the points of a map, and from these to the terrain
+// frame, from the map's manifest; the identity if it has none.
 libmap::Pose map_from_input(const std::optional<libmap::Manifest>& manifest);
 libmap::Pose terrain_from_map(const std::optional<libmap::Manifest>& manifest);
 
-// The outside of the regression plane in the frame of a map's points, as the map's manifest says;
-// the z axis if it says nothing.
+// Returns the upward normal of the regression plane in the frame of a map's points, from the map's
+// manifest; the z axis if it has none.
 Eigen::Vector3d up_of_map(const std::optional<libmap::Manifest>& manifest);
 
 }  // namespace graspmap_tools

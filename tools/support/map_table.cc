@@ -12,16 +12,16 @@ namespace graspmap_tools {
 
 void bind(libmap::ParameterTable& table, MapTableOptions& options) {
   table.add("cutoff", options.cutoff,
-            "of several maps: score from which a voxel counts as graspable; auto: each map's own "
+            "for several maps: minimum score of a graspable voxel; auto: each map's own "
             "threshold");
   table.add("names", options.names,
-            "of several maps in the tables, in their order, with | between; default: their files");
-  table.add("pairs", options.pairs, "of several maps of one cloud: compare each with each");
+            "for several maps: their names in the tables, separated by |; default: their files");
+  table.add("pairs", options.pairs, "for several maps of one cloud: compare all pairs of maps");
   table.add("varied", options.varied,
-            "of several maps: parameter that they differ in, a column of maps.csv; charts show the "
-            "graspable share and, with --expected, Youden's index against it");
+            "for several maps: varied parameter, a column of maps.csv; charts show the graspable "
+            "share and, with --expected, Youden's index against it");
   table.add("series", options.series,
-            "of these charts: columns of maps.csv, with commas between; one curve per combination");
+            "columns of maps.csv, separated by commas; charts have one curve per combination");
 }
 
 namespace {
@@ -47,7 +47,8 @@ ReadMap summarize_one(const std::string& file, const MapTableOptions& options,
   own.graspability_threshold = map.cutoff = cutoff_of(options, own);
   read.voxels = libgtd::voxel_map_of(cloud, libgtd::facts_of(map.manifest));
   if (map.manifest.find_parameter("zero_plane_m") == nullptr)
-    run.warn(file + ": no manifest tells its zero plane: all its points are taken to lie above");
+    run.warn(file +
+             ": has no manifest with the zero plane; all its points are assumed to be above");
   map.summary = libgtd::summarize_map(cloud, read.voxels, own);
   if (expected != nullptr)
     map.expected = libgtd::evaluate_expected_map(
@@ -97,8 +98,8 @@ void say(const libgtd::SummarizedMap& map, Run& run) {
   run.say(text);
 }
 
-// Rows without one of the two numbers are left out. The curves are in the order in which their
-// names first appear, their points by ascending x.
+// Chart of column y against x; rows without one of the two numbers are ignored. Curves are in the
+// order of the first appearance of their names, their points by ascending x.
 libmap::Chart chart_of(const libmap::Table& table, const std::string& x, const std::string& y,
                        const std::string& series) {
   libmap::Chart chart;

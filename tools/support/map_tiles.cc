@@ -23,7 +23,7 @@ std::optional<libgtd::TileStoreIndex> index_of(const libmap::Manifest& manifest)
   if (!lattice) return std::nullopt;
   libgtd::TileStoreIndex index;
   index.lattice = *lattice;
-  // The thesis's program counts in single precision, its voxels' size included.
+  // The thesis's program computes in single precision, including the voxel size.
   const libmap::ManifestValue* value = manifest.find_parameter("method");
   for (const auto& [known, method] : libgtd::method_names())
     if (value != nullptr && *value == libmap::ManifestValue(known) &&
@@ -48,7 +48,7 @@ void write_tile(const std::filesystem::path& store, const libmap::PointCloud& po
 
 void require_no_index(const libgtd::MapTileStore& store) {
   if (std::filesystem::exists(store.index_path()))
-    throw libmap::Error("is complete, but its folder `progress` is not there: --force starts again",
+    throw libmap::Error("is complete, but has no folder `progress`: --force replaces it",
                         {.file = store.folder().string()});
 }
 
@@ -70,8 +70,8 @@ Eigen::AlignedBox3d MapTiles::box(std::size_t tile) const {
              : box;
 }
 
-// Files hold single precision where that moves no coordinate by more than 1e-5 m. Below 256 m it
-// moves none by more than 7.7e-6 m; beyond, the whole map needs double precision if any tile does.
+// Files have single precision if its rounding is at most 1e-5 m. Below 256 m it is at most 7.7e-6
+// m; beyond, the whole map needs double precision if any tile does.
 bool MapTiles::need_float64() const {
   Eigen::AlignedBox3d whole;
   for (std::size_t n = 0; n < index_.tiles.size(); ++n) whole.extend(box(n));
@@ -87,7 +87,7 @@ libmap::PointCloud MapTiles::read(const std::filesystem::path& file,
                                   const libgtd::StoredTile& tile) const {
   libmap::PointCloud cloud = libmap::read_cloud(file).cloud;
   if (cloud.size() != tile.voxels)
-    throw libmap::Error("contains other points than the store's index says",
+    throw libmap::Error("number of points differs from the store's index",
                         {.file = file.string(),
                          .field = "points",
                          .value = std::to_string(cloud.size()),
@@ -111,17 +111,17 @@ namespace {
 libmap::Manifest manifest_of(const std::string& tile) {
   const auto manifest = libmap::read_manifest_of(tile);
   if (!manifest)
-    throw libmap::Error("no manifest beside it: it is not a tile that `graspmap score` wrote",
+    throw libmap::Error("has no manifest: it is not a tile that `graspmap score` wrote",
                         {.file = tile});
   return *manifest;
 }
 
-// Single precision in some shares' files and double in others would meet in the whole.
+// Recomputes positions on the lattice, because shares may differ in precision.
 void restore_full_precision(const libmap::Manifest& part, libmap::PointCloud& whole) {
   if (const auto index = index_of(part)) libgtd::restore_positions(*index, whole);
 }
 
-// The tiles of a store that share their i, one after the other: consecutive in the map's order.
+// Range of tiles with the same i, which are consecutive in the map's order.
 struct TileRow {
   std::size_t begin = 0;
   std::size_t end = 0;
@@ -150,7 +150,7 @@ void merge_store(const std::string& store, const std::string& output, const Merg
                  Run& run) {
   const libmap::GeometryWriteOptions& writing = options.writing;
   if (libmap::format_of(output) == ".pcd" && writing.encoding != libmap::FileEncoding::binary)
-    throw libmap::Error("a tile store is written as binary .pcd",
+    throw libmap::Error("a tile store can be merged only as binary .pcd",
                         {.file = output, .field = "--encoding"});
   const MapTiles tiles(store);
   const libgtd::TileStoreIndex& index = tiles.index();
@@ -208,7 +208,8 @@ void merge_tiles(const std::vector<std::string>& tiles, const std::string& outpu
   run.claim_output(output, tiles);
   const auto store = std::find_if(tiles.begin(), tiles.end(), is_tile_store);
   if (store != tiles.end()) {
-    if (tiles.size() > 1) throw libmap::Error("a tile store is merged by itself", {.file = *store});
+    if (tiles.size() > 1)
+      throw libmap::Error("a tile store cannot be merged with other files", {.file = *store});
     return merge_store(*store, output, options, run);
   }
   std::vector<libmap::Manifest> manifests;
@@ -220,14 +221,14 @@ void merge_tiles(const std::vector<std::string>& tiles, const std::string& outpu
   libmap::PointCloud whole = joined(parts, tiles.front());
   restore_full_precision(manifests.front(), whole);
   libgtd::copy_common_facts(manifests.front(), run.manifest());
-  // The terrain and the gripper that the parts were made from, then the parts.
+  // The inputs are those of the shares, then the shares.
   run.manifest().inputs = manifests.front().inputs;
   for (const std::string& tile : tiles) run.add_input(tile);
   run.add_results({{"scored_voxels", whole.size()},
                    {"border_voxels", libgtd::count_set(whole, "border")},
                    {"graspable_voxels", libgtd::count_set(whole, "graspable")}});
   run.say("{} scored voxels from {} files", whole.size(), parts.size());
-  // A share has slopes alone: the whole map decides on obstacles.
+  // Shares have slopes only, because obstacles depend on the whole map.
   if (whole.find_field("slope_deg") != nullptr) {
     const std::size_t obstacles = in_file(libmap::manifest_path(tiles.front()).string(), [&] {
       return libgtd::add_obstacles_of(manifests.front(), whole);

@@ -1,4 +1,4 @@
-// Tile stores, and shares of maps, as commands read, fill and merge them.
+// Reads, fills and merges tile stores and shares of maps.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -15,41 +15,41 @@
 
 namespace graspmap_tools {
 
-// Whether commands take `path` for a tile store: its name ends in .tiles.
+// Returns true if the path is that of a tile store: its name ends with .tiles.
 bool is_tile_store(const std::string& path);
 
 std::filesystem::path store_index_path(const std::string& store);
 
-// What the manifest of a map in one file says of it, as the index of a store: lattice, frame,
-// transforms, no tiles. Nothing if it knows no lattice.
+// Converts the manifest of a map in one file to the index of a store: lattice, frame, transforms,
+// no tiles. Returns nullopt if the manifest has no lattice.
 std::optional<libgtd::TileStoreIndex> index_of(const libmap::Manifest& manifest);
 
-// Writes the file of a tile of the store, and adds facts on the file to the tile.
+// Writes the file of a tile of the store, and adds its hash and size to `tile`.
 void write_tile(const std::filesystem::path& store, const libmap::PointCloud& points,
                 libgtd::StoredTile& tile);
 
-// Throws Error if a store has an index but no plan to resume by.
+// Throws Error if a store has an index but no plan for resuming.
 void require_no_index(const libgtd::MapTileStore& store);
 
 class MapTiles {
  public:
-  // Throws Error naming the store or its index: missing, incomplete, damaged, without a tile.
+  // Throws Error naming the store or its index if it is missing, incomplete, damaged or empty.
   explicit MapTiles(const std::string& store);
-  // Of a store whose index is not written.
+  // Opens a store whose index is not written yet.
   MapTiles(std::filesystem::path store, libgtd::TileStoreIndex index);
 
   const libgtd::TileStoreIndex& index() const { return index_; }
 
-  // A tile's points at the positions that the file of the merged map has. Throws Error naming the
-  // tile's file: it is missing, damaged, or does not hold what the index says. May be called from
+  // Returns a tile's points at the positions that the file of the merged map has. Throws Error
+  // naming the tile's file if it is missing, damaged or differs from the index. Can be called from
   // several threads.
   libmap::PointCloud load(std::size_t tile) const;
-  // The same, and the file's hash is compared with the index.
+  // Like load, and compares the file's hash with the index.
   libmap::PointCloud load_checked(std::size_t tile) const;
 
-  // Around the centers of a tile's voxels, in the frame of the map's points.
+  // Returns the bounding box of a tile's voxel centers, in the frame of the map's points.
   Eigen::AlignedBox3d box(std::size_t tile) const;
-  // Whether the file of the merged map holds positions in double precision.
+  // Returns true if the file of the merged map has positions in double precision.
   bool float64_positions() const { return float64_positions_; }
 
  private:
@@ -61,11 +61,11 @@ class MapTiles {
   bool float64_positions_ = false;
 };
 
-// A tile store, or one of several shares of a map by its manifest.
+// Returns true for a tile store, or if the manifest of `file` is that of one of several shares.
 bool is_part_of_map(const std::string& file);
 
-// Writes the tiles of a store as one map, a PCD row by row of tiles; other formats need the whole
-// map in memory. Errors name `store`.
+// Writes the tiles of a store as one map. PCD files are written by rows of tiles; other formats
+// need the whole map in memory. Errors name `store`.
 void write_merged(const MapTiles& tiles, const std::string& store,
                   const std::filesystem::path& file, const libmap::GeometryWriteOptions& writing,
                   Run& run);
@@ -75,10 +75,10 @@ struct MergeOptions {
   double pixel_size_m = 0.0;  // of a raster, .tif; 0: the voxel size
 };
 
-// Writes the same bytes as scoring in one run. `tiles` are all shares that `score --tile K/N`
-// wrote, in any order, or one tile store, which is merged row by row of tiles. Throws Error if a
-// share is missing, given twice, or of another map.
-// A store is written as binary .pcd, in another format, or as .tif (the raster alone is in memory).
+// Merges tiles to the same bytes as scoring in one run. `tiles` are all shares that `score --tile
+// K/N` wrote, in any order, or one tile store. A store is written as binary .pcd by rows of tiles,
+// in another cloud format, or as .tif with only the raster in memory. Throws Error if a share is
+// missing, given twice, or of another map.
 void merge_tiles(const std::vector<std::string>& tiles, const std::string& output,
                  const MergeOptions& options, Run& run);
 

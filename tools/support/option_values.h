@@ -1,4 +1,4 @@
-// What the texts of options say.
+// Parses the texts of options.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,25 +9,26 @@
 
 namespace graspmap_tools {
 
-// "a| b||c" at '|' -> a, b, "", c; nothing for an empty text.
+// Splits at '|': "a| b||c" -> a, b, "", c; returns nothing for an empty text.
 std::vector<std::string> split_texts(std::string_view text);
-// The same. Throws Error with `reason` and `field` if there are more than `most`.
+// Splits at '|'. Throws Error with `reason` and `field` if there are more than `most` texts.
 std::vector<std::string> split_texts(std::string_view text, std::size_t most,
                                      const std::string& reason, const std::string& field);
 
-// `count` finite numbers with commas between them; nothing for any other text.
+// Parses `count` finite numbers, separated by commas; returns nullopt for any other text.
 std::optional<std::vector<double>> split_numbers(std::string_view text, std::size_t count);
-// The same. Throws Error naming `field` and `bound`, the form that it must have.
+// Parses `count` finite numbers. Throws Error naming `field` and `bound`, the expected form.
 std::vector<double> parse_numbers(const std::string& text, std::size_t count,
                                   const std::string& field, const std::string& bound);
 
-// "X,Y,Z". Throws Error naming `field`.
+// Parses "X,Y,Z". Throws Error naming `field`.
 Eigen::Vector3d parse_vector(const std::string& text, const std::string& field);
 
-// "3x2", or "3" for both: two finite numbers above 0; nothing for any other text.
+// Parses "3x2", or "3" for both: two finite numbers > 0. Returns nullopt for any other text.
 std::optional<Eigen::Vector2d> split_size(std::string_view text);
 
-// A finite number; nothing for `word`. Throws Error with `reason`, `field` and `bound`.
+// Parses a finite number; returns nullopt for `word`. Throws Error with `reason`, `field` and
+// `bound` for any other text.
 std::optional<double> parse_number_or(std::string_view word, const std::string& text,
                                       const std::string& reason, const std::string& field,
                                       const std::string& bound);

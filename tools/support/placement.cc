@@ -19,7 +19,7 @@ libmap::Pose read_matrix(const fs::path& path) {
   const std::string text = libmap::read_whole_file(path, std::uint64_t{1} << 16U);
   const auto refuse = [&](const std::string& field, const std::string& value) {
     throw libmap::Error(
-        "no transform",
+        "is not a transform",
         {.file = file, .field = field, .value = value, .bound = "four rows of four numbers"});
   };
   Eigen::Matrix4d matrix;
@@ -34,7 +34,7 @@ libmap::Pose read_matrix(const fs::path& path) {
   const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
   if (!(rotation.transpose() * rotation).isApprox(Eigen::Matrix3d::Identity(), tolerance) ||
       !(rotation.determinant() > 0.0) || matrix.row(3) != Eigen::RowVector4d(0, 0, 0, 1))
-    throw libmap::Error("the matrix is no rotation and translation", {.file = file});
+    throw libmap::Error("the matrix is not a rotation and translation", {.file = file});
   libmap::Pose pose = libmap::Pose::Identity();
   pose.linear() = libmap::nearest_rotation(rotation);
   pose.translation() = matrix.topRightCorner<3, 1>();
@@ -55,7 +55,7 @@ std::string transform_text(const libmap::Pose& pose) {
   std::string text;
   const auto add = [&](double value, int decimals) {
     const std::string number = libmap::to_fixed_text(value, decimals);
-    // No sign before what rounds to zero.
+    // Numbers that round to zero get no sign.
     text += (number.find_first_of("123456789") == std::string::npos
                  ? libmap::to_fixed_text(0.0, decimals)
                  : number) +
@@ -73,7 +73,7 @@ std::optional<libmap::Bounds3d> parse_box(const std::string& text) {
   const std::vector<double> n = parse_numbers(text, 6, "--box", bound);
   const libmap::Bounds3d box{{n[0], n[1], n[2]}, {n[3], n[4], n[5]}};
   if ((box.min.array() > box.max.array()).any())
-    throw libmap::Error("the box is inside out",
+    throw libmap::Error("a minimum of the box is above its maximum",
                         {.file = {}, .field = "--box", .value = text, .bound = bound});
   return box;
 }
@@ -90,9 +90,8 @@ libmap::PointCloud part_in_box(const libmap::PointCloud& cloud,
   for (std::size_t n = 0; n < cloud.size(); ++n)
     if (is_inside(box, cloud.positions[n])) inside.push_back(n);
   if (inside.empty())
-    throw cloud.empty()
-        ? libmap::Error("the cloud has no points", {.file = file})
-        : libmap::Error("no point lies in the box", {.file = file, .field = "--box"});
+    throw cloud.empty() ? libmap::Error("the cloud has no points", {.file = file})
+                        : libmap::Error("no point is in the box", {.file = file, .field = "--box"});
   return libmap::select_points(cloud, inside);
 }
 

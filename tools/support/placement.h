@@ -1,4 +1,4 @@
-// Poses and boxes as they stand on the command line.
+// Parses poses and boxes of the command line.
 #pragma once
 
 #include <optional>
@@ -9,19 +9,21 @@
 
 namespace graspmap_tools {
 
-// "X,Y,Z,ROLL,PITCH,YAW" in meters and degrees about the fixed axes, roll first; or the name of a
-// file of four rows of four numbers, as `crop` writes. Empty: the identity. Throws Error.
+// Parses "X,Y,Z,ROLL,PITCH,YAW" in meters and degrees about the fixed axes, roll first, or reads a
+// file of four rows of four numbers, as `crop` writes. Returns the identity for an empty text.
+// Throws Error naming the field or file.
 libmap::Pose parse_transform(const std::string& text, const std::string& field);
 
-// The six numbers that parse_transform reads back as `pose`.
+// Returns the six numbers that parse_transform converts back to `pose`.
 std::string transform_text(const libmap::Pose& pose);
 
-// "XMIN,YMIN,ZMIN,XMAX,YMAX,ZMAX" in meters; nothing where empty. Throws Error.
+// Parses "XMIN,YMIN,ZMIN,XMAX,YMAX,ZMAX" in meters; returns nullopt for an empty text. Throws Error
+// if a minimum is above its maximum or the text has another form.
 std::optional<libmap::Bounds3d> parse_box(const std::string& text);
 
 bool is_inside(const std::optional<libmap::Bounds3d>& box, const Eigen::Vector3d& point);
 
-// The points in the box. Throws Error naming `file` if there is none.
+// Returns the points in the box. Throws Error naming `file` if there are none.
 libmap::PointCloud part_in_box(const libmap::PointCloud& cloud,
                                const std::optional<libmap::Bounds3d>& box, const std::string& file);
 

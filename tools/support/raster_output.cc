@@ -7,8 +7,7 @@ namespace graspmap_tools {
 
 namespace {
 
-// Of the lattice's axes in the frame, the one that is nearer to horizontal, as the direction of
-// columns.
+// Direction of columns: the lattice's x or y axis, whichever is nearer to horizontal.
 Eigen::Vector2d column_axis_of(const Eigen::Matrix3d& frame_from_lattice) {
   const Eigen::Vector2d x = frame_from_lattice.col(0).head<2>();
   const Eigen::Vector2d y = frame_from_lattice.col(1).head<2>();
@@ -32,7 +31,7 @@ libmap::MapRaster raster_of(const libmap::CloudParts& parts, const libmap::Manif
     grid.corner_m = (frame_from_lattice * index->lattice.origin_m).head<2>();
   }
   if (grid.pixel_size_m == 0.0)
-    throw libmap::Error("missing: no voxel size in the manifest of the input",
+    throw libmap::Error("is missing, and the manifest of the input has no voxel size",
                         {.field = "--pixel-size"});
   libmap::MapRaster raster = libmap::make_map_raster(parts, grid);
   if (manifest.georeference) raster.georeference = *manifest.georeference;

@@ -26,7 +26,7 @@ Json array_of(const Items& items, const JsonOf& json_of) {
   return array;
 }
 
-// Why pairs of frames gave no link, by its name in both kinds of report.
+// Numbers of pairs of frames without a link by reason, with the names of both kinds of report.
 std::vector<std::pair<const char*, std::size_t>> rejections_of(
     const libmap::RejectionCounts& counts) {
   return {{"too_few_matches", counts.too_few_matches},
@@ -86,7 +86,7 @@ Json stage_json(const libmap::StageReport& stage) {
   return json;
 }
 
-// Standard deviations of a node against its part's gauge node.
+// Standard deviations of a node relative to its part's gauge node.
 Json node_json(int node, const libmap::Matrix6d& covariance) {
   Json rows = Json::array();
   for (int row = 0; row < 6; ++row)
@@ -129,7 +129,7 @@ void add_errors(const libmap::StageReport& stage, std::string& text) {
     line("absolute", stage.error->absolute);
     line("relative", stage.error->relative);
   }
-  if (stage.rejected_error) line("given up: absolute", stage.rejected_error->absolute);
+  if (stage.rejected_error) line("rejected: absolute", stage.rejected_error->absolute);
 }
 
 void add_stage(const libmap::StageReport& stage, std::string& text) {
@@ -202,7 +202,7 @@ std::string refinement_text(const std::string& scan, const libmap::RefinementRes
   for (const libmap::StageReport& stage : result.stages) add_stage(stage, text);
   fmt::format_to(out, "\n");
   for (const libmap::GraphComponent& part : result.components)
-    fmt::format_to(out, "part of {} nodes, of which {} stays where it was\n", part.nodes.size(),
+    fmt::format_to(out, "part of {} nodes, relative to node {}\n", part.nodes.size(),
                    part.gauge_node);
   fmt::format_to(out, "nodes without links:{}\nnodes without pose:{}\n",
                  numbers_text(result.without_links), numbers_text(result.without_pose));
@@ -218,7 +218,7 @@ std::string refinement_text(const std::string& scan, const libmap::RefinementRes
   for (const std::string& warning : result.warnings) fmt::format_to(out, "warning: {}\n", warning);
   fmt::format_to(
       out,
-      "\nstandard deviations of each pose against its part's fixed node, in its own axes\n"
+      "\nstandard deviations of each pose relative to its part's fixed node, in its own axes\n"
       "  node     x mm     y mm     z mm    x deg    y deg    z deg\n");
   for (const auto& [node, covariance] : result.covariance) {
     fmt::format_to(out, "{:6}", node);

@@ -1,4 +1,4 @@
-// What `graspmap refine` did, stage by stage, as JSON for programs and as text for people.
+// Reports of `graspmap refine` by stage, as JSON and as text.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// Results as JSON, and the facts on finished tiles.
+// Converts results to JSON, and to and from the stored results of finished tiles.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -11,22 +11,22 @@
 namespace graspmap_tools {
 
 nlohmann::ordered_json to_json(const libmap::ManifestValue& value);
-nlohmann::ordered_json to_json(const libmap::ResultTable& table);  // null without a value
+nlohmann::ordered_json to_json(const libmap::ResultTable& table);  // missing values are null
 
 inline nlohmann::ordered_json numbers_json(const Eigen::Vector3d& position) {
   return {position.x(), position.y(), position.z()};
 }
-// null if there are no positions.
+// Returns the bounding box; null if there are no positions.
 inline nlohmann::ordered_json bounds_json(const std::vector<Eigen::Vector3d>& positions) {
   if (positions.empty()) return nullptr;
   const libmap::Bounds3d bounds = libmap::bounds_of(positions);
   return {{"min", numbers_json(bounds.min)}, {"max", numbers_json(bounds.max)}};
 }
 
-// To standard output, with what is no UTF-8 replaced.
+// Prints to standard output; invalid UTF-8 is replaced.
 void print_json(const nlohmann::ordered_json& json);
 
-// What each tile adds to the results of the whole (Merge), and back.
+// Converts the results of a tile that are merged over tiles (Merge) to JSON, and back.
 template <typename Result>
 nlohmann::json facts_of(const Result& result) {
   nlohmann::json facts;

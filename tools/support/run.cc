@@ -29,25 +29,25 @@ std::optional<libmap::Manifest> own_manifest_of(const fs::path& output) {
 
 bool written_by_this_toolkit(const fs::path& output) { return own_manifest_of(output).has_value(); }
 
-// A file of the user's own that happens to stand where the manifest will.
+// Throws Error if a file of the user has the manifest's path.
 void require_no_foreign_manifest(const fs::path& output) {
   const fs::path manifest = libmap::manifest_path(output);
   if (fs::exists(manifest) && !written_by_this_toolkit(output))
-    throw libmap::Error("exists and is no manifest of graspmap: --force overwrites it",
+    throw libmap::Error("exists and is not a manifest of graspmap: --force overwrites it",
                         {.file = manifest.string()});
 }
 
 void require_other_than_inputs(const fs::path& output, const std::vector<std::string>& inputs) {
   for (const std::string& input : inputs)
     if (fs::exists(output) && fs::exists(input) && fs::equivalent(output, input))
-      throw libmap::Error("is the input: the output needs another name", {.file = output.string()});
+      throw libmap::Error("is the input: choose another output name", {.file = output.string()});
 }
 
 void write_named(const libmap::OutputFile& output, const Run::Writer& writer) {
   libmap::write_named(output.temporary_path(), output.final_path(), writer);
 }
 
-// What a killed run has left is none.
+// Returns true if the folder contains files other than leftovers of killed runs.
 bool holds_outputs(const fs::path& folder) {
   const fs::directory_iterator entries(folder);
   return std::any_of(begin(entries), end(entries), [](const fs::directory_entry& entry) {
@@ -59,7 +59,7 @@ constexpr std::size_t max_message_bytes = 1000;
 
 bool is_continuation(char c) { return (static_cast<std::uint8_t>(c) & 0xC0) == 0x80; }
 
-// Bytes of the printable UTF-8 character that `text` begins with (RFC 3629), 0 if there is none.
+// Number of bytes of the first character of `text` if it is printable UTF-8 (RFC 3629), else 0.
 std::size_t character_bytes(std::string_view text) {
   const auto first = static_cast<std::uint8_t>(text[0]);
   if (first < 0x80) return first >= 0x20 && first != 0x7F ? 1 : 0;
@@ -95,7 +95,7 @@ void make_folder(const fs::path& folder) {
   std::error_code code;
   fs::create_directories(folder, code);
   if (code)
-    throw libmap::Error("cannot be made: " + code.message(), {.file = folder.string()},
+    throw libmap::Error("cannot be created: " + code.message(), {.file = folder.string()},
                         libmap::ErrorKind::failed);
 }
 
@@ -181,7 +181,7 @@ void Run::claim_output(const fs::path& path, const std::vector<std::string>& inp
     throw libmap::Error("exists and was not written by graspmap: --force overwrites it",
                         {.file = path.string()});
   if (!options_.force) require_no_foreign_manifest(path);
-  // Made and dropped at once: a folder that is missing or read-only is found before the work.
+  // Reports a missing or read-only folder before the work.
   const libmap::OutputFile probe(path);
   claim_manifest(path);
 }
@@ -202,8 +202,8 @@ libmap::OutputFile Run::begin_manifest(const fs::path& output) {
 }
 
 void Run::write_together(const fs::path& output, const Files& files, bool is_timed) {
-  // The manifest goes first: an output without one would not be recognized as ours, and `make`
-  // evaluates by the output, which is then still the old one.
+  // The manifest comes first, because outputs without one are not recognized. `make` decides by the
+  // output, which is the former one until it is replaced.
   std::vector<libmap::OutputFile> outputs;
   outputs.push_back(begin_manifest(output));
   const auto write = [&] {
@@ -267,7 +267,7 @@ void Run::require_own_folder(const fs::path& given, const std::string& remedy) {
       throw libmap::Error("is not empty and was not written by graspmap" + remedy,
                           {.file = folder.string()});
     if (manifest->command != command_)
-      throw libmap::Error("contains what graspmap " + manifest->command + " wrote" + remedy,
+      throw libmap::Error("contains outputs of graspmap " + manifest->command + remedy,
                           {.file = folder.string()});
   }
   if (!options_.force) require_no_foreign_manifest(folder);
@@ -297,7 +297,7 @@ void Run::check_output_tree(const fs::path& given, const std::vector<std::string
 void Run::claim_output_tree(const fs::path& given, const std::vector<std::string>& names,
                             const std::vector<std::string>& inputs) {
   check_output_tree(given, inputs);
-  // Made and dropped at once: what cannot be written or replaced is found before the work.
+  // Reports a folder that cannot be written or replaced before the work.
   const libmap::OutputFolder probe(given, names);
   claim_manifest(without_trailing_slash(given.string()));
 }

@@ -1,5 +1,5 @@
-// One run of a command: its messages, its timings and its outputs. Files of commands have from here
-// what nearly each of them needs of the standard library, fmt and libmap/core.
+// One run of a command: its messages, timings and outputs. Also includes the headers of the
+// standard library, fmt and libmap/core that nearly all commands need.
 #pragma once
 
 #include <fmt/format.h>
@@ -27,12 +27,12 @@ namespace graspmap_tools {
 
 using libmap::in_file;
 
-// For a terminal, of a text that may come from a file: one line of printable UTF-8. Control
-// characters and bytes that are no UTF-8 become \xNN, line breaks spaces; the middle of a long text
-// is left out.
+// Converts a text, possibly from a file, to one line of printable UTF-8 for a terminal. Control
+// characters and invalid bytes become \xNN, line breaks become spaces; a long text is shortened in
+// the middle.
 std::string message_text(const std::string& text);
 
-// "maps/" and "maps" name the same folder, and its manifest stands beside it.
+// Removes a trailing slash: "maps/" and "maps" are the same folder with the same manifest.
 std::string without_trailing_slash(std::string path);
 
 struct RunOptions {
@@ -53,11 +53,11 @@ class Run {
 
   void add_results(const libmap::ResultTable& table) { manifest_.add_results(table); }
 
-  // Hashes an input into the manifest, of a folder each file; the toolkit's own data by its place
-  // among them, so that the manifest does not depend on where the toolkit lies.
+  // Adds an input with its hash to the manifest; for a folder, each of its files. Paths of the
+  // toolkit's own data are relative, so that the manifest does not depend on the installation.
   void add_input(const std::filesystem::path& path);
 
-  // To stderr: unless --quiet; always; with --verbose only.
+  // Print to stderr: `say` without --quiet, `warn` always, `detail` with --verbose.
   void say(const std::string& text);
   void warn(const std::string& text);
   void detail(const std::string& text);
@@ -74,48 +74,47 @@ class Run {
     detail(fmt::format(text, std::forward<Values>(values)...));
   }
 
-  // Runs `step` and keeps its wall time in the manifest.
+  // Runs `step` and adds its wall time to the manifest.
   template <typename Step>
   auto timed(const std::string& name, const Step& step) {
     const Timing timing(*this, name);
     return step();
   }
-  // What a stage has timed itself, as "STAGE: STEP"; shown with --verbose.
+  // Adds times that a stage measured itself, as "STAGE: STEP"; shown with --verbose.
   void add_timings(const std::vector<std::pair<std::string, double>>& timings_s,
                    const std::string& stage = {});
 
-  // Throws Error if `path` is one of the inputs, if it exists and this toolkit did not write it,
-  // unless --force, if it cannot be written, or if another process has claimed it. Call it before
-  // the work: from here to the end of this run the output is this process's alone.
+  // Reserves the output for this process until the end of the run; called before the work. Throws
+  // Error if `path` is one of the inputs, exists and was not written by this toolkit (unless
+  // --force), cannot be written, or is claimed by another process.
   void claim_output(const std::filesystem::path& path, const std::vector<std::string>& inputs = {});
 
-  // writer(temporary) writes the file; it is put in place whole, with its manifest beside it. With
-  // --dry-run nothing is written.
+  // Calls writer(temporary), which writes the file, then moves it to `path` together with its
+  // manifest. With --dry-run nothing is written.
   using Writer = std::function<void(const std::filesystem::path& temporary)>;
   static Writer text_writer(std::string text);
   void write_output(const std::filesystem::path& path, const Writer& writer);
   void write_text(const std::filesystem::path& path, const std::string& text);
 
-  // The same of an output in several files, `path` the last of them: all are written before the
-  // first is put in place, in their order, so that where `path` is the others are. These must not
-  // stand there already unless an earlier run of this command wrote `path`, or --force:
-  // require_own_companions throws Error if one does, and may be called before the work.
+  // write_outputs writes an output of several files, `path` the last of them. All are written
+  // before they are moved in order, so that all others exist if `path` does. require_own_companions
+  // throws Error if one of the others exists and no earlier run of this command wrote `path`
+  // (unless --force). write_outputs calls it too.
   void require_own_companions(const std::filesystem::path& path,
                               const std::vector<std::filesystem::path>& others);
   using Files = std::vector<std::pair<std::filesystem::path, Writer>>;
   void write_outputs(const std::filesystem::path& path, const Files& files);
 
-  // A folder of outputs, made if it is missing, claimed as a file is. All files are written before
-  // the first is put in place; the manifest FOLDER.json stands beside the folder. With --dry-run
-  // nothing is written.
+  // Claim and write a folder of outputs, which is created if it is missing. All files are written
+  // before the first is moved into the folder; its manifest is FOLDER.json. With --dry-run nothing
+  // is written.
   void claim_output_folder(const std::filesystem::path& folder);
   void write_output_folder(const std::filesystem::path& folder, const Files& files);
 
-  // A folder of any number of files: writer(temporary) fills a folder beside it, which then takes
-  // the place of `folder` as a whole. An earlier one that holds anything but `names`, or is one of
-  // the inputs, is an Error, with --force too. With --dry-run the writer gets no folder (an empty
-  // path) and nothing is written. check_output_tree throws as claim_output_tree but for `names`,
-  // and claims nothing: for folders that several runs make together.
+  // Claim and write a folder of any number of files: writer(temporary) fills a temporary folder,
+  // which then replaces `folder`. Throw Error, even with --force, if `folder` contains other files
+  // than `names` or is one of the inputs. With --dry-run the writer gets an empty path and nothing
+  // is written. check_output_tree only checks, without `names`, for folders of several runs.
   void check_output_tree(const std::filesystem::path& folder,
                          const std::vector<std::string>& inputs = {});
   void claim_output_tree(const std::filesystem::path& folder, const std::vector<std::string>& names,
@@ -135,13 +134,14 @@ class Run {
     std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
   };
 
-  // What stands in a folder must be of an earlier run of this command; `remedy` ends the message.
+  // Throws Error if the folder contains files that this command did not write; `remedy` is appended
+  // to the message.
   void require_own_folder(const std::filesystem::path& folder, const std::string& remedy);
-  // An output is claimed by its manifest, which is in the making from the claim on; begin_manifest
-  // takes it to write it, and makes it where nothing was claimed.
+  // claim_manifest claims an output by creating its temporary manifest. begin_manifest returns this
+  // for writing, and creates it if the output was not claimed.
   void claim_manifest(const std::filesystem::path& output);
   libmap::OutputFile begin_manifest(const std::filesystem::path& output);
-  // Writes the files and the manifest, then puts them in place.
+  // Writes the files and the manifest, then moves them to their paths.
   void write_together(const std::filesystem::path& output, const Files& files, bool is_timed);
 
   std::string command_;

@@ -15,14 +15,14 @@ using libmap::PoseSource;
 
 namespace {
 
-// The best first: optimized, else by odometry, else ground truth.
+// Sources in the order of preference for "auto".
 constexpr PoseSource sources[] = {PoseSource::optimized, PoseSource::odometry,
                                   PoseSource::ground_truth};
 
 std::optional<PoseSource> source_named(const std::string& name) {
   for (const PoseSource source : sources)
     if (to_text(source) == name) return source;
-  if (name == "stored") return PoseSource::optimized;  // the same by another name
+  if (name == "stored") return PoseSource::optimized;  // alternative name
   return std::nullopt;
 }
 
@@ -39,7 +39,7 @@ std::string sources_in(const libmap::PoseGraph& graph) {
   for (const PoseSource source : sources)
     if (!libmap::trajectory_of(graph, source).empty())
       names += (names.empty() ? "" : ", ") + to_text(source);
-  return names.empty() ? "no poses at all" : names;
+  return names.empty() ? "no poses" : names;
 }
 
 libmap::Trajectory poses_in_file(const PosesOption& poses, const libmap::ScanSource& scan,
@@ -78,10 +78,11 @@ libmap::Trajectory wanted_poses(const libmap::ScanSource& scan, const PosesOptio
   if (!source) return poses_in_file(wanted, scan, run);
   libmap::Trajectory poses = libmap::trajectory_of(scan.graph(), *source);
   if (poses.empty())
-    throw libmap::Error("the scan has none", {.file = scan.path().string(),
-                                              .field = "--poses",
-                                              .value = wanted.source,
-                                              .bound = "what it has: " + sources_in(scan.graph())});
+    throw libmap::Error("the scan does not have them",
+                        {.file = scan.path().string(),
+                         .field = "--poses",
+                         .value = wanted.source,
+                         .bound = "a source of the scan: " + sources_in(scan.graph())});
   return poses;
 }
 
@@ -96,7 +97,7 @@ void report_nodes_without_pose(const std::string& scan, const std::string& wante
   run.warn(scan + ": " + text + ": their frames are left out");
 }
 
-// The odometry of each session has a frame of its own.
+// Warns about odometry of several sessions, each of which has its own frame.
 void report_sessions(const std::string& scan, const libmap::PoseGraph& graph,
                      const libmap::Trajectory& poses, Run& run) {
   std::set<int> sessions;
@@ -104,7 +105,7 @@ void report_sessions(const std::string& scan, const libmap::PoseGraph& graph,
     if (const libmap::GraphNode* node = graph.find_node(pose.node)) sessions.insert(node->session);
   if (sessions.size() < 2) return;
   const std::string text = fmt::format(
-      "odometry of {} sessions, each in a frame of its own: refine joins them", sessions.size());
+      "odometry of {} sessions, each in its own frame: join them with refine", sessions.size());
   run.warn(scan + ": " + text);
 }
 
@@ -112,9 +113,9 @@ void report_sessions(const std::string& scan, const libmap::PoseGraph& graph,
 
 void add_poses_option(Command& command, PosesOption& poses) {
   command.option("--poses", "auto|odometry|optimized|ground-truth|FILE", poses.source,
-                 "where the frames were: by the scan, or a file of poses (TUM, KITTI, g2o, TORO; a "
-                 "folder: COLMAP); auto: the first of optimized, odometry and ground-truth that "
-                 "the scan has; optimized may be called stored");
+                 "poses of the frames: from the scan, or a file (TUM, KITTI, g2o, TORO; a folder: "
+                 "COLMAP); auto: the first of optimized, odometry and ground-truth that the scan "
+                 "has; stored: the same as optimized");
   libmap::bind(command.parameters(), poses.file);
 }
 
@@ -133,8 +134,8 @@ std::vector<std::string> scan_inputs(const std::string& scan, const PosesOption&
 
 void add_calibration_option(Command& command, CalibrationOption& calibration) {
   command.option("--calibration", "auto|stored|FILE.yaml", calibration.source,
-                 "the camera as the scan stores it, or as refine --write-calibration found it; "
-                 "auto: as the file of poses was estimated with, else as stored");
+                 "camera of the scan: stored in it, or in a file of refine --write-calibration; "
+                 "auto: the camera that the poses were estimated with, else the stored one");
 }
 
 std::optional<libmap::CameraFile> known_camera(const CalibrationOption& calibration,
@@ -153,7 +154,7 @@ std::optional<libmap::CameraFile> known_camera(const CalibrationOption& calibrat
     const auto* text = made ? std::get_if<std::string>(made->find_result(camera_result)) : nullptr;
     if (text == nullptr) return std::nullopt;
     if (fs::is_regular_file(scan) && !is_input_of(*made, scan)) {
-      run.say("camera of {}: not applied, for it was estimated of another scan", name);
+      run.say("camera of {}: not applied, because it is from another scan", name);
       return std::nullopt;
     }
     camera = libmap::parse_camera(*text, libmap::manifest_path(name).string());

@@ -1,4 +1,4 @@
-// A scan and the poses at which its frames were, as commands take them: SCAN and `--poses`.
+// Options and functions for a scan, its poses and its camera: SCAN, --poses and --calibration.
 #pragma once
 
 #include <optional>
@@ -12,57 +12,58 @@
 namespace graspmap_tools {
 
 // --poses auto|odometry|optimized|ground-truth|FILE. auto: the first of optimized, odometry and
-// ground-truth that the scan has; FILE: any that import_poses reads.
+// ground-truth that the scan has; FILE: any format of import_poses.
 struct PosesOption {
   std::string source = "auto";
   libmap::PoseImportOptions file;
 };
 void add_poses_option(Command& command, PosesOption& poses);
 
-// Without those that the recording itself declares invalid.
+// Counts the nodes that the recording does not declare invalid.
 std::size_t count_valid_nodes(const libmap::PoseGraph& graph);
 
-// The files among the two, for Run::claim_output.
+// Returns the paths of the scan and, if it is a file, of the poses, for Run::claim_output.
 std::vector<std::string> scan_inputs(const std::string& scan, const PosesOption& poses);
 
-// --calibration auto|stored|FILE: the scan's camera as it is known now, its depth correction
-// included. auto: as `poses`, if a file, were estimated with, by their manifest, of the same scan.
+// --calibration auto|stored|FILE: the scan's camera, including its depth correction. auto: the
+// camera that the poses of a file were estimated with, by their manifest, if the scan is the same.
 struct CalibrationOption {
   std::string source = "auto";
 };
 void add_calibration_option(Command& command, CalibrationOption& calibration);
 
-// That camera; nothing for the stored one. Says what is known of it. Throws Error: no such file.
+// Returns the camera of the option, and reports its findings; nullopt for the stored camera. Throws
+// Error if the file cannot be read.
 std::optional<libmap::CameraFile> known_camera(const CalibrationOption& calibration,
                                                const std::string& scan, const PosesOption& poses,
                                                Run& run);
-// Names the camera in the manifests of outputs from here on: of the poses that go with it.
+// Adds the camera to the run's manifest, for poses that were estimated with it.
 void add_camera(const libmap::CameraFile& camera, Run& run);
 
-// Opens a scan; what it had to leave out is a warning, an Error if `strict`. Its frames are those
-// of the camera, if there is one.
+// Opens a scan, with `camera` applied to its frames. Parts that cannot be read are reported as
+// warnings. Throws Error for them if `strict`, and for a scan without nodes.
 std::unique_ptr<libmap::ScanSource> open_scan(const std::string& scan, bool strict, Run& run,
                                               const std::optional<libmap::CameraFile>& camera = {});
-// The same of several scans, joined (join_scans).
+// Opens and joins several scans (join_scans).
 std::unique_ptr<libmap::ScanSource> open_scan(const std::vector<std::string>& scans, bool strict,
                                               Run& run,
                                               const std::optional<libmap::CameraFile>& camera = {});
 
-// The poses that `poses` names, by ascending node; "auto" becomes the source that was taken. Says
-// so, and keeps it in the manifest. Nodes without a pose are a warning, an Error if `strict`.
-// Throws Error if there are no such poses.
+// Returns the poses of the option, by ascending node. "auto" is replaced by the selected source,
+// which is reported and added to the manifest. Nodes without a pose are reported as a warning.
+// Throws Error if there are no such poses or, if `strict`, for nodes without a pose.
 libmap::Trajectory find_poses(const libmap::ScanSource& scan, PosesOption& poses, bool strict,
                               Run& run);
 
-// Whether the manifest of a file of poses names `refine` as the command that wrote them.
+// Returns true if, by its manifest, `refine` wrote the file of poses.
 bool are_refined(const PosesOption& poses);
 
-// The scan's true poses. Throws Error if it has none.
+// Returns the scan's true poses. Throws Error if it has none.
 libmap::Trajectory require_truth(const libmap::ScanSource& scan);
 
-// The rigid transform that aligns `poses` with the scan's true ones; the identity where they are
-// those. Says how well, and keeps it in the manifest as ground_truth_from_poses. Throws Error if
-// the scan has no ground truth.
+// Returns the rigid transform that aligns `poses` with the scan's true poses; the identity if they
+// are the true poses. Reports the error and adds the transform to the manifest as
+// ground_truth_from_poses. Throws Error if the scan has no true poses.
 libmap::Pose truth_from_poses(const libmap::ScanSource& scan, const libmap::Trajectory& poses,
                               const PosesOption& taken, Run& run);
 

@@ -13,7 +13,7 @@ void require_printed() {
   errno = 0;
   std::cout.flush();
   std::fflush(stdout);
-  // They tell of a failed write by their state alone.
+  // Failed writes are visible in the streams' state only.
   if (std::cout && std::ferror(stdout) == 0) return;
   throw libmap::system_failure("standard output", "cannot be written", errno);
 }

@@ -1,14 +1,14 @@
-// What is printed is an output as well.
+// Checks that standard output was written.
 #pragma once
 
 #include <string>
 
 namespace graspmap_tools {
 
-// Throws Error (failed) unless all that was printed to standard output has been written.
+// Flushes standard output. Throws Error (failed) if not all of it was written.
 void require_printed();
 
-// 0, or 1 and a line of `program` on stderr if some of it was not written.
+// Flushes standard output. Returns 0, or 1 with an error line on stderr if it was not all written.
 int exit_code_of_printing(const std::string& program);
 
 }  // namespace graspmap_tools

@@ -16,7 +16,7 @@ TileFolder::Facts parse_facts(const std::string& text, const fs::path& file) {
   }
 }
 
-// A file's name may be no UTF-8.
+// Replaces invalid UTF-8, which names of files may contain.
 std::string json_text(const TileFolder::Facts& json) {
   return json.dump(-1, ' ', false, TileFolder::Facts::error_handler_t::replace);
 }
@@ -25,12 +25,12 @@ std::string json_text(const TileFolder::Facts& json) {
 
 void add_share_option(Command& command, std::string& share) {
   command.option("--tile", "K/N", share,
-                 "make only share K of N of the pieces; the last share completes the folder");
+                 "make only share K of N of the tiles; the last share completes the folder");
 }
 
 void require_folder_of_share(const std::string& output, const std::string& share) {
   if (is_tile_folder(output)) return;
-  refuse_given({{"--tile", share != whole_share}}, "is for a folder of pieces");
+  refuse_given({{"--tile", share != whole_share}}, "requires a folder of tiles as output");
 }
 
 TileFolder::TileFolder(const std::string& output, const std::vector<std::string>& names,
@@ -49,12 +49,12 @@ TileFolder::TileFolder(const std::string& output, const std::vector<std::string>
   }
   run_.check_output_tree(output_, inputs_);
   if (run_.options().force)
-    throw libmap::Error("removes the pieces of all shares: use it without --tile",
+    throw libmap::Error("deletes the tiles of all shares and cannot be combined with --tile",
                         {.field = "--force"});
   if (!run_.options().dry_run) earlier_plan();
 }
 
-// The plan of an earlier run, or of another share, with the same parameters and inputs.
+// Returns the earlier plan with the same parameters and inputs. Throws if a share's plan differs.
 std::optional<TileFolder::Facts> TileFolder::earlier_plan() const {
   const auto text = run_.options().force ? std::nullopt : store_.plan_text();
   if (!text) return std::nullopt;
@@ -62,8 +62,8 @@ std::optional<TileFolder::Facts> TileFolder::earlier_plan() const {
   if (plan.at("key") == key_) return plan;
   if (share_.count == 1) return std::nullopt;
   throw libmap::Error(
-      "contains pieces of another input or of other parameters: --force without --tile starts "
-      "again",
+      "contains tiles of another input or of other parameters: --force without --tile replaces "
+      "them",
       {.file = store_.folder().string()});
 }
 
@@ -75,11 +75,11 @@ bool TileFolder::is_put_together() const {
 
 bool TileFolder::is_complete() const {
   if (!is_put_together()) return false;
-  run_.say("all pieces are there");
+  run_.say("all tiles are complete");
   return true;
 }
 
-// Removes the store after a bad input of a run of all tiles: to resume it would end the same.
+// Removes the store if bad input ends a run of all tiles, because a resumed run would fail too.
 template <typename Step>
 void TileFolder::resumable(const Step& step) {
   try {
@@ -156,15 +156,15 @@ void TileFolder::put_together(const Work& work) {
   const auto done = static_cast<std::size_t>(
       std::count_if(work.tiles.begin(), work.tiles.end(),
                     [this](const std::string& tile) { return is_done(tile); }));
-  // The run of another share may have been the last as well, and have removed the store since.
+  // Another share may have been the last one too and may have removed the store.
   if (done < work.tiles.size() && !is_put_together())
-    return run_.say("{} of {} pieces are done", done, work.tiles.size());
+    return run_.say("{} of {} tiles are complete", done, work.tiles.size());
   if (share_.count > 1) {
     try {
       run_.claim_output_tree(output_, names_, inputs_);
     } catch (const libmap::Error& error) {
       if (error.kind() != libmap::ErrorKind::failed) throw;
-      return run_.say("another share puts the pieces together");
+      return run_.say("another share completes the folder");
     }
   }
   if (!is_put_together()) run_.write_output_tree(output_, names_, work.finish);

@@ -2,10 +2,9 @@
 // run or in shares (libmap/tiles/tile_store_io.h):
 //
 //   FOLDER.progress/tiles/TILE.*    file of a finished tile; none if it is empty
-//   FOLDER.progress/progress/...    plan, with what all tiles need, and journals with facts on
-//   tiles
+//   FOLDER.progress/progress/...    plan with common data, and journals with data of each tile
 //
-// When all are done the folder appears as a whole, and the store is removed.
+// When all tiles are complete, the folder is created at once and the store is removed.
 #pragma once
 
 #include <filesystem>
@@ -22,15 +21,15 @@
 
 namespace graspmap_tools {
 
-// Part of an output's help.
-inline constexpr const char* or_tile_folder = ", or a folder of pieces (no extension)";
+// Part of the description of an output.
+inline constexpr const char* or_tile_folder = ", or a folder of tiles (no extension)";
 
-// Whether the output is a folder of tiles: its name has no extension.
+// Returns true if the output is a folder of tiles: its name has no extension.
 inline bool is_tile_folder(const std::string& output) {
   return std::filesystem::path(without_trailing_slash(output)).extension().empty();
 }
 
-// The names that the folder may contain: tiles of an earlier run, and those to come.
+// Returns the names that the folder may contain: tiles of an earlier run and of this run.
 inline std::vector<std::string> tile_folder_names(
     const std::string& output, const std::vector<std::filesystem::path>& tiles = {},
     const std::string& extension = {}) {
@@ -39,50 +38,52 @@ inline std::vector<std::string> tile_folder_names(
   return names;
 }
 
-// --tile K/N: the share of the tiles that a run makes.
+// --tile K/N: share of the tiles that a run makes.
 inline constexpr const char* whole_share = "1/1";
 void add_share_option(Command& command, std::string& share);
-// Throws Error if a share is asked for and the output is one file.
+// Throws Error if a share is requested and the output is one file.
 void require_folder_of_share(const std::string& output, const std::string& share);
 
 class TileFolder {
  public:
   using Facts = nlohmann::json;
 
-  // Claims the folder `output`, unless other runs make other shares of it; `names` and `inputs` as
-  // for Run::claim_output_tree. The manifest of `run` must have its parameters and inputs. Throws
-  // Error for a share with --force, which removes all tiles, and for a share of other parameters or
-  // inputs than the shares before.
+  // Claims the folder `output` unless the run makes one of several shares. `names` and `inputs` are
+  // those of Run::claim_output_tree. The manifest of `run` must have its parameters and inputs.
+  // Throws Error for a share with --force, which deletes all tiles, and for a share with other
+  // parameters or inputs than the earlier shares.
   TileFolder(const std::string& output, const std::vector<std::string>& names,
              const std::vector<std::string>& inputs, const libmap::TileShare& share, Run& run);
 
-  // Whether shares of the same parameters and inputs have already completed the folder; says so.
+  // Returns true, and reports it, if shares with the same parameters and inputs have completed the
+  // folder.
   bool is_complete() const;
 
-  // Begins the run. The share that begins first finds what all tiles need, while the others wait;
-  // null with --dry-run. Tiles of other parameters or inputs are removed; if shares are made, or
-  // another process works on them, they are an Error instead. Throws what `find` throws.
+  // Begins the run and returns the data common to all tiles; null with --dry-run. The first share
+  // computes it by `find` while the others wait. Tiles of other parameters or inputs are deleted.
+  // Throws Error for such tiles if the run is one of several shares or another process uses them,
+  // and the errors of `find`.
   Facts begin(const std::function<Facts()>& find = [] { return Facts::object(); });
 
   struct Work {
-    std::vector<std::string> tiles;  // of all shares: names without an extension
+    std::vector<std::string> tiles;  // names of the tiles of all shares, without extension
     std::string extension;           // of their files
-    // Writes the n-th tile to `to`, unless it is empty, and returns facts on it: an object.
+    // Writes the n-th tile to `to`, unless it is empty, and returns its data, a JSON object.
     std::function<Facts(std::size_t n, const std::filesystem::path& to)> make;
     // Fills the output with the finished tiles.
     std::function<void(const std::filesystem::path& folder)> finish;
   };
-  // Begins the run if begin() has not, makes the missing tiles of the share, and the folder if then
-  // all tiles are done; else says how many are. With --dry-run nothing is made. Throws Error
-  // (failed) if another process works on this share.
+  // Calls begin() if it was not called, makes the missing tiles of the share, and creates the
+  // folder if all tiles are complete; otherwise reports their number. With --dry-run nothing is
+  // made. Throws Error (failed) if another process works on this share.
   void make(const Work& work);
 
-  // Of a finished tile, in Work::finish.
+  // Data and file of a finished tile, for Work::finish.
   Facts facts(const std::string& tile) const;
   std::filesystem::path file(const std::string& tile, const std::string& extension) const {
     return store_.tiles() / (tile + extension);
   }
-  // The file of a tile once more at `to`: a link where the file system has them, else a copy.
+  // Links the file of a tile to `to`, or copies it if the file system has no hard links.
   static void link_file(const std::filesystem::path& file, const std::filesystem::path& to);
 
  private:
@@ -106,7 +107,7 @@ class TileFolder {
   libmap::TileStore store_;
   Facts common_;
   std::optional<libmap::TileJournal> journal_;
-  std::map<std::string, libmap::TileStore::Line> done_;  // by the tiles' names in JSON
+  std::map<std::string, libmap::TileStore::Line> done_;  // by the tile's name in JSON
 };
 
 }  // namespace graspmap_tools

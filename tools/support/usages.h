@@ -1,4 +1,4 @@
-// The usages of commands that have a file of their own; argv begins at the command.
+// Subcommands in their own files; argv begins at the command.
 #pragma once
 
 #include <string>
@@ -17,7 +17,7 @@ int simulate_scene(int argc, char** argv);
 int simulate_site(int argc, char** argv);
 int simulate_terrain(int argc, char** argv);
 
-// Whether convert_scan takes it: a database, or a folder of frames.
+// Returns true for a scan that convert_scan accepts: a database or a folder of frames.
 bool is_scan_path(const std::string& path);
 
 }  // namespace graspmap_tools

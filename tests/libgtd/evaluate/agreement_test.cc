@@ -16,7 +16,7 @@ using libgtd::cohens_kappa;
 using libgtd::Confusion;
 using libgtd::Kappa;
 
-// Both yes, evaluated alone yes, reference alone yes, both no.
+// Counts: both yes, only evaluated yes, only reference yes, both no.
 Confusion table_of(std::size_t both, std::size_t evaluated, std::size_t reference,
                    std::size_t none) {
   return {.true_positives = both,
@@ -26,7 +26,7 @@ Confusion table_of(std::size_t both, std::size_t evaluated, std::size_t referenc
 }
 
 TEST(CohensKappa, OfPublishedTables) {
-  // Feinstein and Cicchetti 1990: the same share that agrees, other shares of yes.
+  // Feinstein and Cicchetti 1990: same agreement, different shares of yes.
   EXPECT_NEAR(cohens_kappa(table_of(40, 9, 6, 45))->value, 0.70, 0.005);
   EXPECT_NEAR(cohens_kappa(table_of(80, 10, 5, 5))->value, 0.32, 0.005);
   // Stata's kapci on 1932 patients, Statalist, December 2009.
@@ -53,7 +53,7 @@ TEST(CohensKappa, NothingWhereChanceAgreesEverywhere) {
   EXPECT_FALSE(cohens_kappa({}));
   EXPECT_FALSE(cohens_kappa(table_of(12, 0, 0, 0)));
   EXPECT_FALSE(cohens_kappa(table_of(0, 0, 0, 12)));
-  // One says yes everywhere, the other nowhere or somewhere: no better than chance.
+  // One rater always says yes, the other never or sometimes: no better than chance.
   EXPECT_EQ(cohens_kappa(table_of(0, 12, 0, 0))->value, 0.0);
   EXPECT_EQ(cohens_kappa(table_of(5, 7, 0, 0))->value, 0.0);
   EXPECT_EQ(cohens_kappa(table_of(5, 7, 0, 0))->standard_error, 0.0);
@@ -95,7 +95,7 @@ TEST(CohensKappa, ErrorIsThatOfTheDeltaMethod) {
   }
 }
 
-// How far kappa scatters among samples of one population.
+// Spread of kappa among samples of one population.
 TEST(CohensKappa, ErrorIsTheScatterOfSamples) {
   const Confusion population = table_of(300, 60, 90, 550);
   std::discrete_distribution<int> draw({300, 60, 90, 550});

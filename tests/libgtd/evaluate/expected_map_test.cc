@@ -28,7 +28,7 @@ std::string parse_error(const std::string& rows) {
   return error_of([&] { parse(rows); }).what();
 }
 
-// One point per voxel, `score` at each; all are graspable where `flags` are not given.
+// One point per voxel with `score`; all are graspable without `flags`.
 libmap::PointCloud map_of(const std::vector<Eigen::Vector3d>& positions,
                           const std::vector<double>& scores, const std::vector<double>& flags) {
   libmap::PointCloud map;
@@ -45,10 +45,10 @@ TEST(ExpectedMap, CountsByHand) {
       map_of({{0, 0, 0},       // yes, reaches
               {0, 0.09, 0},    // yes, does not
               {0, 0, 0.1},     // yes, on the border, reaches
-              {0.05, 0, 0},    // undecided, though within yes
+              {0.05, 0, 0},    // undecided, also inside yes
               {1.05, 0.5, 0},  // no, beside the segment's middle, does not
               {1, 1.09, 0},    // no, beyond its end, reaches
-              {1, 1.11, 0},    // nowhere
+              {1, 1.11, 0},    // in no region
               {1, 0, 0}},      // no, without a score
              {0.9, 0.79, 0.8, 1.0, 0.1, 0.85, 1.0, std::nan("")}, {0, 0, 1, 1, 0, 1, 1, 1}),
       expected, 0.8);
@@ -77,7 +77,7 @@ TEST(ExpectedMap, CountsByHand) {
   EXPECT_EQ(result.places.size(), 2U);
 }
 
-// As in all other counts, an obstacle is not graspable, whatever its flag says.
+// As in all other counts, an obstacle is not graspable, even with the flag.
 TEST(ExpectedMap, ObstaclesAreNotFlagged) {
   libmap::PointCloud map =
       map_of({{0, 0, 0}, {0, 0.05, 0}, {0, 0, 0.05}}, {0.9, 0.9, 0.9}, {1, 1, std::nan("")});
@@ -88,7 +88,7 @@ TEST(ExpectedMap, ObstaclesAreNotFlagged) {
   EXPECT_EQ(result.regions[0].graspable, 1U);
 }
 
-// An independent look: the nearest of a thousand places along each segment.
+// Oracle: the nearest of a thousand positions along each segment.
 bool holds(const ExpectedRegion& region, const Eigen::Vector3d& point) {
   constexpr int steps = 1000;
   double nearest = 1e9;
@@ -125,7 +125,7 @@ TEST(ExpectedMap, AgreesWithASlowOracle) {
       evaluate_expected_map(map_of(positions, scores, flags), expected, 0.6);
   EXPECT_GT(counts.positives(), 100U);
   EXPECT_GT(counts.negatives(), 30U);
-  // The oracle's steps are 0.4 mm: no point of these lies so near a border.
+  // The steps of the oracle are 0.4 mm; no point here is that near to a border.
   EXPECT_EQ(result.voxels_by_score.true_positives, counts.true_positives);
   EXPECT_EQ(result.voxels_by_score.false_negatives, counts.false_negatives);
   EXPECT_EQ(result.voxels_by_score.false_positives, counts.false_positives);
@@ -179,7 +179,8 @@ TEST(ExpectedMap, HostileTables) {
               HasSubstr("e.csv: y: is a duplicate"));
 }
 
-// Two verdicts on one place: balls, a ball on a segment, crossing and passing segments.
+// Overlapping regions of different verdicts: balls, a ball on a segment, crossing and passing
+// segments.
 TEST(ExpectedMap, ContradictionsAreErrors) {
   EXPECT_THAT(parse_error("a,0,0,0,,,,0.1,1,\nb,0.19,0,0,,,,0.1,0,\n"), HasSubstr("'a' and 'b'"));
   EXPECT_THAT(parse_error("a,0,0,0,2,0,0,0.1,1,\nb,1,0.15,0,,,,0.1,0,\n"), HasSubstr("overlap"));
@@ -200,7 +201,7 @@ TEST(ExpectedMap, NoMap) {
               HasSubstr("score"));
 }
 
-// The regions of scenario 1 lie on its shapes, and say what its list of places says.
+// The regions of scenario 1 are on its shapes and agree with its list of places.
 TEST(ExpectedMap, OfPrimitiveShapes) {
   const auto data = graspmap_test::source_folder() / "data";
   const ExpectedMap expected =

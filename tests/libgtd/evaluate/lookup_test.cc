@@ -34,7 +34,7 @@ std::vector<Eigen::Vector3d> random_points(std::size_t count) {
   return points;
 }
 
-// Every map point is looked at.
+// Oracle: tests every map point.
 std::vector<std::size_t> within(const PointCloud& map, const Eigen::Vector3d& at, double radius) {
   std::vector<std::size_t> found;
   for (std::size_t n = 0; n < map.size(); ++n)

@@ -54,7 +54,7 @@ TEST(VoxelMap, LatticeFromIndicesOrFromPlaces) {
   EXPECT_LT(fitted.lattice.origin_m.norm(), 1e-12);
   std::erase_if(cloud.fields, [](const auto& field) { return field.name == "i"; });
   EXPECT_EQ(libgtd::voxel_map_of(cloud, {.lattice = lattice}).voxels, fitted.voxels);
-  // In another frame, whose way to the terrain is known.
+  // In another frame with a known transform to the terrain.
   const libmap::Pose terrain_from_map(
       Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, 3).normalized()));
   const PointCloud turned = libmap::transform_cloud(graded_floor(), terrain_from_map.inverse());
@@ -98,12 +98,12 @@ TEST(VoxelMap, HostileMapsAreSaid) {
   std::erase_if(cloud.fields, [](const auto& field) { return field.name == "i"; });
   cloud.positions[17].x() = 1e9;
   const libmap::Error far = error_of([&] { libgtd::voxel_map_of(cloud, {.lattice = lattice}); });
-  EXPECT_EQ(far.reason(), "a point lies too far off for voxels of this size");
+  EXPECT_EQ(far.reason(), "a point is too far from the origin for this voxel size");
   EXPECT_EQ(far.context().field, "point 18");
   const PointCloud one = map_cloud({{3, 4, 5}}, [](const Voxel&) { return 1.0; });
   EXPECT_EQ(field_of(one), "voxel_size_m");
   EXPECT_EQ(libgtd::voxel_map_of(one, {.lattice = lattice}).size(), 1U);
-  // What has no place is left out; what has no score is not graspable.
+  // Points without a position are left out; points without a score are not graspable.
   cloud = graded_floor();
   for (Eigen::Vector3d& position : cloud.positions) position.z() = std::nan("");
   EXPECT_THROW(libgtd::voxel_map_of(cloud), libmap::Error);
@@ -116,7 +116,7 @@ TEST(VoxelMap, HostileMapsAreSaid) {
   EXPECT_EQ(map.graspable[1990], 0);
 }
 
-// A null in a manifest is no number; a comparison with one coordinate of three does not see it.
+// A null in a manifest is not a number; comparing one coordinate of three would miss it.
 TEST(VoxelMap, LatticesThatAreNotFinite) {
   PointCloud map = graded_floor();
   std::erase_if(map.fields, [](const auto& field) { return field.name.size() == 1; });  // i, j, k
@@ -131,11 +131,11 @@ TEST(VoxelMap, LatticesThatAreNotFinite) {
     MapFacts facts;
     facts.lattice = libgtd::VoxelLattice{{origin[0], origin[1], origin[2]}, 0.01};
     EXPECT_EQ(error_of([&] { libgtd::voxel_map_of(map, facts); }).reason(),
-              "a point lies too far off for voxels of this size");
+              "a point is too far from the origin for this voxel size");
   }
 }
 
-// Squares of their distances would not be numbers.
+// Squares of their distances would overflow.
 TEST(VoxelMap, LatticesOutOfRange) {
   PointCloud map = graded_floor();
   for (const double size_m : {1e200, 1e-200}) {
@@ -149,7 +149,7 @@ TEST(VoxelMap, LatticesOutOfRange) {
     libgtd::voxel_map_of(map, {.lattice = libgtd::VoxelLattice{{0.0, -1e200, 0.0}, 0.01}});
   });
   EXPECT_EQ(far.context().field, "lattice_origin_m");
-  // As the fields i, j and k tell it.
+  // As with the fields i, j and k.
   for (Eigen::Vector3d& position : map.positions) position *= 1e150;
   EXPECT_EQ(error_of([&] { libgtd::voxel_map_of(map); }).context().field, "voxel_size_m");
 }
@@ -168,7 +168,7 @@ TEST(MapAnalysis, CountsAndAreasByHand) {
   const MapAnalysis result = libgtd::analyze_map(map, level_surface(map));
   EXPECT_EQ(result.voxels, 2000U);
   EXPECT_EQ(result.at_border, 100U);
-  PointCloud earlier = cloud;  // as earlier versions wrote it
+  PointCloud earlier = cloud;  // format of earlier versions
   earlier.find_field("border")->name = "edge";
   EXPECT_EQ(libgtd::voxel_map_of(earlier).border, map.border);
   EXPECT_EQ(result.obstacles, 20U);
@@ -203,7 +203,7 @@ TEST(MapAnalysis, BoundsOfClassesAndScoresOutsideZeroToOne) {
   });
   const VoxelMap map = libgtd::voxel_map_of(cloud);
   const MapAnalysis result = libgtd::analyze_map(map, level_surface(map), {.score_bin = 0.1});
-  // Single precision stores 0.9, 0.8, 0.6 and 0.4 off by a little: they keep their class.
+  // Single precision stores 0.9, 0.8, 0.6 and 0.4 with rounding errors; the classes do not change.
   const std::vector<std::size_t> expected = {3, 1, 1, 1, 1, 1, 2};
   for (std::size_t n = 0; n < expected.size(); ++n)
     EXPECT_EQ(result.classes[n].all, expected[n]) << n;
@@ -252,7 +252,7 @@ TEST(MapAnalysis, SurfaceOfAnotherMap) {
     libgtd::MapSurface surface = level_surface(map);
     (is_slope ? surface.slope_deg : surface.area_m2).pop_back();
     EXPECT_EQ(error_of([&] { libgtd::analyze_map(map, surface); }).reason(),
-              "the surface is of another map");
+              "the surface does not match the map");
   }
 }
 

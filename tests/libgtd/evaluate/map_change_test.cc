@@ -23,7 +23,7 @@ using libgtd::VoxelMatching;
 
 const libmap::Pose same = libmap::Pose::Identity();
 
-// A bumpy floor with scores of its own at each call.
+// Bumpy floor with new scores at each call.
 VoxelMap random_map(int first_i, const libmap::Pose& terrain_from_map = same) {
   std::vector<Voxel> voxels;
   for (int i = first_i; i < first_i + 60; ++i)
@@ -48,7 +48,7 @@ TEST(MapChange, OfAMapAgainstItself) {
   EXPECT_EQ(change.evaluated.lost_area_m2 + change.evaluated.gained_area_m2, 0.0);
 }
 
-// Independent of the order in which pairs are found.
+// Independent of the order of the pairs.
 TEST(MapChange, CountsOfTheDefinitionOnOneLattice) {
   const VoxelMap map = random_map(0);
   const VoxelMap other = random_map(20);
@@ -121,7 +121,7 @@ TEST(MapChange, LatticesShiftedByWholeVoxelsAreOne) {
   EXPECT_EQ(change.matching, VoxelMatching::lattice);
   EXPECT_EQ(change.pairs.size(), map.size());
   EXPECT_EQ(change.evaluated.kappa->value, 1.0);
-  // A tenth of a voxel more: by nearness, each still with itself.
+  // Shifted by a tenth of a voxel: matched by distance, each with itself.
   const libmap::Pose more(Eigen::Translation3d(-0.039, 0.02, -0.07));
   change = libgtd::compare_maps(map, level_surface(map), other, more);
   EXPECT_EQ(change.matching, VoxelMatching::nearest);
@@ -208,14 +208,14 @@ TEST(MapChange, MapsApartAndOptionsOutOfBounds) {
   const auto error_with = [&](const libgtd::MapChangeOptions& options) {
     return error_of([&] { libgtd::compare_maps(map, level_surface(map), map, same, options); });
   };
-  EXPECT_EQ(error_with({.height_bin_m = 0.0}).reason(), "no width of a bin");
+  EXPECT_EQ(error_with({.height_bin_m = 0.0}).reason(), "out of range");
   EXPECT_EQ(error_with({.height_bin_m = 0.0}).context().field, "height_bin_m");
   EXPECT_EQ(error_with({.slope_bin_deg = -1.0}).context().value, "-1");
   EXPECT_EQ(error_with({.slope_bin_deg = std::nan("")}).context().field, "slope_bin_deg");
   libgtd::MapSurface surface = level_surface(map);
   surface.area_m2.pop_back();
   EXPECT_EQ(error_of([&] { libgtd::compare_maps(map, surface, map, same); }).reason(),
-            "the surface is of another map");
+            "the surface does not match the map");
 }
 
 }  // namespace map_change_test

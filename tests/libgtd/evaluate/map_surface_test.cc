@@ -32,7 +32,7 @@ VoxelMap map_of(const std::set<Voxel>& voxels) {
   return map;
 }
 
-// The voxels that points of a surface lie in.
+// Voxels that contain points of a surface.
 std::set<Voxel> voxels_of(const std::function<Eigen::Vector3d(double, double)>& surface,
                           double u_end, double v_end, double du, double dv) {
   std::set<Voxel> voxels;
@@ -49,7 +49,7 @@ Eigen::Matrix3d turn_of(double tilt_deg, double heading_deg) {
       .toRotationMatrix();
 }
 
-// A square turned about z, then tilted about a level axis.
+// Square rotated about z, then tilted about a horizontal axis.
 std::set<Voxel> square(const Eigen::Matrix3d& turn) {
   return voxels_of(
       [&](double u, double v) { return Eigen::Vector3d(turn * Eigen::Vector3d(u, v, 0)); }, edge_m,
@@ -71,7 +71,7 @@ TEST(MapSurface, AreaAndSlopeOfInclinedSquares) {
       const Eigen::Matrix3d turn = turn_of(tilt, heading);
       const VoxelMap map = map_of(square(turn));
       const MapSurface surface = libgtd::measure_surface(map);
-      // Away from the square's edges, whose voxels reach beyond it.
+      // Far from the edges of the square, whose voxels extend beyond it.
       double inner_m2 = 0.0;
       double plan_m2 = 0.0;
       double slope_deg = 0.0;
@@ -84,13 +84,13 @@ TEST(MapSurface, AreaAndSlopeOfInclinedSquares) {
         slope_deg += static_cast<double>(surface.slope_deg[n]);
         ++count;
       }
-      // The rows of the lattice that lie inside are 30, give or take one.
+      // The number of lattice rows inside is 30 within one.
       EXPECT_NEAR(inner_m2 / 0.09, 1.0, 0.05);
       ratios += inner_m2 / 0.09;
       ++squares;
       EXPECT_NEAR(plan_m2 / inner_m2, std::cos(tilt * pi / 180), 0.01);
       EXPECT_NEAR(slope_deg / static_cast<double>(count), tilt, 0.6);
-      // As many voxels as lie in a square that is half a voxel wider on each side.
+      // The number of voxels is that of a square half a voxel wider on each side.
       EXPECT_NEAR(sum_of(surface.area_m2) / (0.61 * 0.61), 1.0, 0.03);
     }
   EXPECT_NEAR(ratios / squares, 1.0, 0.015);

@@ -1,4 +1,4 @@
-// Maps of voxels that a test lists.
+// Makes maps from lists of voxels.
 #pragma once
 
 #include <cmath>
@@ -13,7 +13,7 @@ namespace graspmap_test {
 
 inline constexpr double test_voxel_m = 0.01;
 
-// As `graspmap score` writes maps, on the lattice through the origin. Graspable from 0.8 on.
+// Makes a map like `graspmap score`, on the lattice through the origin, graspable from 0.8.
 inline libmap::PointCloud map_cloud(const std::vector<libgtd::Voxel>& voxels,
                                     const std::function<double(const libgtd::Voxel&)>& score_of) {
   const libgtd::VoxelLattice lattice{Eigen::Vector3d::Zero(), test_voxel_m};
@@ -33,7 +33,7 @@ inline libmap::PointCloud map_cloud(const std::vector<libgtd::Voxel>& voxels,
   return cloud;
 }
 
-// A level floor of `width` x `depth` voxels at k = 0.
+// Returns a level floor of `width` x `depth` voxels at k = 0.
 inline std::vector<libgtd::Voxel> floor_voxels(int width, int depth) {
   std::vector<libgtd::Voxel> voxels;
   for (int i = 0; i < width; ++i)
@@ -41,7 +41,7 @@ inline std::vector<libgtd::Voxel> floor_voxels(int width, int depth) {
   return voxels;
 }
 
-// Each voxel stands for one level face.
+// Returns a surface in which each voxel is one level face.
 inline libgtd::MapSurface level_surface(const libgtd::VoxelMap& map) {
   libgtd::MapSurface surface;
   surface.slope_deg.assign(map.size(), 0.0F);

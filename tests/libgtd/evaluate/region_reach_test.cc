@@ -23,7 +23,7 @@ using libgtd::RegionReach;
 using libgtd::Voxel;
 using libgtd::VoxelMap;
 
-// Square patches of `width` voxels, lowest corners at (i, j), on a floor of their own.
+// Square patches of `width` voxels, lowest corners at (i, j), on a separate floor each.
 struct Patch {
   int i = 0;
   int j = 0;
@@ -70,7 +70,7 @@ TEST(MapRegions, VoxelsAboveEachOtherTouch) {
   EXPECT_EQ(result.region_of_voxel, (std::vector<std::int32_t>{0, 0, 1, 1}));
 }
 
-// The definition: the same label spreads to all voxels whose indices differ by at most `reach`.
+// Oracle by definition: a label spreads to all voxels whose indices differ by at most `reach`.
 std::vector<int> slow_labels(const VoxelMap& map, int reach) {
   std::vector<int> labels(map.size(), -1);
   int next = 0;
@@ -106,7 +106,7 @@ TEST(MapRegions, AreThoseOfTheDefinition) {
     EXPECT_GT(result.regions.size(), 10U);
     std::set<std::pair<int, int>> pairs;
     for (std::size_t n = 0; n < map.size(); ++n) pairs.insert({slow[n], result.region_of_voxel[n]});
-    // One label of the one is one label of the other.
+    // Labels correspond one to one.
     EXPECT_EQ(pairs.size(), result.regions.size() + 1);
     for (std::size_t r = 1; r < result.regions.size(); ++r)
       EXPECT_GE(result.regions[r - 1].area_m2, result.regions[r].area_m2);
@@ -152,7 +152,7 @@ TEST(RegionReach, FromAPlace) {
     return libgtd::find_reach(map, regions,
                               {.stride_m = 0.15, .start = Eigen::Vector3d(x, 0.005, 0.005)});
   };
-  // On the third; half way between it and the second; far from all.
+  // On the third; halfway between it and the second; far from all.
   RegionReach reach = reach_from(0.458);
   EXPECT_EQ(*reach.start_region, 2U);
   EXPECT_EQ(reach.reachable_regions, 1U);
@@ -168,11 +168,11 @@ TEST(RegionReach, FromAPlace) {
 }
 
 struct SlowReach {
-  std::vector<std::vector<double>> distance;  // of regions
-  std::vector<std::vector<double>> stride;    // the least longest step between them
+  std::vector<std::vector<double>> distance;  // between regions
+  std::vector<std::vector<double>> stride;    // minimum over paths of the longest step
 };
 
-// All pairs of voxels, then Floyd and Warshall with the longest step for a way's length.
+// All pairs of voxels, then Floyd and Warshall with the longest step as path length.
 SlowReach slow_reach(const VoxelMap& map, const MapRegionResult& regions) {
   const std::size_t count = regions.regions.size();
   SlowReach slow;
@@ -271,16 +271,16 @@ TEST(RegionReach, OptionsOutOfBounds) {
   libgtd::MapSurface surface = level_surface(map);
   surface.area_m2.pop_back();
   EXPECT_EQ(error_of([&] { libgtd::find_regions(map, surface); }).reason(),
-            "the surface is of another map");
+            "the surface does not match the map");
 }
 
-// Squares of their distances are infinite: no reach joins them.
+// Squares of their distances are infinite: no reach links them.
 TEST(RegionReach, TooFarApartForDistances) {
   VoxelMap map = map_of({{0, 0}, {4, 0}});
   const MapRegionResult regions = libgtd::find_regions(map, level_surface(map));
   map.lattice.voxel_size_m = 1e200;
   const libmap::Error error = error_of([&] { libgtd::find_reach(map, regions); });
-  EXPECT_EQ(error.reason(), "the regions are too far apart: their distances are no numbers");
+  EXPECT_EQ(error.reason(), "the regions are too far apart: their distances are not finite");
   EXPECT_EQ(error.context().field, "voxel_size_m");
   map.lattice.voxel_size_m = 0.01;
   const RegionReach reach =
@@ -297,7 +297,7 @@ TEST(RegionReach, TooManyPairsWithinAStride) {
   ASSERT_EQ(regions.regions.size(), 68U * 68U);
   const libmap::Error error =
       error_of([&] { libgtd::find_reach(map, regions, {.stride_m = 2.5}); });
-  EXPECT_EQ(error.reason(), "joins more than 10 million pairs of regions");
+  EXPECT_EQ(error.reason(), "links more than 10 million pairs of regions");
   EXPECT_EQ(error.context().field, "stride_m");
   EXPECT_EQ(error.context().value, "2.5");
 }

@@ -1,4 +1,4 @@
-// The published figures of the thesis, recomputed from its tables of field-tested locations.
+// Recomputes the published metrics of the thesis from its tables of field-tested locations.
 #include <gmock/gmock.h>
 
 #include <array>
@@ -55,7 +55,7 @@ std::map<std::string, std::string> published_rates(const Table& table, std::size
   return rates;
 }
 
-// All counts of at most `most` locations whose rates, rounded, are the published ones.
+// All counts up to `most` locations whose rounded rates are the published ones.
 std::vector<Confusion> counts_behind(const std::map<std::string, std::string>& rates,
                                      std::size_t most) {
   std::vector<Confusion> found;
@@ -118,8 +118,8 @@ TEST(RocPublished, EveryRowOfTheAccuracyTables) {
     const bool on_wall = scenario == "bouldering_wall";
     const Table& table = on_wall ? wall : field;
     if (!table.find_column(name)) {
-      // Its scores were not published. There are counts that give all six of its rates, so the
-      // row at least agrees with itself.
+      // Its scores were not published. Counts exist that give all six rates, so that the row is at
+      // least consistent.
       without_scores.push_back(name);
       EXPECT_FALSE(counts_behind(published_rates(rows, row), 30).empty());
       continue;
@@ -146,9 +146,8 @@ TEST(RocPublished, TheRowThatThePrintLost) {
   EXPECT_EQ(rates.at("acc"), "0.7000");
 }
 
-// The interpolated case was published without its cutoff: of the ten, 0.6 and its neighbor 0.7,
-// between which no score lies, give the published rates, and 0.8, the other cases' cutoff, does
-// not.
+// The interpolated case was published without its cutoff. Of the ten cutoffs, 0.6 and 0.7 (no score
+// is between them) give the published rates; 0.8, the cutoff of the other cases, does not.
 TEST(RocPublished, TheInterpolatedCaseNeedsAnotherCutoff) {
   GRASPMAP_REQUIRE_DATA();
   const Table field = published("field_test_scenario4.csv");

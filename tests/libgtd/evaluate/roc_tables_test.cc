@@ -70,7 +70,7 @@ TEST(RocTables, RocTableHasTheCutoffsThenTheScores) {
               ElementsAre("map", "cutoff", "0.8", "3", "1", "2", "1", "1", "0", "1", "0.5", "0.5"));
   EXPECT_THAT(table.rows[11],
               ElementsAre("map", "score", "0.8", "3", "1", "2", "1", "1", "0", "1", "0.5", ""));
-  // What was written reads back.
+  // Round trip of the written table.
   const Table again = parse_csv(libmap::to_csv(table), "roc.csv");
   EXPECT_EQ(again.rows, table.rows);
 }
@@ -102,7 +102,7 @@ TEST(RocTables, MarkdownSaysWhichAreaThePublishedOneIs) {
   const std::string outside =
       libgtd::to_markdown(evaluate_small("graspable,score\n1,0.2\n0,0.05\n"), "");
   EXPECT_THAT(outside, HasSubstr("| 0.000 (incomplete, see below) |"));
-  EXPECT_THAT(outside, HasSubstr("can lie below the trapezoid"));
+  EXPECT_THAT(outside, HasSubstr("can be below the trapezoid"));
   EXPECT_THAT(markdown, Not(HasSubstr("incomplete")));
 }
 
@@ -121,7 +121,7 @@ TEST(RocTables, TextsDoNotDependOnTheLocale) {
   const std::string plain = texts();
   const std::string c_before = std::setlocale(LC_ALL, nullptr);
   const std::locale before = std::locale::global(std::locale(std::locale(), new Comma));
-  std::setlocale(LC_ALL, "de_DE.UTF-8");  // where it is installed
+  std::setlocale(LC_ALL, "de_DE.UTF-8");  // if installed
   const std::string comma = texts();
   std::locale::global(before);
   std::setlocale(LC_ALL, c_before.c_str());
@@ -144,10 +144,10 @@ TEST(RocTables, WrongTablesNameFileRowAndColumn) {
   EXPECT_EQ(label.context().value, "'maybe'");
   EXPECT_EQ(error_for("graspable,score\n1,high\n", {"score"}).context().field,
             "row 1, column 'score'");
-  EXPECT_THAT(error_for("graspable,name\n1,a\n").what(), HasSubstr("no column of scores"));
+  EXPECT_THAT(error_for("graspable,name\n1,a\n").what(), HasSubstr("no score column"));
   EXPECT_THAT(error_for("graspable,score\n1,0.5\n", {"score", "score"}).what(),
               HasSubstr("named twice"));
-  EXPECT_THAT(error_for("graspable,score\n", {}).what(), HasSubstr("no column of scores"));
+  EXPECT_THAT(error_for("graspable,score\n", {}).what(), HasSubstr("no score column"));
   EXPECT_THAT(error_for("graspable,score\n1,0.5\n", {"scor"}).what(),
               HasSubstr("did you mean 'score'"));
 }

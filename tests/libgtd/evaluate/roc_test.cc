@@ -35,8 +35,8 @@ struct Sample {
   Scores scores;
 };
 
-// Labels with some relation to the scores, which lie on a lattice of `levels` values so that they
-// tie; some locations have no score. Both classes occur.
+// Labels correlated with the scores, which have `levels` distinct values so that they tie. Some
+// locations have no score. Both classes occur.
 Sample random_sample(std::size_t size, int levels) {
   Sample sample{{true, false}, {0.5, 0.5}};
   while (sample.labels.size() < size) {
@@ -52,7 +52,7 @@ Sample random_sample(std::size_t size, int levels) {
   return sample;
 }
 
-// Every pair of a positive and a negative, looked at one by one.
+// Oracle: every pair of a positive and a negative.
 double pair_count_area(const Sample& sample) {
   double wins = 0, pairs = 0;
   for (std::size_t a = 0; a < sample.labels.size(); ++a) {
@@ -239,7 +239,7 @@ TEST(Roc, UpperSumIsNeverBelowTheTrapezoidsOfItsCutoffs) {
 }
 
 TEST(Roc, UpperSumMissesNegativesOutsideItsCutoffs) {
-  // A perfect score whose negatives lie below the first cutoff: the upper sum does not see them.
+  // A perfect score with negatives below the first cutoff, which the upper sum ignores.
   const RocResult result =
       evaluate_roc({true, true, false, false}, {0.9, 0.8, 0.05, 0.01}, without_bootstrap());
   EXPECT_EQ(result.area->trapezoid, 1.0);
@@ -288,7 +288,7 @@ TEST(Roc, WilsonIntervals) {
     EXPECT_LT(rate.wilson_95()->low, p);
     EXPECT_GT(rate.wilson_95()->high, p);
   }
-  // None of n: the upper end is z^2 / (n + z^2).
+  // Zero of n: the upper end is z^2 / (n + z^2).
   const double z2 = 1.959963984540054 * 1.959963984540054;
   EXPECT_EQ((Rate{0, 10}.wilson_95()->low), 0.0);
   EXPECT_NEAR((Rate{0, 10}.wilson_95()->high), z2 / (10 + z2), 1e-15);
@@ -321,7 +321,7 @@ TEST(Roc, BootstrapIsTheSameAtAnyThreadCountAndDiffersWithTheSeed) {
   EXPECT_NEAR(other.high, intervals.front().high, 0.02);
 }
 
-// The bootstrap written down straight: one draw per location.
+// Direct bootstrap: one draw per location.
 std::vector<double> slow_bootstrap(const Sample& sample, std::uint64_t replicates,
                                    std::uint32_t seed) {
   std::vector<double> positives, negatives;
@@ -350,7 +350,7 @@ std::vector<double> slow_bootstrap(const Sample& sample, std::uint64_t replicate
 }
 
 TEST(Roc, BootstrapIsTheDefinitionToTheBit) {
-  // Of 41 replicates the 0.025th and 0.975th part of the way are the second and the last but one.
+  // The 0.025 and 0.975 quantiles of 41 replicates are the second and the second to last.
   constexpr std::uint64_t replicates = 41;
   for (const std::size_t size : {2U, 3U, 77U, 900U}) {
     const Sample sample = random_sample(size, 50);
@@ -366,7 +366,7 @@ TEST(Roc, BootstrapIsTheDefinitionToTheBit) {
 }
 
 TEST(Roc, BootstrapAgreesWithTheNormalApproximationOnManyLocations) {
-  // The standard error of the area by the placements of each class (DeLong et al. 1988).
+  // Standard error of the area by the placements of each class (DeLong et al. 1988).
   const Sample sample = random_sample(800, 1000000);
   std::vector<double> positives, negatives;
   for (std::size_t i = 0; i < sample.labels.size(); ++i)

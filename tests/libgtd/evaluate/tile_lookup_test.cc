@@ -1,4 +1,4 @@
-// A map in tiles answers as the whole map does, to the bit.
+// Look-ups in a map in tiles equal those in the whole map to the bit.
 #include "libgtd/evaluate/lookup.h"
 
 #include <gtest/gtest.h>
@@ -103,7 +103,7 @@ std::vector<Eigen::Vector3d> places(const TiledMap& map) {
   std::vector<Eigen::Vector3d> points;
   for (int n = 0; n < 400; ++n)
     points.emplace_back(uniform(-0.5, 0.6), uniform(-0.4, 0.5), uniform(-0.1, 0.35));
-  // Corners of voxels are as near to several centers.
+  // Corners of voxels are equally near to several centers.
   for (int n = 0; n < 200; ++n)
     points.push_back(map.index().lattice.origin_m +
                      0.02 * Eigen::Vector3d(std::floor(uniform(-20, 25)),
@@ -189,7 +189,7 @@ TEST(TileLookupLoads, ThreadsChangeNothing) {
   for (std::size_t n = 0; n < points.size(); ++n) EXPECT_EQ(alone[n].values, many[n].values);
 }
 
-// By a transform that is none: nothing lies at a place that is no number.
+// With an invalid transform, no point has a finite position.
 TEST(TileLookup, PlacesThatTheTransformLoses) {
   const TiledMap map(MapFrame::input);
   TileStoreIndex index = map.index();
@@ -224,7 +224,7 @@ TEST(TileLookupErrors, MapsThatCannotBeAsked) {
     return libmap::select_points(cloud, order);
   };
   EXPECT_EQ(error_of([&] { libgtd::look_up_tiles(map.index(), reversed, points); }).reason(),
-            "a tile's points are not in order");
+            "the points of a tile are not in order");
   const auto nowhere = [&](std::size_t tile) {
     PointCloud cloud = map.load(tile);
     for (libmap::ScalarField& field : cloud.fields)
@@ -239,8 +239,7 @@ TEST(TileLookupErrors, MapsThatCannotBeAsked) {
             "radius_m");
 }
 
-// A tile whose points stand farther apart than any terrain's: as much memory and work as for two
-// neighbors.
+// A tile with points farther apart than any terrain takes as much memory and work as two neighbors.
 TEST(TileLookup, ColumnsFarApart) {
   constexpr double far_column = 5e8;
   TileStoreIndex index;

@@ -1,4 +1,4 @@
-// Fingers closed by libgtd and by Bullet: which links touch the ground, and where.
+// Compares fingers closed by libgtd and by Bullet: touching links and contact points.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -20,14 +20,14 @@ using libmap::RandomStream;
 
 constexpr int shape_count = 50;
 
-// Sizes for a finger of this length, m.
+// Sizes of shapes for a finger of this length, m.
 Shape make_shape(int number, double reach) {
   RandomStream random(2026, static_cast<std::uint64_t>(number));
   const auto size = [&](double low, double high) { return reach * random.uniform(low, high); };
   const double half = 4.0 * reach;
   if (number < 14) {
     const double radius = size(0.2, 1.3);
-    // The last ones float.
+    // The last shapes float.
     const double center = radius * (random.uniform(0.2, 1.0) + (number < 10 ? 0.0 : 1.0));
     return {"sphere", on_plane(sphere(radius, center), half), {0.0, 0.0, radius + center}};
   }
@@ -74,8 +74,8 @@ double reach_m(const Gripper& gripper) {
   return 0.001 * (gripper.finger_length_mm + gripper.spine_length_mm);
 }
 
-// Two of 20,000 fingers on shapes that are drawn like these differ: one contact grazes, one is
-// named for the other half of the distal link at the same angle.
+// 2 of 20,000 fingers on such random shapes differ: a grazing contact, and a contact assigned to
+// the other half of the distal link at the same angle.
 TEST(BulletGripper, ClosesAlike) {
   std::map<FingerEnd, int> ends;
   int went_on_alone = 0;
@@ -114,7 +114,7 @@ TEST(BulletGripper, ClosesAlike) {
     for (const libgtd::GripContact& contact : ours.contacts) {
       const ClosedByBullet::Finger& finger = theirs.fingers[contact.finger];
       const auto& point = contact.by_spines ? finger.spines : finger.link;
-      if (!point) continue;  // told above
+      if (!point) continue;  // reported above
       EXPECT_LT((contact.point - *point).norm(), 1e-4) << name;
     }
   }

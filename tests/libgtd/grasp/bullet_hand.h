@@ -1,5 +1,5 @@
-// The same fingers closed by a physics engine, Bullet (Coumans 2010, zlib license). Bullet gets
-// millimeters, and links of its own: capsules about the finger's straight lines, and a disc.
+// Closes the fingers with a physics engine, Bullet (Coumans 2010, zlib license). Bullet uses
+// millimeters and its own links: capsules around the straight lines of the finger, and a disc.
 #pragma once
 
 #include <btBulletCollisionCommon.h>
@@ -41,7 +41,7 @@ inline btTransform in_mm(const Eigen::Isometry3d& frame) {
   return btTransform(btQuaternion(turn.x(), turn.y(), turn.z(), turn.w()), mm(frame.translation()));
 }
 
-// A static mesh, its origin in the location.
+// Static mesh with its origin at the location.
 class StaticMesh {
  public:
   explicit StaticMesh(const Shape& shape) {
@@ -61,15 +61,15 @@ class StaticMesh {
 
 struct Nearest {
   double distance_mm = 0.0;
-  Eigen::Vector3d point{0.0, 0.0, 0.0};  // of the ground, m
+  Eigen::Vector3d point{0.0, 0.0, 0.0};  // point of the ground, m
 };
 
 class Distances {
  public:
   explicit Distances(StaticMesh& mesh) { ground_.setCollisionShape(mesh.surface()); }
 
-  // Of the ground from the shape without its margin: a capsule's line, a disc. Farther ground than
-  // the horizon is not seen.
+  // Distance of the ground from the shape without its margin (line of a capsule, disc). Ground
+  // beyond the horizon is ignored.
   Nearest nearest(btConvexShape& shape, const Eigen::Isometry3d& where) {
     struct Closest : btCollisionWorld::ContactResultCallback {
       Nearest nearest;
@@ -104,7 +104,7 @@ class Distances {
 
 constexpr double link_radius_mm = 0.2;
 constexpr double touch_mm = 0.001;
-constexpr double clearance_m = 1e-5;  // of the open gripper before it closes
+constexpr double clearance_m = 1e-5;  // clearance of the open gripper before closing
 
 enum class Part : std::size_t { proximal, outer_half, inner_half, palm };
 
@@ -121,8 +121,8 @@ struct ClosedByBullet {
   std::vector<Finger> fingers;
 };
 
-// Moves parts until one of them touches. The distance bounds how far they may go without touching
-// (conservative advancement, Mirtich 1996).
+// Moves parts until one of them touches. The distance bounds the free movement (conservative
+// advancement, Mirtich 1996).
 class HandInBullet {
  public:
   HandInBullet(const Gripper& gripper, StaticMesh& mesh)
@@ -170,7 +170,7 @@ class HandInBullet {
     return closed;
   }
 
-  // From the parts of one finger to the ground, at least; mm.
+  // Minimum distance of the parts of one finger from the ground, mm.
   double distance(const Eigen::Isometry3d& frame, int finger, double proximal_rad,
                   double curl_rad) {
     double least = std::numeric_limits<double>::infinity();
@@ -182,7 +182,7 @@ class HandInBullet {
     return least;
   }
 
-  // A part's place in the gripper's frame; its shape lies along z.
+  // Pose of a part in the gripper frame; its shape is along z.
   Eigen::Isometry3d link(int finger, Part part, double proximal_rad, double distal_rad) const {
     if (part == Part::palm)
       return Eigen::Isometry3d(Eigen::Translation3d(0.0, 0.0, 0.001 * palm_half_mm));
@@ -218,7 +218,7 @@ class HandInBullet {
 
   struct Body {
     Part part = Part::palm;
-    double speed = 1.0;  // m at most per unit of the parameter
+    double speed = 1.0;  // maximum m per unit of the parameter
     std::function<Eigen::Isometry3d(double)> at;
   };
   struct Touch {
@@ -227,7 +227,7 @@ class HandInBullet {
     Eigen::Vector3d point{0.0, 0.0, 0.0};
   };
 
-  // The parameter goes down. Where bodies touch at once, the first of them counts.
+  // The parameter decreases. If bodies touch at the same time, the first of them counts.
   std::optional<Touch> move(const std::vector<Body>& bodies, double from, double to) {
     double at = from;
     while (true) {

@@ -1,5 +1,4 @@
-// The pull that takes a closed gripper off, where it holds by Coulomb friction alone, by libgtd and
-// by Bullet.
+// Compares the pull that detaches a gripper held by Coulomb friction only, by libgtd and by Bullet.
 #include <BulletDynamics/Featherstone/btMultiBody.h>
 #include <BulletDynamics/Featherstone/btMultiBodyConstraintSolver.h>
 #include <BulletDynamics/Featherstone/btMultiBodyDynamicsWorld.h>
@@ -24,8 +23,8 @@ namespace bullet_pull_test {
 
 using namespace bullet_test;
 
-// The closed gripper as a body that floats without weight: the palm, and each finger's outer half,
-// which slides along the finger's radius and is pressed toward the axis by the closing force.
+// Closed gripper as a weightless floating body: the palm, and the outer half of each finger, which
+// slides along the radius of the finger and is pressed toward the axis by the closing force.
 class PulledGripper {
  public:
   PulledGripper(const Gripper& gripper, HandInBullet& hand, const ClosedByBullet& closed,
@@ -86,8 +85,8 @@ class PulledGripper {
     world_.removeCollisionObject(&ground_);
   }
 
-  // The pull at which the palm begins to leave. It grows from half of `about_n`; infinity if the
-  // gripper still holds at twice as much.
+  // Returns the pull at which the palm starts to move. The pull grows from half of `about_n`;
+  // infinity if the gripper still holds at twice `about_n`.
   double pull_out(const Eigen::Vector3d& direction, double about_n) {
     constexpr int settling = 200;
     for (int n = 0; n < settling; ++n) step(direction, 0.0, std::min(1.0, 2.0 * n / settling));
@@ -105,7 +104,7 @@ class PulledGripper {
   static constexpr double palm_mass = 0.002;  // 1 N moves it by 500 mm/s2
   static constexpr double finger_mass = 0.0005;
   static constexpr double step_s = 0.001;
-  static constexpr double growth = 1.0005;  // of the pull in a step
+  static constexpr double growth = 1.0005;  // factor of the pull per step
   static constexpr double leaving_mm = 0.03;
 
   void step(const Eigen::Vector3d& direction, double pull, double closing) {
@@ -129,7 +128,7 @@ class PulledGripper {
 struct Pulls {
   double ours_n = 0.0;
   double theirs_n = 0.0;
-  double falling = 0.0;  // sine of the contacts' slope: 0 on a wall, above 0 below an equator
+  double falling = 0.0;  // sine of the contact slope: 0 on a wall, > 0 below an equator
 };
 
 Pulls pulls_of(const Shape& shape, const Gripper& gripper, double friction,
@@ -140,7 +139,7 @@ Pulls pulls_of(const Shape& shape, const Gripper& gripper, double friction,
   std::vector<libgtd::BearingContact> bearing;
   for (const libgtd::GripContact& contact : ours.contacts) {
     EXPECT_TRUE(contact.by_spines);
-    // A lean of 0 and no limit of the spines: friction alone.
+    // Facet angle 0 and no spine limit: friction only.
     bearing.emplace_back(contact, std::vector<double>{0.0}, friction, 1e6);
     pulls.falling -= contact.normal.z() / static_cast<double>(ours.contacts.size());
   }
@@ -167,7 +166,7 @@ Shape post_to_pull(double radius) {
           {0.0, 0.0, 0.15}};
 }
 
-// High enough that the fingers do not meet the plane.
+// High enough for the fingers not to meet the plane.
 Shape sphere_to_pull(double radius) {
   return {fmt::format("sphere of {} m", radius),
           on_plane(sphere(radius, 1.2 * radius, 192), 0.4),
@@ -203,7 +202,7 @@ TEST(BulletGripper, ComesOffASphereAtTheSamePull) {
     }
 }
 
-// All six rows of the equilibrium count: the pull acts on the palm, above the contacts.
+// Tests all six rows of the equilibrium: the pull acts on the palm, above the contacts.
 TEST(BulletGripper, ComesOffSidewaysAtTheSamePull) {
   const Eigen::Vector3d sideways = Eigen::Vector3d::UnitX();
   const Eigen::Vector3d slanting = Eigen::Vector3d(1.0, 0.0, 1.0).normalized();

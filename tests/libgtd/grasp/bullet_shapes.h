@@ -1,4 +1,4 @@
-// Shapes on the ground that fingers are closed on.
+// Makes shapes on the ground for closing fingers.
 #pragma once
 
 #include <cmath>
@@ -17,7 +17,7 @@ using libmap::TriangleMesh;
 
 constexpr double pi = std::numbers::pi;
 
-// About the z axis, from the top down; (r, z) in meters.
+// Body of revolution about z, from the top down; (r, z) in meters.
 inline TriangleMesh revolved(const std::vector<Eigen::Vector2d>& outline, std::uint32_t sides) {
   TriangleMesh mesh;
   for (const Eigen::Vector2d& point : outline)
@@ -37,7 +37,7 @@ inline TriangleMesh revolved(const std::vector<Eigen::Vector2d>& outline, std::u
   return mesh;
 }
 
-// Its center is at this height.
+// Makes the shape with its center at this height.
 inline TriangleMesh sphere(double radius, double center, std::uint32_t sides = 96) {
   std::vector<Eigen::Vector2d> outline;
   const std::uint32_t rows = sides / 2;
@@ -66,7 +66,7 @@ inline TriangleMesh box(double half_x, double half_y, double height) {
   return mesh;
 }
 
-// A ridge along x.
+// Makes a ridge along x.
 inline TriangleMesh wedge(double half_length, double half_width, double height) {
   TriangleMesh mesh;
   mesh.vertices = {{-half_length, 0.0, height},      {half_length, 0.0, height},
@@ -102,7 +102,7 @@ inline TriangleMesh on_plane(const TriangleMesh& shape, double half) {
 struct Shape {
   std::string name;
   TriangleMesh mesh;
-  Eigen::Vector3d location;  // its top, or the middle of a field
+  Eigen::Vector3d location;  // top of the shape, or middle of a field
 };
 
 }  // namespace bullet_test

@@ -39,7 +39,7 @@ bool touches(const Eigen::Vector2d& a, const Eigen::Vector2d& b,
                      [&](const auto& segment) { return cross(a, b, segment.a, segment.b); });
 }
 
-// The same by small steps: the angles at which a link first cuts the profile.
+// Oracle by small steps: angles at which a link first intersects the profile.
 FingerClosing close_in_steps(const FingerGeometry& finger,
                              const std::vector<GroundSegment>& profile, double step) {
   FingerClosing closing;
@@ -52,7 +52,7 @@ FingerClosing close_in_steps(const FingerGeometry& finger,
       closing.end = FingerEnd::link;
       for (double c = finger.curl_rad; c <= finger.curl_limit_rad; c += step) {
         closing.curl_rad = c;
-        // Without the knuckle itself, which may touch.
+        // Excludes the knuckle itself, which may touch.
         const Eigen::Vector2d end = finger.tip(t, c);
         const Eigen::Vector2d middle = 0.5 * (knuckle + end);
         if (touches(middle, end, profile)) {
@@ -94,7 +94,7 @@ TEST(FingerClosing, OnNothingItReachesTheEndStop) {
   }
 }
 
-// The tip's circle about the joint against a plane at depth d: LF cos t + LS cos(t - c) = d.
+// Circle of the tip around the joint against a plane at depth d: LF cos t + LS cos(t - c) = d.
 TEST(FingerClosing, TipOnAPlane) {
   const FingerGeometry finger = libgtd::finger_geometry(grasp_test::gripper());
   for (const double depth : {0.03, 0.05, 0.07}) {
@@ -108,7 +108,7 @@ TEST(FingerClosing, TipOnAPlane) {
   }
 }
 
-// A ridge thinner than any step, in the way of each part of the finger.
+// A ridge thinner than any step, in the path of each part of the finger.
 TEST(FingerClosing, AThinRidgeIsNotSkipped) {
   const FingerGeometry finger = libgtd::finger_geometry(grasp_test::gripper());
   const auto ridge = [](double r, double z) {
@@ -149,7 +149,7 @@ TEST(FingerClosing, AgreesWithSmallSteps) {
     const FingerClosing stepped = close_in_steps(finger, profile, step);
     ++ends[static_cast<int>(exact.end)];
     EXPECT_LE(std::abs(exact.proximal_rad - stepped.proximal_rad), 3 * step) << seed;
-    // Two contacts at nearly one angle may come in either order.
+    // Two contacts at nearly the same angle may occur in either order.
     if (exact.end != stepped.end) continue;
     ++compared;
     EXPECT_LE(std::abs(exact.curl_rad - stepped.curl_rad), 20 * step) << seed;

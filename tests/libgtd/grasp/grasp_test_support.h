@@ -15,7 +15,7 @@
 
 namespace grasp_test {
 
-// With known parameters: 10 N per spine and closing force, whatever the file says.
+// Returns a gripper with known parameters: 10 N per spine and closing force.
 inline libgtd::Gripper gripper(std::vector<std::pair<std::string, std::string>> overrides = {},
                                const std::string& name = "scar-e") {
   for (const char* key : {"fingers.closing_force_n", "fingers.spine_force_limit_n"})
@@ -26,14 +26,14 @@ inline libgtd::Gripper gripper(std::vector<std::pair<std::string, std::string>> 
   return made;
 }
 
-// Each spine meets a facet of this lean.
+// Sets all facets to this angle.
 inline libgtd::Gripper with_lean(libgtd::Gripper gripper, double psi_deg) {
   gripper.engagement.asperity_min_deg = gripper.engagement.asperity_max_deg = psi_deg;
   gripper.engagement.engagement_rate = 100;
   return gripper;
 }
 
-// z = height(x, y) on a square of this half side, with 2 * cells squares along each edge.
+// Returns z = height(x, y) on a square of this half side, with 2 * cells squares along each edge.
 inline libmap::TriangleMesh height_mesh(double half_m, int cells,
                                         const std::function<double(double, double)>& height) {
   libmap::TriangleMesh mesh;
@@ -53,7 +53,7 @@ inline libmap::TriangleMesh height_mesh(double half_m, int cells,
   return mesh;
 }
 
-// A body of revolution about z by its profile (radius, z) from top to bottom.
+// Returns a body of revolution about z by its profile (radius, z) from top to bottom.
 inline libmap::TriangleMesh revolved(const std::vector<Eigen::Vector2d>& profile, int sides) {
   libmap::TriangleMesh mesh;
   for (const Eigen::Vector2d& point : profile)
@@ -74,8 +74,8 @@ inline libmap::TriangleMesh revolved(const std::vector<Eigen::Vector2d>& profile
   return mesh;
 }
 
-// `count` contacts evenly around z at this radius, on ground that falls outward by `slope_rad`,
-// dragged up the slope.
+// Returns `count` contacts evenly around z at this radius, on ground that falls outward by
+// `slope_rad`, dragged up the slope.
 inline std::vector<libgtd::GripContact> ring_of_contacts(int count, double radius,
                                                          double slope_rad) {
   std::vector<libgtd::GripContact> contacts;

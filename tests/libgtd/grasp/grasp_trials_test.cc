@@ -23,7 +23,7 @@ using libgtd::TrialEnd;
 constexpr double degree = libmap::radians_per_degree;
 const double phi = std::atan(0.39);
 
-// The palm comes down on the location.
+// The palm rests on the location.
 GraspOptions certain() {
   GraspOptions options;
   options.poses = 2;
@@ -42,7 +42,7 @@ std::vector<LocationResult> test_on(const libmap::TriangleMesh& mesh,
   return libgtd::test_grasps(ground, of, locations, options, libmap::no_progress());
 }
 
-// The pull away from the ground of a gripper whose drives give way.
+// Pull away from the ground of a gripper whose drives do not resist opening.
 double pull_away(const libmap::TriangleMesh& mesh, const Eigen::Vector3d& location,
                  const libgtd::Gripper& of, double psi_deg) {
   const libgtd::Ground ground(mesh);
@@ -54,7 +54,7 @@ double pull_away(const libmap::TriangleMesh& mesh, const Eigen::Vector3d& locati
                                 .holds_when_closed = false});
 }
 
-// m P tan(g + psi + phi - 90 deg), from the mesh to the force, within 2 %.
+// m P tan(g + psi + phi - 90 deg), from mesh to force, within 2 %.
 TEST(GraspTrials, ClosedFormsFromMeshToForce) {
   const libgtd::Gripper of = gripper({{"fingers.spine_force_limit_n", "1000"}});
   const auto expected = [](double slope_deg, double psi_deg) {
@@ -77,7 +77,7 @@ TEST(GraspTrials, ClosedFormsFromMeshToForce) {
       EXPECT_NEAR(pull_away(cone, {0, 0, -0.002}, of, psi), force, 0.02 * force + 1e-6)
           << slope << " " << psi;
     }
-  // A sphere, on whose upper part the fingers come down: at the polar angle g of the contacts.
+  // A sphere with contacts on its upper part; g is the polar angle of the contacts.
   std::vector<Eigen::Vector2d> sphere;
   for (int n = 1; n < 400; ++n)
     sphere.emplace_back(0.1 * std::sin(n * std::numbers::pi / 400),
@@ -151,7 +151,7 @@ TEST(GraspTrials, SameBytesForAnyThreadsAndOrder) {
   EXPECT_NE(text_of(test_on(mesh, places, other)), text_of(results));
 }
 
-// What only the mask needs changes nothing.
+// Parameters of the mask have no effect.
 TEST(GraspTrials, DoNotDependOnTheMask) {
   const auto mesh = bumps();
   const auto places = places_on(mesh, 4);
@@ -206,7 +206,7 @@ TEST(GraspTrials, ALargerLoadHoldsLess) {
   EXPECT_LT(last, 0.1);
 }
 
-// Two sets: the trials of the ensemble are trials of the one or the other.
+// Two sets: each trial of the ensemble is a trial of one of the sets.
 TEST(GraspTrials, AnEnsembleMixesItsSets) {
   const auto mesh = bumps();
   const auto places = places_on(mesh, 8);
@@ -229,7 +229,7 @@ TEST(GraspTrials, AnEnsembleMixesItsSets) {
     EXPECT_EQ(of_weak[n].parameter_spread, 0);
     EXPECT_EQ(of_both[n].has_force, of_strong[n].has_force);
   }
-  // One set of any weight, and one without weight.
+  // A single set of any weight, and an additional set of weight 0.
   both.ensemble = {{1.0, strong}};
   EXPECT_EQ(text_of(test_on(mesh, places, options, both)), text_of(of_strong));
   both.ensemble = {{1.0, strong}, {0.0, parameters_of(weak)}};
@@ -238,8 +238,8 @@ TEST(GraspTrials, AnEnsembleMixesItsSets) {
   EXPECT_EQ(text_of(test_on(mesh, places, options, both)), text_of(of_weak));
 }
 
-// On level ground all forces are proportional to closing force and spine limit: two sets that
-// differ by a factor of four have a spread of ln 4 / sqrt 2 between them, and that within is
+// On level ground all forces are proportional to closing force and spine limit. Two sets that
+// differ by a factor of four have a spread of ln 4 / sqrt 2 between them; the spread within sets is
 // unchanged.
 TEST(GraspTrials, SpreadsOfTrialsAndSets) {
   const auto mesh = height_mesh(0.4, 4, [](double, double) { return 0.0; });
@@ -301,7 +301,7 @@ TEST(GraspTrials, FailuresAreNamed) {
 }
 
 TEST(GraspTrials, AlongTheGroundsNormal) {
-  // A wall: its normal is level.
+  // A wall: its normal is horizontal.
   auto wall = height_mesh(
       0.3, 60, [](double x, double y) { return 0.04 * std::cos(40 * x) * std::cos(40 * y); });
   auto tilted = wall;
@@ -348,12 +348,12 @@ TEST(GraspTrials, SequentialVerdictsAreTheFullOnes) {
   }
   EXPECT_GE(agree, 59);
   EXPECT_LT(trials, 60u * 30u);
-  // What a location's neighbors need does not matter.
+  // The neighbors of a location have no effect.
   EXPECT_EQ(text_of(test_on(mesh, {places[7]}, options)), text_of({early[7]}));
 }
 
-// Where half of the trials hold, all are made. Where some more do, the draws of all 32 poses end
-// once those to come cannot be expected to change the verdict.
+// If half of the trials hold, all are run. If slightly more hold, the draws of all 32 poses end
+// once the remaining ones are not expected to change the verdict.
 TEST(GraspTrials, SequentialTestsOfUnclearPlacesGoOn) {
   const auto mesh = bumps();
   GraspOptions options;
@@ -405,8 +405,8 @@ TEST(GraspTrials, SequentialRounds) {
   EXPECT_EQ(libgtd::sequential_rounds(options).size(), 1u);
 }
 
-// A patch holds what comes into the cylinder, by comparison with all triangles, and small, large
-// and far ones are found alike.
+// A patch contains the triangles that intersect the cylinder, compared with all triangles; small,
+// large and distant ones are found.
 TEST(GraspTrials, PatchesHoldAllTriangles) {
   auto mesh = bumps();
   const auto large = height_mesh(1.5, 3, [](double, double) { return -0.2; });
@@ -431,7 +431,7 @@ TEST(GraspTrials, PatchesHoldAllTriangles) {
         if (is_in) centers.push_back(center);
       }
       ASSERT_GT(centers.size(), 3u);
-      // In the mesh's order, among others outside.
+      // In the order of the mesh, among others outside.
       std::size_t next = 0;
       for (const Eigen::Vector3d& center : patch.centers)
         if (next < centers.size() && (center - centers[next]).norm() < 1e-9) ++next;

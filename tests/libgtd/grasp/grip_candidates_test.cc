@@ -58,11 +58,11 @@ TEST(GripCandidates, FromAboveOnly) {
   EXPECT_FALSE(candidates.may_hold({0, 0, 0}));
   EXPECT_FALSE(candidates.may_hold({0.02, 0.03, 0.14}));
   EXPECT_TRUE(candidates.may_hold({0.6, 0.6, 0}));
-  // Beside the table it is in the way of some fingers; at the edge it is above.
+  // Beside the table, it blocks some fingers; at the edge, it is above.
   EXPECT_FALSE(candidates.may_hold({0.32, 0, 0}));
   EXPECT_TRUE(candidates.may_hold({0.44, 0, 0}));
   EXPECT_FALSE(candidates.may_hold({std::nan(""), 0, 0}));
-  EXPECT_TRUE(candidates.may_hold({9, 9, 0}));  // nothing there is above anything
+  EXPECT_TRUE(candidates.may_hold({9, 9, 0}));  // outside the mesh
 }
 
 }  // namespace grip_candidates_test

@@ -46,7 +46,7 @@ TEST(GripperClosing, OnAPlaneTheTipsTouchFirst) {
 }
 
 TEST(GripperClosing, ThePalmTouchesItsHighestPoint) {
-  // A needle under the palm, off its center, and one beside it.
+  // A needle below the palm, off its center, and another beside it.
   for (const double x : {0.02, 0.042}) {
     auto mesh = height_mesh(0.3, 30, flat);
     const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
@@ -60,8 +60,8 @@ TEST(GripperClosing, ThePalmTouchesItsHighestPoint) {
   }
 }
 
-// Sphere on a plane: the tip's circle about the joint against the sphere's circle. A sphere that is
-// wide stops open fingers; a small one is not reached.
+// Sphere on a plane: circle of the tip around the joint against the circle of the sphere. A wide
+// sphere stops open fingers; a small one is out of reach.
 TEST(GripperClosing, Spheres) {
   const libgtd::FingerGeometry finger = libgtd::finger_geometry(gripper());
   for (const double radius : {0.02, 0.05, 0.07, 0.5}) {
@@ -70,7 +70,7 @@ TEST(GripperClosing, Spheres) {
       const double polar = n * std::numbers::pi / 400;
       profile.emplace_back(radius * std::sin(polar), radius * (std::cos(polar) - 1));
     }
-    // Wide ones need no ground: with it, the fingers would touch the ground.
+    // No ground for wide spheres, because the fingers would touch it.
     const auto mesh = revolved(profile, 128);
     libgtd::ClosingOptions options;
     options.max_unseen = 1;
@@ -84,7 +84,7 @@ TEST(GripperClosing, Spheres) {
     }
     EXPECT_TRUE(closed.palm_touches);
     EXPECT_NEAR(palm, 0, 2e-4);
-    // By steps of the closing angle: distance of tip and links to the sphere's center.
+    // By steps of the closing angle: distances of tip and links from the center of the sphere.
     const Eigen::Vector2d center(0, -radius - palm);
     const auto distance = [&](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
       const Eigen::Vector2d d = b - a;
@@ -109,7 +109,7 @@ TEST(GripperClosing, Spheres) {
       EXPECT_NEAR(from_center.norm(), radius, 3e-4);
       EXPECT_GT(contact.normal.dot(from_center.normalized()), 0.999);
       EXPECT_NEAR(contact.drag.dot(contact.normal), 0, 1e-9);
-      // Up the sphere, toward its top.
+      // Upward on the sphere, toward its top.
       EXPECT_NEAR(contact.drag.dot(contact.outward), -contact.normal.z(), 1e-3);
       EXPECT_GT(contact.drag.z(), 0);
     }
@@ -134,7 +134,7 @@ TEST(GripperClosing, YawAndRigidMotionOfEverything) {
   const libgtd::Ground ground(moved);
   const Eigen::Vector3d away = motion.linear() * Eigen::Vector3d::UnitZ();
   const auto patch = libgtd::patch_around(ground, motion.translation(), away, gripper(), 0, 0, {});
-  // The patch's frame has its own x axis.
+  // The frame of the patch has its own x axis.
   const Eigen::Vector3d x = patch.mesh_from_patch.linear().transpose() * motion.linear().col(0);
   const ClosedGripper there =
       libgtd::close_gripper(patch, gripper(), {.yaw_rad = std::atan2(x.y(), x.x())}, {});
@@ -158,7 +158,7 @@ TEST(GripperClosing, AFinerMeshOfTheSameGroundChangesLittle) {
 }
 
 TEST(GripperClosing, GroundBehindAHoleIsUnseen) {
-  // A sector of the ground is missing under the finger at azimuth 0.
+  // A sector of the ground is missing below the finger at azimuth 0.
   auto mesh = height_mesh(0.3, 60, flat);
   std::erase_if(mesh.triangles, [&](const libmap::Triangle& triangle) {
     const Eigen::Vector3d& p = mesh.vertices[triangle[0]];
@@ -167,13 +167,13 @@ TEST(GripperClosing, GroundBehindAHoleIsUnseen) {
   const ClosedGripper closed = close_on(mesh);
   const libgtd::FingerGeometry finger = libgtd::finger_geometry(gripper());
   const double tip = finger.tip(finger.opening_rad, finger.curl_rad).x();
-  // The missing ring's share of the sector, to one cell of 5 mm.
+  // Share of the missing ring in the sector, to one cell of 5 mm.
   EXPECT_NEAR(closed.fingers[0].unseen, 1 - 0.065 * 0.065 / (tip * tip), 0.05);
   EXPECT_NEAR(closed.fingers[2].unseen, 0, 1e-9);
   EXPECT_NEAR(closed.unseen, closed.fingers[0].unseen / 8, 1e-9);
   for (const auto& contact : closed.contacts) EXPECT_NE(contact.finger, 0u);
   EXPECT_EQ(closed.contacts.size(), 7u);
-  // Ground far below is seen, though no finger reaches it.
+  // Ground far below is seen, although out of reach.
   const auto cliff =
       close_on(height_mesh(0.3, 60, [](double x, double) { return x > 0.03 ? -0.9 : 0.0; }));
   EXPECT_NEAR(cliff.unseen, 0, 1e-9);
@@ -183,7 +183,7 @@ TEST(GripperClosing, GroundBehindAHoleIsUnseen) {
 TEST(GripperClosing, BesideAHighRockTheWayIsBlocked) {
   const auto step = [](double x, double) { return x > 0.08 ? 0.6 : 0.0; };
   EXPECT_EQ(close_on(height_mesh(0.3, 60, step)).approach, ApproachEnd::blocked);
-  // A roof with room below it is no obstacle.
+  // A roof with free space below is not an obstacle.
   auto mesh = height_mesh(0.3, 60, flat);
   for (const double z : {0.5, 0.6}) {
     const auto first = static_cast<std::uint32_t>(mesh.vertices.size());

@@ -41,7 +41,7 @@ TEST(HoldingForce, ClosedFormsOnSlopes) {
       for (const double slope : {0.0, 20.0, 45.0, 70.0, 90.0})
         for (const double psi : {0.0, 15.0, 40.0, 70.0, 85.0}) {
           const double angle = (slope + psi) * degree + phi - 90 * degree;
-          if (angle > 85 * degree) continue;  // caged: limited by the spines alone
+          if (angle > 85 * degree) continue;  // caged: limited by the spines only
           const double expected = angle > 0 ? fingers * 10 * std::tan(angle) : 0;
           EXPECT_NEAR(libgtd::holding_force(
                           bearing(ring_of_contacts(fingers, 0.08, slope * degree), {psi * degree}),
@@ -51,7 +51,7 @@ TEST(HoldingForce, ClosedFormsOnSlopes) {
         }
 }
 
-// A wedge: two fingers on each side of a ridge.
+// Wedge: two fingers on each side of a ridge.
 TEST(HoldingForce, OnAWedge) {
   std::vector<GripContact> contacts;
   for (const double side : {1.0, -1.0})
@@ -67,9 +67,8 @@ TEST(HoldingForce, OnAWedge) {
               4 * 10 * std::tan(50 * degree + 30 * degree + phi - 90 * degree), 1e-8);
 }
 
-// Chen et al. 2024, whose program was run for these figures: two fingers of ten spines, closing
-// force and spine limit 10 N, 400 draws; psi between the smallest that holds the closing force and
-// 90 deg.
+// Chen et al. 2024, from a run of their program: two fingers of ten spines, closing force and spine
+// limit 10 N, 400 draws; psi between the minimum that bears the closing force and 90 deg.
 TEST(HoldingForce, PublishedMonteCarlo) {
   struct Row {
     double slope_deg, mean_n, deviation_n;
@@ -158,12 +157,12 @@ TEST(HoldingForce, RisesWithWhatHolds) {
 }
 
 TEST(HoldingForce, SpinesThatShareEqually) {
-  // On a cylinder without friction, the facets alone hold: 5 N each.
+  // On a cylinder without friction, only the facets bear force: 5 N each.
   const auto force = [](std::vector<double> leans, SpineSharing sharing) {
     return libgtd::holding_force(bearing(ring_of_contacts(4, 0.08, 0), leans, 0.0, 5.0), away,
                                  limited(1e3, sharing));
   };
-  // Without friction nothing is pulled down along the normal unless the facet overhangs.
+  // Without friction there is no pull down along the normal unless the facet overhangs.
   EXPECT_NEAR(force({80 * degree}, SpineSharing::best), 0, 1e-9);
   // Friction of 20 deg, facets of 90 and 75 deg: pulls at 20 and 5 deg below the plane.
   const double mu = std::tan(20 * degree);
@@ -202,7 +201,7 @@ TEST(HoldingForce, NothingHolds) {
   auto contacts = ring_of_contacts(8, 0.08, 60 * degree);
   contacts.resize(3);
   EXPECT_EQ(libgtd::holding_force(bearing(contacts, {0.3}), away, limited()), 0);
-  // No friction, no lean.
+  // No friction, facet angle 0.
   EXPECT_NEAR(
       libgtd::holding_force(bearing(ring_of_contacts(8, 0.08, 0.5), {0.0}, 0.0), away, limited()),
       0, 1e-12);
@@ -234,7 +233,7 @@ TEST(Engagement, ShareOfSpines) {
   EXPECT_LT(libgtd::engagement_share(engagement, 100), 0.9);
   engagement.drag_mm = 0;
   EXPECT_EQ(libgtd::engagement_share(engagement, 25), 0);
-  // Drawn: of 10000 spines.
+  // Random draws of 10000 spines.
   libmap::RandomStream random(1, 1);
   libgtd::Gripper many = grasp_test::gripper();
   many.fingers->spines_per_finger = 10000;

@@ -1,4 +1,4 @@
-// The holding force against CGAL's exact solver of linear programs.
+// Compares the holding force with the exact linear program solver of CGAL.
 #include <CGAL/Gmpzf.h>
 #include <CGAL/QP_functions.h>
 #include <CGAL/QP_models.h>
@@ -21,7 +21,7 @@ struct ContactData {
   std::vector<double> leans;
 };
 
-// Eight edges of length 1 on the friction cone of a facet, by rotations.
+// Eight unit edges on the friction cone of a facet, by rotations.
 std::vector<Eigen::Vector3d> edges_of(const GripContact& contact, double lean, double friction) {
   const Eigen::Vector3d lateral = contact.normal.cross(contact.drag);
   const Eigen::Vector3d axis = Eigen::AngleAxisd(-lean, lateral) * contact.normal;
@@ -32,13 +32,13 @@ std::vector<Eigen::Vector3d> edges_of(const GripContact& contact, double lean, d
   return edges;
 }
 
-// Variables: the pull, then a weight for each edge. Rows are written as the specification has them;
-// the equilibrium may be missed by `slack` N and Nm.
+// Variables: the pull, then a weight per edge. Rows are as in the specification; the equilibrium
+// has a tolerance of `slack` N and Nm.
 double exact_force(const std::vector<ContactData>& contacts, const Eigen::Vector3d& direction,
                    double friction, double limit_n, const HoldingOptions& options, double slack) {
   using Program = CGAL::Quadratic_program<double>;
   Program program(CGAL::SMALLER, true, 0, false, 0);
-  // Rows 0 to 5: equal, or not above the slack; then 6 to 11: nor below it.
+  // Rows 0 to 5: equal, or at most the slack; rows 6 to 11: at least -slack.
   const bool is_exact = slack == 0.0;
   for (int row = 0; row < 6; ++row)
     if (is_exact) program.set_r(row, CGAL::EQUAL);
@@ -108,8 +108,8 @@ double exact_force(const std::vector<ContactData>& contacts, const Eigen::Vector
   return -CGAL::to_double(solution.objective_value());
 }
 
-// Contacts around the axis, on one side of it, in one plane or of two fingers: also sets that hold
-// nothing.
+// Contacts around the axis, on one side of it, in one plane or of two fingers, including sets that
+// cannot hold.
 std::vector<ContactData> random_set(libmap::RandomStream& random) {
   const int count = 2 + static_cast<int>(random.below(4));
   const bool one_side = random.uniform() < 0.15;
@@ -153,8 +153,8 @@ TEST(LinearProgram, AgreesWithAnExactSolver) {
     for (const ContactData& one : contacts)
       bearing.emplace_back(one.contact, one.leans, friction, limit_n);
     const double force = libgtd::holding_force(bearing, direction, options);
-    // Where contacts leave a moment without resistance, exact equality of rounded numbers has
-    // another solution than the problem that they stand for.
+    // If the contacts do not resist some moment, exact equality of rounded numbers has a different
+    // solution than the real problem.
     const bool is_regular = contacts.size() > 2 && contacts[0].contact.point.z() != 0.0;
     const double exact =
         exact_force(contacts, direction, friction, limit_n, options, is_regular ? 0.0 : 1e-12);

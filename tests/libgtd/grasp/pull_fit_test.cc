@@ -1,5 +1,5 @@
-// The fit to pull tests: simulated pulls of a gripper with other parameters than the prior's
-// middle.
+// Tests the fit to pull tests: simulated pulls of a gripper with parameters other than the middle
+// of the prior.
 #include "libgtd/grasp/pull_fit.h"
 
 #include <gtest/gtest.h>
@@ -116,7 +116,7 @@ TEST(PullFit, TheSameBytesForAnyThreads) {
   EXPECT_EQ(text(1), text(3));
 }
 
-// Forces that no parameters explain: the same place ten times as strong as its equal.
+// Forces that no parameters explain: a position ten times as strong as its equal.
 TEST(PullFit, ContradictionsAreReported) {
   const Gripper prior = libgtd::find_gripper("scar-e");
   std::vector<PullTest> tests(8);
@@ -171,7 +171,7 @@ TEST(PullFit, PullsThatCannotBeMadeAreNamed) {
   EXPECT_EQ(field(&ground, {3, 0, 0}, prior), "row 7");
   EXPECT_EQ(field(nullptr, {0, 0, 0.05}, prior), "row 7");
   EXPECT_EQ(field(&ground, {0, 0, 0.05}, grasp_test::gripper()), "ranges");
-  // A post that is too thin for the fingers.
+  // A post too thin for the fingers.
   const auto post = grasp_test::revolved({{0.001, 0}, {0.002, 0}, {0.002, -0.5}, {0.4, -0.5}}, 24);
   const libgtd::Ground thin(post);
   EXPECT_EQ(field(&thin, {0, 0, 0}, prior), "row 7");
@@ -190,7 +190,7 @@ TEST(PlanPulls, PrefersWhatSeparatesTheSets) {
   EXPECT_GT(plans[0].information_bits, 0.2);
   EXPECT_LE(plans[0].information_bits, 1.0);
   EXPECT_GT(plans[0].load_n, 0.1);
-  // A gripper whose parameters are known has nothing to learn.
+  // A gripper with known parameters has nothing to fit.
   EXPECT_TRUE(
       libgtd::plan_pulls(ground, grasp_test::gripper(), candidates, 2, few(), libmap::no_progress())
           .empty());

@@ -1,4 +1,4 @@
-// Ground that is known with an error: the draws of it, and what they do to the trials.
+// Tests ground with errors: its random draws and their effect on the trials.
 #include "libgtd/grasp/surface_error.h"
 
 #include <gtest/gtest.h>
@@ -41,7 +41,7 @@ TEST(SurfaceError, FieldHasItsDeviationAndCorrelation) {
   constexpr double tolerance = 0.025;  // three and a half standard errors
   EXPECT_NEAR(mean, 0.0, tolerance);
   EXPECT_NEAR(square, 1.0, 1.5 * tolerance);
-  // Along an axis, of places at t and t + 1: the mean of t (1 - t) / (t^2 + (1 - t)^2).
+  // Along an axis, for positions t and t + 1: mean of t (1 - t) / (t^2 + (1 - t)^2).
   EXPECT_NEAR(products[1], std::numbers::pi / 4 - 0.5, tolerance);
   EXPECT_GT(products[0], products[1] + 0.2);
   EXPECT_NEAR(products[2], 0.0, tolerance);
@@ -64,7 +64,7 @@ TEST(SurfaceError, FieldIsContinuousAndTheSameOutsideOfItsBox) {
   EXPECT_TRUE(std::isfinite(without.at({1e300, 0, -1e300})));
 }
 
-// A plane that falls by 45 degrees: vertices move along its normal.
+// A plane with a slope of 45 degrees: vertices move along its normal.
 TEST(SurfaceError, DisplacesAlongTheNormalByTheError) {
   const auto mesh = height_mesh(0.1, 20, [](double x, double) { return -x; });
   GroundErrors errors;
@@ -141,8 +141,8 @@ TEST(SurfaceError, NoneIsTheSameToTheBit) {
   EXPECT_EQ(text_of(test_on(known, options)), with);
 }
 
-// What holds or fails by a little on the exact surface is uncertain on one that is not known so
-// well, and the more so the larger the error.
+// A location that narrowly holds or fails on the exact surface is uncertain on a surface with
+// errors, increasingly with the error.
 TEST(SurfaceError, MarginalPlacesMoveTowardOneHalf) {
   const auto mesh = cone();
   const auto exact = test_on(Ground(mesh), options_of(10)).front();

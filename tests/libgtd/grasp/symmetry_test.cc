@@ -1,5 +1,5 @@
-// The holding force of contacts that are symmetric but for rounding, or nearly so: the rows of the
-// equilibrium then almost depend on each other.
+// Tests the holding force of contacts that are symmetric except for rounding, or nearly so: the
+// rows of the equilibrium are then nearly dependent.
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -15,8 +15,7 @@ namespace symmetry_test {
 using libgtd::BearingContact;
 using libmap::RandomStream;
 
-// On a post the pull is that of the friction, m mu P; normals that lean a little change it a
-// little.
+// On a post the pull is that of friction, m mu P; slightly inclined normals change it slightly.
 TEST(HoldingForce, IsThatOfThePostIfContactsAreNearlySymmetric) {
   for (std::uint64_t seed = 0; seed < 3000; ++seed) {
     RandomStream random(seed, 3);

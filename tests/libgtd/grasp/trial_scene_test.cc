@@ -83,7 +83,7 @@ TEST(TrialScene, OnFlatGroundEveryFingerBears) {
   expect_spheres_of_contacts(shown);
   EXPECT_EQ(spheres(shown.scene, ScenePart::engaged), 8U);
   EXPECT_EQ(spheres(shown.scene, ScenePart::idle), 0U);
-  // Each sphere is about its contact.
+  // Each sphere is around its contact.
   const std::vector<std::size_t> engaged = vertices_of(shown.scene, ScenePart::engaged);
   for (std::size_t n = 0; n < engaged.size(); ++n) {
     const std::size_t contact = n / libgtd::scene_sphere_vertices;
@@ -99,7 +99,7 @@ TEST(TrialScene, AtALedgeSomeFingersAreIdle) {
   EXPECT_GE(spheres(shown.scene, ScenePart::engaged), 2U);
 }
 
-// The first links rest on the edge of a post that is wider than the palm.
+// The proximal links rest on the edge of a post wider than the palm.
 TEST(TrialScene, OverAPostLinksAreYellow) {
   TriangleMesh mesh = floor(-1.0, 1.0, -0.2);
   const double r = 0.07;
@@ -139,7 +139,7 @@ TEST(TrialScene, TheConesAreThoseOfTheSteepestFacet) {
     EXPECT_NEAR(edge.norm(), 1.0, 1e-12);
     EXPECT_NEAR(std::acos(edge.dot(axis)), std::atan(mu), 1e-9);
   }
-  // The force of the best edge lies in it.
+  // The force of the best edge is inside it.
   const Eigen::Vector3d force = libgtd::BearingContact(contact, {1.1}, mu, 10.0)
                                     .best_force({-1.0, 0.0, 0.1}, libgtd::SpineSharing::equally);
   EXPECT_LE(std::acos(force.normalized().dot(axis)), std::atan(mu) + 1e-9);
@@ -165,7 +165,7 @@ TEST(TrialScene, TheArrowIsAsLongAsTheForce) {
   EXPECT_EQ(length(0.0), 0.0);
 }
 
-// Two large triangles are cut to a square about the location; what they share, they share there.
+// Two large triangles are clipped to a square around the location and share their common vertices.
 TEST(TrialScene, TheGroundIsCut) {
   TriangleMesh mesh = floor(-1.0, 1.0);
   mesh.vertex_colors = {{0, 0, 0}, {200, 0, 0}, {200, 0, 0}, {0, 0, 0}};
@@ -186,7 +186,7 @@ TEST(TrialScene, TheGroundIsCut) {
     if (std::find(ground.begin(), ground.end(), triangle[0]) != ground.end())
       area += 0.5 * libmap::area_normal(shown.scene, triangle).z();
   EXPECT_NEAR(area, 4.0 * half * half, 1e-9);
-  // The corners of the square, and where the diagonal crosses its border.
+  // Corners of the square, and intersections of the diagonal with its border.
   EXPECT_EQ(ground.size(), 6U);
 }
 

@@ -1,4 +1,4 @@
-// Priors and ensembles of the parameters of engagement, and the sections of gripper files.
+// Tests priors and ensembles of the engagement parameters, and the sections of gripper files.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -24,7 +24,7 @@ struct MaskCase {
   Method method;
   double voxel_size_m;
   int extra_void_layers;
-  bool top_first;  // ClimbLab's file begins with the top layer
+  bool top_first;  // the ClimbLab file starts with the top layer
 };
 
 void PrintTo(const MaskCase& given, std::ostream* out) { *out << given.file; }
@@ -50,7 +50,7 @@ TEST_P(ReferenceMask, EveryVoxelAgrees) {
   EXPECT_EQ(differences, 0);
 }
 
-// Few voxels in all, but more than an integer holds along one side.
+// Few voxels in total, but more than an integer along one side.
 TEST(GripperMask, MeasuresFarApart) {
   Gripper flat = gripper_named("scar-e");
   flat.closing_height_mm = 1e-300;
@@ -63,7 +63,7 @@ TEST(GripperMask, MeasuresFarApart) {
     EXPECT_NE(error.reason().find("e+29 voxels wide or high, more than 2^20"), std::string::npos)
         << error.what();
   }
-  // Its voxels a millimeter are infinite in single precision.
+  // Its voxels per millimeter are infinite in single precision.
   Gripper tiny = gripper_named("scar-e");
   for (double* measure :
        {&tiny.palm_diameter_mm, &tiny.finger_joint_diameter_mm, &tiny.finger_length_mm,

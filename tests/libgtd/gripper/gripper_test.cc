@@ -17,7 +17,7 @@ std::filesystem::path file_of(const std::string& name) {
 
 std::string yaml_of(const std::string& name) { return graspmap_test::read_text(file_of(name)); }
 
-// The file with the line of `key` replaced, or dropped for an empty `line`.
+// Returns the file with the line of `key` replaced, or dropped for an empty `line`.
 std::string with_line(std::string yaml, const std::string& key, const std::string& line) {
   const std::size_t start = yaml.find(key + ":");
   const std::size_t end = yaml.find('\n', start) + 1;
@@ -119,7 +119,7 @@ TEST(GripperMask, TextHasALineForEachRow) {
   EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 2 + mask.layers * (mask.side + 1));
   EXPECT_EQ(
       std::count(text.begin() + static_cast<std::ptrdiff_t>(text.find("z 0")), text.end(), '1'),
-      std::count(mask.solid.begin(), mask.solid.end(), 1) + 1);  // and the one of "z 1"
+      std::count(mask.solid.begin(), mask.solid.end(), 1) + 1);  // plus the digit of "z 1"
 }
 
 }  // namespace gripper_test

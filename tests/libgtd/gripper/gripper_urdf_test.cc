@@ -44,7 +44,7 @@ std::vector<std::pair<std::string, std::string>> values_of(libgtd::Gripper gripp
   return table.values();
 }
 
-// Every field of the two files, and so every mask.
+// Compares all fields of the two files, and thus all masks.
 TEST(GripperUrdf, HubRoboIsThePublishedGripper) {
   EXPECT_EQ(values_of(libgtd::find_gripper("hubrobo-urdf")),
             values_of(libgtd::find_gripper("hubrobo")));
@@ -53,7 +53,7 @@ TEST(GripperUrdf, HubRoboIsThePublishedGripper) {
   EXPECT_EQ(libgtd::gripper_files(shipped("hubrobo.yaml")).size(), 1U);
 }
 
-// The published places of the tips are in whole mm; those of the URDF round to them.
+// The published positions of the tips are in whole mm; those of the URDF round to them.
 TEST(GripperUrdf, TipsAreWhereTheyArePublished) {
   const auto found = measures(graspmap_test::read_text(shipped("hubrobo.urdf")), hubrobo_mapping());
   EXPECT_EQ(found.at("fingers.count"), 8);
@@ -63,8 +63,8 @@ TEST(GripperUrdf, TipsAreWhereTheyArePublished) {
   EXPECT_EQ(std::round(found.at("closing_height_mm")), 16);
 }
 
-// A gripper of three fingers in closed form, in any frames: the palm's axis is `palm_from_axis` z,
-// joints turn about their own x axis, and a mount is between palm and fingers.
+// Gripper with three fingers in closed form, in any frames: the palm's axis is `palm_from_axis` z,
+// joints rotate about their own x axis, and a mount is between palm and fingers.
 struct Frames {
   Eigen::Matrix3d palm_from_axis = Eigen::Matrix3d::Identity();
   std::string spine_limits = "<limit lower=\"0\" upper=\"1\" effort=\"1\" velocity=\"1\"/>";
@@ -102,7 +102,7 @@ std::string three_fingers(const Frames& frames) {
                                          n == 0   ? 4
                                          : n == 1 ? 5
                                                   : 4);
-    // x tangential, y inward, z toward the ground: a turn about x leads from z to -y, outward.
+    // x tangential, y inward, z toward the ground: a rotation about x leads from z to -y, outward.
     Eigen::Isometry3d base = Eigen::Isometry3d::Identity();
     base.rotate(Eigen::AngleAxisd(2.0 * M_PI * n / 3.0, Eigen::Vector3d::UnitZ()));
     base.translate(Eigen::Vector3d(0, -joint_radius_m, -joint_height_m));
@@ -181,7 +181,7 @@ TEST(GripperUrdf, ACoupledSpineJointFollowsItsFinger) {
   EXPECT_FALSE(found.contains("fingers.curl_limit_deg"));
 }
 
-// One motor: all joints mimic the left finger's, through others.
+// One motor: all joints mimic that of the left finger, some indirectly.
 TEST(GripperUrdf, OneJointMayDriveAllFingers) {
   Frames frames;
   frames.spine_limits += "<mimic joint=\"left_root\" multiplier=\"0.5\" offset=\"0.1\"/>";
@@ -193,7 +193,7 @@ TEST(GripperUrdf, OneJointMayDriveAllFingers) {
   };
   drive("right_root", mimic);
   drive("rear_root", replaced(mimic, "left_root", "right_root"));
-  // Each spine as a function of its own finger: 0.5 q + 0.1 of the left one.
+  // Each spine as a function of its own finger: 0.5 q + 0.1 for the left one.
   const auto spine = [&](const std::string& name, const std::string& by) {
     const std::string head = name + "_carrier\"/><axis xyz=\"-1 0 0\"/>";
     xml = replaced(xml, head + frames.spine_limits,
@@ -229,9 +229,9 @@ TEST(GripperUrdf, NamesMayBeListed) {
 
 struct BadUrdf {
   const char* name;
-  const char* old;  // in the URDF of HubRobo
+  const char* old;  // text in the URDF of HubRobo
   const char* with;
-  const char* field;  // in the error's field
+  const char* field;  // field of the error
 };
 void PrintTo(const BadUrdf& bad, std::ostream* out) { *out << bad.name; }
 class BadUrdfs : public testing::TestWithParam<BadUrdf> {};
@@ -291,18 +291,18 @@ TEST(GripperUrdf, BadMappings) {
   EXPECT_EQ(field_of(&UrdfMapping::tip_link, "finger_*_claw"), "urdf.tip_link");
 }
 
-// TinyXML follows nested elements by recursion, to the end of the stack.
+// TinyXML parses nested elements recursively, until the stack overflows.
 TEST(GripperUrdf, AFileThatCrashesTheLibraryIsAnError) {
   std::string xml = "<robot name=\"r\">";
   for (int n = 0; n < 300000; ++n) xml += "<a>";
-  EXPECT_NE(std::string(error_of([&] { measures(xml, hubrobo_mapping()); }).what()).find("broken"),
+  EXPECT_NE(std::string(error_of([&] { measures(xml, hubrobo_mapping()); }).what()).find("crashed"),
             std::string::npos);
   for (const std::string& text : {std::string(), std::string("no xml"), std::string(5, '\0'),
                                   std::string("<robot/>"), std::string("<robot name=\"r\"/>")})
     EXPECT_THROW(measures(text, hubrobo_mapping()), libmap::Error);
 }
 
-// What the gripper file says counts; what neither says is missing.
+// Values of the gripper file take precedence; values in neither file are missing.
 TEST(GripperUrdf, TheFileStatesTheRest) {
   const std::string file = shipped("mine.yaml").string();
   const std::string yaml = graspmap_test::read_text(shipped("hubrobo-urdf.yaml"));
@@ -321,7 +321,7 @@ TEST(GripperUrdf, TheFileStatesTheRest) {
   EXPECT_EQ(error_in("file: hubrobo.urdf", "file: other.urdf").file,
             shipped("other.urdf").string());
   EXPECT_EQ(error_in("  spines_per_finger: 10\n", "").field, "fingers.spines_per_finger");
-  // Without any key of fingers there is no such section.
+  // Without keys of fingers there is no such section.
   const std::size_t fingers = yaml.find("fingers:\n");
   EXPECT_FALSE(libgtd::parse_gripper(yaml.substr(0, fingers), file).fingers.has_value());
 }

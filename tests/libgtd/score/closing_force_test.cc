@@ -1,4 +1,4 @@
-// The forces of method `calibrated` against closed forms and a slow computation from the
+// Compares forces of method `calibrated` with closed forms and a slow implementation of the
 // definition.
 #include "libgtd/score/closing_force.h"
 
@@ -27,7 +27,7 @@ using libgtd::VoxelGrid;
 
 constexpr double degree = std::numbers::pi / 180;
 
-// Share of beta(4, 2) below so many standard deviations above its mean, of 1 - x.
+// Share of beta(4, 2) below this number of standard deviations above its mean, of 1 - x.
 double beta_share(double deviations) {
   const double t = std::clamp(1.0 / 3 + std::sqrt(8.0 / 252) * deviations, 0.0, 1.0);
   return t * t * (10 - 20 * t + 15 * t * t - 4 * t * t * t);
@@ -63,7 +63,7 @@ std::vector<Voxel> ground(const Height& height, int half = 30) {
   return voxels;
 }
 
-// One lean: min(tan b / (1 - c tan b), n L / P sin b), b = fall + psi + phi - 90 deg.
+// One facet angle: min(tan b / (1 - c tan b), n L / P sin b), b = fall + psi + phi - 90 deg.
 TEST(FingerPulls, ClosedFormOfOneLean) {
   Gripper gripper = known();
   gripper.engagement.asperity_min_deg = gripper.engagement.asperity_max_deg = 70;
@@ -122,7 +122,7 @@ TEST(FingerPulls, RiseWithFallFrictionAndLimit) {
   }
 }
 
-// All contacts alike: C is the pull of one of them, bounded; the palm stands on the open fingers.
+// Equal contacts: C is the bounded pull of one contact; the palm rests on the open fingers.
 TEST(ClosingForce, LevelGround) {
   const Gripper gripper = known();
   const ClosingPath path = libgtd::make_closing_path(gripper, 0.01, 5);
@@ -163,7 +163,7 @@ TEST(ClosingForce, DoesNotDependOnTheOrigin) {
 
 TEST(ClosingForce, ShapesInOrder) {
   const auto flat = force_at_origin(ground([](int, int) { return 0; }));
-  // A cone: the ground falls outward, so that spines bear more.
+  // A cone: the ground falls outward, so that spines bear more force.
   const auto cone = force_at_origin(
       ground([](int i, int j) { return -static_cast<int>(std::lround(0.6 * std::hypot(i, j))); }));
   EXPECT_GT(cone.median_n, 2 * flat.median_n);
@@ -180,7 +180,7 @@ TEST(ClosingForce, ShapesInOrder) {
   EXPECT_LT(pit.median_n, 0.7 * flat.median_n);
 }
 
-// The probability over an ensemble is the mean of those of its sets; quantiles are in order.
+// The probability over an ensemble is the mean over its sets; quantiles are ordered.
 TEST(ClosingForce, AnEnsembleIsAMixture) {
   const auto bumps = ground([](int i, int j) { return (i * i + 3 * j) % 5; });
   Gripper gripper = gripper_named("scar-e");
@@ -193,7 +193,7 @@ TEST(ClosingForce, AnEnsembleIsAMixture) {
       mean += force_at_origin(bumps, gripper, load_n).hold_probability * set.weight;
     }
     gripper.ensemble.clear();
-    // Sets share the weakest side of the file's own parameters.
+    // All sets use the weakest side of the parameters of the gripper file.
     EXPECT_NEAR(force_at_origin(bumps, gripper, load_n).hold_probability, mean, 1e-4) << load_n;
   }
   const ForceEstimate force = force_at_origin(bumps, gripper);
@@ -223,15 +223,15 @@ TEST(OutwardShares, OfShapes) {
   EXPECT_EQ(share_at_origin(ball(4)), 0);
   EXPECT_EQ(share_at_origin(ball(5)), 0);
   for (const double radius : {7.5, 10.0, 15.0, 25.0}) EXPECT_EQ(share_at_origin(ball(radius)), 1);
-  // One voxel may be rounding, two are a fall.
+  // A fall of one voxel may be rounding, two voxels are a fall.
   const auto step = [](int fall) {
     return ground([fall](int i, int j) { return std::hypot(i, j) < 9 ? 0 : -fall; });
   };
   EXPECT_EQ(share_at_origin(step(0)), 0);
   EXPECT_EQ(share_at_origin(step(1)), 0);
   EXPECT_EQ(share_at_origin(step(2)), 1);
-  // A bowl and a pit fall inward. Of a slope of 45 degrees, the azimuths at right angles to its
-  // fall stay level.
+  // A bowl and a pit fall inward. On a slope of 45 degrees, the azimuths at right angles to its
+  // fall are level.
   EXPECT_EQ(share_at_origin(step(-5)), 0);
   EXPECT_EQ(share_at_origin(ground([](int i, int) { return i; })), 7.0 / 16);
   EXPECT_EQ(share_at_origin(ground([](int i, int) { return i + 1000000; })), 7.0 / 16);
@@ -257,7 +257,7 @@ TEST(ClosingForce, UpToThreeColumnsOfAGapAreFilled) {
   EXPECT_LT(holes(20).hold_probability, 0.8 * flat.hold_probability + 0.01);
 }
 
-// From the definition, column by column from a map, where the gripper rests on the pivot's column.
+// By definition, column by column from a map; the gripper rests on the column of the pivot.
 struct SlowColumn {
   double contact = 0.0;
   double capacity = 0.0;
@@ -418,8 +418,8 @@ TEST(ClosingForce, AgreesWithItsDefinition) {
     const double expected =
         slow.probability == 0 ? 0 : slow.probability * beta_share(slow.log_force / slow.spread);
     held += expected > 0.3 ? 1 : 0;
-    // A height on the boundary of a voxel's layer or an angle between two degrees may round either
-    // way in single precision.
+    // A height on a layer boundary or an angle between two degrees may round either way in single
+    // precision.
     if (std::abs(forces[n].hold_probability - expected) > 3e-3) ++differences;
   }
   EXPECT_GT(held, 10U);
@@ -441,7 +441,7 @@ TEST(Calibrated, TheScoreIsTheHoldProbability) {
   for (const char* field : {"hold_probability", "holding_force_n", "holding_force_low_n",
                             "holding_force_high_n", "trial_spread", "parameter_spread"})
     EXPECT_NE(cloud.find_field(field), nullptr) << field;
-  // The same counts as `corrected`.
+  // Counts equal those of `corrected`.
   options.scenario.method = libgtd::Method::corrected;
   const auto corrected = libgtd::detect(graspmap_test::bumpy_cloud(0.8, 0.006), options);
   ASSERT_EQ(corrected.map.voxels.size(), found.map.voxels.size());

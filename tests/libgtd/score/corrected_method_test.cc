@@ -1,4 +1,4 @@
-// One test for each fault of the author's program that method `corrected` must not have.
+// Tests each fault of the author's program that method `corrected` must not have.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -43,7 +43,7 @@ bool same_map(const GraspabilityMap& a, const GraspabilityMap& b) {
   return std::equal(a.voxels.begin(), a.voxels.end(), b.voxels.begin(), b.voxels.end(), same_voxel);
 }
 
-// Fault 6: the center of an even mask lies half a voxel off the pivot.
+// Fault 6: the center of an even mask is half a voxel off the pivot.
 TEST(Corrected, MaskIsSymmetricAboutItsPivot) {
   for (const double voxel_size_m : {0.004, 0.005, 0.01, 0.013}) {
     const GripperMask mask =
@@ -74,7 +74,7 @@ TEST(Corrected, MaskDoesNotRoundItsRadii) {
   }
 }
 
-// Fault 6 again, on a map: a quarter turn of the voxels turns the map and changes no score.
+// Fault 6 on a map: a quarter turn of the voxels rotates the map and changes no score.
 TEST(Corrected, QuarterTurnTurnsTheMap) {
   const auto ground = random_ground(60, -20, 5);
   std::vector<Voxel> turned;
@@ -94,7 +94,7 @@ TEST(Corrected, QuarterTurnTurnsTheMap) {
   }
 }
 
-// Fault 7: the pivot lies in the void layer, so that no score reaches 1. The ground is a cone: it
+// Fault 7: the pivot is in the void layer, so that no score reaches 1. The ground is a cone: it
 // falls outward.
 TEST(Corrected, GroundCutFromTheMaskScoresOne) {
   const GripperMask mask = corrected_mask();
@@ -158,7 +158,7 @@ TEST(Corrected, EveryVoxelIsScoredAndTheBorderIsFlagged) {
   }
 }
 
-// Fault 1: normals change from run to run, for memory that nobody wrote.
+// Fault 1: normals change from run to run because of uninitialized memory.
 TEST(Corrected, RunsAgreeToTheLastBitAtAnyNumberOfThreads) {
   PointCloud cloud = bumpy_cloud(0.5, 0.01);
   DetectionOptions options = corrected_options();
@@ -172,7 +172,7 @@ TEST(Corrected, RunsAgreeToTheLastBitAtAnyNumberOfThreads) {
   }
 }
 
-// A hill on a floor, as a camera above it sees it.
+// A hill on a floor, as seen by a camera above it.
 PointCloud hill(double sign) {
   PointCloud cloud;
   for (double x = -0.3; x <= 0.3; x += 0.006)
@@ -263,7 +263,7 @@ TEST(Corrected, BothHalvesOfAHillAreConvexAndABowlIsNot) {
   }
 }
 
-// Fault 14: points stand several times in the intersection.
+// Fault 14: points are duplicated in the intersection.
 TEST(Corrected, EachVoxelStandsOnceInTheMap) {
   PointCloud cloud = bumpy_cloud(0.4, 0.004);
   cloud.positions.insert(cloud.positions.end(), cloud.positions.begin(), cloud.positions.end());

@@ -73,8 +73,8 @@ TEST_P(Detection, MapReturnsIntoTheInputFrame) {
   const auto result = detect(cloud, options);
   const PointCloud map = to_cloud(result.map, MapFrame::input);
   ASSERT_FALSE(map.empty());
-  // Each voxel's center lies within a voxel's diagonal of a point of the cloud; the downsampling of
-  // `thesis` and its second lattice move it by another voxel.
+  // The center of each voxel is within a voxel diagonal of a point of the cloud; the downsampling
+  // and the second lattice of `thesis` shift it by up to another voxel.
   const bool downsamples = GetParam() == Method::thesis || GetParam() == Method::envelope;
   const double reach = downsamples ? 0.03 : 0.00867;
   for (std::size_t n = 0; n < map.size(); n += 7) {
@@ -153,7 +153,7 @@ TEST(DetectionErrors, RadiiOfTooManyVoxels) {
   Scenario scenario;
   scenario.curvature_radius_m = 1e7;
   libmap::Error error = error_of([&] { halo_voxels(mask, scenario); });
-  EXPECT_EQ(error.reason(), "too large for voxels of this size");
+  EXPECT_EQ(error.reason(), "too large for this voxel size");
   EXPECT_EQ(error.context().field, "curvature_radius_m");
   EXPECT_EQ(error.context().value, "1e+07");
   scenario = {};

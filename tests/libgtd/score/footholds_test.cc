@@ -20,7 +20,7 @@ using libgtd::FootholdResult;
 using libmap::PointCloud;
 using libmap::ScalarType;
 
-// A map of 1 cm voxels over 1 x 1 m; `score_of` and `height_of` at (x, y). Graspable from 0.8 on.
+// Map of 1 cm voxels over 1 x 1 m; `score_of` and `height_of` at (x, y). Graspable from 0.8.
 PointCloud map_of(
     const std::function<double(double, double)>& score_of,
     const std::function<double(double, double)>& height_of = [](double, double) { return 0.0; }) {
@@ -82,7 +82,7 @@ TEST(Footholds, OfATestedMapByProbabilityAndForce) {
   EXPECT_EQ(result.footholds[1].force_n, 34.0);
 }
 
-// The definition, point by point.
+// Oracle by definition, point by point.
 std::vector<std::size_t> slow_footholds(const PointCloud& map, double separation_m) {
   const std::vector<double>& scores = map.find_field("score")->values;
   const std::vector<double>& graspable = map.find_field("graspable")->values;
@@ -127,7 +127,7 @@ TEST(Footholds, AreThoseOfTheDefinition) {
   EXPECT_GT(found.size(), 20U);
 }
 
-// Several points in one place: the definition does not mind.
+// Coincident points are valid.
 TEST(Footholds, OfPointsInOnePlaceToo) {
   PointCloud map = random_map();
   std::vector<std::size_t> points(map.size());
@@ -152,7 +152,7 @@ TEST(Footholds, ScoresThatAreNotFinite) {
     EXPECT_TRUE(std::isfinite(one.score));
     EXPECT_TRUE(std::isfinite(one.mean_score));
   }
-  // The square of the separation is nothing.
+  // The square of the separation underflows to 0.
   map = libmap::select_points(map, {1});
   map.positions[0].setZero();
   const auto alone = libgtd::find_footholds(map, {.separation_m = 1e-200, .graspable_only = false});
@@ -167,7 +167,7 @@ TEST(Footholds, OptionsLeaveOut) {
   EXPECT_EQ(all.candidates, map.size());
   for (const Foothold& one : libgtd::find_footholds(map).footholds)
     EXPECT_GE(one.map_point, map.size() / 2);
-  PointCloud earlier = map;  // as earlier versions wrote it
+  PointCloud earlier = map;  // format of earlier versions
   earlier.find_field("border")->name = "edge";
   EXPECT_EQ(libgtd::find_footholds(earlier).candidates, libgtd::find_footholds(map).candidates);
   EXPECT_LT(libgtd::find_footholds(map).candidates, map.size() / 2 + 1);
@@ -178,7 +178,7 @@ TEST(Footholds, OptionsLeaveOut) {
   ASSERT_EQ(three.footholds.size(), 3U);
   for (std::size_t n = 0; n < 3; ++n)
     EXPECT_EQ(three.footholds[n].map_point, free.footholds[n].map_point);
-  // What has no place or no score is nobody's foothold.
+  // Points without a position or score do not affect footholds.
   map.positions[9000].x() = NAN;
   map.find_field("score")->values[9001] = NAN;
   for (const Foothold& one : libgtd::find_footholds(map, {.separation_m = 0.001}).footholds) {
@@ -202,7 +202,7 @@ TEST(Footholds, NormalSlopeAndApproachOfAnInclinedPlane) {
     EXPECT_EQ(one.approach, Eigen::Vector3d(0, 0, -1));
     EXPECT_FALSE(std::signbit(one.approach.x())) << "it would be written as -0";
   }
-  // In another frame all turns with it.
+  // All vectors rotate with the frame.
   const libmap::Pose turn(Eigen::AngleAxisd(2.1, Eigen::Vector3d(1, 2, -1).normalized()));
   const FootholdResult turned = libgtd::find_footholds(
       libmap::transform_cloud(map, turn), {}, {.up = 3.0 * (turn * Eigen::Vector3d::UnitZ())});

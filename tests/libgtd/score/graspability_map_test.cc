@@ -76,11 +76,11 @@ TEST(Merge, RefusesPartsOfWhichOnlySomeHaveColorsOrNormals) {
 TEST(Obstacles, AreNotFoundInAMapWithoutSlopes) {
   PointCloud cloud = to_cloud(small_map(), MapFrame::terrain);
   const libmap::Error error = error_of([&] { add_obstacles(cloud, 0.01, {}); });
-  EXPECT_EQ(error.reason(), "not a map with slopes: it has no such field");
+  EXPECT_EQ(error.reason(), "the map has no slopes: the field is missing");
   EXPECT_EQ(error.context().field, "slope_deg");
 }
 
-// Such numbers have no order, and no integer holds them.
+// Values that have no order or do not fit an integer.
 TEST(Merge, RefusesIndicesThatAreNone) {
   for (const double index : {std::nan(""), HUGE_VAL, 1e300, 0.5, 0x1p29 + 1}) {
     PointCloud cloud = to_cloud(small_map(), MapFrame::terrain);

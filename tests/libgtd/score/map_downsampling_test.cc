@@ -42,8 +42,7 @@ TEST(MapDownsampling, TheUppermostOfTheMiddleColumnStays) {
   EXPECT_EQ(libgtd::downsample_map(map, 1).size(), 5U) << "one a column";
 }
 
-// Squares so wide that distances from their middles, squared, need more than 32 bits; and an index
-// that is none.
+// Squares so wide that squared distances from their middles exceed 32 bits; and an invalid index.
 TEST(MapDownsampling, FarVoxelsAndNone) {
   PointCloud map = map_of({{-(1 << 29), 0, 0}, {-5, 0, 0}, {5, 7, 0}, {1 << 29, 0, 1 << 29}});
   EXPECT_EQ(voxels_in(libgtd::downsample_map(map, 1 << 29)),
@@ -85,14 +84,14 @@ TEST(MapDownsampling, PointsComeToTheMiddleOfTheirSquares) {
 }
 
 TEST(MapDownsampling, InCubesSteepFacesStay) {
-  // A wall: one column, nine voxels high, and a voxel beside it.
+  // A wall: one column of nine voxels, and a voxel beside it.
   std::vector<Voxel> wall;
   for (int k = -3; k < 6; ++k) wall.push_back({1, 1, k});
   wall.push_back({2, 1, 4});
   const PointCloud map = map_of(wall);
   EXPECT_EQ(voxels_in(libgtd::thin_map_in_cubes(map, 3)),
             (std::vector<Voxel>{{1, 1, -2}, {1, 1, 1}, {1, 1, 4}}));
-  // Of two as near to the middle the upper one.
+  // The upper of two equally near points.
   EXPECT_EQ(voxels_in(libgtd::thin_map_in_cubes(map_of({{1, 1, 0}, {1, 1, 2}}), 3)),
             (std::vector<Voxel>{{1, 1, 2}}));
   EXPECT_EQ(voxels_in(libgtd::thin_map_in_cubes(map, 1)), voxels_in(map));

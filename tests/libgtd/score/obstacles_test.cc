@@ -18,7 +18,7 @@ using graspmap_test::gripper_named;
 using graspmap_test::uniform;
 using libmap::PointCloud;
 
-// A height field over squares of 5 mm; steps become vertical walls.
+// Height field over squares of 5 mm; steps become vertical walls.
 template <typename Height>
 PointCloud terrain_of(const Height& height) {
   PointCloud cloud;
@@ -67,7 +67,7 @@ TEST(Obstacles, StepIsOneAboveTheHeightAndBelowItNone) {
   const PointCloud cloud = terrain_of(step_of_25_cm);
   const Counts above = counts_of(evaluate(cloud, {.height_m = 0.24}));
   EXPECT_GT(above.at(Obstacle::face), 1000U);
-  // The smaller part is out of reach: 0.5 of 1.2 m.
+  // The smaller part is unreachable: 0.5 of 1.2 m.
   EXPECT_NEAR(static_cast<double>(above.at(Obstacle::unreachable)), 120.0 * 50.0, 700.0);
   const auto below = counts_of(evaluate(cloud, {.height_m = 0.26}));
   EXPECT_EQ(below.size(), 1U);
@@ -119,7 +119,7 @@ TEST(Obstacles, RampToTheTableLeadsUp) {
   }
 }
 
-// A pit is too low, not too high; nor is ground that a shadow cuts off.
+// A pit is not an obstacle; neither is ground separated by a shadow.
 TEST(Obstacles, PitsAndGroundBehindGapsAreNone) {
   const Counts pit =
       counts_of(evaluate(terrain_of([](double x, double y) { return 0.3 - table(x, y); }), {}));
@@ -159,7 +159,7 @@ TEST(Obstacles, AnyMethodEvaluatesThem) {
   }
 }
 
-// The definition with loops over all pairs.
+// Oracle by definition, with loops over all pairs.
 std::vector<Obstacle> by_hand(const std::vector<Voxel>& voxels, const std::vector<float>& slopes,
                               const ObstacleOptions& options, double size) {
   const std::size_t count = voxels.size();
@@ -237,7 +237,7 @@ TEST(Obstacles, AgreeWithTheDefinitionOnRandomPlaces) {
     const auto found = find_obstacles(voxels, slopes, 0.01, options);
     EXPECT_EQ(found, by_hand(voxels, slopes, options, 0.01));
     for (const Obstacle one : found) ++seen[one];
-    // Radii beyond all voxels, and beyond what an int holds, are the same.
+    // Radii larger than the extent, and larger than an int, give the same result.
     const auto within = [&](double radius_m) {
       ObstacleOptions wide = options;
       wide.normal_radius_m = radius_m;
@@ -254,7 +254,7 @@ TEST(Obstacles, NeedAMapInOrder) {
   error_of([] { find_obstacles({{1, 0, 0}}, {}, 0.01, {}); });
 }
 
-// As the manifests of shares of a map may say.
+// Parameters as in manifests of shares of a map.
 TEST(Obstacles, NeedPossibleLengths) {
   const std::vector<Voxel> far = {{0, 0, 0}, {300'000'000, 0, 0}};
   const std::vector<float> slopes = {80.0F, 80.0F};

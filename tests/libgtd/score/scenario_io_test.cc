@@ -45,7 +45,7 @@ TEST(ReadScenario, ErrorsNameFileAndField) {
             "nobodys");
 }
 
-// What a scenario names is used, not a default gripper.
+// The gripper of the scenario is used, not a default gripper.
 TEST(Detection, UsesTheGripperOfItsScenario) {
   libgtd::DetectionOptions options;
   options.scenario.gripper = "hubrobo";

@@ -21,7 +21,7 @@ inline libgtd::TileBounds whole_box(const libgtd::VoxelGrid& grid) {
   return {grid.min.i, grid.max.i + 1, grid.min.j, grid.max.j + 1};
 }
 
-// A grid of the given voxels on a lattice of 1 cm.
+// Returns a grid of the given voxels on a lattice of 1 cm.
 inline libgtd::VoxelGrid grid_of(std::vector<libgtd::Voxel> voxels) {
   std::vector<Eigen::Vector3d> centers;
   const libgtd::VoxelLattice lattice;
@@ -29,7 +29,7 @@ inline libgtd::VoxelGrid grid_of(std::vector<libgtd::Voxel> voxels) {
   return libgtd::voxelize(centers, 0.01);
 }
 
-// Rough ground of side x side voxel columns with bumps, a few overhangs and holes.
+// Returns rough ground of side x side columns with bumps, a few overhangs and holes.
 inline std::vector<libgtd::Voxel> random_ground(int side, int first_i = 0, int first_j = 0) {
   std::vector<libgtd::Voxel> voxels;
   const double phase = uniform(0.0, 6.0);
@@ -45,7 +45,7 @@ inline std::vector<libgtd::Voxel> random_ground(int side, int first_i = 0, int f
   return voxels;
 }
 
-// A smooth terrain in the terrain frame as a cloud: bumps of 5 to 12 cm on a floor.
+// Returns a smooth terrain in the terrain frame as a cloud: bumps of 5 to 12 cm on a floor.
 inline libmap::PointCloud bumpy_cloud(double side_m, double spacing_m) {
   libmap::PointCloud cloud;
   for (double x = -side_m / 2; x <= side_m / 2; x += spacing_m)

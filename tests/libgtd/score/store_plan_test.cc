@@ -19,7 +19,7 @@ TEST(StorePlan, TheRectangleContainsTheHaloOfEachTile) {
   frame.lattice.voxel_size_m = 0.01;
   const StoreTiling tiling = tiling_of_10_voxels(3);
   const PointsRectangle rectangle = points_for({{0, 2}, {-1, 5}, {3, 4}}, frame, tiling);
-  // A voxel more.
+  // One voxel of margin.
   EXPECT_NEAR(rectangle.low.x(), -0.14, 1e-12);
   EXPECT_NEAR(rectangle.low.y(), 0.16, 1e-12);
   EXPECT_NEAR(rectangle.high.x(), 0.44, 1e-12);

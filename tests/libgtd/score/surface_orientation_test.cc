@@ -1,4 +1,4 @@
-// Scores with the mask tilted to the surface: closed forms, invariants, an independent oracle.
+// Tests scoring with tilted masks: closed forms, invariants, an independent oracle.
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -41,13 +41,13 @@ DetectionResult score(const PointCloud& cloud, Orientation orientation) {
   return detect(cloud, options_for(orientation));
 }
 
-// Turned by `angle_deg` about y.
+// Rotated by `angle_deg` about y.
 PointCloud turned(const PointCloud& cloud, double angle_deg) {
   return libmap::transform_cloud(cloud,
                                  libmap::make_pose_from_rpy({0, 0, 0}, {0.0, angle_deg, 0.0}));
 }
 
-// A height field over a square, turned in its plane so that no row lies along the lattice.
+// Height field over a square, rotated in its plane so that no row is along the lattice.
 template <typename Height>
 PointCloud ground(double half_m, double spacing_m, const Height& height) {
   PointCloud cloud;
@@ -56,7 +56,7 @@ PointCloud ground(double half_m, double spacing_m, const Height& height) {
     for (double v = -half_m; v <= half_m; v += spacing_m) {
       const Eigen::Vector2d p = turn * Eigen::Vector2d(u, v);
       cloud.positions.emplace_back(p.x(), p.y(), height(p.x(), p.y()));
-      cloud.normals.emplace_back(0.0F, 0.0F, 1.0F);  // the side alone counts
+      cloud.normals.emplace_back(0.0F, 0.0F, 1.0F);  // only the side matters
     }
   return cloud;
 }
@@ -68,7 +68,7 @@ double bump(double x, double y) {
 TEST(SurfaceOrientation, TiltedPlaneCountsAsLevelGroundAtAnyAngle) {
   const PointCloud level = ground(0.25, 0.005, [](double, double) { return 0.003; });
   const GripperMask mask = make_gripper_mask(gripper_named("scar-e"), {});
-  // The plane fills the top layer and no other: every square of a voxel's edge holds a point.
+  // The plane fills the top layer only: every square with the edge of a voxel contains a point.
   std::uint32_t solid = 0;
   for (int x = 0; x < mask.side; ++x)
     for (int y = 0; y < mask.side; ++y) solid += mask.is_solid(x, y, mask.pivot_z) ? 1U : 0U;
@@ -107,7 +107,7 @@ TEST(SurfaceOrientation, LevelGroundIsEvaluatedAsByTheUprightMask) {
   }
 }
 
-// By the definition, one point after the other, with another formula for the turn.
+// Oracle by definition, point by point, with another formula of the rotation.
 VoxelCounts counts_by_hand(const PointCloud& cloud, const VoxelLattice& lattice,
                            const GripperMask& mask, const MapVoxel& one) {
   const Vector3d normal = one.normal.cast<double>().normalized();
@@ -180,7 +180,7 @@ TEST(SurfaceOrientation, BallScoresTheSameAtAnyLatitude) {
   }
   const auto means = [&](Orientation orientation) {
     const auto result = score(ball, orientation);
-    // Nothing lies around the ball, and no place of the mask's square looks past it.
+    // There is nothing around the ball, and no position of the mask square misses it.
     if (orientation == Orientation::surface) {
       EXPECT_EQ(result.border_voxels, 0U);
     }
@@ -242,7 +242,7 @@ TEST(SurfaceOrientation, TurnedTerrainIsEvaluatedAlike) {
   EXPECT_LT(sum / count, 0.05);
 }
 
-// A place without a plane has no slope, and NaN is not equal to itself.
+// A position without a plane has no slope, and NaN is not equal to itself.
 PointCloud with_comparable_slopes(PointCloud map) {
   for (double& slope : map.find_field("slope_deg")->values)
     if (std::isnan(slope)) slope = -1.0;
@@ -297,7 +297,7 @@ TEST(SurfaceOrientation, PlacesWithoutANormalAreEvaluatedUpright) {
     }
 }
 
-// What is looked past, the air over a wall's top, is no edge; the end of the wall is.
+// Air above the top of a wall is not an edge; the end of the wall is.
 TEST(SurfaceOrientation, EdgesAreWhereTheScanEnds) {
   PointCloud cloud;  // floor, a wall that faces -x, a plateau
   const auto add = [&](double x, double y, double z, const Eigen::Vector3f& normal) {
@@ -339,7 +339,7 @@ TEST(SurfaceOrientation, AxesAreTheShortestTurn) {
     EXPECT_TRUE((axes * axes.transpose()).isApprox(Eigen::Matrix3d::Identity(), 1e-9));
     EXPECT_NEAR(axes.determinant(), 1.0, 1e-9);
     EXPECT_TRUE(axes.col(2).isApprox(normal, 1e-12));
-    // A turn about an axis in the plane: the trace says its angle.
+    // A rotation about an axis in the plane; the trace determines its angle.
     if (n >= 20) {
       EXPECT_NEAR(axes.trace(), 1.0 + 2.0 * normal.z(), 1e-9);
     }

@@ -100,7 +100,7 @@ TEST(MapTileStore, PlanAndIndexComeBackToTheBit) {
   EXPECT_EQ(progress.complete(read).done, 3u);
   EXPECT_EQ(progress.complete(read).tiles, 4u);
   EXPECT_FALSE(progress.complete(read).index);
-  // Lines of another key do not count.
+  // Lines of another key are ignored.
   libmap::TileJournal third(store, {1, 1});
   libgtd::add_tiles({tile(0, 0, 1)}, "other key", third);
   EXPECT_FALSE(progress.complete(read).index);
@@ -167,7 +167,7 @@ TEST(MapTileStore, ABoxThatIsNone) {
   EXPECT_EQ(error.context().bound, "min <= max");
 }
 
-// Lines of a journal that no run writes do not count.
+// Invalid lines of a journal are ignored.
 TEST(MapTileStore, TilesThatCannotBe) {
   const fs::path store = scratch_folder() / "m.tiles";
   const MapTileStore progress(store);
@@ -183,7 +183,7 @@ TEST(MapTileStore, TilesThatCannotBe) {
   EXPECT_EQ(progress.complete(plan).done, 1u);
 }
 
-// Each change of a good index is refused in one line that names the file and what is wrong.
+// Each change of a valid index is rejected with one line that names the file and the error.
 TEST(TileStore, HostileIndex) {
   const fs::path store = scratch_folder() / "m.tiles";
   const MapTileStore progress(store);

@@ -31,7 +31,7 @@ INSTANTIATE_TEST_SUITE_P(All, EachMethod,
                                          Method::corrected, Method::calibrated),
                          [](const auto& given) { return name_of(given.param); });
 
-// The property on which distributed scoring rests, over random scenes off the origin.
+// Property required for distributed scoring, over random scenes off the origin.
 TEST_P(EachMethod, TilesOfAnySizeInAnyOrderGiveTheUntiledMap) {
   const GripperMask mask = make_gripper_mask(gripper_named("scar-e"), {GetParam(), 0.01, 1});
   for (int scene = 0; scene < 3; ++scene) {
@@ -71,7 +71,7 @@ TEST(Tiles, CoverEachColumnOnce) {
   const VoxelGrid grid = grid_of({{-7, 3, 0}, {20, -11, 2}});
   std::map<std::pair<int, int>, int> covered;
   for (const TileBounds& tile : make_tiles(grid, 6)) {
-    // Borders within the grid lie on the lattice of tiles.
+    // Borders inside the grid are on the lattice of tiles.
     EXPECT_TRUE(tile.i_begin % 6 == 0 || tile.i_begin == grid.min.i);
     EXPECT_TRUE(tile.j_end % 6 == 0 || tile.j_end == grid.max.j + 1);
     for (int i = tile.i_begin; i < tile.i_end; ++i)
@@ -104,7 +104,7 @@ TEST(Edges, AgreeWithThePlainClosing) {
   std::vector<Voxel> voxels;
   for (int i = 0; i < 44; ++i)
     for (int j = 0; j < 40; ++j)
-      // A hole of 9 x 9 columns near a corner is too wide to be a gap between points.
+      // A hole of 9 x 9 columns near a corner is too wide for a gap between points.
       if (!(i > 30 && i < 40 && j > 27 && j < 37) && graspmap_test::uniform(0, 1) < 0.5)
         voxels.push_back({i, j, 0});
   const VoxelGrid grid = grid_of(voxels);
@@ -129,7 +129,7 @@ TEST(Edges, AgreeWithThePlainClosing) {
   EXPECT_LT(flagged, pivots.size() - 100);
 }
 
-// Of a tile that is far wider than its ground, as of one table over all of it.
+// A tile much wider than its ground gives the same result as one table over all of it.
 TEST(Edges, OfAWideTileWithLittleGround) {
   std::vector<Voxel> voxels;
   for (const Voxel& corner : {Voxel{0, 0, 0}, Voxel{2000, 5, 0}, Voxel{1010, 1015, 0}})
@@ -167,7 +167,7 @@ TEST(StoredTiles, TooManyAreAnError) {
   EXPECT_EQ(error.reason(), "too small: the tile store would have 1049600 tiles");
 }
 
-// However few points they have, tiles are worked on in parts.
+// Tiles are processed in parts even if they have few points.
 TEST(StoredTiles, NotAllAtOnce) {
   TerrainFrame frame;
   frame.max = {14999, 14999, 0};

@@ -87,7 +87,7 @@ TEST(Downsampling, AveragesThePointsOfACell) {
   EXPECT_EQ(centroids[1], points[2]);
 }
 
-// Boxes of few and of too many voxels to be numbered in 64 bits.
+// Boxes with few voxels and with too many for numbers of 64 bits.
 TEST(CountLone, LooksAtAll26Neighbors) {
   using libgtd::count_lone;
   EXPECT_EQ(count_lone({}), 0U);
@@ -131,7 +131,7 @@ TEST(VoxelMeans, DensityHasNoWeight) {
             "voxel_size_m");
 }
 
-// Against the slow way: the points of each voxel by a map.
+// Compared with a slow implementation: the points of each voxel in a map.
 TEST(VoxelMeans, AsAveragedByHand) {
   libmap::PointCloud cloud;
   std::map<Voxel, std::vector<Eigen::Vector3d>> voxels;

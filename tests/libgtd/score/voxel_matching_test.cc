@@ -28,7 +28,7 @@ using libgtd::VoxelGrid;
 
 struct ReferenceCase {
   const char* name;
-  const char* points;  // which cloud was voxelized
+  const char* points;  // name of the voxelized cloud
   const char* gripper;
   double opening_angle_deg;
   Method method;
@@ -38,7 +38,7 @@ struct ReferenceCase {
 
 void PrintTo(const ReferenceCase& given, std::ostream* out) { *out << given.name; }
 
-// The loops for vector registers that this processor has.
+// Loops for the vector registers of this processor.
 class AuthorsProgram : public testing::TestWithParam<ReferenceCase> {
  protected:
   std::filesystem::path file(const std::string& kind) const {
@@ -88,7 +88,7 @@ TEST_P(AuthorsProgram, SameCountsAndScoreOfEveryPivot) {
         counts[n] != VoxelCounts{static_cast<std::uint32_t>(ssv), static_cast<std::uint32_t>(gsv)}
             ? 1
             : 0;
-    // The file holds nine digits.
+    // The file contains nine digits.
     const double expected = reference.score_percent[n];
     const int threshold = given.voxel_size_m < 0.002 ? 100 : 120;
     const double percent = libgtd::score_percent(counts[n], given.method, threshold);
@@ -112,8 +112,8 @@ INSTANTIATE_TEST_SUITE_P(
                     ReferenceCase{"leaning_holds_hubrobo.envelope", "interpolated", "hubrobo", 75,
                                   Method::envelope, 0.001, 3}));
 
-// ClimbLab's voxels are upside down (0 is the highest layer), and its list of graspable points
-// counts x and y from 1.
+// ClimbLab's voxels are upside down (0 is the highest layer), and its list of graspable points has
+// x and y from 1.
 TEST(ClimbLab, SameGraspableVoxels) {
   GRASPMAP_REQUIRE_REFERENCE();
   const auto folder = graspmap_test::reference_folder() / "climblab";
@@ -170,7 +170,7 @@ TEST(VoxelMatching, AgreesWithTheTripleLoop) {
           name + " " + std::to_string(voxel_size_m));
 }
 
-// A mask of random bits, of which `share` are set; V = 1 everywhere where `counts_all` says so.
+// Mask of random bits with the fraction `share` set; V = 1 everywhere if `counts_all`.
 GripperMask random_mask(int side, int layers, double share, bool counts_all) {
   GripperMask mask;
   mask.method = Method::corrected;
@@ -186,7 +186,7 @@ GripperMask random_mask(int side, int layers, double share, bool counts_all) {
   return mask;
 }
 
-// Ground of many voxels in each column.
+// Ground with many voxels per column.
 std::vector<Voxel> porous_ground(int side, int layers) {
   std::vector<Voxel> voxels;
   for (int i = 0; i < side; ++i)
@@ -215,7 +215,7 @@ TEST(VoxelMatching, MasksWithoutASolidVoxelOrOfNothingElse) {
       expect_as_plainly(grid, random_mask(13, 37, share, counts_all), std::to_string(share));
 }
 
-// Sums over boxes are kept in 16 bits: 260 x 255 voxels a row of columns do not fit.
+// Box sums have 16 bits: a row of columns with 260 x 255 voxels does not fit.
 TEST(VoxelMatching, FullGroundUnderAMaskTooLargeForSmallSums) {
   std::vector<Voxel> voxels;
   for (int i = 0; i < 260; ++i)
@@ -228,7 +228,7 @@ TEST(VoxelMatching, FullGroundUnderAMaskTooLargeForSmallSums) {
   expect_as_plainly(grid, mask, pivots, "full ground");
 }
 
-// Every bit of every chunk: counts of bytes must be added up before they overflow.
+// All bits set: counts of bytes must be summed before they overflow.
 TEST(VoxelMatching, FullGroundUnderAFullMask) {
   constexpr int side = 68, layers = 32;
   std::vector<Voxel> voxels;
@@ -247,7 +247,7 @@ TEST(VoxelMatching, FullGroundUnderAFullMask) {
   expect_as_plainly(grid, mask, pivots, "one voxel not counted");
 }
 
-// Levels far apart: the bits move by less than a plane, by planes, and away.
+// Distant levels: bits move by less than a plane, by planes, and out of the window.
 TEST(VoxelMatching, GapsBetweenLevels) {
   std::vector<Voxel> voxels;
   for (const int level : {0, 1, 3, 15, 31, 32, 64, 113, 114, 500})
@@ -276,7 +276,7 @@ TEST(VoxelMatching, AnyChoiceOfPivots) {
   EXPECT_TRUE(libgtd::match_voxels(grid, mask, {}).empty());
 }
 
-// Empty space between far points costs neither time nor memory.
+// Empty space between distant points costs neither time nor memory.
 TEST(VoxelMatching, StrayVoxelsFarAway) {
   std::vector<Voxel> voxels = graspmap_test::random_ground(40);
   const GripperMask mask =

@@ -34,7 +34,7 @@ Curvature bent(float k1, float k2) {
   return c;
 }
 
-// A plain with a hill (y > 0) and a hollow (y < 0), both of a ball of radius 0.25.
+// Plain with a hill (y > 0) and a hollow (y < 0), both of a ball of radius 0.25.
 PointCloud hill_and_hollow() {
   PointCloud cloud;
   for (int i = 0; i < 12000; ++i) {

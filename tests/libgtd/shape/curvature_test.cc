@@ -42,7 +42,7 @@ double normal_noise() {  // Box and Muller 1958
          std::cos(2 * std::numbers::pi * uniform(0, 1));
 }
 
-// A surface z(x, y) over the square of half side `half`; the first point lies above (0, 0).
+// Surface z(x, y) over the square of half side `half`; the first point is above (0, 0).
 template <typename Height>
 PointCloud surface(std::size_t count, double half, const Height& height, double noise = 0) {
   PointCloud cloud;
@@ -54,7 +54,7 @@ PointCloud surface(std::size_t count, double half, const Height& height, double 
   return cloud;
 }
 
-// Points of the whole sphere, evenly spread, with their outward normals.
+// Evenly distributed points of the whole sphere with outward normals.
 PointCloud sphere(std::size_t count, double radius) {
   PointCloud cloud;
   for (std::size_t i = 0; i < count; ++i) {
@@ -71,7 +71,7 @@ Curvature at_first(const PointCloud& cloud, const CurvatureOptions& options) {
   return estimate_curvature(cloud, options, std::vector<std::size_t>{0}).points.at(0);
 }
 
-// The same fit written down straight: all pairs, and the least squares of Eigen's QR.
+// Direct implementation of the fit: all pairs, and least squares by Eigen's QR.
 Curvature slow_curvature(const PointCloud& cloud, std::size_t query, double radius,
                          const Vector3d& up) {
   std::vector<Vector3d> near;
@@ -146,7 +146,7 @@ TEST(Curvature, OfQuadricsIsExact) {
         2000, 0.1, [&](double x, double y) { return s.xx * x * x + s.xy * x * y + s.yy * y * y; });
     const Curvature c = at_first(cloud, within(0.05));
     ASSERT_TRUE(c.valid);
-    // The tangent frame of scattered points is a little off the quadric's own axes.
+    // The tangent frame of scattered points differs slightly from the axes of the quadric.
     EXPECT_NEAR(c.k1, s.k1, 0.02 * (std::abs(s.k1) + std::abs(s.k2)) + 1e-6);
     EXPECT_NEAR(c.k2, s.k2, 0.02 * (std::abs(s.k1) + std::abs(s.k2)) + 1e-6);
     EXPECT_GT(c.normal.z(), 0.999F);
@@ -170,8 +170,8 @@ TEST(Curvature, OfACylinderIsOneOverItsRadiusAndZero) {
 }
 
 TEST(Curvature, FirstDerivativesCountWherePlaneAndTangentDiffer) {
-  // At the rim of a half ball's cloud the neighbors lie on one side only, so that their plane is
-  // tilted against the tangent plane.
+  // At the rim of a half ball the neighbors are on one side, so that their plane is tilted against
+  // the tangent plane.
   PointCloud half;
   half.positions.emplace_back(0, 0, 0.5);
   for (const Vector3d& p : sphere(60000, 0.5).positions)
@@ -256,7 +256,7 @@ TEST(Curvature, DuplicatesOfAllPointsChangeNothing) {
   EXPECT_NEAR(once.k2, often.k2, 1e-5);
 }
 
-// Each by itself knows of no other in its place.
+// Each query alone is unaware of coincident points.
 TEST(Curvature, OfManyPointsInOnePlaceEachAsByItself) {
   PointCloud places = surface(200, 0.2, [](double x, double y) { return x * x - 2 * x * y; });
   PointCloud cloud;
@@ -297,7 +297,7 @@ TEST(Curvature, NeverAMadeUpValue) {
   expect_no_value(cloud, within(1));
   cloud.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}, {2, 1, 0}};  // five
   expect_no_value(cloud, within(10));
-  cloud.positions.insert(cloud.positions.end(), 20, Vector3d(0, 0, 0));  // five places still
+  cloud.positions.insert(cloud.positions.end(), 20, Vector3d(0, 0, 0));  // still five positions
   expect_no_value(cloud, within(10));
   cloud.positions.clear();
   for (int i = 0; i < 100; ++i)
@@ -366,7 +366,7 @@ TEST(Curvature, SameBitsWithAnyThreadsAndAnyQueries) {
   }
 }
 
-// What tiles of a terrain too large for the memory rest on.
+// Property required for tiles of a terrain larger than memory.
 TEST(Curvature, SameBitsFromThePointsNearbyAlone) {
   PointCloud cloud;
   for (int n = 0; n < 6000; ++n) {

@@ -45,7 +45,7 @@ TEST(NeighborLoops, SelectKeepsThePlacesWithinTheRadiusInOrder) {
       Columns<double> candidates(count, lanes, far), neighbors(count, lanes, 99.0);
       candidates.fill(count, 1.0);
       const std::array<double, 3> center = {0.1, -0.2, 0.05};
-      if (count > 7) {  // just at the radius, which counts, and just beyond it
+      if (count > 7) {  // exactly at the radius (included), and just outside
         for (std::size_t a = 0; a < 3; ++a)
           candidates.axes[a][2] = candidates.axes[a][5] = center[a];
         candidates.axes[0][2] += 0.5;
@@ -68,7 +68,7 @@ TEST(NeighborLoops, SelectKeepsThePlacesWithinTheRadiusInOrder) {
     }
 }
 
-// Lane by lane, as the header says it.
+// Lane by lane, as defined in the header.
 double joined(const std::vector<double>& terms) {
   std::array<double, lanes> s{};
   for (std::size_t n = 0; n < terms.size(); ++n) s[n % lanes] += terms[n];
@@ -126,9 +126,9 @@ TEST(NeighborLoops, RanksOrderByDistanceThenByNumber) {
     Columns<float> candidates(count, beyond, std::numeric_limits<float>::infinity());
     candidates.fill(count, 1.0);
     if (count > 9)
-      for (auto& axis : candidates.axes) axis[9] = axis[4];  // two in one place
+      for (auto& axis : candidates.axes) axis[9] = axis[4];  // coincident
     const std::array<float, 3> center = {0.125F, -0.25F, 0.0F};
-    if (count > 9)  // just at the limit, which does not count
+    if (count > 9)  // exactly at the limit (excluded)
       for (std::size_t a = 0; a < 3; ++a) candidates.axes[a][7] = center[a] + (a < 2 ? 0.5F : 0.0F);
     std::vector<std::uint64_t> expected;
     for (std::size_t n = 0; n < count; ++n) {

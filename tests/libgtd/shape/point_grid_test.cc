@@ -40,7 +40,7 @@ TEST(PointGrid, HoldsEachFinitePointOnceInItsCell) {
   EXPECT_FALSE(seen.contains(17));
 }
 
-// Against all points, one by one.
+// Compared with all points, one by one.
 TEST(PointGrid, FindsAllPointsOfTheCellsNearbyInTheirOrder) {
   std::vector<Vector3d> points;
   for (int i = 0; i < 3000; ++i)

@@ -13,7 +13,7 @@ namespace thesis_curvature_test {
 
 using graspmap_test::uniform;
 
-// PCL's usual calls, with its usual search tree: neighbors come sorted by distance.
+// Calls of PCL with its search tree; neighbors are sorted by distance.
 void expect_pcls_own(const libmap::PointCloud& cloud, double radius_m) {
   pcl::PointCloud<pcl::PointXYZ>::Ptr points(new pcl::PointCloud<pcl::PointXYZ>);
   for (const Eigen::Vector3d& position : cloud.positions) {
@@ -79,7 +79,7 @@ TEST(ThesisCurvature, IsPclsOwnOnARegularGrid) {
   expect_pcls_own(cloud, 0.0625);
 }
 
-// All squared distances are nothing against that of the radius.
+// All squared distances are negligible against the squared radius.
 TEST(ThesisCurvature, IsPclsOwnWhereTheRadiusIsFarLargerThanTheCloud) {
   libmap::PointCloud cloud = random_surface(150);
   for (int i = 0; i < 7; ++i)
@@ -87,7 +87,7 @@ TEST(ThesisCurvature, IsPclsOwnWhereTheRadiusIsFarLargerThanTheCloud) {
   expect_pcls_own(cloud, 100.0);
 }
 
-// A few places with many points each, one after the other and mixed.
+// A few positions with many points each, in sequence and mixed.
 TEST(ThesisCurvature, IsPclsOwnOfManyPointsInFewPlaces) {
   libmap::PointCloud places = random_surface(60);
   libmap::PointCloud cloud;

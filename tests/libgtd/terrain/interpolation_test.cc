@@ -57,7 +57,7 @@ InterpolationOptions spacing(double grid_spacing_m) {
   return options;
 }
 
-// The height in the triangle whose circumcircle holds no point: all triangles are tried.
+// Oracle: height in the triangle whose circumcircle contains no point, by testing all triangles.
 std::optional<double> slow_height(const PointCloud& cloud, const Vector2d& at) {
   const auto& p = cloud.positions;
   const auto flat = [&](std::size_t i) -> Vector2d { return p[i].head<2>(); };
@@ -80,7 +80,7 @@ std::optional<double> slow_height(const PointCloud& cloud, const Vector2d& at) {
   return std::nullopt;
 }
 
-// Nodes on corners and edges, where triangles disagree by rounding: every triangle is asked.
+// Nodes on corners and edges, where triangles differ by rounding: tests every triangle.
 TEST(Interpolation, ANodeOnAnEdgeTakesTheLowerOfItsTrianglesHeights) {
   PointCloud cloud;
   for (int i = 0; i < 12; ++i)
@@ -363,7 +363,7 @@ TEST(InterpolationErrors, TooManyNodesOrTooFarAway) {
   EXPECT_THAT(error_of([&] { interpolate(cloud, spacing(10)); }).what(), HasSubstr("origin"));
 }
 
-// Four points 89 m apart asked for a node in each voxel of 1 cm.
+// Four points 89 m apart, with a node in each voxel of 1 cm.
 TEST(InterpolationErrors, TooManyNodesForSoFewPoints) {
   PointCloud cloud;
   cloud.positions = {{0, 0, 0}, {89, 0, 0}, {0, 89, 0.5}, {89, 89, 0}};

@@ -22,7 +22,7 @@ using Triangles = std::vector<std::array<Corner, 3>>;
 
 constexpr std::size_t one_strip = 1'000'000;
 
-// By place, so that another order of the points does not show.
+// Sorted by position, so that the order of the points has no effect.
 Triangles triangles_of(const Points& points, std::size_t points_a_strip) {
   Triangles triangles;
   for (const auto& corners : triangulate_in_plane(points, points_a_strip).triangles) {
@@ -43,7 +43,7 @@ Points scattered(std::size_t count) {
   return points;
 }
 
-// Four points of every square lie on one circle.
+// The four points of every square are cocircular.
 Points lattice(int columns, int rows) {
   Points points;
   for (int i = 0; i < columns; ++i)
@@ -57,7 +57,7 @@ void expect_same_in_strips(const Points& points) {
     ASSERT_EQ(triangles_of(points, points_a_strip), whole) << points_a_strip;
 }
 
-// Twice the area, and whether `p` lies within the circle of a, b, c (counterclockwise).
+// Twice the area, and a test whether `p` is inside the circle of a, b, c (counterclockwise).
 double area_of(const Vector3d& a, const Vector3d& b, const Vector3d& c) {
   return (b.x() - a.x()) * (c.y() - a.y()) - (b.y() - a.y()) * (c.x() - a.x());
 }
@@ -71,7 +71,7 @@ double in_circle(const Vector3d& a, const Vector3d& b, const Vector3d& c, const 
   return m.determinant();
 }
 
-// Every point against every triangle.
+// Tests every point against every triangle.
 TEST(PlanarDelaunay, NoPointLiesInATrianglesCircumcircleAndTheHullIsFilled) {
   const Points points = scattered(300);
   for (const std::size_t points_a_strip : {30u, 100u, 1000u}) {
@@ -87,7 +87,7 @@ TEST(PlanarDelaunay, NoPointLiesInATrianglesCircumcircleAndTheHullIsFilled) {
         EXPECT_LT(in_circle(points[a], points[b], points[c], p), 1e-12);
     }
     EXPECT_EQ(used.size(), points.size());
-    // The hull by gift wrapping.
+    // Hull by gift wrapping.
     std::size_t at = 0;
     for (std::size_t n = 0; n < points.size(); ++n)
       if (points[n].x() < points[at].x()) at = n;
@@ -117,7 +117,7 @@ TEST(PlanarDelaunay, StripsYieldTheTrianglesOfTheWholeWherePointsLieOnOneCircle)
   for (int n = 0; n < 256; ++n)
     circle.emplace_back(std::cos(n * M_PI / 128), std::sin(n * M_PI / 128), 0);
   for (const auto& [x, y] : {std::pair(3, 4), {4, 3}, {5, 0}, {0, 5}, {-3, 4}, {-4, -3}, {0, -5}})
-    circle.emplace_back(x, y, 0);  // exactly on one
+    circle.emplace_back(x, y, 0);  // exactly cocircular
   expect_same_in_strips(circle);
 }
 
@@ -130,11 +130,11 @@ TEST(PlanarDelaunay, StripsYieldTheTrianglesOfTheWholeInAwkwardClouds) {
   Points far = scattered(500);
   for (Vector3d& point : far) point += Vector3d(4e6, -7e5, 0);
   expect_same_in_strips(far);
-  Points clusters;  // with nothing between them
+  Points clusters;  // without points between them
   for (int n = 0; n < 600; ++n)
     clusters.emplace_back(uniform(0, 0.01) + n % 3, uniform(0, 1) * (n % 2), 0);
   expect_same_in_strips(clusters);
-  Points columns = lattice(4, 100);  // a line each, and none of it final
+  Points columns = lattice(4, 100);  // one line each, without final triangles
   columns.emplace_back(100, 3, 0);
   expect_same_in_strips(columns);
 }

@@ -1,4 +1,4 @@
-// The author's frames of his clouds.
+// Compares with the terrain frames that the author published for his clouds.
 #include <gtest/gtest.h>
 #include <pcl/filters/voxel_grid.h>
 #include <pcl/point_types.h>

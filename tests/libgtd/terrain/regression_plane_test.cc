@@ -29,7 +29,7 @@ using testing::HasSubstr;
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
-// Ground with bumps on it; its normal is nearly z, and its heights are skewed upwards.
+// Ground with bumps; its normal is nearly z, and its heights are skewed upward.
 PointCloud bumpy_ground(std::size_t count) {
   PointCloud cloud;
   for (std::size_t i = 0; i < count; ++i) {
@@ -158,7 +158,7 @@ TEST(RegressionPlane, TheCentroidIsRightToTheLastBits) {
     cloud.positions.push_back(Vector3d(1e9 + 0.3, 0.3, 0) - d);
   }
   const RegressionPlane plane = fit_regression_plane(cloud);
-  EXPECT_NEAR(plane.centroid.x(), 1e9 + 0.3, 2.5e-7);  // two steps of a double there
+  EXPECT_NEAR(plane.centroid.x(), 1e9 + 0.3, 2.5e-7);  // two units of rounding at this size
   EXPECT_NEAR(plane.centroid.y(), 0.3, 1e-14);
 }
 
@@ -211,12 +211,13 @@ TEST(RegressionPlaneUp, ThenTheNormalsIfTheyAgree) {
   EXPECT_NEAR(plane.normals_up.value(), 290.0 / 300, 1e-12);
 }
 
-// As solvers of eigenvectors and closed surfaces leave them: any majority is chance.
+// Normals with random sides, as from eigenvector solvers and closed surfaces: any majority is
+// chance.
 TEST(RegressionPlaneUp, NormalsThatDisagreeDoNotDecide) {
   for (const double share : {0.25, 0.5, 0.7, 0.78}) {
     PointCloud cloud = bumpy_ground(1000);
     cloud.normals.assign(1000, Eigen::Vector3f(0, 0, 1));
-    for (std::size_t i = 0; i < 1000; ++i)  // of one part of the ground
+    for (std::size_t i = 0; i < 1000; ++i)  // in one part of the ground
       if (cloud.positions[i].x() < 4 * share - 1) cloud.normals[i].z() = -1;
     const RegressionPlane plane = fit_regression_plane(cloud);
     EXPECT_EQ(plane.up_source, UpSource::frame_z) << share;
@@ -229,7 +230,7 @@ TEST(RegressionPlaneUp, NormalsThatDisagreeDoNotDecide) {
   }
 }
 
-// Heights that were never measured turn the plane of a DEM.
+// Missing heights tilt the plane of a DEM.
 TEST(RegressionPlaneUp, ThePlaneOfHeightsMayNotBeSteep) {
   const PointCloud wall = moved(bumpy_ground(300), rotation_about({0, 1, 0}, 84), {4, 0, 1});
   RegressionPlaneOptions options = upwards({0, 0, 1});
@@ -328,8 +329,8 @@ TEST(RegressionPlane, PointsThatAreNotFiniteAreSkipped) {
   EXPECT_LT((plane.terrain_from_input.matrix() - clean.terrain_from_input.matrix()).norm(), 1e-12);
 }
 
-// A site of 3 x 3 m whose ground rises by a tenth along x. Rocks of up to 0.4 m cover 40 % of it,
-// all on one side; `is_dense` adds a hundred points near a corner for each that is there.
+// Site of 3 x 3 m whose ground rises by a tenth along x. Rocks of up to 0.4 m cover 40 % of it, all
+// on one side; `is_dense` adds a hundred points near a corner for each existing one.
 PointCloud ground_with_rocks(bool is_dense) {
   PointCloud cloud;
   for (int i = 0; i < 20000; ++i) {

@@ -1,4 +1,4 @@
-// For the tests of the regression plane.
+// Support for the tests of the regression plane.
 #pragma once
 
 #include <Eigen/Core>
@@ -7,7 +7,7 @@
 
 namespace regression_plane_test {
 
-// Columns: the terrain's axes in the input's frame.
+// Returns the axes of the terrain frame as columns, in the input frame.
 inline Eigen::Matrix3d axes_of(const libgtd::RegressionPlane& plane) {
   return plane.terrain_from_input.linear().transpose();
 }

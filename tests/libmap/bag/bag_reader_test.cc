@@ -68,9 +68,9 @@ TEST(BagReader, TopicsOfOtherTypesAreSaid) {
       2U);
   EXPECT_EQ(said("sensor_msgs/Image", "0123"),
             "md5sum of /front/image_raw is " + std::string(md5sum) +
-                ": is another definition of sensor_msgs/Image (must be 0123)");
+                ": not the supported definition of sensor_msgs/Image (must be 0123)");
   EXPECT_EQ(said("tf2_msgs/TFMessage", md5sum),
-            "type of /front/image_raw is sensor_msgs/Image: is of another type (must be "
+            "type of /front/image_raw is sensor_msgs/Image: wrong type (must be "
             "tf2_msgs/TFMessage)");
 }
 
@@ -88,7 +88,7 @@ TEST(BagReader, MessagesOfTheWantedTopics) {
   EXPECT_EQ(seen[1], "/rear/image_raw");
   EXPECT_EQ(lengths[1], 10U);
   libmap::read_bag(bag_path(), {{"/none"}}, [](const auto&) { throw 1; });
-  // What `take` throws comes out, and the reading process ends.
+  // Exceptions of `take` are propagated, and the reading process ends.
   EXPECT_THROW(libmap::read_bag(bag_path(), {{"/tf_static"}},
                                 [](const auto&) { throw libmap::Error("enough"); }),
                libmap::Error);
@@ -101,10 +101,10 @@ TEST(BagReader, WhatIsNoWholeBagIsSaid) {
     write_text(bag_path(), bytes);
     return std::string(error_of([] { libmap::list_bag(bag_path()); }).what());
   };
-  EXPECT_THAT(said(""), HasSubstr("is no bag"));
+  EXPECT_THAT(said(""), HasSubstr("not a bag"));
   EXPECT_THAT(said("P6\n\x96\n"), HasSubstr("first line is P6"));
   for (const std::size_t length : {13UL, 4109UL, 4200UL, whole.size() / 2, whole.size() - 1})
-    EXPECT_THAT(said(whole.substr(0, length)), HasSubstr("broken or cut off")) << length;
+    EXPECT_THAT(said(whole.substr(0, length)), HasSubstr("damaged or truncated")) << length;
   std::string unindexed = whole;
   unindexed.replace(whole.find("index_pos=") + 10, 8, 8, '\0');
   EXPECT_THAT(said(unindexed), HasSubstr("has no index"));
@@ -115,7 +115,7 @@ TEST(BagReader, WhatIsNoWholeBagIsSaid) {
 TEST(BagReader, EncryptedBagsAreSaid) {
   write_sample();
   std::string bytes = read_text(bag_path());
-  // One more field of the file's header, in the blanks after it.
+  // Another field of the file's header, in the blanks after it.
   const std::string field = "encryptor=rosbag/NoSuchEncryptor";
   const std::size_t header = 13;
   std::uint32_t length = 0;
@@ -155,7 +155,7 @@ TEST(BagReader, MessagesThatLieOutsideAreErrors) {
   }
 }
 
-// The message's arrays promise what does not follow.
+// The declared lengths of the message's arrays exceed its data.
 TEST(BagReader, PromisedArraysTakeNoMemory) {
   rm::PointCloud2 cloud;
   cloud.height = cloud.width = 1;
@@ -168,7 +168,7 @@ TEST(BagReader, PromisedArraysTakeNoMemory) {
   rusage after{};
   getrusage(RUSAGE_SELF, &before);
   EXPECT_THAT(error_of([] { libmap::read_bag_cloud(bag_path()); }).what(),
-              HasSubstr("promises more than"));
+              HasSubstr("declares more than"));
   getrusage(RUSAGE_SELF, &after);
   EXPECT_LT(after.ru_maxrss - before.ru_maxrss, 100 * 1024);  // KiB
 }

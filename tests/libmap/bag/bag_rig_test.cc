@@ -41,7 +41,7 @@ std::string refusal(const BagRigOptions& options = {}) {
   return error_of([&] { plan(options); }).what();
 }
 
-// The written images of one camera, in the order of their stamps.
+// Written images of one camera in the order of their stamps.
 std::vector<std::vector<std::uint16_t>> images_of(const BagRigPlan& plan,
                                                   const std::string& camera) {
   const fs::path folder = scratch_folder() / "rig";
@@ -55,7 +55,7 @@ std::vector<std::vector<std::uint16_t>> images_of(const BagRigPlan& plan,
   return images;
 }
 
-// A camera whose calibration and frame are there, without images.
+// A camera with calibration and frame, but without images.
 void add_surroundings(SampleBag& bag, const std::string& name) {
   bag.transform("base_link", name + "_optical", Pose::Identity());
   bag.write("/" + name + "/camera_info", 1.0, sample_info(name + "_optical", 1.0));
@@ -69,7 +69,7 @@ TEST(BagRig, CamerasOfInfosAndTransforms) {
   bag.transform("base_link", "rear_optical", front.inverse());
   bag.transform("map", "base_link", mast);
   bag.camera("/front", {5.0}).camera("/rear", {5.01});
-  // Pictures are no depth images.
+  // Color images are not depth images.
   bag.write("/front/color/image_raw", 5.0, sample_image("front_optical", 5.0, "rgb8", 1, 1, "abc"));
   bag.close();
   const BagRigPlan result = plan();
@@ -114,7 +114,7 @@ TEST(BagRig, EncodingsOfDepth) {
           ElementsAre(3000, 3000, 3000, 3000, 3010, 3010, 3010, 3010, 3020, 3020, 3020, 3020),
           ElementsAre(15000, 0, 0, 0, 0, 1, 65534, 0, 0, 1000, 2000, 3000), testing::Each(65535)));
   EXPECT_EQ(libmap::export_bag_rig(bag_path(), fine, {}).pixels_beyond, 2U);
-  // Units of the bag's 16-bit images that are no millimeters, taken as they are.
+  // Units of the bag's 16-bit images other than millimeters are kept.
   EXPECT_EQ(images_of(plan({.depth_unit_m = 0.00025}), "a")[0][0], 300);
 }
 
@@ -151,8 +151,8 @@ TEST(BagRig, CompressedDepth) {
   EXPECT_EQ(images[1][0], 2250);  // mm
   EXPECT_EQ(images[1][1], 0);
   EXPECT_THAT(libmap::export_bag_rig(bag_path(), result, {}).warnings,
-              ElementsAre(HasSubstr("only PNG is read")));
-  // Beside the raw images the compressed ones are the same once more.
+              ElementsAre(HasSubstr("only PNG is supported")));
+  // Compressed images are redundant if there are raw ones.
   SampleBag bag(bag_path());
   bag.transform("base_link", "a_optical", Pose::Identity()).camera("/a", {2.0});
   bag.write(topic, 2.0, compressed("16UC1; compressedDepth", 2.0, 0, 0, values));
@@ -181,7 +181,7 @@ TEST(BagRig, CalibrationsOfAllKinds) {
   EXPECT_EQ(camera_of(info, false).distortion_model, libmap::DistortionModel::equidistant);
   info.D = {0, 0, 0, 0, 0};
   EXPECT_FALSE(camera_of(info, false).is_distorted());
-  // The middle 400 x 200 of 640 x 480 pixels, two by two.
+  // The central 400 x 200 of 640 x 480 pixels with a binning of 2 x 2.
   info.width = 640;
   info.height = 480;
   info.K = {500, 0, 320, 0, 600, 240, 0, 0, 1};
@@ -200,7 +200,7 @@ TEST(BagRig, CalibrationsOfAllKinds) {
   EXPECT_THAT(error_of([&] { camera_of(info, false); }).what(), HasSubstr("fx"));
 }
 
-// What a topic is called decides whether its images are rectified: "direct" is no such name.
+// The name of a topic decides if its images are rectified: "direct" does not count.
 TEST(BagRig, RectifiedImagesAreToldByTheirName) {
   rm::CameraInfo info = sample_info("o", 5.0);
   info.D = {0.1, 0.02, 0.001, 0.002, 0.3};
@@ -227,7 +227,7 @@ TEST(BagRig, SetsAreChosen) {
   const BagRigPlan all = plan();
   ASSERT_EQ(all.sets.size(), 5U);
   EXPECT_EQ(all.sets[0].seen(), 2U);
-  EXPECT_EQ(all.sets[2].seen(), 1U);  // b missed one
+  EXPECT_EQ(all.sets[2].seen(), 1U);  // b has no image in this set
   EXPECT_EQ(all.images.size(), 9U);
   const BagRigPlan second = plan({.every = 2});
   EXPECT_EQ(second.images.size(), 5U);
@@ -246,7 +246,7 @@ TEST(BagRig, OddStampsAndCalibrationsAreLeftOut) {
   bag.transform("base_link", "a_optical", Pose::Identity());
   bag.camera("/a", {5.0, 5.1});
   bag.write("/a/image_raw", 5.2, sample_depth("a_optical", 5.1));  // the same stamp
-  bag.write("/a/image_raw", 5.3, sample_depth("a_optical", 0.0));  // none
+  bag.write("/a/image_raw", 5.3, sample_depth("a_optical", 0.0));  // no stamp
   rm::CameraInfo info = sample_info("a_optical", 6.0);
   info.K[0] = 5.5;
   bag.write("/a/camera_info", 6.0, info);
@@ -256,7 +256,7 @@ TEST(BagRig, OddStampsAndCalibrationsAreLeftOut) {
   ASSERT_EQ(result.images.size(), 3U);
   EXPECT_EQ(result.images[2].stamp_ns, 5300000000);
   EXPECT_THAT(result.warnings,
-              ElementsAre(HasSubstr("1 images have the stamp"), HasSubstr("1 images have another"),
+              ElementsAre(HasSubstr("1 images have a dup"), HasSubstr("1 images differ from the"),
                           HasSubstr("without a stamp")));
 }
 
@@ -283,7 +283,7 @@ TEST(BagRig, BrokenImagesAreCountedAndLeftOut) {
   ASSERT_EQ(result.warnings.size(), 1U);
   EXPECT_THAT(result.warnings[0], HasSubstr("/a/image_raw: 8 images"));
   EXPECT_THAT(result.warnings[0], HasSubstr("23 bytes"));
-  // A set of which no image is left is none.
+  // A set without usable images is dropped.
   ASSERT_EQ(result.sets.size(), 1U);
   EXPECT_EQ(result.sets[0].stamp_s, 5.0);
 }
@@ -302,10 +302,10 @@ TEST(BagRig, ABagWithoutAnImageThatCanBeUsedIsAnError) {
     return std::string(error_of([&] { libmap::export_bag_rig(bag_path(), broken, {}); }).what());
   };
   EXPECT_THAT(said(), HasSubstr("a.bag: /a/image_raw: 1 images cannot be used: data is 23 bytes"));
-  // Another bag by now.
+  // The bag has changed.
   write([](rm::Image& image) { image.header.stamp = ros::Time(7.0); });
   EXPECT_EQ(said(), bag_path().string() + ": no image can be used");
-  // Compressed, of fewer bytes than come before the PNG.
+  // A compressed image with fewer bytes than the header before the PNG.
   rm::CompressedImage image;
   image.header = sample_header("a_optical", 5.0);
   image.format = rm::to_ros("16UC1; compressedDepth png");
@@ -314,7 +314,7 @@ TEST(BagRig, ABagWithoutAnImageThatCanBeUsedIsAnError) {
   add_surroundings(bag, "a");
   bag.write("/a/image_raw/compressedDepth", 5.0, image).close();
   EXPECT_THAT(error_of([&] { libmap::export_bag_rig(bag_path(), plan(), {}); }).what(),
-              HasSubstr("data is 11 bytes: its data end too early (must be >= 12 bytes)"));
+              HasSubstr("data is 11 bytes: truncated (must be >= 12 bytes)"));
 }
 
 TEST(BagRig, RigOfOnesOwn) {
@@ -372,11 +372,11 @@ TEST(BagRig, WhatIsMissingIsNamed) {
   EXPECT_THAT(refusal(), HasSubstr("topic is /a/camera_info"));
   bag([](SampleBag& made) {
     rm::Image image = sample_depth("a_optical", 1.0);
-    image.header.seq = 7;  // as a number of transforms it would promise too much
+    image.header.seq = 7;  // read as a number of transforms, it would be too large
     made.write("/a/image_raw", 1.0, image);
   });
   EXPECT_THAT(refusal({.transform_topic = "/a/image_raw"}),
-              HasSubstr("type of /a/image_raw is sensor_msgs/Image: is of another type (must be "
+              HasSubstr("type of /a/image_raw is sensor_msgs/Image: wrong type (must be "
                         "tf2_msgs/TFMessage)"));
   bag([](SampleBag& made) {
     made.camera("/a", {1.0}).transform("base_link", "a_optcal", Pose::Identity());
@@ -386,7 +386,7 @@ TEST(BagRig, WhatIsMissingIsNamed) {
     made.camera("/a", {1.0}).transform("a_optical", "b", Pose::Identity());
     made.transform("b", "a_optical", Pose::Identity());
   });
-  EXPECT_THAT(refusal(), HasSubstr("lead back"));
+  EXPECT_THAT(refusal(), HasSubstr("form a cycle"));
   bag([](SampleBag& made) {
     rm::CameraInfo info = sample_info("a_optical", 1.0);
     info.K = {};
@@ -401,7 +401,7 @@ TEST(BagRig, WhatIsMissingIsNamed) {
     message.transforms[0].child_frame_id = rm::to_ros("a_optical");
     made.camera("/a", {1.0}).write("/tf_static", 1.0, message);
   });
-  EXPECT_THAT(refusal(), HasSubstr("/tf_static: quaternion of frame a_optical: is no rotation"));
+  EXPECT_THAT(refusal(), HasSubstr("/tf_static: quaternion of frame a_optical: not a rotation"));
 }
 
 }  // namespace bag_rig_test

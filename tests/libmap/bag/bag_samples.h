@@ -1,4 +1,4 @@
-// Bags of the tests' own messages, of ROS 1's own types, encoded and written by its libraries.
+// Bags of sample messages of ROS 1's types, encoded and written by its libraries.
 #pragma once
 
 #include <geometry_msgs/PoseArray.h>
@@ -23,7 +23,7 @@ namespace graspmap_test {
 
 namespace rm {
 
-// With the `rebind` that the message headers ask for, which std::allocator lost in C++20.
+// Allocator with the `rebind` that the message headers require; C++20 removed it.
 template <typename T>
 struct RebindAllocator : std::allocator<T> {
   template <typename U>
@@ -105,13 +105,13 @@ class SampleBag {
 rm::TransformStamped sample_transform(const std::string& parent, const std::string& child,
                                       const libmap::Pose& parent_from_child);
 rm::Header sample_header(const std::string& frame, double stamp_s);
-// Rows of `bytes` one after the other, `step` bytes each.
+// Consecutive rows of `bytes`, `step` bytes each.
 rm::Image sample_image(const std::string& frame, double stamp_s, const std::string& encoding,
                        std::uint32_t width, std::uint32_t height, const std::string& bytes);
 rm::Image sample_depth(const std::string& frame, double stamp_s);
 rm::CameraInfo sample_info(const std::string& frame, double stamp_s);
 
-// The bytes of numbers, in this machine's order or the other one.
+// Bytes of numbers in this machine's order or swapped.
 template <typename T>
 std::string bytes_of(const std::vector<T>& numbers, bool swapped = false) {
   std::string bytes;

@@ -55,7 +55,7 @@ TEST(BagWriter, PosesPointAlongTheDirection) {
     EXPECT_NEAR(rotation.norm(), 1.0, 1e-12);
     EXPECT_TRUE((rotation * Eigen::Vector3d::UnitX())
                     .isApprox(places().places[n].direction.normalized(), 1e-12));
-    // The y axis is the frame's, made square to it.
+    // The y axis is the frame's, made perpendicular to the x axis.
     if (n != 1) {
       EXPECT_GT((rotation * Eigen::Vector3d::UnitY()).y(), 0.9);
     }
@@ -77,7 +77,7 @@ TEST(BagWriter, MarkersStandAtThePlaces) {
   EXPECT_EQ(arrow.type, rm::Marker::ARROW);
   ASSERT_EQ(arrow.points.size(), 2U);
   EXPECT_EQ(arrow.points[1].z, 3.0);
-  EXPECT_NEAR(arrow.points[0].z, 3.08, 1e-12);  // it comes from above
+  EXPECT_NEAR(arrow.points[0].z, 3.08, 1e-12);  // the approach is from above
   EXPECT_EQ(rm::from_ros(markers.markers[2].text), "1: 0.98");
   std::set<std::pair<std::string, int>> names;
   for (const rm::Marker& marker : markers.markers) {
@@ -111,13 +111,13 @@ TEST(BagWriter, WhatRosCannotHoldIsSaid) {
     EXPECT_THAT(error_of([&] {
                   libmap::write_bag(bag_path(), BagFormat::ros1, {.stamp_s = stamp});
                 }).what(),
-                HasSubstr("ROS has no such time"));
+                HasSubstr("outside ROS's range of time"));
   for (const char* topic : {"", "/", "map", "/a b", "/a/", "/\xc3\xa4"})
     EXPECT_THAT(
         error_of([&] {
           libmap::write_bag(bag_path(), BagFormat::ros1, {.clouds = {{topic, "terrain", {}}}});
         }).what(),
-        HasSubstr("no name of a ROS topic"));
+        HasSubstr("not a ROS topic name"));
   const libmap::Error full =
       error_of([] { libmap::write_bag("/dev/full", BagFormat::ros1, {.places = {places()}}); });
   EXPECT_EQ(full.kind(), libmap::ErrorKind::failed);

@@ -104,7 +104,7 @@ TEST(CloudMessage, WhatDoesNotFitIsSaid) {
                 m.fields[5].count = 0x10000000;
               }),
               HasSubstr("more than 1024"));
-  // No points are no error.
+  // A cloud without points is valid.
   rm::PointCloud2 empty = odd_cloud(false);
   empty.width = 0;
   empty.data.clear();
@@ -120,7 +120,7 @@ TEST(CloudMessage, TopicsAndMomentsAreChosen) {
   const auto read = [](const std::string& topic, std::optional<double> stamp) {
     return libmap::read_bag_cloud(bag_path(), topic, stamp);
   };
-  EXPECT_EQ(read("/a", std::nullopt).stamp_s, 7.5);  // the fullest
+  EXPECT_EQ(read("/a", std::nullopt).stamp_s, 7.5);  // the message with the most points
   EXPECT_EQ(read("/a", std::nullopt).messages, 2U);
   EXPECT_EQ(read("/a", 4.0).stamp_s, 3.0);
   EXPECT_THAT(error_of([&] { read("", std::nullopt); }).what(), HasSubstr("/a, /b"));
@@ -158,10 +158,10 @@ TEST(CloudMessage, WrittenCloudsComeBackWhole) {
   EXPECT_EQ(result.cloud.fields, cloud.fields);
 }
 
-// What RViz asks of a cloud.
+// RViz's requirements for a cloud.
 TEST(CloudMessage, LayoutOfWrittenClouds) {
   PointCloud cloud = full_cloud();
-  cloud.positions[0].x() = 100000.25;  // which files would hold as float64
+  cloud.positions[0].x() = 100000.25;  // files would store it as float64
   const libmap::ros_message::PointCloud2 message = libmap::encode_cloud(cloud);
   std::vector<std::string> layout;
   for (const libmap::ros_message::PointField& one : message.point_fields)
@@ -179,7 +179,7 @@ TEST(CloudMessage, LayoutOfWrittenClouds) {
   EXPECT_EQ(x, 0.25F);
   float rgb = 0;
   std::memcpy(&rgb, message.data.data() + 24, 4);
-  EXPECT_FALSE(std::isnan(rgb));  // blue of 255 and all
+  EXPECT_FALSE(std::isnan(rgb));  // also for a blue of 255
 }
 
 }  // namespace cloud_message_test

@@ -97,7 +97,7 @@ TEST(Cdr, WrittenAsPacked) {
   for (const double value : {1.5, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0}) bytes.number(value);
   EXPECT_EQ(rm::encode(MessageEncoding::cdr, message), bytes.bytes());
 
-  // Bytes before numbers, arrays of bytes, an empty array of doubles, which has no padding.
+  // Bytes before numbers, arrays of bytes, and an empty array of doubles without padding.
   rm::CameraInfo info;
   info.header = {.stamp = {0}, .frame_id = "c"};
   info.height = 3;
@@ -112,7 +112,7 @@ TEST(Cdr, WrittenAsPacked) {
   EXPECT_EQ(rm::encode(MessageEncoding::cdr, info), camera.bytes());
 }
 
-// Wherever a message ends, and whatever its lengths say, it is an error and takes no memory.
+// A message truncated anywhere, or with any lengths, is an error and takes no memory.
 TEST(Cdr, CutOffAndLyingMessages) {
   const std::string whole = packed_transform(false);
   for (std::size_t length = 0; length < whole.size(); ++length)
@@ -125,7 +125,7 @@ TEST(Cdr, CutOffAndLyingMessages) {
       lying.replace(at, 4, std::string(4, byte));
       EXPECT_THROW(rm::decode<rm::TFMessage>(MessageEncoding::cdr, lying), libmap::Error) << at;
     }
-  // Of another encapsulation (parameter lists), and of no encoding at all.
+  // Messages of another encapsulation (parameter lists), and of no encoding.
   EXPECT_THROW(rm::decode<rm::TFMessage>(MessageEncoding::cdr, "\x7f\x7f\x7f\x7f"), libmap::Error);
   EXPECT_THROW(rm::decode<rm::TFMessage>(MessageEncoding::other, whole), libmap::Error);
 }
@@ -243,7 +243,7 @@ TEST_P(Ros2Formats, ContentComesBackAndBytesAreTheSame) {
   }
 }
 
-// Cut off anywhere: an error that names the file; with broken bytes: one, or what can be read.
+// A truncated file is an error that names the file. Damaged bytes are an error or can be read.
 TEST_P(Ros2Formats, DamagedFiles) {
   const fs::path whole_bag = write("a");
   const fs::path source = libmap::files_of_bag(whole_bag).back();
@@ -272,7 +272,7 @@ TEST_P(Ros2Formats, DamagedFiles) {
   }
 }
 
-// The place of a cell, by the formula of grid_map: index 0, 0 is the corner of largest x and y.
+// Position of a cell by grid_map's formula: index 0, 0 is the corner of largest x and y.
 TEST(GridMap, CellsAreWhereGridMapLooksForThem) {
   libmap::BagGrid grid = sample_content().grids[0];
   const rm::GridMap map = libmap::encode_grid_map(grid, {});
@@ -355,7 +355,7 @@ TEST(Ros2Bag, SplitRecordingsAreOneBag) {
             (folder / "run_1.mcap").string());
 }
 
-// Databases that are no bags, or that say what is not so.
+// Databases that are not bags, or bags with wrong content.
 TEST(Ros2Bag, ForeignDatabases) {
   const fs::path path = scratch_folder() / "a.db3";
   const auto said = [&](const char* statements) {
@@ -381,7 +381,7 @@ TEST(Ros2Bag, ForeignDatabases) {
   EXPECT_EQ(error_of([&] { libmap::list_bag(path); }).context().file, path.string());
 }
 
-// A chunk takes the memory that it fills, not what it promises.
+// A chunk takes memory for its actual size, not for its declared size.
 TEST(Mcap, ChunksThatPromiseMore) {
   const std::string text(1000, 'x');
   for (const char* compression : {"", "lz4", "zstd"}) {
@@ -420,7 +420,7 @@ TEST(Ros2Bag, DefinitionsNameAllTypes) {
         "MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n",
         "MSG: sensor_msgs/CompressedImage\n", "visualization_msgs/UVCoordinate[] uv_coordinates\n"})
     EXPECT_THAT(text, HasSubstr(part));
-  // Each one once.
+  // Each definition is contained once.
   EXPECT_EQ(text.find("MSG: std_msgs/Header"), text.rfind("MSG: std_msgs/Header"));
   EXPECT_THAT(rm::definition_of<rm::CameraInfo>(), HasSubstr("float64[] d\nfloat64[9] k\n"));
 }

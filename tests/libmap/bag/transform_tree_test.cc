@@ -26,7 +26,7 @@ TEST(TransformTree, UpToACommonFrameAndDownAgain) {
   const Pose lens = random_pose();
   TransformTree tree;
   tree.add("right", "lens", lens);
-  tree.add("/mast", "/left", left);  // names of old programs
+  tree.add("/mast", "/left", left);  // leading '/', as in old programs
   tree.add("mast", "right", right);
   tree.add("base", "mast", mast);
   EXPECT_TRUE(tree.target_from_source("base", "lens").isApprox(mast * right * lens, 1e-12));
@@ -46,7 +46,7 @@ TEST(TransformTree, WhatLeadsNowhereIsSaid) {
   EXPECT_THAT(error_of([&] { tree.target_from_source("base_lnk", "camera"); }).what(),
               HasSubstr("did you mean 'base_link'"));
   EXPECT_THAT(error_of([&] { tree.target_from_source("odom", "camera"); }).what(),
-              HasSubstr("no transforms lead from it to odom"));
+              HasSubstr("no transforms connect it to odom"));
 }
 
 TEST(TransformTree, CirclesEnd) {
@@ -55,8 +55,9 @@ TEST(TransformTree, CirclesEnd) {
   tree.add("b", "c", Pose::Identity());
   tree.add("c", "a", Pose::Identity());
   tree.add("c", "d", Pose::Identity());
-  EXPECT_THAT(error_of([&] { tree.target_from_source("a", "d"); }).what(), HasSubstr("lead back"));
-  EXPECT_THAT(error_of([&] { tree.root_of("b"); }).what(), HasSubstr("lead back"));
+  EXPECT_THAT(error_of([&] { tree.target_from_source("a", "d"); }).what(),
+              HasSubstr("form a cycle"));
+  EXPECT_THAT(error_of([&] { tree.root_of("b"); }).what(), HasSubstr("form a cycle"));
   EXPECT_THROW(tree.add("e", "e", Pose::Identity()), libmap::Error);
 }
 
@@ -64,7 +65,7 @@ TEST(TransformTree, FramesStandStill) {
   TransformTree tree;
   Pose pose = Pose::Identity();
   tree.add("a", "b", pose);
-  tree.add("a", "b", pose);  // said twice
+  tree.add("a", "b", pose);  // added twice
   pose.translation().x() = 0.001;
   EXPECT_THAT(error_of([&] { tree.add("a", "b", pose); }).what(), HasSubstr("is not static"));
   EXPECT_THROW(tree.add("c", "b", Pose::Identity()), libmap::Error);

@@ -88,7 +88,7 @@ TEST(CalibrationCodec, PGoesOverKAndSaysThatTheImageIsRectified) {
   EXPECT_EQ(camera.cx, 161);
   EXPECT_EQ(camera.cy, 121);
   EXPECT_FALSE(camera.is_distorted());
-  // P of zeros stands for none.
+  // A zero P is equivalent to no P.
   EXPECT_EQ(only_camera(record({.k = k, .p = std::vector<double>(12, 0.0)})).fx, 300);
 }
 
@@ -141,7 +141,7 @@ TEST(CalibrationCodec, StereoRecords) {
   EXPECT_DOUBLE_EQ(pair.right_from_left.translation().x(), -0.12);
   EXPECT_EQ(cameras_of(calibration, 0, 0).size(), 2U);
 
-  // Of raw images R and T say where the right one is.
+  // For raw images, R and T define the pose of the right camera.
   const std::vector<double> turned{0, -1, 0, 1, 0, 0, 0, 0, 1};
   const auto raw = stereo_cameras_of(
       libmap::decode_calibration(stereo_record({.k = k}, {.k = k}, turned, {-0.3, 0, 0.4})), 0, 0);
@@ -265,7 +265,7 @@ TEST(CalibrationCodec, RecordsThatDoNotBelongTogether) {
   // 10 int32, R and T stand before the left camera, three int32 of a version before its kind.
   EXPECT_EQ(refusal_of(40 + 72 + 24 + 12, 1), "'1': calibration of an unknown kind (must be 0)");
   EXPECT_EQ(refusal_of(32, 163),
-            "'163': calibration of a stereo camera has another length than it says");
+            "'163': calibration of a stereo camera: length differs from the stored one");
   EXPECT_EQ(error_of([&] { libmap::decode_calibration(stereo + record({.k = k})); }).reason(),
             "calibration contains single and stereo cameras");
 }
@@ -274,7 +274,7 @@ TEST(CalibrationCodec, StereoCamerasAtOnePlace) {
   const Calibration calibration =
       libmap::decode_calibration(stereo_record({.k = k}, {.k = k}, eye, {0, 0, 0}));
   EXPECT_EQ(std::string(error_of([&] { stereo_cameras_of(calibration, 0, 0); }).what()),
-            "baseline_m is 0: stereo camera cannot be used (must be > 0)");
+            "baseline_m is 0: invalid stereo camera (must be > 0)");
 }
 
 TEST(CalibrationCodec, NumbersThatAreNoCamera) {

@@ -197,7 +197,7 @@ TEST(FindChessboard, CornersLieWhereTheyArePainted) {
       ASSERT_TRUE(found);
       std::vector<Eigen::Vector2d> truth = painter.corners(board, pose);
       ASSERT_EQ(found->size(), truth.size());
-      // Which end comes first is not said.
+      // The first corner may be at either end.
       if ((found->front() - truth.front()).norm() > (found->front() - truth.back()).norm())
         std::reverse(truth.begin(), truth.end());
       for (std::size_t n = 0; n < truth.size(); ++n) {
@@ -221,7 +221,7 @@ TEST(FindChessboard, NothingWhereNoneIs) {
   for (std::uint8_t& pixel : noise.pixels)
     pixel = static_cast<std::uint8_t>(graspmap_test::uniform(0, 256));
   EXPECT_FALSE(find_chessboard(noise, {}));
-  // Half of a board is none, nor is one of another size.
+  // Half a board, or a board of another size, is not detected.
   const ChessboardPainter painter(camera, 2);
   Pose pose = Pose::Identity();
   pose.translation() = Eigen::Vector3d(0.12, -0.075, 0.4);
@@ -268,7 +268,7 @@ TEST(CameraCalibration, PicturesThatTellNothingAreRefused) {
   for (const LensModel lens : {LensModel::none, LensModel::equidistant})
     for (const double noise : {0.0, 0.1})
       EXPECT_THAT(refused(straight, noise, lens), HasSubstr("do not determine"));
-  // The same picture over and over; the same pose from a camera that is all noise.
+  // One image several times; one pose with noise.
   EXPECT_THAT(refused(std::vector<Pose>(8, poses[0]), 0.0, LensModel::plumb_bob),
               HasSubstr("pictures is 1"));
   EXPECT_THAT(refused(std::vector<Pose>(8, straight[0]), 2.0, LensModel::none),
@@ -297,7 +297,7 @@ TEST(CameraCalibration, BadPicturesAreLeftOut) {
   CameraCalibrationOptions options;
   options.lens = LensModel::none;
   options.max_picture_error_px = 0.5;
-  // Of many places of the board: in one of four, all pictures together determine no camera.
+  // In one of four random sets of board poses, all images together determine no camera.
   for (int round = 0; round < 12; ++round) {
     auto pictures = noisy_corners(camera, board_poses(camera, {}, 12, 45), 0.05);
     std::reverse(pictures[4].corners.begin(), pictures[4].corners.begin() + 8);

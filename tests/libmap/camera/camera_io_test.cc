@@ -184,7 +184,7 @@ TEST(CameraIo, ReadsRosAndRtabmapVariants) {
                              .camera;
   EXPECT_EQ(fisheye.distortion_model, DistortionModel::equidistant);
   EXPECT_EQ(fisheye.distortion, (std::vector<double>{0.1, 0.2, 0.3, 0.4}));
-  // OpenCV's sample says it in this way.
+  // Notation of OpenCV's sample.
   const Camera sample =
       parse_camera(plain + "fisheye_model: 1\ndistortion_coefficients: [0.1, 0, 0, 0]\n", "a")
           .camera;
@@ -226,7 +226,7 @@ TEST(CameraIo, BadFilesAreNamed) {
       {"image_width: 3\nimage_height: 480\ncamera_matrix: [1, 1, 2, 0, 1, 2, 0, 0, 1]", {"skew"}},
       {"image_width: 3\nimage_height: 480\ncamera_matrix: [0, 0, 2, 0, 1, 2, 0, 0, 1]", {"fx"}},
       {"image_width: 3\nimage_height: 480\ncamera_matrix: [1, 0, 2, 0, 1, 2, 0, 0, 2]",
-       {"camera_matrix: is no camera matrix"}},
+       {"camera_matrix: not a camera matrix"}},
       {"image_width: 3\nimage_height: 4\ncamera_matrix: [1, 0, .nan, 0, 1, 2, 0, 0, 1]", {".nan"}},
       {"image_width: 3\nimage_height: 4\ncamera_matrix: [1, 0, x, 0, 1, 2, 0, 0, 1]", {"is x"}},
       {"image_width: 3\nimage_height: 4\ncamera_matrix: {rows: 3, cols: 3}",
@@ -237,7 +237,7 @@ TEST(CameraIo, BadFilesAreNamed) {
       {plain + "distortion_coefficients: [1, 2, 3]\n", {"4, 5, 8 or 12"}},
       {plain + "distortion_model: equidistant\ndistortion_coefficients: [1, 2, 3, 4, 5]\n", {"4"}},
       {plain + "distortion_model: none\ndistortion_coefficients: [1, 2, 3, 4, 5]\n", {"none"}},
-      {plain + "local_transform: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1, 0]\n", {"no rotation"}},
+      {plain + "local_transform: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1, 0]\n", {"not a rotation"}},
       {plain + "local_transform: [1, 0, 0]\n", {"3 x 4"}}};
   for (const Broken& broken : files) {
     const libmap::Error error = error_of([&] { parse_camera(broken.text, "bad.yaml"); });
@@ -286,7 +286,8 @@ TEST(CameraIo, TimingMotionsAndScaleAreReadBackAsWritten) {
 TEST(CameraIo, HugeListsEndEarly) {
   std::string text = "image_width: 3\nimage_height: 4\ncamera_matrix: [1";
   for (int n = 0; n < 10000; ++n) text += ", 1";
-  EXPECT_THAT(error_of([&] { parse_camera(text + "]", "a"); }).what(), HasSubstr("more numbers"));
+  EXPECT_THAT(error_of([&] { parse_camera(text + "]", "a"); }).what(),
+              HasSubstr("too many numbers"));
 }
 
 }  // namespace camera_io_test

@@ -143,7 +143,7 @@ TEST(Rvl, SizesThatCannotBe) {
   error_of([&] { libmap::decode_depth(with_size(0xffffffffU, 0xffffffffU)); });
   error_of([&] { libmap::decode_depth(with_size(0, 5)); });
   error_of([&] { libmap::decode_depth(with_size(10000, 10000)); });
-  // One row more or less than there is.
+  // One row more or less than stored.
   error_of([&] { libmap::decode_depth(with_size(32, 25)); });
   error_of([&] { libmap::decode_depth(with_size(32, 23)); });
 }

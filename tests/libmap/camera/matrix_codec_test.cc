@@ -39,7 +39,7 @@ TEST(MatrixCodec, RoundTrip) {
     }
 }
 
-// What zlib and OpenCV's numbers say of it: 32FC3 is 21, and the stream is as zlib's own.
+// Compared with zlib and OpenCV: 32FC3 is 21, and the stream is that of zlib.
 TEST(MatrixCodec, FramingByHand) {
   const StoredMatrix matrix{1, 2, 3, MatrixElement::float32,
                             bytes_of(std::vector<float>{1, 2, 3, 4, 5, 6})};
@@ -75,7 +75,7 @@ TEST(MatrixCodec, SizesThatDoNotFit) {
     EXPECT_EQ(error_of([&, rows = rows, columns = columns, type = type] {
                 libmap::decode_matrix(with_trailer(matrix, rows, columns, type));
               }).reason(),
-              "compressed matrix of more than its 111 bytes can hold");
+              "compressed matrix: size exceeds what 111 bytes can contain");
 }
 
 TEST(MatrixCodec, WhatIsTooLargeToBeHeldCanBeGoneThrough) {

@@ -134,7 +134,7 @@ TEST(StereoDepth, StepOfKnownDepth) {
   EXPECT_GT(near.share, 0.97);
   EXPECT_LT(far.rms, 0.0125);
   EXPECT_LT(near.rms, 0.0125);
-  // What only the left camera sees, 0.12 (1/1 - 1/1.5) 250 = 10 columns, has no depth of its own.
+  // The 0.12 (1/1 - 1/1.5) 250 = 10 columns that only the left camera sees have no depth.
   for (int y = 5; y < height - 5; ++y)
     for (int x = 45; x < 195; ++x)
       EXPECT_TRUE(depth.at(x, y) == 0 || (depth.at(x, y) > 0.95F && depth.at(x, y) < 1.6F));

@@ -82,7 +82,7 @@ TEST(CameraTest, DistortionFollowsTheFormulas) {
   EXPECT_NEAR(bent.y(), fisheye.fy * y * td / r + fisheye.cy, 1e-10);
 }
 
-// Without terms the radius in the image is the angle, not its tangent.
+// Without coefficients, the radius in the image is the angle, not its tangent.
 TEST(CameraTest, AnIdealFisheyeIsNoPinhole) {
   const Camera fisheye = distorted(DistortionModel::equidistant, {0, 0, 0, 0});
   const Vector2d pixel = libmap::distort_to_pixel(fisheye, Vector2d(std::tan(0.8), 0.0));
@@ -102,7 +102,7 @@ TEST(CameraTest, EveryPixelsRayComesBackToItsPixel) {
   }
 }
 
-// A barrel so strong that its polynomial turns round: pixels beyond the turn belong to no ray.
+// A barrel distortion whose polynomial has a maximum: pixels beyond it have no ray.
 TEST(CameraTest, PixelsThatNoRayReachesAreNotInvented) {
   const Camera camera = distorted(DistortionModel::radial_tangential, {-1.2, 0.0, 0.0, 0.0});
   // x (1 - 1.2 x^2) is largest at x = 1 / sqrt(3.6): 0.351.
@@ -154,7 +154,7 @@ TEST(CameraTest, WhatCannotBeACameraIsNamed) {
   EXPECT_EQ(field_of([](Camera& c) { c.base_from_camera.translation().x() = std::nan(""); }),
             "base_from_camera");
   EXPECT_EQ(field_of([](Camera& c) { c.distortion = {std::nan("")}; }), "distortion");
-  // Rays and products of them would leave the range of doubles.
+  // Rays and their products would exceed the range of doubles.
   EXPECT_EQ(field_of([](Camera& c) { c.fx = 1e-300; }), "fx");
   EXPECT_EQ(field_of([](Camera& c) { c.fy = 1e300; }), "fy");
   EXPECT_EQ(field_of([](Camera& c) { c.cx = -1e300; }), "cx");

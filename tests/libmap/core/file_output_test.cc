@@ -100,7 +100,7 @@ TEST(FileOutputTest, AKilledWriterDoesNotBlockTheNext) {
   if (child == 0) {
     const OutputFile output(path);
     libmap::write_text(output.temporary_path(), "a very long content that was never finished");
-    _exit(0);  // no destructor: as if it had been killed
+    _exit(0);  // no destructor, as in a killed process
   }
   waitpid(child, nullptr, 0);
   EXPECT_FALSE(fs::exists(path));
@@ -181,7 +181,7 @@ TEST(FileOutputTest, ReadingRefusesWhatIsNoFile) {
   EXPECT_EQ(error_of([&] { libmap::require_readable_file(""); }).reason(), "no such file");
 }
 
-// Where the superuser runs the tests: as if somebody else had started them.
+// Drops the superuser's rights for tests that are run by root.
 class AsSomebodyElse {
  public:
   AsSomebodyElse() : good_(getuid() != 0 || setresuid(65534, 0, 0) == 0) {}

@@ -109,7 +109,7 @@ TEST_F(OutputFolderTest, KeepsTheEarlierOneIfItsOwnIsGone) {
     fill(output, "new");
     fs::remove_all(output.temporary_path());
     const libmap::Error error = graspmap_test::error_of([&] { output.commit(); });
-    EXPECT_EQ(error.reason(), "cannot be put in place: No such file or directory");
+    EXPECT_EQ(error.reason(), "cannot be replaced: No such file or directory");
     EXPECT_EQ(error.context().file, folder_.string());
     EXPECT_EQ(error.kind(), libmap::ErrorKind::failed);
     EXPECT_EQ(fs::exists(folder_ / "a.txt"), has_earlier);

@@ -17,7 +17,7 @@ using libmap::GuardedProcess;
 constexpr std::uint64_t memory = std::uint64_t{1} << 30;
 
 TEST(GuardedProcess, WhatItWritesIsRead) {
-  const std::string text(1 << 20, 'x');  // more than a pipe holds
+  const std::string text(1 << 20, 'x');  // more than the buffer of a pipe
   GuardedProcess process(memory, [&](const GuardedProcess::Write& write) {
     write(text);
     write("end");
@@ -53,7 +53,7 @@ TEST(GuardedProcess, NoneWithoutFiles) {
     const graspmap_test::LowerLimit no_file(RLIMIT_NOFILE, 0);
     const GuardedProcess process(memory, [](const GuardedProcess::Write&) {});
   });
-  EXPECT_EQ(error.reason(), "no process to read it in: Too many open files");
+  EXPECT_EQ(error.reason(), "cannot start a child process: Too many open files");
   EXPECT_EQ(error.kind(), libmap::ErrorKind::failed);
 }
 

@@ -194,7 +194,7 @@ TEST(ManifestTest, TransformsThatAreNone) {
   manifest.transforms[0].second = libmap::Pose(Eigen::Translation3d(0, 0, -2e8));
   EXPECT_EQ(
       error_of([&] { libmap::read_manifest_of(written(libmap::to_json(manifest))); }).reason(),
-      "a transform is a rotation and a shift of at most 1e8 m");
+      "not a rotation and a translation of at most 1e8 m");
 }
 
 TEST(ManifestTest, ObjectsWithoutABoundAreRefused) {
@@ -225,7 +225,7 @@ TEST(ManifestTest, TextOfAnyBytesStaysJson) {
   EXPECT_EQ(read->command, "quote\" \\ \n \xEF\xBF\xBD \xE2\x82\xAC");
 }
 
-// FIPS 180-4, and the NIST example vectors.
+// Examples of FIPS 180-4 and NIST.
 TEST(ManifestTest, Sha256OfKnownMessages) {
   EXPECT_EQ(libmap::sha256_of(""),
             "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
@@ -239,7 +239,7 @@ TEST(ManifestTest, Sha256OfKnownMessages) {
 
 TEST(ManifestTest, Sha256OfAFileIsThatOfItsBytes) {
   const fs::path path = scratch_folder() / "bytes";
-  // About the size of the buffer that files are read by, and none of it.
+  // Sizes near the buffer for reading files, and an empty file.
   for (const std::size_t size : {0U, 1U, 65535U, 65536U, 65537U, 200000U}) {
     std::string bytes(size, '\0');
     for (char& c : bytes) c = static_cast<char>(graspmap_test::random_engine()());

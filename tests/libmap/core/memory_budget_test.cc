@@ -11,7 +11,8 @@ namespace memory_budget_test {
 
 using libmap::MemoryBudget;
 
-// Whether another thread gets `second` while this one holds `first`; it gets it afterwards.
+// True if another thread gets `second` while this one owns `first`; otherwise, it gets it
+// afterwards.
 bool both_at_once(std::uint64_t first, std::uint64_t second) {
   MemoryBudget budget(10);
   std::atomic<bool> is_given = false;

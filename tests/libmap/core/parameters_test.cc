@@ -126,7 +126,7 @@ TEST_F(ParametersTest, ErrorsNameKeyValueAndBound) {
   EXPECT_EQ(message("layers", "11"), "layers is 11: out of range (must be >= 0 and <= 10)");
   EXPECT_EQ(message("layers", "1.5"), "layers is 1.5: not a whole number (must be >= 0 and <= 10)");
   EXPECT_EQ(message("seed", "-1"), "seed is -1: out of range (must be >= 0)");
-  EXPECT_EQ(message("fill", "maybe"), "fill is maybe: not a switch (must be true or false)");
+  EXPECT_EQ(message("fill", "maybe"), "fill is maybe: not a boolean (must be true or false)");
   EXPECT_EQ(message("shape", "rond"),
             "shape is rond: unknown name (did you mean 'round'?) (must be one of round square)");
   EXPECT_EQ(message("sise_m", "1"), "sise_m: unknown key (did you mean 'size_m'?)");

@@ -123,7 +123,7 @@ TEST(PointCloudTest, TransformMovesViewpointsAndTurnsApproachesOfPoints) {
   EXPECT_TRUE(vector_of("vp").isApprox(Eigen::Vector3d(8, 1, 3), 1e-12));
   EXPECT_TRUE(vector_of("approach").isApprox(Eigen::Vector3d(-2, 1, 3), 1e-12));
   EXPECT_EQ(moved.find_field("approach_xy")->values[0], 7.0);
-  // Two of three are something else.
+  // Two of three vector fields are ordinary fields.
   std::erase_if(cloud.fields, [](const auto& field) { return field.name == "vp_z"; });
   EXPECT_EQ(libmap::transform_cloud(cloud, pose).find_field("vp_x")->values[0], 1.0);
 }

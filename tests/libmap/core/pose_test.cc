@@ -40,7 +40,7 @@ TEST(PoseTest, RollPitchYawTurnAboutTheFixedAxes) {
   EXPECT_TRUE(turned({90, 0, 0}, Vector3d::UnitY()).isApprox(Vector3d::UnitZ(), 1e-12));
   EXPECT_TRUE(turned({0, 90, 0}, Vector3d::UnitZ()).isApprox(Vector3d::UnitX(), 1e-12));
   EXPECT_TRUE(turned({0, 0, 90}, Vector3d::UnitX()).isApprox(Vector3d::UnitY(), 1e-12));
-  // First roll (y to z), then pitch (z to x), then yaw (x to y): the order tells.
+  // First roll (y to z), then pitch (z to x), then yaw (x to y).
   EXPECT_TRUE(turned({90, 90, 90}, Vector3d::UnitY()).isApprox(Vector3d::UnitY(), 1e-12));
   EXPECT_TRUE(turned({90, 90, 90}, Vector3d::UnitX()).isApprox(-Vector3d::UnitZ(), 1e-12));
 }
@@ -98,7 +98,7 @@ TEST(PoseTest, RollPitchYawOfAPose) {
   }
 }
 
-// Straight up and down roll and yaw are one; near it they are lost alone, not together.
+// At a pitch of +-90 degrees, only the combination of roll and yaw is determined.
 TEST(PoseTest, RollPitchYawGiveTheRotationBackEverywhere) {
   for (const double pitch : {90.0, -90.0, 90.0 - 1e-7, 1e-9 - 90.0, 89.99}) {
     const Pose pose = libmap::make_pose_from_rpy(Vector3d::Zero(), {20, pitch, -140});

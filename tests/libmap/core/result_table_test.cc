@@ -47,7 +47,7 @@ TEST(ResultTable, HoldsEachTypeOfValue) {
   EXPECT_EQ(*results[4].value, ManifestValue(std::vector<double>{1, 2, 3}));
   EXPECT_FALSE(results[5].value);
   EXPECT_EQ(*results[6].value, ManifestValue(std::string("x")));
-  // The type is there without a value.
+  // The type is known without a value.
   EXPECT_TRUE(std::holds_alternative<double>(results[5].type));
   EXPECT_TRUE(results[5].may_lack);
   EXPECT_FALSE(results[4].may_lack);

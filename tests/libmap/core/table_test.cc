@@ -67,10 +67,9 @@ TEST(TableTest, CommentsAndEmptyLinesArePassedOver) {
 }
 
 TEST(TableTest, RaggedRowNamesItsLine) {
-  EXPECT_EQ(message_of("a,b\n1,2\n3\n"),
-            "t.csv: line 3 is 1 cells long: the header names 2 columns");
+  EXPECT_EQ(message_of("a,b\n1,2\n3\n"), "t.csv: line 3 is 1 cells long: the header has 2 columns");
   EXPECT_EQ(message_of("# c\r\n\r\na,b\r\n\"x\r\ny\",2\r\n3,4,5\r\n"),
-            "t.csv: line 6 is 3 cells long: the header names 2 columns");
+            "t.csv: line 6 is 3 cells long: the header has 2 columns");
 }
 
 TEST(TableTest, UnclosedQuoteNulAndNothing) {

@@ -139,7 +139,7 @@ TEST(TextTest, NearestNameNeverChangesMoreThanHalf) {
   EXPECT_EQ(nearest_name("ab", {"ab1", "ab", "b"}), "ab") << "the nearest and not the first";
 }
 
-// Of 100,000 letters each it would take minutes.
+// The edit distance of two names of 100,000 letters would take minutes.
 TEST(TextTest, NearestNameOfVeryLongOnesIsNone) {
   const std::string name(100'000, 'a');
   EXPECT_EQ(libmap::nearest_name(name, {name + "b"}), std::nullopt);

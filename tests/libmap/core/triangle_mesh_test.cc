@@ -14,7 +14,7 @@ using Eigen::Vector3d;
 using graspmap_test::error_of;
 using libmap::TriangleMesh;
 
-// The box from the origin to `size`, outside faces counter-clockwise.
+// Box from the origin to `size`; faces are counter-clockwise from outside.
 TriangleMesh box(const Vector3d& size) {
   TriangleMesh mesh;
   for (const double z : {0.0, size.z()})
@@ -25,7 +25,7 @@ TriangleMesh box(const Vector3d& size) {
   return mesh;
 }
 
-// A sphere about the origin by `rings` of latitude.
+// Sphere about the origin with `rings` rings of latitude.
 TriangleMesh sphere(double radius, std::uint32_t rings) {
   TriangleMesh mesh;
   const std::uint32_t columns = 2 * rings;
@@ -88,7 +88,7 @@ TEST(TriangleMeshTest, VertexNormalsOfASphereAreRadial) {
   const TriangleMesh mesh = sphere(2.0, 40);
   const std::vector<Eigen::Vector3f> normals = libmap::estimate_vertex_normals(mesh);
   ASSERT_EQ(normals.size(), mesh.vertices.size());
-  // The poles are one place with many vertices, each with triangles of its own column alone.
+  // Each pole has many vertices, each with the triangles of one column only.
   for (std::size_t n = 80; n + 80 < normals.size(); ++n) {
     EXPECT_NEAR(normals[n].norm(), 1.0F, 1e-5F);
     EXPECT_GT(normals[n].cast<double>().dot(mesh.vertices[n].normalized()), 0.998);

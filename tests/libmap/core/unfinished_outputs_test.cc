@@ -24,7 +24,7 @@ using graspmap_test::scratch_folder;
 using libmap::OutputFile;
 using libmap::OutputFolder;
 
-// Runs `action` in a process of its own, as abandoning is for good.
+// Runs `action` in a child process, because abandoning outputs is final.
 template <typename Action>
 void in_a_process(const Action& action) {
   const pid_t child = fork();
@@ -40,7 +40,7 @@ void in_a_process(const Action& action) {
 
 class UnfinishedOutputs : public testing::Test {
  protected:
-  fs::path folder_ = scratch_folder();  // another process would be given another
+  fs::path folder_ = scratch_folder();  // computed once: a child process would get another folder
 };
 
 TEST_F(UnfinishedOutputs, AbandonedOnesLeaveNothing) {
@@ -87,7 +87,7 @@ TEST_F(UnfinishedOutputs, NothingIsPutInPlaceAfterwards) {
       try {
         file.commit();
       } catch (const libmap::Error&) {
-        // What it was to sync is gone.
+        // The file to sync is gone.
         const OutputFile next(folder_ / "next.csv");
       }
       has_gone_on = true;

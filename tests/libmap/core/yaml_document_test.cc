@@ -38,20 +38,20 @@ TEST(YamlDocument, FaultsNameFileAndLine) {
             std::string("given.yaml: a: is too small"));
 }
 
-// yaml-cpp finds documents without end there.
+// yaml-cpp finds an infinite number of documents in these texts.
 TEST(YamlDocument, WhatBelongsToNoDocumentIsRefused) {
   for (const char* text : {"{a: 1}, b", "{a: 1},", ", a", "[a]\n, b"})
     EXPECT_EQ(fault_of(text), "given.yaml: contains more than one YAML document") << text;
 }
 
-// Each takes a hundred times its letters as a node.
+// Each node takes a hundred times the memory of its text.
 TEST(YamlDocument, NodesAreCounted) {
   std::string list = "a: [1";
   for (int n = 0; n < 500'000; ++n) list += ",1";
   EXPECT_EQ(fault_of(list + "]\n"), "given.yaml: contains more than 500000 values");
 }
 
-// Who reads them walks through what they stand for, each time.
+// Readers visit the nodes of an alias each time.
 TEST(YamlDocument, AliasesCountAsWhatTheyStandFor) {
   std::string bomb = "l0: &l0 [1, 1, 1, 1, 1, 1, 1, 1, 1, 1]\n";
   const auto add_level = [&](int level) {
@@ -70,7 +70,7 @@ TEST(YamlDocument, AliasesCountAsWhatTheyStandFor) {
   EXPECT_EQ(fault_of("a: &a [1, *a]\n"), "given.yaml: contains more than 500000 values");
 }
 
-// What has no place in the text has no line.
+// Errors without a position in the text have no line.
 TEST(YamlDocument, FaultsWithoutAPlace) {
   const std::string fault = fault_of("b: 1\n");
   EXPECT_EQ(fault.find("given.yaml: not valid YAML: "), 0U) << fault;
@@ -85,7 +85,7 @@ TEST(YamlDocument, KeysAreKnownAndThereOnce) {
   };
   EXPECT_EQ(fault("{name: a, radus: 1}"), "radus: unknown key of a ball (did you mean 'radius'?)");
   EXPECT_EQ(fault("{name: a, name: b}"), "name: is a duplicate");
-  EXPECT_EQ(fault("{[1]: a}"), "a key is not a name");
+  EXPECT_EQ(fault("{[1]: a}"), "a key is not a scalar");
   EXPECT_NO_THROW(libmap::check_keys(YAML::Load("{name: a}"), {"radius", "name"}));
 }
 

@@ -19,8 +19,8 @@ Vector6d random_six() {
   return six;
 }
 
-// What an observation depends on, in one row: a step of the pose, the motion, the point, and the
-// camera's numbers with four of the spline.
+// Parameters of an observation in one vector: step of the pose, motion, point, and camera
+// parameters with four spline coefficients.
 constexpr Eigen::Index motion_at = 6;
 constexpr Eigen::Index point_at = 12;
 constexpr Eigen::Index camera_at = 15;
@@ -35,7 +35,7 @@ libmap::CalibratedResidual seen_at(const libmap::CalibratedFeature& feature, con
   return seen;
 }
 
-// By central differences.
+// Derivatives by central differences.
 TEST(CalibratedFeature, DerivativesAreThoseOfDifferences) {
   const libmap::Camera camera = graspmap_test::feature_camera();
   const FrameFeatures frame = see_points(1, Pose::Identity(), {{1.6, 0.3, -0.2}});

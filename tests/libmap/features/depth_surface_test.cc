@@ -32,7 +32,7 @@ DepthSurface ground() {
   return frame_of(scan).surfaces.front();
 }
 
-// The largest angle, rad, between an element's normal and that of the points beside it.
+// Largest angle (rad) between an element's normal and the normal of the neighboring points.
 double max_normal_error(const DepthSurface& surface) {
   double largest = 0.0;
   for (int row = 1; row + 1 < surface.rows(); ++row)
@@ -76,7 +76,7 @@ TEST(DepthSurface, ElementsAreThoseOfThePlane) {
   EXPECT_FALSE(surface.met_at({9.0, 0.0, 1.0}, none));
 }
 
-// Through another camera, a plane is another plane; normals turn with the rays.
+// A plane seen through another camera is a different plane; normals are recomputed.
 TEST(DepthSurface, NormalsFollowTheCamera) {
   DepthSurface surface = ground();
   const DepthSurface before = surface;
@@ -142,7 +142,8 @@ TEST(DepthSurface, CellsMustFitTheCamera) {
       "cells");
 }
 
-// Rounds of an adjustment meet other planes each time: a surface without jumps lets them converge.
+// Iterations of an adjustment intersect different planes. Convergence requires a surface without
+// jumps.
 TEST(DepthSurface, HasNoJumpsBetweenItsElements) {
   TexturedScan scan;
   scan.see(plane_z(0.0), around(0), Vector6d::Zero());

@@ -87,13 +87,13 @@ TEST(FeatureCache, DescriptorsOfLongScansAreInAFileWithoutAName) {
               libmap::descriptor_vectors(in_memory.frames[f]));
   }
   EXPECT_EQ(files_in(folder()), before);
-  // Without a folder they stay where they are.
+  // Without a folder, descriptors stay in memory.
   EXPECT_FALSE(found(scan, {}, options).frames[0].descriptors.empty());
 }
 
 TEST(FeatureCache, GivesBackTheSame) {
   TexturedScan scan = two_frames();
-  // A lens that distorts has rays of its own.
+  // With lens distortion, each pixel has its own ray.
   scan.frames.at(2).cameras[0].distortion_model = libmap::DistortionModel::radial_tangential;
   scan.frames.at(2).cameras[0].distortion = {-0.05, 0.01, 0.0, 0.0};
   const FeatureCache cache(folder());
@@ -115,7 +115,7 @@ TEST(FeatureCache, OtherPicturesCamerasOrOptionsAreOthers) {
   options.max_features = 100;
   EXPECT_EQ(found(scan, cache, options).from_cache, 0U);
   options = {};
-  options.planes.radius_px = 2;  // has no key of its own
+  options.planes.radius_px = 2;  // not a bound parameter
   EXPECT_EQ(found(scan, cache, options).from_cache, 0U);
   scan.frames.at(1).color.pixels[100][1] ^= 1;
   EXPECT_EQ(found(scan, cache).from_cache, 1U);
@@ -126,7 +126,7 @@ TEST(FeatureCache, OtherPicturesCamerasOrOptionsAreOthers) {
   EXPECT_EQ(found(scan, cache).from_cache, 2U);
 }
 
-// Cut, changed, emptied, another program's: each is made anew and put right.
+// Truncated, modified, empty and foreign files are ignored and replaced.
 TEST(FeatureCache, DamagedFilesAreMadeAnew) {
   const TexturedScan scan = two_frames();
   const FeatureCache cache(folder());
@@ -136,7 +136,7 @@ TEST(FeatureCache, DamagedFilesAreMadeAnew) {
   const std::string whole = libmap::read_whole_file(files[0]);
   std::string flipped = whole;
   flipped[whole.size() / 2] ^= 4;
-  // The last has the right digest of the wrong content.
+  // The last file has a valid digest of invalid content.
   const std::string foreign = libmap::read_whole_file(files[1]);
   for (const std::string& damaged :
        {whole.substr(0, whole.size() / 2), whole.substr(0, 10), flipped, std::string(),
@@ -151,7 +151,7 @@ TEST(FeatureCache, DamagedFilesAreMadeAnew) {
   EXPECT_EQ(files_in(folder()).size(), 2U);
 }
 
-// With the right digest of what no run of ours would write.
+// Files with a valid digest and content that graspmap never writes.
 TEST(FeatureCache, ForeignContentIsMadeAnew) {
   const TexturedScan scan = two_frames();
   const FeatureCache cache(folder());
@@ -172,7 +172,7 @@ TEST(FeatureCache, ForeignContentIsMadeAnew) {
     expect_anew(changed, key);
   };
   change("/descriptors", nlohmann::json::binary({1, 2, 3}));
-  change("/cameras", nlohmann::json::binary({1, 0}));  // the scan has camera 0 alone
+  change("/cameras", nlohmann::json::binary({1, 0}));  // the scan has only camera 0
   change("/surfaces/0/step_px", 2147483647);
   change("/surfaces/0/step_px", 1e300);
   change("/without_depth", -1);

@@ -27,7 +27,7 @@ TEST(FeatureTracks, JoinsMatchesAndLeavesConflictsOut) {
     return link;
   };
   std::vector<libmap::FeatureLink> links = {linked(0, 1), linked(1, 2)};
-  // The first and the last frame have no link: no track joins them.
+  // The first and the last frame are not linked, so no track joins them.
   const libmap::FeatureTracks apart =
       libmap::build_tracks(frames, links, libmap::TrackFrames::linked);
   EXPECT_EQ(apart.tracks.size(), 30U);

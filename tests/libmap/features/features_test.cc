@@ -12,7 +12,7 @@ namespace features_test {
 using libmap::FeatureOptions;
 using libmap::FeatureType;
 
-// Round spots on a wall 2 m off, none near another; odd numbers of rows and columns.
+// Separate round spots on a wall at 2 m; odd numbers of rows and columns.
 struct SpottedWall {
   libmap::CameraView view;
   std::vector<Eigen::Vector2d> spots;
@@ -70,7 +70,7 @@ libmap::FrameFeatures features_of(const libmap::CameraView& view, const FeatureO
   return frame;
 }
 
-// Pictures of more than 4 megapixels are halved, and the places found are those of the whole.
+// Images above 4 megapixels are halved; positions are in pixels of the full image.
 TEST(Features, PlacesInPicturesThatAreHalved) {
   for (const auto& [width, height, scale] :
        {std::tuple{1281, 961, 1.0}, {2561, 1921, 2.0}, {2881, 1601, 2.0}}) {

@@ -30,7 +30,7 @@ FrameFeatures frame_of(const TexturedScan& scan) {
   return libmap::find_features(scan, {1}, graspmap_test::small_options().features).frames.front();
 }
 
-// The scene in closed form from where color was taken, if depth was taken from the stored place.
+// The scene in closed form from the color camera, with depth from the stored registration.
 double true_depth_m(const Feature& feature, const Pose& world_from_base,
                     const FrameFeatures& frame) {
   const Pose eye =
@@ -50,7 +50,7 @@ TEST(RegisteredDepth, IsOfTheScenePlusTheNoiseOfOnePlane) {
     const double truth = true_depth_m(feature, *scan.graph_.nodes[0].truth_from_base, frame);
     const auto found = libmap::registered_depth(frame, feature, wrong_registration());
     const auto stored = static_cast<double>(feature.depth_m);
-    // At the edges of the boulders planes are of both sides.
+    // At the edges of the boulders, planes mix both surfaces.
     if (!found.known || !(std::abs(stored - truth) < 0.05)) continue;
     squares += std::pow((stored + found.added_m - truth) / double{feature.depth_noise_m}, 2);
     before += std::pow((stored - truth) / double{feature.depth_noise_m}, 2);
@@ -61,8 +61,8 @@ TEST(RegisteredDepth, IsOfTheScenePlusTheNoiseOfOnePlane) {
   EXPECT_LT(std::sqrt(squares / static_cast<double>(count)), 0.77);
 }
 
-// Nothing was measured on the right: a feature at that edge knows its stored depth, which is of
-// another place.
+// Without measurements on the right, a feature at that edge keeps its stored depth, which is that
+// of another point.
 TEST(RegisteredDepth, IsUnknownWhereThereIsNoPlane) {
   TexturedScan scan;
   scan.see(boulders(), around(20), Vector6d::Zero());

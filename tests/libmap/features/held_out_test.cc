@@ -38,7 +38,7 @@ TEST(HeldOut, MeansAreOfWhatBothSetsOfPosesSay) {
   EXPECT_EQ(change.count, 3U);
   EXPECT_NEAR(change.before, 3.0, 1e-12);
   EXPECT_NEAR(change.after, 3.5, 1e-12);
-  // Differences 0.5, 1, 0: a deviation of sqrt(1/6), of three.
+  // Differences 0.5, 1, 0: a standard deviation of sqrt(1/6) of three values.
   EXPECT_NEAR(change.deviation, std::sqrt(1.0 / 18.0), 1e-12);
   EXPECT_EQ(libmap::compare_held_out({none}, {1.0}).count, 0U);
 }
@@ -66,7 +66,7 @@ HeldOutEvaluation evaluation(double matches, double surfaces) {
 }
 
 TEST(HeldOut, AnyRiseOfTheWholeIsWorse) {
-  // Three samples of surfaces count as much as one match.
+  // Three surface samples have the weight of one match.
   EXPECT_NEAR(evaluation(0.002, -0.001).change(), 0.0005, 1e-12);
   EXPECT_TRUE(evaluation(1e-5, 0.0).is_worse()) << "however little";
   EXPECT_TRUE(evaluation(0.002, -0.001).is_worse());
@@ -85,7 +85,7 @@ TEST(HeldOut, SamplesForChecksAreNoOthers) {
   std::size_t checks = 0;
   std::size_t estimation = 0;
   for (const libmap::FrameFeatures& frame : found.frames) {
-    // More than there are: each once.
+    // More than available: each is used once.
     const auto of_checks = libmap::surface_samples(frame, 1000000, SampleUse::checks);
     const auto of_estimation = libmap::surface_samples(frame, 1000000, SampleUse::estimation);
     for (const auto& one : of_checks)
@@ -96,7 +96,7 @@ TEST(HeldOut, SamplesForChecksAreNoOthers) {
   EXPECT_NEAR(static_cast<double>(checks) / static_cast<double>(checks + estimation), 0.1, 0.05);
 }
 
-// The surfaces' costs see a shift across the ground that matches of no features can.
+// Surface costs detect a shift normal to the ground without any matches.
 TEST(HeldOut, SurfacesTellWrongPosesFromTrueOnes) {
   const TexturedScan scan = bare_ground(3);
   const auto found = libmap::find_features(scan, {1, 2, 3});
@@ -118,7 +118,7 @@ TEST(HeldOut, SurfacesTellWrongPosesFromTrueOnes) {
   EXPECT_EQ(evaluated.matches.count, 0U);
   EXPECT_GT(evaluated.change(), 3.0 * evaluated.deviation());
   EXPECT_TRUE(evaluated.is_worse());
-  // A frame without a pose says nothing.
+  // A frame without a pose has no costs.
   wrong.erase(3);
   const auto fewer = libmap::evaluate_held_out(libmap::held_out_costs(found.frames, links, truth),
                                                libmap::held_out_costs(found.frames, links, wrong));
@@ -126,8 +126,8 @@ TEST(HeldOut, SurfacesTellWrongPosesFromTrueOnes) {
   EXPECT_GT(fewer.surfaces.count, 0U);
 }
 
-// The share of the elements that both have and that differ by more than a millimeter or 0.1
-// degrees: at edges one or the other takes another neighbor's plane.
+// Share of the common elements that differ by more than 1 mm or 0.1 degrees. At edges, planes are
+// fitted to different pixels.
 double share_of_other_elements(const std::vector<libmap::FrameFeatures>& one,
                                const std::vector<libmap::FrameFeatures>& other) {
   double elements = 0.0;
@@ -146,8 +146,8 @@ double share_of_other_elements(const std::vector<libmap::FrameFeatures>& one,
   return others / elements;
 }
 
-// The depth of frames read with a wrong camera fits at the true poses once the camera is put right:
-// as well as had it been right from the start.
+// After correcting a wrong camera, depth fits at the true poses as well as with the correct camera
+// from the start.
 TEST(HeldOut, SurfacesAreSeenThroughTheCameraThatIsRefined) {
   TexturedScan scan = bare_ground(3);
   std::map<int, Pose> truth;
@@ -174,7 +174,7 @@ TEST(HeldOut, SurfacesAreSeenThroughTheCameraThatIsRefined) {
   EXPECT_LT(share_of_other_elements(found.frames, right.frames), 0.02);
 }
 
-// Corrected surfaces are those of the corrected images.
+// Corrected surfaces equal the surfaces of corrected images.
 TEST(HeldOut, SurfacesTurnWithTheCorrectionOfDepth) {
   TexturedScan scan = bare_ground(2);
   libmap::DepthCorrection correction{0.5, 0.25, {}, {0.01, -0.004, 0.006}};

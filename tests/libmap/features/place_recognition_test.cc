@@ -14,7 +14,7 @@ using libmap::SimilarFrame;
 constexpr std::size_t places = 4;
 constexpr unsigned features = 40;
 
-// A frame that shows a place, but for `others` of its features, which no other frame shows.
+// A frame that shows a place, with `others` of its features replaced by unique ones.
 FrameFeatures frame_at(unsigned place, unsigned others) {
   static unsigned next = 1000000;
   FrameFeatures frame;
@@ -27,7 +27,7 @@ FrameFeatures frame_at(unsigned place, unsigned others) {
   return frame;
 }
 
-// Each place twice, the second time with some other features; then a frame without any.
+// Two frames per place, the second with some unique features; then a frame without features.
 std::vector<FrameFeatures> scan() {
   std::vector<FrameFeatures> frames;
   for (unsigned n = 0; n < 2 * places; ++n)

@@ -27,7 +27,7 @@ TEST(MatchFeatures, FindsEachOnesBestAndLeavesDoubtfulOnesOut) {
   FrameFeatures b = see_points(2, some_motion(), points);
   const auto vectors = libmap::descriptor_vectors(a);
   EXPECT_EQ(libmap::match_features(vectors, libmap::descriptor_vectors(b), 0.8), same_numbers(50));
-  // Twice the same descriptor: neither is clearly the best.
+  // Two equal descriptors: neither passes the ratio test.
   std::copy_n(b.descriptors.begin(), 128, b.descriptors.begin() + 128);
   const auto matches = libmap::match_features(vectors, libmap::descriptor_vectors(b), 0.8);
   EXPECT_EQ(matches.size(), 48U);
@@ -48,7 +48,7 @@ TEST(RelativePose, ExactMatchesGiveTheExactMotionDespiteOutliers) {
   EXPECT_EQ(pose.inliers.size(), 72U);
 }
 
-// With the stated noise the squared errors are chi-square of six.
+// With the stated noise, squared errors have a chi-square distribution with six degrees of freedom.
 TEST(RelativePose, CovarianceIsThatOfTheErrors) {
   double sum = 0.0;
   constexpr int trials = 200;
@@ -94,7 +94,7 @@ TEST(RelativePose, RefusesTooLittle) {
   for (std::size_t n = 0; n < 60; ++n) shuffled[n].b = static_cast<int>((7 * n + 11) % 60);
   EXPECT_EQ(libmap::estimate_relative_pose(a, b, shuffled, {}, 1).outcome,
             RelativePoseOutcome::too_few_inliers);
-  // All on one line of the picture.
+  // All features on one line of the image.
   for (Eigen::Vector3d& point : points) point = {1.5, uniform(-0.8, 0.8), 0.02};
   const FrameFeatures on_line = see_points(1, Pose::Identity(), points);
   const FrameFeatures from_elsewhere = see_points(2, motion, points);

@@ -1,4 +1,4 @@
-// Frames whose features are points known in closed form, without pictures.
+// Frames with features of known points, without images.
 #pragma once
 
 #include <cmath>
@@ -35,7 +35,7 @@ inline double normal(double deviation) {
   return std::normal_distribution<double>(0.0, deviation)(random_engine());
 }
 
-// Points in front of a base whose x axis looks forward.
+// Points in front of a base whose x axis points forward.
 inline std::vector<Eigen::Vector3d> random_points(std::size_t count) {
   std::vector<Eigen::Vector3d> points;
   for (std::size_t n = 0; n < count; ++n)
@@ -43,7 +43,7 @@ inline std::vector<Eigen::Vector3d> random_points(std::size_t count) {
   return points;
 }
 
-// On a way along y that sways and turns.
+// Poses on a path along y with varying direction and rotation.
 inline libmap::Pose beside(double y) {
   return libmap::make_pose_from_rpy(
       {0.05 * std::sin(3.0 * y), y, 0.03 * std::cos(2.0 * y)},
@@ -51,13 +51,13 @@ inline libmap::Pose beside(double y) {
 }
 
 struct FeatureNoise {
-  double pixel = 0.2;  // as the features claim
+  double pixel = 0.2;  // standard deviations stored in the features
   double depth_m = 0.002;
   bool apply = false;
 };
 
-// The features that a frame has of `points`, the n-th of the n-th point (its descriptor is drawn
-// from `seeds[n]`), whether they lie in the picture or not.
+// Features of a frame: the n-th is the projection of the n-th point, even outside the image, with a
+// random descriptor of seed `seeds[n]`.
 inline libmap::FrameFeatures see_points(int node, const libmap::Pose& world_from_base,
                                         const std::vector<Eigen::Vector3d>& points,
                                         const FeatureNoise& noise = {},

@@ -1,4 +1,4 @@
-// What frames fusion takes: several cameras, colors of another size, frames without depth.
+// Frames of fusion: several cameras, colors of another size, frames without depth.
 #include <gmock/gmock.h>
 
 #include <atomic>
@@ -164,14 +164,14 @@ TEST(DepthFusionFrames, FramesOfAKnownSurfaceAreLeftOut) {
   bool has_last = false;
   for (const Eigen::Vector3d& point : result.cloud.positions) has_last |= point.x() > 2.0;
   EXPECT_TRUE(has_last);
-  // Nearer views know the surface better.
+  // Nearer views measure the surface more precisely.
   scan.see(plane_z(0), looking({0.1, 0, 0.2}, {0, 0, 0}), small_camera(), {}, random_engine());
   EXPECT_EQ(fuse_depth(scan, scan.poses, options).frames, result.frames + 1);
   options.enough_views = 0;
   EXPECT_EQ(fuse_depth(scan, scan.poses, options).frames, 17U);
 }
 
-// The frames that are left out move with the nearest one that is used.
+// Redundant frames move with the nearest used frame.
 TEST(DepthFusionFrames, PosesOfLeftOutFramesAreCorrected) {
   MemoryScan scan;
   for (int n = 0; n < 16; ++n)

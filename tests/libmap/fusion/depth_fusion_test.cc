@@ -1,4 +1,4 @@
-// How near fusion comes to the truth, and what changes nothing.
+// Accuracy and invariants of fusion.
 #include "libmap/fusion/depth_fusion.h"
 
 #include <gmock/gmock.h>
@@ -80,7 +80,7 @@ TEST(DepthFusion, ErrorFallsWithTheRootOfTheViewsAndIsForetold) {
 }
 
 TEST(DepthFusion, NoBiasOnASlantedPlane) {
-  // Averaged where noise has put them, measurements at the far end would win or lose.
+  // Averages of noisy positions would be biased at the far end.
   const MemoryScan scan = ring_scan(plane_z(0), 24, kinect, Eigen::Vector3d::Zero(), 1.6, 0.6);
   const std::vector<double> heights = heights_of(fuse_depth(scan, scan.poses).cloud);
   double mean = 0;
@@ -186,7 +186,7 @@ TEST(DepthFusion, FlyingPixelsMakeNoPoints) {
   EXPECT_LT(rms(heights_of(result.cloud)), 0.003);
 }
 
-// One frame of twelve sees a plate that the others see through.
+// One frame of twelve shows a plate that the others see through.
 MemoryScan visited_scan() {
   MemoryScan scan = ring_scan(plane_z(0), 11, {});
   scan.see(nearest_of({plane_z(0), box({-0.1, -0.1, 0.4}, {0.1, 0.1, 0.42})}),
@@ -213,7 +213,7 @@ TEST(DepthFusion, WhatOthersSeeThroughIsDropped) {
   EXPECT_GT(confirmed.points.unconfirmed, 200U);
 }
 
-// One frame of thirteen sees a ball above a table; behind it is nothing that others could measure.
+// One frame of thirteen shows a ball above a table; other frames measure nothing behind it.
 TEST(DepthFusion, WhatOthersMissIsDropped) {
   const Surface table = box({-0.6, -0.6, -0.05}, {0.6, 0.6, 0.0});
   MemoryScan scan = ring_scan(table, 12, {}, Eigen::Vector3d::Zero(), 1.5, 0.5);
@@ -231,7 +231,7 @@ TEST(DepthFusion, WhatOthersMissIsDropped) {
       << "the table stays, its edge too";
 }
 
-// A post whose upper part is outside the images of the others: it goes with the lower part.
+// A post whose upper part is outside the other frames' images is dropped with its lower part.
 TEST(DepthFusion, WhatHangsTogetherWithWhatIsDroppedIsDropped) {
   MemoryScan scan = ring_scan(plane_z(0), 11, {});
   const Surface post = box({-0.05, -0.05, 0.1}, {0.05, 0.05, 0.9});

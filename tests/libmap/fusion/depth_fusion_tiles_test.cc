@@ -1,4 +1,4 @@
-// A cloud made in tiles is the cloud made at once.
+// A cloud made in tiles equals the cloud made at once.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -22,7 +22,7 @@ using graspmap_test::ring_scan;
 using graspmap_test::small_camera;
 using graspmap_test::step_scene;
 
-// All that is known of each point, in an order that does not depend on the tiles.
+// All values of each point, in an order that does not depend on the tiles.
 using Row = std::vector<double>;
 std::vector<Row> rows_of(const PointCloud& cloud) {
   std::vector<Row> rows;
@@ -66,7 +66,7 @@ TEST(DepthFusionTiles, SamePointsAsAtOnceBitForBit) {
                        {"expected_error", ScalarType::float32, {}}};
       std::size_t tiles = 0;
       TileFusion fusion(scan, scan.poses, {}, tile_m);
-      // As another process goes on: with what the first has found.
+      // Continues with the survey of the first object, as another process does.
       TileFusion again(scan, scan.poses, {}, tile_m, no_progress(), &fusion.survey());
       DepthFusionResult parts = again.report();
       EXPECT_EQ(parts.poses.size(), 10U);

@@ -19,7 +19,7 @@ constexpr int stride = 64;
 constexpr int radius = 3;
 constexpr int rows = 2 * radius + 1;
 
-// What all loops make of a few rows of a rough surface with gaps.
+// Outputs of all loops for a few rows of a rough surface with gaps.
 struct Made {
   std::vector<float> numbers;
   std::vector<std::uint8_t> bytes;
@@ -70,7 +70,7 @@ Made make_with(InstructionSet instructions, const std::vector<float>& depths,
   loops.place(planes, at_rays.x, at_rays.y, count, placement,
               {{at(18), at(19), at(20)}, {at(21), at(22), at(23)}, at(24)});
   loops.place_depths(depths.data(), at_rays.x, at_rays.y, count, placement, at(25), at(26));
-  // Beyond the last pixel, and where there is no plane, anything may stand.
+  // Values beyond the last pixel and without a plane are arbitrary.
   Made made;
   for (int row = 0; row < 27; ++row)
     for (int x = 0; x < count; ++x)

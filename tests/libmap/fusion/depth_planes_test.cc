@@ -80,7 +80,7 @@ TEST(DepthPlanes, NoiseShrinksAsTheSupportGrows) {
 }
 
 TEST(DepthPlanes, EdgeIsNotSmeared) {
-  // A step of 20 cm across the image; the depths on both sides stay their own.
+  // A step of 20 cm across the image does not change the depths on both sides.
   const Surface step = nearest_of({plane_z(2.0), box({0.01, -5, 1.8}, {5, 5, 1.9})});
   const Camera camera = small_camera();
   const DepthImage depth = render_depth(step, camera, Pose::Identity(), {}, random_engine());

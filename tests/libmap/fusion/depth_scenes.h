@@ -1,4 +1,4 @@
-// Scans of surfaces known in closed form, held in memory.
+// Scans in memory of surfaces in closed form.
 #pragma once
 
 #include <cmath>
@@ -74,7 +74,7 @@ inline libmap::Camera small_camera() {
   return camera;
 }
 
-// The base at `eye`, its x axis towards `target`.
+// Returns the pose of a base at `eye` with its x axis towards `target`.
 inline libmap::Pose looking(const Eigen::Vector3d& eye, const Eigen::Vector3d& target) {
   const Eigen::Vector3d x = (target - eye).normalized();
   const Eigen::Vector3d up =
@@ -91,7 +91,7 @@ struct DepthNoiseModel {
   double of_range = 0.0;
 };
 
-// What a camera at `world_from_camera` (optical) measures.
+// Renders the depth image of a camera at `world_from_camera` (optical frame).
 inline libmap::DepthImage render_depth(const Surface& surface, const libmap::Camera& camera,
                                        const libmap::Pose& world_from_camera,
                                        const DepthNoiseModel& noise, std::mt19937_64& engine) {
@@ -109,7 +109,7 @@ inline libmap::DepthImage render_depth(const Surface& surface, const libmap::Cam
   return depth;
 }
 
-// Frames in memory. Nodes in `broken` cannot be read.
+// A scan in memory. Nodes in `broken` cannot be read.
 class MemoryScan : public libmap::ScanSource {
  public:
   const std::filesystem::path& path() const override { return path_; }
@@ -124,7 +124,7 @@ class MemoryScan : public libmap::ScanSource {
     return frame;
   }
 
-  // A frame of one camera; its node is the next number.
+  // Adds a frame of one camera. Returns its node, the next number.
   int add(const libmap::Camera& camera, libmap::DepthImage depth, libmap::ColorImage color = {}) {
     const int node = static_cast<int>(frames.size()) + 1;
     libmap::RgbdFrame frame;
@@ -136,7 +136,7 @@ class MemoryScan : public libmap::ScanSource {
     return node;
   }
 
-  // Renders a frame and keeps its pose in `poses`.
+  // Renders a frame and adds its pose to `poses`.
   void see(const Surface& surface, const libmap::Pose& world_from_base,
            const libmap::Camera& camera, const DepthNoiseModel& noise, std::mt19937_64& engine) {
     const libmap::Pose eye = world_from_base * camera.base_from_camera;

@@ -26,7 +26,7 @@ using graspmap_test::sphere;
 using graspmap_test::Surface;
 using graspmap_test::uniform;
 
-// Ground with boulders and a block: it holds all six degrees of freedom.
+// Ground with boulders and a block, which determines all six degrees of freedom.
 Surface rocky_ground() {
   return nearest_of({plane_z(0), sphere({0.3, 0.1, 0.05}, 0.2), sphere({-0.3, 0.2, 0.0}, 0.15),
                      box({-0.2, -0.4, 0}, {0.1, -0.2, 0.2})});
@@ -58,8 +58,8 @@ Trajectory shaken(const Trajectory& poses, double place_m, double angle_deg) {
   return moved;
 }
 
-// Root mean squares of places and angles against the truth, after the first frames are laid over
-// each other: the frame of all together is free.
+// Root mean squares of position and rotation errors after alignment of the first frames, because
+// the common frame is free.
 struct PoseErrors {
   double place_m = 0.0;
   double angle_deg = 0.0;
@@ -203,7 +203,7 @@ TEST(FrameRegistration, SolvesTheLeastSquaresProblem) {
   }
 }
 
-// Colors of the frames of `scan`, of a texture that is bound to the ground.
+// Colors of the frames of `scan` from a texture of the ground.
 void paint(const Surface& surface, MemoryScan& scan) {
   for (const TrajectoryPose& pose : scan.poses) {
     RgbdFrame& frame = scan.frames.at(pose.node);
@@ -220,8 +220,8 @@ void paint(const Surface& surface, MemoryScan& scan) {
   }
 }
 
-// Views from nearly one position, where color shows each turn. Depth is tilted to the right and to
-// the left in turn: surfaces agree better when frames are turned.
+// Views from nearly one position, where color reveals each rotation. Depth is tilted alternately to
+// the right and left, so that rotated frames improve the agreement of surfaces.
 MemoryScan tilted_scan(const Surface& surface) {
   MemoryScan scan;
   for (int n = 0; n < 8; ++n)
@@ -245,7 +245,7 @@ TEST(FrameRegistration, ColorRejectsWhatWrongDepthSuggests) {
   EXPECT_TRUE(result.registration_check.color.is_clearly_worse());
   for (std::size_t n = 0; n < result.poses.size(); ++n)
     EXPECT_EQ(result.poses[n].world_from_base.matrix(), scan.poses[n].world_from_base.matrix());
-  // Without color nothing contradicts: depth alone cannot show its own fault.
+  // Without color the registration is accepted, because depth does not reveal its own errors.
   for (auto& [node, frame] : scan.frames) frame.color = {};
   EXPECT_GT(fuse_depth(scan, scan.poses).registration_rounds, 0);
 }

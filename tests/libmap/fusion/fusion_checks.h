@@ -1,4 +1,4 @@
-// Scans and measures that the tests of fusion share.
+// Scans and error measures for the tests of fusion.
 #pragma once
 
 #include <cmath>
@@ -13,7 +13,7 @@ namespace graspmap_test {
 
 inline constexpr DepthNoiseModel kinect{0.002, 0.005};
 
-// Views from a ring above the ground, all towards `target`.
+// Returns a scan with views from a ring above the ground towards `target`.
 inline MemoryScan ring_scan(const Surface& surface, int views, const DepthNoiseModel& noise,
                             const Eigen::Vector3d& target = Eigen::Vector3d::Zero(),
                             double radius_m = 0.9, double height_m = 1.0) {
@@ -32,7 +32,7 @@ inline double rms(const std::vector<double>& values) {
   return std::sqrt(squares / static_cast<double>(values.size()));
 }
 
-// Heights of the points that lie within 0.3 m of the z axis.
+// Heights of the points within 0.3 m of the z axis.
 inline std::vector<double> heights_of(const libmap::PointCloud& cloud) {
   std::vector<double> heights;
   for (const Eigen::Vector3d& point : cloud.positions)
@@ -40,7 +40,7 @@ inline std::vector<double> heights_of(const libmap::PointCloud& cloud) {
   return heights;
 }
 
-// Ground with a box of 15 cm on it; the true distance from both.
+// Ground with a box of 15 cm, and the distance of a point from both.
 inline const Surface step_scene =
     nearest_of({plane_z(0), box({-0.2, -0.2, -0.1}, {0.2, 0.2, 0.15})});
 inline double distance_from_step(const Eigen::Vector3d& p) {

@@ -48,7 +48,7 @@ TEST(Normals, OfATiltedPlaneAreExactAndUp) {
   EXPECT_EQ(result.undefined, 0U);
 }
 
-// The axes of the given normals stay; their sides become those of estimated normals.
+// The axes of the given normals do not change; their orientations are those of estimated normals.
 TEST(Normals, GivenNormalsAreOriented) {
   PointCloud cloud = ground(20, 0.5);
   const Eigen::Vector3f truth = Eigen::Vector3f(-0.5F, 0, 1).normalized();

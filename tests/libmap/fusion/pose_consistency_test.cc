@@ -52,7 +52,7 @@ TEST(PoseConsistency, RightPosesAgree) {
   EXPECT_LT(found.given.contradicted, 0.2);
   EXPECT_LT(found.given.difference, 0.01);
   EXPECT_EQ(found.warning(), "");
-  // Another frame of the world is as good.
+  // The frame of the world does not matter.
   const Pose turned = make_pose_from_rpy({10, -20, 5}, {90, 10, 45});
   EXPECT_EQ(checked(scan, [&](const Pose& pose) { return turned * pose; }).warning(), "");
 }

@@ -104,7 +104,7 @@ TEST(SurfaceRefinement, ViewsThatSeeThroughAnElementOrMissIt) {
   EXPECT_EQ(under.seen, 0.0F);
 }
 
-// One frame is near and measures 1 mm too high, one is far and measures 1 mm too low.
+// A near frame measures 1 mm too high, a distant one 1 mm too low.
 std::vector<RefinementView> contrary_views() {
   const Pose near = optical(looking({0, 0, 0.5}, {0, 0, 0}));
   const Pose far = optical(looking({0, 0, 2.0}, {0, 0, 0}));
@@ -139,7 +139,7 @@ TEST(SurfaceRefinement, ObservationsAreTheHeightsOfEachFrame) {
   EXPECT_LT(found[0].variance_m2, found[1].variance_m2) << "the nearer frame has less noise";
 }
 
-// Of depth against the plane: 4 standard deviations and the search, at an incidence of 0 degrees.
+// The gate is 4 standard deviations of depth plus the search, at an incidence of 0 degrees.
 TEST(SurfaceRefinement, DepthsBeyondTheGateHaveNoWeight) {
   const Pose above = optical(looking({0, 0, 1}, {0, 0, 0}));
   const double gate = 4 * sensor.noise.axial_at(1.0) + search.search_m;

@@ -12,7 +12,7 @@ namespace disjoint_sets_test {
 
 using graspmap_test::uniform;
 
-// Against labels that are overwritten at each join.
+// Compares with labels that are overwritten at each join.
 TEST(DisjointSets, AgreeWithLabels) {
   constexpr int count = 200;
   DisjointSets<std::size_t> sets(count);

@@ -21,7 +21,7 @@ struct Valley {
   Eigen::Vector2d at{-1.2, 1.0};
   Eigen::Vector2d proposed = at;
   NormalEquations<2> equations{};
-  std::vector<double> costs{};  // of accepted states
+  std::vector<double> costs{};  // costs of accepted states
   bool solvable = true;
 
   static Eigen::Vector2d residual(const Eigen::Vector2d& p) {

@@ -67,7 +67,7 @@ TEST(UpOfNormals, DirectionOfGroundAndWalls) {
   EXPECT_EQ(up_of(Normals(5, Vector3f(0.1F, 0, 3))).direction, z) << "within 20 degrees";
   const Vector3f forward(0, 0.1F, -1);
   EXPECT_LT(degrees_between(up_of(Normals(5, forward)).direction, forward.cast<double>()), 1e-4);
-  // A floor in a room: its walls cancel each other but one, which is as large as the floor.
+  // A floor in a room: the walls cancel, except one that is as large as the floor.
   Normals room(1000, {1, 0, 0});
   room.insert(room.end(), 1000, {0, 0, 1});
   room.insert(room.end(), 1000, {0, 0, -1});
@@ -83,7 +83,7 @@ TEST(UpOfNormals, DirectionOfGroundAndWalls) {
   EXPECT_EQ(up_of({{std::numeric_limits<float>::quiet_NaN(), 0, 0}}).direction, z);
 }
 
-// Also upside down: a cloud in the frame of a camera.
+// Also upside down, as a cloud in the frame of a camera.
 TEST(UpOfNormals, OrientedNormalsDecide) {
   Oriented made = ground();
   UpOfNormals up = up_of_normals(made.positions, made.normals);
@@ -109,7 +109,7 @@ TEST(UpOfNormals, RandomSidesDoNotDecide) {
   }
 }
 
-// Patches of one side each, as solvers of eigenvectors leave them: the majority is chance.
+// Patches of one side each, as from eigenvector solvers: the majority is random.
 TEST(UpOfNormals, PatchesOfBothSidesDoNotDecide) {
   Oriented made = ground();
   for (std::size_t n = 0; n < made.normals.size(); ++n)
@@ -120,7 +120,7 @@ TEST(UpOfNormals, PatchesOfBothSidesDoNotDecide) {
   EXPECT_NEAR(up.share, 0.75, 0.05);
 }
 
-// The normals of a closed surface add up to zero, but neighbors agree.
+// The normals of a closed surface sum to zero, but neighbors agree.
 TEST(UpOfNormals, ClosedSurfacesDoNotDecide) {
   const Oriented made = ball();
   const UpOfNormals up = up_of_normals(made.positions, made.normals);

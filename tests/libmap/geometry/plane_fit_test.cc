@@ -13,7 +13,7 @@ using Eigen::Vector3d;
 using graspmap_test::uniform;
 
 constexpr std::size_t points_per_chunk = 64;
-// Far away, where sums about the frame's origin would be rounded.
+// Points far away, for which sums about the frame's origin would be inaccurate.
 const Vector3d far_origin(4e5, -3e5, 200.0);
 const Vector3d plane_normal = Vector3d(0.3, -0.2, 1.0).normalized();
 

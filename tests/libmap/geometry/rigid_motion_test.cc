@@ -37,7 +37,7 @@ TEST(RigidMotion, StepsAreUndone) {
               M_PI - 1e-7, 1e-9);
 }
 
-// By central differences.
+// Derivative by central differences.
 TEST(RigidMotion, DerivativesAreThoseOfDifferences) {
   constexpr double step = 1e-6;
   for (const double turn : {1e-5, 0.01, 0.5, 1.7}) {

@@ -43,7 +43,7 @@ TEST(PointTree, AgreesWithASearchOfAllPoints) {
   }
 }
 
-// Where several lie at the same distance, and at none, the search for one finds one of them.
+// If several points have the same distance, also 0, the search returns one of them.
 TEST(PointTree, TheNearestAmongPointsInOnePlace) {
   std::vector<Eigen::Vector3d> points;
   for (int n = 0; n < 600; ++n)
@@ -111,7 +111,7 @@ TEST(PointTree, SpacingOfALattice) {
   for (int x = 0; x < 150; ++x)
     for (int y = 0; y < 150; ++y) points.emplace_back(0.01 * x, 0.02 * y, 5.0);
   EXPECT_NEAR(median_spacing(points), 0.01, 1e-12);
-  // Whether a place holds one point or several does not matter.
+  // The result does not depend on the number of points at a position.
   for (int n = 0; n < 22500; ++n)
     for (int twins = 0; twins < n % 3; ++twins)
       points.push_back(points[static_cast<std::size_t>(n)]);
@@ -138,7 +138,7 @@ TEST(MedianSpacing, NearDuplicatesAreOnePlace) {
 TEST(MedianSpacing, RandomPointsKeepTheirNearestDistance) {
   std::vector<Eigen::Vector3d> points;
   for (int n = 0; n < 10000; ++n) points.emplace_back(uniform(0, 1), uniform(0, 1), 0);
-  // Of a Poisson process: the median of the nearest distance is sqrt(ln 2 / (pi n)).
+  // For a Poisson process, the median of the nearest distance is sqrt(ln 2 / (pi n)).
   EXPECT_NEAR(median_spacing(points), std::sqrt(std::log(2) / std::numbers::pi / 10000), 2e-4);
   EXPECT_NEAR(libmap::point_spacing(points).by_area_m, 0.01, 4e-4);
 }

@@ -1,4 +1,4 @@
-// Every format of clouds, both ways; CSV; the clouds of the thesis.
+// Round trips of all cloud formats; CSV; the clouds of the thesis.
 #include "libmap/io/cloud_io.h"
 
 #include <gmock/gmock.h>
@@ -59,7 +59,7 @@ fs::path write_sample(const Format& format, const PointCloud& cloud) {
   return path;
 }
 
-// CSV's decimals are those of the floats, and read as other doubles.
+// CSV has the decimals of the floats, which parse to different doubles.
 void expect_positions(const PointCloud& read, const PointCloud& written, bool as_floats) {
   ASSERT_EQ(read.size(), written.size());
   for (std::size_t i = 0; i < read.size(); ++i) {
@@ -90,7 +90,7 @@ TEST_P(CloudFormat, KeepsEveryFieldBothWays) {
   for (std::size_t i = 0; i < cloud.fields.size(); ++i) {
     EXPECT_EQ(read.cloud.fields[i].name, cloud.fields[i].name);
     if (is_csv() && cloud.fields[i].type == ScalarType::float32) {
-      // The shortest decimal number of a float is another double than the float's.
+      // The shortest decimal number of a float parses to a different double.
       for (std::size_t k = 0; k < cloud.size(); ++k)
         EXPECT_EQ(static_cast<float>(read.cloud.fields[i].values[k]),
                   static_cast<float>(cloud.fields[i].values[k]));
@@ -124,10 +124,10 @@ TEST_P(CloudFormat, InfoSaysWhatTheReaderFinds) {
 
 TEST_P(CloudFormat, WritesTheSameBytesTwice) {
   PointCloud cloud = sample_cloud(100);
-  cloud.viewpoint = Pose::Identity();  // a rotation comes back to the last digit but one
+  cloud.viewpoint = Pose::Identity();  // a rotation is preserved to the last digit but one
   const std::string first = read_text(write_sample(GetParam(), cloud));
   EXPECT_EQ(read_text(write_sample(GetParam(), cloud)), first);
-  // And after a round trip.
+  // Equal after a round trip, too.
   PointCloud again = read_cloud(write_sample(GetParam(), cloud)).cloud;
   if (is_csv()) return;
   EXPECT_EQ(read_text(write_sample(GetParam(), again)), first);
@@ -143,7 +143,7 @@ TEST_P(CloudFormat, FieldsAreRoundedToTheirTypesAndKeptWithinThem) {
   EXPECT_THAT(read.find_field("whole")->values, ElementsAre(-2, 2147483647, 2, -7));
 }
 
-// More rows than one thread takes at once.
+// More rows than one parallel chunk.
 TEST_P(CloudFormat, ThreadsDoNotMatter) {
   if (GetParam().encoding == FileEncoding::ascii) return;
   const PointCloud cloud = sample_cloud(40000);
@@ -262,7 +262,7 @@ TEST_P(CloudFormat, FieldNamesThatWouldBeReadAsSomethingElseAreRefused) {
   EXPECT_THAT(error_of([&] { write_sample(GetParam(), cloud); }).what(), HasSubstr("r g b"));
 }
 
-// A locale with a decimal comma, whatever the machine has installed.
+// A locale with a decimal comma that needs no installation.
 class CommaPoint : public std::numpunct<char> {
   char do_decimal_point() const override { return ','; }
   char do_thousands_sep() const override { return '.'; }
@@ -335,7 +335,7 @@ TEST(RealClouds, HoldThePublishedNumbersOfPoints) {
   }
 }
 
-// A file with holes, larger than the addresses that are left.
+// A sparse file, larger than the remaining address space.
 TEST(CloudFiles, PcdThatCannotBeMapped) {
   if (!graspmap_test::memory_can_be_limited) return;
   constexpr std::uint64_t gibibyte = std::uint64_t{1} << 30U;

@@ -1,4 +1,4 @@
-// Clouds and comparisons that the tests of cloud and mesh files share.
+// Common clouds and comparisons of the tests of cloud and mesh files.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -25,7 +25,7 @@ inline constexpr std::array<double, 8> type_maximum = {127,          255,       
 
 inline double as_float(double value) { return static_cast<double>(static_cast<float>(value)); }
 
-// One field of each type, with random values and the type's ends in the first two rows.
+// One field of each type, with its limits in the first two rows and random values.
 inline std::vector<libmap::ScalarField> sample_fields(std::size_t rows) {
   std::vector<libmap::ScalarField> fields;
   for (std::size_t t = 0; t < all_types.size(); ++t) {
@@ -43,7 +43,7 @@ inline std::vector<libmap::ScalarField> sample_fields(std::size_t rows) {
   return fields;
 }
 
-// Coordinates that float32 holds exactly.
+// Coordinates that are exact in float32.
 inline libmap::PointCloud sample_cloud(std::size_t size) {
   libmap::PointCloud cloud;
   for (std::size_t i = 0; i < size; ++i) {
@@ -86,7 +86,7 @@ inline void expect_no_crash(const std::string& bytes,
     std::string damaged = bytes;
     const auto flips = static_cast<std::size_t>(uniform(1, 4));
     for (std::size_t flip = 0; flip < flips; ++flip) {
-      // Every other change in the first part: there stands the header.
+      // Every other change is in the first part, which contains the header.
       const std::size_t span =
           trial % 2 == 0 ? damaged.size() : std::min<std::size_t>(damaged.size(), 400);
       const auto at = static_cast<std::size_t>(uniform(0, static_cast<double>(span) - 0.5));

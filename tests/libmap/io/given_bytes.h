@@ -1,4 +1,4 @@
-// Cloud files from bytes that a test gives.
+// Cloud files from given bytes.
 #pragma once
 
 #include <gmock/gmock.h>
@@ -19,7 +19,7 @@ inline libmap::CloudReadResult read_as(const std::string& extension, const std::
   return libmap::read_cloud(path);
 }
 
-// The message of the bad input that the reader finds in them.
+// Message of the reader's error of kind bad_input.
 inline std::string error_as(const std::string& extension, const std::string& bytes) {
   const libmap::Error error = error_of([&] { read_as(extension, bytes); });
   EXPECT_EQ(error.kind(), libmap::ErrorKind::bad_input);
@@ -27,7 +27,7 @@ inline std::string error_as(const std::string& extension, const std::string& byt
   return error.what();
 }
 
-// The bytes of a number, little-endian as the machine's.
+// Bytes of a number in the machine's little-endian order.
 template <typename T>
 std::string raw(T value) {
   std::string bytes(sizeof(T), '\0');

@@ -34,7 +34,7 @@ struct Format {
   bool keeps_normals;
   bool keeps_colors;
   bool keeps_fields;
-  bool keeps_order;  // of the vertices
+  bool keeps_order;  // true if the order of the vertices is preserved
 };
 
 std::ostream& operator<<(std::ostream& out, const Format& format) { return out << format.name; }
@@ -94,7 +94,7 @@ class MeshFormat : public ::testing::TestWithParam<Format> {};
 INSTANTIATE_TEST_SUITE_P(All, MeshFormat, ::testing::ValuesIn(formats),
                          [](const auto& test) { return std::string(test.param.name); });
 
-// Corner by corner, so that the order of the vertices does not matter.
+// Compares corners, so that the order of the vertices does not matter.
 void expect_same_surface(const TriangleMesh& read, const TriangleMesh& written,
                          const Format& format) {
   ASSERT_EQ(read.vertices.size(), written.vertices.size());
@@ -232,7 +232,7 @@ TEST_P(MeshFormat, VerticesThatAreNotFiniteAreNotWritten) {
   TriangleMesh mesh = sheet(3);
   mesh.vertices[4].y() = std::numeric_limits<double>::quiet_NaN();
   const Error error = error_of([&] { write_sample(GetParam(), mesh); });
-  EXPECT_THAT(error.what(), HasSubstr("vertex is 4: a vertex is not finite"));
+  EXPECT_THAT(error.what(), HasSubstr("vertex is 4: position is not finite"));
 }
 
 TEST(MeshFiles, PolygonsBecomeTrianglesWithTheirFields) {
@@ -257,8 +257,8 @@ TEST(MeshFiles, BrokenPlyFaces) {
            face + "\n";
   };
   EXPECT_EQ(read_as(".ply", mesh("3 0 1 2")).mesh.triangles.size(), 1U);
-  EXPECT_THAT(error_as(".ply", mesh("3 0 1 3")), HasSubstr("face 0 is 3: a corner is no vertex"));
-  EXPECT_THAT(error_as(".ply", mesh("3 0 1 -1")), HasSubstr("no vertex"));
+  EXPECT_THAT(error_as(".ply", mesh("3 0 1 3")), HasSubstr("face 0 is 3: no such vertex"));
+  EXPECT_THAT(error_as(".ply", mesh("3 0 1 -1")), HasSubstr("no such vertex"));
   EXPECT_THAT(error_as(".ply", mesh("2 0 1")), HasSubstr("too few corners"));
   EXPECT_THAT(error_as(".ply", mesh("-3 0 1 2")), HasSubstr("list longer"));
   EXPECT_THAT(error_as(".ply", mesh("4 0 1 2")), HasSubstr("list longer"));
@@ -280,7 +280,7 @@ TEST(MeshFiles, GlbHasYUp) {
   EXPECT_EQ(read_mesh(path).mesh.vertices, mesh.vertices);
 }
 
-// Mid gray, 188 of 255 in sRGB, is half the light; and every byte comes back.
+// Mid gray, 188 of 255 in sRGB, is half the linear intensity. All bytes are preserved.
 TEST(MeshFiles, GlbHasLinearColors) {
   TriangleMesh mesh;
   for (int n = 0; n < 256; ++n) {
@@ -303,7 +303,7 @@ TEST(MeshFiles, GlbHasLinearColors) {
   EXPECT_GE(near_half, 256);
 }
 
-// A primitive without attributes, where assimp reads at address 0.
+// A primitive without attributes, for which assimp reads at address 0.
 TEST(MeshFiles, WhatAssimpFallsOverIsAnError) {
   const fs::path path = scratch_folder() / "mesh.glb";
   fs::copy_file(
@@ -313,7 +313,7 @@ TEST(MeshFiles, WhatAssimpFallsOverIsAnError) {
               HasSubstr("mesh.glb: is broken: the library for its format crashed on it"));
 }
 
-// What the library for the format says, and numbers that it lets pass.
+// Errors reported by assimp, and numbers that it accepts.
 TEST(MeshFiles, WhatAssimpRefusesIsSaid) {
   const std::string two = "v 0 0 0\nv 0 1 0\n";
   EXPECT_THAT(error_as(".stl", std::string(84, 'x')), HasSubstr("not a readable stl file: "));
@@ -380,7 +380,7 @@ TEST(MeshFiles, ObjKeepsMapCoordinates) {
               truth.vertices.end());
 }
 
-// A normal per face does not split what the file joins.
+// A normal per face does not split shared vertices.
 TEST(MeshFiles, ObjWithNormalsOfFacesStaysJoined) {
   const std::string roof = "v 0 0 0\nv 0 1 0\nv 1 0 1\nv 1 1 1\nv 2 0 0\nv 2 1 0\n";
   const std::string normals = "vn -1 0 1\nvn 1 0 1\n";
@@ -390,7 +390,7 @@ TEST(MeshFiles, ObjWithNormalsOfFacesStaysJoined) {
   ASSERT_EQ(joined.vertex_normals.size(), 6U);
   EXPECT_EQ(joined.vertex_normals[0], Eigen::Vector3f(-1, 0, 1)) << "as it is in the file";
   EXPECT_EQ(joined.vertex_normals[1], Eigen::Vector3f(0, 0, 1)) << "of the ridge";
-  // Triangles with vertices of their own, as many programs write them.
+  // Triangles without shared vertices, as many programs write them.
   const TriangleMesh soup = read_as(".obj",
                                     "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
                                     "f 1 2 3\nf 4 5 6\n")
@@ -494,7 +494,7 @@ TEST(RealMeshes, GroundTruthOfTheSite) {
   EXPECT_EQ(read.mesh.vertices.size(), 114693U);
   EXPECT_EQ(read.info.fields[0].type, ScalarType::float64);
   EXPECT_NO_THROW(read.mesh.check());
-  // Through every other format and back.
+  // Round trips through all other formats.
   const double area = surface_area(read.mesh);
   for (const char* const name : {"m.obj", "m.off", "m.stl", "m.glb", "m.ply"}) {
     const fs::path copy = scratch_folder() / name;

@@ -1,4 +1,4 @@
-// PCD as other programs write it, and PCD that lies.
+// PCD files of other programs, and PCD files with wrong headers.
 #include "libmap/io/cloud_io.h"
 
 #include <gmock/gmock.h>
@@ -81,7 +81,7 @@ TEST(PcdFiles, NumbersMayLieAnywhere) {
     }
     for (const std::size_t missing : {1u, 4u, 12u, 21u, 22u, 63u})
       EXPECT_THAT(error_as(".pcd", bytes.substr(0, bytes.size() - missing)),
-                  HasSubstr("promises 3 points of 21 bytes, but only " +
+                  HasSubstr("declares 3 points of 21 bytes, but only " +
                             std::to_string(data.size() - missing) + " bytes of data follow"));
   }
 }
@@ -93,7 +93,7 @@ TEST(PcdFiles, PackedColorsInText) {
   EXPECT_EQ(read_as(".pcd", header + "1 2 3 4278194208\n").cloud.colors[0], (Color{0, 16, 32}));
   std::string as_float = header;
   as_float.replace(as_float.find("F F F U"), 7, "F F F F");
-  // The documentation's own example; its bits are 0x4A8080E0.
+  // The example of the documentation; its bits are 0x4A8080E0.
   EXPECT_EQ(read_as(".pcd", as_float + "0.93773 0.33763 0 4.2108e+06\n").cloud.colors[0],
             (Color{128, 128, 224}));
 }
@@ -115,21 +115,21 @@ TEST(PcdFiles, CompressedPaddingMayBeLeftOut) {
 TEST(PcdFiles, HeadersThatLie) {
   const std::string ten(10 * 12, '\1');
   EXPECT_THAT(error_as(".pcd", pcd_header("11", "binary") + ten),
-              HasSubstr("promises 11 points of 12 bytes, but only 120 bytes of data follow (10"));
+              HasSubstr("declares 11 points of 12 bytes, but only 120 bytes of data follow (10"));
   EXPECT_THAT(error_as(".pcd", pcd_header("3", "ascii") + "1 2 3\n4 5 6\n7777777 8\n"),
               HasSubstr("line 14 contains 2 of 3 numbers"));
   EXPECT_THAT(error_as(".pcd", pcd_header("3", "ascii") + "1.25 2.25 3.25\n4.25 5.25 6.25\n"),
-              HasSubstr("promises 3 points, but only 2 lines of data follow"));
+              HasSubstr("declares 3 points, but only 2 lines of data follow"));
   EXPECT_THAT(error_as(".pcd", pcd_header("1", "ascii") + "1 2 three\n"), HasSubstr("three"));
   for (const char* const points : {"9223372036854775807", "4611686018427387904", "1000000000000"})
     for (const char* const data : {"binary", "ascii", "binary_compressed"})
       EXPECT_THAT(error_as(".pcd", pcd_header(points, data) + std::string(100, '\0')),
-                  HasSubstr("promises"))
+                  HasSubstr("declares"))
           << points;
   for (const char* const points : {"-1", "1e3", "99999999999999999999", "x", ""})
     error_as(".pcd", pcd_header(points, "binary") + ten);
   error_as(".pcd", pcd_header("10", "zip") + ten);
-  // Nobody looks for a header's end beyond its first MiB.
+  // The end of a header is searched in the first MiB only.
   const std::string whole = pcd_header("10", "binary") + ten;
   EXPECT_EQ(read_as(".pcd", "# " + std::string(1000, 'x') + "\n" + whole).cloud.size(), 10U);
   EXPECT_THAT(error_as(".pcd", "# " + std::string(std::size_t{1} << 20U, 'x') + "\n" + whole),
@@ -173,7 +173,7 @@ TEST(PcdFiles, HeaderLinesThatDoNotFit) {
   EXPECT_THAT(changed("HEIGHT 1", "HEIGHT 2"), HasSubstr("WIDTH x HEIGHT = 2"));
   EXPECT_THAT(changed("HEIGHT 1", "HEIGHT 1\nHEIGHT 1"), HasSubstr("duplicate"));
   EXPECT_THAT(changed("WIDTH 1\nHEIGHT 1", "WIDTH 4611686018427387904\nHEIGHT 2"),
-              HasSubstr("times HEIGHT is no number of points"));
+              HasSubstr("WIDTH x HEIGHT is too large"));
   EXPECT_THAT(changed("VIEWPOINT 0 0 0 1 0 0 0", "VIEWPOINT 0 0"), HasSubstr("VIEWPOINT"));
   EXPECT_THAT(changed("VIEWPOINT 0 0 0 1 0 0 0", "VIEWPOINT 0 0 0 1 0 0 nan"),
               HasSubstr("VIEWPOINT"));

@@ -1,4 +1,4 @@
-// A PCD written part by part is the file of the whole cloud.
+// A PCD written in parts is identical to the file of the whole cloud.
 
 #include <gtest/gtest.h>
 

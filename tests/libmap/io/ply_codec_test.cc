@@ -1,4 +1,4 @@
-// PLY as other programs write it, and PLY that lies.
+// PLY files of other programs, and PLY files with wrong headers.
 #include "libmap/io/cloud_io.h"
 
 #include <gmock/gmock.h>
@@ -62,15 +62,15 @@ TEST(PlyFiles, ListsInBinary) {
 
 TEST(PlyFiles, HeadersThatLie) {
   EXPECT_THAT(error_as(".ply", ply_header("binary_little_endian", "11") + std::string(120, '\1')),
-              HasSubstr("promises 11 rows of 'vertex' of 12 bytes, but only 120"));
+              HasSubstr("declares 11 rows of 'vertex' of 12 bytes, but only 120"));
   EXPECT_THAT(error_as(".ply", ply_header("ascii", "3") + "1.5 2.5 3.5\n1.5 2.5 3.5\n"),
-              HasSubstr("promises 3 rows of 'vertex', but the data end in row 2"));
+              HasSubstr("declares 3 rows of 'vertex', but the data end in row 2"));
   EXPECT_THAT(error_as(".ply", ply_header("ascii", "1") + "1 2 3 4\n"), HasSubstr("more than one"));
   EXPECT_THAT(error_as(".ply", ply_header("ascii", "1") + "1 22 \n"), HasSubstr("z"));
   for (const char* const points : {"9223372036854775807", "1537228672809129302", "1000000000000"})
     for (const char* const encoding : {"ascii", "binary_little_endian", "binary_big_endian"})
       EXPECT_THAT(error_as(".ply", ply_header(encoding, points) + std::string(100, '1')),
-                  HasSubstr("promises"));
+                  HasSubstr("declares"));
   for (const char* const points : {"-1", "1e3", "99999999999999999999", "x", ""})
     error_as(".ply", ply_header("ascii", points) + "1 2 3\n");
   error_as(".ply", ply_header("binary_middle_endian", "1") + "1 2 3\n");
@@ -88,14 +88,14 @@ TEST(PlyFiles, HeaderLinesThatDoNotFit) {
   EXPECT_THAT(error_as(".ply",
                        "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\n"
                        "property list float int extra\nend_header\n1 1 1\n"),
-              HasSubstr("PLY header line 5 is float: a list's length is an integer"));
+              HasSubstr("PLY header line 5 is float: the type of a list's length must be"));
   EXPECT_THAT(error_as(".ply",
                        "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\n"
                        "element vertex 1\nproperty float x\nend_header\n1\n1\n"),
-              HasSubstr("PLY header line 5 is vertex: this element is a duplicate"));
+              HasSubstr("PLY header line 5 is vertex: duplicate element"));
 }
 
-// Names are compared with all before them.
+// Each name is compared with all previous names.
 TEST(PlyFiles, VeryManyElementsOrProperties) {
   std::string elements = "ply\nformat ascii 1.0\n";
   std::string properties = elements + "element vertex 1\n";

@@ -1,4 +1,4 @@
-// VTP, which is written only, as VTK's own reader sees it.
+// VTP, which is written only, read by VTK.
 #include "libmap/io/vtp_codec.h"
 
 #include <gmock/gmock.h>

@@ -20,7 +20,7 @@ using graspmap_test::square_mesh;
 using graspmap_test::terrain_mesh;
 using graspmap_test::uniform;
 
-// A ball whose every value is a linear function of the place, so that interpolation has a truth.
+// A ball whose values are linear functions of the position, so that interpolation is exact.
 double linear(const Eigen::Vector3d& p) { return 3 * p.x() - 2 * p.y() + 5 * p.z(); }
 
 TriangleMesh valued_ball() {
@@ -89,7 +89,7 @@ TEST(MeshParts, SelectingNothingAndAllAndTheWrongNumber) {
 
 TEST(MeshParts, ComponentsByEdgesNotByCorners) {
   TriangleMesh mesh = square_mesh(0.0);
-  // A third triangle touches the square at a corner only, a fourth at an edge of the third.
+  // A third triangle touches the square in a corner only, a fourth shares an edge with the third.
   mesh.vertices.insert(mesh.vertices.end(), {{2, 1, 0}, {2, 2, 0}, {1, 2, 0}});
   mesh.triangles.push_back({2, 4, 5});
   mesh.triangles.push_back({2, 5, 6});
@@ -122,7 +122,7 @@ TEST(MeshParts, ComponentsByHalfEdgesAreThoseByEdges) {
 }
 
 TEST(MeshParts, EdgesOfComponentsMayHaveManyTriangles) {
-  // Two pairs of cubes with an edge in common, and a triangle that names a vertex twice.
+  // Two pairs of cubes with a common edge, and a triangle with a repeated vertex.
   TriangleMesh mesh = cubes_mesh({{0, 0, 0}, {1, 1, 0}, {5, 0, 0}, {6, 1, 0}});
   mesh.triangles.push_back({0, 0, 1});
   expect_those_of_a_hash_table(mesh, 2);

@@ -18,7 +18,7 @@ using libmap::MeshPieceIndex;
 using libmap::MeshWithMargin;
 using libmap::TriangleMesh;
 
-// A ball whose vertices files keep exactly; its poles are points of many vertices.
+// A ball whose vertices are exact in files; each pole has many vertices.
 TriangleMesh ball_in_files() {
   TriangleMesh ball = ball_mesh(24, 36, {0.1, 0.0, 0.0});
   for (Eigen::Vector3d& vertex : ball.vertices) vertex = libmap::rounded_to_single(vertex);

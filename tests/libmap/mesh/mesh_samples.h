@@ -1,4 +1,4 @@
-// Meshes whose shape is known in closed form.
+// Meshes of known shape.
 #pragma once
 
 #include <Eigen/Core>
@@ -41,7 +41,7 @@ inline libmap::TriangleMesh ball_mesh(std::uint32_t rows, std::uint32_t columns,
   return mesh;
 }
 
-// The triangles of `addition` behind those of `base`; without all that belongs to either.
+// Triangles of `base` followed by those of `addition`, without normals, colors and fields.
 inline libmap::TriangleMesh join_meshes(const libmap::TriangleMesh& base,
                                         const libmap::TriangleMesh& addition) {
   libmap::TriangleMesh joined;

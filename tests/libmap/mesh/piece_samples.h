@@ -12,7 +12,7 @@
 
 namespace graspmap_test {
 
-// Files of the triangles whose centers are in each square, in the order of their names.
+// Writes one file per square with the triangles whose centers are in it. Returns the sorted paths.
 inline std::vector<std::filesystem::path> write_pieces(const libmap::TriangleMesh& mesh,
                                                        double tile_m,
                                                        const std::filesystem::path& folder) {

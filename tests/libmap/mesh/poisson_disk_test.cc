@@ -1,5 +1,5 @@
-// Poisson-disk samples: spacing of every pair, no room for another, even density on any slope, the
-// spectrum of blue noise, and the same bytes however they are made.
+// Poisson-disk samples: minimum distance, maximality, even density on any slope, the spectrum of
+// blue noise, and identical bytes for any number of threads.
 #include "libmap/mesh/poisson_disk.h"
 
 #include <gtest/gtest.h>
@@ -76,7 +76,7 @@ double smallest_pair(const std::vector<Eigen::Vector3d>& points) {
   return std::sqrt(square);
 }
 
-// How far darts on the surface lie from the nearest of the points at most.
+// Largest distance of random points of the surface to the nearest sample.
 double largest_hole(const TriangleMesh& mesh, const std::vector<Eigen::Vector3d>& points,
                     int darts) {
   std::vector<double> areas;
@@ -98,7 +98,7 @@ double largest_hole(const TriangleMesh& mesh, const std::vector<Eigen::Vector3d>
   return std::sqrt(square);
 }
 
-// Every pair keeps its distance, no dart finds room, and the result's figures are true.
+// All pairs have the minimum distance, no dart is accepted, and the reported values are correct.
 void expect_maximal(const TriangleMesh& mesh, const PoissonDiskResult& result, int darts = 50000) {
   const std::vector<Eigen::Vector3d>& points = result.cloud.positions;
   ASSERT_FALSE(points.empty());
@@ -124,7 +124,7 @@ bool same_bytes(const PoissonDiskResult& a, const PoissonDiskResult& b) {
 
 TEST(PieceSampler, SeamsAreSampledAsAllElse) {
   const TriangleMesh mesh = rough_mesh(0.02);
-  // In squares of 0.25 m, and what lies on the seams in either.
+  // In squares of 0.25 m; triangles on seams are in either square.
   constexpr std::size_t pieces = 16;
   std::vector<TriangleMesh> parts;
   std::vector<Bounds3d> boxes;
@@ -176,7 +176,7 @@ TEST(PoissonDisk, ManyDartsFindNoRoom) {
 
 TEST(PoissonDisk, DensityDoesNotDependOnTheTriangles) {
   const double coarse = static_cast<double>(by_radius(square_mesh(0.0), 0.02).cloud.size());
-  // Of random discs without room for another, 0.547 of the plane is covered; more at the border.
+  // Saturated random discs cover 0.547 of the plane, and more at the border.
   const double expected = 0.6965 * std::pow((2.0 + 0.01) / 0.02, 2);
   EXPECT_NEAR(coarse / expected, 1.0, 0.02);
   TriangleMesh fine;
@@ -200,7 +200,7 @@ TEST(PoissonDisk, WallsAsDenseAsFloors) {
   std::array<double, 3> counts{};
   for (const Eigen::Vector3d& point : by_radius(mesh, 0.02).cloud.positions)
     counts[static_cast<std::size_t>(std::lround(point.x() / 10))] += 1.0;
-  // About 7100 each; their number scatters by about 0.2 %.
+  // About 7100 samples each, with a scatter of about 0.2 %.
   EXPECT_NEAR(counts[1] / counts[0], 1.0, 0.012) << "upright";
   EXPECT_NEAR(counts[2] / counts[0], 1.0, 0.012) << "oblique";
 }
@@ -210,10 +210,10 @@ TEST(PoissonDisk, BlueNoise) {
   const auto power = [&](const std::vector<Eigen::Vector3d>& points, double low, double high) {
     double sum = 0.0;
     int frequencies = 0;
-    // Whole waves on the square: its own shape has no power there.
+    // Integer numbers of waves on the square, at which its own spectrum is zero.
     for (int a = -60; a <= 60; ++a)
       for (int b = 0; b <= 60; ++b) {
-        const double frequency = std::hypot(a, b) / 2.0;  // a meter
+        const double frequency = std::hypot(a, b) / 2.0;  // per meter
         if (frequency < low / radius || frequency > high / radius || (a == 0 && b == 0)) continue;
         std::complex<double> wave = 0.0;
         for (const Eigen::Vector3d& p : points)
@@ -230,9 +230,9 @@ TEST(PoissonDisk, BlueNoise) {
   EXPECT_LT(power(points, 0.02, 0.2), 0.15);
   EXPECT_LT(power(points, 0.2, 0.4), 0.3);
 
-  // Pair distances of the points away from the border, over those of white noise.
+  // Pair distances of the points away from the border, relative to white noise.
   const PointTree tree(points);
-  std::array<double, 12> pairs{};  // by a quarter of the radius
+  std::array<double, 12> pairs{};  // in bins of a quarter of the radius
   double inner = 0.0;
   for (const Eigen::Vector3d& p : points) {
     if (p.cwiseAbs().maxCoeff() > 1.0 - 3.0 * radius) continue;
@@ -387,7 +387,7 @@ TEST(PoissonDisk, FilesKeepTheSpacing) {
 }
 
 TEST(PoissonDisk, RadiusBelowSinglePrecision) {
-  // A step of single precision is 15 micrometers there: 15 x 15 places.
+  // The resolution of single precision is 15 micrometers there: 15 x 15 positions.
   const TriangleMesh mesh = moved(square_mesh(0.0, 1e-4), {200.0, 200.0, 0.0});
   const PoissonDiskResult result = by_radius(mesh, 1e-6);
   EXPECT_GE(smallest_pair(result.cloud.positions), 1e-6);
@@ -442,12 +442,11 @@ TEST(PoissonDisk, BadInput) {
   broken = mesh;
   broken.triangles[1][2] = 4;
   EXPECT_NE(reason(broken), "");
-  // So thin that it has hardly any area, and too long for the radius.
+  // A thin triangle with hardly any area, too long for the radius.
   TriangleMesh thread;
   thread.vertices = {{0, 0, 0}, {1e6, 0, 0}, {0, 1e-12, 0}};
   thread.triangles = {{0, 1, 2}};
-  EXPECT_EQ(error_of([&] { by_radius(thread, 1e-3); }).reason(),
-            "the mesh is too large to be cut so small");
+  EXPECT_EQ(error_of([&] { by_radius(thread, 1e-3); }).context().field, "piece size");
 }
 
 TEST(PoissonDisk, RealSite) {

@@ -54,7 +54,7 @@ TEST(ReferenceSurface, SignedDistanceOfABoxInClosedForm) {
   }
 }
 
-// Nearest to the tip of a needle many places lie outside the planes of some of its triangles alone.
+// Many points nearest to the tip of a needle are outside the planes of only some of its triangles.
 TEST(ReferenceSurface, TipOfANeedleHasItsSides) {
   TriangleMesh needle;
   needle.vertices = {{0, 0, 1}, {0.1, 0, 0}, {-0.05, 0.08, 0}, {-0.05, -0.08, 0}};
@@ -98,7 +98,7 @@ TEST(ReferenceSurface, CloudWithNormalsIsASurfaceOfDiscs) {
     ASSERT_NEAR(place.signed_distance_m(point), point.z(), 1e-12) << "gaps do not count";
     ASSERT_FALSE(place.on_border);
   }
-  // The last disc reaches 2 cm beyond the last point at 0.2 m.
+  // The last disc extends 2 cm beyond the last point at 0.2 m.
   const NearestPlace beyond = surface.nearest({0.26, 0.0, -0.03});
   EXPECT_TRUE(beyond.on_border);
   EXPECT_NEAR(beyond.distance_m, std::hypot(0.04, 0.03), 1e-9);
@@ -120,7 +120,7 @@ TEST(ReferenceSurface, CloudWithoutNormalsIsItsPoints) {
     ASSERT_NEAR(distances.distance_m[n], best, 1e-12);
     ASSERT_EQ(distances.signed_distance_m[n], distances.distance_m[n]);
   }
-  // One normal of zero: the whole has no sides, that point is one.
+  // With one zero normal, the surface is not oriented, and that point is a point.
   PointCloud partly = lattice(0.01, true);
   partly.normals[0].setZero();
   EXPECT_FALSE(ReferenceSurface(partly).is_oriented());

@@ -20,7 +20,7 @@ using graspmap_test::square_mesh;
 using graspmap_test::uniform;
 using ::testing::HasSubstr;
 
-// Hills of 2 x 2 m without a symmetry.
+// Hills of 2 x 2 m without symmetry.
 TriangleMesh hills() {
   constexpr std::uint32_t n = 60;
   TriangleMesh mesh;
@@ -99,7 +99,7 @@ TEST(SurfaceAlignment, NoiseAveragesOut) {
   const SurfaceAlignmentResult result =
       align_to_surface(moved(points, small_motion), ReferenceSurface(mesh));
   EXPECT_TRUE(result.converged);
-  // 3 mm over the root of 20000 points, some ten times more along the ground.
+  // 3 mm / sqrt(20000), and about ten times more along the ground.
   EXPECT_LT(difference(result.surface_from_points, small_motion.inverse()), 5e-4);
   EXPECT_NEAR(result.rmse_m, 0.003, 3e-4);
 }
@@ -108,7 +108,7 @@ TEST(SurfaceAlignment, OutliersDoNotPull) {
   const TriangleMesh mesh = hills();
   std::vector<Eigen::Vector3d> points = moved(samples_of(mesh, 2000), small_motion);
   const std::size_t sound = points.size();
-  // 30 % of the points stand above the ground.
+  // 30 % of the points are above the ground.
   for (std::size_t n = 0; n < sound; n += 7)
     for (int k = 0; k < 3; ++k)
       points.push_back(points[n] + Eigen::Vector3d(0, 0, uniform(0.02, 0.18)));
@@ -132,7 +132,7 @@ TEST(SurfaceAlignment, PointsBeyondTheBorderDoNotPull) {
 }
 
 TEST(SurfaceAlignment, PlaneDoesNotSlide) {
-  // Points of the middle of the plane, tilted, lifted, and where they should stay.
+  // Points in the center of the plane, tilted and lifted; their positions along it must be kept.
   for (const double noise : {0.0, 0.002}) {
     std::vector<Eigen::Vector3d> points = samples_of(square_mesh(0.0, 0.5), 5000);
     for (Eigen::Vector3d& point : points) point += gaussian(noise);
@@ -144,7 +144,7 @@ TEST(SurfaceAlignment, PlaneDoesNotSlide) {
     const Pose motion = result.surface_from_points * start;
     EXPECT_NEAR(motion.translation().z(), 0.0, 1e-9 + 0.1 * noise);
     EXPECT_NEAR(motion.linear()(2, 2), 1.0, 1e-9 + 1e-3 * noise);
-    // Turning the plane back moves its points along it by no more than the turn itself.
+    // The rotation back moves points along the plane only by the effect of the rotation.
     EXPECT_LT((motion.translation() - start.translation()).head<2>().norm(), 0.006);
     EXPECT_NEAR(std::atan2(motion.linear()(1, 0), motion.linear()(0, 0)), 0.0, 0.005);
   }
@@ -192,7 +192,7 @@ TEST(SurfaceAlignment, NoOverlapIsSaid) {
   for (const Pose& pose : {above, beside})
     EXPECT_THAT(error_of([&] { align_to_surface(moved(points, pose), surface); }).what(),
                 HasSubstr("too little overlap"));
-  // A quarter overlaps.
+  // The overlap is a quarter.
   const Pose partly = make_pose_from_rpy({1.5, 0, 0}, {0, 0, 0});
   EXPECT_THAT(error_of([&] {
                 align_to_surface(moved(points, partly), surface, {.min_overlap = 0.5});

@@ -64,7 +64,7 @@ TEST(SurfaceDistance, NearestOnATriangleIsNoFurtherThanAnyOfItsPoints) {
     const Eigen::Vector3d c = random_point(1);
     const Eigen::Vector3d point = random_point(2);
     const Eigen::Vector3d nearest = nearest_on_triangle(point, a, b, c);
-    // It lies in the triangle: its parts add up to the whole.
+    // The point is in the triangle if its three sub-areas add up to the area.
     const double whole = (b - a).cross(c - a).norm();
     const double parts = (a - nearest).cross(b - nearest).norm() +
                          (b - nearest).cross(c - nearest).norm() +
@@ -153,7 +153,7 @@ TEST(SurfaceDistance, SamplesAreSpreadByArea) {
   EXPECT_THAT(error_of([&] { sample_surface(mesh, 10, 1); }).what(), HasSubstr("no area"));
 }
 
-// A few large triangles do not ask for what memory does not hold; a large mesh may have more.
+// The number of samples is limited for a few large triangles, and larger for a large mesh.
 TEST(SurfaceDistance, SamplesOfFewTriangles) {
   TriangleMesh mesh = unit_square();
   for (Eigen::Vector3d& vertex : mesh.vertices) vertex *= 60.0;

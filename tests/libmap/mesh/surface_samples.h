@@ -16,10 +16,10 @@
 
 namespace graspmap_test {
 
-enum class Seam { open, closed, twisted };  // twisted: joined with the other direction turned round
+enum class Seam { open, closed, twisted };  // twisted: joined with the other direction reversed
 
-// Quads of a rows x columns parameter grid, each cut in two; `place(u, v)` with u (along rows) and
-// v from 0 to 1. An open direction has one more line of vertices than it has quads.
+// Triangulated quads of a rows x columns parameter grid, with vertices at `place(u, v)`, u (along
+// rows) and v from 0 to 1. An open direction has one more line of vertices than quads.
 inline libmap::TriangleMesh grid_mesh(std::uint32_t rows, std::uint32_t columns, Seam rows_seam,
                                       Seam columns_seam,
                                       const std::function<Eigen::Vector3d(double, double)>& place) {
@@ -49,7 +49,7 @@ inline libmap::TriangleMesh grid_mesh(std::uint32_t rows, std::uint32_t columns,
 
 constexpr double turn = 2.0 * std::numbers::pi;
 
-// About the z axis; the tube's radius is `minor`.
+// Torus about the z axis; `minor` is the radius of the tube.
 inline libmap::TriangleMesh torus_mesh(std::uint32_t rows, std::uint32_t columns, double major,
                                        double minor) {
   return grid_mesh(rows, columns, Seam::closed, Seam::closed, [=](double u, double v) {
@@ -75,7 +75,7 @@ inline libmap::TriangleMesh moebius_mesh(std::uint32_t rows, std::uint32_t colum
   });
 }
 
-// The figure-eight immersion: it runs through itself along a circle.
+// Klein bottle, figure-eight immersion: it intersects itself along a circle.
 inline libmap::TriangleMesh klein_mesh(std::uint32_t rows, std::uint32_t columns) {
   return grid_mesh(rows, columns, Seam::twisted, Seam::closed, [](double u, double v) {
     const double a = turn * u / 2.0;
@@ -86,7 +86,7 @@ inline libmap::TriangleMesh klein_mesh(std::uint32_t rows, std::uint32_t columns
   });
 }
 
-// Height over a square about the origin, normals up.
+// Height field over a square about the origin, normals up.
 inline libmap::TriangleMesh terrain_mesh(std::uint32_t cells, double size_m,
                                          const std::function<double(double, double)>& height) {
   return grid_mesh(cells, cells, Seam::open, Seam::open, [&](double u, double v) {
@@ -96,8 +96,7 @@ inline libmap::TriangleMesh terrain_mesh(std::uint32_t cells, double size_m,
   });
 }
 
-// A geodesic ball: an octahedron whose faces are divided `levels` times, its vertices on the
-// sphere.
+// Geodesic ball: an octahedron divided `levels` times, with vertices on the sphere.
 inline libmap::TriangleMesh geodesic_mesh(int levels, double radius,
                                           const Eigen::Vector3d& center = Eigen::Vector3d::Zero()) {
   libmap::TriangleMesh mesh;
@@ -130,8 +129,8 @@ inline libmap::TriangleMesh geodesic_mesh(int levels, double radius,
   return mesh;
 }
 
-// The surface of unit cubes at these places; corners are shared, so cubes that touch in an edge or
-// a corner alone make it non-manifold.
+// Surface of unit cubes. Corners are shared, so cubes that touch only in an edge or a corner make
+// it non-manifold.
 inline libmap::TriangleMesh cubes_mesh(const std::set<std::array<int, 3>>& cubes) {
   libmap::TriangleMesh mesh;
   std::map<std::array<int, 3>, std::uint32_t> vertices;

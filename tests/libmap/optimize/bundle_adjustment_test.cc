@@ -62,7 +62,7 @@ TEST(BundleAdjustment, ImpossibleCamerasExceedTheirBounds) {
   EXPECT_TRUE(exceeds(corners));
 }
 
-// Few features far away or near determine no correction there: it is constant beyond the others.
+// A few outlying depths do not extend the correction: it is constant beyond the 1 % quantiles.
 TEST(BundleAdjustment, CorrectionsReachAsFarAsMostDepths) {
   std::vector<FrameFeatures> frames(1);
   for (int n = 0; n < 1000; ++n) {
@@ -110,14 +110,14 @@ TEST(BundleAdjustment, InformationIsThatOfTheErrors) {
         sum += step(a).dot(result.information.block(a, b) * step(b));
       }
   }
-  // Three free poses: chi-square of eighteen.
+  // Three free poses: chi-square with eighteen degrees of freedom.
   EXPECT_NEAR(sum / trials, 18.0, 4.0);
 }
 
 TEST(BundleAdjustment, FindsAShiftedPrincipalPoint) {
   const Scene scene = scene_of(8, {});
   std::vector<FrameFeatures> frames = scene.frames;
-  for (FrameFeatures& frame : frames)  // as if pictures lay 0.4 px right and 0.3 px up
+  for (FrameFeatures& frame : frames)  // shifts images by 0.4 px right and 0.3 px up
     libmap::calibrate(frame, {.intrinsics = {{0.0, 0.0, -0.4, 0.3}}});
   for (FrameFeatures& frame : frames) frame.cameras = {graspmap_test::feature_camera()};
   libmap::BundleAdjustmentOptions options;
@@ -134,7 +134,7 @@ TEST(BundleAdjustment, FindsAShiftedPrincipalPoint) {
   EXPECT_LT(error_of_poses(scene, free.map_from_base), error_of_poses(scene, held.map_from_base));
 }
 
-// The errors of the calibration are as large as the alternatives to it say.
+// Errors of the calibration are consistent with the alternatives.
 TEST(BundleAdjustment, AlternativesAreAsFarAsTheTruth) {
   double sum = 0.0;
   constexpr int trials = 30;
@@ -157,12 +157,12 @@ TEST(BundleAdjustment, AlternativesAreAsFarAsTheTruth) {
           numbers(result.alternatives[static_cast<std::size_t>(k)]) - numbers(result.calibration);
     sum += deviations.fullPivLu().solve(numbers(result.calibration)).squaredNorm();
   }
-  // Four numbers, whose truth is 0: chi-square of four.
+  // Four parameters with true value 0: chi-square with four degrees of freedom.
   EXPECT_NEAR(sum / trials, 4.0, 1.5);
 }
 
-// Depth that bends with range and toward the corners, and focal lengths that are 1 % off: both are
-// found together, but for the scale, which nothing tells.
+// A depth error over range and radius together with focal lengths that are 1 % off: both are found,
+// except for the scale, which is not observable.
 TEST(BundleAdjustment, TellsBentDepthFromAFalseFocalLength) {
   const Scene scene = scene_of(12, {});
   std::vector<FrameFeatures> frames = scene.frames;
@@ -226,10 +226,10 @@ TEST(BundleAdjustment, FindsTheTimeOfThePicturesRows) {
   ASSERT_EQ(free.calibration.timing.size(), 1U);
   EXPECT_NEAR(free.calibration.timing[0].rolling_shutter_s, 0.06, 0.006);
   EXPECT_EQ(free.calibration.motion.size(), way.frames.size());
-  // At 0.3 s the base goes 0.6 cos(0.45) m/s along its own y, nearly.
+  // At 0.3 s the base moves with about 0.6 cos(0.45) m/s along its y axis.
   EXPECT_NEAR(free.calibration.motion.at(1).y(), 0.54, 0.08);
   EXPECT_LT(free.final_cost, 0.01 * held.final_cost);
-  // Seen with the calibration, frames fit as if all rows had been exposed at once.
+  // Calibrated frames fit as with a global shutter.
   FrameFeatures calibrated = way.frames[4];
   libmap::calibrate(calibrated, free.calibration);
   const Way exact = way_with_rows(points, 0.0);
@@ -243,7 +243,7 @@ TEST(BundleAdjustment, FindsTheTimeOfThePicturesRows) {
   EXPECT_LT(after, 0.5 * before);
 }
 
-// From a start that is far off, with motions and times free.
+// Starts far from the truth, with free motions and times.
 TEST(BundleAdjustment, IsTheSameForAnyNumberOfThreadsAndNeverWorse) {
   const Way way = way_with_rows(random_points(700), 0.06);
   std::map<int, Pose> start = way.truth;

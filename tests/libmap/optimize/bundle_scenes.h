@@ -1,4 +1,4 @@
-// Scenes of points for bundle adjustments, with the truth.
+// Scenes of points with ground truth for bundle adjustment.
 #pragma once
 
 #include <algorithm>
@@ -55,9 +55,8 @@ struct Way {
   std::vector<libmap::GraphComponent> components = {{{}, 1}};
 };
 
-// A camera that sways by up to 0.6 m/s in front of `points`, and whose pictures' rows are exposed
-// one after the other. At a steady speed nothing tells the rows' times from the places of the
-// points.
+// A rolling shutter camera that sways with up to 0.6 m/s in front of `points`. At constant speed,
+// row times would not be distinguishable from positions of the points.
 inline Way way_with_rows(const std::vector<Eigen::Vector3d>& points, double rolling_shutter_s,
                          int frames = 10) {
   Way way;

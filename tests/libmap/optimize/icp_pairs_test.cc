@@ -44,7 +44,7 @@ struct Frames {
   std::vector<libmap::GraphComponent> components{{{}, 1}};
 };
 
-// Three frames around boulders, the last looks elsewhere.
+// Three frames around boulders; the last has another view direction.
 Frames four_frames() {
   TexturedScan scan;
   Frames all;
@@ -70,7 +70,7 @@ TEST(IcpPairs, FramesThatOverlap) {
     const libmap::ThreadLimit limit(threads);
     EXPECT_EQ(pairs(), expected);
   }
-  options.pairs_per_frame = 1;  // of each frame, the one that overlaps it most
+  options.pairs_per_frame = 1;  // only the frame with the largest overlap
   EXPECT_EQ(pairs(), (Pairs{{0, 1}, {1, 2}}));
   options.min_overlap = 1.0;
   EXPECT_TRUE(pairs().empty());

@@ -53,7 +53,7 @@ GraphLink link(int from, int to, const Pose& motion, const Matrix6d& information
           closure ? "closure" : "neighbor", closure};
 }
 
-// Places on a circle that look along it.
+// Poses on a circle, facing along it.
 std::map<int, Pose> circle(int count) {
   std::map<int, Pose> poses;
   for (int n = 0; n < count; ++n) {
@@ -97,8 +97,8 @@ double largest_difference(const std::map<int, Pose>& a, const std::map<int, Pose
   return largest;
 }
 
-// Between two nodes, with measured rotations that are none, the residuals (t - t_m, log R) are
-// linear in (t, log R): the optimum is the mean weighted by the information matrices.
+// For two nodes and measured rotations of zero, the residuals (t - t_m, log R) are linear in
+// (t, log R). The optimum is the mean weighted by the information matrices.
 TEST(PoseGraphOptimization, OffDiagonalInformationMeetsTheClosedForm) {
   for (int trial = 0; trial < 5; ++trial) {
     Matrix6d sum = Matrix6d::Zero();
@@ -171,7 +171,7 @@ TEST(PoseGraphOptimization, OneFalseClosureIsRejectedAndDoesNoHarm) {
     for (std::size_t n = 0; n < links.size(); ++n) EXPECT_FALSE(result.links[n].rejected) << n;
     EXPECT_TRUE(result.links.back().rejected);
     EXPECT_EQ(result.groups.at("closure").rejected, 1U);
-    // Recalibration begins with the false closure among the others.
+    // The first recalibration includes the false closure.
     EXPECT_LT(largest_difference(clean.map_from_base, result.map_from_base),
               recalibrate ? 5e-3 : 1e-6);
     EXPECT_LT(largest_difference(truth, result.map_from_base),
@@ -205,7 +205,7 @@ TEST(PoseGraphOptimization, PiecesHaveGaugesOfTheirOwn) {
 
 TEST(PoseGraphOptimization, RecalibrationFindsTheTrueDeviations) {
   const std::map<int, Pose> truth = circle(60);
-  // Odometry claims 3 degrees where it is 0.1; closures claim a third of their error.
+  // Odometry states 3 degrees instead of 0.1; closures state a third of their error.
   std::vector<GraphLink> links = noisy_chain(truth, 0.004, 0.1, diagonal_information(0.008, 3.0));
   for (int n = 1; n <= 57; ++n) {
     Vector6d error;
@@ -278,18 +278,18 @@ TEST(PoseGraphOptimization, BrokenLinksAreErrors) {
   options.robust_scale = -1;
   EXPECT_EQ(error_of([&] { libmap::optimize_pose_graph(poses, {}, options); }).context().field,
             "robust_scale");
-  // A link to a node without pose is left out.
+  // A link to a node without a pose is ignored.
   const PoseGraphResult result =
       libmap::optimize_pose_graph(poses, {link(1, 99, Pose::Identity(), random_information())}, {});
   EXPECT_EQ(result.without_links.size(), 3U);
-  // So is one of a node to itself that says nothing of where it lies.
+  // A relative link from a node to itself is ignored as well.
   EXPECT_EQ(
       libmap::optimize_pose_graph(poses, {link(2, 2, Pose::Identity(), random_information())}, {})
           .without_links.size(),
       3U);
 }
 
-// The dense inverse of the information, its derivatives by differences.
+// Dense inverse of the information, with derivatives by finite differences.
 TEST(GraphCovariance, AgreesWithTheDenseInverse) {
   const std::map<int, Pose> poses = circle(6);
   std::vector<GraphLink> links;
@@ -340,7 +340,7 @@ TEST(GraphCovariance, AgreesWithTheDenseInverse) {
   }
 }
 
-// Chains with closures, blocks that no system has, and a diagonal one.
+// Chains with closures, requested blocks that no system contains, and a diagonal system.
 TEST(BlockSolver, SelectedInverseIsThatOfTheColumns) {
   for (const std::size_t size : {1U, 2U, 40U}) {
     libmap::BlockSystem system(size);

@@ -33,14 +33,14 @@ TEST(RelativeMotions, ASteadyMotionIsFound) {
   const auto motions = libmap::relative_motions(path.frames, path.poses, {});
   ASSERT_EQ(motions.size(), 4U);
   for (const auto& [node, motion] : motions) {
-    // To first order in the turn of half a second; at the ends from one side only.
+    // Accurate to first order in the rotation of half a second; one-sided at the ends.
     EXPECT_LT((motion.mean - some_motion()).norm(), 0.05) << node;
     EXPECT_EQ(motion.deviation, KnownMotion{}.deviation) << "poses that far apart";
   }
 }
 
-// Through five poses that follow each other closely, the slope of a curve of fourth order; the
-// deviation is less, as the hand had little time.
+// For five closely following poses, the derivative of a polynomial of fourth order. The deviation
+// is smaller over a shorter time.
 TEST(RelativeMotions, AnAcceleratedMotionIsFoundByClosePoses) {
   Path path;
   for (int n = -2; n <= 2; ++n) {

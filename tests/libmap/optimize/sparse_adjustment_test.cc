@@ -51,8 +51,8 @@ TEST(SparseAdjustment, FindsTheOptimumOfTheGeneralSolver) {
   }
 }
 
-// Gravity and priors of single nodes: their normal equations are those of differences of the cost,
-// which both solvers minimize.
+// Gravity and priors of single nodes: normal equations equal finite differences of the cost, which
+// both solvers minimize.
 TEST(LinkTerms, AbsoluteLinksBindTheirNodes) {
   const Scene scene = scene_of(4, {.apply = true});
   std::vector<libmap::GraphLinkResult> links;

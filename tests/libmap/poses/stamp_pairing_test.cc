@@ -20,7 +20,7 @@ TEST(StampPairing, TakesTheNearest) {
 }
 
 TEST(StampPairing, GivesOneThingToOneOtherOnly) {
-  // 1.01 is the nearest of both; it goes to 1.005.
+  // 1.01 is the nearest for both stamps; it is paired with 1.005.
   EXPECT_EQ(libmap::pair_by_stamp({1.0, 1.005}, {1.01}, 0.02), (Pairs{{1, 0}}));
   EXPECT_EQ(libmap::pair_by_stamp({1.0, 1.0}, {1.0}, 0.02), (Pairs{{0, 0}}));
 }

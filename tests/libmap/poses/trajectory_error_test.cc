@@ -54,7 +54,7 @@ TEST(AbsoluteTrajectoryError, IsZeroForTheSameTrajectoryInAnotherFrame) {
   EXPECT_TRUE(error.truth_from_estimate.isApprox(estimate_from_truth.inverse(), 1e-12));
 }
 
-// The turn about a straight way is that of the rotations: the noise of positions does not tell it.
+// The rotation about a straight path is determined by the rotations, not by the noise of positions.
 TEST(AbsoluteTrajectoryError, StraightWaysAreTurnedByTheirRotations) {
   const Pose estimate_from_truth = random_pose();
   Trajectory truth;
@@ -73,7 +73,7 @@ TEST(AbsoluteTrajectoryError, StraightWaysAreTurnedByTheirRotations) {
   EXPECT_LT(error.max_m, 0.002);
 }
 
-// Positions within a few mm of a line: their noise must not turn the poses.
+// Positions within a few mm of a line: their noise must not rotate the alignment.
 TEST(AbsoluteTrajectoryError, NarrowPathsAreAlignedByRotationsToo) {
   for (int draw = 0; draw < 20; ++draw) {
     const Pose estimate_from_truth = random_pose();
@@ -99,7 +99,7 @@ TEST(AbsoluteTrajectoryError, NarrowPathsAreAlignedByRotationsToo) {
   }
 }
 
-// Rotations of another convention leave the alignment by positions as it is.
+// Rotations of another convention do not change the alignment by positions.
 TEST(AbsoluteTrajectoryError, RotationsThatDisagreeDoNotCount) {
   Trajectory truth = random_trajectory(20);
   Trajectory estimate = moved(random_pose(), truth);
@@ -111,7 +111,7 @@ TEST(AbsoluteTrajectoryError, RotationsThatDisagreeDoNotCount) {
   EXPECT_LT(libmap::absolute_trajectory_error(estimate, truth).max_m, 0.003);
 }
 
-// Two poses in one place and a third beside them: positions on a line, without noise.
+// Two poses at one position and a third one next to them: positions on a line, without noise.
 TEST(AbsoluteTrajectoryError, ExactPositionsOnALineAreTurnedByTheRotations) {
   const Pose estimate_from_truth = random_pose();
   Trajectory truth = random_trajectory(3);
@@ -132,7 +132,7 @@ TEST(AbsoluteTrajectoryError, KeepsScaleErrors) {
 }
 
 TEST(AbsoluteTrajectoryError, TellsMeanMedianRmseAndMaximumApart) {
-  // Opposite poses move alike: 1, 1, 2, 2, 6, 6 mm outwards.
+  // Opposite poses move equally: 1, 1, 2, 2, 6, 6 mm outwards.
   Trajectory estimate = poses_on_axes(1.0);
   const double outwards_m[] = {0.001, 0.002, 0.006};
   for (std::size_t i = 0; i < 6; ++i)
@@ -154,7 +154,7 @@ TEST(AbsoluteTrajectoryError, MeasuresRotationsAfterTheAlignment) {
   EXPECT_NEAR(error.mean_rotation_deg, 0.3 * 180.0 / M_PI / 6.0, 1e-6);
 }
 
-// Umeyama's alignment is the best one: no small motion makes it better.
+// Umeyama's alignment is optimal: no small motion improves it.
 TEST(AbsoluteTrajectoryError, AlignsInTheLeastSquaresSense) {
   const Trajectory truth = random_trajectory(15);
   const Trajectory estimate = random_trajectory(15);
@@ -186,7 +186,7 @@ TEST(AbsoluteTrajectoryError, PairsByNode) {
   Trajectory estimate(truth.rbegin(), truth.rend());
   estimate.erase(estimate.begin() + 3);
   estimate.push_back({99, 0.5, random_pose()});
-  for (libmap::TrajectoryPose& pose : estimate) pose.stamp_s = 0.0;  // does not count
+  for (libmap::TrajectoryPose& pose : estimate) pose.stamp_s = 0.0;  // not used
   const auto error = libmap::absolute_trajectory_error(estimate, truth);
   EXPECT_EQ(error.poses, 9U);
   EXPECT_LT(error.max_m, 1e-12);
@@ -259,7 +259,7 @@ struct TabledError {
   double mean_rotation_deg;
 };
 
-// The table in the data's README, to its last digit.
+// Table in the README of the data, to the last digit.
 TEST(AbsoluteTrajectoryError, AgreesWithTheTableOfTheRealScans) {
   GRASPMAP_REQUIRE_DATA();
   using libmap::PoseSource;

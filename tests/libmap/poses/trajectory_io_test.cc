@@ -58,7 +58,7 @@ TEST(TrajectoryIo, NamesTheFormatsItKnows) {
     EXPECT_EQ(std::string(graspmap_test::error_of([&] {
                             libmap::write_trajectory_as(format, path, example());
                           }).what()),
-              path.string() + ": no format of a file of poses");
+              path.string() + ": poses cannot be written in this format");
   EXPECT_FALSE(fs::exists(path));
 }
 
@@ -82,7 +82,7 @@ TEST(TrajectoryIo, NumbersPosesWithoutNodes) {
     libmap::write_trajectory(graspmap_test::scratch_folder() / name, written);
     const auto read = libmap::read_trajectory(graspmap_test::scratch_folder() / name);
     ASSERT_EQ(read.poses.size(), 3U);
-    // Made up: in order, and where the file can say so no nodes of a scan.
+    // Generated node numbers, marked as such if the format allows comments.
     for (std::size_t i = 0; i < 3; ++i) {
       EXPECT_EQ(read.poses[i].node, std::string(name) == "poses.g2o" ? 0 : static_cast<int>(i) + 1);
       EXPECT_TRUE(read.poses[i].world_from_base.isApprox(written.poses[i].world_from_base, 1e-14));
@@ -154,7 +154,7 @@ TEST(AssignNodes, TakesPosesWithoutNodesAndStampsInTheirOrder) {
   const libmap::NodeTrajectory result = libmap::assign_nodes(poses, graph_of_nodes());
   EXPECT_EQ(nodes_of(result.poses), (std::vector<int>{1, 2, 4}));
   EXPECT_TRUE(result.poses[2].world_from_base.isApprox(poses[2].world_from_base));
-  // As many as the scan has stored poses: RTAB-Map exports those.
+  // As many poses as stored poses of the scan, which RTAB-Map exports.
   libmap::PoseGraph graph = graph_of_nodes();
   graph.optimized_map_from_base = {{1, random_pose()}, {4, random_pose()}};
   const Trajectory two(poses.begin(), poses.begin() + 2);

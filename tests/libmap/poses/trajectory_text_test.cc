@@ -193,7 +193,7 @@ TEST(G2oText, KeepsPosesAndLinksOfEveryType) {
     EXPECT_EQ(read.links[i].to, links[i].to);
     EXPECT_EQ(read.links[i].type, links[i].type);
     EXPECT_TRUE(read.links[i].from_from_to.isApprox(links[i].from_from_to, 1e-14));
-    // Factors of two change no digit; the two halves may differ by rounding.
+    // Factors of two are exact; the two halves can differ by rounding.
     EXPECT_TRUE(read.links[i].information.isApprox(links[i].information, 1e-14));
   }
 }
@@ -213,11 +213,11 @@ TEST(G2oText, NumbersAtTheEndsOfTheirRange) {
   const auto links = [&](const std::string& ends, const std::string& entry) {
     return libmap::parse_g2o("EDGE_SE3:QUAT " + ends + pose + entry + rest, "a.g2o").links;
   };
-  // Without vertices, edges of numbers that follow each other are odometry.
+  // Without vertices, edges between consecutive numbers are odometry.
   EXPECT_EQ(links("2147483646 2147483647", "1").front().type, LinkType::neighbor);
   EXPECT_EQ(links("2147483647 2147483647", "1").front().type, LinkType::global_closure);
   const libmap::Error error = graspmap_test::error_of([&] { links("1 2", "1e308"); });
-  EXPECT_EQ(error.reason(), "no information of a link");
+  EXPECT_EQ(error.reason(), "information out of range");
   EXPECT_EQ(error.context().bound, "<= 1e300");
 }
 
@@ -316,13 +316,13 @@ TEST(ToroText, ReadsWhatIsWrittenByHand) {
 
 TEST(ToroText, KeepsPosesAndEdges) {
   Trajectory poses = random_trajectory();
-  // Where yaw and roll turn about the same axis.
+  // Yaw and roll have the same axis.
   for (const double pitch : {90.0, -90.0, 89.9999999})
     poses.push_back({static_cast<int>(poses.size()) + 1, 0.0,
                      libmap::make_pose_from_rpy({1, 2, 3}, {33.0, pitch, -17.0})});
   const std::vector<libmap::PoseLink> links = links_of_every_type();
   const std::string text = libmap::to_toro(poses, links);
-  EXPECT_EQ(text.find('#'), std::string::npos);  // RTAB-Map's reader ends at a comment
+  EXPECT_EQ(text.find('#'), std::string::npos);  // RTAB-Map's reader stops at a comment
   const libmap::PoseGraphText read = libmap::parse_toro(text, "poses.toro");
   ASSERT_EQ(read.poses.size(), poses.size());
   for (std::size_t i = 0; i < poses.size(); ++i) {
@@ -356,7 +356,7 @@ TEST(ToroText, NamesTheLineThatIsBroken) {
   }
 }
 
-// What a step of 1 m to each side becomes. z of the optical axes is x of ours, x is -y, y is -z.
+// A step of 1 m along each axis. Optical z is x of this project, x is -y, y is -z.
 TEST(PoseAxes, OpticalOnesTurnTheWorldAndTheBase) {
   using libmap::PoseAxes;
   const Pose step = libmap::make_pose({1, 2, 3}, Eigen::Quaterniond::Identity());
@@ -414,7 +414,7 @@ TEST(Open3dLog, MatricesOfCameras) {
         "poses.log");
 }
 
-// Its cameras have y up and z backward.
+// nerfstudio's cameras have y up and z backward.
 TEST(Nerfstudio, CamerasOfOpenGl) {
   const std::string text =
       R"({"w": 640, "frames": [{"file_path": "images/000007.jpg", "transform_matrix":

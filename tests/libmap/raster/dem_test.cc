@@ -47,7 +47,7 @@ TEST(Dem, PixelCentersKeepTheirPlaceAndHeight) {
             Eigen::Vector3d(451239.5, 5412346.25, 807.125));
 }
 
-// As many rasters come: -9999 means no height, but the file does not say so.
+// As in many rasters, -9999 means no height, but is not declared as nodata.
 TEST(Dem, UndeclaredNodataIsDroppedAndCounted) {
   AsciiGrid grid = small_grid();
   grid.rows[0][0] = -9999;
@@ -88,7 +88,8 @@ TEST(Dem, TilesStripsAndPixelIsPointAreTheSamePoints) {
     EXPECT_EQ(sorted(libmap::read_dem_cloud(write_dem("layout.tif", grid, layout))), strips);
 }
 
-// A VRT states any affine transform, unit, scale and offset; gdal_translate makes a GeoTIFF of it.
+// A VRT can have any affine transform, unit, scale and offset; gdal_translate converts it to
+// GeoTIFF.
 fs::path write_transformed(const std::string& name, const std::string& transform,
                            const std::string& band = "", std::vector<std::string> words = {}) {
   write_dem("source.tif", {.rows = {{0, 1}, {2, 4}, {3, 9}}});
@@ -105,7 +106,7 @@ fs::path write_transformed(const std::string& name, const std::string& transform
 }
 
 TEST(Dem, ARotatedTransformIsUsed) {
-  // Columns lead north, rows lead east.
+  // Columns go north, rows go east.
   const PointCloud cloud =
       libmap::read_dem_cloud(write_transformed("turned.tif", "10, 0, 3, 20, 2, 0"));
   EXPECT_EQ(cloud.positions[0], Eigen::Vector3d(11.5, 21, 0));
@@ -146,7 +147,7 @@ TEST(Dem, MeshOfAPlaneFacesUpWhereverRowsLead) {
 }
 
 TEST(Dem, TheDiagonalIsTheSmallerStep) {
-  // A ridge from corner to corner: its ends, 5 and 5, are joined.
+  // A diagonal ridge: its ends, 5 and 5, are connected.
   const AsciiGrid ridge{.rows = {{5, 0}, {1, 5}}};
   const libmap::TriangleMesh mesh = libmap::read_dem_mesh(write_dem("ridge.tif", ridge));
   ASSERT_EQ(mesh.triangles.size(), 2U);
@@ -160,7 +161,7 @@ TEST(Dem, PiecesShareTheFrameOfTheFirst) {
   fs::create_directory(scratch_folder() / "pieces");
   AsciiGrid grid = small_grid();
   const fs::path first = write_dem("pieces/a.tif", grid, utm);
-  grid.west += 5000.0;  // its own offset would be another
+  grid.west += 5000.0;  // its own offset would differ
   const fs::path second = write_dem("pieces/b.tif", grid, utm);
   const auto pieces = libmap::cloud_pieces(scratch_folder() / "pieces");
   ASSERT_EQ(pieces.size(), 2U);
@@ -187,8 +188,8 @@ TEST(Dem, PiecesShareTheFrameOfTheFirst) {
 struct BadDem {
   std::string name;
   std::vector<std::string> words;
-  std::string field;   // of the error
-  std::string remedy;  // in its text
+  std::string field;   // field of the error
+  std::string remedy;  // part of its text
 };
 void PrintTo(const BadDem& bad, std::ostream* out) { *out << bad.name; }
 class BadDems : public testing::TestWithParam<BadDem> {};
@@ -254,7 +255,7 @@ TEST(Dem, TruncatedAndForeignFilesAreErrors) {
     EXPECT_EQ(error.context().file, file.string()) << bytes;
     EXPECT_EQ(error.kind(), libmap::ErrorKind::bad_input);
   }
-  graspmap_test::write_text(file, "ncols 1\nnrows 1\n");  // of another driver of GDAL
+  graspmap_test::write_text(file, "ncols 1\nnrows 1\n");  // format of another driver of GDAL
   EXPECT_THROW(libmap::read_cloud(file), libmap::Error);
 }
 

@@ -1,4 +1,4 @@
-// GDAL's own programs (Debian: gdal-bin) as independent readers and writers of rasters.
+// GDAL's programs (Debian: gdal-bin) as independent readers and writers of rasters.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -24,13 +24,13 @@ inline nlohmann::json gdalinfo(const std::string& file) {
 }
 
 struct AsciiGrid {
-  double west = 0.0;  // of the lower left pixel's corner
+  double west = 0.0;  // x of the lower left corner
   double south = 0.0;
   double pixel = 1.0;
   std::vector<std::vector<double>> rows;  // from the north; -9999: none
 };
 
-// GRID.tif of the scratch folder, from ESRI's text format, by gdal_translate with more `words`.
+// Writes GRID.tif in the scratch folder from ESRI's text format by gdal_translate with `words`.
 inline std::filesystem::path write_dem(const std::string& name, const AsciiGrid& grid,
                                        std::vector<std::string> words = {}) {
   std::string text = "ncols " + std::to_string(grid.rows.front().size()) + "\nnrows " +
@@ -48,7 +48,7 @@ inline std::filesystem::path write_dem(const std::string& name, const AsciiGrid&
   return scratch_folder() / name;
 }
 
-// The values of a band, row by row, as GDAL writes them raw.
+// Values of a band in row-major order, as raw output of GDAL.
 inline std::vector<double> gdal_values(const std::string& file, int band) {
   gdal({"gdal_translate", "-q", "-b", std::to_string(band), "-of", "ENVI", "-ot", "Float64", file,
         "values.raw"});

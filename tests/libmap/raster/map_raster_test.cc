@@ -57,7 +57,7 @@ TEST(MapRaster, TheTopmostVoxelOfAColumnCounts) {
   }
 }
 
-// In parts, and with pixels turned by 30 degrees under points turned by as much.
+// Points in parts; pixels and points are both rotated by 30 degrees.
 TEST(MapRaster, TurnedPointsOnTurnedPixelsAreTheSameRaster) {
   const PointCloud cloud = voxels({{0, 0, 0}, {3, 1, 0}, {3, 1, 2}, {7, 9, 1}});
   const MapRaster level = raster_of(cloud, {.pixel_size_m = 0.1});
@@ -114,7 +114,7 @@ TEST(MapRaster, GdalReadsValuesPlacesUnitsAndCrs) {
   EXPECT_NEAR(heights[3], 800.35, 1e-9);  // float64: float32 would be off by 2e-5 m
   EXPECT_EQ(scores[3], 0.25);
   EXPECT_TRUE(std::isnan(scores[0]));
-  // And it is a terrain again.
+  // The raster can be read as a terrain.
   const PointCloud back = libmap::read_dem_cloud(scratch_folder() / "map.tif");
   ASSERT_EQ(back.size(), 2U);
   EXPECT_LT((back.positions[0] - Eigen::Vector3d(0.45, 0.65, -0.15)).norm(), 1e-7);

@@ -45,7 +45,7 @@ TEST(KnownBoard, IsCornersAndASide) {
     EXPECT_EQ(error_of([&] { parse_known_board(text); }).context().field, "board") << text;
 }
 
-// Poses in units of a depth camera that is off by true_scale, and what their pictures show.
+// Poses in units of a depth camera with the error true_scale, and views of the board.
 struct Scene {
   PaintedBoard painted{};
   Chessboard board{};
@@ -208,7 +208,7 @@ TEST(BoardScale, RefinedPosesHaveTheScaleOfTheBoard) {
         painted, (pose * textured_camera().base_from_camera).inverse() * board_at(-0.2));
     libmap::RgbdFrame& frame = scan.frames.at(n + 1);
     for (std::size_t pixel = 0; pixel < picture.pixels.size(); ++pixel)
-      if (picture.pixels[pixel] != 120.0F)  // what is not board
+      if (picture.pixels[pixel] != 120.0F)  // the background
         frame.color.pixels[pixel].fill(static_cast<std::uint8_t>(picture.pixels[pixel]));
     for (float& depth : frame.depth.pixels) depth *= 1.008F;
   }
@@ -226,7 +226,7 @@ TEST(BoardScale, RefinedPosesHaveTheScaleOfTheBoard) {
   EXPECT_GE(figures.at("lengths"), 8.0);
   EXPECT_LT(figures.at("deviation"), 0.001);
   EXPECT_NEAR(figures.at("factor"), 1.0 / 1.008, 3.0 * figures.at("deviation"));
-  EXPECT_TRUE(result.scale.ends_with("pictures: corrected")) << result.scale;
+  EXPECT_TRUE(result.scale.ends_with("images: corrected")) << result.scale;
   options.known_lengths = {{{1, {60, 100}}, {2, {90, 110}}, 1.0}};
   EXPECT_EQ(error_of([&] { libmap::refine_poses(scan, options); }).context().field, "board");
 }

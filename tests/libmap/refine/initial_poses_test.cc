@@ -1,5 +1,4 @@
-// Where an optimization starts, against the definition: links gone through in order, again and
-// again.
+// Initial poses against their definition: repeated passes over the links in order.
 #include "libmap/refine/initial_poses.h"
 
 #include <gtest/gtest.h>
@@ -61,7 +60,7 @@ void place(const PoseGraph& graph, Poses& poses) {
   }
 }
 
-// Of the links between two parts, the move with which most agree.
+// The motion that most links between two parts agree with.
 Pose best_move(const std::vector<std::pair<Pose, Pose>>& moves_and_probes) {
   std::pair<int, Pose> best(-1, Pose::Identity());
   for (const auto& [move, probe] : moves_and_probes) {
@@ -75,7 +74,7 @@ Pose best_move(const std::vector<std::pair<Pose, Pose>>& moves_and_probes) {
   return best.second;
 }
 
-// Moves the first part that is tied to `whole`, and adds it; whether there was one.
+// Moves the first part that is linked to `whole`, and adds it. Returns true if there was one.
 bool join_one(std::vector<int>& whole, Parts& open, Poses& poses,
               const std::vector<PoseLink>& links) {
   const std::set<int> inside(whole.begin(), whole.end());
@@ -113,7 +112,7 @@ Parts joined(Parts open, Poses& poses, const std::vector<PoseLink>& links) {
   return result;
 }
 
-// A node that has no part joins that of the first link's other end.
+// A node without a part joins the part of the first link's other end.
 void spread_parts(const PoseGraph& graph, const Poses& poses, Parts& parts) {
   for (bool any = true; any;) {
     any = false;
@@ -170,7 +169,7 @@ TEST(InitialPoses, AreThoseOfTheDefinition) {
   EXPECT_GT(seen.size(), 2U);
 }
 
-// Sizes at which going through all links for each node, or all pairs of links, takes minutes.
+// Sizes at which visiting all links for each node, or all pairs of links, would take minutes.
 TEST(InitialPoses, OfManyNodesLinksAndParts) {
   PoseGraph chain;
   for (int id = 1; id <= 5'000; ++id) chain.nodes.push_back({.id = id});

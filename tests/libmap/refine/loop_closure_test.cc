@@ -14,7 +14,7 @@ using libmap::Pose;
 
 Pose some_motion() { return libmap::moved(Pose::Identity(), random_step(0.3, 0.2)); }
 
-// What descriptors say does not depend on the cameras: the second time it is not asked for.
+// Matches of descriptors do not depend on the cameras and are not computed again.
 TEST(VerifyPairs, KnownMatchesStandForDescriptors) {
   const auto points = random_points(80);
   std::vector<FrameFeatures> frames = {see_points(1, Pose::Identity(), points),
@@ -37,7 +37,7 @@ TEST(VerifyPairs, KnownMatchesStandForDescriptors) {
   EXPECT_TRUE(links(nullptr).empty()) << "descriptors that say nothing";
 }
 
-// Ten matches are too few for a link, and enough to say where to look.
+// Ten matches are too few for a link, but enough for an initial motion.
 TEST(GuessMotion, TakesFewMatches) {
   const auto points = random_points(10);
   const Pose truth = graspmap_test::beside(0.0).inverse() * graspmap_test::beside(0.1);

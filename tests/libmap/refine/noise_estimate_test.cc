@@ -15,7 +15,7 @@ namespace noise_estimate_test {
 using libmap::DepthNoise;
 using libmap::SurfaceResidual;
 
-// Distances of a camera with the noise `truth`, stated by `assumed`; one in ten is an outlier.
+// Residuals of a camera with the noise `truth`, normalized by `assumed`; 10 % are outliers.
 std::vector<SurfaceResidual> residuals_of(const DepthNoise& truth, const DepthNoise& assumed,
                                           int count = 20000) {
   std::vector<SurfaceResidual> residuals;

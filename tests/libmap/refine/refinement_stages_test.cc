@@ -18,9 +18,9 @@ libmap::PoseLink link_between(int from, int to, const Pose& from_from_to = Pose:
   return {from, to, libmap::LinkType::neighbor, from_from_to, 1e4 * libmap::Matrix6d::Identity()};
 }
 
-// Frames along a way in front of points, whose poses err by centimeters.
+// Frames along a path in front of points, with pose errors of centimeters.
 struct Way {
-  TexturedScan scan{};  // without frames of its own
+  TexturedScan scan{};  // without frames
   libmap::RefinementOptions options{};
   RefinementInput input{scan, options, libmap::no_progress()};
   RefinementState state{};

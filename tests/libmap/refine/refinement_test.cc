@@ -51,14 +51,14 @@ TEST(Refinement, BringsADriftingLoopToTheTruth) {
   EXPECT_TRUE(result.poses.front().world_from_base.isApprox(around(0, 1.0), 1e-12))
       << "the first node stays";
   ASSERT_EQ(result.covariance.size(), 14U);
-  // Deviations are honest within a factor of a few.
+  // Stated deviations are correct within a small factor.
   const double claimed = std::sqrt(result.covariance.at(8).topLeftCorner<3, 3>().trace());
   EXPECT_GT(claimed, 5e-5);
   EXPECT_LT(claimed, 5e-3);
 }
 
-// A principal point turns all frames about themselves: against the first one, the poses are as
-// uncertain as the camera that they rest on.
+// An error of the principal point rotates all frames, so the uncertainty of poses relative to the
+// first one includes that of the camera.
 TEST(Refinement, DeviationsCoverAnEstimatedCamera) {
   TexturedScan scan = loop_of(14);
   const auto deviation = [](const RefinementResult& result) {
@@ -137,8 +137,8 @@ TEST(Refinement, WithoutTextureAndReliefThePosesStayAndItSaysSo) {
         result.poses[n].world_from_base.isApprox(*scan.graph_.nodes[n].odometry_from_base, 1e-9));
 }
 
-// Two patches of ground that look the same, five meters apart: their frames match perfectly, and
-// only the way between tells them apart.
+// Two identical patches of ground, five meters apart. Their frames match perfectly; only the poses
+// between them distinguish the patches.
 TEST(Refinement, SameLookAtAnotherPlaceIsNotTheSamePlace) {
   TexturedScan scan;
   for (int n = 0; n < 20; ++n)
@@ -198,7 +198,7 @@ TEST(Refinement, NullPosesComeFromLinksOrPicturesAndTheRestIsNamed) {
   EXPECT_EQ(without.without_pose, (std::vector<int>{7, 8}));
 }
 
-// Ground that is bare but for its relief: only across it do frames bind each other.
+// Ground with texture-free relief: frames determine each other only perpendicular to it.
 TEST(IcpRefinement, PlanesDoNotSlide) {
   TexturedScan scan;
   const Pose first = looking({0, 0, 1.2}, {0.4, 0, 0});
@@ -259,8 +259,8 @@ double stated_scale(const std::function<double(double, double)>& bend, double pr
   return libmap::align_surfaces(found.frames, start, prior, {{nodes, 1}}, {}, {}).deviation_scale;
 }
 
-// Depth that errs alike at neighboring pixels tells less than its number of samples; surfaces that
-// contradict what was known before are wrong or it was: what is stated grows with both.
+// Stated deviations grow with the correlation of depth errors between neighboring pixels, and with
+// the contradiction between surfaces and prior.
 TEST(IcpRefinement, DeviationsGrowWhereResidualsDependOnEachOtherOrContradictThePrior) {
   const auto nothing = [](double, double) { return 0.0; };
   const double clean = stated_scale(nothing, 0.0);
@@ -286,7 +286,8 @@ TEST(IcpRefinement, DepthAloneTellsTheMotionOfAPair) {
   ASSERT_TRUE(link);
   EXPECT_EQ(link->from, 1);
   EXPECT_EQ(link->to, 2);
-  // Across the ground it is found; around the boulders it stays near the guess, and says so.
+  // The pose is found perpendicular to the ground; around the boulders it remains near the guess,
+  // with a large deviation.
   const Vector6d error = libmap::step_between(truth, link->from_from_to);
   EXPECT_LT(std::abs(error[0]) + std::abs(error[2]), 0.01);
   EXPECT_LT(std::abs(error[4]), 2e-3);
@@ -343,8 +344,7 @@ TEST(Features, OptionsOutOfTheirRangesAreNamed) {
             "max_depth_m is ");
 }
 
-// OpenCV 4.6 places SIFT's features a quarter of a pixel off; ours stand where the picture has
-// them.
+// OpenCV 4.6 shifts SIFT features by a quarter of a pixel; this is corrected.
 TEST(Features, SurfacesOfLongScansFitTheirMemory) {
   const libmap::Camera camera{.width = 512, .height = 424, .fx = 365, .fy = 365};
   libmap::FeatureOptions options;

@@ -1,4 +1,4 @@
-// Scans whose nodes have no poses, or poses that lie: pictures alone give the way.
+// Scans whose nodes have no poses or wrong poses, which are determined by images only.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -71,7 +71,7 @@ TEST(RefinementWithoutPoses, PicturesAloneGiveTheWay) {
   EXPECT_EQ(result.covariance.size(), 8U);
 }
 
-// Poses and links that lie say nothing where the pictures alone are asked.
+// Wrong poses and links have no effect with StartPoses::visual.
 TEST(RefinementWithoutPoses, VisualStartHearsNoOdometry) {
   TexturedScan scan = loop_of(6);
   for (std::size_t n = 1; n < 6; ++n)
@@ -123,7 +123,7 @@ TEST(RefinementWithoutPoses, TwoSessionsBecomeOneMap) {
   EXPECT_LT(result.stages.back().error->absolute.rmse_m, 0.003);
 }
 
-// Pictures without features in between: depth leads over them, from where the motion leads.
+// Images without features are tracked by depth, from the pose by constant motion.
 TEST(RefinementWithoutPoses, DepthLeadsOverBlurredPictures) {
   TexturedScan scan = loop_of(10);
   for (const int node : {4, 5, 8}) {
@@ -139,8 +139,8 @@ TEST(RefinementWithoutPoses, DepthLeadsOverBlurredPictures) {
   EXPECT_LT(result.stages.back().error->absolute.rmse_m, 0.002);
 }
 
-// The camera turns back at a picture without features: no steady motion before it leads there, the
-// way on both sides does.
+// The camera reverses at an image without features. Constant motion from before does not predict
+// its pose, but interpolation between both sides does.
 TEST(RefinementWithoutPoses, DepthFindsAFrameFromBothSides) {
   TexturedScan scan;
   for (const double angle : {-15.0, 0.0, 15.0, 30.0, 15.0, 0.0, -15.0})
@@ -157,7 +157,7 @@ TEST(RefinementWithoutPoses, DepthFindsAFrameFromBothSides) {
   EXPECT_LT(result.stages.back().error->absolute.rmse_m, 0.002);
 }
 
-// Two frames that lie well to each other, and anywhere else.
+// Two frames with a correct relative pose, but a wrong pose relative to the others.
 TEST(RefinementWithoutPoses, APartIsCarriedToWhereItsDepthFits) {
   const TexturedScan scan = loop_of(7, 7.5);
   const auto frames =
@@ -186,7 +186,7 @@ TEST(RefinementWithoutPoses, APartIsCarriedToWhereItsDepthFits) {
   EXPECT_TRUE(kept.depth_links.empty());
 }
 
-// A scan without poses whose frames are all broken says how.
+// The error for a scan without poses whose frames are all broken is that of a frame.
 TEST(RefinementWithoutPoses, TheFirstBrokenFrameIsNamed) {
   TexturedScan scan = loop_of(2);
   forget_poses(scan);
@@ -199,7 +199,7 @@ TEST(RefinementWithoutPoses, TheFirstBrokenFrameIsNamed) {
   }
 }
 
-// Frames far apart that show nothing but bare ground: neither pictures nor depth tell.
+// Distant frames of bare ground: neither images nor depth determine their relative pose.
 TEST(RefinementWithoutPoses, WithoutTextureAndReliefThereIsNoWay) {
   TexturedScan scan;
   for (int n = 0; n < 3; ++n) {
@@ -218,8 +218,8 @@ TEST(RefinementWithoutPoses, WithoutTextureAndReliefThereIsNoWay) {
   }
 }
 
-// The hand turns by up to 100 degrees a second. There are 15 frames a second, more of them than a
-// calibration rests on, and the rows of a picture are exposed over 20 ms.
+// The camera rotates by up to 100 degrees per second at 15 frames per second, with a rolling
+// shutter of 20 ms. There are more frames than a calibration uses.
 TEST(RefinementWithoutPoses, RollingShutterOfALongScan) {
   TexturedScan scan;
   scan.interval_s = 0.0667;
@@ -242,7 +242,7 @@ TEST(RefinementWithoutPoses, RollingShutterOfALongScan) {
   EXPECT_EQ(result.calibration.motion.size(), 90U);
   EXPECT_TRUE(result.calibration.intrinsics.empty()) << "nothing else is wrong";
   EXPECT_TRUE(result.calibration.depth.empty());
-  // The picture that shows nothing is a reason to track again.
+  // The blank image is a reason to track again.
   EXPECT_GT(stage_of(result, "tracking again").held_out.matches.count, 0U);
   // All frames are moved by their motions before surfaces are aligned.
   EXPECT_LT(stage_of(result, "calibration").error->absolute.rmse_m, 0.0015);
@@ -268,7 +268,7 @@ TEST(InitialPoses, LinksAloneGiveParts) {
   for (const auto& [from, to] : {std::pair(1, 2), {3, 2}, {5, 6}})
     graph.links.push_back(
         {from, to, libmap::LinkType::neighbor, motion, 100.0 * libmap::Matrix6d::Identity()});
-  // RTAB-Map's way to say that it does not know.
+  // RTAB-Map's variance of an unknown motion.
   graph.links.push_back(
       {6, 9, libmap::LinkType::neighbor, motion, libmap::Matrix6d::Identity() / 9999.0});
   const libmap::InitialPoses poses = libmap::initial_poses(graph, StartPoses::automatic);

@@ -46,7 +46,7 @@ Frames two_frames() {
   return made;
 }
 
-// What the pixel of the node shows, in closed form.
+// Scene point at the pixel of the node, in closed form.
 Eigen::Vector3d shown(int node, const Eigen::Vector2d& pixel) {
   const libmap::Camera camera = graspmap_test::textured_camera();
   const Pose eye = around(20.0 * (node - 1)) * camera.base_from_camera;
@@ -76,7 +76,7 @@ TEST(ScanScale, KnownLengthsGiveTheFactor) {
     EXPECT_NEAR(scale.factor, factor, 3.0 * scale.deviation);
     EXPECT_LT(scale.chi_square, 9.0);
   }
-  // A length that contradicts the others shows.
+  // A length that contradicts the others raises chi-square.
   std::vector<KnownLength> wrong = lengths_times(1.0);
   wrong[1].length_m *= 1.2;
   EXPECT_GT(libmap::scale_by_lengths(made.frames, {}, made.poses, wrong).chi_square, 9.0);

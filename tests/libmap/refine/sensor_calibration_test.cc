@@ -16,8 +16,8 @@ using graspmap_test::way_with_rows;
 using libmap::FrameFeatures;
 using libmap::Pose;
 
-// A calibration rests on a part of a long scan. The frames that it does not rest on have motions
-// too; one that nothing joins has that of its neighbors.
+// A calibration uses a part of a long scan. The other frames have motions too; a frame without
+// links has that of its neighbors.
 TEST(SensorCalibration, AllFramesHaveMotions) {
   constexpr int count = 90;
   constexpr int alone = 50;
@@ -79,7 +79,7 @@ TEST(SensorCalibration, AModelBeyondItsBoundIsNotAccepted) {
   }
 }
 
-// A base that goes along x in front of a wall: depth that is late is nearer by the way it went.
+// A base that moves along x towards a wall: late depth is smaller by the distance moved.
 TEST(SensorCalibration, LateDepthIsMovedBack) {
   libmap::SensorCalibration calibration;
   calibration.timing = {{0.05, 0.0}};

@@ -1,4 +1,4 @@
-// Scans in memory of textured surfaces known in closed form, with poses, links and the truth.
+// Scans in memory of textured surfaces in closed form, with poses, links and true poses.
 #pragma once
 
 #include <algorithm>
@@ -56,7 +56,7 @@ inline libmap::Camera textured_camera() {
   return camera;
 }
 
-// For its small pictures.
+// Returns options for the small images of TexturedScan.
 inline libmap::RefinementOptions small_options() {
   libmap::RefinementOptions options;
   options.features.max_features = 400;
@@ -72,7 +72,7 @@ class TexturedScan : public libmap::ScanSource {
     return frames.at(node);
   }
 
-  // A frame at `truth`; odometry measures the motion from the last with `error`.
+  // Adds a frame at `truth`; odometry measures the motion from the last frame with `error`.
   void see(const Surface& surface, const libmap::Pose& truth, const libmap::Vector6d& error,
            bool textured = true, const DepthNoiseModel& noise = {0.002, 0.005}) {
     const int node = static_cast<int>(frames.size()) + 1;
@@ -117,7 +117,7 @@ class TexturedScan : public libmap::ScanSource {
   std::map<int, libmap::RgbdFrame> frames;
   libmap::PoseGraph graph_;
   double interval_s = 1.0;  // between frames
-  // Where the base is at a time, for rows of pictures that are exposed one after the other.
+  // Pose of the base as a function of time, for a rolling shutter.
   std::function<libmap::Pose(double)> base_at;
   double rolling_shutter_s = 0.0;
 
@@ -132,7 +132,7 @@ inline Surface boulders() {
                      sphere({0.5, -0.4, -0.05}, 0.3)});
 }
 
-// Around the boulders, looking at them.
+// Returns a pose on a circle around the boulders, towards them.
 inline libmap::Pose around(double angle_deg, double height_m = 1.1) {
   const double angle = angle_deg * 3.14159265358979323846 / 180.0;
   return looking({1.2 * std::cos(angle), 1.2 * std::sin(angle), height_m}, {0, 0, 0.05});

@@ -31,7 +31,7 @@ std::vector<Eigen::Vector3d> wall(double length_m, double from_m = 0.0) {
   return points;
 }
 
-// What lies in the picture.
+// Features of the points in the image.
 FrameFeatures see(int node, const Pose& pose, const std::vector<Eigen::Vector3d>& points,
                   const FeatureNoise& noise = {}) {
   const FrameFeatures all = see_points(node, pose, points, noise);
@@ -78,7 +78,7 @@ VisualOdometryResult track(const Walk& walk, const TrackingStart& start = {},
   return libmap::track_frames(walk.frames, start, {}, options, 1);
 }
 
-// How far `node` lies from where the truth has it, seen from `from`.
+// Position error of `node` relative to `from`.
 double error_of(const Walk& walk, const VisualOdometryResult& result, int from, int node) {
   const Pose truth = walk.truth.at(from).inverse() * walk.truth.at(node);
   const Pose found = result.map_from_base.at(from).inverse() * result.map_from_base.at(node);
@@ -132,7 +132,7 @@ TEST(VisualOdometry, KeyFramesFollowTheWayTheTurnAndTheMatches) {
   EXPECT_EQ(track(walk, {}, options).key_frames.size(), 11U);
 }
 
-// Whatever noise the features claim, the covariances of the links are those of their errors.
+// Covariances of links match their errors, independent of the stated noise of the features.
 TEST(VisualOdometry, CovariancesAreHonest) {
   const auto points = wall(1.0);
   for (const double claimed : {1.0, 2.0}) {
@@ -193,7 +193,7 @@ TEST(VisualOdometry, ABlankPictureCostsOneNode) {
   EXPECT_LT(error_of(walk, result, 1, 10), 2e-5);
 }
 
-// After a long gap the camera stands where it has been before.
+// After a long gap the camera is at a location that it visited before.
 TEST(VisualOdometry, IsFoundAgainByAppearance) {
   Walk walk;
   const auto points = wall(6.0);
@@ -216,7 +216,7 @@ TEST(VisualOdometry, IsFoundAgainByAppearance) {
   EXPECT_GE(closures, 2U) << "one alone is not believed";
 }
 
-// A poster that one frame of the first place shows hangs in the second too.
+// A poster in one frame of the first location is also at the second location.
 TEST(VisualOdometry, OneLookAlikeIsNotBelieved) {
   Walk walk;
   const auto points = wall(4.0);
@@ -249,7 +249,7 @@ TEST(VisualOdometry, OneLookAlikeIsNotBelieved) {
   EXPECT_FALSE(result.tried.contains({4, 18})) << "and may find a witness later";
 }
 
-// A part that begins in the dark is carried to the others once it sees what they have seen.
+// A part that begins after dark frames is joined to the others when it shows the same scene.
 TEST(VisualOdometry, ALatePartJoinsTheFirst) {
   Walk walk;
   const auto points = wall(8.0);
@@ -355,6 +355,6 @@ TEST(VisualOdometry, RefusesOptionsOutOfRange) {
   broken([](VisualOdometryOptions& o) { o.relocalization_candidates = -2; });
 }
 
-// The whole of refine where the scan says nothing about poses.
+// Complete refinement of a scan without poses.
 
 }  // namespace visual_odometry_test

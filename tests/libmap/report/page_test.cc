@@ -18,7 +18,7 @@ using libmap::ReportContent;
 using libmap::ReportPicture;
 using libmap::ReportPictures;
 
-// No coder makes noise small.
+// Noise cannot be compressed.
 ColorImage noise(int width, int height) {
   ColorImage image(width, height);
   for (libmap::Color& pixel : image.pixels)
@@ -197,7 +197,7 @@ TEST(Picture, BrokenOnesAreErrors) {
   EXPECT_THROW(libmap::read_picture_bytes("<svg><rect>"), libmap::Error);
   const std::string filled = "<svg>" + std::string(std::size_t{4} << 20, ' ') + "</svg>";
   EXPECT_STREQ(error_of([&] { libmap::read_picture_bytes(filled); }).what(),
-               "'4194315 bytes': is too large for a page (must be <= 4194304)");
+               "'4194315 bytes': too large for a page (must be <= 4194304)");
   const ReportPicture drawing = libmap::read_picture_bytes("<?xml version='1.0'?><svg></svg>");
   EXPECT_EQ(drawing.media_type, "image/svg+xml");
   EXPECT_EQ(libmap::fit_picture(drawing, libmap::max_picture_level).bytes, drawing.bytes);

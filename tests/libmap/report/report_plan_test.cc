@@ -59,7 +59,7 @@ TEST(ReportPlan, OfAFolder) {
   EXPECT_EQ(plan.count(libmap::ItemKind::table), 1U);
 }
 
-// Of several maps in one folder and below it: each manifest's time counts once.
+// Several maps in a folder and its subfolders: the time of each manifest is counted once.
 TEST(ReportPlan, OfMapsTogether) {
   for (const char* map : {"a.pcd", "b.pcd", "sub/map.pcd", "sub/second.pcd", "sub/c/deep.pcd"}) {
     put(map, "");
@@ -105,7 +105,7 @@ TEST(ReportPlan, ScenesOfGrasp) {
   EXPECT_EQ(items[1].caption, "P10: holds.");
 }
 
-// However the folder is written, its files are named alike.
+// File names do not depend on the notation of the folder.
 TEST(ReportPlan, OfTheCurrentFolder) {
   put("run/a.csv", "x\n1\n");
   put("run/b/c.txt", "");
@@ -123,7 +123,7 @@ TEST(ReportPlan, OfTheCurrentFolder) {
 
 TEST(ReportPlan, OfNothing) {
   EXPECT_NE(std::string(error_of([] { libmap::plan_report(scratch_folder()); }).what())
-                .find("nothing that a report could show"),
+                .find("nothing to report"),
             std::string::npos);
   EXPECT_NE(std::string(error_of([] { libmap::plan_report(scratch_folder() / "no"); }).what())
                 .find("no such folder"),

@@ -56,7 +56,7 @@ TEST(ReportReader, WhatIsBrokenSaysWhy) {
   EXPECT_NE(content.sources[1].error, "");
 }
 
-// Of a picture of a map, and of a file that the run did not write.
+// Includes an image of a map, and a file that the run did not write.
 TEST(ReportReader, FilesAreNamedOnceInTheirOrder) {
   put("inner/map.pcd", "");
   put_manifest("inner/map.pcd", "score");

@@ -53,13 +53,13 @@ TEST(Html, Base64OfTheStandard) {
 }
 
 TEST(Html, Base64IsOfLessThanAGigabyte) {
-  // Pages that nobody touches take no memory.
+  // Memory pages that are not accessed are not allocated.
   constexpr std::size_t size = std::size_t{1} << 30;
   void* const pages = mmap(nullptr, size, PROT_READ, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
   ASSERT_NE(pages, MAP_FAILED);
   const std::string_view bytes(static_cast<const char*>(pages), size);
   EXPECT_STREQ(error_of([&] { libmap::to_base64(bytes); }).what(),
-               "'1073741824 bytes': too large to be put into a page (must be <= 1073741823)");
+               "'1073741824 bytes': too large for a page (must be <= 1073741823)");
   munmap(pages, size);
 }
 
@@ -153,7 +153,7 @@ TEST(Timings, EachStepByEachCase) {
   EXPECT_NE(html.find(">2375.0</td>"), std::string::npos);
 }
 
-// What each search through all of them would take minutes for.
+// A linear search per name would take minutes.
 TEST(Timings, ManySteps) {
   std::vector<std::pair<std::string, std::vector<Manifest>>> cases;
   for (int n = 0; n < 10; ++n) {
@@ -185,7 +185,7 @@ TEST(Parameters, ManyOfSeveralOutputs) {
   const std::size_t row = html.find("<th scope=\"row\">p49999</th>");
   ASSERT_NE(row, std::string::npos);
   EXPECT_NE(html.substr(row, html.find("</tr>", row) - row).find(">4999</td>"), std::string::npos);
-  const std::size_t same = html.find("The same in all");
+  const std::size_t same = html.find("Equal in all");
   ASSERT_NE(same, std::string::npos);
   EXPECT_GT(html.find("<th scope=\"row\">r4999</th>"), same);
 }

@@ -1,4 +1,4 @@
-// Pictures and cameras for MeshLab: what is written, what the pictures show, which are chosen.
+// Images and cameras for MeshLab: files, content of the images, and selection of views.
 
 #include <gmock/gmock.h>
 
@@ -36,7 +36,7 @@ Pose random_pose() {
                             {uniform(-180, 180), uniform(-80, 80), uniform(-180, 180)});
 }
 
-// Bundler's own projection, from the text alone: pixels from the image's middle, y upwards.
+// Bundler's projection by the text: pixels from the image's center, y up.
 struct BundlerCamera {
   double f = 0, k1 = 0, k2 = 0;
   Eigen::Matrix3d rotation;
@@ -85,7 +85,7 @@ TEST(Bundler, PointsFallOnTheirPixels) {
       const Eigen::Vector3d in_camera(uniform(-0.5, 0.5), uniform(-0.4, 0.4), 1.3);
       const Eigen::Vector2d pixel = *project_point(views[n].camera, in_camera);
       const Eigen::Vector2d found = cameras[n].project(views[n].world_from_camera * in_camera);
-      // Pixel centers have whole coordinates: the middle of 200 columns is 99.5.
+      // Pixel centers have whole coordinates: the center of 200 columns is 99.5.
       EXPECT_NEAR(found.x(), pixel.x() - (views[n].camera.width - 1) / 2.0, 1e-9);
       EXPECT_NEAR(-found.y(), pixel.y() - (views[n].camera.height - 1) / 2.0, 1e-9);
     }
@@ -94,7 +94,7 @@ TEST(Bundler, PointsFallOnTheirPixels) {
   EXPECT_EQ(to_bundle_text({}), "# Bundle file v0.3\n0 0\n");
 }
 
-// A smooth picture: the color says where it is.
+// A smooth image whose color is a function of the position.
 ColorImage smooth_picture(int width, int height) {
   ColorImage image(width, height);
   for (int y = 0; y < height; ++y)
@@ -123,14 +123,14 @@ TEST(PinholeImage, ShowsWhatTheLensShowed) {
       for (int x = 0; x < pinhole.width; ++x) {
         const Eigen::Vector3d ray((x - pinhole.cx) / pinhole.fx, (y - pinhole.cy) / pinhole.fy, 1);
         const Eigen::Vector2d at = *project_point(lens, ray);
-        // Nothing is made up: every pixel shows a place of the picture.
+        // Every pixel is from a position inside the source image.
         ASSERT_GE(at.minCoeff(), -1e-6);
         ASSERT_LE(at.x(), lens.width - 1 + 1e-6);
         ASSERT_LE(at.y(), lens.height - 1 + 1e-6);
         ASSERT_NEAR(resampled.at(x, y)[0], 20 + at.x(), 0.7);
         ASSERT_NEAR(resampled.at(x, y)[1], 30 + at.y(), 0.7);
       }
-    // The next larger picture would not fit.
+    // The next larger image would not fit.
     const auto fits = [&](int width, int height) {
       for (const double x : {-(width - 1) / 2.0, 0.0, (width - 1) / 2.0})
         for (const double y : {-(height - 1) / 2.0, 0.0, (height - 1) / 2.0}) {
@@ -171,7 +171,7 @@ TEST(PinholeImage, PixelsThatOnlyMoveAreKept) {
   }
 }
 
-// The greater focal length stretches the image's extent along the other axis beyond any int.
+// The larger focal length would extend the image beyond the range of int along the other axis.
 TEST(PinholeImage, PixelsFarFromSquareTakeNoMoreThanTheImageHas) {
   Camera camera;
   camera.width = camera.height = 64;
@@ -222,13 +222,13 @@ TEST(ViewSelection, KeepsNoTwoAlikeAndOneForEachLeftOut) {
     ASSERT_TRUE(std::any_of(kept.begin(), kept.end(), [&](std::size_t k) {
       return k == n || (resemble(poses[n], poses[k], 0.5, 30) && qualities[k] > qualities[n]);
     })) << n;
-  // The order in which views come does not matter.
+  // The order of the views does not matter.
   std::vector<Pose> reversed(poses.rbegin(), poses.rend());
   std::vector<std::size_t> again = select_views(reversed, {qualities.rbegin(), qualities.rend()});
   for (std::size_t& n : again) n = poses.size() - 1 - n;
   std::reverse(again.begin(), again.end());
   EXPECT_EQ(again, kept);
-  // A turn about the optical axis shows nothing new.
+  // A rotation about the optical axis does not add a view.
   const Pose turned = poses[0] * make_pose_from_rpy({0, 0, 0}, {0, 0, 90});
   EXPECT_EQ(select_views({poses[0], turned}, {1, 1}), std::vector<std::size_t>{0});
   EXPECT_EQ(select_views({poses[0], turned}, {1, 2}), std::vector<std::size_t>{1});

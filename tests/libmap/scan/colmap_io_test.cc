@@ -1,4 +1,4 @@
-// Models of COLMAP: the texts, the cameras, and the points that a scan's depth gives.
+// COLMAP models: texts, cameras, and points from the depth of a scan.
 #include "libmap/poses/colmap_io.h"
 
 #include <gmock/gmock.h>
@@ -30,7 +30,7 @@ Pose random_pose() {
                             {uniform(-180, 180), uniform(-80, 80), uniform(-180, 180)});
 }
 
-// The first image has no feature, the last one no line for them.
+// The first image has no features, the last one no line of features.
 const char* const images_text =
     "# Image list with two lines of data per image:\n"
     "3 1 0 0 0 1 2 3 7 left/a picture, of rocks.jpg\n"
@@ -105,7 +105,7 @@ TEST(ColmapText, NamesTheLineThatIsBroken) {
     const char* part;
   };
   const Case cases[] = {
-      {"1 1 0 0 0 0 0 0 1\n", "line 1", "no image"},
+      {"1 1 0 0 0 0 0 0 1\n", "line 1", "not an image"},
       {"1 0.5 0 0 0 0 0 0 1 a.jpg\n", "line 1", "length 1"},
       {"1 1 0 0 0 0 1e300 0 1 a.jpg\n", "line 1", "1e8"},
       {"1 1 0 0 0 0 inf 0 1 a.jpg\n", "line 1", "finite"},
@@ -141,7 +141,7 @@ TEST(ColmapModel, SaysWhyThereIsNone) {
   EXPECT_THAT(error_of([&] { find_colmap_model(folder); }).what(), HasSubstr("model_converter"));
 }
 
-// COLMAP's own projections, as its documentation of camera models defines them.
+// COLMAP's projections by its documentation of camera models.
 Eigen::Vector2d project_as_colmap(const ColmapCamera& camera, const Eigen::Vector3d& point) {
   const std::vector<double>& p = camera.parameters;
   const double u = point.x() / point.z();
@@ -227,7 +227,7 @@ bool is_on_surface(const Eigen::Vector3d& point) {
   return on_side || std::abs(point.z() - height) < 1e-6;
 }
 
-// Along a ray from 2 m above, to the box's top, its side or the ground.
+// Depth along a ray from 2 m above to the box's top, its side or the ground.
 double depth_of_box(double camera_x, double ray_x) {
   const double to_side = (0.3 - camera_x) / ray_x;
   const bool starts_above_box = camera_x > 0.3;
@@ -305,7 +305,7 @@ TEST(ColmapBuilder, PointsLieOnTheSurfaceAndProjectToTheirPixels) {
   for (const auto& [id, point] : model.points) {
     EXPECT_TRUE(is_on_surface(point.position)) << point.position.transpose();
     seen_thrice += point.track.size() == 3 ? 1 : 0;
-    // Colored by the pixel in the middle of its square.
+    // The color is that of the pixel in the center of its cell.
     const Eigen::Vector2d pixel =
         model.images.at(point.track[0].image).observations[point.track[0].observation].pixel;
     EXPECT_EQ(point.color[0], static_cast<int>(pixel.x()));
@@ -340,7 +340,7 @@ TEST(ColmapBuilder, DepthOfAnotherSizeServesToo) {
   const ColmapModel model = model_of_box(2);
   EXPECT_GT(model.points.size(), 100U);
   expect_consistent(model);
-  // A nearest pixel is half a pixel off, which matters on the box's side alone.
+  // The nearest pixel is half a pixel off, which matters on the box's side only.
   for (const auto& [id, point] : model.points)
     EXPECT_TRUE(is_on_surface(point.position) || std::abs(point.position.x() - 0.3) < 0.03)
         << point.position.transpose();

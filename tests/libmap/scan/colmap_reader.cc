@@ -9,7 +9,7 @@ namespace graspmap_test {
 
 namespace {
 
-// use(words) for each line that is no comment.
+// Calls use(words) for each line that is not a comment.
 template <typename Use>
 void each_line(const std::filesystem::path& path, const Use& use) {
   std::ifstream file(path);

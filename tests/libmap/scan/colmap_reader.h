@@ -1,4 +1,4 @@
-// COLMAP's text models as our own writer leaves them, read back.
+// Reader of COLMAP's text models as written by this project.
 #pragma once
 
 #include <filesystem>
@@ -7,7 +7,7 @@
 
 namespace graspmap_test {
 
-// The folder that find_colmap_model finds.
+// Reads the folder returned by find_colmap_model.
 libmap::ColmapModel read_colmap_model(const std::filesystem::path& path);
 
 }  // namespace graspmap_test

@@ -1,4 +1,4 @@
-// What stands in a database, by SQLite itself.
+// Reads the rows of a database by SQLite itself.
 #pragma once
 
 #include <SQLiteCpp/SQLiteCpp.h>

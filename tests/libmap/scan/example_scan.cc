@@ -62,7 +62,7 @@ void expect_same_link(const libmap::PoseLink& actual, const libmap::PoseLink& ex
   EXPECT_LE((actual.information - expected.information).cwiseAbs().maxCoeff(), tolerance * scale);
 }
 
-// As RTAB-Map does, with the last localization at the last of them.
+// As in RTAB-Map, with the last localization at the last pose.
 void store_optimized_poses(const std::filesystem::path& path,
                            const std::map<int, Pose>& map_from_base) {
   if (map_from_base.empty()) return;
@@ -168,7 +168,7 @@ void expect_same_camera(const libmap::Camera& actual, const libmap::Camera& expe
   EXPECT_NEAR(actual.cy, expected.cy, tolerance);
   EXPECT_EQ(actual.distortion_model, expected.distortion_model);
   EXPECT_EQ(actual.distortion, expected.distortion);
-  // Rotations are made proper again when they are read: float32's rounding goes away.
+  // Reading makes rotations proper, which removes float32's rounding.
   expect_same_pose(actual.base_from_camera, expected.base_from_camera, 1e-7);
 }
 

@@ -17,13 +17,13 @@ struct ExampleScan {
   std::map<int, libmap::RgbdFrame> frames{};  // by node
 };
 
-// Numbers that float32 holds exactly, and whole millimeters: nothing is lost in a database.
+// Numbers that are exact in float32, and whole millimeters: a database preserves them.
 libmap::Pose random_float_pose();
 libmap::Camera example_camera(int width, int height);
 libmap::ColorImage random_color(int width, int height);
-libmap::DepthImage random_depth(int width, int height);  // 0 here and there
+libmap::DepthImage random_depth(int width, int height);  // some pixels are 0
 
-// Nodes 1, 2, 5 and 9 in two sessions with everything that a node can hold; links of several types.
+// Nodes 1, 2, 5 and 9 in two sessions with all attributes of a node; links of several types.
 ExampleScan example_scan();
 
 void write_database(const std::filesystem::path& path, const ExampleScan& scan,

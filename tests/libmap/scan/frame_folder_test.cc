@@ -48,7 +48,7 @@ TEST(FrameFolder, GivesBackWhatWasWritten) {
   EXPECT_EQ(counts.associations, 4U);
   const FrameFolder read(folder);
   EXPECT_EQ(read.warnings(), std::vector<std::string>());
-  // A quaternion in between: not to the last digit, and no longer float32's.
+  // Poses are stored as quaternions: not exact to the last digit of float32.
   graspmap_test::expect_same_graph(read.graph(), scan.graph, 2e-7);
   for (const auto& [id, frame] : scan.frames) {
     SCOPED_TRACE("node " + std::to_string(id));
@@ -77,7 +77,7 @@ TEST(FrameFolder, KeepsStoredImageFilesByteForByte) {
   writer.finish(scan.graph);
   EXPECT_EQ(graspmap_test::read_text(folder / "color/000001.jpg"), jpeg);
   EXPECT_TRUE(FrameFolder(folder).read_frame(1).color == libmap::decode_color(jpeg));
-  // The other nodes are there without images.
+  // The other nodes have no images.
   const libmap::RgbdFrame empty = FrameFolder(folder).read_frame(2);
   EXPECT_TRUE(empty.color.empty());
   EXPECT_TRUE(empty.depth.empty());
@@ -118,7 +118,7 @@ TEST(FrameFolder, KeepsNodesOfTheSameStampApart) {
   graspmap_test::expect_same_graph(FrameFolder(folder).graph(), scan.graph, 2e-7);
 }
 
-// A node without a pose does not get that of its neighbor in time.
+// A node without a pose does not get the pose of its neighbor in time.
 TEST(FrameFolder, KeepsNodesOfNearStampsApart) {
   ExampleScan scan = graspmap_test::example_scan();
   double stamp_s = 5.0;
@@ -147,7 +147,7 @@ TEST(FrameFolder, ReadsOnlyThePartsThatAreAskedFor) {
   EXPECT_EQ(error.context().field, "node 5: depth");
 }
 
-// A folder as the TUM benchmark has it: images of other times and names, the camera's poses.
+// A folder in the TUM benchmark's layout: images of other times and names, poses of the camera.
 class TumFolder : public testing::Test {
  protected:
   fs::path folder_ = new_folder();
@@ -202,14 +202,14 @@ TEST_F(TumFolder, PairsListsOfImagesByTime) {
   EXPECT_TRUE(frame.color == libmap::decode_color(graspmap_test::read_text(folder_ / "rgb/b.png")));
   ASSERT_EQ(frame.cameras.size(), 1U);
   graspmap_test::expect_same_camera(frame.cameras[0], camera_);
-  // 5000 units a meter; 65535 is no measurement.
+  // 5000 units per meter; 65535 is not a measurement.
   const libmap::MillimeterImage& units = depth_.at("y.png");
   EXPECT_EQ(frame.depth.pixels[0], 0.0F);
   for (std::size_t i = 1; i < units.pixels.size(); ++i)
     EXPECT_FLOAT_EQ(frame.depth.pixels[i], static_cast<float>(units.pixels[i]) / 5000.0F);
 }
 
-// The stamps of arrival jitter by 8 ms; the phase of the two cameras is 5 ms, then -16 ms.
+// The arrival stamps jitter by 8 ms; the phase of the two cameras is 5 ms, then -16 ms.
 TEST_F(TumFolder, SmoothsTheDelayOfDepthByItsStamps) {
   write_pair();
   std::string color;
@@ -275,7 +275,7 @@ TEST_F(TumFolder, InterpolatesBetweenPosesThatAreNear) {
     write_text(folder_ / "poses.tum", text);
     return FrameFolder(folder_).graph().nodes.at(0).odometry_from_base;
   };
-  // A quarter of the way, and of the quarter turn.
+  // A quarter of the distance, and of the quarter turn.
   const auto between = odometry_with("3.495 0 0 0 0 0 0 1\n3.515" + turned);
   ASSERT_TRUE(between);
   EXPECT_TRUE(between->isApprox(libmap::make_pose_from_rpy({1, 0, 0}, {0, 0, 22.5}), 1e-5));
@@ -321,7 +321,7 @@ TEST_F(TumFolder, RegistersADepthCameraToColor) {
     const auto ray = libmap::pixel_to_ray(seen_by, Eigen::Vector2d(x, 7));
     const auto pixel =
         libmap::project_point(depth_camera, 2.0 * ray->homogeneous() - Eigen::Vector3d(0.4, 0, 0));
-    // But for a pixel of rounding.
+    // Except for one pixel of rounding.
     const bool inside = pixel->x() > 0.5 && pixel->x() < 18.5;
     const bool outside = pixel->x() < -1.5 || pixel->x() > 20.5;
     if (inside || outside) {
@@ -383,7 +383,7 @@ TEST_F(TumFolder, RefusesDepthOfAnotherAspectRatio) {
   EXPECT_EQ(error.context().field, "node 1: depth");
   EXPECT_EQ(error.context().value, "30 x 40");
   EXPECT_NE(error.context().bound.find("40 x 30"), std::string::npos);
-  // Another size of the same ratio, but for rounding, is no fault.
+  // Another size of the same aspect ratio within rounding is valid.
   write_text(folder_ / "depth/1.png", libmap::encode_png(libmap::MillimeterImage(53, 40)));
   EXPECT_EQ(read.read_frame(1).depth.width, 53);
 }
@@ -392,7 +392,7 @@ TEST_F(TumFolder, NamesTheCellThatIsNoNumber) {
   const std::map<std::string, std::string> refusals{
       {"node,stamp_s,baseline_m\n1,5,0.1 x\n", "row 1, column baseline_m is 0.1 x: not a number"},
       {"node,stamp_s,gps\n1,5,1 2 3 4 5 inf\n", "row 1, column gps is 1 2 3 4 5 inf: not a number"},
-      {"node,stamp_s\n7,5\n0,6\n", "row 2, column node is 0: no number of a node (must be > 0)"},
+      {"node,stamp_s\n7,5\n0,6\n", "row 2, column node is 0: not a node number (must be > 0)"},
       {"node,stamp_s\n1,nan\n", "row 1, column stamp_s is nan: not a number of seconds"},
       {"node,stamp_s,session\n1,5,2147483648\n",
        "row 1, column session is 2147483648: not a whole number (must be of 32 bits)"},
@@ -414,8 +414,7 @@ TEST_F(TumFolder, DropsLinksOfMissingNodes) {
   write_text(folder_ / "scan.yaml", "pose_frame: base\n");
   const FrameFolder read(folder_);
   EXPECT_EQ(read.graph().links.size(), 1U);
-  EXPECT_EQ(read.warnings(),
-            std::vector<std::string>{"links.g2o: 1 link of nodes that are not there"});
+  EXPECT_EQ(read.warnings(), std::vector<std::string>{"links.g2o: 1 link of missing nodes"});
 }
 
 TEST_F(TumFolder, DropsLinksOfANodeToItself) {
@@ -452,7 +451,7 @@ TEST(FrameFolderError, OfFoldersThatCannotBeMade) {
     const libmap::Error error =
         graspmap_test::error_of([&] { libmap::FrameFolderWriter writer(place); });
     EXPECT_EQ(error.context().file, (place / "color").string());
-    EXPECT_EQ(error.reason().find("cannot be made: "), 0U) << error.what();
+    EXPECT_EQ(error.reason().find("cannot be created: "), 0U) << error.what();
     EXPECT_EQ(error.kind(), libmap::ErrorKind::failed);
   }
 }

@@ -59,7 +59,7 @@ TEST(JoinedScan, HasAllNodesSessionsLinksAndFrames) {
   }
   EXPECT_EQ(error_of([&] { joined->read_frame(2000); }).context().field, "node");
   EXPECT_EQ(error_of([&] { joined->read_frame(-3); }).context().field, "node");
-  // A folder of databases is the same, in the order of their names.
+  // A folder of databases is joined in the order of their names.
   const auto by_folder = libmap::open_scan(folder);
   ASSERT_EQ(by_folder->graph().nodes.size(), 2 * count);
   EXPECT_EQ(by_folder->graph().nodes.back().id, graph.nodes.back().id);

@@ -59,7 +59,7 @@ TEST(LaserScan, WhatIsBroken) {
     std::string info = info_76(5);
     info.replace(24, 4, bytes_of(std::vector<float>{points}));
     EXPECT_EQ(error_of([&] { libmap::check_laser_scan(blob, info); }).reason(),
-              "scan_info contains no number of points");
+              "invalid number of points in scan_info");
   }
   error_of([&] { libmap::check_laser_scan(scan_blob(9, std::vector<float>(9, 1.0F)), ""); });
 }

@@ -39,8 +39,8 @@ TEST(PictureFile, NodesWithoutColorOrCalibrationAreNamed) {
   const auto refusal_of = [&](int node) {
     return std::string(error_of([&] { libmap::read_pictures(scan, node, {}); }).what());
   };
-  EXPECT_EQ(refusal_of(1), file.string() + ": node 1: it has no color image");
-  EXPECT_EQ(refusal_of(2), file.string() + ": node 2: it has no calibration");
+  EXPECT_EQ(refusal_of(1), file.string() + ": node 1: has no color image");
+  EXPECT_EQ(refusal_of(2), file.string() + ": node 2: has no calibration");
 }
 
 }  // namespace picture_file_test

@@ -1,4 +1,4 @@
-// Poses of files for the frames of a scan.
+// Import of pose files for the frames of a scan.
 #include "libmap/scan/pose_import.h"
 
 #include <gmock/gmock.h>
@@ -77,7 +77,7 @@ struct Image {
 
 fs::path write_model(const std::vector<Image>& images, double unit_m = 1.0) {
   libmap::ColmapModel model;
-  model.cameras[1] = {"FOV", 640, 480, {1, 2, 3, 4, 5}};  // of no matter here
+  model.cameras[1] = {"FOV", 640, 480, {1, 2, 3, 4, 5}};  // not used
   int id = 0;
   for (const Image& image : images) {
     Pose in_units = image.world_from_camera;
@@ -119,7 +119,7 @@ TEST(PoseImport, ImagesOfColmapByTheirNumbers) {
 
 TEST(PoseImport, ImagesOfColmapByTheScansOwnNamesAndByStamps) {
   RigScan scan;
-  // A name that looks like another node's number: the scan's own name counts.
+  // The scan's own file name has priority over a name that equals another node's number.
   scan.names() = {{3, "4.jpg"}, {4, "DSC 01, b.jpg"}};
   const fs::path folder = write_model({{"4.jpg", scan.camera(0)},
                                        {"x/DSC 01, b.jpg", scan.camera(0)},
@@ -135,8 +135,8 @@ TEST(PoseImport, CamerasThatTheRigHasNotAreLeftOut) {
   const fs::path folder = write_model({{"3.jpg", random_pose()}, {"4_2.jpg", random_pose()}});
   const libmap::ImportedPoses imported = libmap::import_poses(folder, scan);
   EXPECT_THAT(nodes_of(imported), ElementsAre(3));
-  EXPECT_THAT(imported.warnings, ElementsAre("scan: node 4 is camera 2: has no such camera (must "
-                                             "be < 2); its pose is left out"));
+  EXPECT_THAT(imported.warnings, ElementsAre("scan: node 4 is camera 2: no such camera (must "
+                                             "be < 2); its pose is dropped"));
 }
 
 TEST(PoseImport, CamerasOfOneNodeGiveTheMean) {
@@ -156,7 +156,7 @@ TEST(PoseImport, CamerasOfOneNodeGiveTheMean) {
   EXPECT_EQ(imported.trajectory.foreign, 0U);
 }
 
-// What is scaled are the cameras' places, not the way from a camera to the base.
+// The scale applies to the positions of the cameras, not to the offset from a camera to the base.
 TEST(PoseImport, ScalesTheUnitsOfTheFile) {
   RigScan scan;
   const Pose elsewhere = random_pose();
@@ -173,7 +173,7 @@ TEST(PoseImport, ScalesTheUnitsOfTheFile) {
       EXPECT_TRUE(pose.world_from_base.isApprox(
           elsewhere * *scan.graph().find_node(pose.node)->odometry_from_base, 1e-11));
   }
-  // Without odometry the stored poses serve; without both there is nothing to compare with.
+  // Without odometry, the stored poses are used; without both, the scale is undetermined.
   for (libmap::GraphNode& node : scan.graph().nodes) {
     scan.graph().optimized_map_from_base[node.id] = *node.odometry_from_base;
     node.odometry_from_base.reset();
@@ -197,7 +197,7 @@ TEST(PoseImport, PosesOfTheCameraBecomeThoseOfTheBase) {
   scaled.translation() *= 2.0;
   EXPECT_TRUE(imported.trajectory.poses[1].world_from_base.isApprox(
       scaled * scan.camera(0).inverse(), 1e-12));
-  // The one whose calibration cannot be read.
+  // Node 130, whose calibration cannot be read.
   EXPECT_EQ(imported.trajectory.foreign, 1U);
   ASSERT_EQ(imported.warnings.size(), 1U);
   EXPECT_THAT(imported.warnings[0], HasSubstr("node 130"));
@@ -296,7 +296,7 @@ TEST(PoseImport, NamesTheFileThatIsOfNoUse) {
               HasSubstr("contains no pose"));
 }
 
-// The stored poses of a real scan, by each format, back to the digit of its float32.
+// Round trip of a real scan's stored poses by each format, to the precision of float32.
 TEST(PoseImport, RealScanThroughEveryFormat) {
   GRASPMAP_REQUIRE_DATA();
   const libmap::RtabmapDatabase scan(graspmap_test::data_folder() / "scans" / "site_full.db");

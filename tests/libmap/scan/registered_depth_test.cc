@@ -1,4 +1,4 @@
-// Depth that a calibration registers to color, against the plane that was measured.
+// Depth that a calibration registers to color, compared with the measured plane.
 #include <gtest/gtest.h>
 
 #include <algorithm>

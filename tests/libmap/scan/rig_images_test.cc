@@ -81,7 +81,7 @@ TEST(RigImages, BadFoldersAreNamed) {
   };
   EXPECT_THAT(said(scratch_folder() / "none"), HasSubstr("no such folder"));
   touch(scratch_folder() / "file");
-  EXPECT_THAT(said(scratch_folder() / "file"), HasSubstr("is no folder"));
+  EXPECT_THAT(said(scratch_folder() / "file"), HasSubstr("not a folder"));
   fs::create_directories(scratch_folder() / "empty" / "left");
   EXPECT_THAT(said(scratch_folder() / "empty"), HasSubstr("no image"));
   touch(scratch_folder() / "odd" / "left" / "first.png");
@@ -123,7 +123,7 @@ TEST(SynchronizedSets, FullestThenTightestThenEarliest) {
   const SynchronizedSet set = fullest_synchronized_set(images, 3, 0.02);
   EXPECT_EQ(set.seen(), 3U);
   EXPECT_EQ(set.stamp_s, 3.001);
-  // An oracle: no stamp of an image does better.
+  // Oracle: no other stamp of an image has more cameras.
   for (const RigImage& image : images)
     EXPECT_LE(synchronized_set_at(images, 3, image.stamp_s, 0.02).seen(), 3U);
   EXPECT_THROW(fullest_synchronized_set({}, 3, 0.02), libmap::Error);
@@ -132,7 +132,7 @@ TEST(SynchronizedSets, FullestThenTightestThenEarliest) {
 TEST(SynchronizedSets, FullestAgreesWithLookingAtEveryStamp) {
   for (int round = 0; round < 200; ++round) {
     std::vector<RigImage> images;
-    // Stamps that many images share, and ties to both sides.
+    // Stamps of several images, and ties on both sides.
     for (int n = 0; n < 40; ++n)
       images.push_back({static_cast<std::size_t>(graspmap_test::uniform(0, 3.99)),
                         0.25 * std::floor(graspmap_test::uniform(0, 60)),
@@ -160,7 +160,8 @@ TEST(SynchronizedSets, FullestAgreesWithLookingAtEveryStamp) {
   }
 }
 
-// As many as a bag of 100 kB may hold, all within the tolerance: minutes in cubic time.
+// As many images as a bag of 100 kB can contain, all within the tolerance: cubic time would take
+// minutes.
 TEST(SynchronizedSets, OfVeryManyImagesOfOneMoment) {
   std::vector<RigImage> images;
   for (std::size_t n = 0; n < 3'000; ++n)
@@ -198,7 +199,7 @@ TEST(SynchronizedSets, EachImageIsInOneMoment) {
   for (std::size_t camera = 0; camera < 4; ++camera)
     for (int n = 0; n < 60; ++n)
       images.push_back({camera, 0.1 * n + graspmap_test::uniform(0, 0.05), {}});
-  // In any order, and some of them missing.
+  // Images in any order, some of them missing.
   std::shuffle(images.begin(), images.end(), graspmap_test::random_engine());
   images.resize(200);
   for (const double tolerance : {0.0, 0.02, 0.05, 1.0}) {

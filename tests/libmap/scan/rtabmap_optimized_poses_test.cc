@@ -30,7 +30,7 @@ using libmap::Pose;
 
 fs::path scratch(const std::string& name) { return graspmap_test::scratch_folder() / name; }
 
-// Every row of every table but Admin.
+// All rows of all tables except Admin.
 std::map<std::string, Rows> tables_of(const fs::path& path) {
   SQLite::Database database = open_database(path);
   std::map<std::string, Rows> tables;
@@ -87,7 +87,7 @@ TEST(CopyWithOptimizedPoses, MovesTheLastLocalizationWithItsNode) {
             (Rows{{"NULL", "NULL", "NULL"}}));
 }
 
-// What RTAB-Map made with the earlier poses, it would show with the new ones.
+// RTAB-Map would show its map of the earlier poses with the new poses.
 TEST(CopyWithOptimizedPoses, DropsTheStoredMap) {
   const ExampleScan scan = graspmap_test::example_scan();
   write_database(scratch("a.db"), scan);
@@ -114,7 +114,7 @@ TEST(CopyWithOptimizedPoses, LandmarksMoveWithTheNodeThatSeesThem) {
   const Pose landmark = graspmap_test::random_float_pose();
   scan.graph.optimized_map_from_base[-3] = landmark;
   scan.graph.links.push_back({.from = 9, .to = -3, .type = libmap::LinkType::landmark});
-  // Seen by no node that has a pose.
+  // No node with a pose sees this landmark.
   scan.graph.optimized_map_from_base[-4] = landmark;
   scan.graph.links.push_back({.from = 5, .to = -4, .type = libmap::LinkType::landmark});
   write_database(scratch("a.db"), scan);
@@ -145,7 +145,7 @@ TEST(CopyWithOptimizedPoses, NewRowsHaveTheFormOfRealOnes) {
   link.from_from_to = graspmap_test::random_float_pose();
   link.information(0, 5) = link.information(5, 0) = 0.25;
   libmap::copy_with_optimized_poses(source, scratch("b.db"), graph.optimized_map_from_base, {link});
-  // The same ids and poses: the same matrices, whatever the compression made of them.
+  // Equal ids and poses: equal matrices, although their compression can differ.
   const char* trailers =
       "SELECT hex(substr(opt_ids, -12)), hex(substr(opt_poses, -12)), "
       "typeof(opt_last_localization), length(opt_last_localization) FROM Admin";
@@ -164,7 +164,7 @@ TEST(CopyWithOptimizedPoses, NewRowsHaveTheFormOfRealOnes) {
   EXPECT_EQ(query(scratch("b.db"), "PRAGMA foreign_key_check"), Rows{});
 }
 
-// One bit more on one side of the diagonal, as sums of products leave it, and g2o drops the graph.
+// g2o drops a graph whose matrices differ by one bit across the diagonal, as by sums of products.
 TEST(CopyWithOptimizedPoses, WrittenInformationIsExactlySymmetric) {
   ExampleScan scan = graspmap_test::example_scan();
   libmap::PoseLink link = scan.graph.links.front();
@@ -172,7 +172,7 @@ TEST(CopyWithOptimizedPoses, WrittenInformationIsExactlySymmetric) {
   link.information(4, 1) = 1234.25;
   scan.graph.links.front() = link;
   write_database(scratch("a.db"), scan);
-  link.from = 1;  // not linked with it yet
+  link.from = 1;  // no link to it yet
   link.to = 5;
   libmap::copy_with_optimized_poses(scratch("a.db"), scratch("b.db"), {}, {link});
   std::size_t tilted = 0;
@@ -203,7 +203,7 @@ TEST(CopyWithOptimizedPoses, CopiesADatabaseThatIsOpenElsewhere) {
     other.exec("PRAGMA journal_mode = " + mode);
     libmap::SqliteFile(scratch("a.db")).copy_to(scratch("plain.db"));
     EXPECT_EQ(query(scratch("plain.db"), "PRAGMA journal_mode"), (Rows{{"3:delete"}}));
-    // Begun and not committed: the copy must not see it.
+    // Not committed: the copy must not contain it.
     other.exec("BEGIN IMMEDIATE; UPDATE Node SET map_id = 77;");
     libmap::copy_with_optimized_poses(scratch("a.db"), scratch("b.db"), {{9, Pose::Identity()}});
     other.exec("ROLLBACK");
@@ -228,7 +228,7 @@ TEST(CopyWithOptimizedPoses, RefusesWhatHasNoPlaceForThem) {
         "INSERT INTO Admin VALUES ('0.11.8')");
   }
   for (const auto& [name, reason] : std::map<std::string, std::string>{
-           {"other.db", "no scan of RTAB-Map"}, {"old.db", "before 0.13"}}) {
+           {"other.db", "not an RTAB-Map database"}, {"old.db", "before 0.13"}}) {
     const libmap::Error error = graspmap_test::error_of([&, &name = name] {
       libmap::copy_with_optimized_poses(scratch(name), scratch("b.db"), {});
     });
@@ -236,11 +236,11 @@ TEST(CopyWithOptimizedPoses, RefusesWhatHasNoPlaceForThem) {
   }
 }
 
-// Pages that can be read and not be written: what SQLite then says is the source's fault.
+// Pages that can be read but not written: SQLite's error is reported for the source.
 TEST(CopyWithOptimizedPoses, ABrokenSourceIsNamed) {
   write_database(scratch("a.db"), graspmap_test::example_scan());
   std::fstream file(scratch("a.db"), std::ios::in | std::ios::out | std::ios::binary);
-  file.seekp(20).put('\xff');  // bytes of each page that are not used
+  file.seekp(20).put('\xff');  // unused bytes of each page
   file.close();
   const libmap::Error error = graspmap_test::error_of([&] {
     libmap::copy_with_optimized_poses(scratch("a.db"), scratch("b.db"), {{1, Pose::Identity()}});
@@ -261,19 +261,19 @@ TEST(CopyWithOptimizedPoses, RefusesTablesOfAnotherForm) {
     return std::string(error.what()).substr(scratch("a.db").string().size());
   };
   EXPECT_EQ(refusal_of("INSERT INTO Admin (version) VALUES ('0.23.0')"),
-            ": rows of table Admin is 2: is no RTAB-Map database (must be 1)");
+            ": rows of table Admin is 2: not an RTAB-Map database (must be 1)");
   EXPECT_EQ(refusal_of("DELETE FROM Admin"),
-            ": rows of table Admin is 0: is no RTAB-Map database (must be 1)");
+            ": rows of table Admin is 0: not an RTAB-Map database (must be 1)");
   EXPECT_EQ(refusal_of("DROP TABLE Link; CREATE TABLE Link (from_id INTEGER, to_id INTEGER, "
                        "type INTEGER, variance FLOAT, transform BLOB)"),
-            ": has no place for links with information matrices: RTAB-Map before 0.13 made it");
+            ": cannot store information matrices of links: created by RTAB-Map before 0.13");
 }
 
 TEST(CopyWithOptimizedPoses, ReportsAFullDisk) {
   write_database(scratch("a.db"), graspmap_test::example_scan());
   std::map<int, Pose> landmarks;
   for (int id = -2000; id < 0; ++id) landmarks[id] = graspmap_test::random_float_pose();
-  // While the file is copied, and when more is written into the copy.
+  // Failures while the file is copied, and while the copy is changed.
   for (const std::uintmax_t bytes : {std::uintmax_t{8192}, fs::file_size(scratch("a.db"))}) {
     const libmap::Error error = graspmap_test::error_of([&] {
       const graspmap_test::FileSizeLimit limit(bytes);

@@ -63,16 +63,16 @@ TEST(RtabmapReader, LinksThatCannotBeUsedAreNamed) {
   insert("2, 3, 2", identity.substr(1), good);
   insert("2, 3, 3", identity, good.substr(8));
   insert("2, 3, 4", identity, bytes_of(std::vector<double>(36, INFINITY)));
-  insert("2, 3, 5", std::string(48, '\0'), good);  // null: odometry was lost
-  insert("2, 3, 12", identity, good);              // a type to come
+  insert("2, 3, 5", std::string(48, '\0'), good);  // null: lost odometry
+  insert("2, 3, 12", identity, good);              // a future type
   const RtabmapDatabase scan(file);
   EXPECT_EQ(scan.graph().links.size(), 2U);
   ASSERT_EQ(scan.warnings().size(), 7U);
-  EXPECT_EQ(scan.warnings()[0], "link 1 -> 77: is left out: node 77 is not there");
+  EXPECT_EQ(scan.warnings()[0], "link 1 -> 77: dropped: node 77 is missing");
   EXPECT_NE(scan.warnings()[2].find("not finite"), std::string::npos);
 }
 
-// Before 0.13 a link has variances in place of a matrix.
+// Before 0.13, a link has variances instead of a matrix.
 TEST(RtabmapReader, LinksWithoutAVarianceAreNamed) {
   const fs::path file = sample_file({12, 0});
   const std::size_t links = RtabmapDatabase(file).graph().links.size();
@@ -81,11 +81,11 @@ TEST(RtabmapReader, LinksWithoutAVarianceAreNamed) {
   const RtabmapDatabase scan(file);
   EXPECT_EQ(scan.graph().links.size(), links - 1);
   EXPECT_EQ(scan.warnings(),
-            (std::vector<std::string>{"link 1 -> 2: is left out: variance that is not above 0",
-                                      "link 2 -> 1: is left out: variance that is not above 0"}));
+            (std::vector<std::string>{"link 1 -> 2: dropped: variance is not > 0",
+                                      "link 2 -> 1: dropped: variance is not > 0"}));
   execute(file, "UPDATE Link SET rot_variance = 1e-310 WHERE from_id = 1 AND to_id = 2");
   EXPECT_EQ(RtabmapDatabase(file).warnings().front(),
-            "link 1 -> 2: is left out: variance so small that its reciprocal is beyond 1e300");
+            "link 1 -> 2: dropped: reciprocal of the variance exceeds 1e300");
 }
 
 TEST(RtabmapReader, NodesThatCannotBeUsedAreNamed) {
@@ -100,7 +100,7 @@ TEST(RtabmapReader, NodesThatCannotBeUsedAreNamed) {
   ASSERT_EQ(scan.graph().nodes.size(), 3U);
   for (const libmap::GraphNode& node : scan.graph().nodes)
     EXPECT_FALSE(node.odometry_from_base) << node.id;
-  EXPECT_EQ(scan.warnings().size(), 4U);  // a null pose is none
+  EXPECT_EQ(scan.warnings().size(), 4U);  // a null pose counts as missing
 }
 
 fs::path database_of(const std::vector<std::string>& statements) {
@@ -119,7 +119,7 @@ TEST(RtabmapReader, NodesThatAreThereTwice) {
   EXPECT_NE(scan.warnings()[0].find("more than once"), std::string::npos);
 }
 
-// SQLite sorts texts by their letters: 1, 10, 2.
+// SQLite sorts texts alphabetically: 1, 10, 2.
 TEST(RtabmapReader, NodesWhoseNumbersAreTexts) {
   const RtabmapDatabase scan(database_of(
       {"CREATE TABLE Node (id TEXT, label TEXT)",
@@ -127,7 +127,7 @@ TEST(RtabmapReader, NodesWhoseNumbersAreTexts) {
   ASSERT_EQ(scan.graph().nodes.size(), 3U);
   for (const int id : {1, 2, 10}) EXPECT_NE(scan.graph().find_node(id), nullptr) << id;
   EXPECT_EQ(scan.graph().find_node(10)->label, "ten");
-  EXPECT_EQ(scan.graph().find_node(2)->label, "two");  // a table could not hold the rest
+  EXPECT_EQ(scan.graph().find_node(2)->label, "two");  // cut at the zero character
 }
 
 TEST(RtabmapReader, ValuesThatASchemaMakesUpAreNotRead) {
@@ -138,18 +138,18 @@ TEST(RtabmapReader, ValuesThatASchemaMakesUpAreNotRead) {
   EXPECT_TRUE(scan.read_frame(1).color.pixels.empty());
 }
 
-// What no file of poses or links could give back.
+// Values that no file of poses or links could represent.
 TEST(RtabmapReader, PosesAndInformationBeyondAllBounds) {
   std::vector<float> pose = {1, 0, 0, 3e38F, 0, 1, 0, 0, 0, 0, 1, 0};
   EXPECT_EQ(error_of([&] { libmap::decode_pose(bytes_of(pose)); }).reason(),
-            "pose that lies beyond 1e8 m of the origin");
+            "pose is more than 1e8 m from the origin");
   pose[3] = 9e7F;
   EXPECT_TRUE(libmap::decode_pose(bytes_of(pose)));
   for (const double entry : {1e308, -1e308, static_cast<double>(NAN)}) {
     std::vector<double> information(36, 0.0);
     information[20] = entry;
     EXPECT_EQ(error_of([&] { libmap::decode_information(bytes_of(information)); }).reason(),
-              "information matrix that is not finite, or beyond 1e300");
+              "information matrix is not finite or exceeds 1e300");
   }
 }
 
@@ -195,11 +195,11 @@ TEST(RtabmapReader, OptimizedPosesThatDoNotFitTheirIdsAreLeftOut) {
     EXPECT_TRUE(scan.graph().optimized_map_from_base.empty());
     return scan.warnings();
   };
+  EXPECT_EQ(warnings_with(libmap::MatrixElement::float32, 3),
+            std::vector<std::string>{"Admin.opt_poses: the matrices are not of int32 and float32"});
   EXPECT_EQ(
-      warnings_with(libmap::MatrixElement::float32, 3),
-      std::vector<std::string>{"Admin.opt_poses: matrices of other types than int32 and float32"});
-  EXPECT_EQ(warnings_with(libmap::MatrixElement::int32, 2),
-            std::vector<std::string>{"Admin.opt_poses: '2 and 3': other numbers of ids and poses"});
+      warnings_with(libmap::MatrixElement::int32, 2),
+      std::vector<std::string>{"Admin.opt_poses: '2 and 3': the numbers of ids and poses differ"});
 }
 
 // ----------------------------------------------------------------------------------------- frames
@@ -214,7 +214,7 @@ TEST(RtabmapReader, PartsThatAreNotAskedForAreLeftOut) {
   EXPECT_EQ(none.cameras.at(0).width, 32);
 }
 
-// The size of a camera that stores none stands in the image's header, however long that is.
+// A camera without a stored size has that of the image's header, which can be long.
 TEST(RtabmapReader, SizesFromAnImageWithALongHeader) {
   const fs::path file = sample_file({10, 7});
   std::string jpeg = libmap::encode_jpeg(sample_color(1));
@@ -336,7 +336,7 @@ TEST(RtabmapReader, StoredMap) {
   EXPECT_EQ(map.preview->width, 32);
 }
 
-// Inflated, they would take gigabytes.
+// Decompressed, they would take gigabytes.
 TEST(RtabmapReader, OptimizedPosesAreCountedBeforeTheyAreInflated) {
   const fs::path file = sample_file();
   const auto claims = [](std::int32_t columns, std::int32_t type) {
@@ -344,9 +344,9 @@ TEST(RtabmapReader, OptimizedPosesAreCountedBeforeTheyAreInflated) {
   };
   for (const auto& [ids, poses, reason] :
        {std::tuple{claims(1000, 4), claims(11999, 5),
-                   "'1000 and 999': other numbers of ids and poses"},
-        {claims(1000, 4), claims(12001, 5), "'1000 and 1000': other numbers of ids and poses"},
-        {claims(1000, 5), claims(12000, 5), "matrices of other types than int32 and float32"}}) {
+                   "'1000 and 999': the numbers of ids and poses differ"},
+        {claims(1000, 4), claims(12001, 5), "'1000 and 1000': the numbers of ids and poses differ"},
+        {claims(1000, 5), claims(12000, 5), "the matrices are not of int32 and float32"}}) {
     execute(file, "UPDATE Admin SET opt_ids = ?, opt_poses = ?", {ids, poses});
     const RtabmapDatabase scan(file);
     EXPECT_EQ(scan.warnings(),
@@ -365,7 +365,7 @@ TEST(RtabmapReader, PolygonsOfSeveralMaterials) {
     return RtabmapDatabase(file).stored_map().polygons;
   };
   EXPECT_EQ(polygons({1, 0, 1, 2, 0, 2, 3, 4, 5, 6, 7, 8}, 3), 3U);
-  // More than a piece of what is inflated at a time.
+  // Larger than one piece of decompression.
   std::vector<std::int32_t> many(1 + 3 * 30000, 7);
   many[0] = 30000;
   EXPECT_EQ(polygons(many, 3), 30000U);
@@ -412,7 +412,7 @@ TEST(RtabmapReader, RealDatabases) {
   }
 }
 
-// RTAB-Map's own encoder and ours write the same bytes.
+// RTAB-Map's encoder and this project's write equal bytes.
 TEST(RtabmapReader, RealRvlAndCalibrationsKeepTheirBytes) {
   GRASPMAP_REQUIRE_DATA();
   for (const char* name : {"site_tiny_q.db", "site_tiny_v0160.db", "site_killed.db"}) {

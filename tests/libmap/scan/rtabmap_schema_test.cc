@@ -1,4 +1,4 @@
-// Databases of every version, told apart by their tables, read alike.
+// Databases of all versions are recognized by their tables and read alike.
 #include <gtest/gtest.h>
 
 #include <string>
@@ -138,10 +138,9 @@ TEST(RtabmapSchema, WhatComesAfterTodayIsNamed) {
   execute(file, "CREATE TABLE Smell (id INTEGER)");
   execute(file, "CREATE TABLE \"odd \"\"name(\" (id INTEGER)");
   const RtabmapDatabase scan(file);
-  EXPECT_EQ(scan.warnings(),
-            (std::vector<std::string>{"Data.hologram is not known and is not read",
-                                      "Smell is not known and is not read",
-                                      "odd \"name( is not known and is not read"}));
+  EXPECT_EQ(scan.warnings(), (std::vector<std::string>{"Data.hologram is unknown and ignored",
+                                                       "Smell is unknown and ignored",
+                                                       "odd \"name( is unknown and ignored"}));
   EXPECT_EQ(scan.read_frame(1).color, sample_color(1));
 }
 
@@ -173,7 +172,7 @@ TEST(RtabmapSchema, ImagesInTablesOfTheirOwn) {
   EXPECT_EQ(scan.read_frame(1).depth, libmap::to_meters(sample_depth(1)));
   EXPECT_EQ(scan.read_frame(1).cameras.at(0).fy, 31);
   EXPECT_EQ(scan.read_frame(1).cameras.at(0).width, 32);
-  // A second focal length below 1 is a baseline.
+  // An fy below 1 is a baseline.
   EXPECT_EQ(scan.read_frame(2).stereo.at(0).baseline_m, 0.125);
   EXPECT_EQ(scan.read_frame(2).right.at(0, 0), 9);
   EXPECT_TRUE(scan.read_frame(3).cameras.empty());

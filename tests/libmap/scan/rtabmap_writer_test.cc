@@ -143,14 +143,14 @@ TEST(RtabmapWriter, KeepsStereoPairs) {
   EXPECT_NEAR(read.stereo[0].baseline_m, 0.12, 1e-9);
   EXPECT_NEAR(read.stereo[0].right_from_left.translation().x(), -0.12, 1e-9);
   graspmap_test::expect_same_camera(read.stereo[0].left, stereo.left);
-  // What was read can be written again.
+  // A frame that was read can be written again.
   scan.frames.at(5) = read;
   write_database(scratch("again.db"), scan, {.color = ImageFormat::png});
   const libmap::RgbdFrame again = libmap::RtabmapDatabase(scratch("again.db")).read_frame(5);
   ASSERT_EQ(again.stereo.size(), 1U);
   graspmap_test::expect_same_camera(again.stereo[0].left, read.stereo[0].left);
   graspmap_test::expect_same_camera(again.stereo[0].right, read.stereo[0].right);
-  // It is stored times the focal length.
+  // The baseline is stored as a product with the focal length.
   EXPECT_NEAR(again.stereo[0].baseline_m, read.stereo[0].baseline_m, 1e-15);
 }
 
@@ -207,7 +207,7 @@ TEST(RtabmapWriter, WritesNullsWhereNothingIsKnown) {
   EXPECT_TRUE(read.read_frame(3).depth.empty());
 }
 
-// Equal input gives equal bytes, whatever the time and whatever stood in the file and in memory.
+// Equal input gives equal bytes, independent of time, earlier content of the file, and memory.
 TEST(RtabmapWriter, WritesTheSameBytesEachTime) {
   const ExampleScan scan = graspmap_test::example_scan();
   write_database(scratch("a.db"), scan);
@@ -259,7 +259,7 @@ Rows schema_of(const fs::path& path) {
   return schema;
 }
 
-// Words of the triggers' statements, without what stands between them.
+// Words of the triggers' statements, without the separators.
 Rows triggers_of(const fs::path& path) {
   Rows triggers = query(
       path, "SELECT name, lower(sql) FROM sqlite_master WHERE type = 'trigger' ORDER BY name");

@@ -1,4 +1,4 @@
-// What the tests of databases of any schema share.
+// Common checks of the tests of databases of all schemas.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -10,7 +10,7 @@
 
 namespace graspmap_test {
 
-// The sample in this test's scratch folder.
+// Path of the sample in this test's scratch folder.
 inline std::filesystem::path sample_file(SchemaVersion version = {}) {
   const std::filesystem::path file = scratch_folder() / (version.text() + ".db");
   write_sample(file, version);
@@ -24,7 +24,7 @@ inline const libmap::PoseLink* find_link(const libmap::PoseGraph& graph, int fro
   return nullptr;
 }
 
-// The same within float32's rounding, and a proper rotation.
+// Expects equal poses within float32's rounding, and a proper rotation.
 inline void expect_same_pose(const std::optional<libmap::Pose>& actual,
                              const libmap::Pose& expected) {
   ASSERT_TRUE(actual);

@@ -175,13 +175,13 @@ void insert_admin(Inserter& insert, SchemaVersion version) {
   insert.row("Admin", {{"version", "'" + version.text() + "'"}}, blobs);
   const std::string table = version >= SchemaVersion{11, 11} ? "Info" : "Statistics";
   if (version < SchemaVersion{11, 8}) return;
-  // The newest row is not the last.
+  // The newest row is not the last one.
   insert.row(table, {{"parameters", "'Kp/Max:500;Path/Url:http://x;Empty:'"},
                      {"time_enter", "'2021-01-01'"}});
   insert.row(table, {{"parameters", "'Old/Key:0'"}, {"time_enter", "'2020-01-01'"}});
 }
 
-// `columns` in versions from that one on, and in those before it.
+// Return `columns` for versions from `first` on, or before `end`, else an empty text.
 std::string from(SchemaVersion version, SchemaVersion first, const std::string& columns) {
   return version >= first ? columns : std::string();
 }
@@ -189,7 +189,7 @@ std::string before(SchemaVersion version, SchemaVersion end, const std::string& 
   return version < end ? columns : std::string();
 }
 
-// Of the runs of the program, of what it found, and of whole images.
+// Tables of the program's runs, its results, and whole images.
 void append_statistics(SchemaVersion version, std::vector<std::string>& statements) {
   const std::string sizes =
       "STM_size INTEGER, last_sign_added INTEGER, process_mem_used INTEGER, database_mem_used "

@@ -19,7 +19,7 @@ struct SchemaVersion {
   std::string text() const;
 };
 
-// Those whose tables differ, 0.10.0 to 0.23.0.
+// Versions with different tables, 0.10.0 to 0.23.0.
 std::vector<SchemaVersion> schema_versions();
 std::vector<std::string> table_statements(SchemaVersion version);
 
@@ -29,7 +29,7 @@ std::string bytes_of(const std::vector<T>& numbers) {
 }
 std::string pose_bytes(const libmap::Pose& pose);
 
-// SQL, with blobs in place of '?'.
+// SQL statement with blobs for its '?'.
 void execute(const std::filesystem::path& file, const std::string& statement,
              const std::vector<std::string>& blobs = {});
 

@@ -57,7 +57,7 @@ TEST(ScanVerification, ListsEveryBrokenPart) {
         "INSERT INTO GlobalDescriptor VALUES (3, 0, NULL, x'0102030405060708090a0b0c0d0e')",
         "INSERT INTO Statistics (id, data) VALUES (3, x'0102030405060708090a0b0c0d0e')"})
     execute(file, change);
-  // Five triangles that are not there.
+  // Five missing triangles.
   execute(file, "UPDATE Admin SET opt_polygons_size = 3, opt_polygons = ?",
           {libmap::encode_matrix(
               {1, 2, 1, libmap::MatrixElement::int32, bytes_of(std::vector<std::int32_t>{5, 0})})});
@@ -88,7 +88,7 @@ std::string lines_of(const ScanVerificationResult& result) {
   return lines;
 }
 
-// Pose columns have no few bytes that mean "none", as images have.
+// Unlike images, poses have no short blob that means NULL.
 TEST(ScanVerification, PosesOfAFewBytes) {
   const fs::path file = scratch_folder() / "a.db";
   for (const char* blob : {"x'00'", "x'00000000'"}) {
@@ -110,8 +110,8 @@ TEST(ScanVerification, TextWhereABlobBelongs) {
   const ScanVerificationResult result = verify(file);
   EXPECT_THAT(parts_of(result), testing::IsSupersetOf({std::string("2 Node.velocity"),
                                                        std::string("2 Link.information_matrix")}));
-  EXPECT_THAT(lines_of(result), testing::HasSubstr("node 2: Node.velocity: is a text, not a blob"));
-  // A text of no letters is no value.
+  EXPECT_THAT(lines_of(result), testing::HasSubstr("node 2: Node.velocity: is text, not a blob"));
+  // An empty text is not a value.
   write_sample(scratch_folder() / "b.db");
   execute(scratch_folder() / "b.db", "UPDATE Node SET velocity = '' WHERE id = 2");
   EXPECT_EQ(lines_of(verify(scratch_folder() / "b.db")), "");
@@ -129,20 +129,20 @@ TEST(ScanVerification, NodesWithoutARowInData) {
 TEST(ScanVerification, WhatTheGraphLeavesOut) {
   const fs::path file = scratch_folder() / "a.db";
   write_sample(file);
-  // Sound as a blob, but of a node that is not there.
+  // A valid blob of a missing node.
   execute(file, "UPDATE Link SET to_id = 77 WHERE from_id = 3 AND to_id = 1");
   const RtabmapDatabase scan(file);
   ASSERT_EQ(scan.warnings().size(), 1U);
   const ScanVerificationResult result = libmap::verify_scan(scan);
   EXPECT_EQ(lines_of(result), "graph: " + scan.warnings().front() + "\n");
-  // A pose that is listed by its blob is not listed again.
+  // A damaged pose is listed once, by its blob.
   execute(file, "UPDATE Node SET pose = x'01' WHERE id = 1");
   const std::string lines = lines_of(verify(file));
   EXPECT_THAT(lines, testing::HasSubstr("node 1: Node.pose"));
   EXPECT_EQ(std::count(lines.begin(), lines.end(), '\n'), 2) << lines;
 }
 
-// RTAB-Map's next version may have them: nothing is broken.
+// RTAB-Map's next version can have them, so they are not faults.
 TEST(ScanVerification, UnknownTablesAndColumnsAreNoFaults) {
   const fs::path file = scratch_folder() / "a.db";
   write_sample(file);
@@ -188,7 +188,7 @@ struct BlobPlace {
   std::string bytes;
 };
 
-// Every blob that is stored.
+// All stored blobs.
 std::vector<BlobPlace> blobs_in(const fs::path& file) {
   const std::vector<std::pair<std::string, std::vector<std::string>>> columns{
       {"Node", {"pose", "ground_truth_pose", "velocity", "gps", "env_sensors"}},
@@ -225,7 +225,7 @@ std::string mutated(std::string bytes) {
     case 1:
       bytes.resize(place());
       break;
-    case 2: {  // a number that lies
+    case 2: {  // a wrong number
       const std::uint32_t number = engine() % 2 == 0 ? 0x7fffffffU : 0x80000000U;
       if (bytes.size() >= 4) std::memcpy(bytes.data() + engine() % (bytes.size() - 3), &number, 4);
       break;
@@ -236,7 +236,7 @@ std::string mutated(std::string bytes) {
   return bytes;
 }
 
-// Reads all that there is; each part is sound or one Error that names the file.
+// Reads all content; each part is valid or throws one Error that names the file.
 void read_all(const fs::path& file) {
   const RtabmapDatabase scan(file);
   const auto attempt = [&](const auto& step) {

@@ -75,14 +75,14 @@ TEST(SqliteFile, WalModeThatAnotherProgramWritesTo) {
   const auto names = names_in(folder);
   {
     const RtabmapDatabase scan(folder / "a.db");
-    expect_sample(scan, 4);  // what is committed, and no more
+    expect_sample(scan, 4);  // committed data only
   }
   EXPECT_EQ(names_in(folder), names);
   writer.exec("COMMIT");
   expect_sample(RtabmapDatabase(folder / "a.db"), 5);
 }
 
-// The program died: its -wal holds what the file does not.
+// The program crashed: its -wal contains data that the file does not.
 TEST(SqliteFile, WalThatWasLeftBehind) {
   const fs::path folder = scratch_folder();
   write_sample(folder / "a.db");
@@ -104,7 +104,7 @@ TEST(SqliteFile, WalThatWasLeftBehind) {
   EXPECT_EQ(files_in(left), before);
 }
 
-// Without a sound frame in it SQLite would delete it.
+// SQLite would delete a -wal without a valid frame.
 TEST(SqliteFile, WalOfNoiseStays) {
   const fs::path folder = scratch_folder();
   write_sample(folder / "a.db");
@@ -125,12 +125,12 @@ TEST(SqliteFile, RollbackModeWithAWriterInItsTransaction) {
   writer.exec("BEGIN IMMEDIATE; INSERT INTO Node (id, map_id) VALUES (7, 0)");
   const RtabmapDatabase scan(folder / "a.db");
   expect_sample(scan);
-  // Reading does not keep the writer from its commit.
+  // Reading does not block the writer's commit.
   writer.exec("COMMIT");
   expect_sample(RtabmapDatabase(folder / "a.db"), 4);
 }
 
-// SQLite's usual way to files, but for waits: they are over at once.
+// SQLite's default VFS, but without waiting.
 class WithoutWaiting {
  public:
   WithoutWaiting() : files_(*sqlite3_vfs_find(nullptr)) {
@@ -165,7 +165,7 @@ TEST(SqliteFile, CopyOfAFileThatStaysLocked) {
 TEST(SqliteFile, JournalOfAnInterruptedWrite) {
   const fs::path folder = scratch_folder();
   write_sample(folder / "a.db");
-  // A process that dies in the middle of writing its pages.
+  // A process that is killed while it writes pages.
   const pid_t child = fork();
   ASSERT_GE(child, 0);
   if (child == 0) {
@@ -215,11 +215,12 @@ TEST(OpenScan, WhatIsNoScan) {
   write_text(folder / "empty.db", "");
   EXPECT_EQ(reason("empty.db"), "is empty: 0 bytes");
   write_text(folder / "text.db", "this is no database");
-  EXPECT_NE(reason("text.db").find("is no scan"), std::string::npos);
+  EXPECT_NE(reason("text.db").find("is not a scan"), std::string::npos);
   write_text(folder / "zeros.db", std::string(8192, '\0'));
-  EXPECT_NE(reason("zeros.db").find("is no scan"), std::string::npos);
+  EXPECT_NE(reason("zeros.db").find("is not a scan"), std::string::npos);
   execute(folder / "other.db", "CREATE TABLE Customers (id INTEGER)");
-  EXPECT_EQ(reason("other.db"), "is an SQLite file but no scan of RTAB-Map: it has no table Node");
+  EXPECT_EQ(reason("other.db"),
+            "is an SQLite file but not an RTAB-Map database: it has no table Node");
   execute(folder / "nodes.db", "CREATE TABLE Node (name TEXT)");
   EXPECT_NE(reason("nodes.db").find("no column id"), std::string::npos);
   execute(folder / "links.db", "CREATE TABLE Node (id INTEGER)");
@@ -228,7 +229,7 @@ TEST(OpenScan, WhatIsNoScan) {
   write_sample(folder / "whole.db");
   const std::string whole = read_text(folder / "whole.db");
   write_text(folder / "header.db", whole.substr(0, 50));
-  EXPECT_NE(reason("header.db").find("ends in its header"), std::string::npos);
+  EXPECT_NE(reason("header.db").find("truncated header"), std::string::npos);
   write_text(folder / "page.db", whole.substr(0, 4096));
   reason("page.db");
   fs::create_directory(folder / "folder");

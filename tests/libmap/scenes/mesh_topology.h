@@ -1,4 +1,4 @@
-// What a triangle mesh is as a surface, for tests: counted from its edges, without a mesh library.
+// Topology of a triangle mesh for tests, computed from its edges without a mesh library.
 #pragma once
 
 #include <cstddef>

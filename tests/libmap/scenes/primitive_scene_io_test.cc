@@ -1,4 +1,4 @@
-// YAML there and back, and every way in which a file can be wrong.
+// Round trip of YAML, and all errors of scene files.
 #include "libmap/scenes/primitive_scene.h"
 
 #include <gmock/gmock.h>
@@ -80,7 +80,7 @@ TEST(SceneYaml, wrong_values_are_errors_that_name_key_value_and_bound) {
               AllOf(HasSubstr("shapes[0].height_m"), HasSubstr("a cone needs it")));
   EXPECT_THAT(message_of("shapes: [{radius_m: 1}]"), HasSubstr("shape"));
   EXPECT_THAT(message_of("shapes: [{shape: capsule, radius_m: 1, length_m: 1}]"),
-              HasSubstr("shorter than wide"));
+              HasSubstr("length below the diameter"));
 }
 
 TEST(SceneYaml, documents_of_another_form_are_errors) {

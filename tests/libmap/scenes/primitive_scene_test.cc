@@ -146,7 +146,7 @@ Numeric numeric_truth(const SceneGeometry& geometry, double x, double y) {
   return {Eigen::Vector3d(-fx, -fy, 1.0) / w, solver.eigenvalues()};
 }
 
-// Whether the four faces of the difference stencil belong to one smooth piece.
+// Returns true if the four points of the difference stencil are on one smooth face.
 bool is_smooth_around(const SceneGeometry& geometry, double x, double y) {
   const std::optional<SurfaceTruth> middle = from_above(geometry, x, y);
   for (const double dx : {-3e-4, 3e-4}) {
@@ -273,11 +273,12 @@ TEST(SceneCheck, names_shape_parameter_value_and_bound) {
   const auto message = [](SceneShape shape) {
     return std::string(error_of([&] { scene_of({std::move(shape)}).check(); }).what());
   };
-  EXPECT_THAT(message({Capsule{0.2, 0.3}, {}, {}}),
-              testing::HasSubstr("length_m is 0.3: shorter than wide in capsule (must be >= 0.4)"));
+  EXPECT_THAT(
+      message({Capsule{0.2, 0.3}, {}, {}}),
+      testing::HasSubstr("length_m is 0.3: length below the diameter in capsule (must be >= 0.4)"));
   EXPECT_THAT(message({Plane{1.0, 1.0}, {.roll_deg = 90.0}, {}}), testing::HasSubstr("face up"));
   EXPECT_THAT(message({Bump{0.1, 0.2, BumpProfile::cosine}, {}, {}}),
-              testing::HasSubstr("bumps need a plane"));
+              testing::HasSubstr("bumps require a plane"));
   EXPECT_THAT(std::string(error_of([] { scene_of({}).check(); }).what()),
               testing::HasSubstr("at least one shape"));
 }

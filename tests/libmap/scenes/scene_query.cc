@@ -72,8 +72,8 @@ bool lies_on(const ProfileSegment& segment, const Eigen::Vector2d& point, double
          (point.array() <= high.array() + tolerance).all();
 }
 
-// Where a line meets the solid last: the largest s at which origin + s * direction lies on the
-// surface, with the segment that it meets.
+// Last intersection of a line with the solid: the largest s with origin + s * direction on the
+// surface, and its segment.
 struct ProfileHit {
   double s = 0.0;
   std::size_t segment = 0;

@@ -1,4 +1,4 @@
-// What is seen of a scene straight from above, in closed form: the oracle of samples and meshes.
+// Visible surface of a scene from above in closed form, the oracle for samples and meshes.
 #pragma once
 
 #include <optional>
@@ -7,11 +7,11 @@
 
 namespace graspmap_test {
 
-// The topmost surface at (x, y); nothing where there is none.
+// Topmost surface at (x, y); nullopt if there is none.
 std::optional<libmap::SurfaceTruth> from_above(const libmap::SceneGeometry& geometry, double x,
                                                double y);
 
-// To the surface of all solids together: negative inside.
+// Signed distance to the union of all solids; negative inside.
 double distance_to_scene(const libmap::SceneGeometry& geometry, const Eigen::Vector3d& point);
 
 }  // namespace graspmap_test

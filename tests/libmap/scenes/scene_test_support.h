@@ -20,7 +20,7 @@ namespace graspmap_test {
 
 inline constexpr double pi = std::numbers::pi;
 
-// Of data/scenes and data/sites.
+// Files of data/scenes and data/sites.
 inline libmap::PrimitiveScene shipped_scene(const std::string& name) {
   const std::filesystem::path path = source_folder() / "data/scenes" / name;
   return libmap::parse_scene(libmap::read_whole_file(path), path.string());
@@ -44,7 +44,7 @@ inline const std::vector<double>& values_of(const libmap::PointCloud& cloud,
   return cloud.find_field(name)->values;
 }
 
-// One of each kind, posed at odd angles, overlapping each other and the ground.
+// One shape of each kind at arbitrary angles, overlapping each other and the ground.
 inline libmap::PrimitiveScene mixed_scene() {
   using namespace libmap;
   return scene_of({

@@ -1,4 +1,4 @@
-// Noise and textures: bounds, smoothness, and that they are the same for ever.
+// Bounds, smoothness and fixed values of noise and textures.
 #include "libmap/scenes/solid_noise.h"
 
 #include <gtest/gtest.h>
@@ -71,7 +71,7 @@ TEST(SolidNoise, CellDistanceIsThatToOneFeaturePoint) {
   }
 }
 
-// Files that were made stay reproducible.
+// Earlier files remain reproducible.
 TEST(SolidNoise, KeepsItsValues) {
   EXPECT_EQ(mix_bits(1, 2), mix_bits(1, 2));
   EXPECT_NE(mix_bits(1, 2), mix_bits(2, 1));

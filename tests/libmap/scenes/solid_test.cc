@@ -150,7 +150,7 @@ TEST(RefineFacets, KeepsHolesInAFacet) {
   EXPECT_NEAR(volume(fine), 0.5 * (1.0 - 0.4 * 0.41), 1e-12);
 }
 
-// Of three walls of a box the edges between the first and the last lie behind each other.
+// A box with three walls of one label: edges of the first and the last wall overlap in projection.
 TEST(RefineFacets, ARegionThatIsNotFlatIsAnError) {
   Solid solid = box({0.0, 0.0, 0.0}, {1.0, 1.0, 1.0});
   for (int& label : solid.labels)
@@ -198,12 +198,12 @@ TEST(Booleans, TouchingSolidsAreAnErrorOrAManifold) {
   const Solid a = box({0.0, 0.0, 0.0}, {1.0, 1.0, 1.0});
   const Solid b = box({1.0, 1.0, 0.0}, {2.0, 2.0, 1.0});
   EXPECT_NE(error_of([&] { unite({a, b}); }).reason().find("touch"), std::string::npos);
-  // Nor has what is left of a box without two opposite quarters.
+  // A box without two opposite quarters is not a manifold, either.
   const Solid rest = subtract(a, box({-1.0, -1.0, -1.0}, {0.5, 0.5, 2.0}));
   EXPECT_EQ(error_of([&] {
               subtract(rest, box({0.5, 0.5, -1.0}, {2.0, 2.0, 2.0}));
             }).reason(),
-            "the difference of two solids is no manifold");
+            "the difference of two solids is not a manifold");
 }
 
 TEST(Booleans, SplintersGoWithoutMovingTheSurface) {

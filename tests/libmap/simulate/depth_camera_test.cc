@@ -234,7 +234,7 @@ struct Step {
         graspmap_test::join_meshes(square_mesh(0.0, 50.0), square_mesh(1.0, 0.2));
     view = VisibleSurface(mesh).view(rays, looking_down({0.013, 0.007, 2.0}), false);
   }
-  // Distance in pixels from the outline of the upper square's picture.
+  // Distance in pixels from the outline of the upper square in the image.
   double edge_distance(std::size_t p) const {
     const Eigen::Vector2d ray = rays.centers[p];
     const double x = std::abs(ray.x() + 0.013) - 0.2;

@@ -1,4 +1,4 @@
-// Places are evaluated on bodies whose flats, edges and corners are known.
+// Field points on bodies with known flat faces, edges and corners.
 #include "libmap/simulate/field_points.h"
 
 #include <gtest/gtest.h>

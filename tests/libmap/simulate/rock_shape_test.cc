@@ -1,4 +1,4 @@
-// Every form that is drawn is a closed body of the size that was asked for.
+// All rock shapes are closed solids of the requested size.
 #include "libmap/simulate/site_mesh.h"
 
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@ struct Extent {
   Eigen::Vector3d high = Eigen::Vector3d::Constant(-1e9);
 };
 
-// Of the surface above the ground, cut at z = 0.
+// Bounding box of the surface above the ground, cut at z = 0.
 Extent extent_above_ground(const Solid& solid) {
   Extent extent;
   for (const Eigen::Vector3d& vertex : solid.vertices) {
@@ -53,7 +53,7 @@ TEST_P(RockShapes, AreClosedAndOfTheirSize) {
     mesh.vertices = solid.vertices;
     mesh.triangles = solid.triangles;
     EXPECT_GT(signed_volume(mesh), 0.1 * rock.width_m * rock.depth_m * rock.height_m) << seed;
-    // It stands in the ground.
+    // The rock extends into the ground.
     double lowest = 0.0;
     for (const Eigen::Vector3d& vertex : solid.vertices) lowest = std::min(lowest, vertex.z());
     EXPECT_LT(lowest, -0.1 * height) << seed;

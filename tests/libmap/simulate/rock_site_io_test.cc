@@ -1,4 +1,4 @@
-// Site files: what is given stands, what is missing is drawn, what is wrong is named.
+// Site files: given values are kept, missing ones are drawn, and errors name the field.
 #include "libmap/simulate/rock_site.h"
 
 #include <gtest/gtest.h>
@@ -32,7 +32,7 @@ TEST(RockSiteIo, KeepsWhatIsGivenAndDrawsTheRest) {
   EXPECT_EQ(site.rocks[0].y_m, -1.0);
   // Placed clear of the free square.
   EXPECT_GT(std::max(std::abs(site.rocks[1].x_m), std::abs(site.rocks[1].y_m)), 0.75);
-  // Another seed draws other rocks, and leaves what is given.
+  // Another seed draws other rocks but keeps given values.
   const RockSite other = parse(text, 6);
   EXPECT_EQ(other.rocks[0].width_m, 0.33);
   EXPECT_NE(other.rocks[0].seed, site.rocks[0].seed);
@@ -125,7 +125,7 @@ TEST(RockSiteIo, EntriesAreBounded) {
                "site.yaml: bumps is 10001: too many entries (must be at most 10000)");
 }
 
-// Of sites that were read from no file.
+// Errors of sites that are not read from a file.
 TEST(RockSiteIo, CheckNamesTheEntry) {
   RockSite site = parse("rocks:\n  - {name: a, height_m: 0.3, x_m: 1, y_m: 1}\n");
   EXPECT_NO_THROW(site.check());

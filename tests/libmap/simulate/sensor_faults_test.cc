@@ -44,7 +44,7 @@ std::vector<libmap::RgbdFrame> frames_of(const ScanSimulationOptions& options) {
   return frames;
 }
 
-// How far the points of a frame are from ground and ball when the camera is at `pose`, at most.
+// Maximum distance of a frame's points from ground and ball for a camera at `pose`.
 double deviation(const libmap::RgbdFrame& frame, const libmap::Camera& camera,
                  const Pose& world_from_camera) {
   const auto rays = libmap::ray_table(camera);
@@ -214,7 +214,7 @@ TEST(SensorFaults, MultipathLeavesWhatIsFlatOrConvex) {
   }
 }
 
-// Of two planes at a right angle, against the sum over small squares of the other plane.
+// Multipath of two planes at a right angle, against the sum over small squares of the other plane.
 TEST(SensorFaults, MultipathInACornerIsTheSumOverItsOtherSide) {
   libmap::TriangleMesh corner = graspmap_test::square_mesh(0.0, 1.0);  // z = 0, x and y from -1
   corner.vertices.insert(corner.vertices.end(), {{1, -1, 0}, {1, 1, 0}, {1, 1, 2}, {1, -1, 2}});

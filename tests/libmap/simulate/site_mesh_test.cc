@@ -1,4 +1,4 @@
-// Sites as surfaces: closed, without self-intersections, with rocks where and as high as was asked.
+// Site meshes are closed, without self-intersections, and have rocks of given position and height.
 #include "libmap/simulate/site_mesh.h"
 
 #include <gtest/gtest.h>
@@ -136,7 +136,7 @@ TEST(SiteMesh, AClimbingWallStandsUp) {
   const Bounds3d bounds = bounds_of(mesh.vertices);
   const double tilt = 95.0 * M_PI / 180.0;
   EXPECT_NEAR(bounds.max.z() - bounds.min.z(), 3.2 * std::sin(tilt), 0.03);
-  // Leaning over: the top's plane stands nearer to -y than the foot's.
+  // Overhanging: the top is nearer to -y than the foot.
   std::map<int, std::size_t> triangles;
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
   for (std::size_t n = 0; n < mesh.triangles.size(); ++n) {

@@ -1,4 +1,4 @@
-// Rocky ground in pieces: what lies at a place follows from the place and the seed alone.
+// Terrain in pieces: the surface depends only on position and seed.
 #include "libmap/simulate/terrain_pieces.h"
 
 #include <gtest/gtest.h>
@@ -148,7 +148,7 @@ TEST(TerrainPieces, DoNotDependOnTheSizeOfTheWhole) {
   const PointCloud same = sample_piece(large, {1, 1});
   EXPECT_EQ(small.positions, same.positions);
   EXPECT_EQ(small.normals, same.normals);
-  // One that is cut off holds the points of the whole one as far as it goes.
+  // A cropped piece is a subset of the complete one.
   TerrainPiecesOptions cut = small_pieces();
   cut.size_x_m = 1.5;
   const PointCloud part = sample_piece(cut, {1, 1});

@@ -1,4 +1,4 @@
-// Ground given by points, as cameras see it: the same square by square as all at once.
+// Terrain from points: rendering in squares equals rendering the whole surface.
 #include "libmap/simulate/terrain_surface.h"
 
 #include <gtest/gtest.h>

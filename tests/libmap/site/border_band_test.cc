@@ -27,13 +27,13 @@ struct FloorOptions {
   double yaw_deg = 0;
   Vector2d center = {0, 0};
   double gaps = 0;     // share of the band that is missing
-  bool rocks = false;  // white ones inside, one of them against the band
-  double grain = 6;    // of the colors, standard deviation
+  bool rocks = false;  // white rocks inside, one of them touching the band
+  double grain = 6;    // standard deviation of the colors
   double white = 215;
-  double skew = 0;  // the right side leans outwards by this slope
+  double skew = 0;  // outward slope of the right side
 };
 
-// A floor of 5 x 5 m with points each 8 mm, a little off the grid.
+// A floor of 5 x 5 m with one point per 8 mm, slightly off the grid.
 PointCloud floor_with_band(const FloorOptions& o) {
   std::mt19937_64& engine = graspmap_test::random_engine();
   std::normal_distribution<double> grain(0, o.grain);
@@ -68,7 +68,7 @@ PointCloud floor_with_band(const FloorOptions& o) {
   return cloud;
 }
 
-// How far the corners lie from those of the area, the farthest.
+// Largest distance between the corners found and those of the area.
 double corner_error(const BorderBand& band, const FloorOptions& o) {
   const Eigen::Rotation2Dd turn(o.yaw_deg * std::numbers::pi / 180);
   double farthest = 0;
@@ -133,7 +133,7 @@ TEST(BorderBand, MarginMovesEverySideInwards) {
   EXPECT_LT(corner_error(band, smaller), 0.006);
 }
 
-// The floor is measured too large by 0.8 %.
+// The measured floor is 0.8 % too large.
 TEST(BorderScale, SidesOfAKnownSizeGiveTheFactor) {
   for (const Vector2d& size : {Vector2d(3, 3), Vector2d(4, 2)}) {
     FloorOptions o;
@@ -153,7 +153,7 @@ TEST(BorderScale, LeastSquaresOfTheSides) {
   band.sides_m = {2.02, 1.02, 2.02, 1.0};
   for (const Vector2d& size : {Vector2d(2, 1), Vector2d(1, 2)}) {
     const BorderScale scale = scale_by_border(band, size);
-    // Sides s of size t are r t: r = sum(s t) / sum(t t), and three degrees of freedom are left.
+    // Sides s with true sizes t: s = r t, r = sum(s t) / sum(t t), with three degrees of freedom.
     const double ratio = 10.1 / 10;
     EXPECT_NEAR(scale.factor, 1 / ratio, 1e-12);
     const double squares = 2 * 0.01 * 0.01;
@@ -203,7 +203,7 @@ TEST(BorderBand, WhatHasNone) {
   for (Eigen::Vector3d& point : high.positions) point.z() += 3;
   EXPECT_NE(reason(high).find("heights"), std::string::npos);
   o.white = 110;
-  EXPECT_NE(reason(floor_with_band(o)).find("white enough"), std::string::npos);
+  EXPECT_NE(reason(floor_with_band(o)).find("contrast"), std::string::npos);
   o.white = 215;
   o.gaps = 1;
   o.rocks = true;

@@ -25,7 +25,7 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using graspmap_test::error_of;
 
-// Flat ground of 4 x 4 m with two blocks on it, closed at their feet.
+// Flat ground of 4 x 4 m with two blocks on it, joined to the ground at their feet.
 TriangleMesh site_mesh() {
   TriangleMesh mesh = graspmap_test::square_mesh(0, 2);
   const auto add_block = [&](const Vector3d& low, const Vector3d& high) {
@@ -81,7 +81,7 @@ TEST(Crop, LevelledMeshAndCloud) {
     EXPECT_NEAR((site_from_site.linear().col(2) - Vector3d::UnitZ()).norm(), 0, 2e-5);
     EXPECT_NEAR(site_from_site.translation().z(), 0, 1e-4);
     EXPECT_TRUE(report.outline.empty());
-    // x and y stay near the map's.
+    // x and y stay near those of the map.
     const Vector3d middle = tilted * Vector3d(0, 0, 0);
     EXPECT_LT((report.site_from_map * middle - middle).head<2>().norm(), 0.1);
   }
@@ -104,7 +104,7 @@ TEST(Crop, AnyRotationOfTheMapGivesTheSameSite) {
     EXPECT_NEAR((mesh.report.site_from_map * turn).linear()(2, 2), 1, 1e-9);
     EXPECT_NEAR((mesh.report.site_from_map * turn).translation().z(), 0, 1e-4);
   }
-  // The map's own z, if the user says so: the blocks then hang from the ground.
+  // With a given up along the map's z, the blocks hang from the ground.
   CropOptions options;
   options.up = Vector3d(0, 0, 1);
   const Pose over = make_pose_from_rpy({0, 0, 0}, {180, 0, 0});
@@ -133,7 +133,7 @@ TEST(Crop, PiecesAreCutAsTheWhole) {
     });
     ASSERT_EQ(areas.size(), 3U);
     EXPECT_EQ(areas[1], 0.0);
-    // The ground is found among other samples.
+    // The ground is found from different samples.
     EXPECT_NEAR(areas[0] + areas[2], surface_area(whole.mesh), 1e-4);
     EXPECT_TRUE(report.site_from_map.isApprox(whole.report.site_from_map, 1e-4));
     EXPECT_NEAR((bounds_of(vertices).max - bounds_of(whole.mesh.vertices).max).norm(), 0, 1e-3);
@@ -221,7 +221,7 @@ TEST(Crop, YawTurnsTheLevelFrame) {
 }
 
 TEST(Crop, BorderOfWhiteTriangles) {
-  // A fine floor, painted.
+  // A fine mesh of a floor with painted colors.
   TriangleMesh mesh;
   constexpr std::uint32_t count = 250;
   const Pose map_from_site = make_pose_from_rpy({5, 6, 7}, {3, 5, -30});
@@ -262,7 +262,7 @@ TEST(Crop, WhatCannotBe) {
                         }).what())
                 .find("nothing of the mesh"),
             std::string::npos);
-  EXPECT_NE(message(box_options({1, 0}, {0, 1})).find("inside out"), std::string::npos);
+  EXPECT_NE(message(box_options({1, 0}, {0, 1})).find("box"), std::string::npos);
   CropOptions options;
   options.region = CropRegion::polygon;
   options.polygon = {{0, 0}, {1, 1}};
@@ -295,7 +295,7 @@ TEST(Crop, WhatCannotBe) {
   EXPECT_NEAR(crop_mesh(one, {}).mesh.vertices[1].z(), 0, 1e-9);
 }
 
-// Aslant over kilometers, upright ones of kilometers, and far from where a step of a cell is none.
+// Oblique and vertical triangles of kilometers, and coordinates at which a cell is below rounding.
 TEST(Crop, TrianglesOfAnyShapeAreSeenByFewSamples) {
   CropOptions options;
   options.level = false;

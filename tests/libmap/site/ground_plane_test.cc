@@ -31,7 +31,7 @@ double noise(double sigma) {
   return sigma > 0.0 ? normal(graspmap_test::random_engine()) : 0.0;
 }
 
-// `count` points on the parallelogram, off it by noise.
+// Adds `count` noisy points on a parallelogram.
 void add_patch(Points& points, int count, const Vector3d& corner, const Vector3d& a,
                const Vector3d& b, double sigma = 0.0) {
   const Vector3d normal = a.cross(b).normalized();
@@ -55,7 +55,7 @@ void add_box(Points& points, const Vector3d& corner, const Vector3d& size, doubl
   add_patch(points, count(y, z), corner + x, y, z, sigma);
 }
 
-// Ground of 4 x 4 m at z = 0 with 4 x 4 boxes of different heights that cover over half of it.
+// Ground of 4 x 4 m at z = 0, more than half of it covered by 4 x 4 boxes of different heights.
 Points covered_site(double sigma) {
   Points points;
   constexpr double per_m2 = 1500;
@@ -102,13 +102,13 @@ TEST(GroundPlane, RocksOverMoreThanHalfDoNotTiltIt) {
     EXPECT_LT(degrees_between(plane.normal, map_from_site.linear().col(2)), 0.01) << sigma;
     EXPECT_NEAR((map_from_site.inverse() * plane.center).z(), 0, sigma / 6 + 1e-9);
     EXPECT_LT(plane.share, 0.25) << "walls and tops of the boxes contain the rest";
-    // Within the tolerance there are the boxes' feet, too.
+    // The feet of the boxes are within the tolerance as well.
     EXPECT_NEAR(plane.rmse_m, sigma, 0.006);
   }
 }
 
 TEST(GroundPlane, SlopedRocksDoNotLiftIt) {
-  // Wedges whose faces begin at the ground, all rising the same way.
+  // Wedges whose faces start at the ground and rise in the same direction.
   Points points;
   add_patch(points, 6000, {0, 0, 0}, {4, 0, 0}, {0, 4, 0}, 0.002);
   for (int n = 0; n < 6; ++n)
@@ -158,7 +158,7 @@ TEST(GroundPlane, LowerMeansUnderThePlaneEvenIfUpIsRough) {
   add_patch(points, 3000, {0, 0, 0}, {3, 0, 0}, {0, 3, 0}, 0.002);
   add_patch(points, 6000, {-12, 0, 0.7}, {3, 0, 0}, {0, 3, 0}, 0.002);
   GroundPlaneOptions options;
-  options.up = {std::sin(0.35), 0, std::cos(0.35)};  // along it the table lies 3 m lower
+  options.up = {std::sin(0.35), 0, std::cos(0.35)};  // along this direction, the table is 3 m lower
   EXPECT_NEAR(find_ground_plane(points, options).offset_m, 0, 1e-3);
 }
 
@@ -216,7 +216,7 @@ TEST(GroundPlane, FarFromTheOrigin) {
   const GroundPlane plane = find_ground_plane(points);
   EXPECT_LT(degrees_between(plane.normal, near.normal), 1e-5);
   EXPECT_NEAR(plane.offset_m - plane.normal.dot(far), near.offset_m, 1e-5);
-  // Levelled about its own middle, not about the origin.
+  // Rotated about its center, not about the origin.
   const Pose level = level_from_map(plane);
   for (const Vector3d& point : points) {
     ASSERT_LT((level * point - point).head<2>().norm(), 0.01);
@@ -228,7 +228,7 @@ TEST(GroundPlane, LevelIsTheLeastRotation) {
   GroundPlane plane;
   plane.normal = Vector3d(0.1, -0.2, 0.9).normalized();
   plane.offset_m = 2;
-  plane.center = {4, 5, 0};  // off the plane: its foot counts
+  plane.center = {4, 5, 0};  // off the plane: projected onto it
   const Pose level = level_from_map(plane);
   const Eigen::AngleAxisd turn(level.linear());
   EXPECT_NEAR(turn.axis().z(), 0, 1e-12);
@@ -248,7 +248,7 @@ TEST(GroundPlane, LevelIsTheLeastRotation) {
   EXPECT_NEAR((over * Vector3d(7, 8, -3)).z(), 2, 1e-12);
 }
 
-// Natural terrain: the error names a tolerance, and with it there is a plane.
+// Natural terrain: the error suggests a tolerance with which there is a plane.
 TEST(GroundPlane, RoughTerrainIsToldItsTolerance) {
   std::vector<Vector3d> points;
   for (int i = 0; i < 100; ++i)
@@ -261,7 +261,7 @@ TEST(GroundPlane, RoughTerrainIsToldItsTolerance) {
   GroundPlaneOptions options;
   options.tolerance_m = std::stod(reason.substr(at + option.size()));
   EXPECT_LT(find_ground_plane(points, options).tilt_deg, 40.0);
-  // A wall, for which z is no up.
+  // A wall, for which z is not up.
   for (Vector3d& point : points) point = Vector3d(0.01 * point.z(), point.y(), point.x());
   EXPECT_NE(error_of([&] { find_ground_plane(points); }).reason().find("--up "), std::string::npos);
 }
@@ -309,7 +309,7 @@ TEST(GroundPlane, RealSite) {
   EXPECT_LT(plane.tilt_deg, 1.5);
   EXPECT_GT(plane.share, 0.4);
   EXPECT_LT(plane.rmse_m, 0.01);
-  // Hardly anything lies under the ground.
+  // Hardly any points are below the ground.
   const auto below = std::count_if(points.begin(), points.end(), [&](const Vector3d& point) {
     return plane.normal.dot(point) < plane.offset_m - 0.05;
   });

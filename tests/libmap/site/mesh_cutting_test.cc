@@ -59,7 +59,7 @@ Corners random_star(int count, const Vector2d& center, double least, double most
   return corners;
 }
 
-// A closed ball: that of mesh_samples.h with one vertex at each pole.
+// The ball of mesh_samples.h, closed with one vertex at each pole.
 TriangleMesh closed_ball(std::uint32_t rows, std::uint32_t columns, const Vector3d& center) {
   TriangleMesh ball = ball_mesh(rows, columns, center);
   std::vector<Triangle> triangles;
@@ -97,7 +97,7 @@ double distance_to_border(const PlanPolygon& outline, const Vector3d& vertex) {
   return nearest;
 }
 
-// Edges with one triangle.
+// Edges with exactly one triangle.
 std::vector<std::array<std::uint32_t, 2>> open_edges(const TriangleMesh& mesh) {
   std::map<std::array<std::uint32_t, 2>, int> users;
   for (const Triangle& t : mesh.triangles)
@@ -111,7 +111,7 @@ std::vector<std::array<std::uint32_t, 2>> open_edges(const TriangleMesh& mesh) {
   return open;
 }
 
-// A sheet over all of the outline was cut: one piece without holes, whose border is the outline's.
+// Expects one component without holes whose boundary is the outline.
 void expect_clean_cut(const TriangleMesh& mesh, const PlanPolygon& outline) {
   mesh.check();
   EXPECT_NEAR(area_from_above(mesh), outline.area_m2(), 1e-9 * (1 + outline.area_m2()));
@@ -169,7 +169,7 @@ TEST(MeshCutting, OutlineInsideOneTriangle) {
 }
 
 TEST(MeshCutting, ThroughVerticesAndAlongEdges) {
-  const TriangleMesh mesh = field_mesh(20, 1, waves);  // vertices each 0.1
+  const TriangleMesh mesh = field_mesh(20, 1, waves);  // spacing of 0.1
   const PlanPolygon on_grid = make_rectangle({mesh.vertices[3].x(), mesh.vertices[4 * 21].y()},
                                              {mesh.vertices[15].x(), mesh.vertices[17 * 21].y()});
   const TriangleMesh cut = cut_mesh(mesh, {on_grid});
@@ -181,7 +181,7 @@ TEST(MeshCutting, ThroughVerticesAndAlongEdges) {
   // Corners on edges, a corner on a vertex, collinear corners.
   const PlanPolygon mixed({{-0.5, -0.5}, {0, -0.5}, {0.45, -0.5}, {0.45, 0.3}, {0.1, 0.05}});
   expect_clean_cut(cut_mesh(mesh, {mixed}), mixed);
-  // So near to vertices that they are moved onto the border.
+  // Close enough to vertices that they are moved onto the border.
   const PlanPolygon near = make_rectangle({-0.5 + 3e-8, -0.5 - 3e-8}, {0.5, 0.5 + 2e-8});
   const TriangleMesh moved = cut_mesh(mesh, {near});
   expect_clean_cut(moved, near);
@@ -235,7 +235,7 @@ TEST(MeshCutting, UprightWalls) {
   // Through a corner of the outline.
   const TriangleMesh turned = cut_mesh(wall, {PlanPolygon({{2, -1}, {3, 0}, {2, 1}, {1, 0}})});
   EXPECT_NEAR(surface_area(turned), 4, 1e-12);
-  // Half a ball, cut through a meridian.
+  // Half a ball, cut along a meridian.
   const TriangleMesh ball = closed_ball(12, 12, {0, 0, 0});
   EXPECT_NEAR(surface_area(cut_mesh(ball, {make_rectangle({0, -2}, {2, 2})})) * 2,
               surface_area(ball), 1e-9);
@@ -250,8 +250,8 @@ TEST(MeshCutting, SurfacesThatAreNoManifold) {
     return fin;
   }();
   mesh = graspmap_test::join_meshes(mesh, upright);
-  mesh.triangles.push_back(mesh.triangles[55]);  // twice
-  mesh.triangles.push_back({7, 7, 9});           // no triangle at all
+  mesh.triangles.push_back(mesh.triangles[55]);  // duplicate
+  mesh.triangles.push_back({7, 7, 9});           // degenerate
   const TriangleMesh cut = cut_mesh(mesh, {make_rectangle({-0.33, -0.47}, {0.51, 0.6})});
   EXPECT_GT(cut.triangles.size(), 20U);
   EXPECT_NEAR(surface_area(cut), 0.84 * 1.07 + (0.84 - 0.33 * 0.33 / 2 - 0.51 * 0.51 / 2), 0.02);

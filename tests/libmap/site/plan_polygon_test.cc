@@ -18,7 +18,7 @@ using graspmap_test::error_of;
 using graspmap_test::uniform;
 using Corners = std::vector<Vector2d>;
 
-// Star-shaped about the origin, each corner at a radius of its own: simple, seldom convex.
+// Star-shaped polygon about the origin with random radii: simple, rarely convex.
 Corners random_star(int count) {
   Corners corners;
   for (int n = 0; n < count; ++n) {
@@ -28,7 +28,7 @@ Corners random_star(int count) {
   return corners;
 }
 
-// By the angle that the outline turns through around the point.
+// Independent test by the winding angle of the outline around the point.
 bool winds_around(const Corners& corners, const Vector2d& point) {
   double turned = 0;
   for (std::size_t n = 0; n < corners.size(); ++n) {
@@ -143,7 +143,7 @@ TEST(PlanPolygon, WhatIsNone) {
   EXPECT_TRUE(says(reason({{0, 0}, {1, 0}}), "corners is 2"));
   EXPECT_TRUE(says(reason({{0, 0}, {1, 0}, {0, 0}}), "")) << "there and back";
   EXPECT_TRUE(says(reason({{0, 0}, {1, nan}, {0, 1}}), "corner 2"));
-  EXPECT_TRUE(says(reason({{0, 0}, {1, 0}, {1, 0}, {0, 1}}), "one place"));
+  EXPECT_TRUE(says(reason({{0, 0}, {1, 0}, {1, 0}, {0, 1}}), "corner 2"));
   EXPECT_TRUE(says(reason({{0, 0}, {1, 1}, {1, 0}, {0, 1}}), "crosses or touches"));
   EXPECT_TRUE(says(reason({{0, 0}, {1, 0}, {2, 0}}), "crosses or touches"));
   EXPECT_TRUE(says(reason({{0, 0}, {4, 0}, {4, 4}, {2, 0}, {0, 4}}), "crosses or touches"))

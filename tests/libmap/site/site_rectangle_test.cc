@@ -21,7 +21,7 @@ Vector2d turned(const Vector2d& place, double yaw_deg) {
   return Eigen::Rotation2Dd(yaw_deg * std::numbers::pi / 180) * place;
 }
 
-// A grid of points each 2 cm over the rectangle about `center`, turned.
+// A grid of points with a spacing of 2 cm over a rotated rectangle about `center`.
 Places field(const Vector2d& size, double yaw_deg = 0, const Vector2d& center = {0, 0}) {
   Places places;
   const int columns = static_cast<int>(std::lround(size.x() / 0.02));
@@ -129,7 +129,7 @@ TEST(SiteRectangle, WhatCannotBe) {
                 .context()
                 .field,
             "site_cell_m");
-  // One stray point far off must not cost all memory.
+  // One distant stray point must not exhaust the memory.
   Places stray = field({4, 4});
   stray.emplace_back(1e6, 2e6);
   EXPECT_NE(error_of([&] {

@@ -61,7 +61,7 @@ TEST(SpotCheck, ErrorsOfATiltedPlaneInClosedForm) {
   EXPECT_NEAR(result.mean_abs_error_m, sum / 28, 1e-9);
   EXPECT_NEAR(result.mean_error_m, signed_sum / 28, 1e-9);
   EXPECT_NEAR(result.mean_error_m, 0.001, 1e-9) << "the rest is symmetric";
-  // The place of edge a or c that lies farthest out in the direction of the slope.
+  // The extreme position of edge a or c in the direction of the slope.
   EXPECT_NEAR(result.max_abs_error_m, 0.01 * 1.5 * 6 / 7 + 0.02 * 1.45 + 0.001, 1e-9);
 }
 
@@ -92,11 +92,11 @@ TEST(SpotCheck, PlacesWithoutDataAreEmptyNotZero) {
   EXPECT_THAT(error_of([&] {
                 check_edges(corners_of({-1, -1}, {1, 1}), nothing, zero);
               }).what(),
-              HasSubstr("no place"));
+              HasSubstr("no position"));
   EXPECT_THAT(error_of([&] {
                 check_edges(corners_of({-1, -1}, {1, 1}), zero, nothing);
               }).what(),
-              HasSubstr("no place"));
+              HasSubstr("no position"));
 }
 
 TEST(SpotCheck, HeightsOfACloudAreMedians) {

@@ -1,4 +1,4 @@
-// Meshes and checks that the tests of mesh cleaning share.
+// Meshes and checks for the tests of mesh cleaning.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -12,20 +12,20 @@
 
 namespace graspmap_test {
 
-// Repairs alone: nothing that depends on lengths in meters.
+// Options for repairs only, without steps that depend on lengths in meters.
 libmap::MeshCleaningOptions repairs();
 libmap::MeshCleaningOptions holes_up_to(double diameter_m);
 
 libmap::TriangleMesh mesh_of(std::vector<Eigen::Vector3d> vertices,
                              std::vector<libmap::Triangle> triangles);
 
-// A mesh with every kind of value.
+// Adds normals, colors and fields of each type.
 libmap::TriangleMesh with_values(libmap::TriangleMesh mesh);
 
 const libmap::ScalarField& field_of(const std::vector<libmap::ScalarField>& fields,
                                     const std::string& name);
 
-// The triangles for whose middle `keep` holds.
+// Returns the triangles for whose center `keep` is true.
 libmap::TriangleMesh kept_where(const libmap::TriangleMesh& mesh,
                                 const std::function<bool(const Eigen::Vector3d&)>& keep);
 
@@ -33,10 +33,11 @@ testing::AssertionResult same_geometry(const libmap::TriangleMesh& a,
                                        const libmap::TriangleMesh& b);
 testing::AssertionResult same_mesh(const libmap::TriangleMesh& a, const libmap::TriangleMesh& b);
 
-// No fault in its report, an independent count of the same, arrays that fit.
+// Expects a report without defects, confirmed by independent counts, and arrays of consistent
+// sizes.
 void expect_clean(const libmap::TriangleMesh& mesh);
 
-// Clean, and cleaning it again changes nothing.
+// Cleans the mesh. Expects a clean result that a second cleaning does not change.
 libmap::MeshCleaningResult cleaned(const libmap::TriangleMesh& mesh,
                                    const libmap::MeshCleaningOptions& options);
 

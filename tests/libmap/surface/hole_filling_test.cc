@@ -1,4 +1,4 @@
-// What cleaning puts into holes.
+// Patches of filled holes.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -44,7 +44,7 @@ TEST(HoleFilling, HoleInAPlaneIsFilled) {
   EXPECT_EQ(result.filling.holes, 1U);
   EXPECT_NEAR(result.filling.area_m2, 0.2 * 0.16, 1e-12);
   EXPECT_NEAR(libmap::surface_area(result.mesh), 1.44, 1e-12);
-  // What there was before stays in its place.
+  // The original vertices and triangles are unchanged.
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
     ASSERT_EQ(result.mesh.vertices[v], mesh.vertices[v]);
   const libmap::ScalarField& filled = field_of(result.mesh.face_fields, "filled");
@@ -52,7 +52,7 @@ TEST(HoleFilling, HoleInAPlaneIsFilled) {
   for (std::size_t t = 0; t < filled.values.size(); ++t)
     ASSERT_EQ(filled.values[t], t < mesh.triangles.size() ? 0.0 : 1.0);
   EXPECT_EQ(result.filling.triangles, filled.values.size() - mesh.triangles.size());
-  // Triangles about as large as those around.
+  // Triangles have about the size of those around the hole.
   EXPECT_GT(result.filling.triangles, 50U);
   EXPECT_LT(result.filling.triangles, 600U);
   const MeshReport report = report_mesh(result.mesh);
@@ -79,7 +79,7 @@ TEST(HoleFilling, ValuesOfNewVerticesComeFromTheBoundary) {
     EXPECT_EQ(result.mesh.vertex_colors[v][1], 50);
     EXPECT_NEAR(result.mesh.vertex_normals[v].z(), 1.0F, 1e-6F);
   }
-  // Face fields are those of a triangle at the hole.
+  // Face fields are copied from a triangle at the hole.
   const auto& number = field_of(result.mesh.face_fields, "number").values;
   for (std::size_t t = mesh.triangles.size(); t < number.size(); ++t) {
     const auto& corners = whole.triangles[static_cast<std::size_t>(number[t])];
@@ -87,7 +87,7 @@ TEST(HoleFilling, ValuesOfNewVerticesComeFromTheBoundary) {
   }
 }
 
-// The patch goes on in the surface's tangent planes.
+// The patch continues the tangent planes of the surface.
 TEST(HoleFilling, HoleInABallIsFilledRound) {
   const TriangleMesh ball = geodesic_mesh(5, 1.0);
   const TriangleMesh mesh = kept_where(ball, [](const Eigen::Vector3d& p) { return p.z() < 0.9; });
@@ -102,14 +102,14 @@ TEST(HoleFilling, HoleInABallIsFilledRound) {
     lowest = std::min(lowest, v.norm());
     highest = std::max(highest, v.norm());
   }
-  // A flat lid would lie 0.1 below the ball.
+  // A flat patch would be 0.1 below the ball.
   EXPECT_GT(lowest, 0.97);
   EXPECT_LT(highest, 1.03);
   EXPECT_NEAR(report.volume_m3, libmap::signed_volume(ball), 0.01 * libmap::signed_volume(ball));
 }
 
 TEST(HoleFilling, OuterBoundariesAreNeverFilled) {
-  // Smaller than the largest hole allowed, all of them.
+  // All holes are smaller than the allowed diameter.
   const MeshCleaningOptions options = holes_up_to(10.0);
   for (const TriangleMesh& open :
        {terrain_mesh(20, 1.0, [](double x, double y) { return x * y; }),
@@ -121,7 +121,7 @@ TEST(HoleFilling, OuterBoundariesAreNeverFilled) {
     EXPECT_EQ(result.filling.holes, 0U);
     EXPECT_TRUE(same_geometry(result.mesh, open));
   }
-  // A ring keeps its outer boundary, and its inner one is filled.
+  // The inner boundary of a ring is filled; the outer one stays open.
   const TriangleMesh ring = graspmap_test::grid_mesh(
       3, 40, graspmap_test::Seam::open, graspmap_test::Seam::closed, [](double u, double v) {
         const double r = 1.0 + 0.3 * u;
@@ -140,7 +140,7 @@ TEST(HoleFilling, LongTubeIsClosedAtItsEnds) {
   EXPECT_TRUE(report_mesh(result.mesh).is_watertight());
 }
 
-// A patch over this hole would run through the needle that stands in it.
+// A patch of this hole would intersect the needle in it.
 TEST(HoleFilling, PatchesMeetNothingElse) {
   TriangleMesh mesh = kept_where(terrain_mesh(40, 1.0, [](double, double) { return 0.0; }),
                                  [](const Eigen::Vector3d& p) { return p.norm() > 0.1; });

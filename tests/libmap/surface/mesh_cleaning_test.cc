@@ -1,4 +1,4 @@
-// Cleaning as a whole: its options, its invariants, meshes of random and of real faults.
+// Mesh cleaning as a whole: options, invariants, meshes with random and real defects.
 #include "libmap/surface/mesh_cleaning.h"
 
 #include <gtest/gtest.h>
@@ -109,14 +109,14 @@ TEST(MeshCleaning, TheSameWhereverItLies) {
   EXPECT_NEAR(libmap::surface_area(here.mesh), libmap::surface_area(there.mesh), 1e-3);
 }
 
-// Triangles between random points: every fault there is, all over the place.
+// Triangles between random points, which have every type of defect.
 TEST(MeshCleaning, RandomTriangles) {
   for (int trial = 0; trial < 150; ++trial) {
     TriangleMesh mesh;
     const auto count = static_cast<std::uint32_t>(uniform(3, trial < 75 ? 12 : 60));
     for (std::uint32_t v = 0; v < count; ++v) {
       Eigen::Vector3d place(uniform(0, 1), uniform(0, 1), uniform(0, 1));
-      if (trial % 3 == 0) place = (4.0 * place).array().floor();  // many in one place, on one line
+      if (trial % 3 == 0) place = (4.0 * place).array().floor();  // coincident and collinear points
       if (trial % 5 == 0) place.z() = 0.0;
       mesh.vertices.push_back(place);
     }
@@ -162,7 +162,7 @@ TEST(MeshCleaning, HostileMeshes) {
   none_left(mesh_of({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}, {{0, 1, 2}}));
   none_left(mesh_of({{1, 1, 1}, {1, 1, 1}, {1, 1, 1}}, {{0, 1, 2}}));
   none_left(mesh_of({{0, 0, 0}, {1, 0, 0}}, {{0, 0, 1}, {1, 1, 1}}));
-  // One vertex a billion meters away: the others are one place against that.
+  // One vertex a billion meters away: relative to that, the others coincide.
   TriangleMesh far = geodesic_mesh(2, 1.0);
   far.vertices[0] = {1e9, 0, 0};
   EXPECT_NO_THROW({

@@ -1,5 +1,4 @@
-// What cleaning does to triangles that are wrong: doubled, without area, turned, joined or
-// crossing.
+// Repair of defective triangles: duplicate, degenerate, misoriented, non-manifold or intersecting.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -61,8 +60,8 @@ TEST(MeshRepair, TriangleSoupIsWelded) {
 TEST(MeshRepair, MergeDistance) {
   MeshCleaningOptions options = repairs();
   options.merge_distance_m = 0.1;
-  // Along a line, each within 0.1 of the one before: the third is too far from the first, which
-  // the second is joined to.
+  // Along a line, each within 0.1 of its predecessor: the third is too far from the first, into
+  // which the second is merged.
   const TriangleMesh mesh =
       mesh_of({{0, 0, 0}, {0.09, 0, 0}, {0.18, 0, 0}, {0.5, 1, 0}, {1, -1, 0}},
               {{0, 2, 3}, {1, 2, 3}, {2, 4, 3}, {0, 1, 3}});
@@ -95,7 +94,7 @@ TEST(MeshRepair, BadTrianglesAreDropped) {
   EXPECT_TRUE(report_mesh(result.mesh).is_watertight());
 }
 
-// A vertex in the middle of another triangle's edge, joined by a triangle without area.
+// A vertex in the middle of another triangle's edge, connected by a triangle without area.
 TEST(MeshRepair, CapIsFlipped) {
   const TriangleMesh mesh = mesh_of({{0, 0, 0}, {2, 0, 0}, {1, 0, 0}, {1, 1, 0}, {1, -1, 0}},
                                     {{0, 2, 3}, {2, 1, 3}, {0, 1, 2}, {1, 0, 4}});
@@ -110,7 +109,7 @@ TEST(MeshRepair, CapIsFlipped) {
   EXPECT_EQ(report.boundary_edges, 4U);
 }
 
-// Many caps along one edge, and a cap at a boundary.
+// A row of caps along one edge, and a cap at a boundary.
 TEST(MeshRepair, FansOfCaps) {
   TriangleMesh mesh;
   const std::uint32_t points = 40;
@@ -124,7 +123,7 @@ TEST(MeshRepair, FansOfCaps) {
   EXPECT_NEAR(libmap::surface_area(result.mesh), 600.0, 1e-9);
   EXPECT_EQ(report_mesh(result.mesh).boundaries.size(), 1U);
   EXPECT_EQ(result.mesh.vertices.size(), mesh.vertices.size());
-  mesh.triangles.pop_back();  // now the caps end at a boundary
+  mesh.triangles.pop_back();  // the caps are now at a boundary
   result = cleaned(mesh, repairs());
   EXPECT_NEAR(libmap::surface_area(result.mesh), 300.0, 1e-9);
   EXPECT_EQ(result.mesh.triangles.size(), points);
@@ -146,7 +145,7 @@ TEST(MeshRepair, FinOnASurfaceIsCutOff) {
   EXPECT_EQ(result.mesh.triangles.size(), mesh.triangles.size());
   const MeshReport report = report_mesh(result.mesh);
   EXPECT_EQ(report.components, 2U);
-  // The surface keeps its vertices.
+  // Vertices of the surface are unchanged.
   for (std::size_t v = 0; v < n; ++v) EXPECT_EQ(result.mesh.vertices[v], mesh.vertices[v]);
   MeshCleaningOptions islands = repairs();
   islands.min_island_area_m2 = 0.5;
@@ -184,7 +183,7 @@ TEST(MeshRepair, TwoConesJoinedAtAVertex) {
   EXPECT_EQ(report.boundaries.size(), 2U);
 }
 
-// Copies of vertices lie farther apart than what a second cleaning makes one.
+// Copies of vertices are farther apart than the merge distance of a second cleaning.
 TEST(MeshRepair, TinyFansStayApart) {
   TriangleMesh mesh = terrain_mesh(20, 10.0, [](double, double) { return 0.0; });
   const auto n = static_cast<std::uint32_t>(mesh.vertices.size());
@@ -205,7 +204,7 @@ TEST(MeshRepair, TurnedTrianglesAreTurnedBack) {
   EXPECT_GT(result.turned_triangles, 50U);
   const MeshReport report = report_mesh(result.mesh);
   EXPECT_TRUE(report.is_watertight());
-  EXPECT_NEAR(report.volume_m3, libmap::signed_volume(original), 1e-12);  // outward, as most were
+  EXPECT_NEAR(report.volume_m3, libmap::signed_volume(original), 1e-12);  // oriented as most were
 }
 
 TEST(MeshRepair, OneSidedSurfacesAreCut) {
@@ -221,7 +220,7 @@ TEST(MeshRepair, OneSidedSurfacesAreCut) {
 
 TEST(MeshRepair, FoldIsTakenOutAndClosed) {
   TriangleMesh mesh = terrain_mesh(40, 2.0, [](double x, double y) { return 0.1 * x * y; });
-  // One vertex is pulled below its neighbors, where another one hangs down.
+  // One vertex is moved below its neighbors, next to another one that is moved down.
   mesh.vertices[20 * 41 + 20] += Eigen::Vector3d(0.17, 0.02, -0.02);
   mesh.vertices[22 * 41 + 20].z() -= 0.05;
   ASSERT_GT(report_mesh(mesh).self_intersections, 0U);
@@ -240,19 +239,18 @@ TEST(MeshRepair, FoldIsTakenOutAndClosed) {
     EXPECT_LT(d, 0.01);
 }
 
-// A tube through the ground cuts a small disc out of it: that goes at once, and the ground is
-// closed.
+// A tube through the ground cuts off a small disc, which is dropped, and the ground is closed.
 TEST(MeshRepair, ScrapsOfIntersectionsAreDropped) {
   const TriangleMesh ground = terrain_mesh(40, 2.0, [](double, double) { return 0.0; });
   TriangleMesh tube = graspmap_test::cylinder_mesh(25, 12, 0.3, 0.6);
   for (Eigen::Vector3d& v : tube.vertices) v += Eigen::Vector3d(0.012, 0.017, -0.31);
   const MeshCleaningResult result = cleaned(graspmap_test::join_meshes(ground, tube), repairs());
   EXPECT_EQ(result.open_places, 0U);
-  EXPECT_LT(result.intersecting_triangles, 450U);  // one round's
+  EXPECT_LT(result.intersecting_triangles, 450U);  // of one round
   const MeshReport report = report_mesh(result.mesh);
   EXPECT_EQ(report.components, 3U);
   EXPECT_NEAR(report.largest_component_area_m2, 4.0, 0.01);
-  EXPECT_EQ(report.boundaries.size(), 3U);  // of the ground, and the tube's old ends
+  EXPECT_EQ(report.boundaries.size(), 3U);  // boundary of the ground and both ends of the tube
 }
 
 TEST(MeshRepair, NoisyBallBecomesClean) {
@@ -274,7 +272,7 @@ TEST(MeshRepair, CrossingBallsAreParted) {
   EXPECT_EQ(result.remaining_intersecting_triangles, 0U);
 }
 
-// Cells of such a size would have no finite number, and all vertices one list.
+// Grid cells of this size would have infinite indices.
 TEST(MeshRepair, VerticesAreJoinedWithinDistancesOfAnySize) {
   TriangleMesh mesh;
   for (int n = 0; n < 60000; ++n) mesh.vertices.emplace_back(n + 1.0, -2.0 * n, 1e30);

@@ -97,7 +97,7 @@ TEST(MeshReport, DiameterOfAVeryLongBoundary) {
 }
 
 TEST(MeshReport, CylinderHasTwoBoundariesLongestFirst) {
-  // A cone's trunk: the lower boundary is the longer one.
+  // A truncated cone: the lower boundary is longer.
   const TriangleMesh cone = graspmap_test::grid_mesh(
       8, 300, graspmap_test::Seam::open, graspmap_test::Seam::closed, [](double u, double v) {
         const double r = 1.0 + u;
@@ -157,7 +157,7 @@ TEST(MeshReport, CubesThatTouch) {
   EXPECT_FALSE(at_edge.is_closed());
 }
 
-// Where boundaries touch in a vertex, each stays with its own triangles.
+// Boundaries that touch in a vertex each follow their own triangles.
 TEST(MeshReport, BowTieHasTwoBoundaries) {
   const MeshReport report = report_mesh(
       mesh_of({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {-1, 0, 0}, {0, -1, 0}}, {{0, 1, 2}, {0, 3, 4}}));
@@ -198,7 +198,7 @@ TEST(MeshReport, InsideOutHasNegativeVolume) {
 TEST(MeshReport, TheSameWhereverItLies) {
   TriangleMesh mesh = graspmap_test::join_meshes(graspmap_test::klein_mesh(30, 20),
                                                  graspmap_test::torus_mesh(20, 10, 1.5, 1.2));
-  // No corner lies exactly on another triangle, where rounding decides.
+  // No corner is exactly on another triangle, where rounding would decide.
   for (Eigen::Vector3d& v : mesh.vertices)
     v += Eigen::Vector3d(uniform(-0.01, 0.01), uniform(-0.01, 0.01), uniform(-0.01, 0.01));
   const MeshReport here = report_mesh(mesh);
@@ -266,7 +266,7 @@ TEST(SelfIntersections, Touching) {
   EXPECT_EQ(pairs({{1, 1, 0.1}, {1, 1, 1}, {2, 1, 1}}, {3, 4, 5}), 0U);  // just above
   EXPECT_EQ(pairs({{1, 1, -1}, {1, 1, 1}, {2, 1, 1}}, {3, 4, 5}), 1U);   // through it
   EXPECT_EQ(pairs({{1, 1, 0}, {1, 2, 0}, {2, 1, 0}}, {3, 4, 5}), 1U);    // inside its plane
-  EXPECT_EQ(pairs({{0, 0, 0}, {-1, 0, 0}, {0, -1, 0}}, {3, 4, 5}), 1U);  // corners in one place
+  EXPECT_EQ(pairs({{0, 0, 0}, {-1, 0, 0}, {0, -1, 0}}, {3, 4, 5}), 1U);  // coincident corners
   EXPECT_EQ(pairs({{-1, 0, 0}, {0, -1, 0}}, {0, 3, 4}), 0U);             // a corner in common
   EXPECT_EQ(pairs({{1, 1, 1}, {1, 1, -1}}, {0, 3, 4}), 1U);              // and through it
   EXPECT_EQ(pairs({{1, 1, 0}, {9, 1, 0}}, {0, 3, 4}), 1U);               // and folded onto it

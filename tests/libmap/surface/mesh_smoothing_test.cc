@@ -56,7 +56,7 @@ TEST(MeshSmoothing, LeavesBoundaries) {
   }
 }
 
-// Many points of `a`, each triangle's corners and points between them, against the surface of `b`.
+// Largest distance of corners and inner points of the triangles of `a` to the surface of `b`.
 double sampled_distance(const TriangleMesh& a, const TriangleMesh& b) {
   std::vector<Eigen::Vector3d> points;
   constexpr int steps = 6;
@@ -89,7 +89,7 @@ TEST(MeshDecimation, KeepsItsBound) {
     EXPECT_GT(result.decimation.deviation_m, 0.3 * bound);
     EXPECT_LE(sampled_distance(result.mesh, mesh), result.decimation.deviation_m + 1e-12);
     EXPECT_LE(sampled_distance(mesh, result.mesh), result.decimation.deviation_m + 1e-12);
-    // What stays keeps its values.
+    // Remaining vertices keep their values.
     const libmap::SurfaceDistance original(mesh);
     const auto& height = field_of(result.mesh.vertex_fields, "height").values;
     for (std::size_t v = 0; v < result.mesh.vertices.size(); ++v)

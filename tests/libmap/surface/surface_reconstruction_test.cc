@@ -27,7 +27,7 @@ using ::testing::HasSubstr;
 
 constexpr double pi = std::numbers::pi;
 
-// Nearly even on a sphere (Fibonacci lattice), about `spacing_m` apart.
+// Nearly even points on a sphere (Fibonacci lattice) with a spacing of about `spacing_m`.
 PointCloud ball(double radius, double spacing_m, const Eigen::Vector3d& center = {0, 0, 0}) {
   PointCloud cloud;
   const int count = static_cast<int>(4 * pi * radius * radius / (spacing_m * spacing_m));
@@ -118,7 +118,7 @@ TEST_P(Reconstruction, CellsHaveTheWantedSize) {
   for (const double cell : {0.01, 0.013, 0.02, 0.04}) {
     const SurfaceReconstructionResult result = reconstruct(cloud, cells_of(cell));
     EXPECT_EQ(result.cell_size_m, cell);
-    // Marching cubes makes edges a little shorter than its cells.
+    // Edges of marching cubes are slightly shorter than the cells.
     const double edge = report_mesh(result.mesh).edge_lengths.median_m;
     EXPECT_GT(edge, 0.6 * cell);
     EXPECT_LT(edge, 1.3 * cell);
@@ -127,7 +127,7 @@ TEST_P(Reconstruction, CellsHaveTheWantedSize) {
   }
 }
 
-// A half of the samples gives the same surface as all of them, but near where it ends.
+// Half of the samples yields the same surface as all of them, except near its border.
 TEST(ImplicitSurface, DependsOnNearSamplesOnly) {
   std::vector<SurfaceSample> all;
   for (const Eigen::Vector3d& position : ball(0.25, 0.01).positions) {
@@ -157,8 +157,8 @@ TEST(ImplicitSurface, DependsOnNearSamplesOnly) {
   EXPECT_EQ(corners_of(part), expected);
 }
 
-// Algebraic spheres fit balls exactly, however uneven the samples are; along an edge of the grid
-// the function is taken as straight, which is off by cell^2 / 8 radius at most.
+// Algebraic spheres fit balls exactly for any distribution of samples. Linear interpolation along
+// an edge of the grid causes an error of at most cell^2 / 8 radius.
 TEST(ImplicitSurface, SpheresAreExact) {
   constexpr double cell_m = 0.01;
   for (const double radius : {0.04, 0.1, 0.5}) {
@@ -227,12 +227,12 @@ TEST_P(Reconstruction, GapsAreLeftOpen) {
       cloud.normals.push_back(full.normals[n]);
     }
   const TriangleMesh mesh = reconstruct(cloud, cells_of(0.01)).mesh;
-  EXPECT_EQ(cleaned_report(mesh).boundaries.size(), 2U);  // the gap is wider than holes are filled
+  EXPECT_EQ(cleaned_report(mesh).boundaries.size(), 2U);  // the gap is wider than filled holes
   for (const Eigen::Vector3d& vertex : mesh.vertices)
     EXPECT_GT(vertex.head<2>().norm(), 0.1 - 0.025);
 }
 
-// A lone point far from the others costs no time and makes no surface.
+// An isolated distant point costs no time and creates no surface.
 TEST(ImplicitSurface, LonePointsMakeNoSurface) {
   PointCloud cloud = plane(0.4, 0.01);
   for (int n = 0; n < 20; ++n) {
@@ -259,7 +259,7 @@ TEST_P(Reconstruction, NoiseIsAveraged) {
 }
 
 TEST_P(Reconstruction, UncertainPointsCountForLess) {
-  // Every other point 8 mm too far out, and known to be bad.
+  // Every second point is 8 mm too far out and has a large expected error.
   PointCloud cloud = ball(0.25, 0.006);
   ScalarField& errors = cloud.add_field("expected_error", ScalarType::float32);
   for (std::size_t n = 0; n < cloud.size(); ++n) {
@@ -389,7 +389,7 @@ TEST_P(Reconstruction, CloudsThatAreTooThin) {
   PointCloud two;
   two.positions = {{0, 0, 0}, {1, 0, 0}, {1, 0, 0}};
   two.normals.assign(3, Eigen::Vector3f::UnitZ());
-  EXPECT_THAT(refusal(two), HasSubstr("2 places: too few points"));
+  EXPECT_THAT(refusal(two), HasSubstr("points is 2"));
   PointCloud line;
   for (int n = 0; n < 100; ++n) line.positions.emplace_back(0.01 * n, 1.0, 2.0);
   line.normals.assign(100, Eigen::Vector3f::UnitZ());
@@ -451,7 +451,7 @@ TEST_P(Reconstruction, OptionsOutOfTheirRangesAreNamed) {
   EXPECT_THAT(refusal([](auto& o) { o.samples_per_cell = 0; }), HasSubstr("samples_per_cell is 0"));
   EXPECT_THAT(refusal([](auto& o) { o.trim_distance_cells = 0; }),
               HasSubstr("trim_distance_cells is 0"));
-  // 0.2 m and a margin of a tenth in 4096 cells; a quarter of the spacing.
+  // Poisson: 0.2 m and a margin of a tenth in 4096 cells; implicit: a quarter of the spacing.
   const bool is_poisson = GetParam() == SurfaceMethod::poisson;
   EXPECT_THAT(refusal([](auto& o) { o.cell_size_m = 1e-5; }),
               ::testing::AllOf(HasSubstr("cell_size_m is 1e-05"),
@@ -471,7 +471,7 @@ TEST_P(Reconstruction, CellsLargerThanTheCloudAreRefused) {
   EXPECT_LT(surface_area(reconstruct(cloud, cells_of(0.1)).mesh), 1.1);
 }
 
-// Deeper than reconstruct_surface lets it go, PCL's tables have no size.
+// For an octree deeper than reconstruct_surface allows, PCL cannot allocate its tables.
 TEST(PclPoisson, WhatPclThrowsIsSaid) {
   std::vector<SurfaceSample> samples;
   for (int x = -2; x <= 2; ++x)
@@ -487,7 +487,7 @@ TEST(PclPoisson, WhatPclThrowsIsSaid) {
 TEST(PclPoisson, StandardOutputStaysClean) {
   testing::internal::CaptureStdout();
   testing::internal::CaptureStderr();
-  // A tangle in which PCL drops faces and says so.
+  // Irregular points for which PCL drops faces and prints messages.
   for (const unsigned seed : {0U, 2U, 3U, 4U}) {
     std::mt19937_64 engine(seed);
     std::normal_distribution<double> normal;

@@ -1,4 +1,4 @@
-// A surface made in tiles is the surface made at once.
+// A surface made in tiles equals the whole surface.
 #include "libmap/surface/surface_tiles.h"
 
 #include <gtest/gtest.h>
@@ -32,8 +32,8 @@ void add_point(PointCloud& cloud, const Eigen::Vector3d& place, const Eigen::Vec
   cloud.fields[0].values.push_back(uniform(0.001, 0.004));
 }
 
-// Rough ground with holes large and small, small islands beside it, above it and in its holes, and
-// a strip that passes from tile to tile and is narrow.
+// Rough ground with large and small holes, small islands beside it, above it and in its holes, and
+// a narrow strip across tiles.
 PointCloud ground(double length_m, double width_m) {
   PointCloud cloud;
   cloud.fields = {{"expected_error", ScalarType::float32, {}}};
@@ -57,7 +57,7 @@ PointCloud ground(double length_m, double width_m) {
                 {-0.36 * std::cos(9 * x) * std::cos(11 * y),
                  0.44 * std::sin(9 * x) * std::sin(11 * y), 1});
     }
-  // One every 40 cm, of 8 x 8 cm; and one 4 cm wide along all.
+  // Islands of 8 x 8 cm every 40 cm, and a strip of 4 cm width over the whole length.
   for (double x = 0.0; x < length_m; x += 0.012)
     for (double y = 0.0; y < 0.08; y += 0.012) {
       if (std::fmod(x, 0.4) < 0.08) add_point(cloud, {x, y, 0.3}, {0, 0, 1});
@@ -75,7 +75,7 @@ SurfaceTileOptions options_of(double tile_m) {
   return options;
 }
 
-// Each triangle by all that is known of its corners, from its lowest one on.
+// Sorted triangles with all values of their corners, each starting at its lowest corner.
 using Rows = std::vector<std::vector<double>>;
 void add_rows(const TriangleMesh& mesh, Rows& rows) {
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
@@ -144,7 +144,7 @@ TEST(SurfaceTiles, SameTrianglesAsAtOnceBitForBit) {
 }
 
 TEST(SurfaceTiles, IslandsAreJudgedAcrossTiles) {
-  // A strip of 0.018 m2 in each tile is more than the bound in all, one that ends is less.
+  // A strip of 0.018 m2 per tile exceeds the bound in total; a strip that ends does not.
   PointCloud cloud;
   cloud.fields = {{"expected_error", ScalarType::float32, {}}};
   const auto strip = [&](double y, double length_m) {

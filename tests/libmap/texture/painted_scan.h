@@ -13,7 +13,7 @@
 
 namespace graspmap_test {
 
-// 0 to 255 a channel, at a place of a triangle.
+// Color at a point of a triangle, 0 to 255 per channel.
 using Paint = std::function<Eigen::Vector3d(std::uint32_t triangle, const Eigen::Vector3d& point)>;
 
 class PaintedScan : public libmap::ScanSource {

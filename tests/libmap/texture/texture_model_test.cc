@@ -233,7 +233,7 @@ TEST(TextureModel, WhatNobodySeesIsGrayAndCounted) {
   // A mesh seen from below only has no front.
   const PaintedScan below(mesh, red_plate, small_camera(), {looking_at({0, 0, -1}, {0, 0, 0})});
   EXPECT_NE(std::string(error_of([&] { libmap::texture_mesh(mesh, below, below.poses()); }).what())
-                .find("none of its triangles is seen"),
+                .find("no triangle is visible in any"),
             std::string::npos);
 }
 
@@ -343,13 +343,13 @@ TEST(TextureModel, FramesThatCannotBeUsed) {
   EXPECT_EQ(result.skipped[0].first, 2);
   EXPECT_STREQ(result.skipped[0].second.what(), "painted: node 2: broken");
   EXPECT_EQ(result.skipped[0].second.context().file, "painted");
-  EXPECT_EQ(result.skipped[1].second.reason(), "node 3: its pose is not finite");
+  EXPECT_EQ(result.skipped[1].second.reason(), "node 3: pose is not finite");
   TextureOptions strict;
   strict.strict = true;
   EXPECT_THROW(libmap::texture_mesh(mesh, scan, poses, strict), libmap::Error);
   scan.without_color = true;
   EXPECT_NE(std::string(error_of([&] { libmap::texture_mesh(mesh, scan, scan.poses()); }).what())
-                .find("none of 4 frames has a photograph"),
+                .find("no usable photograph in 4 frames"),
             std::string::npos);
   EXPECT_THROW(libmap::texture_mesh(mesh, scan, {}), libmap::Error);
 }
@@ -360,13 +360,13 @@ TEST(TextureModel, MeshesThatCannotBeTextured) {
   TriangleMesh far = mesh;
   for (Eigen::Vector3d& vertex : far.vertices) vertex += Eigen::Vector3d(1000, 0, 0);
   EXPECT_NE(std::string(error_of([&] { libmap::texture_mesh(far, scan, scan.poses()); }).what())
-                .find("seen by any of 3 photographs"),
+                .find("in any of the 3 photographs"),
             std::string::npos);
   EXPECT_THROW(libmap::texture_mesh({}, scan, scan.poses()), libmap::Error);
   TriangleMesh broken = mesh;
   broken.vertices[3].z() = std::nan("");
   EXPECT_THROW(libmap::texture_mesh(broken, scan, scan.poses()), libmap::Error);
-  // Triangles without area and such as name a vertex twice are nobody's.
+  // Triangles without area, and triangles with a repeated vertex, are not seen.
   TriangleMesh slivers = mesh;
   slivers.triangles.push_back({0, 0, 5});
   slivers.triangles.push_back({0, 1, 2});

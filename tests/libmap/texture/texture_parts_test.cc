@@ -1,4 +1,4 @@
-// The parts that textures are made of, each for itself.
+// Unit tests of the steps of texturing.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -30,7 +30,7 @@ TEST(ViewTable, KeepsTheBestInOrder) {
     ViewTable table(1, 4);
     std::vector<libmap::ViewQuality> all;
     for (std::uint32_t photo = 0; photo < 9; ++photo) {
-      // Equal qualities happen.
+      // Equal qualities occur.
       all.push_back({photo, static_cast<float>(std::floor(uniform(1, 5)))});
       table.insert(0, all.back());
     }
@@ -313,12 +313,12 @@ TEST(Exposure, GainsOfPhotographsThatDifferAndLeftOversThatDoNotFit) {
     EXPECT_NEAR(static_cast<double>(exposure.gains[i][0] / exposure.gains[1][0]), gains[i], 0.01);
   EXPECT_NEAR(std::log(static_cast<double>(exposure.factor(3, 0.5)[1] / exposure.gains[3][1])),
               -0.15, 0.01);
-  // A photograph that no other one overlaps is left as it is.
+  // A photograph without overlap is not changed.
   EXPECT_NEAR(static_cast<double>(exposure.gains[3][2]), 1.0, 0.08);
   EXPECT_EQ(libmap::even_out_exposure({}, 2, {}).gains[1], Eigen::Vector3f::Ones());
 }
 
-// How many edges belong to one triangle alone, and to more than two.
+// Number of edges with one triangle, and with more than two.
 std::pair<std::size_t, std::size_t> edge_uses(const TriangleMesh& mesh) {
   const libmap::MeshEdges edges = libmap::edges_of(mesh.triangles, mesh.vertices.size());
   std::pair<std::size_t, std::size_t> uses{0, 0};
@@ -360,7 +360,7 @@ TEST(SplitLongSides, SameSurfaceWithoutGaps) {
     }
   }
   EXPECT_EQ(libmap::split_long_sides(ball, 2.0, most).mesh.triangles, ball.triangles);
-  // Kilometers are not cut into centimeters.
+  // The number of triangles is limited for large meshes.
   const TriangleMesh wide = graspmap_test::square_mesh(0.0, 5000.0);
   const libmap::SubdivisionResult bounded = libmap::split_long_sides(wide, 0.05, 10000);
   EXPECT_LT(bounded.mesh.triangles.size(), 10001U);

@@ -239,7 +239,7 @@ TEST(TextureViews, VerticesAreSeenWhereThePhotographShowsAllTheirTriangles) {
   EXPECT_LT((seen[{10, 1.35}]), (seen[{10, 0.0}]));
 }
 
-// A red plate, in pieces of its own, stands before the ground of others.
+// A red plate in separate pieces occludes the ground of other pieces.
 TEST(TexturePieces, NeighborsHideWhatIsBehindThem) {
   const std::size_t of_ground = 2 * 50 * 50;
   TriangleMesh plate = grid_mesh(12, 0.24, 0.25);
@@ -296,7 +296,7 @@ TEST(TexturePieces, APieceThatNobodySeesIsGray) {
                           {graspmap_test::looking_at({0, 0, -1}, {0, 0, 0})});
   EXPECT_NE(
       std::string(graspmap_test::error_of([&] { textured(mesh, below, {}, 0.5, report); }).what())
-          .find("none of its triangles is seen"),
+          .find("no triangle is visible in any"),
       std::string::npos);
 }
 

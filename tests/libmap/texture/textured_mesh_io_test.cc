@@ -48,7 +48,7 @@ TexturedMesh random_model(bool normals) {
   return model;
 }
 
-// Each triangle of one is one of the other, with the same places, page and colors.
+// Both models have the same triangles, with equal positions, page and colors.
 void expect_same(const TexturedMesh& read, const TexturedMesh& written, double color_tolerance) {
   ASSERT_EQ(read.mesh.triangles.size(), written.mesh.triangles.size());
   ASSERT_EQ(read.mesh.vertices.size(), written.mesh.vertices.size());
@@ -230,7 +230,7 @@ TEST(TexturedMeshIo, FilesThatAreBroken) {
     graspmap_test::write_text(folder / "forged.glb", forged);
     const libmap::Error error =
         error_of([&] { libmap::read_textured_mesh(folder / "forged.glb"); });
-    EXPECT_TRUE(at == 12U || error.context().field == "length of its text") << error.what();
+    EXPECT_TRUE(at == 12U || error.context().field == "length of the JSON text") << error.what();
   }
   TexturedMesh wrong = model;
   wrong.page_of_triangle[3] = 2;

@@ -9,7 +9,7 @@
 
 namespace graspmap_test {
 
-// All files of a model, straight to their paths.
+// Writes all files of a model.
 inline void write_textured_mesh(const std::filesystem::path& path,
                                 const libmap::TexturedMesh& model,
                                 const libmap::TexturedMeshWriteOptions& options = {}) {

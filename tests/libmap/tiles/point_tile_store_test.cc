@@ -13,7 +13,7 @@ using graspmap_test::uniform;
 using libmap::PointCloud;
 using libmap::PointTileStore;
 
-// Against the plain filter, whatever fits into the buffer.
+// Compares with a filter in memory for several sizes of the buffer.
 TEST(PointTileStore, PointsOfARectangleInTheirOrder) {
   for (const std::size_t buffer : {std::size_t{100}, std::size_t{20000}, std::size_t{1} << 26U}) {
     for (const bool normals : {false, true}) {

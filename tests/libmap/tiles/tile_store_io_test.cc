@@ -81,7 +81,7 @@ TEST(TileStore, OtherFoldersAreNotTouched) {
   fs::create_directory(scratch_folder() / "a");
   write_text(scratch_folder() / "a/diary.txt", "dear");
   EXPECT_EQ(error_of([&] { TileStore(scratch_folder() / "a").begin({}, nothing); }).reason(),
-            "is not empty and is no tile store");
+            "is not empty and is not a tile store");
   EXPECT_EQ(
       error_of([&] { TileStore(scratch_folder() / "a/diary.txt").begin({}, nothing); }).reason(),
       "is a file, not a tile store");

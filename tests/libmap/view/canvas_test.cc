@@ -11,7 +11,7 @@ constexpr Color white{255, 255, 255};
 constexpr Color red{255, 0, 0};
 constexpr Color blue{0, 0, 255};
 
-// Of the pixels that are not white.
+// Bounding box of the pixels that are not white.
 PixelRect drawn_box(const ColorImage& image) {
   int left = image.width, top = image.height, right = 0, bottom = 0;
   for (int y = 0; y < image.height; ++y) {

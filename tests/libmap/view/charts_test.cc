@@ -46,7 +46,7 @@ struct Box {
   double middle_row() const { return 0.5 * (top + bottom); }
 };
 
-// Where that very color is.
+// Bounding box of the pixels of exactly this color.
 Box find_color(const ColorImage& image, const Color& color) {
   Box box;
   for (int y = 0; y < image.height; ++y) {
@@ -72,7 +72,7 @@ Chart unit_chart() {
 
 using Element = vtkXMLDataElement;
 
-// All elements of that name, or of any name.
+// All elements of a given name, or of any name.
 void collect(Element* element, const std::string& name, std::vector<Element*>& found) {
   if (name.empty() || name == element->GetName()) found.push_back(element);
   for (int i = 0; i < element->GetNumberOfNestedElements(); ++i)

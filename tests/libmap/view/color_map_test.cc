@@ -231,7 +231,7 @@ TEST(ColorPoints, ErrorsNameWhatWasMeant) {
   coloring = {.mode = ColorMode::field, .field = "curvature"};
   cloud.fields[0].values.pop_back();
   EXPECT_STREQ(error_of([&] { color(cloud, coloring); }).what(),
-               "curvature is 2 values: the field has not one value per point (must be 3)");
+               "curvature is 2 values: not one value per point (must be 3)");
   coloring.mode = ColorMode::single;
   coloring.color = "gren";
   EXPECT_THAT(error_of([&] { color(cloud, coloring); }).what(), HasSubstr("green"));

@@ -110,7 +110,7 @@ TEST_F(VirtualDisplayTest, AServerThatDoesNotComeUpIsAnError) {
   const Error error = error_of([] { const VirtualDisplay display; });
   setenv("PATH", path.c_str(), 1);
   EXPECT_EQ(error.kind(), ErrorKind::failed);
-  EXPECT_THAT(error.what(), HasSubstr("Xvfb did not come up"));
+  EXPECT_THAT(error.what(), HasSubstr("Xvfb did not start"));
   EXPECT_EQ(variable("DISPLAY"), "(unset)");
   EXPECT_EQ(waitpid(-1, nullptr, WNOHANG), -1);
 }
@@ -125,7 +125,7 @@ TEST_F(VirtualDisplayTest, AServerWithoutOpenGlIsAnError) {
   const Error error = error_of([] { const VirtualDisplay display; });
   setenv("PATH", path.c_str(), 1);
   EXPECT_EQ(error.kind(), ErrorKind::failed);
-  EXPECT_THAT(error.what(), HasSubstr("Xvfb answers without OpenGL"));
+  EXPECT_THAT(error.what(), HasSubstr("Xvfb has no OpenGL"));
   EXPECT_EQ(variable("DISPLAY"), "(unset)");
   EXPECT_EQ(waitpid(-1, nullptr, WNOHANG), -1);
 }
@@ -136,7 +136,7 @@ TEST_F(VirtualDisplayTest, WithoutAFileLeftToOpenItIsAnError) {
     const VirtualDisplay display;
   });
   EXPECT_EQ(error.kind(), ErrorKind::failed);
-  EXPECT_THAT(error.what(), HasSubstr("no pipe to Xvfb: Too many open files"));
+  EXPECT_THAT(error.what(), HasSubstr("pipe to Xvfb failed: Too many open files"));
   EXPECT_EQ(variable("LIBGL_ALWAYS_SOFTWARE"), "(unset)");
 }
 
@@ -175,13 +175,13 @@ TEST(DrawOffscreen, WhatVtkSaysIsTheReason) {
   });
   EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
   EXPECT_EQ(error.kind(), ErrorKind::failed);
-  EXPECT_STREQ(error.what(), "VTK could not draw the picture: ERROR: no such shader at all");
+  EXPECT_STREQ(error.what(), "VTK failed to render the image: ERROR: no such shader at all");
 }
 
 TEST(DrawOffscreen, APictureWithoutPixelsCannotBeReadBack) {
   const Error error = error_of([] { draw_offscreen(0, 0, [](vtkRenderWindow&) {}); });
   EXPECT_EQ(error.kind(), ErrorKind::failed);
-  EXPECT_STREQ(error.what(), "the picture could not be read back from OpenGL");
+  EXPECT_STREQ(error.what(), "the image could not be read back from OpenGL");
 }
 
 }  // namespace offscreen_test

@@ -178,7 +178,7 @@ TEST_F(PictureSheetTest, ScenesShareScaleAndPlace) {
   EXPECT_EQ(at(alone, rows.cells[1].left + 100, rows.cells[1].top + 50), blue);
 }
 
-// Two scenes with different values share one range of colors.
+// Two scenes with different values share one color range.
 TEST_F(PictureSheetTest, ContinuousColorsShareTheirRange) {
   const auto scene = [](double low, double high) {
     PointCloud cloud;
@@ -230,7 +230,7 @@ TEST_F(PictureSheetTest, ADimensionLineIsDrawnAtItsEnds) {
 
 TEST(PictureSheet, WhatCannotBeDrawnIsAnError) {
   const std::vector<SheetCell> one = {cell_of("", ColorImage(10, 10, red))};
-  EXPECT_THAT(error_of([] { draw_sheet({}, {}); }).what(), HasSubstr("without pictures"));
+  EXPECT_THAT(error_of([] { draw_sheet({}, {}); }).what(), HasSubstr("no cells"));
   PictureSheetOptions options;
   options.cell_width_px = 3;
   EXPECT_THAT(error_of([&] { draw_sheet(one, options); }).what(), HasSubstr("cell_width_px"));

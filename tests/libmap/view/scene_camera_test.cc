@@ -55,7 +55,7 @@ TEST(SceneCamera, ObliqueStandsInFrontOnTheLeftAndAbove) {
   EXPECT_LT(camera.pixel_of({0, 0, 1}).y(), camera.pixel_of({0, 0, -1}).y());
 }
 
-// Whatever is shown: all of it, not too small, in the middle, by a proper rotation.
+// Any scene is shown completely, not too small, centered, and with a proper rotation.
 TEST(SceneCamera, FitsAnyCloud) {
   for (int round = 0; round < 100; ++round) {
     const Eigen::Vector3d size(std::pow(10.0, uniform(-3, 3)), std::pow(10.0, uniform(-3, 3)),

@@ -17,7 +17,7 @@ SceneViewOptions options_of(int width, int height) {
   return options;
 }
 
-// No part lies on another or beyond the picture, and the scene has the most of it.
+// Parts of the page neither overlap nor exceed the image, and the scene has most of the area.
 TEST(PlanPage, PartsNeverOverlapAtAnySize) {
   const std::vector<Legend> legends{score_legend()};
   for (const int width : {1, 2, 64, 100, 160, 320, 640, 801, 1600, 4000, 16384}) {

@@ -36,7 +36,7 @@ SceneLayer colored_points(const std::vector<Eigen::Vector3d>& positions,
   return layer;
 }
 
-// The scene over the whole picture.
+// Options for a scene that fills the image.
 SceneViewOptions bare(int width, int height, Viewpoint view = Viewpoint::top) {
   SceneViewOptions options;
   options.width = width;
@@ -334,8 +334,7 @@ TEST_F(SceneViewTest, RefusesSizesAndColorsThatCannotBe) {
   EXPECT_THAT(error_of([&] { render_scene(scene, options); }).what(), HasSubstr("'black'"));
   options = {};
   options.extent = Bounds3d{{0, 1, 0}, {1, 0, 1}};
-  EXPECT_STREQ(error_of([&] { render_scene(scene, options); }).what(),
-               "extent: an empty box cannot be shown");
+  EXPECT_STREQ(error_of([&] { render_scene(scene, options); }).what(), "extent: the box is empty");
 }
 
 TEST(ImageFile, IsWrittenWholeAndRefusedTorn) {
@@ -348,7 +347,7 @@ TEST(ImageFile, IsWrittenWholeAndRefusedTorn) {
     to_png(broken);
   });
   error_of([] { to_png({}); });
-  // libpng would end the program.
+  // libpng would abort the program.
   const Error wide = error_of([] { to_png(ColorImage(1'000'001, 1)); });
   EXPECT_EQ(wide.context().value, "1000001 x 1");
   EXPECT_EQ(wide.context().bound, "at most 1000000 a side");
