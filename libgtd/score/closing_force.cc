@@ -41,9 +41,9 @@ constexpr double max_deviations = 2.0;
 // reaches each of nine loads. With the mean c of C, of the columns whose C is above
 // `floor_of_capacity` the mean of ln C, its spread and their fraction p, and the spread v of a
 // finger's pull on level ground (FingerPulls::spreads):
-//   P(force > 0) = logistic(1.154 + 1.813 p + 3.586 contact + 0.811 ln(c + offset) - 0.990 v),
-//   mean ln(force / closing forces) = 0.487 + 0.983 ln C - 0.529 rise + 1.305 tilt - 1.067 v,
-//   ln(spread of ln force) = -1.660 + 1.068 spread(ln C) + 1.014 v.
+//   P(force > 0) = logistic(1.234 + 1.623 p + 3.988 contact + 0.679 ln(c + offset) - 1.203 v),
+//   mean ln(force / closing forces) = 0.293 + 1.006 ln C - 0.446 rise + 0.663 tilt - 0.537 v,
+//   ln(spread of ln force) = -1.540 + 1.056 spread(ln C) + 0.745 v.
 // contact: fraction of the azimuths with spine contact on the weakest side; rise of the palm above
 // the voxel; tilt: imbalance of the depths of the contacts. Both in finger lengths. The weakest of
 // several random pulls decreases with their spread, hence v.
@@ -320,12 +320,12 @@ GRASPMAP_CLONED_CHOICE void find_forces(const SetSums& sums, const MeanTerms& me
     const float log = logs[s] / count;
     const float variance = squares[s] / count - log * log;
     const float spread = std::sqrt(variance > 0.0F ? variance : 0.0F);
-    const float logit = 1.154F + 1.813F * count / mean.weights + 3.586F * mean.contact +
-                        0.811F * quick_log(capacities[s] / mean.weights + offset_of_capacity) -
-                        0.990F * pull_spreads[s];
+    const float logit = 1.234F + 1.623F * count / mean.weights + 3.988F * mean.contact +
+                        0.679F * quick_log(capacities[s] / mean.weights + offset_of_capacity) -
+                        1.203F * pull_spreads[s];
     probability[s] = has_force ? 1.0F / (1.0F + quick_exp(-logit)) : 0.0F;
-    log_force[s] = log_scale[s] + mean.bias + 0.983F * log - 1.067F * pull_spreads[s];
-    const float log_spread = -1.660F + 1.068F * spread + 1.014F * pull_spreads[s];
+    log_force[s] = log_scale[s] + mean.bias + 1.006F * log - 0.537F * pull_spreads[s];
+    const float log_spread = -1.540F + 1.056F * spread + 0.745F * pull_spreads[s];
     const float low = log_spread > -3.0F ? log_spread : -3.0F;
     spreads[s] = quick_exp(low < 1.0F ? low : 1.0F);
     scale[s] = beta_spread / spreads[s];
@@ -406,7 +406,7 @@ class BlockCloser {
     find_forces(
         sums_,
         {.contact = static_cast<float>(mean.contact / weights),
-         .bias = static_cast<float>(0.487 + (1.305 * mean.tilt - 0.529 * mean.palm) / lengths),
+         .bias = static_cast<float>(0.293 + (0.663 * mean.tilt - 0.446 * mean.palm) / lengths),
          .weights = static_cast<float>(weights)},
         log_scale_.data(), path_.pulls.spreads.data(), forces_);
     return estimate();

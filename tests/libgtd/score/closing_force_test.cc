@@ -133,10 +133,10 @@ TEST(ClosingForce, LevelGround) {
   c /= std::sqrt(1 + c * c / (0.55 * 0.55));
   const double v = path.pulls.spreads[0];
   const double probability =
-      1 / (1 + std::exp(-(1.154 + 1.813 + 3.586 + 0.811 * std::log(c + 0.003) - 0.990 * v)));
+      1 / (1 + std::exp(-(1.234 + 1.623 + 3.988 + 0.679 * std::log(c + 0.003) - 1.203 * v)));
   const double log_force =
-      std::log(80.0) + 0.487 + 0.983 * std::log(c) - 0.529 * depth / 0.081 - 1.067 * v;
-  const double spread = std::exp(-1.660 + 1.014 * v);
+      std::log(80.0) + 0.293 + 1.006 * std::log(c) - 0.446 * depth / 0.081 - 0.537 * v;
+  const double spread = std::exp(-1.540 + 0.745 * v);
   const auto survival = [&](double force) {
     return probability * beta_share((log_force - std::log(force)) / spread);
   };
@@ -379,12 +379,12 @@ SlowForce slow_force(const std::map<std::pair<int, int>, double>& heights, const
   const double log = logs / with_force;
   const double variance = std::max(0.0, squares / with_force - log * log);
   const double v = path.pulls.spreads[0];
-  const double logit = 1.154 + 1.813 * with_force / weights + 3.586 * mean.contact / weights +
-                       0.811 * std::log(mean.capacity / weights + 0.003) - 0.990 * v;
+  const double logit = 1.234 + 1.623 * with_force / weights + 3.988 * mean.contact / weights +
+                       0.679 * std::log(mean.capacity / weights + 0.003) - 1.203 * v;
   return {1 / (1 + std::exp(-logit)),
-          std::log(path.pulls.all_fingers[0]) + 0.487 + 0.983 * log - 0.529 * mean.rise / weights +
-              1.305 * mean.tilt / weights - 1.067 * v,
-          std::exp(std::clamp(-1.660 + 1.068 * std::sqrt(variance) + 1.014 * v, -3.0, 1.0))};
+          std::log(path.pulls.all_fingers[0]) + 0.293 + 1.006 * log - 0.446 * mean.rise / weights +
+              0.663 * mean.tilt / weights - 0.537 * v,
+          std::exp(std::clamp(-1.540 + 1.056 * std::sqrt(variance) + 0.745 * v, -3.0, 1.0))};
 }
 
 TEST(ClosingForce, AgreesWithItsDefinition) {
