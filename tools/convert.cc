@@ -301,6 +301,7 @@ bool has_cloud_extension(const std::string& path) {
 // such as a model of COLMAP. Of all else a folder without an extension is a bag: of a rig, or of
 // one map; several are the shares of a map, which become a file.
 Usage* usage_of(const Words& words) {
+  if (is_world_path(words.output)) return convert_world;
   if (words.any_input([](const std::string& word) { return word.ends_with(".db"); }))
     return convert_scan;
   if (libmap::has_bag_extension(words.output) || words.any_input(libmap::is_bag_path) ||
@@ -320,6 +321,6 @@ Usage* usage_of(const Words& words) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  return run_usage(argc, argv, {convert_file, convert_scan, convert_bag},
+  return run_usage(argc, argv, {convert_file, convert_scan, convert_bag, convert_world},
                    usage_of(words_of(argc, argv)));
 }
