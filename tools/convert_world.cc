@@ -48,9 +48,8 @@ libmap::WorldScores read_scores(const std::string& file, Run& run) {
   scores.points = map.positions;
   for (const double one : score->values) scores.colors.push_back(libmap::score_color(one));
   const auto manifest = libmap::read_manifest_of(file);
-  scores.size_m =
-      libmap::number_of(manifest ? manifest->find_parameter("voxel_size_m") : nullptr)
-          .value_or(libmap::median_spacing(map.positions));
+  scores.size_m = libmap::number_of(manifest ? manifest->find_parameter("voxel_size_m") : nullptr)
+                      .value_or(libmap::median_spacing(map.positions));
   return scores;
 }
 
@@ -71,8 +70,7 @@ libmap::Pose rig_pose(const std::string& text, const libmap::TriangleMesh& mesh)
   Eigen::Vector3d place = 0.5 * (bounds.min + bounds.max);
   place.z() = bounds.max.z() + 1.0;
   const auto hit = libmap::RayCaster(mesh).cast(place, -Eigen::Vector3d::UnitZ());
-  if (!hit)
-    throw libmap::Error("no ground below the middle of the site", {.field = "--rig-pose"});
+  if (!hit) throw libmap::Error("no ground below the middle of the site", {.field = "--rig-pose"});
   place.z() += height_m - hit->distance;
   return libmap::make_pose(place, Eigen::Quaterniond::Identity());
 }
@@ -104,10 +102,9 @@ std::vector<std::string> notes_of(const libmap::Manifest& manifest) {
     notes.push_back(std::string(site_from_map_name) +
                     " (x, y, z, roll, pitch, yaw; m, degrees): " + transform_text(*pose));
   if (const auto& geo = manifest.georeference)
-    notes.push_back(fmt::format("georeference: offset {} {} {} m, CRS {}",
-                                libmap::to_text(geo->origin_m.x()),
-                                libmap::to_text(geo->origin_m.y()),
-                                libmap::to_text(geo->origin_m.z()), geo->crs_wkt));
+    notes.push_back(fmt::format(
+        "georeference: offset {} {} {} m, CRS {}", libmap::to_text(geo->origin_m.x()),
+        libmap::to_text(geo->origin_m.y()), libmap::to_text(geo->origin_m.z()), geo->crs_wkt));
   return notes;
 }
 
@@ -143,8 +140,7 @@ std::vector<libmap::WorldModel> write_models(const fs::path& folder,
     models.push_back(write(
         {.name = pieces.path(n).stem().string(),
          .visual = read_visual(pieces.path(n)),
-         .surface =
-             pieces.with_margin(n, margin_cells * options.world.field.cell_size_m).mesh}));
+         .surface = pieces.with_margin(n, margin_cells * options.world.field.cell_size_m).mesh}));
   return models;
 }
 
@@ -154,8 +150,7 @@ void write_world(const WorldCommandOptions& options, Run& run) {
   in_file(options.output, [&] { libmap::require_world_name(scene.name, "name"); });
   libmap::gravity_of(options.world.gravity);
   const auto names = libmap::world_file_names();
-  run.claim_output_tree(options.output, names,
-                        {options.site, options.map, options.footholds});
+  run.claim_output_tree(options.output, names, {options.site, options.map, options.footholds});
   scene.options = options.world;
   carry_frame(options.site, run);
   const libmap::WorldScores scores = read_scores(options.map, run);
@@ -178,11 +173,11 @@ void write_world(const WorldCommandOptions& options, Run& run) {
                            .bound = fmt::format(">= half of {}", scores.points.size())});
     run.add_results({{"models", scene.models.size()}, {"footholds", scene.footholds.size()}});
     run.add_results(libmap::described(report));
-    run.say("{} triangles for collision of {}, within {:.3g} mm; height field within {:.3g} mm, "
-            "{} convex pieces for the rest",
-            report.collision_triangles, report.visual_triangles,
-            1e3 * report.collision_deviation_m, 1e3 * report.field_deviation_m,
-            report.convex_pieces);
+    run.say(
+        "{} triangles for collision of {}, within {:.3g} mm; height field within {:.3g} mm, "
+        "{} convex pieces for the rest",
+        report.collision_triangles, report.visual_triangles, 1e3 * report.collision_deviation_m,
+        1e3 * report.field_deviation_m, report.convex_pieces);
   });
 }
 
@@ -201,9 +196,10 @@ int graspmap_tools::convert_world(int argc, char** argv) {
   command.option("--map", "MAP", options.map, "graspability map of the site, a second visual");
   command.option("--footholds", "FOOTHOLDS", options.footholds, "footholds of the map as markers");
   command.option("--rig", "FILE|NAME", options.rig, "depth cameras of a robot as sensors");
-  command.parameters().add("rig_pose", options.rig_pose,
-                           "pose of the robot's body in the site's frame: X,Y,Z,ROLL,PITCH,YAW in m "
-                           "and degrees; auto: 0.25 m above the middle of the site");
+  command.parameters().add(
+      "rig_pose", options.rig_pose,
+      "pose of the robot's body in the site's frame: X,Y,Z,ROLL,PITCH,YAW in m "
+      "and degrees; auto: 0.25 m above the middle of the site");
   bind(command.parameters(), options.world);
   return command.run(argc, argv, [&](Run& run) { write_world(options, run); });
 }

@@ -2,24 +2,32 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <vector>
 
 #include "libmap/core/triangle_mesh.h"
 
 namespace libmap {
 
-// A tetrahedron: the triangle itself, and a corner behind its center.
+// The hull of one triangle, or of two neighbors that make a nearly flat convex quadrilateral, and a
+// corner behind their center.
 struct ConvexPiece {
-  Eigen::Vector3d center = Eigen::Vector3d::Zero();  // of the triangle
-  std::array<Eigen::Vector3d, 4> corners_m;          // from `center`; the last one is behind
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();
+  std::vector<Eigen::Vector3d> corners_m;  // from `center`; the last one is behind
 };
 
-// One piece for each marked triangle, in their order. The depth of a piece is at most
-// `max_depth_m`, half the thickness of the body behind the triangle, and 1.5 times the radius of
-// the triangle's inscribed circle, so that no piece passes through an edge of more than 57 degrees.
-// Triangles lower than 10 micrometers have no piece.
-std::vector<ConvexPiece> make_convex_pieces(const TriangleMesh& mesh,
-                                            const std::vector<bool>& marks, double max_depth_m);
+struct ConvexPieces {
+  std::vector<ConvexPiece> pieces;
+  // No point of the marked triangles is outside the pieces, and no point of a quadrilateral's hull
+  // is farther in front of its triangles than this.
+  double deviation_m = 0.0;
+};
+
+// Pieces behind the marked triangles, in their order. The depth of a piece is at most
+// `max_depth_m`, half the thickness of the body behind it, and 1.5 times the radius of the smallest
+// inscribed circle of its triangles, so that no piece passes through an edge of more than 57
+// degrees. Triangles lower than 10 micrometers have no piece. The mesh must be an oriented
+// manifold.
+ConvexPieces make_convex_pieces(const TriangleMesh& mesh, const std::vector<bool>& marks,
+                                double max_deviation_m, double max_depth_m);
 
 }  // namespace libmap

@@ -69,9 +69,8 @@ HeightField make_grid(const TriangleMesh& mesh, double cell_size_m) {
   const Eigen::Array2d high = (bounds.max.head<2>() / cell_size_m).array().ceil() + 1;
   const Eigen::Array2d nodes = high - low + 1;
   if (!(nodes.prod() <= max_nodes))
-    throw Error("makes too many nodes", {.field = "cell_size_m",
-                                         .value = to_text(cell_size_m),
-                                         .bound = "<= 2^26 nodes"});
+    throw Error("makes too many nodes",
+                {.field = "cell_size_m", .value = to_text(cell_size_m), .bound = "<= 2^26 nodes"});
   field.corner_m = low * cell_size_m;
   field.base_m = bounds.min.z();
   field.columns = static_cast<std::size_t>(nodes.x());
@@ -128,7 +127,8 @@ void extend_border(HeightField& field) {
           sum += far == missing ? near : 2 * near - far;
           count += 1.0F;
         }
-      if (count > 0) field.heights_m[static_cast<std::size_t>(row * columns + column)] = sum / count;
+      if (count > 0)
+        field.heights_m[static_cast<std::size_t>(row * columns + column)] = sum / count;
     }
 }
 

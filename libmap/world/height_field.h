@@ -43,6 +43,7 @@ struct HeightField {
 HeightField make_height_field(const TriangleMesh& mesh, const HeightFieldOptions& options);
 
 // Whether a triangle is above or below a cell that is left out.
-bool is_above_left_out(const HeightField& field, const TriangleMesh& mesh, const Triangle& triangle);
+bool is_above_left_out(const HeightField& field, const TriangleMesh& mesh,
+                       const Triangle& triangle);
 
 }  // namespace libmap

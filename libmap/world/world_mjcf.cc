@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <numbers>
+#include <utility>
 
 #include "libmap/core/angle.h"
 #include "libmap/core/text.h"
@@ -10,6 +12,11 @@
 namespace libmap {
 
 namespace {
+
+// Unit of the pieces' corners, and of their centers.
+constexpr double piece_unit_m = 1e-5;
+
+std::string piece_name(const WorldModel& model, std::size_t n) { return numbered(model.name, n); }
 
 // A spring and damper whose contacts bounce with this restitution: the decay of a damped
 // oscillation over half a period.
@@ -21,13 +28,11 @@ std::string solref_of(double restitution) {
       Eigen::Vector2d(time_constant_s, std::max(1e-3, decay / std::sqrt(1 + decay * decay))));
 }
 
-void add_visual_assets(const std::vector<WorldVisual>& visuals,
-                       XmlWriter& xml) {
+void add_visual_assets(const std::vector<WorldVisual>& visuals, XmlWriter& xml) {
   for (const WorldVisual& visual : visuals) {
     xml.element("mesh", {{"name", visual.file}, {"file", visual.file}});
     if (visual.texture.empty()) continue;
-    xml.element("texture",
-                {{"name", visual.texture}, {"type", "2d"}, {"file", visual.texture}});
+    xml.element("texture", {{"name", visual.texture}, {"type", "2d"}, {"file", visual.texture}});
     xml.element("material", {{"name", visual.texture}, {"texture", visual.texture}});
   }
 }
@@ -44,11 +49,12 @@ void add_assets(const WorldModel& model, XmlWriter& xml) {
   xml.element("hfield",
               {{"name", model.name}, {"file", model.field_file}, {"size", number_text(size)}});
   for (std::size_t n = 0; n < model.pieces.size(); ++n) {
-    Eigen::VectorXd corners(12);
-    for (Eigen::Index k = 0; k < 4; ++k)
-      corners.segment<3>(3 * k) = model.pieces[n].corners_m[static_cast<std::size_t>(k)];
-    xml.element("mesh", {{"name", numbered(model.name + "_piece", n)},
-                         {"vertex", number_text(corners)}});
+    std::string corners;
+    for (const Eigen::Vector3d& corner : model.pieces[n].corners_m)
+      for (const double x : corner)
+        corners +=
+            (corners.empty() ? "" : " ") + to_text(std::int64_t{std::llround(x / piece_unit_m)});
+    xml.element("mesh", {{"class", "piece"}, {"name", piece_name(model, n)}, {"vertex", corners}});
   }
 }
 
@@ -65,14 +71,10 @@ void add_model_mjcf(const WorldModel& model, XmlWriter& xml) {
         field.corner_m.x() + 0.5 * static_cast<double>(field.columns - 1) * field.cell_size_m,
         field.corner_m.y() + 0.5 * static_cast<double>(field.rows - 1) * field.cell_size_m,
         field.base_m + static_cast<double>(field.min_m()));
-    xml.element("geom", {{"class", "collision"},
-                         {"type", "hfield"},
-                         {"hfield", model.name},
-                         {"pos", number_text(center)}});
+    xml.element("geom", {{"class", "field"}, {"hfield", model.name}, {"pos", number_text(center)}});
     for (std::size_t n = 0; n < model.pieces.size(); ++n)
-      xml.element("geom", {{"class", "collision"},
-                           {"type", "mesh"},
-                           {"mesh", numbered(model.name + "_piece", n)},
+      xml.element("geom", {{"class", "piece"},
+                           {"mesh", piece_name(model, n)},
                            {"pos", number_text(model.pieces[n].center)}});
   });
 }
@@ -81,9 +83,8 @@ void add_model_mjcf(const WorldModel& model, XmlWriter& xml) {
 void add_rig_mjcf(const WorldRig& rig, XmlWriter& xml) {
   const auto pose_attributes = [](const Pose& pose) {
     const Eigen::Quaterniond turn(pose.linear());
-    return std::pair(
-        number_text(pose.translation()),
-        number_text(Eigen::Vector4d(turn.w(), turn.x(), turn.y(), turn.z())));
+    return std::pair(number_text(pose.translation()),
+                     number_text(Eigen::Vector4d(turn.w(), turn.x(), turn.y(), turn.z())));
   };
   const auto [robot_pos, robot_quat] = pose_attributes(rig.world_from_robot);
   xml.element("body", {{"name", "rig"}, {"pos", robot_pos}, {"quat", robot_quat}}, [&] {
@@ -93,10 +94,9 @@ void add_rig_mjcf(const WorldRig& rig, XmlWriter& xml) {
       const auto [pos, quat] = pose_attributes(pose);
       const double fovy_deg =
           2 * std::atan(0.5 * camera.camera.height / camera.camera.fy) / radians_per_degree;
-      xml.element("camera", {{"name", camera.name},
-                             {"pos", pos},
-                             {"quat", quat},
-                             {"fovy", to_text(fovy_deg)}});
+      xml.element(
+          "camera",
+          {{"name", camera.name}, {"pos", pos}, {"quat", quat}, {"fovy", to_text(fovy_deg)}});
     }
   });
 }
@@ -120,23 +120,26 @@ void add_world_mjcf(const WorldScene& scene, XmlWriter& xml) {
 std::string to_mjcf(const WorldScene& scene) {
   XmlWriter xml(scene.notes);
   xml.element("mujoco", {{"model", scene.name}}, [&] {
-    xml.element("compiler", {{"angle", "degree"},
-                             {"meshdir", world_mesh_folder},
-                             {"texturedir", world_mesh_folder}});
+    xml.element(
+        "compiler",
+        {{"angle", "degree"}, {"meshdir", world_mesh_folder}, {"texturedir", world_mesh_folder}});
     xml.element("option", {{"gravity", gravity_text(scene.options)}});
     xml.element("default", {}, [&] {
       xml.element("default", {{"class", "visual"}}, [&] {
-        xml.element("geom", {{"type", "mesh"},
-                             {"contype", "0"},
-                             {"conaffinity", "0"},
-                             {"group", "2"}});
+        xml.element("geom",
+                    {{"type", "mesh"}, {"contype", "0"}, {"conaffinity", "0"}, {"group", "2"}});
       });
-      xml.element("default", {{"class", "collision"}}, [&] {
-        xml.element("geom", {{"group", "3"},
-                             {"friction", number_text(Eigen::Vector3d(
-                                              scene.options.friction, 0.005, 0.0001))},
-                             {"solref", solref_of(scene.options.restitution)}});
-      });
+      const std::string friction =
+          number_text(Eigen::Vector3d(scene.options.friction, 0.005, 0.0001));
+      const std::string solref = solref_of(scene.options.restitution);
+      for (const char* name : {"field", "piece"})
+        xml.element("default", {{"class", name}}, [&] {
+          xml.element("geom", {{"type", name == std::string("field") ? "hfield" : "mesh"},
+                               {"group", "3"},
+                               {"friction", friction},
+                               {"solref", solref}});
+          xml.element("mesh", {{"scale", number_text(Eigen::Vector3d::Constant(piece_unit_m))}});
+        });
     });
     xml.element("asset", {}, [&] {
       for (const WorldModel& model : scene.models) add_assets(model, xml);

@@ -48,9 +48,8 @@ double gravity_of(const std::string& text) {
 void require_world_name(const std::string& name, const std::string& field) {
   const bool reserved =
       name == "world" || (name.size() >= 4 && name.starts_with("__") && name.ends_with("__"));
-  const bool control = std::any_of(name.begin(), name.end(), [](unsigned char c) {
-    return c < 0x20 || c == 0x7f;
-  });
+  const bool control =
+      std::any_of(name.begin(), name.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; });
   if (name.empty() || reserved || control || name.find("::") != std::string::npos)
     throw Error("SDF forbids this name",
                 {.field = field,

@@ -20,11 +20,11 @@ namespace libmap {
 struct WorldOptions {
   double collision_error_m = 0.002;  // > 0: between the collision mesh and the visual one
   HeightFieldOptions field{};
-  double piece_depth_m = 0.02;      // > 0: maximum depth of the convex pieces
-  std::string gravity = "earth";    // m/s2 downwards, or earth, moon, mars
-  double friction = 0.8;            // >= 0: Coulomb's coefficient
-  double restitution = 0.0;         // 0 to 1
-  double sensor_noise_m = 0.0;      // >= 0: standard deviation of the rig's depth
+  double piece_depth_m = 0.02;    // > 0: maximum depth of the convex pieces
+  std::string gravity = "earth";  // m/s2 downwards, or earth, moon, mars
+  double friction = 0.8;          // >= 0: Coulomb's coefficient
+  double restitution = 0.0;       // 0 to 1
+  double sensor_noise_m = 0.0;    // >= 0: standard deviation of the rig's depth
 };
 void bind(ParameterTable& table, WorldOptions& options);
 
@@ -47,9 +47,9 @@ struct WorldModel {
   std::string name;
   std::vector<WorldVisual> visuals;
   std::vector<WorldVisual> graspability;
-  std::string collision;    // .obj in the folder of meshes
-  std::string field_file;   // of MuJoCo's height field
-  HeightField field;        // without the cells
+  std::string collision;   // .obj in the folder of meshes
+  std::string field_file;  // of MuJoCo's height field
+  HeightField field;       // without the cells
   std::vector<ConvexPiece> pieces;
 };
 

@@ -15,9 +15,8 @@ constexpr double camera_rate_hz = 15.0;
 
 void add_visual_sdf(const std::string& name, const WorldVisual& visual, XmlWriter& xml) {
   xml.element("visual", {{"name", name}}, [&] {
-    xml.element("geometry", {}, [&] {
-      xml.element("mesh", {}, [&] { xml.text("uri", mesh_path(visual.file)); });
-    });
+    xml.element("geometry", {},
+                [&] { xml.element("mesh", {}, [&] { xml.text("uri", mesh_path(visual.file)); }); });
     if (!visual.texture.empty()) return;
     xml.element("material", {}, [&] {
       for (const char* kind : {"ambient", "diffuse"}) xml.text(kind, color_text(visual.color));

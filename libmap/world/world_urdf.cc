@@ -9,8 +9,9 @@ namespace {
 void add_mesh_urdf(const char* kind, const std::string& name, const WorldVisual& visual,
                    XmlWriter& xml) {
   xml.element(kind, {{"name", name}}, [&] {
-    xml.element("geometry", {},
-                [&] { xml.element("mesh", {{"filename", mesh_path(visual.file)}}); });
+    xml.element("geometry", {}, [&] {
+      xml.element("mesh", {{"filename", mesh_path(visual.file)}});
+    });
     xml.element("material", {{"name", name}}, [&] {
       if (visual.texture.empty())
         xml.element("color", {{"rgba", color_text(visual.color)}});
@@ -28,18 +29,20 @@ void add_model_urdf(const WorldModel& model, const WorldOptions& options, XmlWri
     });
     xml.element("inertial", {}, [&] {
       xml.element("mass", {{"value", "0"}});
-      xml.element("inertia", {{"ixx", "0"}, {"ixy", "0"}, {"ixz", "0"}, {"iyy", "0"}, {"iyz", "0"},
-                              {"izz", "0"}});
+      xml.element(
+          "inertia",
+          {{"ixx", "0"}, {"ixy", "0"}, {"ixz", "0"}, {"iyy", "0"}, {"iyz", "0"}, {"izz", "0"}});
     });
     for (std::size_t n = 0; n < model.visuals.size(); ++n)
       add_mesh_urdf("visual", numbered(model.name + "_visual", n), model.visuals[n], xml);
     for (std::size_t n = 0; n < model.graspability.size(); ++n)
-      add_mesh_urdf("visual", numbered(model.name + "_graspability", n),
-                    model.graspability[n], xml);
+      add_mesh_urdf("visual", numbered(model.name + "_graspability", n), model.graspability[n],
+                    xml);
     // Bullet takes the triangles as they are, not their convex hull.
     xml.element("collision", {{"name", "collision"}, {"concave", "yes"}}, [&] {
-      xml.element("geometry", {},
-                  [&] { xml.element("mesh", {{"filename", mesh_path(model.collision)}}); });
+      xml.element("geometry", {}, [&] {
+        xml.element("mesh", {{"filename", mesh_path(model.collision)}});
+      });
     });
   });
   xml.element("joint", {{"name", model.name + "_joint"}, {"type", "fixed"}}, [&] {

@@ -1,6 +1,7 @@
 #include "libmap/world/world_writer.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <set>
@@ -24,6 +25,9 @@ namespace {
 
 // Vertices this near to each other, of the mesh's size, are one.
 constexpr double weld_share = 1e-7;
+// Vertices of the collision mesh are multiples of this; so MJCF rounds, ten times as coarse.
+constexpr double rounding_m = 1e-6;
+constexpr double bulge_share = 0.5;
 
 struct CollisionMesh {
   TriangleMesh mesh;
@@ -51,12 +55,13 @@ CollisionMesh make_collision_mesh(const TriangleMesh& visual, double max_error_m
   double moved_m = weld_m;
   for (const double distance : distances_to_surface(copies, visual))
     moved_m = std::max(moved_m, weld_m + distance);
+  moved_m += rounding_m;
   if (max_error_m > moved_m)
     collision.deviation_m =
         decimate_mesh(collision.mesh, max_error_m - moved_m, progress).deviation_m;
   collision.deviation_m += moved_m;
-  collision.mesh = select_triangles(collision.mesh,
-                                    std::vector<bool>(collision.mesh.triangles.size(), true));
+  for (Eigen::Vector3d& vertex : collision.mesh.vertices)
+    vertex = (vertex / rounding_m).array().round() * rounding_m;
   return collision;
 }
 
@@ -118,8 +123,7 @@ std::vector<WorldVisual> write_scores(const fs::path& folder, const std::string&
                                       WorldReport& report) {
   std::vector<WorldVisual> visuals;
   if (scores.points.empty()) return visuals;
-  const ScoreSquares squares =
-      score_squares(scores.points, scores.colors, scores.size_m, surface);
+  const ScoreSquares squares = score_squares(scores.points, scores.colors, scores.size_m, surface);
   report.score_points += squares.on_surface;
   for (const ColoredMesh& colored : squares.meshes) {
     visuals.push_back({.file = name + "_score_" + std::to_string(visuals.size()) + ".obj",
@@ -130,12 +134,13 @@ std::vector<WorldVisual> write_scores(const fs::path& folder, const std::string&
   return visuals;
 }
 
-std::vector<ConvexPiece> pieces_of(const TriangleMesh& collision, const HeightField& field,
-                                   double max_depth_m) {
+ConvexPieces pieces_of(const TriangleMesh& collision, const HeightField& field,
+                       const WorldOptions& options) {
   std::vector<bool> marks(collision.triangles.size());
   for (std::size_t t = 0; t < marks.size(); ++t)
     marks[t] = is_above_left_out(field, collision, collision.triangles[t]);
-  return make_convex_pieces(collision, marks, max_depth_m);
+  return make_convex_pieces(collision, marks, bulge_share * options.collision_error_m,
+                            options.piece_depth_m);
 }
 
 }  // namespace
@@ -156,6 +161,8 @@ void describe(ResultTable& table, const WorldReport& report) {
   table.add("left_out_cells", report.left_out_cells, Merge::sum,
             "cells of the height fields that convex pieces replace");
   table.add("convex_pieces", report.convex_pieces, Merge::sum, "convex pieces");
+  table.add("piece_deviation_m", report.piece_deviation_m, Merge::max,
+            "maximum distance of the pieces' outer faces from the visual meshes, m");
   table.add("collision_bytes", report.collision_bytes, Merge::sum,
             "size of collision meshes and height fields, bytes");
   table.add("score_points", report.score_points, Merge::sum, "map points on the surface");
@@ -178,7 +185,8 @@ WorldModel write_world_model(const fs::path& folder, const WorldModelInput& inpu
                    .pieces = {}};
   const CollisionMesh collision =
       make_collision_mesh(input.visual.mesh, options.collision_error_m, progress);
-  model.pieces = pieces_of(collision.mesh, model.field, options.piece_depth_m);
+  ConvexPieces pieces = pieces_of(collision.mesh, model.field, options);
+  model.pieces = std::move(pieces.pieces);
   model.visuals = write_visuals(meshes, input.name, input.visual);
   model.graspability = write_scores(meshes, input.name, input.visual.mesh, scores, report);
   if (!meshes.empty()) {
@@ -195,6 +203,8 @@ WorldModel write_world_model(const fs::path& folder, const WorldModelInput& inpu
   report.field_deviation_m = std::max(report.field_deviation_m, model.field.deviation_m);
   report.left_out_cells += model.field.left_out_cells;
   report.convex_pieces += model.pieces.size();
+  report.piece_deviation_m = std::max(report.piece_deviation_m,
+                                      collision.deviation_m + pieces.deviation_m + 10 * rounding_m);
   model.field.left_out = {};
   return model;
 }

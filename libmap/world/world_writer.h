@@ -34,6 +34,7 @@ struct WorldReport {
   double field_deviation_m = 0.0;  // of HeightField
   std::size_t left_out_cells = 0;
   std::size_t convex_pieces = 0;
+  double piece_deviation_m = 0.0;   // of their outer faces from the visual mesh
   std::size_t collision_bytes = 0;  // of collision meshes and height fields
   std::size_t score_points = 0;     // of the map, on the surface
 };
