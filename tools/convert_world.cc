@@ -122,9 +122,9 @@ libmap::TexturedMesh read_visual(const fs::path& file) {
 std::vector<libmap::WorldModel> write_models(const fs::path& folder,
                                              const WorldCommandOptions& options,
                                              const libmap::WorldScores& scores,
-                                             libmap::WorldReport& report, Run& run) {
+                                             libmap::WorldReport& report) {
   const auto write = [&](const libmap::WorldModelInput& input) {
-    return libmap::write_world_model(folder, input, scores, options.world, report, run.progress());
+    return libmap::write_world_model(folder, input, scores, options.world, report);
   };
   if (!fs::is_directory(options.site)) {
     libmap::WorldModelInput input{
@@ -162,7 +162,7 @@ void write_world(const WorldCommandOptions& options, Run& run) {
   run.write_output_tree(options.output, names, [&](const fs::path& folder) {
     libmap::WorldReport report;
     in_file(options.site, [&] {
-      scene.models = write_models(folder, options, scores, report, run);
+      scene.models = write_models(folder, options, scores, report);
       libmap::write_world(folder, scene);
     });
     if (2 * report.score_points < scores.points.size())

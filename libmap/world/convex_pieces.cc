@@ -84,6 +84,7 @@ ConvexPieces make_convex_pieces(const TriangleMesh& mesh, const std::vector<bool
     std::vector<std::uint32_t> corners(t.begin(), t.end());
     Eigen::Vector3d normal = area_normal(mesh, t);
     double depth_m = std::min(max_depth_m, max_depth_of_radius * radius_m[n]);
+    double bulge_m = 0.0;
     free[n] = false;
     if (const auto partner = partner_of(mesh, opposite, free, n, max_deviation_m)) {
       const HalfEdge other = opposite[partner->first];
@@ -91,19 +92,20 @@ ConvexPieces make_convex_pieces(const TriangleMesh& mesh, const std::vector<bool
       normal += area_normal(mesh, mesh.triangles[other / 3]);
       depth_m = std::min(depth_m, max_depth_of_radius * radius_m[other / 3]);
       free[other / 3] = false;
-      result.deviation_m = std::max(result.deviation_m, partner->second);
+      bulge_m = partner->second;
+      result.deviation_m = std::max(result.deviation_m, bulge_m);
     }
-    ConvexPiece piece;
+    Eigen::Vector3d center = Eigen::Vector3d::Zero();
     for (const std::uint32_t v : corners)
-      piece.center += mesh.vertices[v] / static_cast<double>(corners.size());
-    piece.center = (piece.center / center_unit_m).array().round() * center_unit_m;
+      center += mesh.vertices[v] / static_cast<double>(corners.size());
+    const Eigen::Vector3d behind = -normal.normalized();
+    if (const auto hit = rays.cast(center, behind, ray_start_m + bulge_m))
+      depth_m = std::min(depth_m, thickness_share * hit->distance);
+    ConvexPiece piece;
+    piece.center = (center / center_unit_m).array().round() / std::round(1 / center_unit_m);
     for (const std::uint32_t v : corners)
       piece.corners_m.emplace_back(mesh.vertices[v] - piece.center);
-    const Eigen::Vector3d behind = -normal.normalized();
-    const double start_m = ray_start_m + result.deviation_m;
-    if (const auto hit = rays.cast(piece.center, behind, start_m))
-      depth_m = std::min(depth_m, thickness_share * hit->distance);
-    piece.corners_m.emplace_back(depth_m * behind);
+    piece.corners_m.emplace_back(center + depth_m * behind - piece.center);
     result.pieces.push_back(std::move(piece));
   }
   return result;

@@ -117,18 +117,22 @@ void extend_border(HeightField& field) {
   for (std::ptrdiff_t row = 0; row < rows; ++row)
     for (std::ptrdiff_t column = 0; column < columns; ++column) {
       if (at(column, row) != missing) continue;
-      float sum = 0.0F;
-      float count = 0.0F;
+      // Sums and counts of continued slopes, and of heights alone.
+      std::array<float, 2> sums{};
+      std::array<float, 2> counts{};
       for (std::ptrdiff_t y = -1; y <= 1; ++y)
         for (std::ptrdiff_t x = -1; x <= 1; ++x) {
           const float near = at(column + x, row + y);
           const float far = at(column + 2 * x, row + 2 * y);
           if (near == missing) continue;
-          sum += far == missing ? near : 2 * near - far;
-          count += 1.0F;
+          const std::size_t kind = far == missing ? 1 : 0;
+          sums[kind] += kind == 1 ? near : 2 * near - far;
+          counts[kind] += 1.0F;
         }
-      if (count > 0)
-        field.heights_m[static_cast<std::size_t>(row * columns + column)] = sum / count;
+      const std::size_t kind = counts[0] > 0 ? 0 : 1;
+      if (counts[kind] > 0)
+        field.heights_m[static_cast<std::size_t>(row * columns + column)] =
+            sums[kind] / counts[kind];
     }
 }
 

@@ -30,7 +30,7 @@ std::string solref_of(double restitution) {
 
 void add_visual_assets(const std::vector<WorldVisual>& visuals, XmlWriter& xml) {
   for (const WorldVisual& visual : visuals) {
-    xml.element("mesh", {{"name", visual.file}, {"file", visual.file}});
+    xml.element("mesh", {{"class", "visual"}, {"name", visual.file}, {"file", visual.file}});
     if (visual.texture.empty()) continue;
     xml.element("texture", {{"name", visual.texture}, {"type", "2d"}, {"file", visual.texture}});
     xml.element("material", {{"name", visual.texture}, {"texture", visual.texture}});
@@ -54,12 +54,12 @@ void add_assets(const WorldModel& model, XmlWriter& xml) {
       for (const double x : corner)
         corners +=
             (corners.empty() ? "" : " ") + to_text(std::int64_t{std::llround(x / piece_unit_m)});
-    xml.element("mesh", {{"class", "piece"}, {"name", piece_name(model, n)}, {"vertex", corners}});
+    xml.element("mesh", {{"name", piece_name(model, n)}, {"vertex", corners}});
   }
 }
 
 void add_model_mjcf(const WorldModel& model, XmlWriter& xml) {
-  xml.element("body", {{"name", model.name}}, [&] {
+  xml.element("body", {{"name", model.name}, {"childclass", "piece"}}, [&] {
     for (const auto* visuals : {&model.visuals, &model.graspability})
       for (const WorldVisual& visual : *visuals)
         xml.element("geom", {{"class", "visual"},
@@ -73,9 +73,8 @@ void add_model_mjcf(const WorldModel& model, XmlWriter& xml) {
         field.base_m + static_cast<double>(field.min_m()));
     xml.element("geom", {{"class", "field"}, {"hfield", model.name}, {"pos", number_text(center)}});
     for (std::size_t n = 0; n < model.pieces.size(); ++n)
-      xml.element("geom", {{"class", "piece"},
-                           {"mesh", piece_name(model, n)},
-                           {"pos", number_text(model.pieces[n].center)}});
+      xml.element("geom",
+                  {{"mesh", piece_name(model, n)}, {"pos", number_text(model.pieces[n].center)}});
   });
 }
 
@@ -125,7 +124,9 @@ std::string to_mjcf(const WorldScene& scene) {
         {{"angle", "degree"}, {"meshdir", world_mesh_folder}, {"texturedir", world_mesh_folder}});
     xml.element("option", {{"gravity", gravity_text(scene.options)}});
     xml.element("default", {}, [&] {
+      xml.element("mesh", {{"scale", number_text(Eigen::Vector3d::Constant(piece_unit_m))}});
       xml.element("default", {{"class", "visual"}}, [&] {
+        xml.element("mesh", {{"scale", "1 1 1"}});
         xml.element("geom",
                     {{"type", "mesh"}, {"contype", "0"}, {"conaffinity", "0"}, {"group", "2"}});
       });
@@ -138,7 +139,6 @@ std::string to_mjcf(const WorldScene& scene) {
                                {"group", "3"},
                                {"friction", friction},
                                {"solref", solref}});
-          xml.element("mesh", {{"scale", number_text(Eigen::Vector3d::Constant(piece_unit_m))}});
         });
     });
     xml.element("asset", {}, [&] {

@@ -35,8 +35,7 @@ struct CollisionMesh {
 };
 
 // Decimation needs an oriented manifold. Cutting the mesh into one moves copies of vertices.
-CollisionMesh make_collision_mesh(const TriangleMesh& visual, double max_error_m,
-                                  Progress& progress) {
+CollisionMesh make_collision_mesh(const TriangleMesh& visual, double max_error_m) {
   CollisionMesh collision;
   collision.mesh.vertices = visual.vertices;
   collision.mesh.triangles = visual.triangles;
@@ -57,11 +56,10 @@ CollisionMesh make_collision_mesh(const TriangleMesh& visual, double max_error_m
     moved_m = std::max(moved_m, weld_m + distance);
   moved_m += rounding_m;
   if (max_error_m > moved_m)
-    collision.deviation_m =
-        decimate_mesh(collision.mesh, max_error_m - moved_m, progress).deviation_m;
+    collision.deviation_m = decimate_triangles(collision.mesh, max_error_m - moved_m).deviation_m;
   collision.deviation_m += moved_m;
   for (Eigen::Vector3d& vertex : collision.mesh.vertices)
-    vertex = (vertex / rounding_m).array().round() * rounding_m;
+    vertex = (vertex / rounding_m).array().round() / std::round(1 / rounding_m);
   return collision;
 }
 
@@ -170,7 +168,7 @@ void describe(ResultTable& table, const WorldReport& report) {
 
 WorldModel write_world_model(const fs::path& folder, const WorldModelInput& input,
                              const WorldScores& scores, const WorldOptions& options,
-                             WorldReport& report, Progress& progress) {
+                             WorldReport& report) {
   check_parameters(options);
   require_sound(input.visual.mesh);
   if (input.visual.mesh.triangles.empty()) throw Error("contains no triangle");
@@ -183,8 +181,7 @@ WorldModel write_world_model(const fs::path& folder, const WorldModelInput& inpu
                    .field_file = input.name + "_field.bin",
                    .field = make_height_field(input.surface, options.field),
                    .pieces = {}};
-  const CollisionMesh collision =
-      make_collision_mesh(input.visual.mesh, options.collision_error_m, progress);
+  const CollisionMesh collision = make_collision_mesh(input.visual.mesh, options.collision_error_m);
   ConvexPieces pieces = pieces_of(collision.mesh, model.field, options);
   model.pieces = std::move(pieces.pieces);
   model.visuals = write_visuals(meshes, input.name, input.visual);

@@ -15,7 +15,6 @@
 #include <string>
 #include <vector>
 
-#include "libmap/core/progress.h"
 #include "libmap/core/result_table.h"
 #include "libmap/core/triangle_mesh.h"
 #include "libmap/world/world_scene.h"
@@ -58,7 +57,7 @@ struct WorldModelInput {
 // The same bytes for any number of threads. Throws Error: no triangle, or none that faces up.
 WorldModel write_world_model(const std::filesystem::path& folder, const WorldModelInput& input,
                              const WorldScores& scores, const WorldOptions& options,
-                             WorldReport& report, Progress& progress = no_progress());
+                             WorldReport& report);
 
 // Writes the descriptions. Throws Error for a name that simulators forbid.
 void write_world(const std::filesystem::path& folder, const WorldScene& scene);

@@ -33,8 +33,8 @@ TriangleMesh mesh_of(const HeightField& field, double half_m) {
         continue;
       const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
       for (const auto& [x, y] : {std::pair(0, 0), {1, 0}, {1, 1}, {0, 1}})
-        mesh.vertices.push_back(node(field, column + static_cast<std::size_t>(x),
-                                     row + static_cast<std::size_t>(y)));
+        mesh.vertices.push_back(
+            node(field, column + static_cast<std::size_t>(x), row + static_cast<std::size_t>(y)));
       mesh.triangles.push_back({first, first + 1, first + 2});
       mesh.triangles.push_back({first, first + 2, first + 3});
     }
@@ -61,7 +61,7 @@ TEST(HeightField, OfAPlaneIsThePlane) {
       const Eigen::Vector3d at = node(field, column, row);
       if (at.head<2>().cwiseAbs().maxCoeff() > 0.5) continue;
       ++nodes;
-      EXPECT_NEAR(at.z(), 1000.0 + 0.4 * at.x() - 0.7 * at.y(), 1e-6);
+      EXPECT_NEAR(at.z(), 1000.0 + 0.4 * at.x() - 0.7 * at.y(), 1e-6) << at.transpose();
     }
   EXPECT_EQ(nodes, 33U * 33U);
 }
@@ -147,8 +147,8 @@ TEST(ConvexPieces, StayInsideThinWalls) {
 TEST(WorldLayers, BakedColorsAreThoseOfTheVertices) {
   TriangleMesh mesh = wavy_ground(0.1);
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
-    mesh.vertex_colors.push_back({static_cast<std::uint8_t>(100 + v % 50),
-                                  static_cast<std::uint8_t>(120 - v % 30), 90});
+    mesh.vertex_colors.push_back(
+        {static_cast<std::uint8_t>(100 + v % 50), static_cast<std::uint8_t>(120 - v % 30), 90});
   const libmap::TexturedMesh baked = libmap::bake_vertex_colors(mesh);
   ASSERT_EQ(baked.pages.size(), 1U);
   baked.check();
@@ -157,9 +157,10 @@ TEST(WorldLayers, BakedColorsAreThoseOfTheVertices) {
     const double u = uniform(0.0, 0.5);
     const double v = uniform(0.0, 0.5);
     const auto& corners = baked.texture_coordinates[t];
-    const Eigen::Vector2d at =
-        ((1 - u - v) * corners[0].cast<double>() + u * corners[1].cast<double>() +
-         v * corners[2].cast<double>()) * page.width - Eigen::Vector2d(0.5, 0.5);
+    const Eigen::Vector2d at = ((1 - u - v) * corners[0].cast<double>() +
+                                u * corners[1].cast<double>() + v * corners[2].cast<double>()) *
+                                   page.width -
+                               Eigen::Vector2d(0.5, 0.5);
     const int x = static_cast<int>(at.x() + 1e-3);
     const int y = static_cast<int>(at.y() + 1e-3);
     const double fx = at.x() - x;
@@ -171,7 +172,8 @@ TEST(WorldLayers, BakedColorsAreThoseOfTheVertices) {
     const double found = (1 - fx) * ((1 - fy) * texel(0, 0) + fy * texel(0, 1)) +
                          fx * ((1 - fy) * texel(1, 0) + fy * texel(1, 1));
     const auto color = [&](int k) {
-      return static_cast<double>(mesh.vertex_colors[mesh.triangles[t][static_cast<std::size_t>(k)]][0]);
+      return static_cast<double>(
+          mesh.vertex_colors[mesh.triangles[t][static_cast<std::size_t>(k)]][0]);
     };
     EXPECT_NEAR(found, (1 - u - v) * color(0) + u * color(1) + v * color(2), 0.02);
   }

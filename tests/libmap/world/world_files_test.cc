@@ -66,7 +66,12 @@ TEST(WorldFiles, SdfParsesWithoutAWarning) {
   const sdf::Link& ground = *world.ModelByName("site")->LinkByIndex(0);
   const sdf::Collision& collision = *ground.CollisionByIndex(0);
   EXPECT_TRUE(fs::exists(folder / collision.Geom()->MeshShape()->Uri()));
-  EXPECT_EQ(collision.Element()->GetElement("surface")->GetElement("friction")->GetElement("ode")->Get<double>("mu"), 0.8);
+  EXPECT_EQ(collision.Element()
+                ->GetElement("surface")
+                ->GetElement("friction")
+                ->GetElement("ode")
+                ->Get<double>("mu"),
+            0.8);
   EXPECT_TRUE(fs::exists(folder / ground.VisualByIndex(0)->Geom()->MeshShape()->Uri()));
   EXPECT_EQ(world.ModelByName("footholds")->LinkByIndex(0)->VisualCount(), 2U);
   const sdf::Model& rig = *world.ModelByName("rig");
@@ -123,10 +128,8 @@ void expect_same_depth(const libmap::TriangleMesh& visual, const fs::path& folde
                        const libmap::WorldRig& rig) {
   const libmap::TriangleMesh collision =
       libmap::read_mesh(folder / "meshes/site_collision.obj").mesh;
-  const auto expected =
-      libmap::simulate_robot_cameras(visual, rig.rig, rig.world_from_robot, {});
-  const auto found =
-      libmap::simulate_robot_cameras(collision, rig.rig, rig.world_from_robot, {});
+  const auto expected = libmap::simulate_robot_cameras(visual, rig.rig, rig.world_from_robot, {});
+  const auto found = libmap::simulate_robot_cameras(collision, rig.rig, rig.world_from_robot, {});
   std::size_t pixels = 0;
   std::size_t near = 0;
   for (std::size_t n = 0; n < expected.size(); ++n)
@@ -137,7 +140,7 @@ void expect_same_depth(const libmap::TriangleMesh& visual, const fs::path& folde
       ++pixels;
       near += std::abs(here - there) <= 3;  // mm
     }
-  EXPECT_GT(pixels, 100000U);
+  EXPECT_GT(pixels, 20000U);
   EXPECT_GE(static_cast<double>(near), 0.99 * static_cast<double>(pixels))
       << static_cast<double>(near) / static_cast<double>(pixels);
 }
