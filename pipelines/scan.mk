@@ -15,7 +15,8 @@
 # folders of pieces and the map is a tile store, so that memory does not depend on the area; then
 # there is no texture unless TEXTURE=model asks for a folder of models, of which there is no picture,
 # and CROP cannot be --size or --border of a site too large for memory. A second run does nothing;
-# other variables or changed files make again what depends on them.
+# other variables or changed files make again what depends on them. The target `world` makes a
+# simulation world of the site, with its texture if there is one, by the flags WORLD.
 
 here := $(dir $(lastword $(MAKEFILE_LIST)))
 GRASPMAP ?= $(firstword $(wildcard $(here)../build/release/graspmap) graspmap)
@@ -33,6 +34,7 @@ RESAMPLE ?=
 TILES ?=
 TEXTURE ?= $(if $(TILES),,model.glb)
 SCORE ?=
+WORLD ?=
 export TITLE ?= $(basename $(notdir $(SCAN)))
 
 # make splits names at spaces; better an error than half a name.
@@ -64,7 +66,7 @@ results := $(OUT)/scan.txt $(if $(TILES),$(addprefix $(OUT)/,$(TEXTURE)),$(pictu
   $(if $(TRUTH),$(OUT)/accuracy.txt)
 
 .DELETE_ON_ERROR:
-.PHONY: all map FORCE
+.PHONY: all map world FORCE
 all: $(results) map
 
 $(OUT):
@@ -79,8 +81,9 @@ export cropped_with := $(CROP)
 export resampled_with := $(RESAMPLE)
 score_flags := --config $(SCENARIO) $(if $(METHOD),--method $(METHOD)) $(SCORE)
 export scored_with := $(score_flags)
+export converted_with := $(WORLD)
 stamps := $(addprefix $(OUT)/,refined_with fused_with meshed_with cropped_with resampled_with \
-  scored_with checked_with)
+  scored_with checked_with converted_with)
 $(stamps): FORCE | $(OUT)
 	@printf '%s\n' "$${$(@F)}" | cmp -s - $@ || printf '%s\n' "$${$(@F)}" > $@
 
@@ -115,6 +118,10 @@ $(terrain): $(site) $(OUT)/resampled_with
 
 $(OUT)/$(TEXTURE): $(site) $(SCAN) $(OUT)/fused_poses.tum
 	@exec $(GRASPMAP) texture $< --scan $(SCAN) --poses $(OUT)/fused_poses.tum $(true_frame) -o $@
+
+world: $(OUT)/site.world.json
+$(OUT)/site.world.json: $(if $(TEXTURE),$(OUT)/$(TEXTURE),$(site)) $(OUT)/converted_with
+	@exec $(GRASPMAP) convert $< -o $(OUT)/site.world $(WORLD)
 
 $(OUT)/cloud.png: $(cloud)
 	@exec $(GRASPMAP) render $< -o $@ --view oblique --color own --title "$$TITLE: cloud" --quiet

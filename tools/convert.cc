@@ -300,6 +300,7 @@ bool has_cloud_extension(const std::string& path) {
 // converted to a file are, for example, models of COLMAP. An output without an extension is
 // otherwise a bag, of a rig or of one map; several inputs are shares of a map.
 Usage* usage_of(const Words& words) {
+  if (is_world_path(words.output)) return convert_world;
   if (words.any_input([](const std::string& word) { return word.ends_with(".db"); }))
     return convert_scan;
   if (libmap::has_bag_extension(words.output) || words.any_input(libmap::is_bag_path) ||
@@ -319,6 +320,6 @@ Usage* usage_of(const Words& words) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  return run_usage(argc, argv, {convert_file, convert_scan, convert_bag},
+  return run_usage(argc, argv, {convert_file, convert_scan, convert_bag, convert_world},
                    usage_of(words_of(argc, argv)));
 }

@@ -14,6 +14,7 @@
 #include "libmap/scan/rig_io.h"
 #include "libmap/view/color_map.h"
 #include "tools/support/command_line.h"
+#include "tools/support/foothold_file.h"
 #include "tools/support/map_frame.h"
 #include "tools/support/option_values.h"
 #include "tools/support/run.h"
@@ -215,29 +216,13 @@ PointCloud curvature_map(const CloudFile& map) {
 }
 
 libmap::BagPlaces places_of(const CloudFile& footholds, double arrow_m) {
-  const auto field = [&](const char* name) -> const std::vector<double>& {
-    const libmap::ScalarField* found = footholds.cloud.find_field(name);
-    if (found) return found->values;
-    throw libmap::Error("is missing: the file does not contain footholds",
-                        {.file = footholds.path, .field = name});
-  };
-  const std::vector<double>& x = field("approach_x");
-  const std::vector<double>& y = field("approach_y");
-  const std::vector<double>& z = field("approach_z");
-  const std::vector<double>& score = field("score");
   libmap::BagPlaces places;
   places.marker_topic = "/footholds";
   places.pose_topic = "/foothold_poses";
   places.arrow_m = arrow_m;
-  for (std::size_t n = 0; n < footholds.cloud.size(); ++n) {
-    const Eigen::Vector3d approach(x[n], y[n], z[n]);
-    if (!approach.allFinite() || approach.norm() < 1e-9)
-      throw libmap::Error(
-          "is not a direction",
-          {.file = footholds.path, .field = fmt::format("approach of foothold {}", n + 1)});
-    places.places.push_back({footholds.cloud.positions[n], approach, libmap::score_color(score[n]),
-                             fmt::format("{}: {:.2f}", n + 1, score[n])});
-  }
+  for (const FootholdMark& mark : foothold_marks(footholds.cloud, footholds.path))
+    places.places.push_back({mark.position, mark.approach, libmap::score_color(mark.score),
+                             fmt::format("{}: {:.2f}", places.places.size() + 1, mark.score)});
   return places;
 }
 

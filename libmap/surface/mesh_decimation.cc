@@ -209,4 +209,29 @@ MeshDecimation decimate_mesh(TriangleMesh& mesh, double max_error_m, Progress& p
   return result;
 }
 
+MeshDecimation decimate_triangles(TriangleMesh& mesh, double max_error_m) {
+  MeshDecimation result;
+  if (max_error_m <= 0.0 || mesh.triangles.empty()) return result;
+  TriangleMesh smaller = collapsed(mesh, std::vector<bool>(mesh.vertices.size(), false),
+                                   tolerance_share * max_error_m);
+  const std::vector<Deviation> there = deviations(smaller, mesh, max_error_m);
+  std::vector<bool> keep(there.size());
+  for (std::size_t t = 0; t < keep.size(); ++t) keep[t] = there[t].nearest_there == none;
+  if (count_of(keep) == 0) return result;
+  smaller = select_triangles(smaller, keep);
+  const std::vector<Deviation> back = deviations(mesh, smaller, max_error_m);
+  std::vector<bool> restore(back.size());
+  for (std::size_t t = 0; t < restore.size(); ++t) restore[t] = back[t].nearest_there != none;
+  for (const std::vector<Deviation>* way : {&there, &back})
+    for (const Deviation& one : *way)
+      if (one.nearest_there == none) result.deviation_m = std::max(result.deviation_m, one.bound_m);
+  // So that the restored triangles overlap the others.
+  grow_marks(mesh, 1, restore);
+  append_mesh(select_triangles(mesh, restore), smaller);
+  if (smaller.triangles.size() >= mesh.triangles.size()) return {};
+  result.removed_triangles = mesh.triangles.size() - smaller.triangles.size();
+  mesh = std::move(smaller);
+  return result;
+}
+
 }  // namespace libmap

@@ -7,6 +7,7 @@ namespace graspmap_tools {
 
 int compare_edges(int argc, char** argv);  // compare SITE --edges
 int convert_bag(int argc, char** argv);    // convert BAG, and ... -o BAG
+int convert_world(int argc, char** argv);  // convert SITE -o OUT.world
 int convert_scan(int argc, char** argv);   // convert SCAN
 int fuse_rig(int argc, char** argv);       // fuse RIG_FOLDER
 
@@ -16,6 +17,9 @@ int simulate_scan(int argc, char** argv);
 int simulate_scene(int argc, char** argv);
 int simulate_site(int argc, char** argv);
 int simulate_terrain(int argc, char** argv);
+
+// Returns true for a path that convert_world writes: its name ends in .world.
+bool is_world_path(const std::string& path);
 
 // Returns true for a scan that convert_scan accepts: a database or a folder of frames.
 bool is_scan_path(const std::string& path);

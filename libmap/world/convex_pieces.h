@@ -1,0 +1,33 @@
+// Convex pieces behind a surface, for simulators that collide meshes only by their convex hulls.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "libmap/core/triangle_mesh.h"
+
+namespace libmap {
+
+// The hull of one triangle, or of two neighbors that make a nearly flat convex quadrilateral, and a
+// corner behind their center.
+struct ConvexPiece {
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();
+  std::vector<Eigen::Vector3d> corners_m;  // from `center`; the last one is behind
+};
+
+struct ConvexPieces {
+  std::vector<ConvexPiece> pieces;
+  // No point of the marked triangles is outside the pieces, and no point of a quadrilateral's hull
+  // is farther in front of its triangles than this.
+  double deviation_m = 0.0;
+};
+
+// Pieces behind the marked triangles, in their order. The depth of a piece is at most
+// `max_depth_m`, half the thickness of the body behind it, and 1.5 times the radius of the smallest
+// inscribed circle of its triangles, so that no piece passes through an edge of more than 57
+// degrees. Triangles lower than 10 micrometers have no piece. The mesh must be an oriented
+// manifold.
+ConvexPieces make_convex_pieces(const TriangleMesh& mesh, const std::vector<bool>& marks,
+                                double max_deviation_m, double max_depth_m);
+
+}  // namespace libmap

@@ -1,0 +1,35 @@
+// Shapes that a world shows: a mesh by the pages of its texture, and the scores of a map on it.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "libmap/core/point_cloud.h"
+#include "libmap/core/triangle_mesh.h"
+#include "libmap/mesh/surface_distance.h"
+
+namespace libmap {
+
+// The mesh with its vertex colors as a texture: each triangle has 2 x 2 texels, between whose
+// centers bilinear interpolation is that of the colors. Without colors there are no pages.
+TexturedMesh bake_vertex_colors(TriangleMesh mesh);
+
+// The triangles of one page (no_page: without texture), with this page alone.
+TexturedMesh page_of(const TexturedMesh& model, std::int32_t page);
+
+struct ColoredMesh {
+  Color color{};
+  TriangleMesh mesh;
+};
+
+// A square on the surface for each point of a map, one mesh per color. Points farther from the
+// surface than the size of a square have none.
+struct ScoreSquares {
+  std::vector<ColoredMesh> meshes;
+  std::size_t on_surface = 0;
+};
+ScoreSquares score_squares(const std::vector<Eigen::Vector3d>& points,
+                           const std::vector<Color>& colors, double size_m,
+                           const TriangleMesh& surface);
+
+}  // namespace libmap

@@ -1,0 +1,182 @@
+#include "libmap/world/height_field.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "libmap/mesh/surface_distance.h"
+#include "libmap/world/convex_pieces.h"
+#include "libmap/world/world_layers.h"
+#include "tests/libmap/world/world_samples.h"
+#include "tests/support/test_support.h"
+
+namespace height_field_test {
+
+using namespace graspmap_test;
+using libmap::HeightField;
+using libmap::TriangleMesh;
+
+Eigen::Vector3d node(const HeightField& field, std::size_t column, std::size_t row) {
+  return {field.corner_m.x() + static_cast<double>(column) * field.cell_size_m,
+          field.corner_m.y() + static_cast<double>(row) * field.cell_size_m,
+          field.base_m + static_cast<double>(field.heights_m[row * field.columns + column])};
+}
+
+// The cells that are not left out and within `half_m`, as triangles.
+TriangleMesh mesh_of(const HeightField& field, double half_m) {
+  TriangleMesh mesh;
+  for (std::size_t row = 0; row + 1 < field.rows; ++row)
+    for (std::size_t column = 0; column + 1 < field.columns; ++column) {
+      if (field.left_out[row * (field.columns - 1) + column]) continue;
+      if (node(field, column, row).head<2>().minCoeff() < -half_m ||
+          node(field, column + 1, row + 1).head<2>().maxCoeff() > half_m)
+        continue;
+      const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+      for (const auto& [x, y] : {std::pair(0, 0), {1, 0}, {1, 1}, {0, 1}})
+        mesh.vertices.push_back(
+            node(field, column + static_cast<std::size_t>(x), row + static_cast<std::size_t>(y)));
+      mesh.triangles.push_back({first, first + 1, first + 2});
+      mesh.triangles.push_back({first, first + 2, first + 3});
+    }
+  return mesh;
+}
+
+double farthest(const TriangleMesh& from, const TriangleMesh& to) {
+  std::vector<Eigen::Vector3d> points;
+  for (const libmap::SurfacePoint& point : libmap::sample_surface(from, 2e5, 1))
+    points.push_back(point.position);
+  const std::vector<double> distances = libmap::distances_to_surface(points, to);
+  return *std::max_element(distances.begin(), distances.end());
+}
+
+TEST(HeightField, OfAPlaneIsThePlane) {
+  TriangleMesh mesh = square_mesh(0.0, 0.5);
+  for (Eigen::Vector3d& v : mesh.vertices) v.z() = 1000.0 + 0.4 * v.x() - 0.7 * v.y();
+  const HeightField field = libmap::make_height_field(mesh, {.cell_size_m = 0.03});
+  EXPECT_EQ(field.left_out_cells, 0U);
+  EXPECT_LT(field.deviation_m, 1e-6);
+  std::size_t nodes = 0;
+  for (std::size_t row = 0; row < field.rows; ++row)
+    for (std::size_t column = 0; column < field.columns; ++column) {
+      const Eigen::Vector3d at = node(field, column, row);
+      if (at.head<2>().cwiseAbs().maxCoeff() > 0.5) continue;
+      ++nodes;
+      EXPECT_NEAR(at.z(), 1000.0 + 0.4 * at.x() - 0.7 * at.y(), 1e-6) << at.transpose();
+    }
+  EXPECT_EQ(nodes, 33U * 33U);
+}
+
+// The stated deviation against distances by Embree, in both directions.
+TEST(HeightField, NoPointIsFartherThanItsDeviation) {
+  for (const double cell : {0.004, 0.015, 0.04}) {
+    const TriangleMesh ground = wavy_ground();
+    const HeightField field =
+        libmap::make_height_field(ground, {.cell_size_m = cell, .max_deviation_m = 1.0});
+    EXPECT_EQ(field.left_out_cells, 0U);
+    EXPECT_GT(field.deviation_m, 1e-6);
+    const double there = farthest(mesh_of(field, 0.4), ground);
+    const double back = farthest(ground, mesh_of(field, 1.0));
+    EXPECT_LE(std::max(there, back), field.deviation_m + 1e-6) << cell;
+    EXPECT_GE(std::max(there, back), 0.3 * field.deviation_m) << cell;
+  }
+}
+
+TEST(HeightField, LeavesOutOverhangs) {
+  const TriangleMesh mesh = ground_with_boulder();
+  const HeightField field = libmap::make_height_field(mesh, {});
+  EXPECT_LE(field.deviation_m, 0.002);
+  EXPECT_LE(farthest(mesh_of(field, 0.4), mesh), field.deviation_m + 1e-6);
+  double left_out_m2 = 0.0;
+  for (std::size_t row = 0; row + 1 < field.rows; ++row)
+    for (std::size_t column = 0; column + 1 < field.columns; ++column) {
+      const bool left_out = field.left_out[row * (field.columns - 1) + column];
+      if (left_out) left_out_m2 += field.cell_size_m * field.cell_size_m;
+      const Eigen::Vector2d at = node(field, column, row).head<2>();
+      EXPECT_TRUE(left_out || (at - Eigen::Vector2d(0.1, 0.05)).norm() > 0.11);
+      EXPECT_LE(node(field, column, row).z(),
+                wavy_height(at.x(), at.y()) + 0.002);  // no node is above the ground
+    }
+  EXPECT_NEAR(left_out_m2, 3.1416 * 0.127 * 0.127, 0.01);
+}
+
+TEST(HeightField, BadMeshes) {
+  TriangleMesh ceiling = square_mesh(0.0);
+  for (libmap::Triangle& t : ceiling.triangles) std::swap(t[0], t[1]);
+  error_of([&] { libmap::make_height_field(ceiling, {}); });
+  const libmap::Error error =
+      error_of([] { libmap::make_height_field(square_mesh(0.0, 1e3), {.cell_size_m = 1e-3}); });
+  EXPECT_EQ(error.context().field, "cell_size_m");
+}
+
+// Pieces of a ball are inside it, reach its surface everywhere and do not overlap much.
+TEST(ConvexPieces, AreBehindTheSurface) {
+  TriangleMesh ball = ball_mesh(16, 32, {1.0, 2.0, 3.0}, 0.2);
+  std::erase_if(ball.triangles, [&](const libmap::Triangle& t) {
+    return libmap::area_normal(ball, t).norm() < 1e-12;
+  });
+  const std::vector<bool> marks(ball.triangles.size(), true);
+  const libmap::ConvexPieces one_by_one = libmap::make_convex_pieces(ball, marks, 0.0, 0.02);
+  const libmap::ConvexPieces pairs = libmap::make_convex_pieces(ball, marks, 0.001, 0.02);
+  EXPECT_LT(pairs.pieces.size(), 0.7 * static_cast<double>(ball.triangles.size()));
+  EXPECT_LE(pairs.deviation_m, 0.001);
+  for (const libmap::ConvexPieces* pieces : {&one_by_one, &pairs}) {
+    std::size_t triangles = 0;
+    for (const libmap::ConvexPiece& piece : pieces->pieces) {
+      triangles += piece.corners_m.size() - 3;
+      for (const Eigen::Vector3d& corner : piece.corners_m)
+        EXPECT_LE((piece.center + corner - Eigen::Vector3d(1, 2, 3)).norm(), 0.2 + 1e-9);
+      const double depth = piece.corners_m.back().norm();
+      EXPECT_LE(depth, 0.02 + 1e-9);
+      EXPECT_GT(depth, 1e-4);
+    }
+    EXPECT_EQ(triangles, ball.triangles.size());
+  }
+}
+
+// Two faces of a thin wall: no piece passes through the other face.
+TEST(ConvexPieces, StayInsideThinWalls) {
+  TriangleMesh back = square_mesh(0.0, 0.1);
+  for (libmap::Triangle& t : back.triangles) std::swap(t[0], t[1]);
+  const TriangleMesh wall = join_meshes(square_mesh(0.004, 0.1), back);
+  for (const libmap::ConvexPiece& piece :
+       libmap::make_convex_pieces(wall, {true, true, true, true}, 0.001, 0.02).pieces)
+    EXPECT_NEAR((piece.center + piece.corners_m.back()).z(), 0.002, 1e-5);
+}
+
+// Bilinear interpolation in the texture is linear interpolation between the vertices.
+TEST(WorldLayers, BakedColorsAreThoseOfTheVertices) {
+  TriangleMesh mesh = wavy_ground(0.1);
+  for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
+    mesh.vertex_colors.push_back(
+        {static_cast<std::uint8_t>(100 + v % 50), static_cast<std::uint8_t>(120 - v % 30), 90});
+  const libmap::TexturedMesh baked = libmap::bake_vertex_colors(mesh);
+  ASSERT_EQ(baked.pages.size(), 1U);
+  baked.check();
+  const libmap::ColorImage& page = baked.pages[0];
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const double u = uniform(0.0, 0.5);
+    const double v = uniform(0.0, 0.5);
+    const auto& corners = baked.texture_coordinates[t];
+    const Eigen::Vector2d at = ((1 - u - v) * corners[0].cast<double>() +
+                                u * corners[1].cast<double>() + v * corners[2].cast<double>()) *
+                                   page.width -
+                               Eigen::Vector2d(0.5, 0.5);
+    const int x = static_cast<int>(at.x() + 1e-3);
+    const int y = static_cast<int>(at.y() + 1e-3);
+    const double fx = at.x() - x;
+    const double fy = at.y() - y;
+    const auto texel = [&](int dx, int dy) {
+      return static_cast<double>(page.pixels[page.index(std::min(x + dx, page.width - 1),
+                                                        std::min(y + dy, page.height - 1))][0]);
+    };
+    const double found = (1 - fx) * ((1 - fy) * texel(0, 0) + fy * texel(0, 1)) +
+                         fx * ((1 - fy) * texel(1, 0) + fy * texel(1, 1));
+    const auto color = [&](int k) {
+      return static_cast<double>(
+          mesh.vertex_colors[mesh.triangles[t][static_cast<std::size_t>(k)]][0]);
+    };
+    EXPECT_NEAR(found, (1 - u - v) * color(0) + u * color(1) + v * color(2), 0.02);
+  }
+}
+
+}  // namespace height_field_test
