@@ -98,7 +98,7 @@ libmap::Error wrong_value(py::handle given, const std::string& name, const std::
 
 py::array checked_array(const py::object& given, const std::string& name, const Numbers& numbers,
                         const Shape& shape, const std::string& bound) {
-  const py::array array = py::array::ensure(given);
+  py::array array = py::array::ensure(given);
   PyErr_Clear();
   if (!array || !has_shape(array, shape)) throw wrong_value(given, name, bound);
   const char kind = array.dtype().kind();

@@ -49,8 +49,8 @@ def complete(*modules: ModuleType) -> None:
     found = {name: value for module in modules for name, value in vars(module).items()}
     for stage in _core.stages():
         function = found[stage]
-        result = found.get(function.__annotations__["return"].__name__)
-        is_result = result is not None and issubclass(result, found["Result"])
-        if is_result:
+        name = function.__annotations__["return"]
+        result = found[name] if name.endswith("Result") else None
+        if result is not None:
             _complete_result(result, stage)
-        _complete_stage(function, result if is_result else None, stage)
+        _complete_stage(function, result, stage)

@@ -1,5 +1,7 @@
 """Scans, poses, clouds, meshes and manifests in files."""
 
+from __future__ import annotations
+
 import json
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Mapping
@@ -59,7 +61,7 @@ def open_scan(path: Path, calibration: Path | None = None) -> Scan:
 
 
 def read_poses(path: Path, scan: Scan | None = None, *, options: Options = None,
-               **values: "Unpack[_options.ReadPosesOptions]") -> Poses:
+               **values: Unpack[_options.ReadPosesOptions]) -> Poses:
     """Reads poses from a file: TUM, KITTI, g2o, TORO, or a COLMAP model of `scan`.
 
     Parameters
