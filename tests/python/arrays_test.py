@@ -275,9 +275,13 @@ class Arguments(unittest.TestCase):
                                              markers=[[0, 0, 0]] * 2), "labels")
         for threads in (-1, 1.5, "2"):
             self.assertEqual(self.field_of_error(graspmap.score, plain(9), threads=threads), "threads")
-        for wrong in (5, "abcd", None, np.zeros((4, 1)), [1, 0]):
-            table = table_of_labels() | {"score": wrong}
-            self.assertEqual(self.field_of_error(graspmap.evaluate, table), "column score")
+        self.assertEqual(self.field_of_error(graspmap.evaluate, table_of_labels() | {"score": [1]}),
+                         "column score")
+        for wrong in (5, "abcd", None, np.zeros((4, 1))):
+            with self.assertRaises(graspmap.Error) as raised:
+                graspmap.evaluate({"score": wrong, "graspable": [1]})
+            self.assertEqual(raised.exception.field, "column score")
+            self.assertEqual(raised.exception.bound, "values of shape (N,)")
 
     def test_array_as_cloud(self):
         cloud = graspmap.Cloud(plain(21).positions)

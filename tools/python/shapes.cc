@@ -99,12 +99,11 @@ std::vector<ScalarField> fields_from(const py::dict& given) {
   return fields;
 }
 
-std::shared_ptr<PointCloud> make_cloud(const std::vector<Eigen::Vector3d>& positions,
-                                       const py::object& normals, const py::object& colors,
-                                       const py::dict& fields,
+std::shared_ptr<PointCloud> make_cloud(const py::object& positions, const py::object& normals,
+                                       const py::object& colors, const py::dict& fields,
                                        const std::optional<libmap::Pose>& viewpoint) {
   PointCloud cloud;
-  cloud.positions = positions;
+  cloud.positions = positions_from(positions, "positions");
   cloud.normals = normals_from(normals, "normals");
   cloud.colors = colors_from(colors, "colors");
   cloud.fields = fields_from(fields);
@@ -129,12 +128,12 @@ std::vector<libmap::Triangle> triangles_from(const py::object& given, const std:
   return triangles;
 }
 
-std::shared_ptr<TriangleMesh> make_mesh(const std::vector<Eigen::Vector3d>& vertices,
-                                        const py::object& triangles, const py::object& normals,
-                                        const py::object& colors, const py::dict& vertex_fields,
+std::shared_ptr<TriangleMesh> make_mesh(const py::object& vertices, const py::object& triangles,
+                                        const py::object& normals, const py::object& colors,
+                                        const py::dict& vertex_fields,
                                         const py::dict& face_fields) {
   TriangleMesh mesh;
-  mesh.vertices = vertices;
+  mesh.vertices = positions_from(vertices, "vertices");
   mesh.triangles = triangles_from(triangles, "triangles");
   mesh.vertex_normals = normals_from(normals, "vertex_normals");
   mesh.vertex_colors = colors_from(colors, "vertex_colors");

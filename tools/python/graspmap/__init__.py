@@ -1,13 +1,13 @@
 """Graspability maps for robots that climb with spined grippers, on NumPy arrays.
 
-Each function is a stage of the command line of the same name, with the same options by the same names,
-units and bounds: as keyword arguments (``voxel_size_m=0.01``), or in a dict `options`, in which a dict
-is a section as in YAML (``{"gripper": {"opening_angle_deg": 80}}``). Keyword arguments are stronger.
-``options("score")`` lists them.
+Each function is a stage of the command line of the same name, with the same options by the same
+names, units and bounds: as keyword arguments (``voxel_size_m=0.01``), or in a dict `options`, in which
+a dict is a section as in YAML (``{"gripper": {"opening_angle_deg": 80}}``). Keyword arguments are
+stronger. ``options("score")`` lists them.
 
-Lengths are meters. Where a cloud is expected, an array (N, 3) of positions is accepted; where a mesh is
-expected, a pair of vertices (V, 3) and triangles (T, 3). An argument of a wrong type, shape or value is
-an `Error` whose `field` names it.
+Lengths are meters. Where a cloud is expected, an array (N, 3) of positions is accepted; where a mesh
+is expected, a pair of vertices (V, 3) and triangles (T, 3). An argument of a wrong type, shape or
+value is an `Error` whose `field` names it.
 
 Arrays of clouds, meshes, frames and poses are read-only views of their memory and keep it alive.
 Results do not depend on the number of threads, and are those of the command line to the bit.
@@ -16,8 +16,8 @@ Long calls let other Python threads run. They take `threads` (0: all processors)
 ``progress(stage, done, total)``, which is called at most ten times a second, from any thread; an
 exception that it raises ends the call.
 
-Examples in docstrings are run with ``import graspmap`` and ``import numpy as np``, in a folder with the
-manual's scan.db.
+Examples in docstrings assume ``import graspmap`` and ``import numpy as np``; their scan.db is that of
+the manual.
 """
 
 from . import _documentation, _files, _results, _stages
