@@ -5,6 +5,8 @@ arrays_test.py BUILD_FOLDER
 """
 
 import gc
+import inspect
+import pathlib
 import pickle
 import threading
 import time
@@ -184,6 +186,160 @@ class Errors(unittest.TestCase):
         self.error(graspmap.evaluate, {"graspable": [1, 0], "score": [0.5, 0.1]}, label="verdict")
         self.error(graspmap.render, plain(), markers=[[0, 0, 0]], labels=["a", "b"])
         self.error(graspmap.mesh, graspmap.Cloud(plain().positions))
+
+
+def table_of_labels():
+    return {"graspable": [1, 0, 1, 0], "score": [0.9, 0.1, 0.4, 0.6]}
+
+
+def poses():
+    return graspmap.Poses([1], [np.eye(4)])
+
+
+class Arguments(unittest.TestCase):
+    """Arguments of other types and shapes than the documented ones."""
+
+    # Values of the parameters without default.
+    GIVEN = {"stage": "score", "path": "none", "scan": None, "poses": poses(), "cloud": plain(9),
+             "mesh": square(), "terrain": plain(9), "points": [[0.15, 0.15, 0]], "map": plain(9),
+             "table": table_of_labels(), "shown": plain(9), "image": np.zeros((2, 2, 3), np.uint8),
+             "positions": np.zeros((1, 3)), "vertices": np.zeros((3, 3)), "triangles": [[0, 1, 2]],
+             "nodes": [1], "world_from_base": [np.eye(4)], "target_from_source": np.eye(4),
+             "index": [0]}
+
+    def functions(self):
+        for name in graspmap.__all__:
+            value = getattr(graspmap, name)
+            if inspect.isfunction(value):
+                parameters = inspect.signature(value).parameters
+                yield value, {one: parameter.default for one, parameter in parameters.items()
+                              if parameter.kind != parameter.VAR_KEYWORD}
+        required = inspect.Parameter.empty
+        yield graspmap.Cloud, {"positions": required, "normals": None, "colors": None, "fields": {},
+                               "viewpoint": None}
+        yield graspmap.Mesh, {"vertices": required, "triangles": required, "vertex_normals": None,
+                              "vertex_colors": None, "vertex_fields": {}, "face_fields": {}}
+        yield graspmap.Poses, {"nodes": required, "world_from_base": required, "stamps_s": None}
+        yield plain(9).transformed, {"target_from_source": required}
+        yield plain(9).__getitem__, {"index": required}
+
+    def test_each_parameter_is_named(self):
+        """Arguments before it are right, or absent where that needs a scan."""
+        count = 0
+        for function, parameters in self.functions():
+            given = {name: self.GIVEN[name] for name, default in parameters.items()
+                     if default is inspect.Parameter.empty}
+            if "scan" in given:  # its own error comes first
+                parameters = {"scan": None}
+            for name in parameters:
+                for wrong in (object(), graspmap.read_cloud):
+                    if name == "progress" and callable(wrong):
+                        continue
+                    with self.subTest(function=function.__name__, parameter=name):
+                        with self.assertRaises(graspmap.Error) as raised:
+                            function(**given | {name: wrong})
+                        self.assertEqual((raised.exception.field, raised.exception.kind),
+                                         (name, "bad_input"))
+                        self.assertIn(type(wrong).__name__, raised.exception.value)
+                        self.assertTrue(raised.exception.bound)
+                        count += 1
+        self.assertGreater(count, 150)
+
+    def field_of_error(self, function, *arguments, **values):
+        with self.assertRaises(graspmap.Error) as raised:
+            function(*arguments, **values)
+        return raised.exception.field
+
+    def test_wrong_shapes_and_types(self):
+        ragged = [[0, 0, 0], [1, 1]]
+        for wrong in (np.zeros((4, 2)), np.zeros((3, 3, 3)), np.zeros(3), [], ragged, "terrain.pcd",
+                      5, None, {}, square(), np.zeros((2, 3), bool), np.zeros((2, 3), complex)):
+            for function, name in [(graspmap.score, "terrain"), (graspmap.mesh, "cloud"),
+                                   (graspmap.estimate_normals, "cloud"), (graspmap.footholds, "map")]:
+                self.assertEqual(self.field_of_error(function, wrong), name)
+        self.assertEqual(self.field_of_error(graspmap.score, [[0, 0, 0], [0, np.nan, 0]]),
+                         "terrain, row 1")
+        vertices, triangles = square().vertices, square().triangles
+        for wrong, field in [(vertices, "mesh"), ((vertices,), "mesh"), (plain(9), "mesh"),
+                             ((vertices, triangles, triangles), "mesh"), ((vertices, 5), "mesh"),
+                             ((vertices[:, :2], triangles), "mesh: vertices"),
+                             ((vertices, triangles[:, :2]), "mesh: triangles"),
+                             ((vertices, triangles + 0.5), "mesh: triangles"),
+                             ((vertices, [[0, 1, -1]]), "mesh: triangles"),
+                             ((vertices, [[0, 1, 2], [0, 1, 4]]), "mesh: triangle 1"),
+                             ((vertices + np.inf, triangles), "mesh: vertices, row 0")]:
+            self.assertEqual(self.field_of_error(graspmap.resample, wrong), field)
+        self.assertEqual(self.field_of_error(graspmap.grasp, square(), [[0, 0, 0]],
+                                             more_loads_n=[5, "6"]), "more_loads_n, item 1")
+        self.assertEqual(self.field_of_error(graspmap.render, plain(9), labels="ab",
+                                             markers=[[0, 0, 0]] * 2), "labels")
+        for threads in (-1, 1.5, "2"):
+            self.assertEqual(self.field_of_error(graspmap.score, plain(9), threads=threads), "threads")
+        self.assertEqual(self.field_of_error(graspmap.evaluate, table_of_labels() | {"score": [1]}),
+                         "column score")
+        for wrong in (5, "abcd", None, np.zeros((4, 1))):
+            with self.assertRaises(graspmap.Error) as raised:
+                graspmap.evaluate({"score": wrong, "graspable": [1]})
+            self.assertEqual(raised.exception.field, "column score")
+            self.assertEqual(raised.exception.bound, "values of shape (N,)")
+
+    def test_array_as_cloud(self):
+        cloud = graspmap.Cloud(plain(21).positions)
+        for array in (cloud.positions, cloud.positions.tolist(), np.asfortranarray(cloud.positions)):
+            for function in (graspmap.score, graspmap.estimate_normals):
+                by_array, by_cloud = function(array), function(cloud)
+                name = "map" if function is graspmap.score else "cloud"
+                made, expected = getattr(by_array, name), getattr(by_cloud, name)
+                np.testing.assert_array_equal(made.positions, expected.positions)
+                for field, values in expected.fields.items():
+                    np.testing.assert_array_equal(made.fields[field], values)
+        whole = graspmap.lookup(np.int32([[0, 0, 0], [5, 0, 0]]), np.float32([[4.99, 0, 0]]))
+        self.assertEqual(whole.map_point[0], 1)
+        folder = support.scratch_folder(self)
+        graspmap.write_cloud(folder / "array.ply", cloud.positions)
+        graspmap.write_cloud(folder / "cloud.ply", cloud)
+        self.assertEqual((folder / "array.ply").read_bytes(), (folder / "cloud.ply").read_bytes())
+        size = {"width_px": 32, "height_px": 32}
+        np.testing.assert_array_equal(graspmap.render(cloud.positions, **size),
+                                      graspmap.render(cloud, **size))
+        two = [[0, 0, 0], [1, 1, 0]]  # two points, not vertices and triangles
+        np.testing.assert_array_equal(graspmap.render(two, **size),
+                                      graspmap.render(graspmap.Cloud(two), **size))
+
+    def test_vertices_and_triangles_as_mesh(self):
+        mesh = square(0.5)
+        for pair in ((mesh.vertices, mesh.triangles), [mesh.vertices.tolist(), mesh.triangles.tolist()],
+                     (np.float32(mesh.vertices), np.int64(mesh.triangles))):
+            made, expected = (graspmap.resample(one, radius_m=0.05) for one in (pair, mesh))
+            np.testing.assert_array_equal(made.cloud.positions, expected.cloud.positions)
+        pair = mesh.vertices, mesh.triangles
+        made, expected = (graspmap.grasp(one, [[0.15, 0.15, 0]], trials=2, draws=2)
+                          for one in (pair, mesh))
+        self.assertEqual(made.columns, expected.columns)
+        folder = support.scratch_folder(self)
+        graspmap.write_mesh(folder / "pair.ply", pair)
+        graspmap.write_mesh(folder / "mesh.ply", mesh)
+        self.assertEqual((folder / "pair.ply").read_bytes(), (folder / "mesh.ply").read_bytes())
+        size = {"width_px": 32, "height_px": 32}
+        np.testing.assert_array_equal(graspmap.render(pair, **size), graspmap.render(mesh, **size))
+
+    def test_other_accepted_types(self):
+        """Types that are not the documented ones, but are converted without loss."""
+        folder = support.scratch_folder(self)
+        graspmap.write_cloud(str(folder / "cloud.ply"), plain(9))
+        self.assertEqual(len(graspmap.read_cloud(pathlib.PurePosixPath(folder / "cloud.ply"))), 81)
+        spot = np.array([[0.15, 0.15, 0]])
+        made = [graspmap.grasp(square(), spot, trials=2, draws=2, more_loads_n=loads, threads=threads,
+                               sequential=sequential).columns
+                for loads, threads, sequential in [([5.0], 1, False), ((5,), np.int64(1), np.False_),
+                                                   (np.array([5]), np.uint8(1), 0),
+                                                   (iter([5.0]), 1, False)]]
+        self.assertEqual(made[0], made[1])
+        self.assertEqual(made[0], made[2])
+        self.assertEqual(made[0], made[3])
+        self.assertEqual(len(plain(9)[[]]), 0)
+        areas = graspmap.evaluate(table_of_labels(), scores=(name for name in ["score"])).areas
+        self.assertEqual(areas, {"score": 0.75})
 
 
 class Options(unittest.TestCase):

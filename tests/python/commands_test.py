@@ -83,6 +83,23 @@ class Commands(unittest.TestCase):
         self.assertEqual(frame.cameras[0].width, frame.color.shape[1])
         self.assertIsNone(scan.frame(node, depth=False).depth)
 
+    def test_wrong_parameters_of_a_scan(self):
+        scan = graspmap.open_scan(self.example("scan.db"))
+        for function, names in [
+                (graspmap.refine, ("known_lengths", "board", "options", "progress", "threads")),
+                (graspmap.fuse, ("poses", "options", "progress", "threads"))]:
+            for name in names:
+                with self.subTest(function.__name__, parameter=name):
+                    with self.assertRaises(graspmap.Error) as raised:
+                        function(scan, **{name: object()})
+                    self.assertEqual(raised.exception.field, name)
+        node = {"node": int(scan.nodes[0])}
+        for method, given, name in [(scan.frame, {}, "node"), (scan.frame, node, "color"),
+                                    (scan.frame, node, "depth"), (scan.poses, {}, "source")]:
+            with self.assertRaises(graspmap.Error) as raised:
+                method(**given | {name: object()})
+            self.assertEqual(raised.exception.field, name)
+
     def test_surface(self):
         made = graspmap.mesh(graspmap.read_cloud(self.example("cloud.ply")))
         self.assert_same_bytes(self.example("mesh.ply"), graspmap.write_mesh, made.mesh)

@@ -2,7 +2,7 @@
 #include "libgtd/grasp/grasp_trials.h"
 #include "libgtd/gripper/gripper_io.h"
 #include "libmap/core/error.h"
-#include "tools/python/values.h"
+#include "tools/python/arguments.h"
 
 namespace graspmap_python {
 
@@ -36,7 +36,7 @@ libgtd::GroundErrors errors_of(const libmap::TriangleMesh& mesh, const py::objec
   }
   throw libmap::Error("no error of a surface",
                       {.field = "surface_error",
-                       .value = py::str(given).cast<std::string>(),
+                       .value = py::repr(given).cast<std::string>(),
                        .bound = "None, \"mesh\", or 0 to max_surface_error_m, m"});
 }
 
@@ -92,7 +92,7 @@ py::dict results_of(const Results& results, const libgtd::GraspOptions& options)
   return made;
 }
 
-py::dict grasp(const libmap::TriangleMesh& mesh, const py::object& points,
+py::dict grasp(const libmap::TriangleMesh& mesh, const std::vector<Eigen::Vector3d>& points,
                const py::object& surface_error, const std::vector<double>& more_loads_n,
                bool sequential, bool pull_limits, const py::dict& values,
                const py::object& progress, unsigned threads) {
@@ -102,10 +102,9 @@ py::dict grasp(const libmap::TriangleMesh& mesh, const py::object& points,
   options.trials.pull_limits = pull_limits;
   options.trials.check();
   const libgtd::Gripper gripper = libgtd::find_gripper(options.gripper, options.overrides);
-  const std::vector<Eigen::Vector3d> places = positions_from(points, "points");
   const libgtd::Ground ground(mesh, errors_of(mesh, surface_error, options.trials.surface));
   const Results results = run(threads, progress, [&](libmap::Progress& bar) {
-    return libgtd::test_grasps(ground, gripper, places, options.trials, bar);
+    return libgtd::test_grasps(ground, gripper, points, options.trials, bar);
   });
   return results_of(results, options.trials);
 }
@@ -113,7 +112,9 @@ py::dict grasp(const libmap::TriangleMesh& mesh, const py::object& points,
 }  // namespace
 
 void add_grasps(py::module_& module) {
-  module.def("grasp", &grasp);
+  define(module, "grasp", &grasp,
+         {"mesh", "points", "surface_error", "more_loads_n", "sequential", "pull_limits", "options",
+          "progress", "threads"});
   add_stage<GraspOptions>("grasp");
 }
 

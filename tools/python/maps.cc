@@ -9,7 +9,7 @@
 #include "libmap/core/data_folder.h"
 #include "libmap/core/error.h"
 #include "libmap/core/table.h"
-#include "tools/python/values.h"
+#include "tools/python/arguments.h"
 
 namespace graspmap_python {
 
@@ -27,15 +27,15 @@ void bind(libmap::ParameterTable& table, ScoreOptions& options) {
   table.add("frame", options.frame, libgtd::map_frame_names(), "frame of the map's points");
 }
 
-ScoreOptions score_options(const std::optional<std::string>& scenario, const py::object& up,
-                           const py::dict& values) {
+ScoreOptions score_options(const std::optional<std::string>& scenario,
+                           const std::optional<Eigen::Vector3d>& up, const py::dict& values) {
   ScoreOptions options;
   if (scenario) options.detection = libgtd::read_scenario(*scenario);
   options.detection.gripper.reset();  // an option may name another
   options = options_from(values, std::move(options));
   options.detection.scenario.check();
-  if (up.is_none()) return options;
-  options.detection.up = vector_from(up, "up");
+  if (!up) return options;
+  options.detection.up = *up;
   if (options.detection.plane == libgtd::PlaneSource::none)
     throw libmap::Error("says on which side of the fitted plane up is: with plane none it is z",
                         {.field = "up"});
@@ -43,8 +43,8 @@ ScoreOptions score_options(const std::optional<std::string>& scenario, const py:
 }
 
 py::dict score(const PointCloud& terrain, const std::optional<std::string>& scenario,
-               const py::object& up, const py::dict& values, const py::object& progress,
-               unsigned threads) {
+               const std::optional<Eigen::Vector3d>& up, const py::dict& values,
+               const py::object& progress, unsigned threads) {
   const ScoreOptions options = score_options(scenario, up, values);
   PointCloud map;
   const libgtd::DetectionResult result = run(threads, progress, [&](libmap::Progress& bar) {
@@ -76,13 +76,12 @@ py::dict values_of(const PointCloud& map, const std::vector<libgtd::LookupAnswer
   return dict;
 }
 
-py::dict lookup(const PointCloud& map, const py::object& points, const py::dict& values,
-                unsigned threads) {
+py::dict lookup(const PointCloud& map, const std::vector<Eigen::Vector3d>& points,
+                const py::dict& values, unsigned threads) {
   const auto options = options_from<libgtd::LookupOptions>(values);
-  const std::vector<Eigen::Vector3d> places = positions_from(points, "points");
   using Answer = libgtd::LookupAnswer;
   const std::vector<Answer> answers = run(threads, py::none(), [&](libmap::Progress& /*bar*/) {
-    return libgtd::look_up(map, places, options);
+    return libgtd::look_up(map, points, options);
   });
   py::dict made;
   made["found"] = column<bool>(answers, [](const Answer& answer) { return answer.found; });
@@ -94,10 +93,10 @@ py::dict lookup(const PointCloud& map, const py::object& points, const py::dict&
   return made;
 }
 
-py::dict footholds(const PointCloud& map, const py::object& up, const py::dict& values,
+py::dict footholds(const PointCloud& map, const Eigen::Vector3d& up, const py::dict& values,
                    unsigned threads) {
   const auto options = options_from<libgtd::FootholdOptions>(values);
-  const libgtd::FootholdFrame frame = {.up = vector_from(up, "up")};
+  const libgtd::FootholdFrame frame = {.up = up};
   PointCloud cloud;
   const libgtd::FootholdResult result = run(threads, py::none(), [&](libmap::Progress& /*bar*/) {
     libgtd::FootholdResult found = libgtd::find_footholds(map, options, frame);
@@ -122,21 +121,27 @@ py::dict columns_of(const libmap::Table& table) {
   return dict;
 }
 
-py::dict evaluate(const std::vector<std::pair<std::string, std::vector<std::string>>>& columns,
-                  const std::vector<std::string>& scores, const py::dict& values,
-                  unsigned threads) {
-  auto options = options_from<libgtd::TableEvaluationOptions>(values);
-  options.score_columns = scores;
+libmap::Table table_from(const py::dict& columns) {
   libmap::Table table;
-  for (const auto& [name, cells] : columns) {
-    if (table.columns.empty()) table.rows.resize(cells.size());
+  for (const auto& [name, given] : columns) {
+    const std::string column = "column " + table.columns.emplace_back(py::str(name));
+    if (!py::isinstance<py::list>(given)) throw wrong_value(given, column, "values of shape (N,)");
+    const auto cells = given.cast<std::vector<std::string>>();
+    if (table.columns.size() == 1) table.rows.resize(cells.size());
     if (cells.size() != table.rows.size())
-      throw libmap::Error("wrong length", {.field = "column " + name,
+      throw libmap::Error("wrong length", {.field = column,
                                            .value = std::to_string(cells.size()),
                                            .bound = std::to_string(table.rows.size())});
-    table.columns.push_back(name);
     for (std::size_t row = 0; row < cells.size(); ++row) table.rows[row].push_back(cells[row]);
   }
+  return table;
+}
+
+py::dict evaluate(const py::dict& columns, const std::vector<std::string>& scores,
+                  const py::dict& values, unsigned threads) {
+  auto options = options_from<libgtd::TableEvaluationOptions>(values);
+  options.score_columns = scores;
+  const libmap::Table table = table_from(columns);
   const libgtd::TableEvaluation evaluation =
       run(threads, py::none(),
           [&](libmap::Progress& /*bar*/) { return libgtd::evaluate_table(table, options); });
@@ -156,10 +161,10 @@ py::dict evaluate(const std::vector<std::pair<std::string, std::vector<std::stri
 }  // namespace
 
 void add_maps(py::module_& module) {
-  module.def("score", &score);
-  module.def("lookup", &lookup);
-  module.def("footholds", &footholds);
-  module.def("evaluate", &evaluate);
+  define(module, "score", &score, {"terrain", "scenario", "up", "options", "progress", "threads"});
+  define(module, "lookup", &lookup, {"map", "points", "options", "threads"});
+  define(module, "footholds", &footholds, {"map", "up", "options", "threads"});
+  define(module, "evaluate", &evaluate, {"table", "scores", "options", "threads"});
   add_stage<ScoreOptions, libgtd::DetectionResult>("score", {"obstacle_voxels"});
   add_stage<libgtd::LookupOptions>("lookup");
   add_stage<libgtd::FootholdOptions, libgtd::FootholdResult>("footholds");

@@ -1,7 +1,7 @@
 // The extension module graspmap._core: the libraries on arrays. The face of it is in graspmap/.
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
-#include "tools/python/values.h"
+#include "tools/python/arguments.h"
 
 namespace {
 
@@ -17,6 +17,9 @@ const graspmap_python::Stage& stage_of(const std::string& name) {
                       {.field = "stage", .value = name, .bound = "one of " + known});
 }
 
+pybind11::list options(const std::string& stage) { return stage_of(stage).options(); }
+pybind11::list results(const std::string& stage) { return stage_of(stage).results(); }
+
 }  // namespace
 
 PYBIND11_MODULE(_core, module) {
@@ -27,8 +30,8 @@ PYBIND11_MODULE(_core, module) {
   graspmap_python::add_maps(module);
   graspmap_python::add_grasps(module);
   graspmap_python::add_pictures(module);
-  module.def("options", [](const std::string& stage) { return stage_of(stage).options(); });
-  module.def("results", [](const std::string& stage) { return stage_of(stage).results(); });
+  graspmap_python::define(module, "options", &options, {"stage"});
+  graspmap_python::define(module, "results", &results, {"stage"});
   module.def("stages", [] {
     std::vector<std::string> names;
     for (const graspmap_python::Stage& stage : graspmap_python::stages())

@@ -1,6 +1,6 @@
 #include "libmap/core/error.h"
 #include "libmap/view/scene_view.h"
-#include "tools/python/values.h"
+#include "tools/python/arguments.h"
 
 namespace graspmap_python {
 
@@ -20,12 +20,11 @@ void bind(libmap::ParameterTable& table, PictureOptions& options) {
 using Shown =
     std::variant<std::shared_ptr<libmap::PointCloud>, std::shared_ptr<libmap::TriangleMesh>>;
 
-std::vector<libmap::Marker> markers_of(const py::object& given,
+std::vector<libmap::Marker> markers_of(const std::optional<std::vector<Eigen::Vector3d>>& positions,
                                        const std::vector<std::string>& labels) {
   std::vector<libmap::Marker> markers;
-  if (given.is_none()) return markers;
-  for (const Eigen::Vector3d& position : positions_from(given, "markers"))
-    markers.push_back({.position = position});
+  if (!positions) return markers;
+  for (const Eigen::Vector3d& position : *positions) markers.push_back({.position = position});
   if (!labels.empty() && labels.size() != markers.size())
     throw libmap::Error("wrong length", {.field = "labels",
                                          .value = std::to_string(labels.size()),
@@ -34,21 +33,19 @@ std::vector<libmap::Marker> markers_of(const py::object& given,
   return markers;
 }
 
-py::array render(const Shown& shown, const py::object& markers,
+py::array render(const Shown& shown, const std::optional<std::vector<Eigen::Vector3d>>& markers,
                  const std::vector<std::string>& labels, std::optional<double> zero_plane_m,
-                 const py::object& terrain_from_scene, const py::object& camera_position,
-                 const py::object& camera_target, const py::dict& values) {
+                 const std::optional<libmap::Pose>& terrain_from_scene,
+                 const std::optional<Eigen::Vector3d>& camera_position,
+                 const std::optional<Eigen::Vector3d>& camera_target, const py::dict& values) {
   auto options = options_from<PictureOptions>(values);
   std::visit([&](const auto& shape) { options.layer.shape = *shape; }, shown);
   if (zero_plane_m) options.layer.coloring.zero_plane_m = *zero_plane_m;
-  if (!camera_position.is_none())
-    options.view.camera.position = vector_from(camera_position, "camera_position");
-  if (!camera_target.is_none())
-    options.view.camera.focal_point = vector_from(camera_target, "camera_target");
+  if (camera_position) options.view.camera.position = *camera_position;
+  if (camera_target) options.view.camera.focal_point = *camera_target;
   libmap::Scene scene;
   scene.markers = markers_of(markers, labels);
-  if (!terrain_from_scene.is_none())
-    scene.terrain_from_scene = pose_from(terrain_from_scene, "terrain_from_scene");
+  if (terrain_from_scene) scene.terrain_from_scene = *terrain_from_scene;
   scene.layers.push_back(std::move(options.layer));
   auto image = std::make_unique<libmap::ColorImage>(
       without_lock([&] { return libmap::render_scene(std::move(scene), options.view); }));
@@ -60,24 +57,32 @@ py::array render(const Shown& shown, const py::object& markers,
 }
 
 py::bytes to_png(const py::object& pixels) {
-  const py::array array =
-      py::array_t<std::uint8_t, py::array::c_style>::ensure(py::array::ensure(pixels));
-  if (!array || array.ndim() != 3 || array.shape(2) != 3) {
-    PyErr_Clear();
-    throw libmap::Error("is no picture",
-                        {.field = "image", .value = {}, .bound = "uint8 of shape (H, W, 3)"});
-  }
+  const auto array = array_from<std::uint8_t>(
+      pixels, "image", byte_numbers, {any_length, any_length, 3}, "uint8 of shape (H, W, 3)");
   libmap::ColorImage image(static_cast<int>(array.shape(1)), static_cast<int>(array.shape(0)));
-  std::copy_n(static_cast<const std::uint8_t*>(array.data()), array.size(),
+  std::copy_n(array.data(), array.size(),
               image.pixels.empty() ? nullptr : image.pixels.front().data());
   return libmap::to_png(image);
 }
 
 }  // namespace
 
+// A cloud or a mesh; two arrays of two dimensions are the vertices and triangles of a mesh.
+template <>
+struct Argument<Shown> {
+  static Shown from(const py::object& given, const std::string& name) {
+    if (py::isinstance<libmap::TriangleMesh>(given) || is_pair_of_tables(given))
+      return Argument<libmap::TriangleMesh>::from(given, name).object;
+    return cloud_from(given, name,
+                      "a Cloud, a Mesh, numbers of shape (N, 3), or vertices and triangles");
+  }
+};
+
 void add_pictures(py::module_& module) {
-  module.def("render", &render);
-  module.def("to_png", &to_png);
+  define(module, "render", &render,
+         {"shown", "markers", "labels", "zero_plane_m", "terrain_from_scene", "camera_position",
+          "camera_target", "options"});
+  define(module, "to_png", &to_png, {"image"});
   add_stage<PictureOptions>("render");
 }
 

@@ -1,11 +1,12 @@
 #include <algorithm>
 
+#include "class_documentation.h"
 #include "libmap/core/error.h"
 #include "libmap/fusion/depth_fusion.h"
 #include "libmap/refine/refinement.h"
 #include "libmap/scan/pose_import.h"
 #include "libmap/scan/scan_source.h"
-#include "tools/python/values.h"
+#include "tools/python/arguments.h"
 
 namespace graspmap_python {
 
@@ -20,6 +21,15 @@ using libmap::ScanSource;
 struct Poses {
   libmap::Trajectory poses;
 };
+
+}  // namespace
+
+template <>
+struct Argument<Poses> : ObjectArgument<Poses> {};
+template <>
+struct Argument<ScanSource> : ObjectArgument<ScanSource> {};
+
+namespace {
 
 constexpr PoseSource sources[] = {PoseSource::optimized, PoseSource::odometry,
                                   PoseSource::ground_truth};
@@ -36,24 +46,23 @@ py::array pose_view(const py::object& self, Shape row, Shape strides, const Fiel
 
 std::shared_ptr<Poses> make_poses(const py::object& nodes, const py::object& matrices,
                                   const py::object& stamps) {
-  const auto numbers = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>::ensure(
-      checked_array(nodes, "nodes", "iu", "whole numbers of shape (N,)", 0));
-  const std::string of_length = std::to_string(numbers.size());
-  Poses made;
+  const auto numbers = array_from<std::int64_t>(nodes, "nodes", whole_numbers, {any_length},
+                                                "whole numbers of shape (N,)");
+  const py::ssize_t count = numbers.size();
+  const std::string length = std::to_string(count);
+  const py::array given = checked_array(matrices, "world_from_base", real_numbers, {count, 4, 4},
+                                        "rigid transforms of shape (" + length + ", 4, 4)");
   py::array_t<double> times;
   if (!stamps.is_none())
-    times = checked_array(stamps, "stamps_s", "iuf", "numbers of shape (" + of_length + ",)", 0);
-  if (py::len(matrices) != static_cast<std::size_t>(numbers.size()) ||
-      (!stamps.is_none() && times.size() != numbers.size()))
-    throw libmap::Error("wrong length", {.field = "world_from_base or stamps_s",
-                                         .value = {},
-                                         .bound = of_length + ", one for each node"});
-  for (py::ssize_t n = 0; n < numbers.size(); ++n) {
+    times = checked_array(stamps, "stamps_s", real_numbers, {count},
+                          "numbers of shape (" + length + ",)");
+  Poses made;
+  for (py::ssize_t n = 0; n < count; ++n) {
     libmap::TrajectoryPose& pose = made.poses.emplace_back();
     pose.node = static_cast<int>(numbers.at(n));
     pose.stamp_s = stamps.is_none() ? 0.0 : times.at(n);
     pose.world_from_base =
-        pose_from(matrices[py::int_(n)], "world_from_base, pose " + std::to_string(n));
+        pose_from(given[py::int_(n)], "world_from_base, pose " + std::to_string(n));
   }
   return shared(std::move(made));
 }
@@ -110,123 +119,114 @@ const char* name_of(libmap::DistortionModel model) {
 
 void add_frames(py::module_& module) {
   using libmap::Camera;
-  py::class_<Camera>(
-      module, "Camera",
-      "A pinhole camera: u = fx * x/z + cx, v = fy * y/z + cy in pixels, with OpenCV's\n"
-      "terms of distortion; z forward, x right, y down.")
-      .def_readonly("width", &Camera::width)
-      .def_readonly("height", &Camera::height)
-      .def_readonly("fx", &Camera::fx)
-      .def_readonly("fy", &Camera::fy)
-      .def_readonly("cx", &Camera::cx)
-      .def_readonly("cy", &Camera::cy)
-      .def_property_readonly("distortion_model",
-                             [](const Camera& camera) { return name_of(camera.distortion_model); })
-      .def_readonly("distortion", &Camera::distortion)
+  py::class_<Camera>(module, "Camera", documentation::camera)
+      .def_readonly("width", &Camera::width, documentation::camera_width)
+      .def_readonly("height", &Camera::height, documentation::camera_height)
+      .def_readonly("fx", &Camera::fx, documentation::camera_fx)
+      .def_readonly("fy", &Camera::fy, documentation::camera_fy)
+      .def_readonly("cx", &Camera::cx, documentation::camera_cx)
+      .def_readonly("cy", &Camera::cy, documentation::camera_cy)
+      .def_property_readonly(
+          "distortion_model", [](const Camera& camera) { return name_of(camera.distortion_model); },
+          documentation::camera_distortion_model)
+      .def_readonly("distortion", &Camera::distortion, documentation::camera_distortion)
       .def_property_readonly(
           "base_from_camera",
           [](const Camera& camera) { return matrix_of(camera.base_from_camera); },
-          "(4, 4) float64, m");
-  py::class_<RgbdFrame, std::shared_ptr<RgbdFrame>>(
-      module, "Frame",
-      "What one node of a scan recorded. Cameras are side by side in one image, in their order.")
-      .def_readonly("node", &RgbdFrame::node)
-      .def_readonly("stamp_s", &RgbdFrame::stamp_s)
-      .def_readonly("cameras", &RgbdFrame::cameras)
+          documentation::camera_base_from_camera);
+  py::class_<RgbdFrame, std::shared_ptr<RgbdFrame>>(module, "Frame", documentation::frame)
+      .def_readonly("node", &RgbdFrame::node, documentation::frame_node)
+      .def_readonly("stamp_s", &RgbdFrame::stamp_s, documentation::frame_stamp_s)
+      .def_readonly("cameras", &RgbdFrame::cameras, documentation::frame_cameras)
       .def_property_readonly("color",
                              viewing(&RgbdFrame::color, pixels_of<std::uint8_t, libmap::Color>),
-                             "(height, width, 3) uint8, or None")
+                             documentation::frame_color)
       .def_property_readonly("depth", viewing(&RgbdFrame::depth, pixels_of<float, float>),
-                             "(height, width) float32: distance from the camera's plane, m; 0\n"
-                             "where nothing was measured; or None")
+                             documentation::frame_depth)
       .def_property_readonly("right",
                              viewing(&RgbdFrame::right, pixels_of<std::uint8_t, std::uint8_t>),
-                             "(height, width) uint8 of a stereo pair, or None");
+                             documentation::frame_right);
+}
+
+py::array nodes_of(const py::object& self) {
+  return pose_view<int>(self, {}, {}, [](const auto& pose) { return &pose.node; });
+}
+
+py::array stamps_of(const py::object& self) {
+  return pose_view<double>(self, {}, {}, [](const auto& pose) { return &pose.stamp_s; });
+}
+
+py::array matrices_of(const py::object& self) {
+  // Eigen's matrices are stored column by column.
+  return pose_view<double>(self, {4, 4}, {sizeof(double), 4 * sizeof(double)},
+                           [](const auto& pose) { return pose.world_from_base.matrix().data(); });
+}
+
+void write_poses(const fs::path& path, const Poses& poses, bool nodes) {
+  libmap::require_trajectory_format(path);
+  write_whole(path, [&](const fs::path& file) {
+    libmap::write_trajectory(file, {poses.poses, {}}, nodes);
+  });
+}
+
+std::shared_ptr<Poses> read_poses(const fs::path& path, const std::shared_ptr<ScanSource>& scan,
+                                  const py::dict& values) {
+  const auto options = options_from<libmap::PoseImportOptions>(values);
+  return without_lock([&] {
+    if (scan != nullptr)
+      return shared(Poses{libmap::import_poses(path, *scan, options).trajectory.poses});
+    const libmap::TrajectoryFile file = libmap::read_trajectory(path, options.format);
+    if (file.of_cameras)
+      throw libmap::Error("poses of cameras need a scan", {.file = path.string(), .field = "scan"});
+    return shared(Poses{file.poses});
+  });
 }
 
 void add_poses(py::module_& module) {
-  using libmap::TrajectoryPose;
-  py::class_<Poses, std::shared_ptr<Poses>>(module, "Poses", "Poses of a scan's nodes.")
-      .def(py::init(&make_poses), py::arg("nodes"), py::arg("world_from_base"),
-           py::arg("stamps_s") = py::none())
-      .def_property_readonly(
-          "nodes",
-          [](const py::object& self) {
-            return pose_view<int>(self, {}, {}, [](const TrajectoryPose& p) { return &p.node; });
-          },
-          "(N,) int32; 0 where not known")
-      .def_property_readonly(
-          "stamps_s",
-          [](const py::object& self) {
-            return pose_view<double>(self, {}, {},
-                                     [](const TrajectoryPose& p) { return &p.stamp_s; });
-          },
-          "(N,) float64, s")
-      .def_property_readonly(
-          "world_from_base",
-          [](const py::object& self) {
-            // Eigen's matrices are stored column by column.
-            return pose_view<double>(
-                self, {4, 4}, {sizeof(double), 4 * sizeof(double)},
-                [](const TrajectoryPose& p) { return p.world_from_base.matrix().data(); });
-          },
-          "(N, 4, 4) float64, m")
-      .def("__len__", [](const Poses& poses) { return poses.poses.size(); });
-  module.def("write_poses", [](const fs::path& path, const Poses& poses, bool nodes) {
-    libmap::require_trajectory_format(path);
-    write_whole(path, [&](const fs::path& file) {
-      libmap::write_trajectory(file, {poses.poses, {}}, nodes);
-    });
-  });
-  module.def("read_poses", [](const fs::path& path, const std::shared_ptr<ScanSource>& scan,
-                              const py::dict& values) {
-    const auto options = options_from<libmap::PoseImportOptions>(values);
-    return without_lock([&] {
-      if (scan == nullptr) {
-        const libmap::TrajectoryFile file = libmap::read_trajectory(path, options.format);
-        if (file.of_cameras)
-          throw libmap::Error("poses of cameras need a scan",
-                              {.file = path.string(), .field = "scan"});
-        return shared(Poses{file.poses});
-      }
-      return shared(Poses{libmap::import_poses(path, *scan, options).trajectory.poses});
-    });
-  });
+  py::class_<Poses, std::shared_ptr<Poses>> poses(module, "Poses", documentation::poses);
+  define_constructor(poses, &make_poses, py::arg("nodes"), py::arg("world_from_base"),
+                     py::arg("stamps_s") = py::none());
+  poses.def_property_readonly("nodes", &nodes_of, documentation::poses_nodes)
+      .def_property_readonly("stamps_s", &stamps_of, documentation::poses_stamps_s)
+      .def_property_readonly("world_from_base", &matrices_of, documentation::poses_world_from_base)
+      .def(
+          "__len__", [](const Poses& all) { return all.poses.size(); }, documentation::poses_len);
+  define(module, "write_poses", &write_poses, {"path", "poses", "nodes"});
+  define(module, "read_poses", &read_poses, {"path", "scan", "options"});
+}
+
+std::shared_ptr<RgbdFrame> frame_of(const ScanSource& scan, int node, bool color, bool depth) {
+  return without_lock(
+      [&] { return shared(scan.read_frame(node, {.color = color, .depth = depth})); });
 }
 
 void add_scan(py::module_& module) {
-  py::class_<ScanSource, std::shared_ptr<ScanSource>>(
-      module, "Scan", "A recorded scan; frames are read one by one.")
-      .def_property_readonly("path", [](const ScanSource& scan) { return scan.path().string(); })
-      .def_property_readonly("warnings", &ScanSource::warnings)
+  py::class_<ScanSource, std::shared_ptr<ScanSource>> scan(module, "Scan", documentation::scan);
+  scan.def_property_readonly(
+          "path", [](const ScanSource& source) { return source.path().string(); },
+          documentation::scan_path)
+      .def_property_readonly("warnings", &ScanSource::warnings, documentation::scan_warnings)
       .def_property_readonly(
           "nodes",
-          [](const ScanSource& scan) {
-            return column<int>(scan.graph().nodes, [](const auto& node) { return node.id; });
+          [](const ScanSource& source) {
+            return column<int>(source.graph().nodes, [](const auto& node) { return node.id; });
           },
-          "(N,) int32, ascending")
+          documentation::scan_nodes)
       .def_property_readonly(
           "stamps_s",
-          [](const ScanSource& scan) {
-            return column<double>(scan.graph().nodes,
+          [](const ScanSource& source) {
+            return column<double>(source.graph().nodes,
                                   [](const auto& node) { return node.stamp_s; });
           },
-          "(N,) float64, s")
-      .def_property_readonly("pose_sources", &sources_of,
-                             "those of optimized, odometry and ground-truth that the scan has")
+          documentation::scan_stamps_s)
+      .def_property_readonly("pose_sources", &sources_of, documentation::scan_pose_sources)
       .def(
-          "poses", &poses_of, py::arg("source") = "auto",
-          "The scan's own poses: optimized, odometry or ground-truth; auto: the first that it has.")
-      .def(
-          "frame",
-          [](const ScanSource& scan, int node, bool color, bool depth) {
-            return without_lock(
-                [&] { return shared(scan.read_frame(node, {.color = color, .depth = depth})); });
-          },
-          py::arg("node"), py::arg("color") = true, py::arg("depth") = true,
-          "Decodes the images of a node; not those that are False.")
-      .def("__len__", [](const ScanSource& scan) { return scan.graph().nodes.size(); });
-  module.def("open_scan", &open_source);
+          "__len__", [](const ScanSource& source) { return source.graph().nodes.size(); },
+          documentation::scan_len);
+  define_method(scan, "poses", &poses_of, documentation::scan_poses, py::arg("source") = "auto");
+  define_method(scan, "frame", &frame_of, documentation::scan_frame, py::arg("node"),
+                py::arg("color") = true, py::arg("depth") = true);
+  define(module, "open_scan", &open_source, {"path", "calibration"});
 }
 
 py::list texts_of(const std::vector<std::pair<int, libmap::Error>>& skipped) {
@@ -276,12 +276,13 @@ py::dict refine(const ScanSource& scan, const std::vector<std::string>& known_le
   return made;
 }
 
-py::dict fuse(const ScanSource& scan, const Poses& poses, const py::dict& values,
+py::dict fuse(const ScanSource& scan, const std::shared_ptr<Poses>& given, const py::dict& values,
               const py::object& progress, unsigned threads) {
   const auto options = options_from<libmap::DepthFusionOptions>(values);
+  const std::shared_ptr<Poses> poses = given != nullptr ? given : poses_of(scan, "auto");
   libmap::DepthFusionResult result = run(threads, progress, [&](libmap::Progress& bar) {
     return libmap::in_file(scan.path(),
-                           [&] { return libmap::fuse_depth(scan, poses.poses, options, bar); });
+                           [&] { return libmap::fuse_depth(scan, poses->poses, options, bar); });
   });
   py::dict made = dict_of(libmap::described(result));
   made["cloud"] = shared(std::move(result.cloud));
@@ -297,8 +298,9 @@ void add_scans(py::module_& module) {
   add_frames(module);
   add_poses(module);
   add_scan(module);
-  module.def("refine", &refine);
-  module.def("fuse", &fuse);
+  define(module, "refine", &refine,
+         {"scan", "known_lengths", "board", "options", "progress", "threads"});
+  define(module, "fuse", &fuse, {"scan", "poses", "options", "progress", "threads"});
   add_stage<libmap::PoseImportOptions>("read_poses");
   add_stage<libmap::RefinementOptions, libmap::RefinementResult>(
       "refine", {"poses", "nodes_without_pose", "nodes_without_links"});

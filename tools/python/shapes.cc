@@ -1,10 +1,11 @@
 #include <algorithm>
 
+#include "class_documentation.h"
 #include "libmap/core/error.h"
 #include "libmap/core/manifest.h"
 #include "libmap/io/cloud_io.h"
 #include "libmap/io/mesh_io.h"
-#include "tools/python/values.h"
+#include "tools/python/arguments.h"
 
 namespace graspmap_python {
 
@@ -66,13 +67,8 @@ std::vector<Eigen::Vector3f> normals_from(const py::object& given, const std::st
 std::vector<libmap::Color> colors_from(const py::object& given, const std::string& name) {
   std::vector<libmap::Color> colors;
   if (given.is_none()) return colors;
-  const char* const bound = "uint8 of shape (N, 3)";
-  const py::array array = checked_array(given, name, "u", bound, 3);
-  if (array.itemsize() != 1)
-    throw libmap::Error(
-        "wrong type",
-        {.field = name, .value = py::str(array.dtype()).cast<std::string>(), .bound = bound});
-  const auto bytes = py::array_t<std::uint8_t, py::array::c_style>::ensure(array);
+  const auto bytes =
+      array_from<std::uint8_t>(given, name, byte_numbers, {any_length, 3}, "uint8 of shape (N, 3)");
   colors.resize(static_cast<std::size_t>(bytes.shape(0)));
   std::copy_n(bytes.data(), bytes.size(), colors.empty() ? nullptr : colors.front().data());
   return colors;
@@ -93,8 +89,8 @@ std::vector<ScalarField> fields_from(const py::dict& given) {
     ScalarField& field = fields.emplace_back();
     field.name = py::str(name).cast<std::string>();
     const py::array array =
-        checked_array(py::reinterpret_borrow<py::object>(values), "field " + field.name, "biuf",
-                      "numbers of shape (N,)", 0);
+        checked_array(py::reinterpret_borrow<py::object>(values), "field " + field.name,
+                      real_or_truth, {any_length}, "numbers of shape (N,)");
     field.type = type_of(array);
     const auto numbers =
         py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(array);
@@ -105,28 +101,28 @@ std::vector<ScalarField> fields_from(const py::dict& given) {
 
 std::shared_ptr<PointCloud> make_cloud(const py::object& positions, const py::object& normals,
                                        const py::object& colors, const py::dict& fields,
-                                       const py::object& viewpoint) {
+                                       const std::optional<libmap::Pose>& viewpoint) {
   PointCloud cloud;
   cloud.positions = positions_from(positions, "positions");
   cloud.normals = normals_from(normals, "normals");
   cloud.colors = colors_from(colors, "colors");
   cloud.fields = fields_from(fields);
-  if (!viewpoint.is_none()) cloud.viewpoint = pose_from(viewpoint, "viewpoint");
+  if (viewpoint) cloud.viewpoint = *viewpoint;
   cloud.check();
   return shared(std::move(cloud));
 }
 
-std::vector<libmap::Triangle> triangles_from(const py::object& given) {
-  const auto array = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>::ensure(
-      checked_array(given, "triangles", "iu", "whole numbers of shape (M, 3)", 3));
+std::vector<libmap::Triangle> triangles_from(const py::object& given, const std::string& name) {
+  const auto array = array_from<std::int64_t>(given, name, whole_numbers, {any_length, 3},
+                                              "whole numbers of shape (T, 3)");
   std::vector<libmap::Triangle> triangles(static_cast<std::size_t>(array.shape(0)));
   const std::int64_t* from = array.data();
   for (libmap::Triangle& triangle : triangles)
     for (std::uint32_t& corner : triangle) {
       if (*from < 0 || *from > std::numeric_limits<std::uint32_t>::max())
         throw libmap::Error(
-            "is no vertex",
-            {.field = "triangles", .value = std::to_string(*from), .bound = "indices of vertices"});
+            "no index of a vertex",
+            {.field = name, .value = std::to_string(*from), .bound = "indices of vertices"});
       corner = static_cast<std::uint32_t>(*from++);
     }
   return triangles;
@@ -138,7 +134,7 @@ std::shared_ptr<TriangleMesh> make_mesh(const py::object& vertices, const py::ob
                                         const py::dict& face_fields) {
   TriangleMesh mesh;
   mesh.vertices = positions_from(vertices, "vertices");
-  mesh.triangles = triangles_from(triangles);
+  mesh.triangles = triangles_from(triangles, "triangles");
   mesh.vertex_normals = normals_from(normals, "vertex_normals");
   mesh.vertex_colors = colors_from(colors, "vertex_colors");
   mesh.vertex_fields = fields_from(vertex_fields);
@@ -153,7 +149,7 @@ std::shared_ptr<PointCloud> selected(const PointCloud& cloud, const py::object& 
   const py::module_ numpy = py::module_::import("numpy");
   const py::object numbers_of_slice =
       py::isinstance<py::slice>(which) ? numpy.attr("arange")(size)[which] : which;
-  py::array array = checked_array(numbers_of_slice, "index", "biu", bound, 0);
+  py::array array = checked_array(numbers_of_slice, "index", indices_or_truth, {any_length}, bound);
   if (array.dtype().kind() == 'b') {
     if (array.size() != size)
       throw libmap::Error(
@@ -174,85 +170,117 @@ std::shared_ptr<PointCloud> selected(const PointCloud& cloud, const py::object& 
   return shared(libmap::select_points(cloud, indices));
 }
 
+std::shared_ptr<PointCloud> transformed(const PointCloud& cloud, const libmap::Pose& pose) {
+  return shared(libmap::transform_cloud(cloud, pose));
+}
+
 void add_cloud(py::module_& module) {
-  py::class_<PointCloud, std::shared_ptr<PointCloud>>(
-      module, "Cloud",
-      "A cloud of points, as it is: a changed one is a new one, made of arrays or by "
-      "`cloud[index]`\n"
-      "(truth values or whole numbers). A map is a cloud of its voxels.")
-      .def(py::init(&make_cloud), py::arg("positions"), py::arg("normals") = py::none(),
-           py::arg("colors") = py::none(), py::arg("fields") = py::dict(),
-           py::arg("viewpoint") = py::none())
+  py::class_<PointCloud, std::shared_ptr<PointCloud>> cloud(module, "Cloud", documentation::cloud);
+  define_constructor(cloud, &make_cloud, py::arg("positions"), py::arg("normals") = py::none(),
+                     py::arg("colors") = py::none(), py::arg("fields") = py::dict(),
+                     py::arg("viewpoint") = py::none());
+  cloud
       .def_property_readonly("positions", viewing(&PointCloud::positions, positions_of),
-                             "(N, 3) float64, m")
+                             documentation::cloud_positions)
       .def_property_readonly("normals", viewing(&PointCloud::normals, normals_of),
-                             "(N, 3) float32, or None")
+                             documentation::cloud_normals)
       .def_property_readonly("colors", viewing(&PointCloud::colors, colors_of),
-                             "(N, 3) uint8: red, green, blue; or None")
+                             documentation::cloud_colors)
       .def_property_readonly("fields", viewing(&PointCloud::fields, fields_of),
-                             "{name: (N,) float64}")
+                             documentation::cloud_fields)
       .def_property_readonly(
-          "field_types", [](const PointCloud& cloud) { return types_of(cloud.fields); },
-          "{name: type of the numbers in files}")
+          "field_types", [](const PointCloud& self) { return types_of(self.fields); },
+          documentation::cloud_field_types)
       .def_property_readonly(
-          "viewpoint", [](const PointCloud& cloud) { return matrix_of(cloud.viewpoint); },
-          "(4, 4) float64: cloud_from_sensor; the identity where not known")
-      .def(
-          "transformed",
-          [](const PointCloud& cloud, const py::object& target_from_source) {
-            const libmap::Pose pose = pose_from(target_from_source, "target_from_source");
-            return shared(libmap::transform_cloud(cloud, pose));
-          },
-          py::arg("target_from_source"), "The cloud moved by a rigid transform (4, 4).")
-      .def("__getitem__", &selected, py::arg("index"))
-      .def("__len__", &PointCloud::size);
+          "viewpoint", [](const PointCloud& self) { return matrix_of(self.viewpoint); },
+          documentation::cloud_viewpoint)
+      .def("__len__", &PointCloud::size, documentation::cloud_len);
+  define_method(cloud, "transformed", &transformed, documentation::cloud_transformed,
+                py::arg("target_from_source"));
+  define_method(cloud, "__getitem__", &selected, documentation::cloud_getitem, py::arg("index"));
 }
 
 void add_mesh(py::module_& module) {
-  py::class_<TriangleMesh, std::shared_ptr<TriangleMesh>>(
-      module, "Mesh", "A triangle mesh, as it is: a changed one is a new one, made of arrays.")
-      .def(py::init(&make_mesh), py::arg("vertices"), py::arg("triangles"),
-           py::arg("vertex_normals") = py::none(), py::arg("vertex_colors") = py::none(),
-           py::arg("vertex_fields") = py::dict(), py::arg("face_fields") = py::dict())
-      .def_property_readonly("vertices", viewing(&TriangleMesh::vertices, positions_of),
-                             "(V, 3) float64, m")
+  py::class_<TriangleMesh, std::shared_ptr<TriangleMesh>> mesh(module, "Mesh", documentation::mesh);
+  define_constructor(mesh, &make_mesh, py::arg("vertices"), py::arg("triangles"),
+                     py::arg("vertex_normals") = py::none(), py::arg("vertex_colors") = py::none(),
+                     py::arg("vertex_fields") = py::dict(), py::arg("face_fields") = py::dict());
+  mesh.def_property_readonly("vertices", viewing(&TriangleMesh::vertices, positions_of),
+                             documentation::mesh_vertices)
       .def_property_readonly("triangles", viewing(&TriangleMesh::triangles, triangles_of),
-                             "(T, 3) uint32: vertices, counter-clockwise from outside")
+                             documentation::mesh_triangles)
       .def_property_readonly("vertex_normals", viewing(&TriangleMesh::vertex_normals, normals_of),
-                             "(V, 3) float32, or None")
+                             documentation::mesh_vertex_normals)
       .def_property_readonly("vertex_colors", viewing(&TriangleMesh::vertex_colors, colors_of),
-                             "(V, 3) uint8, or None")
+                             documentation::mesh_vertex_colors)
       .def_property_readonly("vertex_fields", viewing(&TriangleMesh::vertex_fields, fields_of),
-                             "{name: (V,) float64}")
+                             documentation::mesh_vertex_fields)
       .def_property_readonly("face_fields", viewing(&TriangleMesh::face_fields, fields_of),
-                             "{name: (T,) float64}")
-      .def_property_readonly("area_m2", &libmap::surface_area);
+                             documentation::mesh_face_fields)
+      .def_property_readonly("area_m2", &libmap::surface_area, documentation::mesh_area_m2);
 }
 
 }  // namespace
 
+std::shared_ptr<PointCloud> cloud_from(const py::object& given, const std::string& name,
+                                       const std::string& bound) {
+  if (py::isinstance<PointCloud>(given)) return given.cast<std::shared_ptr<PointCloud>>();
+  PointCloud cloud;
+  cloud.positions = positions_from(given, name, Finite::required, bound);
+  return shared(std::move(cloud));
+}
+
+bool is_pair_of_tables(const py::object& given) {
+  if (!py::isinstance<py::tuple>(given) && !py::isinstance<py::list>(given)) return false;
+  if (py::len(given) != 2) return false;
+  for (const py::handle part : given) {
+    const auto array = py::array::ensure(part);
+    PyErr_Clear();
+    if (!array || array.ndim() != 2) return false;
+  }
+  return true;
+}
+
+Kept<TriangleMesh> Argument<TriangleMesh>::from(const py::object& given, const std::string& name) {
+  if (py::isinstance<TriangleMesh>(given)) return {given.cast<std::shared_ptr<TriangleMesh>>()};
+  if (!is_pair_of_tables(given))
+    throw wrong_value(given, name, "a Mesh, or vertices (V, 3) and triangles (T, 3)");
+  return {libmap::in_field(name, [&] {
+    TriangleMesh mesh;
+    mesh.vertices = positions_from(given[py::int_(0)], "vertices");
+    mesh.triangles = triangles_from(given[py::int_(1)], "triangles");
+    mesh.check();
+    return shared(std::move(mesh));
+  })};
+}
+
 void add_shapes(py::module_& module) {
   add_cloud(module);
   add_mesh(module);
-  module.def("read_cloud", [](const fs::path& path) {
+  const auto read_cloud = [](const fs::path& path) {
     return without_lock([&] { return shared(libmap::read_cloud(path).cloud); });
-  });
-  module.def("read_mesh", [](const fs::path& path) {
+  };
+  const auto read_mesh = [](const fs::path& path) {
     return without_lock([&] { return shared(libmap::read_mesh(path).mesh); });
-  });
-  module.def("write_cloud", [](const fs::path& path, const PointCloud& cloud) {
+  };
+  const auto write_cloud = [](const fs::path& path, const PointCloud& cloud) {
     libmap::require_cloud_format(path);
     write_whole(path, [&](const fs::path& file) { libmap::write_cloud(file, cloud); });
-  });
-  module.def("write_mesh", [](const fs::path& path, const TriangleMesh& mesh) {
+  };
+  const auto write_mesh = [](const fs::path& path, const TriangleMesh& mesh) {
     libmap::require_mesh_format(path);
     write_whole(path, [&](const fs::path& file) { libmap::write_mesh(file, mesh); });
-  });
-  module.def("read_manifest", [](const fs::path& path) -> std::optional<std::string> {
+  };
+  const auto read_manifest = [](const fs::path& path) -> std::optional<std::string> {
     const auto manifest = libmap::read_manifest_of(path);
     if (!manifest) return std::nullopt;
     return libmap::to_json(*manifest);
-  });
+  };
+  define(module, "read_cloud", +read_cloud, {"path"});
+  define(module, "read_mesh", +read_mesh, {"path"});
+  define(module, "write_cloud", +write_cloud, {"path", "cloud"});
+  define(module, "write_mesh", +write_mesh, {"path", "mesh"});
+  define(module, "read_manifest", +read_manifest, {"path"});
 }
 
 }  // namespace graspmap_python

@@ -3,7 +3,7 @@
 #include "libmap/mesh/poisson_disk.h"
 #include "libmap/surface/mesh_cleaning.h"
 #include "libmap/surface/surface_reconstruction.h"
-#include "tools/python/values.h"
+#include "tools/python/arguments.h"
 
 namespace graspmap_python {
 
@@ -75,9 +75,9 @@ py::dict resample(const libmap::TriangleMesh& mesh, const py::dict& values,
 }  // namespace
 
 void add_surfaces(py::module_& module) {
-  module.def("estimate_normals", &estimate_normals);
-  module.def("mesh", &mesh);
-  module.def("resample", &resample);
+  define(module, "estimate_normals", &estimate_normals, {"cloud", "options", "threads"});
+  define(module, "mesh", &mesh, {"cloud", "options", "progress", "threads"});
+  define(module, "resample", &resample, {"mesh", "options", "progress", "threads"});
   add_stage<libmap::NormalEstimationOptions>("estimate_normals");
   add_stage<MeshOptions, libmap::SurfaceReconstructionResult, libmap::MeshCleaningResult>("mesh");
   add_stage<libmap::PoissonDiskOptions, libmap::PoissonDiskResult>("resample");

@@ -19,6 +19,29 @@ std::string short_repr(py::handle value) {
   return text.size() <= longest ? text : text.substr(0, longest) + "...";
 }
 
+// Shape and type of an array, the value of a text or a number, the type of another object.
+std::string outline(py::handle given) {
+  if (py::hasattr(given, "shape") || py::isinstance<py::list>(given) ||
+      py::isinstance<py::tuple>(given)) {
+    const auto array = py::array::ensure(given);
+    PyErr_Clear();
+    if (array && array.ndim() > 0)
+      return "of shape " + py::str(array.attr("shape")).cast<std::string>() + " and type " +
+             py::str(array.dtype()).cast<std::string>();
+  }
+  if (given.is_none() || py::isinstance<py::str>(given) || PyNumber_Check(given.ptr()) != 0)
+    return short_repr(given);
+  return "of type " + py::type::of(given).attr("__name__").cast<std::string>();
+}
+
+bool has_shape(const py::array& array, const Shape& shape) {
+  if (array.ndim() != static_cast<py::ssize_t>(shape.size())) return false;
+  for (std::size_t n = 0; n < shape.size(); ++n)
+    if (shape[n] != any_length && shape[n] != array.shape(static_cast<py::ssize_t>(n)))
+      return false;
+  return true;
+}
+
 std::string text_of(const std::string& key, py::handle value) {
   if (py::isinstance<py::bool_>(value)) return value.cast<bool>() ? "true" : "false";
   if (py::isinstance<py::str>(value)) return value.cast<std::string>();
@@ -68,63 +91,53 @@ const char* type_name(libmap::ParameterType type) {
 
 }  // namespace
 
-py::array checked_array(const py::object& given, const std::string& field, const std::string& kinds,
-                        const std::string& bound, py::ssize_t columns) {
-  const py::array array = py::array::ensure(given);
-  if (!array) {
-    PyErr_Clear();
-    throw libmap::Error("is no array",
-                        {.field = field, .value = short_repr(given), .bound = bound});
-  }
-  const bool has_shape =
-      columns == 0 ? array.ndim() == 1 : array.ndim() == 2 && array.shape(1) == columns;
-  if (has_shape && kinds.find(array.dtype().kind()) != std::string::npos) return array;
-  const std::string shape = py::str(array.attr("shape")).cast<std::string>();
-  const std::string type = py::str(array.dtype()).cast<std::string>();
-  throw libmap::Error(
-      "wrong shape or type",
-      {.field = field, .value = "of shape " + shape + " and type " + type, .bound = bound});
+libmap::Error wrong_value(py::handle given, const std::string& name, const std::string& bound) {
+  return libmap::Error("wrong type or shape",
+                       {.field = name, .value = outline(given), .bound = bound});
 }
 
-std::vector<Eigen::Vector3d> positions_from(const py::object& given, const std::string& field,
-                                            Finite finite) {
-  const auto array = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(
-      checked_array(given, field, "iuf", "numbers of shape (N, 3)", 3));
+py::array checked_array(const py::object& given, const std::string& name, const Numbers& numbers,
+                        const Shape& shape, const std::string& bound) {
+  py::array array = py::array::ensure(given);
+  PyErr_Clear();
+  if (!array || !has_shape(array, shape)) throw wrong_value(given, name, bound);
+  const char kind = array.dtype().kind();
+  const bool has_type = numbers.kinds.find(kind) != std::string_view::npos &&
+                        (numbers.bytes == 0 || numbers.bytes == array.itemsize());
+  // An empty list has NumPy's default type.
+  if (has_type || (array.size() == 0 && kind == 'f')) return array;
+  throw wrong_value(array, name, bound);
+}
+
+std::vector<Eigen::Vector3d> positions_from(const py::object& given, const std::string& name,
+                                            Finite finite, const std::string& bound) {
+  const auto array = array_from<double>(given, name, real_numbers, {any_length, 3}, bound);
   std::vector<Eigen::Vector3d> positions(static_cast<std::size_t>(array.shape(0)));
   const double* from = array.data();
   for (std::size_t row = 0; row < positions.size(); ++row, from += 3) {
     positions[row] = Eigen::Vector3d(from[0], from[1], from[2]);
     if (finite == Finite::required && !positions[row].allFinite())
       throw libmap::Error("x, y and z must be finite",
-                          {.field = field + ", row " + std::to_string(row)});
+                          {.field = name + ", row " + std::to_string(row)});
   }
   return positions;
 }
 
-Eigen::Vector3d vector_from(const py::object& given, const std::string& field) {
-  const auto array = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(
-      checked_array(given, field, "iuf", "three numbers", 0));
-  if (array.size() != 3)
-    throw libmap::Error("wrong shape", {.field = field,
-                                        .value = "of " + std::to_string(array.size()) + " numbers",
-                                        .bound = "three numbers"});
+Eigen::Vector3d vector_from(const py::object& given, const std::string& name) {
+  const auto array = array_from<double>(given, name, real_numbers, {3}, "three numbers");
   return {array.at(0), array.at(1), array.at(2)};
 }
 
-libmap::Pose pose_from(const py::object& given, const std::string& field) {
+libmap::Pose pose_from(const py::object& given, const std::string& name) {
   const char* const bound = "a rigid transform of shape (4, 4)";
-  const auto array = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(
-      checked_array(given, field, "iuf", bound, 4));
-  Eigen::Matrix4d matrix = Eigen::Matrix4d::Zero();
-  if (array.shape(0) == 4)
-    matrix = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(array.data());
-  const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
-  const bool is_rigid = matrix.allFinite() && matrix.row(3) == Eigen::RowVector4d(0, 0, 0, 1) &&
-                        (rotation * rotation.transpose()).isIdentity(1e-6) &&
-                        rotation.determinant() > 0.0;
-  if (!is_rigid) throw libmap::Error("is none", {.field = field, .value = {}, .bound = bound});
+  const auto array = array_from<double>(given, name, real_numbers, {4, 4}, bound);
   libmap::Pose pose;
-  pose.matrix() = matrix;
+  pose.matrix() = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(array.data());
+  const Eigen::Matrix3d rotation = pose.linear();
+  const bool is_rigid =
+      pose.matrix().allFinite() && pose.matrix().row(3) == Eigen::RowVector4d(0, 0, 0, 1) &&
+      (rotation * rotation.transpose()).isIdentity(1e-6) && rotation.determinant() > 0.0;
+  if (!is_rigid) throw libmap::Error("not a rigid transform", {.field = name, .bound = bound});
   return pose;
 }
 

@@ -63,19 +63,35 @@ inline Shape rows(std::size_t count, py::ssize_t width) {
   return {static_cast<py::ssize_t>(count), width};
 }
 
-// What Python gave as an array, of `columns` numbers per row (0: of one dimension). Throws Error
-// naming the field, the array's shape and type and what they must be. reals: any whole or real
-// numbers, finite unless said otherwise.
+// Error of a parameter whose value has a wrong type or shape.
+libmap::Error wrong_value(py::handle given, const std::string& name, const std::string& bound);
+
+// Types of numbers: NumPy's letters, and their size (0: any).
+struct Numbers {
+  std::string_view kinds;
+  py::ssize_t bytes = 0;
+};
+constexpr Numbers byte_numbers = {"u", 1}, whole_numbers = {"iu"}, real_numbers = {"iuf"};
+constexpr Numbers indices_or_truth = {"biu"}, real_or_truth = {"biuf"};
+constexpr py::ssize_t any_length = -1;
+
+// The array itself after a check of its type and shape.
+py::array checked_array(const py::object& given, const std::string& name, const Numbers& numbers,
+                        const Shape& shape, const std::string& bound);
+template <typename Number>
+auto array_from(const py::object& given, const std::string& name, const Numbers& numbers,
+                const Shape& shape, const std::string& bound) {
+  return py::array_t<Number, py::array::c_style | py::array::forcecast>::ensure(
+      checked_array(given, name, numbers, shape, bound));
+}
+
 enum class Finite { required, any };
-std::vector<Eigen::Vector3d> positions_from(const py::object& given, const std::string& field,
-                                            Finite finite = Finite::required);
-Eigen::Vector3d vector_from(const py::object& given, const std::string& field);
-libmap::Pose pose_from(const py::object& given, const std::string& field);  // 4 x 4, rigid
+std::vector<Eigen::Vector3d> positions_from(const py::object& given, const std::string& name,
+                                            Finite finite = Finite::required,
+                                            const std::string& bound = "numbers of shape (N, 3)");
+Eigen::Vector3d vector_from(const py::object& given, const std::string& name);
+libmap::Pose pose_from(const py::object& given, const std::string& name);  // 4 x 4, rigid
 py::array matrix_of(const libmap::Pose& pose);
-// The array itself after a check of its type's kinds ("iu": whole numbers, "f": real, "b": truth
-// values) and of its shape.
-py::array checked_array(const py::object& given, const std::string& field, const std::string& kinds,
-                        const std::string& bound, py::ssize_t columns);
 
 // Sets the table's parameters by their keys; a dict in a dict is a section, as in YAML. Throws what
 // ParameterTable::set throws, and Error for a value that is no truth value, number or text.
@@ -148,6 +164,8 @@ auto run(unsigned threads, const py::object& callback, const Step& step) {
     throw libmap::Error(
         "not a number of threads",
         {.field = "threads", .value = std::to_string(threads), .bound = ">= 0 and <= 4096"});
+  if (!callback.is_none() && PyCallable_Check(callback.ptr()) == 0)
+    throw wrong_value(callback, "progress", "None or a function of (stage, done, total)");
   CallProgress progress(callback);
   const py::gil_scoped_release released;
   const libmap::ThreadLimit limit(threads);

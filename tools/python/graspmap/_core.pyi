@@ -1,3 +1,6 @@
+"""Types and documentation of the extension module. The docstrings of the classes are those at run
+time: class_documentation.py passes them to the C++ sources."""
+
 from os import PathLike
 from typing import Any, Callable
 
@@ -5,141 +8,373 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 class Cloud:
+    """Cloud of points; a map is a cloud of its voxels.
+
+    A cloud does not change. A changed one is made of arrays, or by ``cloud[index]`` with N truth
+    values, K indices or a slice. Its arrays are read-only views of its memory.
+
+    Parameters
+    ----------
+    positions : array_like, shape (N, 3)
+        Positions, m: finite numbers.
+    normals : array_like, shape (N, 3), optional
+        Unit normals, stored as float32. A normal that is zero or NaN is unknown.
+    colors : array_like of uint8, shape (N, 3), optional
+        Red, green and blue.
+    fields : dict of array_like, shape (N,), optional
+        Values of each field by name. Files store them as the given type.
+    viewpoint : array_like, shape (4, 4), optional
+        Rigid transform cloud_from_sensor, m.
+
+    Raises
+    ------
+    Error
+        If an array has a wrong shape, length or type; its `field` names the parameter.
+
+    Examples
+    --------
+    >>> cloud = graspmap.Cloud([[0, 0, 0], [1, 0, 2]], fields={"score": [0.25, 0.75]})
+    >>> len(cloud)
+    2
+    >>> cloud[cloud.fields["score"] > 0.5].positions
+    array([[1., 0., 2.]])
+    """
     def __init__(self, positions: ArrayLike, normals: ArrayLike | None = None,
                  colors: ArrayLike | None = None, fields: dict[str, Any] = ...,
                  viewpoint: ArrayLike | None = None) -> None: ...
     @property
-    def positions(self) -> NDArray[np.float64]: ...
+    def positions(self) -> NDArray[np.float64]:
+        """Positions, m: array (N, 3) of float64."""
     @property
-    def normals(self) -> NDArray[np.float32] | None: ...
+    def normals(self) -> NDArray[np.float32] | None:
+        """Unit normals: array (N, 3) of float32, or None."""
     @property
-    def colors(self) -> NDArray[np.uint8] | None: ...
+    def colors(self) -> NDArray[np.uint8] | None:
+        """Red, green and blue: array (N, 3) of uint8, or None."""
     @property
-    def fields(self) -> dict[str, NDArray[np.float64]]: ...
+    def fields(self) -> dict[str, NDArray[np.float64]]:
+        """Values of each field by name: dict of arrays (N,) of float64."""
     @property
-    def field_types(self) -> dict[str, str]: ...
+    def field_types(self) -> dict[str, str]:
+        """Type of each field's numbers in files, by name, for example 'float32'."""
     @property
-    def viewpoint(self) -> NDArray[np.float64]: ...
-    def transformed(self, target_from_source: ArrayLike) -> Cloud: ...
-    def __getitem__(self, index: slice | ArrayLike) -> Cloud: ...
-    def __len__(self) -> int: ...
+    def viewpoint(self) -> NDArray[np.float64]:
+        """Rigid transform cloud_from_sensor, m: array (4, 4) of float64; identity if unknown."""
+    def transformed(self, target_from_source: ArrayLike) -> Cloud:
+        """Moves the cloud by a rigid transform.
+
+        Parameters
+        ----------
+        target_from_source : array_like, shape (4, 4)
+            Rigid transform, m.
+
+        Returns
+        -------
+        Cloud
+            Moved points with rotated normals.
+
+        Raises
+        ------
+        Error
+            If the matrix is not a rigid transform.
+
+        Examples
+        --------
+        >>> lift = np.eye(4)
+        >>> lift[2, 3] = 0.5
+        >>> graspmap.Cloud([[0, 0, 0]]).transformed(lift).positions
+        array([[0. , 0. , 0.5]])
+        """
+    def __getitem__(self, index: slice | ArrayLike) -> Cloud:
+        """Selects points by a slice, N truth values or K indices: a new cloud."""
+    def __len__(self) -> int:
+        """Number of points."""
 
 class Mesh:
+    """Triangle mesh.
+
+    A mesh does not change. A changed one is made of arrays. Its arrays are read-only views of its
+    memory.
+
+    Parameters
+    ----------
+    vertices : array_like, shape (V, 3)
+        Positions, m: finite numbers.
+    triangles : array_like of int, shape (T, 3)
+        Indices of vertices, counterclockwise seen from outside.
+    vertex_normals : array_like, shape (V, 3), optional
+        Unit normals, stored as float32.
+    vertex_colors : array_like of uint8, shape (V, 3), optional
+        Red, green and blue.
+    vertex_fields : dict of array_like, shape (V,), optional
+        Values of each field by name.
+    face_fields : dict of array_like, shape (T,), optional
+        Values of each field by name.
+
+    Raises
+    ------
+    Error
+        If an array has a wrong shape, length or type, or an index is not that of a vertex.
+
+    Examples
+    --------
+    >>> mesh = graspmap.Mesh([[0, 0, 0], [2, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    >>> mesh.area_m2
+    1.0
+    """
     def __init__(self, vertices: ArrayLike, triangles: ArrayLike,
                  vertex_normals: ArrayLike | None = None, vertex_colors: ArrayLike | None = None,
                  vertex_fields: dict[str, Any] = ..., face_fields: dict[str, Any] = ...) -> None: ...
     @property
-    def vertices(self) -> NDArray[np.float64]: ...
+    def vertices(self) -> NDArray[np.float64]:
+        """Positions, m: array (V, 3) of float64."""
     @property
-    def triangles(self) -> NDArray[np.uint32]: ...
+    def triangles(self) -> NDArray[np.uint32]:
+        """Indices of vertices, counterclockwise seen from outside: array (T, 3) of uint32."""
     @property
-    def vertex_normals(self) -> NDArray[np.float32] | None: ...
+    def vertex_normals(self) -> NDArray[np.float32] | None:
+        """Unit normals: array (V, 3) of float32, or None."""
     @property
-    def vertex_colors(self) -> NDArray[np.uint8] | None: ...
+    def vertex_colors(self) -> NDArray[np.uint8] | None:
+        """Red, green and blue: array (V, 3) of uint8, or None."""
     @property
-    def vertex_fields(self) -> dict[str, NDArray[np.float64]]: ...
+    def vertex_fields(self) -> dict[str, NDArray[np.float64]]:
+        """Values of each field by name: dict of arrays (V,) of float64."""
     @property
-    def face_fields(self) -> dict[str, NDArray[np.float64]]: ...
+    def face_fields(self) -> dict[str, NDArray[np.float64]]:
+        """Values of each field by name: dict of arrays (T,) of float64."""
     @property
-    def area_m2(self) -> float: ...
+    def area_m2(self) -> float:
+        """Area of the triangles, m2."""
 
 class Camera:
+    """Pinhole camera, from `Frame.cameras`.
+
+    A point (x, y, z) of the optical frame (x right, y down, z forward) is seen at the pixel
+    u = fx * x/z + cx, v = fy * y/z + cy, after OpenCV's terms of distortion.
+
+    Examples
+    --------
+    >>> scan = graspmap.open_scan("scan.db")
+    >>> camera = scan.frame(scan.nodes[0]).cameras[0]
+    >>> camera.width, camera.height, camera.distortion_model
+    (512, 424, 'none')
+    """
     @property
-    def width(self) -> int: ...
+    def width(self) -> int:
+        """Width of the image, pixels."""
     @property
-    def height(self) -> int: ...
+    def height(self) -> int:
+        """Height of the image, pixels."""
     @property
-    def fx(self) -> float: ...
+    def fx(self) -> float:
+        """Focal length along x, pixels."""
     @property
-    def fy(self) -> float: ...
+    def fy(self) -> float:
+        """Focal length along y, pixels."""
     @property
-    def cx(self) -> float: ...
+    def cx(self) -> float:
+        """Principal point along x, pixels."""
     @property
-    def cy(self) -> float: ...
+    def cy(self) -> float:
+        """Principal point along y, pixels."""
     @property
-    def distortion_model(self) -> str: ...
+    def distortion_model(self) -> str:
+        """Model of the distortion: 'none', 'radial_tangential' or 'equidistant'."""
     @property
-    def distortion(self) -> list[float]: ...
+    def distortion(self) -> list[float]:
+        """Coefficients of the distortion in OpenCV's order."""
     @property
-    def base_from_camera(self) -> NDArray[np.float64]: ...
+    def base_from_camera(self) -> NDArray[np.float64]:
+        """Rigid transform from the optical frame to the robot's base, m: array (4, 4) of float64."""
 
 class Frame:
+    """Images of one node of a scan, from `Scan.frame`.
+
+    Images of several cameras are side by side in one array, in the order of `cameras`.
+
+    Examples
+    --------
+    >>> scan = graspmap.open_scan("scan.db")
+    >>> frame = scan.frame(scan.nodes[0])
+    >>> frame.color.shape, frame.depth.shape
+    ((424, 512, 3), (424, 512))
+    """
     @property
-    def node(self) -> int: ...
+    def node(self) -> int:
+        """Number of the node."""
     @property
-    def stamp_s(self) -> float: ...
+    def stamp_s(self) -> float:
+        """Time of the images, s."""
     @property
-    def cameras(self) -> list[Camera]: ...
+    def cameras(self) -> list[Camera]:
+        """Cameras in the order of their images."""
     @property
-    def color(self) -> NDArray[np.uint8] | None: ...
+    def color(self) -> NDArray[np.uint8] | None:
+        """Red, green and blue: array (height, width, 3) of uint8, or None."""
     @property
-    def depth(self) -> NDArray[np.float32] | None: ...
+    def depth(self) -> NDArray[np.float32] | None:
+        """Distance from the camera's plane, m, 0 where nothing was measured: array (height, width)
+        of float32, or None."""
     @property
-    def right(self) -> NDArray[np.uint8] | None: ...
+    def right(self) -> NDArray[np.uint8] | None:
+        """Right image of a stereo pair: array (height, width) of uint8, or None."""
 
 class Poses:
+    """Poses of a scan's nodes.
+
+    Parameters
+    ----------
+    nodes : array_like of int, shape (N,)
+        Numbers of the nodes.
+    world_from_base : array_like, shape (N, 4, 4)
+        Rigid transforms from the robot's base to the world, m.
+    stamps_s : array_like, shape (N,), optional
+        Times, s.
+
+    Raises
+    ------
+    Error
+        If an array has a wrong shape or type, or a matrix is not a rigid transform.
+
+    Examples
+    --------
+    >>> poses = graspmap.Poses([1, 2], [np.eye(4), np.eye(4)])
+    >>> poses.nodes
+    array([1, 2], dtype=int32)
+    """
     def __init__(self, nodes: ArrayLike, world_from_base: ArrayLike,
                  stamps_s: ArrayLike | None = None) -> None: ...
     @property
-    def nodes(self) -> NDArray[np.int32]: ...
+    def nodes(self) -> NDArray[np.int32]:
+        """Numbers of the nodes, 0 if unknown: array (N,) of int32."""
     @property
-    def stamps_s(self) -> NDArray[np.float64]: ...
+    def stamps_s(self) -> NDArray[np.float64]:
+        """Times, s, 0 if unknown: array (N,) of float64."""
     @property
-    def world_from_base(self) -> NDArray[np.float64]: ...
-    def __len__(self) -> int: ...
+    def world_from_base(self) -> NDArray[np.float64]:
+        """Rigid transforms from the robot's base to the world, m: array (N, 4, 4) of float64."""
+    def __len__(self) -> int:
+        """Number of poses."""
 
 class Scan:
-    @property
-    def path(self) -> str: ...
-    @property
-    def warnings(self) -> list[str]: ...
-    @property
-    def nodes(self) -> NDArray[np.int32]: ...
-    @property
-    def stamps_s(self) -> NDArray[np.float64]: ...
-    @property
-    def pose_sources(self) -> list[str]: ...
-    def poses(self, source: str = "auto") -> Poses: ...
-    def frame(self, node: int, color: bool = True, depth: bool = True) -> Frame: ...
-    def __len__(self) -> int: ...
+    """Recorded scan, from `open_scan`. Frames are read one by one.
 
-# The stages as graspmap/__init__.py calls them; a result's fields as a dict.
+    Examples
+    --------
+    >>> scan = graspmap.open_scan("scan.db")
+    >>> len(scan), scan.pose_sources
+    (24, ['odometry', 'ground-truth'])
+    """
+    @property
+    def path(self) -> str:
+        """Path of the database or folder."""
+    @property
+    def warnings(self) -> list[str]:
+        """Warnings of opening the scan."""
+    @property
+    def nodes(self) -> NDArray[np.int32]:
+        """Numbers of the nodes, ascending: array (N,) of int32."""
+    @property
+    def stamps_s(self) -> NDArray[np.float64]:
+        """Times of the nodes, s: array (N,) of float64."""
+    @property
+    def pose_sources(self) -> list[str]:
+        """Sources of poses that the scan has: 'optimized', 'odometry', 'ground-truth'."""
+    def poses(self, source: str = "auto") -> Poses:
+        """Poses that the scan contains.
+
+        Parameters
+        ----------
+        source : {'auto', 'optimized', 'odometry', 'ground-truth'}
+            Source of the poses. 'auto' is the first of the others that the scan has.
+
+        Returns
+        -------
+        Poses
+            Poses of the nodes that have one.
+
+        Raises
+        ------
+        Error
+            If the scan has no poses of this source.
+
+        Examples
+        --------
+        >>> len(graspmap.open_scan("scan.db").poses("odometry"))
+        24
+        """
+    def frame(self, node: int, color: bool = True, depth: bool = True) -> Frame:
+        """Decodes the images of a node.
+
+        Parameters
+        ----------
+        node : int
+            Number of the node, one of `nodes`.
+        color : bool
+            True to decode the color image.
+        depth : bool
+            True to decode the depth image.
+
+        Returns
+        -------
+        Frame
+            Cameras and images. A missing image, or one that was not decoded, is None.
+
+        Raises
+        ------
+        Error
+            If the scan has no such node, or an image is damaged.
+
+        Examples
+        --------
+        >>> scan = graspmap.open_scan("scan.db")
+        >>> frame = scan.frame(scan.nodes[0], color=False)
+        >>> frame.color is None, frame.depth.dtype
+        (True, dtype('float32'))
+        """
+    def __len__(self) -> int:
+        """Number of nodes."""
+
+# The stages as _stages.py and _files.py call them; a result's fields as a dict.
 _Path = str | PathLike[str]
 _Progress = Callable[[str, int, int], None] | None
+_Cloud = Cloud | ArrayLike
+_Mesh = Mesh | tuple[ArrayLike, ArrayLike]
 
 def options(stage: str) -> list[dict[str, Any]]: ...
 def results(stage: str) -> list[dict[str, Any]]: ...
 def stages() -> list[str]: ...
 def open_scan(path: _Path, calibration: _Path | None) -> Scan: ...
-def read_poses(path: _Path, scan: Scan | None, values: dict[str, Any]) -> Poses: ...
+def read_poses(path: _Path, scan: Scan | None, options: dict[str, Any]) -> Poses: ...
 def write_poses(path: _Path, poses: Poses, nodes: bool) -> None: ...
 def read_cloud(path: _Path) -> Cloud: ...
-def write_cloud(path: _Path, cloud: Cloud) -> None: ...
+def write_cloud(path: _Path, cloud: _Cloud) -> None: ...
 def read_mesh(path: _Path) -> Mesh: ...
-def write_mesh(path: _Path, mesh: Mesh) -> None: ...
+def write_mesh(path: _Path, mesh: _Mesh) -> None: ...
 def read_manifest(path: _Path) -> str | None: ...
-def refine(scan: Scan, known_lengths: list[str], board: str | None, values: dict[str, Any],
+def refine(scan: Scan, known_lengths: list[str], board: str | None, options: dict[str, Any],
            progress: _Progress, threads: int) -> dict[str, Any]: ...
-def fuse(scan: Scan, poses: Poses, values: dict[str, Any], progress: _Progress,
+def fuse(scan: Scan, poses: Poses | None, options: dict[str, Any], progress: _Progress,
          threads: int) -> dict[str, Any]: ...
-def estimate_normals(cloud: Cloud, values: dict[str, Any], threads: int) -> dict[str, Any]: ...
-def mesh(cloud: Cloud, values: dict[str, Any], progress: _Progress,
+def estimate_normals(cloud: _Cloud, options: dict[str, Any], threads: int) -> dict[str, Any]: ...
+def mesh(cloud: _Cloud, options: dict[str, Any], progress: _Progress,
          threads: int) -> dict[str, Any]: ...
-def resample(mesh: Mesh, values: dict[str, Any], progress: _Progress,
+def resample(mesh: _Mesh, options: dict[str, Any], progress: _Progress,
              threads: int) -> dict[str, Any]: ...
-def score(terrain: Cloud, scenario: str | None, up: ArrayLike | None, values: dict[str, Any],
+def score(terrain: _Cloud, scenario: str | None, up: ArrayLike | None, options: dict[str, Any],
           progress: _Progress, threads: int) -> dict[str, Any]: ...
-def grasp(mesh: Mesh, points: ArrayLike, surface_error: float | str | None,
-          more_loads_n: list[float], sequential: bool, pull_limits: bool, values: dict[str, Any],
+def grasp(mesh: _Mesh, points: ArrayLike, surface_error: float | str | None,
+          more_loads_n: list[float], sequential: bool, pull_limits: bool, options: dict[str, Any],
           progress: _Progress, threads: int) -> dict[str, Any]: ...
-def lookup(map: Cloud, points: ArrayLike, values: dict[str, Any],
+def lookup(map: _Cloud, points: ArrayLike, options: dict[str, Any],
            threads: int) -> dict[str, Any]: ...
-def footholds(map: Cloud, up: ArrayLike, values: dict[str, Any],
+def footholds(map: _Cloud, up: ArrayLike, options: dict[str, Any],
               threads: int) -> dict[str, Any]: ...
-def evaluate(columns: list[tuple[str, list[str]]], scores: list[str], values: dict[str, Any],
+def evaluate(table: dict[str, list[str]], scores: list[str], options: dict[str, Any],
              threads: int) -> dict[str, Any]: ...
-def render(shown: Cloud | Mesh, markers: ArrayLike | None, labels: list[str],
+def render(shown: _Cloud | _Mesh, markers: ArrayLike | None, labels: list[str],
            zero_plane_m: float | None, terrain_from_scene: ArrayLike | None,
            camera_position: ArrayLike | None, camera_target: ArrayLike | None,
-           values: dict[str, Any]) -> NDArray[np.uint8]: ...
+           options: dict[str, Any]) -> NDArray[np.uint8]: ...
 def to_png(image: NDArray[np.uint8]) -> bytes: ...

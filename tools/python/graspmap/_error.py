@@ -2,11 +2,34 @@
 
 
 class Error(Exception):
-    """What the commands print as one line, with its parts as fields.
+    """Error of a stage or a file, with the parts of its message.
 
-    `str(error)` is "FILE: FIELD is VALUE: REASON (must be BOUND)"; parts that are not known are empty.
-    `kind` is "bad_input" where a file, an option or data cannot be used (exit code 3 of the
-    commands), "failed" where the run itself went wrong, for instance on a full disk (exit code 1).
+    ``str(error)`` is the line that the commands print: "FILE: FIELD is VALUE: REASON (must be
+    BOUND)". Parts that are unknown are empty.
+
+    Attributes
+    ----------
+    reason : str
+        What is wrong.
+    file : str
+        Path of the file.
+    field : str
+        Parameter, option, column or key.
+    value : str
+        Given value, or the shape and type of a given array.
+    bound : str
+        Accepted values.
+    kind : {'bad_input', 'failed'}
+        bad_input: a file, an argument or data cannot be used (exit code 3 of the commands). failed:
+        the run itself went wrong, for instance on a full disk (exit code 1).
+
+    Examples
+    --------
+    >>> try:
+    ...     graspmap.score(np.zeros((5, 2)))
+    ... except graspmap.Error as error:
+    ...     print(error.field, "|", error.value, "|", error.bound)
+    terrain | of shape (5, 2) and type float64 | a Cloud, or numbers of shape (N, 3)
     """
 
     def __init__(self, message: str, reason: str, file: str = "", field: str = "", value: str = "",
@@ -22,6 +45,3 @@ class Error(Exception):
     def __reduce__(self) -> tuple[type["Error"], tuple[str, ...]]:
         return Error, (str(self), self.reason, self.file, self.field, self.value, self.bound,
                        self.kind)
-
-
-Error.__module__ = "graspmap"

@@ -1,4 +1,4 @@
-"""What the stages return: objects, and the numbers and texts that the libraries describe."""
+"""Results of the stages: objects, beside the numbers and texts that the libraries describe."""
 
 import dataclasses
 from typing import Any, Literal
@@ -11,10 +11,24 @@ from ._core import Cloud, Mesh, Poses
 
 
 class Result:
-    """Named fields; `as_dict()` gives them as a dict."""
+    """Result of a stage with named fields.
+
+    Examples
+    --------
+    >>> square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]
+    >>> sampled = graspmap.resample(square, radius_m=0.5)
+    >>> sampled.as_dict()["area_m2"] == sampled.area_m2
+    True
+    """
 
     def as_dict(self) -> dict[str, Any]:
-        """{name of the field: value}; arrays are not copied."""
+        """Fields by name.
+
+        Returns
+        -------
+        dict
+            {name: value}; arrays are not copied.
+        """
         return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
 
     def __repr__(self) -> str:
@@ -32,52 +46,111 @@ class Result:
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class RefineResult(_fields.RefineFields, Result):
-    """Refined poses and how they were found."""
+    """Refined poses and a report of each stage, from `refine`.
+
+    Attributes
+    ----------
+    poses : Poses
+        Refined poses.
+    nodes_without_pose : list of int
+        Nodes that are not connected to the largest component of the pose graph.
+    nodes_without_links : list of int
+        Nodes without links; their poses follow the start.
+    skipped : list of (int, str)
+        Nodes whose images could not be used, and why.
+    stages : list of dict
+        Of each stage: name, rejected, seconds, figures; held_out_matches and held_out_surfaces
+        (before, after); trajectory_rmse_m and trajectory_rotation_error_deg of a scan with truth.
+    findings : list of str
+        Findings about the sensor.
+    warnings : list of str
+        Warnings.
+    """
 
     poses: Poses
     nodes_without_pose: list[int]
     nodes_without_links: list[int]
-    skipped: list[tuple[int, str]]  # node and reason
-    # Of each stage: name, rejected, seconds, figures; held_out_matches and held_out_surfaces
-    # (before, after); trajectory_rmse_m and trajectory_rotation_error_deg of a scan with true poses.
+    skipped: list[tuple[int, str]]
     stages: list[dict[str, Any]]
-    findings: list[str]  # about the sensor
+    findings: list[str]
     warnings: list[str]
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class FuseResult(_fields.FuseFields, Result):
-    """One cloud of all frames."""
+    """Cloud of all frames of a scan, from `fuse`.
 
-    # World frame of the poses, m; unit normals towards the cameras; colors if a frame has them;
-    # fields `views` and `expected_error` (m, one standard deviation along the normal).
+    Attributes
+    ----------
+    cloud : Cloud
+        Points in the world frame of the poses, m, with unit normals towards the cameras, colors if a
+        frame has them, and the fields views and expected_error (one standard deviation along the
+        normal, m).
+    poses : Poses
+        Poses that the frames were fused with.
+    skipped : list of (int, str)
+        Nodes whose images could not be used, and why.
+    timings_s : dict of float
+        Time of each step, s.
+    """
+
     cloud: Cloud
-    poses: Poses  # that the frames were fused by
-    skipped: list[tuple[int, str]]  # node and reason
+    poses: Poses
+    skipped: list[tuple[int, str]]
     timings_s: dict[str, float]
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class NormalsResult(Result):
-    """A cloud with normals."""
+    """Cloud with normals, from `estimate_normals`.
+
+    Attributes
+    ----------
+    cloud : Cloud
+        The cloud with N unit normals; a normal that is undefined is zero.
+    undefined : int
+        Number of normals that are zero.
+    oriented_by : str
+        Source of the side that normals point to.
+    """
 
     cloud: Cloud
-    undefined: int  # normals that are zero
-    oriented_by: Literal["view_fields", "viewpoint", "spanning_tree"] | str
+    undefined: int
+    oriented_by: str
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class MeshResult(_fields.MeshFields, Result):
-    """A clean surface."""
+    """Clean surface, from `mesh`.
 
-    mesh: Mesh  # vertex normals; face field `filled`: 1 on triangles that close holes
-    holes_filled: int  # as filled_holes
+    Attributes
+    ----------
+    mesh : Mesh
+        Surface with vertex normals and the face field filled: 1 on triangles that close holes.
+    holes_filled : int
+        As filled_holes.
+    timings_s : dict of float
+        Time of each step, s.
+    """
+
+    mesh: Mesh
+    holes_filled: int
     timings_s: dict[str, float]
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class ResampleResult(_fields.ResampleFields, Result):
-    """Poisson-disk samples."""
+    """Poisson-disk samples of a surface, from `resample`.
+
+    Attributes
+    ----------
+    cloud : Cloud
+        Samples with the normals, colors and fields of the surface.
+    count_reached : bool
+        False if a number of samples was requested and could not be reached.
+    timings_s : dict of float
+        Time of each step, s.
+    """
 
     cloud: Cloud
     count_reached: bool
@@ -86,14 +159,31 @@ class ResampleResult(_fields.ResampleFields, Result):
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class ScoreResult(_fields.ScoreFields, Result):
-    """A graspability map."""
+    """Graspability map, from `score`.
 
-    # A point for each voxel, at its center, with the fields score (0..1), graspable, border, i, j, k
-    # and others (FORMATS.md); in the frame `frame`.
+    Attributes
+    ----------
+    map : Cloud
+        A point at the center of each scored voxel, m, in the frame `frame`, with the fields score
+        (0 to 1), graspable, border, i, j, k and others (FORMATS.md).
+    frame : {'terrain', 'input'}
+        Frame of the map's points.
+    terrain_from_input : array, shape (4, 4), float64
+        Rigid transform from the frame of the input to the terrain frame, m.
+    zero_plane_m : float or None
+        Height of the zero plane in the terrain frame, m; None without one.
+    voxel_size_m : float
+        Side of the voxels, m.
+    obstacle_voxels : int
+        Voxels with obstacles.
+    timings_s : dict of float
+        Time of each step, s.
+    """
+
     map: Cloud
     frame: Literal["terrain", "input"]
-    terrain_from_input: NDArray[np.float64]  # 4 x 4
-    zero_plane_m: float | None  # None: no zero plane
+    terrain_from_input: NDArray[np.float64]
+    zero_plane_m: float | None
     voxel_size_m: float
     obstacle_voxels: int
     timings_s: dict[str, float]
@@ -101,57 +191,112 @@ class ScoreResult(_fields.ScoreFields, Result):
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class GraspResult(Result):
-    """The virtual field test of N locations."""
+    """Virtual field test of N locations, from `grasp`.
 
-    holds: NDArray[np.bool_]  # (N,): hold_probability >= 0.5
-    hold_probability: NDArray[np.float64]  # (N,)
-    hold_low: NDArray[np.float64]  # (N,): Wilson's interval of 95 %
+    Attributes
+    ----------
+    holds : array, shape (N,), bool
+        True if hold_probability >= 0.5.
+    hold_probability : array, shape (N,), float64
+        Share of the trials that hold the load.
+    hold_low, hold_high : array, shape (N,), float64
+        Wilson's interval of the probability, 95 %.
+    force_n : array, shape (N, 3), float64
+        Quantiles 0.1, 0.5 and 0.9 of the holding force over the trials, N.
+    force_range_n : array, shape (N, 2), float64
+        Quantiles 0.05 and 0.95 of the holding force, N.
+    trial_spread : array, shape (N,), float64
+        Standard deviation of ln(force) between trials of one parameter set.
+    parameter_spread : array, shape (N,), float64
+        Standard deviation of ln(force) between parameter sets.
+    best_force_n : array, shape (N, 3), float64
+        As force_n, with the best sharing of the load between the fingers, N.
+    unseen : array, shape (N,), float64
+        Share of unseen ground under the fingers.
+    trials : array, shape (N,), int64
+        Number of trials.
+    directions : list of str
+        Names of the 17 directions of the pulls.
+    pull_limits_n : array, shape (N, 17), float64, or None
+        Pull that nine of ten trials hold in each direction, N; None without `pull_limits`.
+    columns : dict of list of str
+        Table as `graspmap grasp` writes it, by column.
+    """
+
+    holds: NDArray[np.bool_]
+    hold_probability: NDArray[np.float64]
+    hold_low: NDArray[np.float64]
     hold_high: NDArray[np.float64]
-    force_n: NDArray[np.float64]  # (N, 3): quantiles 0.1, 0.5, 0.9 of the trials, N
-    force_range_n: NDArray[np.float64]  # (N, 2): quantiles 0.05 and 0.95, N
-    # (N,): standard deviations of ln(force), between trials of one parameter set and between sets
+    force_n: NDArray[np.float64]
+    force_range_n: NDArray[np.float64]
     trial_spread: NDArray[np.float64]
     parameter_spread: NDArray[np.float64]
-    best_force_n: NDArray[np.float64]  # (N, 3): the same with the best sharing of the load
-    unseen: NDArray[np.float64]  # (N,): share of unseen ground under the fingers
-    trials: NDArray[np.int64]  # (N,)
-    directions: list[str]  # of the pulls
-    pull_limits_n: NDArray[np.float64] | None  # (N, 17): what nine of ten trials hold, N
-    columns: dict[str, list[str]]  # as `graspmap grasp` writes them
+    best_force_n: NDArray[np.float64]
+    unseen: NDArray[np.float64]
+    trials: NDArray[np.int64]
+    directions: list[str]
+    pull_limits_n: NDArray[np.float64] | None
+    columns: dict[str, list[str]]
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class LookupResult(Result):
-    """The map at N points."""
+    """Values of a map at N points, from `lookup`.
 
-    found: NDArray[np.bool_]  # (N,)
-    distance_m: NDArray[np.float64]  # (N,): to the nearest map point, found or not
-    map_point: NDArray[np.int64]  # (N,): index of the map point that the values are of
-    values: dict[str, NDArray[np.float64]]  # (N,) of each field; NaN where nothing was found
+    Attributes
+    ----------
+    found : array, shape (N,), bool
+        True if the map has a value at the point.
+    distance_m : array, shape (N,), float64
+        Distance to the nearest map point, found or not, m.
+    map_point : array, shape (N,), int64
+        Index of the map point that the values are from.
+    values : dict of array, shape (N,), float64
+        Values of each field by name; NaN where nothing was found.
+    """
+
+    found: NDArray[np.bool_]
+    distance_m: NDArray[np.float64]
+    map_point: NDArray[np.int64]
+    values: dict[str, NDArray[np.float64]]
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class FootholdsResult(_fields.FootholdsFields, Result):
-    """The best places of a map, best first."""
+    """Best locations of a map, best first, from `footholds`.
 
-    # With normals, and the fields approach_x, approach_y, approach_z, slope_deg, k1, k2 (1/m),
-    # mean_score, graspable_points beside the map's own.
+    Attributes
+    ----------
+    cloud : Cloud
+        K locations with normals, the fields of the map, and the fields approach_x, approach_y,
+        approach_z, slope_deg, k1, k2 (1/m), mean_score and graspable_points.
+    map_point : array, shape (K,), int64
+        Index of each location in the map.
+    """
+
     cloud: Cloud
-    map_point: NDArray[np.int64]  # index of each in the map
+    map_point: NDArray[np.int64]
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class EvaluateResult(Result):
-    """ROC evaluation of columns of scores."""
+    """Evaluation of scores against labels, from `evaluate`.
 
-    areas: dict[str, float | None]  # under the curve, by trapezoids; None without both classes
+    Attributes
+    ----------
+    areas : dict of float or None
+        Area under the ROC curve of each column, by trapezoids; None without both classes.
+    summary : dict
+        Content of summary.json of the command.
+    summary_json : str
+        Text of summary.json of the command.
+    roc, rates, accuracy : dict of list of str
+        Tables roc.csv, rates.csv and accuracy.csv of the command, by column.
+    """
+
+    areas: dict[str, float | None]
     summary: dict[str, Any]
-    summary_json: str  # summary.json of the command
-    roc: dict[str, list[str]]  # roc.csv, rates.csv and accuracy.csv of the command
+    summary_json: str
+    roc: dict[str, list[str]]
     rates: dict[str, list[str]]
     accuracy: dict[str, list[str]]
-
-
-for _name, _value in list(globals().items()):
-    if isinstance(_value, type) and issubclass(_value, Result):
-        _value.__module__ = "graspmap"
