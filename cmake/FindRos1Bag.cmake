@@ -1,8 +1,7 @@
-# ROS 1's bag library and the messages that graspmap knows, as Debian packages them. Their own CMake
-# and pkg-config files cannot be used: they ask for ament's Python package and for a pluginlib.pc
-# that Debian does not have.
+# Finds ROS 1's bag library and messages as Debian packages them. Their own CMake and pkg-config files
+# cannot be used: they require ament's Python package and a pluginlib.pc that Debian does not have.
 #
-# Ros1Bag::Ros1Bag; Ros1Bag_MISSING, the packages without which it cannot be built.
+# Defines the target Ros1Bag::Ros1Bag, and Ros1Bag_MISSING, the list of missing packages.
 set(Ros1Bag_MISSING "")
 set(Ros1Bag_INCLUDE_DIRS "")
 function(_ros1bag_header variable header package)
@@ -50,7 +49,7 @@ else()
   set(Ros1Bag_FOUND TRUE)
   if(NOT TARGET Ros1Bag::Ros1Bag)
     add_library(Ros1Bag::Ros1Bag INTERFACE IMPORTED)
-    # Directories of the compiler's own must not come before its other ones.
+    # The compiler's own directory must not precede its other directories.
     list(REMOVE_ITEM Ros1Bag_INCLUDE_DIRS /usr/include)
     target_include_directories(Ros1Bag::Ros1Bag SYSTEM INTERFACE ${Ros1Bag_INCLUDE_DIRS})
     target_link_libraries(Ros1Bag::Ros1Bag INTERFACE ${Ros1Bag_LIBRARIES})

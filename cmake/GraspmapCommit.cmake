@@ -1,4 +1,4 @@
-# Script: writes OUTPUT, a header with the commit of the source folder SOURCE, if it says another one.
+# Script: writes OUTPUT, a header with the commit of the source folder SOURCE, if its content changes.
 set(commit "unknown")
 find_package(Git QUIET)
 if(Git_FOUND AND EXISTS ${SOURCE}/.git)

@@ -1,9 +1,9 @@
-# The target `docs`: public headers and pages as build/.../docs/html, by Doxygen where it is
-# installed. A warning is an error.
+# Target `docs`: HTML of public headers and pages in build/.../docs/html, if Doxygen is installed.
+# Warnings are errors.
 find_program(DOXYGEN_PROGRAM doxygen)
 if(DOXYGEN_PROGRAM)
   set(GRASPMAP_DOCS_FOLDER ${PROJECT_BINARY_DIR}/docs)
-  # Equations: Debian's libjs-mathjax; without it a browser takes MathJax from the network.
+  # Equations use Debian's libjs-mathjax. Without it, a browser loads MathJax from the network.
   find_path(MATHJAX_FOLDER MathJax.js PATHS /usr/share/javascript/mathjax NO_DEFAULT_PATH)
   set(GRASPMAP_MATHJAX "")
   if(MATHJAX_FOLDER)

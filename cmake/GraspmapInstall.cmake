@@ -1,6 +1,6 @@
-# cmake --install: the program, its commands, libraries, the public headers, data and the CMake package,
-# so that find_package(graspmap) gives graspmap::map and graspmap::gtd. The component `development` is
-# what building against the libraries needs; the Python module has its own, in tools/python.
+# Rules of cmake --install: program, commands, libraries, public headers, data and CMake package.
+# find_package(graspmap) defines graspmap::map and graspmap::gtd. The component `development` contains
+# the files for building against the libraries. tools/python installs the Python module.
 include(CMakePackageConfigHelpers)
 include(PublicHeaders)
 set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME graspmap)
@@ -13,7 +13,7 @@ install(TARGETS ${graspmap_commands}
   RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/graspmap)
 install(TARGETS ${graspmap_libraries} EXPORT graspmap_targets
   LIBRARY DESTINATION ${graspmap_library_folder} NAMELINK_COMPONENT development)
-# Loaded when they are needed; nothing links them.
+# Modules are loaded at run time; no target links them.
 get_property(graspmap_modules GLOBAL PROPERTY graspmap_modules)
 if(graspmap_modules)
   install(TARGETS ${graspmap_modules} LIBRARY DESTINATION ${graspmap_library_folder})
@@ -28,7 +28,7 @@ install(DIRECTORY data/cameras data/expected data/grippers data/report data/rigs
 install(DIRECTORY pipelines DESTINATION ${CMAKE_INSTALL_DATADIR}/graspmap)
 install(FILES tools/completion/graspmap.bash
   DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions RENAME graspmap)
-# Made by scripts/package.
+# Manual pages of scripts/package.
 install(DIRECTORY ${PROJECT_BINARY_DIR}/man/ DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 OPTIONAL)
 install(FILES LICENSE README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
 

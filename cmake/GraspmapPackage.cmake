@@ -1,9 +1,9 @@
-# cpack: Debian packages. graspmap has the program, its private libraries, data and pipelines,
-# libgraspmap-dev what building against the libraries needs, python3-graspmap the module. scripts/package
-# makes the manual pages and the compressed changelog first.
+# Debian packages by cpack. graspmap contains the program, its private libraries, data and pipelines;
+# libgraspmap-dev the files for building against the libraries; python3-graspmap the Python module.
+# scripts/package writes the manual pages and the compressed changelog first.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME graspmap)
-# As dch does: who builds a package maintains it.
+# The builder of a package is its maintainer, as with dch.
 if(DEFINED ENV{DEBEMAIL})
   set(CPACK_PACKAGE_CONTACT "$ENV{DEBFULLNAME} <$ENV{DEBEMAIL}>")
 else()
@@ -28,8 +28,8 @@ set(CPACK_COMPONENTS_ALL graspmap development)
 set(CPACK_DEBIAN_GRASPMAP_PACKAGE_NAME graspmap)
 set(CPACK_DEBIAN_GRASPMAP_PACKAGE_SECTION science)
 set(CPACK_COMPONENT_GRASPMAP_DESCRIPTION "${package_text}")
-# Of what the programs link, by dpkg-shlibdeps; then what they read and start: fonts, VTK's scenes
-# without a screen, and the pipelines.
+# dpkg-shlibdeps finds the linked libraries. The others provide fonts, rendering without a screen, the
+# report's 3-D view and make for the pipelines.
 set(CPACK_DEBIAN_GRASPMAP_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS ${CMAKE_LIBRARY_OUTPUT_DIRECTORY})
 set(CPACK_DEBIAN_GRASPMAP_PACKAGE_DEPENDS "fonts-dejavu-core, libgl1-mesa-dri, libjs-three, make, xvfb")
@@ -49,7 +49,7 @@ if(TARGET graspmap_python)
   set(CPACK_COMPONENT_PYTHON_DESCRIPTION "${package_text}
 This package has the Python module, which runs the stages on NumPy
 arrays.")
-  # The extension module is of one version of Python.
+  # The extension module requires the Python version that it was built for.
   get_target_property(minor graspmap_python python_minor_version)
   math(EXPR next_minor "${minor} + 1")
   string(CONCAT CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS "graspmap (= ${PROJECT_VERSION}), python3-numpy, "
@@ -58,7 +58,7 @@ arrays.")
 endif()
 include(CPack)
 
-# Each package has its copyright and its changelog, as Debian's policy demands (12.5, 12.7).
+# Debian's policy requires a copyright file and a changelog in each package (12.5, 12.7).
 foreach(component IN LISTS CPACK_COMPONENTS_ALL)
   string(TOUPPER ${component} upper)
   set(package_doc_folder share/doc/${CPACK_DEBIAN_${upper}_PACKAGE_NAME})

@@ -1,21 +1,20 @@
-# The ways in which this project makes its targets: one function each for a library, a command and
-# a test, so that flags stand in one place.
+# Functions that define libraries, commands and tests with common flags.
 include(GNUInstallDirs)
 
 find_program(CCACHE_PROGRAM ccache)
 if(CCACHE_PROGRAM AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
-  # As ccache's manual asks for precompiled headers.
+  # Required for precompiled headers (manual of ccache).
   set(CMAKE_CXX_COMPILER_LAUNCHER
     ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=pch_defines,time_macros ${CCACHE_PROGRAM})
 endif()
 
-# A shared library that was built anew is loaded, not linked again.
+# Targets are not linked again if a shared library changes.
 set(CMAKE_LINK_DEPENDS_NO_SHARED ON)
 
 set(CMAKE_LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/lib)
 set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR})
-# Installed files find their libraries beside them, wherever the prefix is moved to.
-# The libraries have a folder of their own: their ABI changes with every version.
+# Relative paths: an installation can be moved. The libraries have a separate folder because their ABI
+# changes with every version.
 set(graspmap_library_folder ${CMAKE_INSTALL_LIBDIR}/graspmap)
 file(RELATIVE_PATH graspmap_lib_from_bin
   /prefix/${CMAKE_INSTALL_LIBEXECDIR}/graspmap /prefix/${graspmap_library_folder})
@@ -27,28 +26,26 @@ if(GRASPMAP_SANITIZE)
     -fno-sanitize-recover=all)
 endif()
 
-# Eigen allocates in its own way under sanitizers; PCL was compiled without, and frees what we
-# allocate.
+# Eigen changes its allocator under sanitizers. PCL is compiled without them and frees memory that
+# graspmap allocates.
 set(graspmap_sanitizer_definitions $<$<BOOL:${GRASPMAP_SANITIZE}>:EIGEN_MALLOC_ALREADY_ALIGNED=1>)
 
-# Several sources are compiled as one (CMAKE_UNITY_BUILD, in the presets): most of the time goes into
-# Eigen's templates, which each of them would instantiate again. Files with options of their own
-# stay apart.
+# Several sources are compiled as one (CMAKE_UNITY_BUILD in the presets), because instantiating Eigen's
+# templates in each source takes most of the time. Sources with their own options are compiled alone.
 set(CMAKE_UNITY_BUILD_BATCH_SIZE 12)
 
-# Libraries; graspmap_compile_quickly has -O1.
+# For libraries. graspmap_compile_quickly sets -O1.
 set(CMAKE_CXX_FLAGS_RELEASE "-O2 -DNDEBUG")
 
-# For targets that do little themselves.
+# Compiles a target with -O1, for commands and tests.
 function(graspmap_compile_quickly target)
-  # At -O1 GCC 12 takes members of Eigen's matrices and strings of lists for uninitialized or short.
+  # At -O1, GCC 12 reports false warnings for Eigen's matrices and for lists of strings.
   target_compile_options(${target} PRIVATE $<$<CONFIG:Release,RelWithDebInfo>:-O1>
     $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized;-Wno-array-bounds;-Wno-stringop-overflow>)
 endfunction()
 
-# graspmap_headers(NAME HEADERS <HEADER>... [LINK TARGET...]): graspmap_NAME, headers that are compiled
-# once for all targets that name it in graspmap_precompiled(TARGET graspmap_NAME): those given, Eigen
-# and the standard library's.
+# graspmap_headers(NAME HEADERS <HEADER>... [LINK TARGET...]): target graspmap_NAME of precompiled
+# headers: HEADERS, Eigen and the standard library. graspmap_precompiled(TARGET graspmap_NAME) uses it.
 function(graspmap_headers name)
   cmake_parse_arguments(ARG "" "" "HEADERS;LINK" ${ARGN})
   set(target graspmap_${name})
@@ -72,16 +69,16 @@ function(graspmap_set_flags target)
   target_compile_features(${target} PUBLIC cxx_std_20)
   set_target_properties(${target} PROPERTIES CXX_EXTENSIONS OFF CXX_VISIBILITY_PRESET default
     POSITION_INDEPENDENT_CODE ON)
-  # -Wno-restrict: GCC 12 sees overlaps in std::string's operator+ (GCC bug 105651).
-  # No contraction into fused multiply-adds: results must not depend on the machine.
-  # Where sources are compiled together, a name of one file may hide that of another.
+  # -Wno-restrict: GCC 12 reports false overlaps in std::string's operator+ (GCC bug 105651).
+  # -ffp-contract=off: results must not depend on the machine, so no fused multiply-adds.
+  # In a unity build, a name of one file may shadow a name of another.
   if(CMAKE_UNITY_BUILD)
     set(shadow $<$<CXX_COMPILER_ID:GNU>:-Wshadow=local -Wno-subobject-linkage>)
   else()
     set(shadow -Wshadow)
   endif()
-  # -fPIC for executables too: precompiled headers must be compiled as what includes them.
-  # The compiler collects its garbage only above 1 GB: a tenth of the time of most files.
+  # -fPIC for executables too: precompiled headers need the flags of the sources that use them.
+  # ggc-min-heapsize: no garbage collection below 1 GB saves a tenth of the compile time.
   target_compile_options(${target} PRIVATE -Wall -Wextra -Wconversion ${shadow}
     $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict;--param=ggc-min-heapsize=1048576> -fPIC -ffp-contract=off
     $<$<BOOL:${GRASPMAP_WARNINGS_AS_ERRORS}>:-Werror> ${graspmap_sanitizer_flags})
@@ -89,9 +86,9 @@ function(graspmap_set_flags target)
   target_link_options(${target} PRIVATE ${graspmap_sanitizer_flags})
 endfunction()
 
-# Counts which lines of a target are run, where that is asked for. Counts are those of the source
-# only where little is optimized; the tests themselves run at full speed. GCC 12 sees uninitialized
-# memory in OpenMesh's properties at -O1.
+# Measures the line coverage of a target if GRASPMAP_COVERAGE is set. Counts match source lines only at
+# low optimization. The tests themselves are not counted and run at full speed. GCC 12 reports false
+# uninitialized memory in OpenMesh's properties at -O1.
 function(graspmap_count_lines target)
   if(GRASPMAP_COVERAGE)
     target_compile_options(${target} PRIVATE --coverage -O1 -fprofile-update=atomic
@@ -100,16 +97,16 @@ function(graspmap_count_lines target)
   endif()
 endfunction()
 
-# GCC's pragmas choose the instruction set of single functions; other compilers get the portable
-# loops, whose results are the same (libmap/core/instruction_set_loops.h).
+# GCC's pragmas select the instruction set of single functions. Other compilers use the portable loops,
+# which give identical results (libmap/core/instruction_set_loops.h).
 if(CMAKE_CXX_COMPILER_ID STREQUAL GNU AND CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64)$")
   set(graspmap_x86_loops GRASPMAP_X86_LOOPS)
 endif()
 
 # graspmap_library(NAME SOURCES FILE... [LINK TARGET...] [PUBLIC_LINK TARGET...]
 #                  [INCLUDE DIR...] [DEFINE NAME...])
-# A shared library graspmap_NAME. LINK and INCLUDE stay inside it: public headers show the standard
-# library, Eigen and this project alone.
+# Shared library graspmap_NAME. LINK and INCLUDE are private: public headers include only the standard
+# library, Eigen and this project.
 function(graspmap_library name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LINK;PUBLIC_LINK;INCLUDE;DEFINE" ${ARGN})
   set(target graspmap_${name})
@@ -129,9 +126,9 @@ function(graspmap_library name)
   set_property(GLOBAL APPEND PROPERTY graspmap_libraries ${target})
 endfunction()
 
-# graspmap_command(NAME [SOURCES FILE...] [LINK TARGET...]): the command `graspmap NAME`, made from
-# NAME.cc and further files. Each command is a program of its own, started by `graspmap`, so that it loads only the
-# libraries that it uses: all of them together take 0.16 s to load.
+# graspmap_command(NAME [SOURCES FILE...] [LINK TARGET...]): command `graspmap NAME`, built from NAME.cc
+# and SOURCES. Each command is a separate program that `graspmap` starts, so that it loads only the
+# libraries that it uses. Loading all of them takes 0.16 s.
 function(graspmap_command name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LINK" ${ARGN})
   set(target graspmap-${name})
@@ -148,16 +145,16 @@ function(graspmap_command name)
   set_property(GLOBAL APPEND PROPERTY graspmap_commands ${target})
 endfunction()
 
-# Of tests that render: leaks are not looked for, since Mesa's driver keeps memory until its library
-# is gone.
+# Environment of tests that render. Leak detection is off, since Mesa's driver keeps memory until its
+# library is unloaded.
 set(graspmap_drawing_environment "")
 if(GRASPMAP_SANITIZE)
   set(graspmap_drawing_environment ASAN_OPTIONS=detect_leaks=0:protect_shadow_gap=0)
 endif()
 
 # graspmap_test(NAME SOURCES FILE... [LINK TARGET...] [INCLUDE DIR...] [DRAWS] [SHARDS N]): a GoogleTest
-# program test_NAME, which ctest runs in N processes (1). A process per case would spend more time on
-# loading libraries than on most cases. DRAWS: it renders.
+# program test_NAME. ctest runs it in N processes (default: 1), not in one process per case, because
+# loading the libraries takes longer than most cases. DRAWS: the program renders.
 function(graspmap_test name)
   cmake_parse_arguments(ARG "DRAWS" "SHARDS" "SOURCES;LINK;INCLUDE" ${ARGN})
   set(target test_${name})
@@ -184,7 +181,7 @@ function(graspmap_test name)
     endif()
     add_test(NAME ${test} COMMAND ${target})
     math(EXPR index "${shard} - 1")
-    # 77: all of its cases were skipped.
+    # Exit code 77: all cases were skipped.
     set_tests_properties(${test} PROPERTIES TIMEOUT 1800 SKIP_RETURN_CODE 77
       ENVIRONMENT "GTEST_TOTAL_SHARDS=${shards};GTEST_SHARD_INDEX=${index};${environment}")
   endforeach()

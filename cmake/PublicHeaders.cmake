@@ -1,5 +1,5 @@
-# The public API: the headers that are installed, each with all that it includes. All other headers are
-# private to this project and may change without notice. scripts/include-graph --check holds the list.
+# Public API: the installed headers and all headers that they include. All other headers are private
+# and may change without notice. scripts/include-graph --check checks the list.
 set(graspmap_public_headers
   libgtd/detect.h
   libgtd/evaluate/lookup.h

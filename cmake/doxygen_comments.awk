@@ -1,8 +1,8 @@
-# The headers' plain comments as Doxygen reads them, for Doxyfile.in: the first block is the file's;
-# one above declarations belongs to all of them up to the next empty line or comment, also beyond the
-# body of a type; one behind a declaration belongs to that.
+# Doxygen filter of headers: converts plain comments. The first block documents the file. A comment above
+# declarations documents all of them up to the next blank line or comment, also after the body of a
+# type. A comment after a declaration documents that declaration.
 
-# Plain words, though they may look like a command, a tag or the end of a list.
+# Escapes text that Doxygen would read as a command, a tag or the end of a list.
 function plain(text) {
   gsub(/\\/, "\\\\\\\\", text)
   gsub(/@/, "\\@", text)
@@ -16,8 +16,8 @@ function is_comment(text) { return text ~ /^ *\/\/( |$)/ }
 function is_label(text) { return text ~ /^ *(public|private|protected):/ }
 function indentation(text) { match(text, /^ */); return RLENGTH }
 
-# The last line of the declarations that the comment above line `first` belongs to, if they are
-# more than one and none has a body of several lines; else 0.
+# Returns the last line of the group of declarations below a comment, from line `first` on; 0 if there is
+# only one declaration or if one has a body of several lines.
 function end_of_group(first,    n, last, ends, width) {
   width = indentation(line[first])
   for (n = first; n <= count; n++) {
@@ -40,8 +40,8 @@ END {
     for (; is_comment(line[n]); n++) print "///" plain(substr(line[n], 3))
   }
   group_end = 0
-  behind = 0  # column of a comment behind a declaration, which the next lines may go on with
-  # above[width]: the comment above the type whose body is open at that indentation
+  behind = 0  # column of a comment after a declaration, which the next lines may continue
+  # above[width]: comment above the type whose body is open at that indentation
   for (; n <= count; n++) {
     text = line[n]
     if (is_comment(text)) {
@@ -65,7 +65,7 @@ END {
     behind = 0
     if (text !~ /^}/ && match(text, /[;,{}a-zA-Z0-9] +\/\/ /)) {
       behind = RSTART + RLENGTH - 3
-      # Behind an enumeration in one line it would be its last value's.
+      # After an enumeration in one line, Doxygen would assign the comment to its last value.
       if (text ~ /^ *enum .*};/) {
         print "///" plain(substr(text, behind + 2))
         text = substr(text, 1, behind - 1)

@@ -1,7 +1,7 @@
-# The pages as Doxygen reads them: equations between dollars, and links to headings by the names that
-# web views of repositories give these.
+# Doxygen filter of pages: converts equations between dollars, and links to headings by the anchors of
+# web views of repositories.
 
-# The name of a heading, unique among all pages.
+# Returns the anchor of a heading, unique among all pages.
 function label(heading,    page, name) {
   page = FILENAME
   gsub(/[^a-zA-Z0-9]/, "_", page)
@@ -20,7 +20,7 @@ function label(heading,    page, name) {
 }
 
 !in_code {
-  # Within the page; of another page its begin.
+  # Links within the page; links to another page lose their anchor.
   while (match($0, /\]\(#[a-z0-9_-]+\)/))
     $0 = substr($0, 1, RSTART + 1) "@ref " label(substr($0, RSTART + 3, RLENGTH - 4)) \
       substr($0, RSTART + RLENGTH - 1)
@@ -29,7 +29,7 @@ function label(heading,    page, name) {
 
 {
   if (!in_code && /\$/) {
-    # Display equations, then those in a sentence; code spans keep their dollars.
+    # Display equations, then inline equations. Code spans keep their dollars.
     gsub(/\$\$/, "\001")
     count = split($0, parts, "`")
     text = ""

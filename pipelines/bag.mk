@@ -1,15 +1,15 @@
-# A robot's bag to maps: its depth images, and of each moment a panorama, a graspability map,
-# footholds, a picture, and a bag that RViz shows.
+# Maps from a robot's bag: its depth images, and for each synchronized set of images a panorama, a
+# graspability map, footholds, an image, and a bag for RViz.
 #
-# BAG is a bag of ROS 1 (.bag) or ROS 2 (.mcap, or a folder of .db3); the bags written are of its kind:
-# map.bag, map.mcap, or a folder map_bag.
+# BAG is a bag of ROS 1 (.bag) or ROS 2 (.mcap, or a folder of .db3). The written bags have the same
+# format: map.bag, map.mcap, or a folder map_bag.
 #
 #   make -f pipelines/bag.mk BAG=robot.bag SCENARIO=artificial_rocks_realtime OUT=folder \
 #        [EVERY=10] [BAG_FLAGS="--near 0.28 --far 1.5"] [METHOD=corrected] [SCORE="..."] -j2
 #
-# EVERY takes every n-th moment of the bag. BAG_FLAGS are further flags of `graspmap convert`, such as
-# topics, a rig, a range; FOOTHOLDS of `graspmap footholds`. A second run does nothing; other variables make again
-# what depends on them. Names must not hold spaces.
+# EVERY=n uses every n-th set of images. BAG_FLAGS are further flags of `graspmap convert`, for example
+# topics, a rig or a range; FOOTHOLDS are flags of `graspmap footholds`. A second run does nothing. If a
+# variable changes, the results that depend on it are recomputed. Names must not contain spaces.
 
 here := $(dir $(lastword $(MAKEFILE_LIST)))
 GRASPMAP ?= $(firstword $(wildcard $(here)../build/release/graspmap) graspmap)
@@ -20,7 +20,7 @@ BAG_FLAGS ?=
 SCORE ?=
 FOOTHOLDS ?=
 
-one_word = $(if $(word 2,$($(1))),$(error $(1) holds a space, which make cannot handle: $($(1))))
+one_word = $(if $(word 2,$($(1))),$(error $(1) contains a space, which make cannot handle: $($(1))))
 $(foreach name,BAG OUT SCENARIO,$(call one_word,$(name)))
 ifeq ($(BAG),)
   $(error BAG is not set: the robot's bag, e.g. BAG=robot.bag)
@@ -41,21 +41,21 @@ all: $(OUT)/images.json
 $(OUT):
 	@mkdir -p $@
 
-# Stamps of the variables that a result depends on: written anew only if they change.
+# Stamp files of the variables that results depend on, rewritten only if the variables change.
 export read_with := $(BAG) $(EVERY) $(BAG_FLAGS)
 export scored_with := $(SCENARIO) $(METHOD) $(SCORE) $(FOOTHOLDS)
 $(OUT)/read_with $(OUT)/scored_with: FORCE | $(OUT)
 	@printf '%s\n' "$${$(@F)}" | cmp -s - $@ || printf '%s\n' "$${$(@F)}" > $@
 
-# The folder's manifest stands for the folder.
+# The manifest of the folder is the target that represents the folder.
 $(OUT)/images.json: $(BAG) $(wildcard $(BAG)/*) $(OUT)/read_with
 	@rm -rf $(OUT)/images
 	@exec $(GRASPMAP) convert $(BAG) -o $(OUT)/images --every $(EVERY) $(BAG_FLAGS)
 
-# The bag of a map; its manifest stands for a folder.
+# Bag of a map. For a folder, its manifest is the target.
 map_bag := $(if $(filter %.bag,$(BAG)),map.bag,$(if $(filter %.mcap,$(BAG)),map.mcap,map_bag.json))
 
-# Known once the images are there.
+# The list of sets is known once the images exist.
 stamps := $(shell test -f $(OUT)/images/moments.csv && tail -n +2 $(OUT)/images/moments.csv | cut -d, -f1)
 moments: $(foreach stamp,$(stamps),$(OUT)/$(stamp)/$(map_bag) $(OUT)/$(stamp)/top.png)
 

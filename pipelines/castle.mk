@@ -1,12 +1,12 @@
-# A RealSense sequence of others, from its images to a map: 30 frames of an SR300 carried by hand around
-# a model castle, of ViSP's test data, with the planes that were measured on the castle.
+# Map from a third-party RealSense sequence: 30 frames of a hand-held SR300 around a model castle, from
+# ViSP's test data, with planes measured on the castle.
 #
 #   sudo apt install visp-images-data netpbm
 #   make -f pipelines/castle.mk OUT=folder -j2
 #
-# Depth is registered to color by the scan's two cameras, there are no poses, and the noise is that of a
-# short range. planes.txt compares the mesh with the planes, a part of which the camera did not see. The
-# results are those of scan.mk, whose variables are passed on.
+# The scan has two cameras, to register depth to color, no poses, and short-range noise. planes.txt
+# compares the mesh with the planes, some of which the camera did not see. The other results are those
+# of scan.mk, whose variables are passed on.
 
 here := $(dir $(lastword $(MAKEFILE_LIST)))
 GRASPMAP ?= $(firstword $(wildcard $(here)../build/release/graspmap) graspmap)
@@ -17,7 +17,7 @@ ifeq ($(OUT),)
   $(error OUT is not set: the folder of the results, e.g. OUT=results)
 endif
 ifeq ($(wildcard $(CASTEL)/chateau.cao),)
-  $(error $(CASTEL) has no castle: apt install visp-images-data)
+  $(error $(CASTEL) does not contain the castle sequence: apt install visp-images-data)
 endif
 
 .DELETE_ON_ERROR:
@@ -25,7 +25,7 @@ endif
 all: chain
 	@exec $(MAKE) --no-print-directory -f $(here)castle.mk $(OUT)/planes.txt
 
-# The last of its files.
+# The file that castle.py writes last.
 $(OUT)/map_from_planes.txt: $(here)castle.py
 	@mkdir -p $(OUT)
 	@$(here)castle.py $(CASTEL) $(OUT)

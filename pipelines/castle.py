@@ -1,10 +1,10 @@
 #!/usr/bin/python3
-"""The RealSense sequence of ViSP's test data (Debian: visp-images-data) as a scan of graspmap.
+"""Converts the RealSense sequence of ViSP's test data (Debian: visp-images-data) to a scan.
 
 usage: castle.py CASTEL_FOLDER OUT_FOLDER
 
-Writes OUT/scan, a folder of frames with its two cameras, and what is known of the model castle: its
-planes (OUT/planes.obj) and where they lie (OUT/map_from_planes.txt). Needs pnmtopng (Debian: netpbm).
+Writes OUT/scan, a folder of frames with two cameras, and the ground truth of the model castle: its
+planes (OUT/planes.obj) and their pose (OUT/map_from_planes.txt). Needs pnmtopng (Debian: netpbm).
 """
 
 import math
@@ -14,8 +14,8 @@ import struct
 import subprocess
 import sys
 
-DEPTH_UNIT_M = 0.000125  # of the SR300
-# Of the optical frame, in the base's: x ahead, z up.
+DEPTH_UNIT_M = 0.000125  # depth unit of the SR300
+# Rotation from the optical frame to the base frame: x ahead, z up.
 BASE_FROM_OPTICAL = [[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]]
 
 
@@ -24,14 +24,14 @@ def times(a, b):
 
 
 def inverse(pose):
-    """Of a rigid motion."""
+    """Returns the inverse of a rigid motion."""
     rotation = [[pose[j][i] for j in range(3)] for i in range(3)]
     shift = [-sum(rotation[i][k] * pose[k][3] for k in range(3)) for i in range(3)]
     return [rotation[i] + [shift[i]] for i in range(3)] + [[0, 0, 0, 1]]
 
 
 def rigid(shift, turn):
-    """From a shift and a rotation vector."""
+    """Returns the rigid motion of a translation and a rotation vector."""
     angle = math.hypot(*turn)
     x, y, z = (value / angle for value in turn)
     cross = [[0, -z, y], [z, 0, -x], [-y, x, 0]]
@@ -85,7 +85,7 @@ def write_scan(source, scan):
 
 
 def planes_of(cao):
-    """Vertices and faces of a model file of ViSP: lists, each after the number of its lines."""
+    """Reads vertices and faces of a ViSP model file: lists, each preceded by its number of lines."""
     lines = [line.split("#")[0].split() for line in cao.read_text().splitlines()]
     lines = [line for line in lines if line and line != ["V1"]]
     blocks = []

@@ -1,5 +1,5 @@
-# graspmap's main job without any data: rock_site.mk, from a simulated scan's database to the map;
-# primitive_shapes.mk, the thesis's shapes with their known truth; one page of both.
+# Demonstration without data: rock_site.mk (from a simulated scan's database to the map),
+# primitive_shapes.mk (the thesis's shapes with known truth), and one report of both.
 #
 #   make -f pipelines/demo.mk OUT=folder -j2
 
@@ -14,7 +14,7 @@ page := $(OUT)/report.html
 
 .DELETE_ON_ERROR:
 .PHONY: all rock_site primitive_shapes
-# The page is written again only if something is newer than it.
+# The report is rewritten only if a result is newer.
 all: rock_site primitive_shapes
 	@test -f $(page) && test -z "$$(find $(OUT) -type f -newer $(page) ! -name 'report.html*' \
 	    ! -name .lock -print -quit)" || \

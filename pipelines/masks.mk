@@ -1,16 +1,17 @@
-# The gripper masks side by side: each method's mask in three sections, its map of each site, the
-# scores of all in one chart, and how far each two agree (Cohen's kappa).
+# Comparison of the gripper masks: each method's mask in three sections, its map of each site, a chart of
+# all scores, and the agreement of each pair of methods (Cohen's kappa).
 #
 #   make -f pipelines/masks.mk OUT=folder [SITES="name:cloud.pcd cloud.pcd ..."] \
 #        [METHODS="thesis envelope climblab corrected"] [GRIPPERS="scar-e hubrobo"] -j2
 #
-# SITES are clouds, with a name before a colon if their files' names are not to serve; without any,
-# the embedded scene and simulated rocks. SCAR-E takes the thesis's 10 mm, H_add 1 and TSV 120.
-# HubRobo's 1 mm are finer than a site's cloud is dense and would make 9 million voxels of 3 x 3 m:
-# 5 mm are five to its palm's radius and three layers of its mask. Its published H_add 3 and TSV 100
-# are turned into these voxels: 1 layer, and 4 of the 324 voxels under its window as 100 of 7744;
-# gaps between the points are interpolated. The zero plane is off: all ground counts. A second run
-# does nothing; other variables or changed files make again what depends on them.
+# SITES are clouds, each with an optional name before a colon (default: the file's name). Without SITES,
+# the embedded scene and simulated rocks are used. SCAR-E uses the thesis's 10 mm voxels, H_add 1 and
+# TSV 120. HubRobo's voxels of 1 mm are smaller than the spacing of a site's cloud and would give 9
+# million voxels for 3 x 3 m. Here they are 5 mm, a fifth of its palm's radius, and its mask has three
+# layers. Its published H_add 3 and TSV 100 are converted to these voxels: 1 layer, and 4 of the 324
+# voxels of its window instead of 100 of 7744. Gaps between the points are interpolated. The zero plane
+# is off: all ground counts. A second run does nothing. If a variable or a file changes, the results
+# that depend on it are recomputed.
 
 here := $(dir $(lastword $(MAKEFILE_LIST)))
 GRASPMAP ?= $(firstword $(wildcard $(here)../build/release/graspmap) graspmap)
@@ -28,8 +29,8 @@ hubrobo_mask ?= --voxel-size 0.005 --extra-void-layers 1
 scar-e_score ?= --solid-voxel-threshold 120
 hubrobo_score ?= --solid-voxel-threshold 4 --curvature-radius 0.03 --set interpolation=yes
 
-# make splits names at spaces; better an error than half a name.
-one_word = $(if $(word 2,$($(1))),$(error $(1) holds a space, which make cannot handle: $($(1))))
+# make splits names at spaces, so a name with a space is an error.
+one_word = $(if $(word 2,$($(1))),$(error $(1) contains a space, which make cannot handle: $($(1))))
 $(foreach name,OUT SCENARIO,$(call one_word,$(name)))
 ifeq ($(OUT),)
   $(error OUT is not set: the folder of the results, e.g. OUT=masks)
@@ -41,12 +42,12 @@ ifdef is_alone
 
 simulated := primitive_shapes:$(OUT)/sites/primitive_shapes.pcd rocks:$(OUT)/sites/rocks.pcd
 sites := $(or $(strip $(SITES)),$(simulated))
-# A site's name and its cloud.
+# Name and cloud of a site.
 name_of = $(if $(findstring :,$(1)),$(firstword $(subst :, ,$(1))),$(basename $(notdir $(1))))
 cloud_of = $(lastword $(subst :, ,$(1)))
 names := $(foreach site,$(sites),$(call name_of,$(site)))
 ifneq ($(words $(names)),$(words $(sort $(names))))
-  $(error SITES holds a name twice: $(names): name:cloud.pcd gives another)
+  $(error SITES contains a duplicate name: $(names); use name:cloud.pcd to rename a site)
 endif
 
 maps_of = $(foreach method,$(METHODS),$(OUT)/$(1)/$(2)/$(method).pcd)
@@ -69,7 +70,7 @@ all: $(results)
 $(OUT) $(OUT)/sections $(OUT)/sites $(folders):
 	@mkdir -p $@
 
-# Stamps of the variables that a result depends on: written anew only if they change.
+# Stamp files of the variables that results depend on, rewritten only if the variables change.
 export scored_with := $(SCENARIO) $(SCORE) $(foreach gripper,$(GRIPPERS),$($(gripper)_mask) $($(gripper)_score))
 export shown_with := $(sites) $(METHODS) $(GRIPPERS) $(CELL)
 export simulated_with := $(COUNT) $(EDGE) $(SPACING)
@@ -85,7 +86,7 @@ $(OUT)/sites/rocks/mesh.ply: $(OUT)/simulated_with | $(OUT)/sites
 $(OUT)/sites/rocks.pcd: $(OUT)/sites/rocks/mesh.ply
 	@exec $(GRASPMAP) resample $< --count $(COUNT) -o $@ --quiet
 
-# Gripper, method.
+# Arguments: gripper, method.
 define sections_of
 $(OUT)/sections/$(1)_$(2).png: $(OUT)/scored_with | $(OUT)/sections
 	@exec $(GRASPMAP) mask --gripper $(1) --method $(2) $($(1)_mask) --sections -o $$@ \
@@ -94,7 +95,8 @@ endef
 $(foreach gripper,$(GRIPPERS),$(foreach method,$(METHODS),$(eval \
   $(call sections_of,$(gripper),$(method)))))
 
-# Site's name, its cloud, gripper. make runs the maps side by side: each process takes one thread.
+# Arguments: name of the site, its cloud, gripper. make runs the maps in parallel, so each process uses
+# one thread.
 define maps_and_tables
 $(OUT)/$(1)/$(3)/%.pcd: $(2) $(OUT)/scored_with | $(OUT)/$(1)/$(3)
 	@exec $(GRASPMAP) score $$< -o $$@ --config $(SCENARIO) --gripper $(3) --method $$* --zero-plane -10 \
@@ -117,7 +119,7 @@ $(OUT)/$(1).png: $(foreach name,$(names),$(call maps_of,$(name),$(1))) $(OUT)/sh
 endef
 $(foreach gripper,$(GRIPPERS),$(eval $(call sheet,$(gripper))))
 
-# One table of all sites and grippers: these two before the columns of each.
+# One table of all sites and grippers, with columns for both added in front.
 joined = @rm -f $@.partial; for name in $(names); do for gripper in $(GRIPPERS); do \
   sed "1s/^/site,of_gripper,/; 2,\$$s/^/$$name,$$gripper,/" \
     $(OUT)/$$name/$$gripper/summary/$(@F) | { if [ -s $@.partial ]; then tail -n +2; else cat; fi; } \

@@ -1,17 +1,17 @@
-# One make at a time works in the folder $(OUT). A make file includes this before its rules, which
-# hold only once it is alone:
+# Lock that allows only one make at a time in the folder $(OUT). A make file includes this file before its
+# rules, which are defined only if the make holds the lock:
 #
 #   include $(here)one_run.mk
 #   ifdef is_alone
 #   ... rules
 #   endif
 #
-# The first make takes a lock, $(OUT)/.lock, and becomes a second one of the same goals that has the
-# rules. The system gives the lock back when that one and all its commands have ended, however they
-# end: the file that stays behind means nothing by itself.
+# The first make locks $(OUT)/.lock and executes a second make with the same goals and the rules. The
+# operating system releases the lock when the second make and all its commands have ended, for any
+# reason. A leftover lock file has no effect.
 #
-# Recipes `exec` what they run: make hands SIGTERM to its children, but a shell in between would not
-# hand it on.
+# Recipes start programs with `exec`, because make sends SIGTERM to its children, but a shell between
+# them would not forward it.
 
 ifeq ($(folder_of_this_run),$(abspath $(OUT)))
 is_alone := yes

@@ -1,6 +1,6 @@
-# The embedded example: the thesis's scenario 1 (primitive shapes on a plane), simulated exactly,
-# scored with the thesis's program's method and with the corrected one, looked up at 12 places and
-# evaluated against their expected graspability. Needs no data.
+# Embedded example: the thesis's scenario 1 (primitive shapes on a plane), simulated exactly, scored with
+# the methods `thesis` and `corrected`, looked up at 12 locations and evaluated against their expected
+# graspability. Needs no data.
 #
 #   make -f pipelines/primitive_shapes.mk OUT=folder [SHARES=4] -j2
 
@@ -25,7 +25,7 @@ all: $(OUT)/scene.png $(methods)
 $(OUT):
 	@mkdir -p $@
 
-# About as many points as the thesis's scan of this scene.
+# About as many points as in the thesis's scan of this scene.
 $(OUT)/terrain.pcd: | $(OUT)
 	@exec $(GRASPMAP) simulate scene --spacing $(SPACING) -o $@
 

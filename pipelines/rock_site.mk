@@ -1,6 +1,6 @@
-# The thesis's scenario 4 without leaving the desk: a simulated site of rocks, its scan by a Kinect
-# v2 carried round it by hand, and all of scan.mk: cloud, surface, the 3 x 3 m site, texture, samples,
-# map, each with its distance to the true mesh. Needs no data.
+# Simulation of the thesis's scenario 4: a rock site, its scan by a hand-held Kinect v2, and the stages of
+# scan.mk (cloud, surface, the 3 x 3 m site, texture, samples, map), each with its distance to the true
+# mesh. Needs no data.
 #
 #   make -f pipelines/rock_site.mk OUT=folder [SEED=1] [FRAMES=60] [SITE=rocks] [EDGE=0.008] -j2
 
@@ -31,7 +31,7 @@ all: $(OUT)/site.png map
 $(OUT):
 	@mkdir -p $@
 
-# A stamp of the variables that site and scan depend on: written anew only if they change.
+# Stamp file of the variables that site and scan depend on, rewritten only if they change.
 export simulated_with := $(site_flags) $(scan_flags)
 $(OUT)/simulated_with: FORCE | $(OUT)
 	@printf '%s\n' "$${$(@F)}" | cmp -s - $@ || printf '%s\n' "$${$(@F)}" > $@
@@ -49,7 +49,7 @@ $(OUT)/site.png: $(OUT)/site/mesh.ply
 $(OUT)/scan.db: $(OUT)/site/mesh.ply
 	@exec $(GRASPMAP) simulate scan $< $(scan_flags) -o $@
 
-# The field test that nobody made: a gripper closed on the true mesh.
+# Virtual field test: a gripper is closed on the true mesh.
 $(OUT)/field_test.csv: $(OUT)/site/mesh.ply $(OUT)/site/field_points.csv $(OUT)/tested_with
 	@exec $(GRASPMAP) grasp $< --points $(word 2,$^) $(FIELD_TEST) -o $@
 

@@ -1,22 +1,22 @@
-# A scan from its database to pictures: one cloud of all its frames, a clean surface, the levelled
-# and cropped site with its photographs as texture, evenly spread samples of it, and the
-# graspability map with look-up and evaluation. Where there is a true mesh, each stage's distance to
-# it.
+# Graspability map from a scan's database: one cloud of all frames, a clean surface, the leveled and
+# cropped site with its photographs as texture, uniform samples of the site, and the map with look-up,
+# evaluation and images. If there is a true mesh, also the distance of each stage to it.
 #
 #   make -f pipelines/scan.mk SCAN=scan.db OUT=folder [POSES=odometry] [TRUTH=mesh.ply] \
 #        [CROP="--size 3x3"] [RESAMPLE="--count 73000"] [POINTS=points.csv] \
 #        [SCENARIO=artificial_rocks_prescan] [METHOD=thesis] [TILES=5] -j2
 #
 # SCAN is an RTAB-Map database or a folder of images. POSES is refined (by graspmap refine), odometry,
-# optimized, ground-truth or a file of poses (optimized). With TRUTH, a mesh in the frame of the
-# scan's true poses, the cloud is carried into that frame. POINTS lie in the cloud's frame. REFINE,
-# FUSE, MESH, CROP, RESAMPLE and SCORE hold further flags of their commands; without CROP the map is
-# levelled and kept whole. TEXTURE= leaves the texture out. With TILES, the side of a square in meters, cloud, mesh, site and terrain are
-# folders of pieces and the map is a tile store, so that memory does not depend on the area; then
-# there is no texture unless TEXTURE=model asks for a folder of models, of which there is no picture,
-# and CROP cannot be --size or --border of a site too large for memory. A second run does nothing;
-# other variables or changed files make again what depends on them. The target `world` makes a
-# simulation world of the site, with its texture if there is one, by the flags WORLD.
+# optimized, ground-truth or a file of poses (default: optimized). TRUTH is a mesh in the frame of the
+# scan's true poses; the cloud is transformed into that frame. POINTS are in the frame of the cloud.
+# REFINE, FUSE, MESH, CROP, RESAMPLE and SCORE are further flags of their commands. Without CROP, the map
+# is leveled but not cropped. TEXTURE= omits the texture. TILES is the side of a tile in meters: cloud,
+# mesh, site and terrain are then folders of tiles and the map is a tile store, so that memory does not
+# depend on the area. With TILES there is no texture unless TEXTURE=model requests a folder of models,
+# without an image, and CROP cannot be --size or --border if the site is too large for memory. A second
+# run does nothing. If a variable or a file changes, the results that depend on it are recomputed.
+# The target `world` makes a simulation world of the site, with its texture if there is one, by the
+# flags WORLD.
 
 here := $(dir $(lastword $(MAKEFILE_LIST)))
 GRASPMAP ?= $(firstword $(wildcard $(here)../build/release/graspmap) graspmap)
@@ -37,8 +37,8 @@ SCORE ?=
 WORLD ?=
 export TITLE ?= $(basename $(notdir $(SCAN)))
 
-# make splits names at spaces; better an error than half a name.
-one_word = $(if $(word 2,$($(1))),$(error $(1) holds a space, which make cannot handle: $($(1))))
+# make splits names at spaces, so a name with a space is an error.
+one_word = $(if $(word 2,$($(1))),$(error $(1) contains a space, which make cannot handle: $($(1))))
 $(foreach name,SCAN OUT POSES TRUTH POINTS SCENARIO TEXTURE TILES,$(call one_word,$(name)))
 ifeq ($(SCAN),)
   $(error SCAN is not set: the scan, e.g. SCAN=scan.db)
@@ -59,7 +59,7 @@ mesh := $(OUT)/mesh$(if $(TILES),,.ply)
 site := $(OUT)/site$(if $(TILES),,.ply)
 terrain := $(OUT)/terrain$(if $(TILES),,.pcd)
 tile_flag := $(if $(TILES),--tile-size $(TILES))
-# A site that is not cropped has no straight edges to check.
+# Only a cropped site has straight edges to check.
 pictures := $(OUT)/cloud.png $(OUT)/site.png $(if $(CROP),$(OUT)/spot_check.txt) \
   $(if $(TEXTURE),$(OUT)/texture.png)
 results := $(OUT)/scan.txt $(if $(TILES),$(addprefix $(OUT)/,$(TEXTURE)),$(pictures)) \
@@ -72,7 +72,7 @@ all: $(results) map
 $(OUT):
 	@mkdir -p $@
 
-# Stamps of the variables that a result depends on: written anew only if they change.
+# Stamp files of the variables that results depend on, rewritten only if the variables change.
 export fused_with := $(SCAN) $(poses_flags) $(tile_flag) $(FUSE)
 export refined_with := $(SCAN) $(REFINE)
 export checked_with := $(TRUTH)
@@ -95,7 +95,7 @@ $(OUT)/poses.tum $(OUT)/refinement.json &: $(SCAN) $(OUT)/refined_with
 	@exec $(GRASPMAP) refine $< -o $(OUT)/poses.tum --report $(OUT)/refinement.json \
 	  $(REFINE)
 
-# fuse corrects the poses; photographs match its cloud by the corrected ones alone.
+# fuse corrects the poses. Photographs match its cloud only with the corrected poses.
 $(cloud) $(OUT)/fused_poses.tum &: $(SCAN) $(or $(refined),$(wildcard $(POSES))) \
     $(OUT)/fused_with
 	@exec $(GRASPMAP) fuse $(SCAN) -o $(cloud) --corrected-poses $(OUT)/fused_poses.tum \
@@ -132,7 +132,7 @@ $(OUT)/site.png: $(site)
 $(OUT)/texture.png: $(OUT)/$(TEXTURE)
 	@exec $(GRASPMAP) render $< -o $@ --view oblique --title "$$TITLE: textured" --quiet
 
-# Without a true mesh the ground is the plane that was found.
+# Without a true mesh, the fitted plane is the ground.
 $(OUT)/spot_check.txt: $(site) $(TRUTH) $(OUT)/checked_with
 	@exec $(GRASPMAP) compare $< --edges -o $(OUT)/spot_check.csv $(if $(TRUTH),--truth $(TRUTH) \
 	  --truth-frame map) > $@.partial
@@ -149,7 +149,7 @@ $(OUT)/accuracy.txt: $(cloud) $(site) $(TRUTH) $(OUT)/checked_with
 	@mv $@.partial $@
 
 ifdef TILES
-# A store is resumed, but begun anew for another terrain or other variables.
+# A tile store is resumed. It is recomputed if the terrain or a variable changes.
 $(OUT)/map.begun: $(terrain) $(OUT)/scored_with
 	@rm -rf $(OUT)/map.tiles && touch $@
 

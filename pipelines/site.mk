@@ -1,13 +1,13 @@
-# A site from its cloud to pictures: graspability map tile by tile, look-up, evaluation, pictures.
+# Graspability map of a site from its cloud, tile by tile, with look-up, evaluation and images.
 #
 #   make -f pipelines/site.mk SITE=cloud.pcd POINTS=points.csv SCENARIO=artificial_rocks_prescan \
 #        OUT=folder [METHOD=thesis] [SHARES=8] [SCORE="..."] [POINTS_FRAME=map] [TITLE="..."] -j2
 #
-# POINTS (columns x, y, z; first column: name) may be left out; if it has a column `graspable` (1 or
-# 0), the map is evaluated against it. SCENARIO is a name of data/scenarios or a file. METHOD, if
-# set, replaces the scenario's method. POINTS lie in the site's frame, or with POINTS_FRAME=map in
-# that of the map which the site was cropped from. A second run does nothing; a run that was stopped goes on;
-# other variables or changed files make again what depends on them.
+# POINTS is optional (columns x, y, z; first column: name). If it has a column `graspable` (1 or 0), the
+# map is evaluated against it. POINTS are in the frame of the site, or with POINTS_FRAME=map in the frame
+# of the map that the site was cropped from. SCENARIO is a name in data/scenarios or a file. METHOD
+# replaces the scenario's method. A second run does nothing. A stopped run is resumed. If a variable or
+# a file changes, the results that depend on it are recomputed.
 
 here := $(dir $(lastword $(MAKEFILE_LIST)))
 GRASPMAP ?= $(firstword $(wildcard $(here)../build/release/graspmap) graspmap)
@@ -18,8 +18,8 @@ POINTS_FRAME ?= input
 SCORE ?=
 export TITLE ?= $(basename $(notdir $(SITE)))
 
-# make splits names at spaces; better an error than half a name.
-one_word = $(if $(word 2,$($(1))),$(error $(1) holds a space, which make cannot handle: $($(1))))
+# make splits names at spaces, so a name with a space is an error.
+one_word = $(if $(word 2,$($(1))),$(error $(1) contains a space, which make cannot handle: $($(1))))
 $(foreach name,SITE POINTS OUT SCENARIO,$(call one_word,$(name)))
 ifeq ($(SITE),)
   $(error SITE is not set: the cloud of the terrain, e.g. SITE=cloud.pcd)
@@ -28,7 +28,7 @@ ifeq ($(OUT),)
   $(error OUT is not set: the folder of the results, e.g. OUT=results)
 endif
 ifneq ($(shell test '$(SHARES)' -ge 1 2>/dev/null && echo yes),yes)
-  $(error SHARES is '$(SHARES)': it must be a whole number >= 1)
+  $(error SHARES is '$(SHARES)': it must be an integer >= 1)
 endif
 ifneq ($(POINTS)$(wildcard $(POINTS)),$(POINTS)$(POINTS))
   $(error POINTS is '$(POINTS)': no such file)
@@ -37,7 +37,7 @@ endif
 include $(here)one_run.mk
 ifdef is_alone
 
-# The scenario's file and its gripper's: named ones lie in data/ (beside this folder, installed too).
+# Files of the scenario and of its gripper. Named ones are in data/, beside this folder.
 data := $(firstword $(wildcard $(here)../data) $(here)..)
 scenario_file := $(firstword $(wildcard $(SCENARIO) $(data)/scenarios/$(SCENARIO).yaml))
 gripper := $(if $(scenario_file),$(shell sed -n 's/^gripper: *\([^ \#]*\).*/\1/p' $(scenario_file)))
@@ -65,13 +65,13 @@ all: $(results)
 $(OUT) $(OUT)/tiles:
 	@mkdir -p $@
 
-# Stamps of the variables that a result depends on: written anew only if they change.
+# Stamp files of the variables that results depend on, rewritten only if the variables change.
 export scored_with := $(SITE) $(score_flags)
 export shown_with := $(POINTS) $(POINTS_FRAME) $(TITLE)
 $(OUT)/scored_with $(OUT)/shown_with: FORCE | $(OUT)
 	@printf '%s\n' "$${$(@F)}" | cmp -s - $@ || printf '%s\n' "$${$(@F)}" > $@
 
-# make runs the shares side by side: each process takes one thread.
+# make runs the shares in parallel, so each process uses one thread.
 $(OUT)/tiles/%-of-$(SHARES).pcd: $(SITE) $(OUT)/scored_with $(scenario_file) $(gripper_file) \
     | $(OUT)/tiles
 	@exec $(GRASPMAP) score $(SITE) -o $@ $(score_flags) --tile $*/$(SHARES) --threads 1 --quiet

@@ -1,19 +1,20 @@
-# The thesis's chapters 4 and 5 as one run: its four scenarios, pre-scanned and in situ, the places
-# of the field tests looked up in every map, the robot's body inclined, thresholds, masks, the
-# published tables evaluated, and one report of all of it. Needs no data: sites, scans and the
-# robot's cameras are simulated. Where GRASPMAP_DATA names the author's data, his clouds are run
-# beside the simulated ones and his tables are evaluated.
+# Repetition of the thesis's chapters 4 and 5 in one run: the four scenarios, pre-scanned and in situ,
+# look-up of the field test's locations in every map, inclination of the robot's body, thresholds,
+# masks, evaluation of the published tables, and one report. Needs no data: sites, scans and the robot's
+# cameras are simulated. If GRASPMAP_DATA is the folder of the author's data, his clouds are also
+# processed and his tables evaluated.
 #
 #   make -f pipelines/study.mk OUT=folder [SCENARIOS="1 2 3 4"] [METHODS="thesis corrected"] \
 #        [STAGES="walls published thresholds masks grasp report"] [INCLINATIONS="10 25"] [SEED=1] -j2
 #
-# A map is made by site.mk. Pre-scanned: Poisson-disk samples of the site's true mesh, COUNT of them.
-# In situ: the six depth images of the robot at one pose on the site, with the noise of a real sensor
-# (SENSOR), as one panorama. EDGE, SPACING and COUNT coarsen sites, scene and samples; CAMERAS and
-# PANORAMA hold further flags of `simulate cameras` and `fuse`, LOOKUP of `lookup` (but of the
-# wall a hold is looked up as the best within HOLD_RADIUS); SHARES is the number of processes that
-# score one map; PLACES and TRIALS those of the virtual field test. A second run does nothing; other variables or changed files make again what depends
-# on them.
+# site.mk computes each map. The terrain of a pre-scanned map consists of COUNT Poisson-disk samples of the
+# site's true mesh. The terrain in situ is a panorama of the robot's six depth images at one pose, with
+# the noise of a real sensor (SENSOR). EDGE, SPACING and COUNT set the resolution of sites, scene and
+# samples. CAMERAS, PANORAMA and LOOKUP are further flags of `simulate cameras`, `fuse` and `lookup`; on
+# the wall, the look-up of a hold uses the best voxel within HOLD_RADIUS instead. SHARES is the number of
+# processes per map. PLACES and TRIALS are the numbers of locations and trials of the virtual field
+# test. A second run does nothing. If a variable or a file changes, the results that depend on it are
+# recomputed.
 
 here := $(dir $(lastword $(MAKEFILE_LIST)))
 GRASPMAP ?= $(firstword $(wildcard $(here)../build/release/graspmap) graspmap)
@@ -36,15 +37,15 @@ SHARES ?= 1
 PLACES ?= 1000
 TRIALS ?= --trials 16 --draws 8
 
-# make splits names at spaces; better an error than half a name.
-one_word = $(if $(word 2,$($(1))),$(error $(1) holds a space, which make cannot handle: $($(1))))
+# make splits names at spaces, so a name with a space is an error.
+one_word = $(if $(word 2,$($(1))),$(error $(1) contains a space, which make cannot handle: $($(1))))
 $(foreach name,OUT SEED EDGE SPACING COUNT SHARES GRASPMAP_DATA,$(call one_word,$(name)))
 ifeq ($(OUT),)
   $(error OUT is not set: the folder of the results, e.g. OUT=study)
 endif
-# One of these words, or an error: variable, known words.
+# Fails if a variable contains an unknown word. Arguments: variable, known words.
 known = $(foreach word,$($(1)),$(if $(filter $(word),$(2)),,\
-  $(error $(1) holds '$(word)', which is none of: $(2))))
+  $(error $(1) contains '$(word)', which is not one of: $(2))))
 $(call known,SCENARIOS,1 2 3 4)
 $(call known,METHODS,thesis envelope climblab corrected calibrated)
 $(call known,STAGES,walls published thresholds masks grasp report)
@@ -66,10 +67,10 @@ tables := $(and $(GRASPMAP_DATA),$(wildcard $(GRASPMAP_DATA)/thesis))
 .PHONY: all FORCE
 all:
 
-# Text as one word of the shell.
+# Text quoted as one word of the shell.
 quoted = '$(subst ','\'',$(1))'
 
-# A stamp of variables that results depend on, written anew only if they change: file, text.
+# Stamp file of variables, rewritten only if they change. Arguments: file, text.
 define stamp
 $(1): FORCE
 	@mkdir -p $$(@D)

@@ -1,17 +1,17 @@
-# The thesis's threshold study (its table 5-6): the solid-voxel threshold TSV times the extra void
-# layers H_add, each a map; all maps side by side, and one table of them. On scenario 1 also the
-# measure that its chapter 5.2.4 asks for: sensitivity and specificity against places whose
-# graspability is expected, and Youden's index over the two thresholds.
+# Threshold study of the thesis (table 5-6): one map for each pair of a solid-voxel threshold TSV and a
+# number of extra void layers H_add, one image of all maps, and one table. On scenario 1 also the
+# metrics that chapter 5.2.4 of the thesis requests: sensitivity and specificity against locations of
+# expected graspability, and Youden's index over the two thresholds.
 #
 #   make -f pipelines/thresholds.mk OUT=folder [TSV="120 300 700 2500"] [HADD="1 3 5"] \
 #        [METHODS="thesis corrected"] [SITE=cloud.pcd [EXPECTED=regions.csv]] [SCENARIO=...] -j2
 #
-# The thesis's own twelve pairs are not known here: this grid is ours. H_add takes the values of the
-# published parameter sets (tab. B 2-1 and the gripper HubRobo's: 1, 3, 5). A TSV matters where
-# windows hold fewer solid voxels (SSV): 120 is the thesis's; 300, 700 and 2500 are about the 5th
-# percentile and the median of SSV that `thesis` finds on the embedded scene, and the median that
-# `corrected` does. SITE: another cloud, without expectations unless EXPECTED names some. A second
-# run does nothing; other variables or changed files make again what depends on them.
+# The thesis does not state its twelve pairs, so this grid is a choice of this project. The values of
+# H_add are those of the published parameter sets (table B 2-1 and the gripper HubRobo: 1, 3, 5). A TSV
+# has an effect on windows with fewer solid voxels (SSV). 120 is the thesis's TSV. 300 and 700 are about
+# the 5th percentile and the median of the SSV of `thesis` on the embedded scene, 2500 the median of
+# `corrected`. SITE is another cloud, evaluated only if EXPECTED is set. A second run does nothing. If a
+# variable or a file changes, the results that depend on it are recomputed.
 
 here := $(dir $(lastword $(MAKEFILE_LIST)))
 GRASPMAP ?= $(firstword $(wildcard $(here)../build/release/graspmap) graspmap)
@@ -27,8 +27,8 @@ export TITLE ?= $(if $(SITE),$(basename $(notdir $(SITE))),primitive shapes)
 data := $(firstword $(wildcard $(here)../data) $(here)..)
 EXPECTED ?= $(if $(SITE),,$(data)/expected/primitive_shapes.csv)
 
-# make splits names at spaces; better an error than half a name.
-one_word = $(if $(word 2,$($(1))),$(error $(1) holds a space, which make cannot handle: $($(1))))
+# make splits names at spaces, so a name with a space is an error.
+one_word = $(if $(word 2,$($(1))),$(error $(1) contains a space, which make cannot handle: $($(1))))
 $(foreach name,SITE OUT SCENARIO EXPECTED,$(call one_word,$(name)))
 ifeq ($(OUT),)
   $(error OUT is not set: the folder of the results, e.g. OUT=thresholds)
@@ -64,7 +64,7 @@ all: $(results)
 $(OUT) $(foreach method,$(METHODS),$(OUT)/$(method)):
 	@mkdir -p $@
 
-# Stamps of the variables that a result depends on: written anew only if they change.
+# Stamp files of the variables that results depend on, rewritten only if the variables change.
 export scored_with := $(SITE) $(SCENARIO) $(SCORE) $(if $(SITE),,$(SPACING))
 export shown_with := $(TSV); $(HADD); $(METHODS); $(EXPECTED) $(TITLE) $(CELL)
 $(OUT)/scored_with $(OUT)/shown_with: FORCE | $(OUT)
@@ -73,7 +73,7 @@ $(OUT)/scored_with $(OUT)/shown_with: FORCE | $(OUT)
 $(OUT)/terrain.pcd: $(OUT)/scored_with | $(OUT)
 	@exec $(GRASPMAP) simulate scene --spacing $(SPACING) -o $@ --quiet
 
-# make runs the maps side by side: each process takes one thread.
+# make runs the maps in parallel, so each process uses one thread.
 define score
 $(OUT)/$(1)/%.pcd: $(terrain) $(OUT)/scored_with $(scenario_file) | $(OUT)/$(1)
 	@exec $(GRASPMAP) score $$< -o $$@ --config $(SCENARIO) --method $(1) $(SCORE) --threads 1 --quiet \

@@ -1,5 +1,5 @@
-# A large terrain's map by a Slurm cluster: an array of tasks makes shares of its tiles in one store,
-# then the tiles are merged.
+# Map of a large terrain on a Slurm cluster: the tasks of a job array compute shares of the tiles in one
+# tile store, then the tiles are merged.
 #
 #   make -f pipelines/slurm/tiles.mk TERRAIN=terrain OUT=folder SHARES=100 [SCENARIO=NAME|FILE]
 #        [SCORE="..."] [SBATCH="--mem=2G --time=1:00:00"] [map]
@@ -8,17 +8,23 @@
 #   make -f pipelines/slurm/tiles.mk SCAN=scan.db [POSES=poses.tum] OUT=... [FUSE="..."] cloud
 #   make -f pipelines/slurm/tiles.mk MESH=folder SCAN=scan.db [POSES=poses.tum] OUT=... [TEXTURE="..."] model
 #
-# TERRAIN is a cloud or a folder of clouds. The default goal makes $(OUT)/map.tiles, which lookup,
-# render, info and convert read; `map` merges it to $(OUT)/map.pcd as well. `held` tests the gripper
-# at every voxel of the map on MESH, in the frame of TERRAIN: $(OUT)/held.tiles, merged by `held_map`
-# to $(OUT)/held.pcd. `mesh` makes the surface of TERRAIN, a cloud with normals, in a folder of pieces,
-# $(OUT)/mesh; SURFACE holds the flags of graspmap mesh, among them --cell-size. `cloud` fuses the depth
-# images of SCAN to a folder of pieces, $(OUT)/cloud, and writes the poses that it was fused by,
-# $(OUT)/fused_poses.tum. `model` textures the pieces of MESH with the photographs of SCAN,
-# $(OUT)/model. All of these files and graspmap itself
-# must be reached by the same path on all nodes. SBATCH holds further flags of sbatch, among them --cpus-per-task and --array=1-100%10 to run
-# ten at a time. A second run does nothing; after a run that failed, the next makes what is missing.
-# Logs: $(OUT)/logs, $(OUT)/held_logs, $(OUT)/mesh_logs and so on.
+# TERRAIN is a cloud or a folder of clouds. Goals:
+#
+#   tiles (default)  $(OUT)/map.tiles, which lookup, render, info and convert read
+#   map              $(OUT)/map.pcd, merged from map.tiles
+#   held             $(OUT)/held.tiles: the gripper tested at every voxel of the map on MESH, which is in
+#                    the frame of TERRAIN
+#   held_map         $(OUT)/held.pcd, merged from held.tiles
+#   mesh             $(OUT)/mesh, the surface of TERRAIN (a cloud with normals) as a folder of tiles;
+#                    SURFACE are flags of graspmap mesh and include --cell-size
+#   cloud            $(OUT)/cloud, the fused depth images of SCAN as a folder of tiles, and
+#                    $(OUT)/fused_poses.tum, the poses that fuse used
+#   model            $(OUT)/model, the tiles of MESH textured with the photographs of SCAN
+#
+# All nodes must have the same paths to these files and to graspmap. SBATCH are further flags of sbatch,
+# for example --cpus-per-task, or --array=1-100%10 to run ten tasks at a time. A second run does nothing.
+# After a failed run, the next run computes the missing tiles. Logs: $(OUT)/logs, $(OUT)/held_logs,
+# $(OUT)/mesh_logs and so on.
 
 here := $(dir $(lastword $(MAKEFILE_LIST)))
 GRASPMAP ?= $(firstword $(wildcard $(here)../../build/release/graspmap) graspmap)
@@ -35,26 +41,26 @@ FUSE ?=
 SBATCH ?=
 TRIES ?= 3
 
-one_word = $(if $(word 2,$($(1))),$(error $(1) holds a space, which make cannot handle: $($(1))))
+one_word = $(if $(word 2,$($(1))),$(error $(1) contains a space, which make cannot handle: $($(1))))
 $(foreach name,TERRAIN OUT SCENARIO SHARES MESH SCAN POSES,$(call one_word,$(name)))
 ifeq ($(filter cloud model,$(MAKECMDGOALS)),)
   ifeq ($(wildcard $(TERRAIN)),)
     $(error TERRAIN is '$(TERRAIN)': it must be a cloud or a folder of clouds)
   endif
 else
-  $(foreach name,SCAN $(if $(filter model,$(MAKECMDGOALS)),MESH),$(if $(wildcard $($(name))),,$(error $(name) is '$($(name))': there is no such file)))
+  $(foreach name,SCAN $(if $(filter model,$(MAKECMDGOALS)),MESH),$(if $(wildcard $($(name))),,$(error $(name) is '$($(name))': no such file)))
 endif
 ifeq ($(OUT),)
   $(error OUT is not set: the folder of the results, e.g. OUT=results)
 endif
 ifneq ($(shell test '$(SHARES)' -ge 1 2>/dev/null && echo yes),yes)
-  $(error SHARES is '$(SHARES)': it must be a whole number >= 1)
+  $(error SHARES is '$(SHARES)': it must be an integer >= 1)
 endif
 
 include $(here)../one_run.mk
 ifdef is_alone
 
-# Tasks run in the folder of their submission; paths are made whole all the same.
+# Tasks run in the folder of their submission. Paths are made absolute nevertheless.
 program := $(shell command -v $(GRASPMAP))
 terrain := $(abspath $(TERRAIN))
 mesh := $(abspath $(MESH))
@@ -82,8 +88,8 @@ model: $(model)
 $(OUT) $(logs) $(held_logs) $(cloud_logs) $(mesh_logs) $(model_logs):
 	@mkdir -p $@
 
-# A stamp of what the tiles depend on: written anew only if it changes, and then tiles of another
-# terrain or other parameters go.
+# Stamp file of the inputs and parameters of the tiles, rewritten only if they change. Tiles of another
+# terrain or of other parameters are then deleted.
 export scored_with := $(TERRAIN) $(score_flags)
 $(OUT)/scored_with: FORCE | $(OUT)
 	@printf '%s\n' "$$scored_with" | cmp -s - $@ || \
@@ -109,12 +115,12 @@ $(OUT)/textured_with: FORCE | $(OUT)
 	@printf '%s\n' "$$textured_with" | cmp -s - $@ || \
 	  { rm -rf $(model) $(model).json $(model).progress && printf '%s\n' "$$textured_with" > $@; }
 
-# $(call in_shares,LOGS,STORE,COMMAND WORDS). sbatch --wait ends when the last task has, with the
-# largest of their exit codes. A task that has been put back into the queue is not at its end.
+# $(call in_shares,LOGS,STORE,COMMAND WORDS). sbatch --wait ends after the last task and returns the
+# largest exit code. A requeued task has not ended.
 define in_shares
 @GRASPMAP=$(program) TRIES=$(TRIES) sbatch --wait --export=ALL --array=1-$(SHARES) \
   --output=$(1)/%a.log $(SBATCH) $(here)tile_share.sbatch $(SHARES) $(2) $(3) --quiet || \
-  { echo "tiles.mk: tasks failed; $(1) says why, and make again makes what is missing" >&2; exit 1; }
+  { echo "tiles.mk: tasks failed; see $(1), then run make again to compute the missing tiles" >&2; exit 1; }
 @test -e $@ || $(program) info $(2) >$(1)/info.log
 @touch -c $@
 endef
@@ -123,7 +129,7 @@ $(store)/index.json: $(TERRAIN) $(OUT)/scored_with | $(logs)
 	$(call in_shares,$(logs),$(store),score $(terrain) $(score_flags))
 
 $(held)/index.json: $(MESH) $(store)/index.json $(OUT)/grasped_with | $(held_logs)
-	$(if $(MESH),,$(error MESH is not set: the mesh on which the gripper is tested))
+	$(if $(MESH),,$(error MESH is not set: the mesh for the test of the gripper))
 	$(call in_shares,$(held_logs),$(held),grasp $(mesh) --map $(store) $(GRASP))
 
 $(surface): $(TERRAIN) $(OUT)/meshed_with | $(mesh_logs)

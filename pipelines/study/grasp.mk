@@ -1,11 +1,12 @@
-# The virtual field test of the scenarios, and what predicts it; included by study.mk.
+# Virtual field test of the scenarios, and evaluation of its predictors; included by study.mk.
 #
-# OUT/N_name/grasp/: PLACES places spread evenly over the terrain, the maps of all methods
-# looked up there, the verdicts of the virtual field test on the true mesh (table.csv), and how well
-# each column predicts them at three loads (evaluation_LOAD/). `again` is the field test with another
-# seed: nothing can predict better. `nz`, the normal's vertical part, is the slope alone.
-# Of scenario 4 also `scanned`: the same field test on the surface of a simulated scan of the site.
-# OUT/grasp_real/: the same on the surfaces of the author's clouds, the bouldering holds by HubRobo.
+# OUT/N_name/grasp/: PLACES locations spread evenly over the terrain, the maps of all methods looked up
+# there, the verdicts of the virtual field test on the true mesh (table.csv), and the evaluation of each
+# column as a predictor of the verdicts at three loads (evaluation_LOAD/). `again` is the field test with
+# another seed, the upper bound of any prediction. `nz`, the vertical component of the normal, is the
+# slope alone. In scenario 4, `scanned` is the field test on the surface of a simulated scan of the site.
+# OUT/grasp_real/: the field test on the surfaces of the author's clouds, for the bouldering holds with
+# HubRobo.
 # OUT/grasp_sweep/: scenario 4 with other parameters of the field test.
 
 grasp_methods := thesis envelope climblab corrected calibrated
@@ -19,7 +20,7 @@ commas = $(subst $(space),$(comma),$(strip $(1)))
 grasp_mesh_1 := $(folder_1)/scene.ply
 grasp_scenario_1 := primitive_shapes_prescan
 $(foreach n,1 2 3 4,$(eval grasp_cloud_$(n) := $(folder_$(n))/terrain.pcd))
-# Away from the border, where the gripper would be over nothing.
+# Keeps locations away from the border, where the gripper would have no ground below it.
 grasp_box_1 := -0.8,-0.8,0.8,0.8
 grasp_box_2 := -2.5,-1.9,2.5,1.9
 grasp_box_3 := -1.3,-1.3,1.3,1.3
@@ -27,7 +28,7 @@ grasp_box_4 := -1.3,-1.3,1.3,1.3
 $(foreach n,2 3 4,$(eval grasp_mesh_$(n) := $(folder_$(n))/site.ply) \
   $(eval grasp_scenario_$(n) := $(scenario_$(n))))
 
-# The author's clouds: 5 to 7.
+# The author's clouds are numbered 5 to 7.
 names_real := artificial_rocks primitive_shapes bouldering_holds
 $(foreach n,1 2 3,$(eval name_$(words 1 2 3 4 $(wordlist 1,$(n),1 2 3)) := thesis_$(word $(n),$(names_real))))
 $(foreach n,5 6 7,$(eval folder_$(n) := $(OUT)/grasp_real/$(name_$(n))) \
@@ -42,12 +43,12 @@ grasp_box_5 := -1.3,-1.3,1.3,1.3
 grasp_box_6 := -1.2,-1.2,1.2,1.2
 grasp_box_7 := -0.25,-0.32,0.25,0.32
 grasp_mesh_flags_6 := --normals estimate
-# As in masks.mk.
+# Parameters as in masks.mk.
 grasp_flags_7 := --gripper hubrobo
 grasp_score_flags_7 := --gripper hubrobo --voxel-size 0.005 --solid-voxel-threshold 4 \
   --curvature-radius 0.03 --set interpolation=yes
 
-# Scenario's number, method.
+# Arguments: number of the scenario, method.
 define grasp_lookup
 $(folder_$(1))/grasp/map_$(2).pcd: $(grasp_cloud_$(1))
 	@mkdir -p $$(@D)
@@ -58,7 +59,7 @@ $(folder_$(1))/grasp/with_$(2).csv: $(folder_$(1))/grasp/map_$(2).pcd $(3)
 	  --column '$(2)_score=score,$(2)_convex=convex,$(2)_graspable=graspable'
 endef
 
-# Scenario's number.
+# Argument: number of the scenario.
 define grasp_study
 $(call stamp,$(folder_$(1))/grasp/placed_with,$(PLACES) $(SEED) $(TRIALS))
 $(folder_$(1))/grasp/inner.ply: $(grasp_mesh_$(1)) $(folder_$(1))/grasp/placed_with
@@ -81,7 +82,7 @@ $(call grasp_evaluation,$(1),5,graspable_5)
 $(call grasp_evaluation,$(1),30,graspable_30)
 endef
 
-# Scenario's number, load, label.
+# Arguments: number of the scenario, load, label.
 define grasp_evaluation
 $(folder_$(1))/grasp/evaluation_$(2)/accuracy.csv: $(folder_$(1))/grasp/table.csv
 	@exec $$(GRASPMAP) evaluate $$< -o $$(@D) --label $(3) --score $(call commas,$(grasp_columns) $(grasp_more_$(1))) \
@@ -89,7 +90,7 @@ $(folder_$(1))/grasp/evaluation_$(2)/accuracy.csv: $(folder_$(1))/grasp/table.cs
 results += $(folder_$(1))/grasp/evaluation_$(2)/accuracy.csv
 endef
 
-# What a scan's error costs: of a scan with noise and drift to a surface, in the truth's frame.
+# Effect of scan errors: surface of a scan with noise and drift, in the frame of the truth.
 grasp_last_4 := scanned
 grasp_more_4 := scanned_hold_probability scanned_graspable
 $(folder_4)/grasp/scan.db: $(folder_4)/site/mesh.ply
@@ -105,7 +106,7 @@ $(folder_4)/grasp/scanned.csv: $(folder_4)/grasp/scanned.ply $(folder_4)/grasp/a
 	@exec $(GRASPMAP) grasp $< --points $(word 2,$^) -o $@ $(TRIALS) --best-draws 0 \
 	  --prefix scanned_ --max-distance 0.5 --quiet
 
-# The surfaces of the author's clouds; the leaning board of holds is laid flat.
+# Surfaces of the author's clouds. The inclined board of holds is rotated to horizontal.
 define grasp_real_mesh
 $(folder_$(1))/mesh.ply: $(grasp_cloud_$(1))
 	@mkdir -p $$(@D)
@@ -122,7 +123,7 @@ $(folder_7)/terrain.pcd: $(folder_7)/mesh.ply
 	@exec $(GRASPMAP) resample $< -o $@ --count 18401 --quiet
 endif
 
-# Name, flags of grasp: scenario 4 with other parameters.
+# Scenario 4 with other parameters. Arguments: name, flags of grasp.
 define grasp_sweep
 $(OUT)/grasp_sweep/$(1)/accuracy.csv: $(grasp_mesh_4) $(folder_4)/grasp/again.csv
 	@mkdir -p $(OUT)/grasp_sweep

@@ -1,13 +1,13 @@
-# The places of the field tests in every map of scenarios 2 to 4; included by study.mk.
+# Look-up of the field test's locations in every map of scenarios 2 to 4; included by study.mk.
 #
-# OUT/N_name/METHOD/table.csv has a row a place and a column a case, as the thesis's tables B 2-3
-# (the score at the place, and 1 or 0 by the combined criterion) and, of the wall, B 2-4 (whether a
-# hold is graspable). In situ a place has a value only where the robot measured a point near it. The
-# wall's cases are evaluated against its pre-scanned map: METHOD/evaluation/.
+# OUT/N_name/METHOD/table.csv has one row per location and one column per case, as the thesis's tables
+# B 2-3 (score at the location, and 1 or 0 by the combined criterion) and, for the wall, B 2-4
+# (graspability of a hold). In situ, a location has a value only if the robot measured a point near it.
+# The wall's cases are evaluated against its pre-scanned map: METHOD/evaluation/.
 
-# How a place is looked up, and what of the map stands in its column: for the score, and for the
-# combined criterion. A hold is graspable if the best place on it is, or if any of it is convex and
-# reaches the threshold: a share of its voxels that is not nothing.
+# Flags of the look-up and field of the map, for the score and for the combined criterion. A hold is
+# graspable by the score if its best score reaches 0.9, and by the combined criterion if any of its voxels is
+# convex and reaches the threshold.
 by_score_2 := score
 by_score_3 := score>=0.9
 by_score_4 := score
@@ -21,7 +21,8 @@ look_by_both_3 := --mode mean --radius $(HOLD_RADIUS)
 look_by_score_4 := $(LOOKUP)
 look_by_both_4 := $(LOOKUP)
 
-# One column: scenario's number, method, column, case, by_score or by_both, flags, the table before.
+# One column. Arguments: number of the scenario, method, column, case, by_score or by_both, flags,
+# previous table.
 define column
 $(folder_$(1))/$(2)/places/$(3).csv: $(folder_$(1))/$(2)/$(4)/map.pcd $(7) \
     $(folder_$(1))/$(2)/looked_up_with
@@ -30,7 +31,7 @@ $(folder_$(1))/$(2)/places/$(3).csv: $(folder_$(1))/$(2)/$(4)/map.pcd $(7) \
 	  $(6) --column '$(3)=$($(5)_$(1))' --quiet
 endef
 
-# Scenario's number, method.
+# Arguments: number of the scenario, method.
 define places
 $(call stamp,$(folder_$(1))/$(2)/looked_up_with,$(look_by_score_$(1)) $(by_score_$(1)))
 $(call column,$(1),$(2),prescan,prescan,by_score,,$(folder_$(1))/site/field_points.csv)
@@ -47,7 +48,7 @@ results += $(folder_$(1))/$(2)/table.csv
 endef
 $(foreach n,$(sites),$(foreach method,$(METHODS),$(eval $(call places,$(n),$(method)))))
 
-# Method.
+# Argument: method.
 define wall_evaluation
 $(folder_3)/$(1)/evaluation/accuracy.csv: $(folder_3)/$(1)/table.csv
 	@exec $$(GRASPMAP) evaluate $$< -o $$(@D) --label prescan --title 'against the pre-scanned map' \

@@ -1,8 +1,8 @@
-# The robot's body inclined on the rocks (chapter 5.2.3); included by study.mk.
+# Inclination of the robot's body on the rocks (chapter 5.2.3); included by study.mk.
 #
-# OUT/4_artificial_rocks/poses/planes.csv: by how many degrees the regression plane of what the robot
-# sees misses the true ground, its body level and inclined by each of INCLINATIONS to four sides;
-# places_METHOD.csv: the raw map's scores at the places of the field test that each pose sees.
+# OUT/4_artificial_rocks/poses/planes.csv: angle between the true ground and the regression plane of the
+# robot's view, in degrees, with the body level and inclined by each of INCLINATIONS to four sides.
+# places_METHOD.csv: scores of the raw map at the field test's locations that each pose sees.
 
 ifneq ($(filter 4,$(SCENARIOS)),)
 folder_poses := $(folder_4)/poses
@@ -17,7 +17,7 @@ turn_right = --roll $(1)
 
 $(eval $(call stamp,$(folder_poses)/posed_with,$(METHODS) $(poses)))
 
-# Pose.
+# Argument: pose.
 define pose
 $(folder_poses)/$(1)/panorama.pcd: $(ground_4) $(folder_4)/seen_with
 	@mkdir -p $$(@D)
@@ -28,7 +28,7 @@ $(folder_poses)/$(1)/panorama.pcd: $(ground_4) $(folder_4)/seen_with
 endef
 $(foreach one,$(poses),$(eval $(call pose,$(one))))
 
-# Pose, method, the table before it: a map, a row of planes.csv, a column of places_METHOD.csv.
+# Map, row of planes.csv and column of places_METHOD.csv. Arguments: pose, method, previous table.
 define plane_of_pose
 $(folder_poses)/$(1)/$(2).pcd: $(folder_poses)/$(1)/panorama.pcd
 	@exec $$(GRASPMAP) score $$< -o $$@ --config artificial_rocks_realtime --method $(2) \

@@ -1,11 +1,11 @@
-# The scenarios' terrains and maps; included by study.mk.
+# Terrains and maps of the scenarios; included by study.mk.
 #
-# OUT/N_name/ holds the scene or site, terrain.pcd (pre-scanned), panorama.pcd (in situ) and one
-# folder of site.mk for each map: METHOD/prescan, METHOD/insitu_raw, METHOD/insitu_interpolated;
-# below real/, the same of the author's clouds.
+# OUT/N_name/ contains the scene or site, terrain.pcd (pre-scanned), panorama.pcd (in situ) and one
+# folder of site.mk per map: METHOD/prescan, METHOD/insitu_raw, METHOD/insitu_interpolated. real/
+# contains such folders for the author's clouds.
 
-# A map by site.mk, which remakes only what has changed: folder, cloud, scenario, method, title,
-# points, their frame, further flags of score.
+# Map by site.mk, which recomputes only changed results. Arguments: folder, cloud, scenario, method,
+# title, points, frame of the points, further flags of score.
 define map
 $(1)/map.pcd: $(2) $(6) FORCE
 	@exec $$(MAKE) --no-print-directory -s -f $(here)site.mk SITE=$(strip $(2)) SCENARIO=$(strip $(3)) \
@@ -14,14 +14,14 @@ $(1)/map.pcd: $(2) $(6) FORCE
 results += $(1)/map.pcd
 endef
 
-# A picture: picture, what it shows, flags of render, title.
+# Image. Arguments: image, rendered file, flags of render, title.
 define picture
 $(1): $(2)
 	@exec $$(GRASPMAP) render $(2) -o $$@ $(3) --title '$(strip $(4))' --quiet
 results += $(1)
 endef
 
-# --- 1: a scene, pre-scanned, with about as many points as the thesis's scan of it.
+# --- 1: a pre-scanned scene with about as many points as the thesis's scan.
 ifneq ($(filter 1,$(SCENARIOS)),)
 points_1 := $(data)/field_test/primitive_shapes.csv
 $(eval $(call stamp,$(folder_1)/simulated_with,$(SPACING) $(SEED)))
@@ -36,8 +36,8 @@ $(foreach method,$(METHODS),$(eval $(call map,$(folder_1)/$(method)/prescan,\
   $(points_1),input)))
 endif
 
-# --- 2 to 4: a site with its true mesh, levelled and cut (the wall is laid flat, so that holds stand
-# up from it), samples of it, and what the robot sees from its pose on it.
+# --- 2 to 4: a site with its true mesh, leveled and cropped (the wall is rotated to horizontal, so that
+# holds point up), samples of it, and the robot's view from its pose on the site.
 site_2 := slopes_and_bumps
 site_3 := bouldering_wall
 site_4 := rocks
@@ -47,8 +47,8 @@ crop_4 := --level none --box=-1.5,-1.5,1.5,1.5
 scenario_2 := slopes_and_bumps_realtime
 scenario_3 := bouldering_wall_prescan
 scenario_4 := artificial_rocks_prescan
-# Where the robot stands: on the level floor beside the bumps, on the wall among the holds, in the
-# free square. Of the wall it sees the part that was cut out.
+# Position of the robot: on the level floor beside the bumps, on the wall among the holds, in the free
+# square. It sees only the cropped part of the wall.
 pose_2 := --x -0.3 --y 0.1 --z 0.3
 pose_3 := --x 0 --y 0 --z 0.3
 pose_4 := --x 0 --y 0 --z 0.3
@@ -56,7 +56,7 @@ ground_2 := $(folder_2)/site/mesh.ply
 ground_3 := $(folder_3)/site.ply
 ground_4 := $(folder_4)/site/mesh.ply
 
-# Scenario's number.
+# Argument: number of the scenario.
 define site
 $(call stamp,$(folder_$(1))/simulated_with,$(site_$(1)) $(SEED) $(EDGE))
 $(call stamp,$(folder_$(1))/sampled_with,$(crop_$(1)) $(COUNT))
@@ -80,8 +80,8 @@ $(call picture,$(folder_$(1))/panorama.png,$(folder_$(1))/panorama.pcd,--view to
 $(subst _, ,$(name_$(1))): what the robot sees)
 endef
 
-# Scenario's number, method. Scenario 2 has no parameters of a pre-scanned map: it is run with those
-# in situ, as the author's cloud of it, which is as sparse.
+# Arguments: number of the scenario, method. Scenario 2 has no parameters for a pre-scanned map, so it
+# uses those in situ, as does the author's equally sparse cloud.
 define maps_of_site
 $(call map,$(folder_$(1))/$(2)/prescan,$(folder_$(1))/terrain.pcd,$(scenario_$(1)),$(2),\
 $(subst _, ,$(name_$(1))): pre-scanned: $(2),$(folder_$(1))/site/field_points.csv,map)
@@ -97,7 +97,8 @@ sites := $(filter 2 3 4,$(SCENARIOS))
 $(foreach n,$(sites),$(eval $(call site,$(n))) \
   $(foreach method,$(METHODS),$(eval $(call maps_of_site,$(n),$(method)))))
 
-# --- The author's clouds: scenario's number, case, cloud, scenario, points, flags of score.
+# --- The author's clouds. Arguments: number of the scenario, case, cloud, scenario, points, flags of
+# score.
 define real_map
 $(call map,$(folder_$(1))/real/$(7)/$(2),$(clouds)/$(3),$(4),$(7),\
 $(subst _, ,$(name_$(1))): cloud of the thesis: $(subst _, ,$(2)): $(7),$(5),input,$(6))

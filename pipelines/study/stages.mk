@@ -1,13 +1,12 @@
-# What follows the scenarios: the published tables, thresholds, masks, the report; included by
-# study.mk.
+# Stages after the scenarios: published tables, thresholds, masks, report; included by study.mk.
 
-# --- The thesis's tables as they were published: B 2-3 against the field test's verdicts, once more
-# with the cutoff that its interpolated case needs, and B 2-4 against the pre-scanned map.
+# --- The thesis's published tables: B 2-3 against the verdicts of the field test, also with the cutoff
+# for its interpolated case, and B 2-4 against the pre-scanned map.
 insitu_cases := realtime_raw,realtime_interpolated,realtime_combined
 cases_artificial_rocks := prescan,$(insitu_cases)
 cases_artificial_rocks_interpolated := realtime_interpolated
 cases_bouldering_wall := prescan_combined,$(insitu_cases)
-# Folder, table, label, cutoff.
+# Arguments: folder, table, label, cutoff.
 define published
 $(OUT)/published/$(1)/accuracy.csv: $(tables)/$(2)
 	@mkdir -p $(OUT)/published
@@ -21,7 +20,7 @@ $(eval $(call published,artificial_rocks_interpolated,field_test_scenario4.csv,g
 $(eval $(call published,bouldering_wall,bouldering_wall_scenario3.csv,prescan,0.5))
 endif
 
-# --- The threshold study on scenario 1, and the masks on the terrains of all scenarios.
+# --- Threshold study on scenario 1, and masks on the terrains of all scenarios.
 ifneq ($(and $(filter thresholds,$(STAGES)),$(filter 1,$(SCENARIOS))),)
 $(OUT)/thresholds/thresholds.csv: $(folder_1)/terrain.pcd $(data)/expected/primitive_shapes.csv FORCE
 	@exec $(MAKE) --no-print-directory -s -f $(here)thresholds.mk OUT=$(@D) SITE=$< \
@@ -36,7 +35,7 @@ $(OUT)/masks/pairs.csv: $(foreach n,$(SCENARIOS),$(folder_$(n))/terrain.pcd) FOR
 results += $(OUT)/masks/pairs.csv
 endif
 
-# --- The report of all that is there.
+# --- Report of all existing results.
 ifneq ($(filter report,$(STAGES)),)
 all: $(OUT)/report.html
 endif

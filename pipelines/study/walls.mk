@@ -1,8 +1,8 @@
-# The rocks' steep walls evaluated as walls (chapter 6.2); included by study.mk.
+# Steep walls of the rocks evaluated as walls (chapter 6.2); included by study.mk.
 #
-# OUT/4_artificial_rocks/walls/: the pre-scanned map with the mask along the surface's normal, and
-# what is too high and too steep (surface/), footholds on it for a planner, and what changes against
-# the upright mask (analysis/).
+# OUT/4_artificial_rocks/walls/: the pre-scanned map with the mask along the surface normal and
+# with flags of ground that is too high or too steep (surface/), footholds on it for a planner, and the
+# changes against the upright mask (analysis/).
 
 ifneq ($(and $(filter walls,$(STAGES)),$(filter 4,$(SCENARIOS)),$(filter corrected,$(METHODS))),)
 folder_walls := $(folder_4)/walls

@@ -3,9 +3,9 @@
 # Gravito-Inertial Acceleration", CLAWAR 2020; ClimbLab's gia_limit): about the axis through the
 # footholds a and b, the robot tumbles when
 #   m a_gi . n > F_j . ((p_b - p_j) x (p_a - p_j)),   n = (p_g - p_a) x (p_g - p_b),
-# where F_j is what the gripper at the third foothold j holds downward (pull_away_n).
-# Input: a table of `graspmap footholds --mesh`; its first three footholds are used.
-# Variables: mass (kg), height (m, of the center of mass above the footholds' mean).
+# where F_j is the downward force that the gripper at the third foothold j holds (pull_away_n).
+# Input: a table of `graspmap footholds --mesh`. The first three footholds are used.
+# Variables: mass (kg), height (height of the center of mass above the footholds' mean, m).
 BEGIN { FS = "," }
 NR == 1 { for (n = 1; n <= NF; ++n) column[$n] = n; next }
 NR <= 4 {
@@ -25,7 +25,7 @@ END {
   for (j = 0; j < 3; ++j) {
     a = (j + 1) % 3; b = (j + 2) % 3
     cross(b, a, p[j, 0], p[j, 1], p[j, 2])
-    if (c[2] > 0) { a = (j + 2) % 3; b = (j + 1) % 3 }  # the pull down resists
+    if (c[2] > 0) { a = (j + 2) % 3; b = (j + 1) % 3 }  # the downward force resists
     moment = force[j] * (c[2] > 0 ? c[2] : -c[2])
     cross(a, b, g[0], g[1], g[2])  # (p_a - p_g) x (p_b - p_g) = n
     length_n = sqrt(c[0] ^ 2 + c[1] ^ 2 + c[2] ^ 2)

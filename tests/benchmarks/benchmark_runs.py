@@ -1,4 +1,4 @@
-"""What the benchmarks of whole commands share: figures of a run, and tables in a page."""
+"""Code shared by the benchmarks of commands: metrics of a run, and tables in a page."""
 
 import argparse
 import os
@@ -9,7 +9,7 @@ import time
 
 
 def measure(words, folder=None):
-    """(wall s, processor s, peak resident MiB) of a command; ends if it fails."""
+    """Returns (wall s, processor s, peak resident MiB) of a command; exits if it fails."""
     start = time.monotonic()
     process = subprocess.Popen(words, cwd=folder)
     _, status, usage = os.wait4(process.pid, 0)
@@ -21,7 +21,7 @@ def measure(words, folder=None):
 
 
 def scan_options(description, seeds):
-    """Options of the benchmarks that simulate scans and refine them, from the command line."""
+    """Parses the command line of the benchmarks that simulate and refine scans."""
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("build", type=pathlib.Path)
     parser.add_argument("--folder", type=pathlib.Path, required=True)
@@ -36,7 +36,7 @@ def scan_options(description, seeds):
 
 
 def put_into_page(page, name, text):
-    """Puts the text between the marks of the benchmark `scripts/bench NAME`."""
+    """Replaces the text between the marks of the benchmark `scripts/bench NAME` in a page."""
     begin = f"<!-- {name}: written by scripts/bench {name} -->"
     end = f"<!-- end of {name} -->"
     content = page.read_text(encoding="utf-8")

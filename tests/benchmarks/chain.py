@@ -1,14 +1,14 @@
 #!/usr/bin/python3
-"""Time and memory of every stage from a scan to its map, in pieces, against the area.
+"""Time and memory of every stage from a scan to its map, in tiles, as a function of the area.
 
 usage: chain.py BUILD_FOLDER [--sides 3,10] [--frames-per-m2 3.4] [--folder FOLDER] [--page README.md]
 
-Simulates square rocky terrains at 1 cm and a scan in lanes over each, and runs every stage of
-pipelines/scan.mk with folders of pieces as a process of its own, with two threads; of the field test
-with 8 poses of 2 draws one share in 40. Prints a Markdown table with the exponents between the first
-and the last side; with --page, puts it between the marks of that page and the chart chain.png beside
-it. All files are in a temporary folder in FOLDER (TMPDIR) and are removed. A side that ended earlier is
-read from FOLDER/chain_SIDE.json instead.
+Simulates square rocky terrains at 1 cm and a scan in lanes over each. Runs every stage of
+pipelines/scan.mk with folders of tiles as a separate process with two threads; of the virtual field
+test (8 poses of 2 draws), one share of 40. Prints a Markdown table with the exponents between the first
+and the last side. --page writes it between the marks of that page, and the chart chain.png beside it.
+All files are in a temporary folder in FOLDER (default: TMPDIR) and are removed. Results of an earlier
+run are read from FOLDER/chain_SIDE.json.
 """
 
 import argparse
@@ -21,7 +21,7 @@ import tempfile
 
 from benchmark_runs import measure, put_into_page
 
-# Stage: words, what it reads and makes in the folder.
+# Stage: arguments, inputs and outputs in the folder.
 STAGES = {
     "simulate scan": "simulate scan ground --frames {frames} --seed 71 -o scan.db",
     "refine": "refine scan.db -o poses.tum --report refine.json",
@@ -36,7 +36,7 @@ STAGES = {
 
 
 def run_chain(graspmap, folder, side, frames):
-    """Of each stage its figures, and the errors of the refined poses and of the meshes."""
+    """Returns the metrics of each stage, and the errors of the refined poses and of the meshes."""
     subprocess.run([graspmap, "simulate", "terrain", "--size", str(side), "--seed", "71", "-o", "ground",
                     "--quiet"], cwd=folder, check=True)
     found = {"side_m": side, "frames": frames, "stages": {}}
@@ -50,7 +50,7 @@ def run_chain(graspmap, folder, side, frames):
 
 
 def exponent(runs, name, key):
-    """Of a power law of the area through the first and the last run of the stage."""
+    """Returns the exponent of a power law of the area through the first and the last run of the stage."""
     ran = [run for run in runs if name in run["stages"]]
     first, last = ran[0], ran[-1]
     areas = last["side_m"] ** 2 / first["side_m"] ** 2

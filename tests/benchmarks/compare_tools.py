@@ -1,14 +1,14 @@
 #!/usr/bin/python3
-"""graspmap against MeshLab, Open3D and CloudCompare, each as Debian packages it, in one run.
+"""Compares graspmap with MeshLab, Open3D and CloudCompare as Debian packages them, in one run.
 
 usage: compare_tools.py [samples|surface] BUILD_FOLDER DATA_FOLDER [--count N] [--repeat N]
 
 samples: Poisson-disk samples of scans/site_ground_truth_mesh.ply.
 surface: Poisson reconstruction of the fused cloud of scans/site_full.db with true poses.
 
-Prints a Markdown table: wall time, processor time and memory of each program as a command, reading
-and writing its files included (the least of the repeats), and what sample_quality or
-`graspmap compare` say of what it wrote. A program that is not installed is named and left out.
+Prints a Markdown table: wall time, processor time and memory of each program as a command, including
+reading and writing its files (minimum of the repeats), and the quality of its output by sample_quality
+or `graspmap compare`. Programs that are not installed are reported and omitted.
 """
 
 import argparse
@@ -21,7 +21,7 @@ import sys
 import tempfile
 import time
 
-PYTHON = "/usr/bin/python3"  # Debian's: it sees python3-open3d
+PYTHON = "/usr/bin/python3"  # Debian's Python, which finds python3-open3d
 
 MESHLAB_SAMPLES = """<!DOCTYPE FilterScript>
 <FilterScript>
@@ -67,7 +67,7 @@ cloud = mesh.sample_points_poisson_disk(int(sys.argv[3]))
 o3d.io.write_point_cloud(sys.argv[2], cloud)
 """
 
-# Trimmed as Open3D's tutorial does it: the share of vertices of the least density.
+# Trimming as in Open3D's tutorial: removes the share of vertices of the lowest density.
 OPEN3D_SURFACE = """
 import sys, numpy, open3d as o3d
 cloud = o3d.io.read_point_cloud(sys.argv[1])
@@ -80,12 +80,12 @@ if share > 0:
 o3d.io.write_triangle_mesh(sys.argv[2], mesh)
 """
 
-SITE_BOX = "-1.5,-1.5,-0.5,1.5,1.5,2"  # of the true mesh
+SITE_BOX = "-1.5,-1.5,-0.5,1.5,1.5,2"  # box of the true mesh
 MESH_FROM_TRUTH = "0,0,0,0,0,-90"
 
 
 class Display:
-    """A screen of its own for programs that will not start without one; nothing without Xvfb."""
+    """Starts a virtual screen for programs that require one; does nothing without Xvfb."""
 
     def __enter__(self):
         self.server = None
@@ -106,7 +106,7 @@ class Display:
 
 
 def measured(words, output, repeat):
-    """(wall s, processor s, MB) of a command; None, with its words on stderr, if it fails."""
+    """Returns (wall s, processor s, MB) of a command; None, with its output on stderr, if it fails."""
     best = None
     for _ in range(repeat):
         output.unlink(missing_ok=True)
@@ -190,7 +190,8 @@ def compare_samples(options, folder, tools):
 
     qualities = [evaluate(*run) for run in runs]
     if tools["CloudCompare"] and qualities[0]:
-        # It has no Poisson-disk sampling of meshes; downsampling dense random samples comes nearest.
+        # CloudCompare has no Poisson-disk sampling of meshes. Downsampling of dense random samples is the
+        # closest equivalent.
         radius = qualities[0]["smallest_distance_m"]
         evaluate("CloudCompare, 20 N random samples downsampled to our radius", theirs,
               ["CloudCompare", "-SILENT", "-AUTO_SAVE", "OFF", "-C_EXPORT_FMT", "PLY", "-O", mesh,
@@ -212,7 +213,7 @@ def compare_surfaces(options, folder, tools):
             runs.append((f"graspmap, {1e3 * float(cell):g} mm", folder / "graspmap.ply",
                          [graspmap, "mesh", cloud, "-o", folder / "graspmap.ply", "--cell-size",
                           cell, "--quiet"]))
-    # Cells of 1.5 and of 0.75 cm.
+    # Cells of 1.5 and 0.75 cm.
     for depth in (8, 9):
         if tools["MeshLab"]:
             script = folder / f"surface_{depth}.mlx"
@@ -259,7 +260,7 @@ def main():
     tools = installed()
     with Display(), tempfile.TemporaryDirectory() as name:
         os.environ.setdefault("XDG_RUNTIME_DIR", name)
-        os.chdir(name)  # MeshLab writes its cache where it stands
+        os.chdir(name)  # MeshLab writes its cache into the current folder
         load = os.getloadavg()[0]
         print(f"{os.cpu_count()} processors, load {load:.1f} at the start, least of "
               f"{options.repeat}\n")

@@ -1,12 +1,12 @@
 #!/usr/bin/python3
-"""How many frames of a camera that is carried fast `graspmap refine` tracks, and how well.
+"""Tracking of a fast hand-held camera by `graspmap refine`: tracked frames and errors.
 
 usage: fast_hands.py BUILD_FOLDER --folder FOLDER [--seeds 61,62,63] [--threads N] [--page README.md]
 
-Simulates a RealSense D435 (rolling shutter of 20 ms) that goes around a site of rocks in 13 s, 193
-frames, its hand turning by some 65 and up to 160 degrees a second, and refines the frames by their
-pictures alone. What a run gave is kept in FOLDER; such runs are not repeated. Prints a Markdown
-table of medians and worst seeds; with --page, puts it between the marks of that page.
+Simulates a RealSense D435 (rolling shutter of 20 ms) that moves around a rock site in 13 s (193 frames)
+and rotates by about 65 and up to 160 degrees per second, and refines the frames from their images only.
+The results of a run are stored in FOLDER, and such runs are not repeated. Prints a Markdown table of
+medians and worst seeds. --page writes it between the marks of that page.
 """
 
 import json
@@ -20,7 +20,7 @@ from benchmark_runs import measure, put_into_page, scan_options
 from faults import align, read_poses, read_truth
 
 FRAMES = 193
-# Of the color camera: exposure in s, and the share of the pictures that have it.
+# Color camera: exposure in s, and the share of images with this exposure.
 BLURS = {
     "none": (0.0, 1.0),
     "33 ms, half of the pictures": (0.033, 0.5),

@@ -1,12 +1,12 @@
 #!/usr/bin/python3
-"""How well `graspmap refine` undoes faults of a sensor, and how honest its stated deviations are.
+"""Correction of sensor faults by `graspmap refine`, and calibration of its stated deviations.
 
 usage: faults.py BUILD_FOLDER --folder FOLDER [--seeds 31,32,33] [--threads N] [--page README.md]
 
-Simulates scans of 40 frames of two sites with each fault at full size, and of the first site at half
-and double size with the first seed, and refines each. What a run gave is kept in FOLDER as one
-file .json; such runs are not repeated. Prints a Markdown table of medians and worst seeds; with
---page, puts it between the marks of that page and the chart faults.png beside it.
+Simulates and refines scans of 40 frames: of two sites with each fault at full size, and of the first
+site at half and double size with the first seed. The results of a run are stored in FOLDER as a .json
+file, and such runs are not repeated. Prints a Markdown table of medians and worst seeds. --page writes
+it between the marks of that page, and the chart faults.png beside it.
 """
 
 import json
@@ -36,7 +36,7 @@ FAULTS = {
     "rolling shutter": {"rolling-shutter": 0.020},
 }
 SIZES = (0.5, 1.0, 2.0)
-FIXED = ("vignetting", "blurred-frames", "jpeg-quality")  # are not larger or smaller
+FIXED = ("vignetting", "blurred-frames", "jpeg-quality")  # faults without a size
 
 
 def options_of(fault, size):
@@ -45,7 +45,7 @@ def options_of(fault, size):
 
 
 def pose_of(blob):
-    """As RTAB-Map stores it: three rows of floats."""
+    """Reads a pose as RTAB-Map stores it: three rows of floats."""
     pose = numpy.eye(4)
     pose[:3] = numpy.frombuffer(blob, "<f4").reshape(3, 4)
     rotation, _, other = numpy.linalg.svd(pose[:3, :3])
@@ -54,7 +54,7 @@ def pose_of(blob):
 
 
 def read_truth(scan):
-    """True poses by node, and the stored focal length."""
+    """Returns the true poses by node, and the stored focal length."""
     with sqlite3.connect(f"file:{scan}?mode=ro", uri=True) as database:
         poses = {node: pose_of(blob) for node, blob in
                  database.execute("SELECT id, ground_truth_pose FROM Node") if blob}
@@ -63,7 +63,7 @@ def read_truth(scan):
 
 
 def read_poses(path):
-    """By node, of a file .tum with nodes."""
+    """Returns the poses by node of a .tum file with nodes."""
     poses = {}
     for line in path.read_text().splitlines():
         if line.startswith("#"):
@@ -79,7 +79,7 @@ def read_poses(path):
 
 
 def align(estimate, truth, with_scale):
-    """RMSE and scale of the similarity that fits best (Umeyama 1991); rows are positions."""
+    """Returns RMSE and scale of the best-fitting similarity (Umeyama 1991). Rows are positions."""
     a, b = (points - points.mean(0) for points in (estimate, truth))
     u, values, v = numpy.linalg.svd(b.T @ a)
     values[2] *= numpy.sign(numpy.linalg.det(u) * numpy.linalg.det(v))
@@ -89,7 +89,7 @@ def align(estimate, truth, with_scale):
 
 
 def errors_in_deviations(poses, truth, nodes, scale):
-    """Of each axis of each position against the node that is held."""
+    """Returns the error of each axis of each position relative to the fixed node."""
     held = min(nodes, key=lambda node: node["deviation_m"])["node"]
     errors = []
     for node in nodes:
@@ -144,7 +144,7 @@ def median_and_worst(values):
 
 
 def shares(runs, scaled):
-    """Of the errors within one and two stated deviations, percent."""
+    """Returns the shares of errors within one and two stated deviations, percent."""
     errors = numpy.abs(numpy.concatenate([run["errors"][scaled] for run in runs]))
     return f"{100 * (errors < 1).mean():.0f}/{100 * (errors < 2).mean():.0f}"
 

@@ -1,12 +1,11 @@
 #!/usr/bin/python3
-"""How the time and the memory of `graspmap refine` grow with the number of nodes.
+"""Time and memory of `graspmap refine` as a function of the number of nodes.
 
 usage: refine_scaling.py BUILD_FOLDER [--frames 60,125,250,500,1000] [--seed N] [--threads N]
 
-Simulates the rock site and scans of it, a loop of about 30 frames after the other, with pictures of
-256 x 212 pixels, and refines each. Prints a Markdown table: processor seconds of each stage, peak
-memory, the trajectory's RMSE at the start and at the end, and the exponents of a power law fitted
-to all sizes.
+Simulates the rock site and scans of consecutive loops of about 30 frames, with images of 256 x 212
+pixels, and refines each. Prints a Markdown table: processor seconds of each stage, peak memory, RMSE of
+the trajectory before and after refinement, and the exponents of a power law fitted to all sizes.
 """
 
 import argparse
@@ -31,7 +30,7 @@ distortion_coefficients: !!opencv-matrix
 
 
 def run(words):
-    """Processor seconds and MB of a command."""
+    """Returns the processor seconds and MB of a command."""
     process = subprocess.Popen(list(map(str, words)))
     _, status, usage = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(status)
@@ -64,7 +63,7 @@ def measure(graspmap, folder, frames, options):
 
 
 def exponent(sizes, values):
-    """Of the power law with the least squares in logarithms."""
+    """Returns the exponent of the power law fitted by least squares of logarithms."""
     points = [(math.log(n), math.log(v)) for n, v in zip(sizes, values) if v > 0.01]
     if len(points) < 2:
         return float("nan")

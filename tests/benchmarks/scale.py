@@ -1,12 +1,12 @@
 #!/usr/bin/python3
-"""Time and memory of `graspmap score` into a tile store against the size of the terrain.
+"""Time and memory of `graspmap score` into a tile store as a function of the terrain size.
 
 usage: scale.py BUILD_FOLDER [--sides 3,10,30,100] [--repeat N] [--folder FOLDER] [--page README.md]
 
-Simulates square rocky terrains at 1 cm, scores each out of core as a process of its own, and looks a
-million locations up in the largest map's store. Prints a Markdown table; with --page, puts it between
-the marks of that page and the chart scale.png beside it. All files lie in a temporary folder in
-FOLDER (TMPDIR), about 9 GB for 100 x 100 m, and are removed.
+Simulates square rocky terrains at 1 cm, scores each out of core in a separate process, and looks up a
+million locations in the tile store of the largest map. Prints a Markdown table. --page writes it between
+the marks of that page, and the chart scale.png beside it. All files are in a temporary folder in FOLDER
+(default: TMPDIR), about 9 GB for 100 x 100 m, and are removed.
 """
 
 import argparse
@@ -26,7 +26,7 @@ def bytes_of(folder):
 
 
 def score(graspmap, terrain, store, repeat):
-    """The run of least processor time of several; a store is made anew each time."""
+    """Returns the run with the lowest processor time; each run creates a new tile store."""
     runs = []
     for _ in range(repeat):
         subprocess.run(["rm", "-rf", store, f"{store}.json"], check=True)

@@ -4,11 +4,11 @@ project.
 
 headers_test.py BUILD_FOLDER SOURCE_FOLDER EIGEN_INCLUDE_FOLDER COMPILER
 
-A compiler takes up to a second for the standard library and Eigen in each header. So they are
-precompiled once (without Eigen for headers that need none: it loads faster) and each header is
-compiled after them, which finds missing includes of this project. Missing includes of the standard
-library and Eigen are found by comparing the names std:: and Eigen:: with what the header and the
-project's headers below it include.
+A compiler takes up to a second for the standard library and Eigen in each header. Therefore they are
+precompiled once (without Eigen for headers that do not need it, which loads faster), and each header is
+compiled after them to find missing includes of this project. Missing includes of the standard library
+and Eigen are found by comparing the used names of std:: and Eigen:: with the includes of the header and
+of the project's headers that it includes.
 """
 
 import pathlib
@@ -21,7 +21,7 @@ from concurrent.futures import ThreadPoolExecutor
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', re.MULTILINE)
 COMMENT_OR_TEXT = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\\n])*"', re.DOTALL)
 NAME = re.compile(r"\bstd::(\w+)")
-# Headers that define names of another spelling; any of them is enough.
+# Headers that define names of a different spelling. One of them suffices.
 HEADERS = {
     "cmath": "atan2 cos floor log sin sqrt",
     "chrono": "chrono",
@@ -48,7 +48,7 @@ HEADERS = {
     "variant": "monostate",
 }
 DEFINED_IN = {name: {header} for header, names in HEADERS.items() for name in names.split()}
-# The standard lets many headers define these; these do in every library.
+# The standard allows many headers to define these names. These headers do in every library.
 CONTAINERS = {"array", "deque", "list", "map", "set", "span", "string", "string_view", "vector"}
 DEFINED_IN |= {name: CONTAINERS | {"cstddef", "cstring"} for name in ("size_t", "ptrdiff_t", "byte")}
 DEFINED_IN |= {name: CONTAINERS | {"algorithm", "functional", "memory", "optional", "tuple", "utility",
@@ -62,7 +62,7 @@ def needed(name):
 
 
 def headers_below(header, includes):
-    """The header and all headers of this project that it includes, directly or not."""
+    """Returns the header and all headers of this project that it includes, directly or indirectly."""
     below, open_ones = set(), {header}
     while open_ones:
         below |= open_ones
@@ -71,15 +71,15 @@ def headers_below(header, includes):
 
 
 def included(header, includes):
-    """All names that the header includes, directly or through headers of this project."""
+    """Returns all headers that the header includes, directly or through headers of this project."""
     return {name for one in headers_below(header, includes) for name in includes[one]}
 
 
 def chains(includes):
-    """The headers in lists, each header after those of its list that it includes.
+    """Divides the headers into lists, in each of which a header follows the headers it includes.
 
-    A list is one compilation. It shows as much as one for each header: what stands before a header
-    is what it includes itself.
+    Each list is compiled at once and finds the same faults as one compilation per header, because a header
+    follows only headers that it includes.
     """
     below = {header: headers_below(header, includes) for header in includes}
     left = dict.fromkeys(sorted(includes, key=lambda header: (-len(below[header]), header)))
@@ -99,7 +99,7 @@ def shows_eigen(names):
 
 
 def faults_of(header, there, code):
-    """What the header uses of the standard library and Eigen without a header that defines it."""
+    """Yields names of the standard library and Eigen that the header uses without including them."""
     for name in sorted(set(NAME.findall(code))):
         if not needed(name) & there:
             yield f"{header}: std::{name} without <{'> or <'.join(sorted(needed(name)))}>"

@@ -1,6 +1,6 @@
 #!/bin/sh
-# Installs the build folder $1 of the source folder $2 into a scratch prefix, builds README's example
-# against it, and compares its map with that of the installed program.
+# Installs the build folder $1 of the source folder $2 into a scratch prefix, builds the example of
+# README.md against it, and compares its map with the map of the installed program.
 set -eu
 build=$1
 source=$2
@@ -16,13 +16,13 @@ program=$scratch/prefix/bin/graspmap
 "$scratch/build/consumer" "$scratch/terrain.pcd" "$scratch/library.pcd" | grep -q ' voxels are graspable$'
 "$program" score "$scratch/terrain.pcd" --config primitive_shapes_prescan -o "$scratch/command.pcd" --quiet
 cmp "$scratch/library.pcd" "$scratch/command.pcd"
-# Moved as a whole, it still finds its libraries and its data.
+# A moved installation finds its libraries and its data.
 mv "$scratch/prefix" "$scratch/moved"
 "$scratch/moved/bin/graspmap" simulate scene --spacing 0.03 -o "$scratch/scene.pcd" --quiet
 "$scratch/moved/bin/graspmap" score "$scratch/scene.pcd" --voxel-size 0.03 -o "$scratch/map.pcd" \
   --quiet
 "$scratch/moved/bin/graspmap" info "$scratch/map.pcd" | grep 'kind: graspability map'
-# So does the Python module, where it is built.
+# The Python module, if it is built, finds them too.
 module=$scratch/moved/lib/python3/dist-packages
 if [ -d "$module" ]; then
   PYTHONPATH=$module /usr/bin/python3 -B -c "if True:

@@ -1,15 +1,15 @@
 #!/usr/bin/python3
-"""Checks all documents of the source without running their command lines.
+"""Checks all documents of the source folder without running their command lines.
 
 check_documents.py BUILD_FOLDER SOURCE_FOLDER [RUN_DOCUMENT...]
 
-- Each line of a fenced block that is a command line stands in a `console` block after `$ `, and each
-  document with such blocks is among RUN_DOCUMENT, those that check_transcripts.py runs.
-- Commands, options, their choices, variables of make files and scripts are those that there are: in
-  blocks, and in `code` within sentences.
-- Links lead to files and headings that exist.
-- Each command has a page in tools/manual, with its picture; the index lists it, and the gallery
-  shows its picture.
+- Each command line in a fenced block is in a `console` block after `$ `. Each document with such blocks is
+  among RUN_DOCUMENT, the documents that check_transcripts.py runs.
+- Commands, options, their choices, variables of make files and scripts exist, in blocks and in `code`
+  within sentences.
+- Links lead to existing files and headings.
+- Each command has a page in tools/manual with its image. The index lists the page, and the gallery shows
+  the image.
 """
 
 import pathlib
@@ -22,7 +22,7 @@ from documents import Document
 COMMAND_LINE = re.compile(
     r"(\$ |graspmap(?![:.])\b[^:]*(\s|$)|make -f|scripts/\w|build/\S*graspmap |cmake |ctest |g?db |apt)")
 CONDITIONS = {"data", "long", "elsewhere"}
-# Options of other programs that sentences name by themselves.
+# Options of other programs that documents mention without the program.
 FOREIGN_OPTIONS = {"--install", "--prefix", "--requeue", "--array", "--cpus-per-task", "--mem",
                    "--time", "--output_type"}
 MANUAL = pathlib.PurePath("tools/manual")
@@ -57,13 +57,13 @@ class Checker:
         name = str(document.path.relative_to(self.source))
         if name not in self.run_documents and any(
                 "elsewhere" not in block.conditions for block in document.consoles()):
-            self.fault(document.path, 1, "it has command lines that no test runs")
+            self.fault(document.path, 1, "no test runs its command lines")
 
     def check_console(self, document, block):
         for word in set(block.conditions) - CONDITIONS:
             self.fault(document.path, block.number, f"unknown condition {word}")
         if {"long", "elsewhere"} & set(block.conditions) and not block.reason:
-            self.fault(document.path, block.number, "it says no reason why it is not run")
+            self.fault(document.path, block.number, "a block that is not run needs a reason")
         transcripts = block.transcripts()
         if not transcripts:
             self.fault(document.path, block.number, "a console block without a `$ ` line")
@@ -72,7 +72,7 @@ class Checker:
             self.command_lines += 1
             self.check_line(document, number, transcript.command)
             if "GRASPMAP_DATA" in transcript.command and not block.conditions:
-                self.fault(document.path, number, "it needs data: ```console data")
+                self.fault(document.path, number, "a command that needs data requires ```console data")
             for line in transcript.output:
                 if re.match(r"graspmap [a-z-]+ (?!\S+:)|make -f", line):
                     self.fault(document.path, number, "a command line without `$ `: " + line)
@@ -82,8 +82,8 @@ class Checker:
             self.fault(document.path, number, text)
 
     def contexts(self, document, line, words):
-        """Commands whose option a code span may name: its own, the row's, or the page's and those
-        that the same line names; none: any command."""
+        """Returns the commands whose option a code span may name: the command of the span, of the table
+        row, or of the page and of the line. An empty list allows any command."""
         own = self.program.command_of(words)
         if own:
             return [own]
@@ -101,7 +101,7 @@ class Checker:
         return []
 
     def in_script(self, line, option):
-        """Whether a script that the line names knows the option."""
+        """Returns True if a script that the line names has the option."""
         paths = [self.source / name for name in re.findall(r"`(scripts/[\w-]+)", line)]
         return any(path.is_file() and option in path.read_text(encoding="utf-8")
                    for path in paths)
@@ -175,7 +175,7 @@ class Checker:
 
 
 def documents_of(source):
-    """All documents, builds and hidden folders left out."""
+    """Returns all documents outside of builds and hidden folders."""
     return [path for path in sorted(source.rglob("*.md"))
             if not any(part == "build" or part.startswith(".")
                        for part in path.relative_to(source).parts)]

@@ -1,15 +1,19 @@
 #!/usr/bin/python3
-"""Runs the command lines of a document and compares what they print with what it shows.
+"""Runs the command lines of a document and compares their output with the output in the document.
 
 check_transcripts.py BUILD_FOLDER SOURCE_FOLDER DOCUMENT [--begin-with FOLDER] [--in FOLDER]
                      [--makes FILE] [--write]
 
-What a document's blocks mean says documents.py; in what a command prints, `...` stands for any
-number of lines. All commands of a document run in one scratch folder, in order, with `graspmap` on
-the PATH and the source's `data`, `pipelines`, `scripts` and `tests` in it. --begin-with: the scratch
-folder begins with the files of this one; --in: it is this folder, emptied first and kept; --makes:
-the document's commands leave this file; --write: the document is changed to show what its commands
-print. Ends with 77 if nothing could be run.
+documents.py describes the blocks of a document. In the output of a command, `...` matches any number of
+lines. All commands of a document run in one scratch folder, in order, with `graspmap` in PATH and links
+to `data`, `pipelines`, `scripts` and `tests` of the source folder.
+
+--begin-with FOLDER  copies the files of FOLDER into the scratch folder first
+--in FOLDER          uses FOLDER as the scratch folder; it is emptied first and kept
+--makes FILE         requires that the commands write FILE
+--write              replaces the output in the document by the output of the commands
+
+Exits with 77 if no block could be run.
 """
 
 import argparse
@@ -27,7 +31,7 @@ SOURCE_LINKS = ("data", "pipelines", "scripts", "tests")
 
 
 def matches(expected, actual):
-    """Whether the lines are equal, `...` standing for any of them."""
+    """Returns True if the lines are equal; `...` matches any number of lines."""
     pattern = "".join(
         "(?:.*\n)*" if line.strip() == "..." else re.escape(line.rstrip()) + "[ ]*\n"
         for line in expected)
@@ -35,7 +39,7 @@ def matches(expected, actual):
 
 
 def run_command(command, folder, environment):
-    """(exit code, lines) of one command line."""
+    """Runs a command line and returns (exit code, lines)."""
     run = subprocess.run(["bash", "-c", command], cwd=folder, env=environment, text=True,
                          stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                          stderr=subprocess.STDOUT, errors="replace", check=False)
@@ -43,7 +47,7 @@ def run_command(command, folder, environment):
 
 
 def run_document(document, folder, environment, write):
-    """(number of commands that were run, number of those that failed)."""
+    """Returns (number of commands that were run, number of failed commands)."""
     count = failed = 0
     changes = []
     for block in document.consoles():
@@ -74,7 +78,7 @@ def run_document(document, folder, environment, write):
 
 
 def prepare(folder, source, begin_with):
-    """Puts the files of `begin_with` and links to the source's folders into the scratch folder."""
+    """Copies the files of `begin_with` into the scratch folder and links folders of the source."""
     if begin_with:
         for entry in begin_with.iterdir():
             if entry.is_dir() and not entry.is_symlink():

@@ -1,4 +1,4 @@
-"""Command lines of graspmap and of the pipelines, checked against `--help` and the make files."""
+"""Checks command lines of graspmap and of the pipelines against `--help` and the make files."""
 
 import pathlib
 import re
@@ -11,7 +11,7 @@ PLACEHOLDER = re.compile(r"[A-Z]|[$|*<]|\.\.")
 
 
 def words_of(line):
-    """The line's words as a shell would see them, nearly; separators are words of their own."""
+    """Splits a line into words approximately as a shell does. Separators are separate words."""
     try:
         words = shlex.split(line, comments=True)
     except ValueError:
@@ -27,7 +27,7 @@ def words_of(line):
 
 
 class Program:
-    """The commands of a built graspmap, and each one's options as its --help shows them."""
+    """Commands of a built graspmap with their options, from --help."""
 
     def __init__(self, executable):
         self.executable = str(executable)
@@ -44,7 +44,7 @@ class Program:
         return re.findall(r"^  ([a-z][\w-]*)  ", rest.partition("\n\n")[0], re.MULTILINE)
 
     def options(self, command):
-        """Option -> its choices (an empty list: any value) of `score`, `simulate scan`, ..."""
+        """Returns {option: choices} of `score`, `simulate scan`, ...; an empty list allows any value."""
         if command not in self._options:
             found = {}
             for line in self._help(*command.split(), "--help").splitlines():
@@ -60,13 +60,13 @@ class Program:
         return self._options[command]
 
     def all_options(self):
-        """Every option of every command."""
+        """Returns the options of all commands."""
         return set().union({"--help", "--version"}, *(
             self.options(f"{name} {kind}".strip())
             for name in self.commands for kind in self.kinds[name] or [""]))
 
     def command_of(self, words):
-        """`score` of ["score", "TERRAIN", ...], `simulate scan`, or nothing."""
+        """Returns the command of words, for example `score` of ["score", "TERRAIN"], or an empty text."""
         if not words or words[0] not in self.commands:
             return ""
         kinds = self.kinds[words[0]]
@@ -75,7 +75,7 @@ class Program:
         return f"{words[0]} {words[1]}" if len(words) > 1 and words[1] in kinds else ""
 
     def faults(self, words):
-        """What is wrong with the words that follow `graspmap`, up to the next command."""
+        """Returns the faults of the words between `graspmap` and the next command."""
         if not words or words[0] in SEPARATORS or words[0] in ("--help", "--version"):
             return []
         if PLACEHOLDER.search(words[0]):
@@ -89,7 +89,7 @@ class Program:
         return self.option_faults(command, words[len(command.split()):])
 
     def option_faults(self, command, words):
-        """What is wrong with the options among a command's words."""
+        """Returns the faults of the options among a command's words."""
         options = self.options(command)
         found = []
         for place, word in enumerate(words):
@@ -109,7 +109,7 @@ class Program:
 
 
 def make_faults(words, source):
-    """What is wrong with the words of a `make -f FILE VARIABLE=...`."""
+    """Returns the faults of the words of a `make -f FILE VARIABLE=...`."""
     if "-f" not in words[:-1]:
         return []
     name = words[words.index("-f") + 1].removeprefix("/usr/share/graspmap/")
@@ -137,7 +137,7 @@ def make_faults(words, source):
 
 
 def line_faults(line, program, source):
-    """What is wrong with a command line: commands, options, choices, make files, scripts."""
+    """Returns the faults of a command line: commands, options, choices, make files, scripts."""
     words = words_of(line)
     found = []
     for place, word in enumerate(words):

@@ -1,12 +1,12 @@
-"""What a Markdown document holds: fenced blocks, command lines, code in its sentences, links.
+"""Parser of Markdown documents: fenced blocks, command lines, code in sentences, links.
 
-Blocks fenced as ```console hold `$ COMMAND` lines, each followed by its output, standard output and
-error together. Words after `console` say when the block is run; a colon and a reason may follow:
+Blocks fenced as ```console contain `$ COMMAND` lines, each followed by its standard output and error.
+Words after `console` are the conditions for running the block; a colon and a reason may follow:
 
   console                      always
-  console data                 where GRASPMAP_DATA names the real data
-  console long: REASON         where GRASPMAP_LONG_DOCS is set
-  console elsewhere: REASON    never here; its command lines are still checked against --help
+  console data                 if GRASPMAP_DATA is the folder of the real data
+  console long: REASON         if GRASPMAP_LONG_DOCS is set
+  console elsewhere: REASON    never; its command lines are checked against --help
 """
 
 import os
@@ -17,7 +17,7 @@ FENCE = re.compile(r"\s*(```+|~~~+)\s*(.*)$")
 
 
 class Transcript:
-    """A command line of a block, and what the document says that it prints."""
+    """Command line of a block, with its output in the document."""
 
     def __init__(self, number, command):
         self.number = number
@@ -27,7 +27,7 @@ class Transcript:
 
 
 class Block:
-    """A fenced block: its line number, the fence's language, its conditions, reason and lines."""
+    """Fenced block: line number, language, conditions, reason and lines."""
 
     def __init__(self, number, info):
         words, _, reason = info.partition(":")
@@ -39,7 +39,7 @@ class Block:
         self.lines = []
 
     def skipped(self):
-        """Why the block is not run here, or nothing."""
+        """Returns the reason why the block is not run, or an empty text."""
         if "elsewhere" in self.conditions:
             return self.reason
         if "data" in self.conditions and not os.environ.get("GRASPMAP_DATA"):
@@ -49,7 +49,7 @@ class Block:
         return ""
 
     def transcripts(self):
-        """Each command of a console block."""
+        """Returns the commands of a console block with their output."""
         found = []
         for number, line in self.lines:
             if line.startswith("$ "):
@@ -63,7 +63,7 @@ class Block:
 
 
 class Document:
-    """A document's blocks, and its other lines as (line number, text)."""
+    """Blocks of a document, and its other lines as (line number, text)."""
 
     def __init__(self, path):
         self.path = pathlib.Path(path)
@@ -84,22 +84,22 @@ class Document:
         self.open_fence = fence is not None
 
     def consoles(self):
-        """Its console blocks."""
+        """Returns the console blocks."""
         return [block for block in self.blocks if block.language == "console"]
 
     def code_spans(self):
-        """(line number, line, code) of each `code` in its sentences and tables."""
+        """Returns (line number, line, code) of each `code` in sentences and tables."""
         return [(number, line, code.strip().replace("\\|", "|")) for number, line in self.prose
                 for code in re.findall(r"`([^`]+)`", line)]
 
     def links(self):
-        """(line number, target) of each link and picture."""
+        """Returns (line number, target) of each link and image."""
         pattern = r"\]\(([^()\s]+(?:\([^()\s]*\))?)\)|<img[^>]*\ssrc=\"([^\"]+)\""
         return [(number, markdown or html) for number, line in self.prose
                 for markdown, html in re.findall(pattern, re.sub(r"`[^`]*`", "", line))]
 
     def anchors(self):
-        """The names of its headings, as web views of repositories make them."""
+        """Returns the anchors of the headings, as web views of repositories generate them."""
         headings = [re.match(r"#+\s+(.*?)\s*#*$", line) for _, line in self.prose]
         return {re.sub(r"[^\w\- ]", "", heading.group(1)).lower().replace(" ", "-")
                 for heading in headings if heading}

@@ -1,11 +1,11 @@
 #!/usr/bin/python3
-"""Makes the pictures of tools/manual anew, by the pages' own commands.
+"""Regenerates the images of tools/manual with the commands of the pages.
 
 manual_pictures.py BUILD_FOLDER SOURCE_FOLDER [PAGE...]
 
-Each page PAGE.md leaves a PAGE.png. It goes into tools/manual/pictures as it is, or, if it is larger
-than 60,000 bytes, as a JPEG, made smaller until it is not; the page shows it by that name. Look at
-what has changed.
+The commands of each page PAGE.md write PAGE.png. It is copied to tools/manual/pictures, or, if it is
+larger than 60,000 bytes, converted to a JPEG and scaled down to this size. The page shows it by the
+resulting name. Inspect the changed images.
 """
 
 import pathlib
@@ -18,12 +18,12 @@ from vtkmodules.vtkIOImage import vtkJPEGWriter, vtkPNGReader
 
 LARGEST = 60_000
 WIDEST = 960
-# Share of the sides' length, quality of the JPEG.
+# Scale of the sides, quality of the JPEG.
 ATTEMPTS = [(1.0, 90), (1.0, 80), (1.0, 70), (0.85, 75), (0.7, 75), (0.5, 75)]
 
 
 def write_jpeg(source, target, scale, quality):
-    """Writes the picture with its sides shortened."""
+    """Writes the image scaled down."""
     reader = vtkPNGReader()
     reader.SetFileName(str(source))
     rgb = vtkImageExtractComponents()
@@ -44,7 +44,7 @@ def write_jpeg(source, target, scale, quality):
 
 
 def put_picture(source, folder):
-    """Puts the picture into the folder, small enough, in place of an earlier one."""
+    """Writes the image into the folder, at most 60,000 bytes, and removes the earlier image."""
     for extension in (".png", ".jpg"):
         (folder / source.name).with_suffix(extension).unlink(missing_ok=True)
     if source.stat().st_size <= LARGEST:

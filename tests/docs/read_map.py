@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""Reads a graspability map, its manifest and, if given, its tile store by tools/FORMATS.md alone, and
-checks what stands there: read_map.py MAP.pcd [STORE.tiles]. Nothing but the standard library."""
+"""Reads a graspability map, its manifest and optionally its tile store according to tools/FORMATS.md, and
+checks that page: read_map.py MAP.pcd [STORE.tiles]. Uses only the standard library."""
 
 import hashlib
 import json
@@ -16,7 +16,7 @@ COLORS = ((0.9, (0, 100, 0)), (0.8, (34, 170, 34)), (0.7, (154, 205, 50)), (0.6,
 
 
 def read_pcd(path):
-    """The records of a binary PCD file as dictionaries."""
+    """Returns the records of a binary PCD file as dictionaries."""
     data = path.read_bytes()
     end = data.index(b"DATA binary\n") + len(b"DATA binary\n")
     header = dict(line.split(" ", 1) for line in data[:end].decode().splitlines()
@@ -34,7 +34,7 @@ def read_manifest(path):
 
 
 def matched_of(point, threshold):
-    """The score of method `corrected` from its counts, before the factor falling_share."""
+    """Returns the score of method `corrected` from its counts, before the factor falling_share."""
     share = point["gsv"] / point["ssv"]
     if point["ssv"] <= threshold and share >= 0.6:
         share -= (threshold - point["ssv"]) / threshold
@@ -68,7 +68,7 @@ def check_map(points, manifest):
 
 
 def check_inputs(manifest, folder):
-    """How many of the inputs lie in the folder; their bytes are those of the manifest."""
+    """Returns the number of inputs in the folder. Checks their bytes against the manifest."""
     found = 0
     for one in manifest["inputs"]:
         path = folder / one["path"]
@@ -80,7 +80,7 @@ def check_inputs(manifest, folder):
 
 
 def read_store(store):
-    """All points of a tile store, each tile checked against the index and its journal."""
+    """Returns all points of a tile store. Checks each tile against the index and its journal."""
     index = json.loads((store / "index.json").read_text(encoding="utf-8"))
     assert index["format"] == "graspmap tile store" and index["version"] == 1
     journal = [json.loads(line) for path in sorted((store / "progress").glob("*_of_*.jsonl"))

@@ -1,6 +1,7 @@
 #!/usr/bin/python3
-"""Makes the mask of method `corrected` by section 4 of libgtd/ALGORITHM.md alone and compares it with
-what `graspmap mask` wrote: read_mask.py GRIPPER.yaml VOXEL_SIZE_M MASK.txt (no extra void layers)."""
+"""Computes the mask of method `corrected` according to section 4 of libgtd/ALGORITHM.md and compares it
+with the output of `graspmap mask`: read_mask.py GRIPPER.yaml VOXEL_SIZE_M MASK.txt (no extra void
+layers)."""
 
 import math
 import pathlib
@@ -14,7 +15,7 @@ def read_gripper(path):
 
 
 def read_mask(path):
-    """(side, layers of lines), the top layer first."""
+    """Returns (side, layers of lines), the top layer first."""
     lines = path.read_text(encoding="utf-8").splitlines()
     side = int(lines[1].split()[0])
     rows = [line for line in lines[2:] if not line.startswith("z")]

@@ -1,15 +1,15 @@
 #!/usr/bin/python3
-"""Every function and enumeration of the public headers is documented: check_documented.py XML_FOLDER
+"""Checks that functions and enumerations of public headers have comments: check_documented.py XML_FOLDER
 
-Reads Doxygen's XML. A comment above a paragraph of declarations is all of theirs, and one of several
-overloads is documented for all. What says by its name what it is needs no sentence: fields; accessors
-and other functions that are defined where they are declared; constructors without arguments, of
-copies and moves, destructors and operators; and four names with one meaning everywhere:
+Reads Doxygen's XML. A comment documents all declarations up to the next blank line, and the comment of
+one overload documents all overloads. Fields, accessors and other functions that are defined where they
+are declared, default, copy and move constructors, destructors and operators need no comment, nor do
+four names that have one meaning in all headers:
 
   bind(table, options)  binds the options' fields to keys and flags
-  X_names()             the names of an enumeration's values, as flags and files have them
-  to_text(value)        such a name
-  check()               throws Error naming the first field that cannot be
+  X_names()             returns the names of an enumeration's values in flags and files
+  to_text(value)        returns the name of a value
+  check()               throws Error naming the first invalid field
 """
 
 import pathlib
@@ -36,7 +36,7 @@ def explains_itself(member, owner):
 
 
 def undocumented(compound):
-    """(file, line, declaration) of what has no comment in a class or namespace."""
+    """Returns (file, line, declaration) of declarations without a comment in a class or namespace."""
     owner = compound.findtext("compoundname").split("::")[-1]
     missing = []
     documented = set()

@@ -1,6 +1,6 @@
 #!/bin/sh
-# The target `docs` builds without a warning, and every function of the public headers has a comment.
-# run.sh BUILD_FOLDER PYTHON DOXYGEN. Ends with 77 where Doxygen is not installed.
+# Checks that the target `docs` builds without warnings and that every function of the public headers has
+# a comment: run.sh BUILD_FOLDER PYTHON DOXYGEN. Exits with 77 if Doxygen is not installed.
 set -eu
 if [ ! -x "$3" ]; then
   echo "skipped: Debian's doxygen is not installed"

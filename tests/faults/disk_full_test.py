@@ -1,16 +1,16 @@
 #!/usr/bin/python3
-"""Every command that writes, on a disk that is full.
+"""Runs every command that writes files on a full disk.
 
 disk_full_test.py GRASPMAP SOURCE_FOLDER
 
-Each command runs once on a small disk of its own (a tmpfs in a namespace of mounts), then once more
-with nothing left of it, and once with half of what its outputs take. The second and third must end
- - with exit code 1 and one line that names a file and says that the disk is full (with half left: or
-   with all outputs as they were, where that was enough);
- - with every earlier file as it was, and no other beside them.
-What prints to standard output must fail on /dev/full alike. Ends with 77 where no disk can be mounted.
-Without FULL: each command once or twice; FULL=1: each use of it in tests/hostile/commands.py. ONLY: a
-part of a command to run alone.
+Each command runs three times on a small disk (a tmpfs in a mount namespace): with enough space, with no
+free space, and with half the space of its outputs. The second and third run must
+ - exit with 1 and print one line that names a file and reports that the disk is full (the third run may
+   instead write all outputs, if the space suffices);
+ - leave every earlier file unchanged and write no other file.
+Commands that write to standard output must fail in the same way on /dev/full. Exits with 77 if no disk
+can be mounted. Runs each command once or twice, or with FULL=1 each use of it in
+tests/hostile/commands.py. ONLY selects the commands that contain this text.
 """
 import os
 import pathlib
@@ -63,18 +63,18 @@ PRINTING = [
     "--help",
     "--version",
 ]
-# Outputs whose content differs from run to run: how long it took.
+# Outputs that contain the run time and therefore differ between runs.
 WITH_TIMES = (".json", ".txt", ".html")
 
 
 def mounted_disks():
-    """Whether this process may mount: it has a namespace of its own."""
+    """Returns True if this process is in a separate mount namespace and may mount."""
     return os.environ.get("GRASPMAP_TEST_MOUNTS") == "1"
 
 
 def enter_namespace():
     probe = ["sh", "-c", "mount -t tmpfs -o size=64k none /mnt"]
-    # The first needs namespaces of users, the second root.
+    # The first command needs user namespaces, the second root.
     for line in (["unshare", "--mount", "--map-root-user"], ["unshare", "--mount"]):
         if shutil.which("unshare") and subprocess.run(line + probe, capture_output=True, check=False).returncode == 0:
             os.environ["GRASPMAP_TEST_MOUNTS"] = "1"
@@ -118,7 +118,7 @@ class Disk:
         self.folder.mkdir()
 
     def leave(self, free):
-        """Fills it but for `free` bytes; what took the place lies outside of the folder."""
+        """Fills the disk up to `free` bytes with a file outside of the folder."""
         filler = self.place / "filler"
         filler.unlink(missing_ok=True)
         left = os.statvfs(self.place)
@@ -163,7 +163,7 @@ class Test:
         self.disk.empty()
         first = self.run(line)
         if first.returncode == 3 and line not in MORE:
-            return False  # the good inputs alone do not make it
+            return False  # the command fails on the good inputs
         if first.returncode != 0:
             self.expect(False, line, "fails on a disk with room", first)
             return False
@@ -173,25 +173,25 @@ class Test:
             self.disk.leave(free)
             title = f"{line} ({free} bytes left)"
             run = self.run(line)
-            # A store that is complete has nothing to write.
+            # A complete store has nothing to write.
             if (free == 0 and "out.tiles" not in line) or run.returncode != 0:
                 self.refused += 1
                 self.expect_clear_error(title, run)
             if "--force" in line and "out.tiles" in line:
-                continue  # a store begun anew: it is emptied first, since two may not fit where one does
+                continue  # a restarted store is emptied first, since the disk may hold only one
             after = snapshot(self.disk.folder)
             for difference in differences(before, after):
                 self.expect(False, title, difference, run)
         return True
 
     def new(self, line):
-        """No earlier output: nothing appears."""
+        """Checks a run without earlier outputs: it leaves no file."""
         self.disk.make_room()
         self.disk.empty()
         self.disk.leave(0)
         run = self.run(line)
         self.expect_clear_error(line + " (new)", run)
-        # A store of tiles can be resumed later.
+        # A tile store can be resumed.
         left = [name for name in snapshot(self.disk.folder) if not re.match(r"out\.(tiles|txt\.features|g2o\.features)", name)]
         self.expect(not left, line + " (new)", f"leaves {left}", run)
 

@@ -1,14 +1,14 @@
-"""Every place of every command that takes a file: which kinds of input fit there."""
+"""Uses of every command with an input file, and the kinds of broken input for each."""
 from dataclasses import dataclass
 
 
 @dataclass
 class Use:
     name: str
-    words: list    # {x}: the broken input, {good}: the folder of good ones; outputs by their plain names
-    kinds: tuple   # of broken inputs that fit
-    main: bool     # in the short run as well
-    example: str   # the good input in the broken one's place
+    words: list    # {x}: the broken input, {good}: the folder of good inputs; outputs without a folder
+    kinds: tuple   # kinds of broken input
+    main: bool     # also in the short run
+    example: str   # good input to replace the broken one
 
 
 def use(words, kinds, example, main=False):

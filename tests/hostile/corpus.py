@@ -1,4 +1,4 @@
-"""The folder of broken inputs, and damage that fits any format."""
+"""Corpus of broken inputs, and damage that applies to any format."""
 import hashlib
 import os
 import pathlib
@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 @dataclass
 class Case:
-    kind: str      # what it pretends to be: the key of commands.ACCEPTS
-    name: str      # what is wrong with it
+    kind: str      # claimed kind: the key of commands.ACCEPTS
+    name: str      # name of the fault
     path: pathlib.Path
-    refused: bool  # nothing sound can be read out of it: exit code 0 would be wrong
+    refused: bool  # contains nothing valid: exit code 0 is an error
 
     @property
     def title(self):
@@ -20,7 +20,7 @@ class Case:
 
 
 class Corpus:
-    """Each case lies in a folder of its own, as "broken" + the extension of its format."""
+    """Folder with one subfolder per case, which contains "broken" + the extension of the format."""
 
     def __init__(self, folder, good, seed):
         self.folder = pathlib.Path(folder)
@@ -29,28 +29,28 @@ class Corpus:
         self.cases = []
 
     def random(self, *words):
-        """Independent of the other cases: a new case changes no earlier one."""
+        """Returns the random generator of a case, so that a new case changes no other case."""
         return random.Random("/".join([str(self.seed), *words]))
 
     def path(self, kind, name, extension, refused=False):
-        """A new case's place."""
+        """Adds a case and returns its path."""
         folder = self.folder / f"{kind}.{name}"
         folder.mkdir(parents=True)
         case = Case(kind, name, folder / ("broken" + extension), refused and kind not in self.PATIENT)
         self.cases.append(case)
         return case.path
 
-    # Kinds of which one broken file is passed over, or an empty one says nothing and is sound.
+    # Kinds in which one broken file is skipped, or an empty file is valid.
     PATIENT = ("board", "scenario")
 
     def add(self, kind, name, extension, content, refused=False):
-        """A case of one file; True: nothing can be read out of it."""
+        """Adds a case of one file. True: it contains nothing valid."""
         if isinstance(content, str):
             content = content.encode()
         self.path(kind, name, extension, refused).write_bytes(content)
 
     def copy(self, kind, name, source, extension="", refused=False):
-        """A case that begins as a copy of a good folder or file."""
+        """Adds a case as a copy of a good folder or file."""
         path = self.path(kind, name, extension, refused)
         source = self.good / source
         if source.is_dir():
@@ -60,7 +60,7 @@ class Corpus:
         return path
 
     def digest(self):
-        """SHA-256 of every file's name and content."""
+        """Returns the SHA-256 of all file names and contents."""
         total = hashlib.sha256()
         for root, folders, files in os.walk(self.folder):
             folders.sort()
@@ -74,7 +74,7 @@ class Corpus:
 
 
 def damaged_bytes(data, draw):
-    """(name, bytes, whether it must be refused) of what can befall any file."""
+    """Returns (name, bytes, True if it must be rejected) of damage that applies to any file."""
     size = len(data)
     at = draw.randrange(size // 4, size)
     flipped = bytearray(data)
@@ -104,7 +104,7 @@ def damaged_bytes(data, draw):
 
 
 def damage_file(corpus, kind, source, label, extension=None, leave_out=()):
-    """Every general damage of one good file."""
+    """Adds all general damage of one good file."""
     extension = extension or pathlib.Path(source).suffix
     data = (corpus.good / source).read_bytes()
     for name, content, refused in damaged_bytes(data, corpus.random(kind, label)):
@@ -113,7 +113,7 @@ def damage_file(corpus, kind, source, label, extension=None, leave_out=()):
 
 
 def damage_text(corpus, kind, source, label, extension=None):
-    """What befalls texts in particular."""
+    """Adds damage that applies to text files."""
     extension = extension or pathlib.Path(source).suffix
     text = (corpus.good / source).read_text()
     add = lambda name, content, refused=False: corpus.add(kind, f"{label} {name}", extension, content, refused)

@@ -213,7 +213,7 @@ def glb(corpus):
 
 
 def maps(corpus):
-    """A map's cloud or its manifest."""
+    """Adds damage of a map's cloud or of its manifest."""
     def broken_manifest(name, change):
         path = corpus.copy("map", f"manifest {name}", "map.pcd", ".pcd")
         text = (corpus.good / "map.pcd.json").read_text()
@@ -249,7 +249,7 @@ def maps(corpus):
 
 
 def tiff(tags, data=b""):
-    """A little-endian TIFF of one directory; tags: {number: (type, count, value)}; the data are at byte 8."""
+    """Returns a little-endian TIFF of one directory. tags: {number: (type, count, value)}. Data start at byte 8."""
     at = 8 + len(data)
     entries = b"".join(struct.pack("<HHII", tag, *what) for tag, what in sorted(tags.items()))
     return b"II*\0" + struct.pack("<I", at) + data + struct.pack("<H", len(tags)) + entries + bytes(4)
@@ -259,7 +259,7 @@ def dem(corpus):
     damage_file(corpus, "dem", "dem.tif", "TIFF")
     scale = struct.pack("<3d6d", 0.02, 0.02, 0, 0, 0, 0, 500000, 5400000, 0)
     values = struct.pack("<16f", *range(16))
-    # 4 x 4 pixels of float32 in one strip; the transform before them.
+    # 4 x 4 pixels of float32 in one strip, after the transform.
     good = {256: (3, 1, 4), 257: (3, 1, 4), 258: (3, 1, 32), 259: (3, 1, 1), 262: (3, 1, 1), 273: (4, 1, 8 + len(scale)),
             277: (3, 1, 1), 278: (3, 1, 4), 279: (4, 1, 64), 339: (3, 1, 3), 33550: (12, 3, 8), 33922: (12, 6, 32)}
 

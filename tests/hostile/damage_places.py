@@ -1,4 +1,4 @@
-"""Paths that are no file, or none that can be read; the same for every kind of input."""
+"""Paths that are not files or not readable, for every kind of input."""
 import os
 
 EXTENSIONS = {
@@ -9,7 +9,7 @@ EXTENSIONS = {
 
 
 def make(corpus):
-    """Needs no root; a file that nobody may read is one for root too, by its owner's lack of rights."""
+    """Adds the paths without root privileges. Root runs "not readable" as nobody."""
     for kind, extension in EXTENSIONS.items():
         folder = kind in ("tiles", "rig-folder", "run-folder")
         path = lambda name, refused=True: corpus.path(kind, name, extension, refused)
@@ -33,7 +33,7 @@ def make(corpus):
         place = path("not readable")
         place.mkdir() if folder else place.write_text("text\n")
         place.chmod(0)
-        # procfs: of size 0, and reading fails.
+        # procfs file of size 0; reading fails.
         path("a file of the kernel").symlink_to("/proc/self/mem")
     corpus.add("cloud", "size of a sparse file", ".pcd", b"# .PCD v0.7\nVERSION 0.7\n", True)
     os.truncate(corpus.cases[-1].path, 1 << 40)

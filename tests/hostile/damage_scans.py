@@ -15,7 +15,7 @@ def rvl(width, height, words):
 
 
 def zip_bomb(size, tail):
-    """Zeros that unpack to `size`, as RTAB-Map stores matrices: three numbers at the end."""
+    """Returns compressed zeros of `size` bytes as RTAB-Map stores matrices: three numbers at the end."""
     packer = zlib.compressobj(9, zlib.DEFLATED, -15)
     block = packer.compress(bytes(1 << 20)) + packer.flush(zlib.Z_FULL_FLUSH)
     checksum = size % 65521 << 16 | 1  # Adler-32 of zeros
@@ -24,12 +24,12 @@ def zip_bomb(size, tail):
 
 
 def database(corpus, name, statements, refused=False):
-    """A copy of the good database on which `statements` (SQL, or SQL and its values) were run."""
+    """Adds a copy of the good database after `statements` (SQL, or SQL and its values)."""
     path = corpus.copy("scan", f"database {name}", "scan.db", ".db", refused)
     with sqlite3.connect(path) as connection:
         connection.execute("PRAGMA foreign_keys = OFF")
         connection.execute("PRAGMA journal_mode = OFF")
-        # They hinder changes of tables and mean nothing to a reader.
+        # Triggers prevent changes of tables and do not affect readers.
         for (trigger,) in connection.execute("SELECT name FROM sqlite_master WHERE type = 'trigger'").fetchall():
             connection.execute(f"DROP TRIGGER {trigger}")
         for statement in statements:
@@ -192,13 +192,13 @@ def database_file(corpus):
 
 
 def inflated_png(side):
-    """Promises side x side pixels of 16 bits."""
+    """Returns an image whose header declares side x side pixels of 16 bits."""
     return png(side, side, [bytes(64)] * 3, 16)
 
 
 @functools.cache
 def png_bomb():
-    """8000 x 8000 pixels of 16 bits in 130 kB."""
+    """Returns an image of 8000 x 8000 pixels of 16 bits in 130 kB."""
     return png(8000, 8000, [bytes(16000)] * 8000, 16)
 
 
@@ -300,7 +300,7 @@ def ros2_bags(corpus):
             database.commit()
 
     def transforms(*frames):
-        """CDR of a tf2_msgs/msg/TFMessage: (parent, child), each at the other's origin."""
+        """Returns the CDR of a tf2_msgs/msg/TFMessage: identity transforms of (parent, child)."""
         data = bytearray(struct.pack("<I", len(frames)))
         for pair in frames:
             data += bytes(-len(data) % 4 + 8)

@@ -19,7 +19,7 @@ def yaml(corpus):
         damage_file(corpus, kind, source, "YAML", leave_out=("0xff", "zeros", "one byte"))
         damage_text(corpus, kind, source, "YAML")
         add = lambda name, content, refused=False: corpus.add(kind, f"YAML {name}", ".yaml", content, refused)
-        strict = kind != "camera"  # OpenCV's files hold more than is read
+        strict = kind != "camera"  # OpenCV's files contain more fields than are read
         add("aliases that multiply", aliases + text, strict)
         add("merges that multiply", merged + text, strict)
         add("alias of itself", "a: &a [*a]\n" + text, strict)
@@ -41,7 +41,7 @@ def yaml(corpus):
 
 
 def urdf(corpus):
-    """A gripper file whose URDF is broken."""
+    """Adds a gripper file with a broken URDF."""
     mapping = (corpus.good / "hubrobo-urdf.yaml").read_text().replace("hubrobo.urdf", "broken.urdf")
     good = (corpus.good / "hubrobo.urdf").read_text()
 
@@ -65,7 +65,7 @@ def urdf(corpus):
 
 
 def numeric_keys(text):
-    """Keys, each once, that a number or a list of numbers follows."""
+    """Returns the unique keys that precede a number or a list of numbers."""
     keys = []
     for word in text.replace("{", " ").replace(",", " ").split():
         if word.endswith(":") and word[:-1] not in keys and word[:-1] not in (
@@ -218,7 +218,7 @@ def tile_indexes(corpus):
     with_index("version 9", lambda other: other.update(version=9))
     with_index("another format", lambda other: other.update(format="other"))
     with_index("no map", lambda other: other.pop("map"))
-    # Hashes that are right, of a tile that is not.
+    # Correct hashes of a broken tile.
     file = index["tiles"][0]["file"]
     tile = (corpus.good / "map.tiles" / file).read_bytes()
     forged = tile.replace(b"POINTS ", b"POINTS 9", 1).replace(b"WIDTH ", b"WIDTH 9", 1)

@@ -1,4 +1,4 @@
-"""Small good inputs of every kind, made by graspmap itself."""
+"""Small valid inputs of every kind, written by graspmap."""
 import math
 import pathlib
 import shutil
@@ -67,7 +67,7 @@ TEXTS = {
 
 SCORE = ["score", "terrain.pcd", "--config", "scenario.yaml"]
 
-# In this order; each reads what stands before it.
+# Commands in order; each may read the outputs of earlier ones.
 COMMANDS = [
     ["simulate", "scene", "--scene", "scene.yaml", "--spacing", "0.02", "-o", "terrain.pcd"],
     ["simulate", "scene", "--scene", "scene.yaml", "--mesh", "--edge-length", "0.1",
@@ -103,7 +103,7 @@ COMMANDS = [
 
 
 def png(width, height, rows, depth=8, color=0):
-    """A PNG of `rows`, each the bytes of a row of pixels."""
+    """Returns a PNG of `rows`, each the bytes of a row of pixels."""
     def chunk(kind, data):
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
     data = b"".join(b"\0" + row for row in rows)
@@ -112,13 +112,13 @@ def png(width, height, rows, depth=8, color=0):
 
 
 def board(turn, lean):
-    """A chessboard of 8 x 6 inner corners seen by a camera of 160 x 120 pixels."""
+    """Returns an image of a chessboard of 8 x 6 inner corners, 160 x 120 pixels."""
     c, s, d = math.cos(turn), math.sin(turn), math.cos(lean)
     rows = []
     for v in range(120):
         row = bytearray()
         for u in range(160):
-            # The ray through the pixel meets the board's plane, which leans about y.
+            # Intersection of the pixel's ray with the board's plane, which is rotated about y.
             x, y = (u - 79.5) / 150, (v - 59.5) / 150
             scale = 0.32 * d / (d - x * math.sin(lean))
             px, py = scale * x / d, scale * y
@@ -130,7 +130,7 @@ def board(turn, lean):
 
 
 def make(folder, graspmap, source):
-    """Fills `folder`; an input that cannot be made ends the program."""
+    """Writes the inputs into `folder`; exits if one fails."""
     folder = pathlib.Path(folder)
     folder.mkdir()
     for name, text in TEXTS.items():

@@ -36,14 +36,14 @@ import good_inputs
 
 CPU_S = 10
 NOBODY = 65534
-WALL_S = 90  # of a loaded machine
+WALL_S = 90  # limit on a loaded machine
 MEMORY_MB = 500
 ADDRESS_SPACE = 12 << 30
 FILE_SIZE = 1 << 30
-SAMPLE = 60      # of the runs that the short run leaves out
-FOREIGN = 12     # files of other kinds in each place
+SAMPLE = 60      # number of runs sampled from those that the short run omits
+FOREIGN = 12     # files of other kinds per use
 
-# What a library or the C++ runtime says of itself is no reason for a user.
+# Messages of libraries or of the C++ runtime do not explain an error to a user.
 RAW = re.compile(r"bad_alloc|basic_string|vector::|map::at|_M_|stoi|stod|bad_\w+_access|std::|Eigen|json\.exception|"
                  r"yaml-cpp|boost|assert|\[pcl|vtk[A-Z]|cv::|OpenCV\(|SQLITE_|filesystem error|Success$")
 
@@ -69,7 +69,7 @@ class Findings:
 
 
 def snapshot(folder):
-    """Which files there are, and which they are: a file written anew has another inode or time."""
+    """Returns the files with inode and time, which change if a file is rewritten."""
     found = {}
     for root, folders, files in os.walk(folder):
         for name in folders + files:
@@ -81,7 +81,7 @@ def snapshot(folder):
 
 
 class Place:
-    """A use's folder with its earlier good outputs, made anew where a run changed it."""
+    """Folder of a use with earlier good outputs, recreated if a run changed it."""
 
     def __init__(self, use, template, folder):
         self.use, self.template, self.folder = use, template, folder
@@ -90,7 +90,7 @@ class Place:
     def renew(self):
         shutil.rmtree(self.folder, ignore_errors=True)
         shutil.copytree(self.template, self.folder)
-        if os.geteuid() == 0:  # some runs are nobody's
+        if os.geteuid() == 0:  # some runs have the user nobody
             for root, _, files in os.walk(self.folder):
                 for name in [root] + [os.path.join(root, file) for file in files]:
                     os.chown(name, NOBODY, NOBODY)
@@ -98,7 +98,7 @@ class Place:
 
 
 def run(words, folder, as_nobody, sanitized):
-    """(exit code, stdout, stderr, MB, processor seconds); 128 + the signal's number if one ended it."""
+    """Returns (exit code, or 128 + number of the signal, stdout, stderr, MB, processor seconds)."""
     prefix = [] if sanitized else ["/usr/bin/prlimit", f"--as={ADDRESS_SPACE}", f"--fsize={FILE_SIZE}", f"--cpu={4 * CPU_S}"]
     if as_nobody:
         prefix = ["/usr/bin/setpriv", f"--reuid={NOBODY}", f"--regid={NOBODY}", "--clear-groups"] + prefix
@@ -119,7 +119,7 @@ def run(words, folder, as_nobody, sanitized):
 
 
 def problems_of_text(code, stderr, names):
-    """What is wrong with what a run said; `names` are those of its inputs."""
+    """Returns the faults of the output of a run; `names` are those of its inputs."""
     found = []
     try:
         text = stderr.decode()
@@ -151,17 +151,17 @@ def check(graspmap, good, case, place, findings, sanitized):
     inputs = snapshot(case.path.parent) if case.path.parent.is_dir() else {}
     as_nobody = case.name == "not readable" and os.geteuid() == 0
     code, stdout, stderr, megabytes, seconds = run([graspmap] + words, place.folder, as_nobody, sanitized)
-    # The broken file or one beside it, what it names or does not fit with, or the flag or the output
-    # that it is not for.
+    # The error must name the broken file or one beside it, a file that it names or contradicts, or the
+    # flag or the output that does not accept it.
     names = [str(case.path.parent), str(good), "/dev/zero", "/etc/passwd"]
     names += [word for word in words if word.startswith("--")]
     if not fits(case, use):
         names += [word for word in words if word.startswith("out")]
     found = problems_of_text(code, stderr, names)
-    # A file of another kind may make it another usage of the command, with other arguments.
+    # A file of another kind may select another usage of the command, with other arguments.
     if code not in ((0, 1, 3) if fits(case, use) else (0, 1, 2, 3)):
         found.append("a crash" if code > 127 else f"exit code {code}")
-    # info describes files that other commands refuse; of a bag it reads as much as they do.
+    # info describes files that other commands reject. It reads bags as completely as they do.
     lenient = use.words[0] == "info" and use.kinds != ("bag",)
     if code == 0 and case.refused and use.main and fits(case, use) and not lenient:
         found.append("not refused")
@@ -187,7 +187,7 @@ def check(graspmap, good, case, place, findings, sanitized):
 
 
 def make_corpus(folder, good, seed):
-    """(cases, digest)."""
+    """Returns (cases, digest)."""
     broken = corpus.Corpus(folder, good, seed)
     for part in (damage_geometry, damage_scans, damage_texts, damage_places):
         part.make(broken)
@@ -195,7 +195,7 @@ def make_corpus(folder, good, seed):
 
 
 def apart(work, *arguments):
-    """In a process of its own: what it takes of memory would count for each program started later."""
+    """Creates the corpus in a separate process, whose memory would count for programs started later."""
     with ProcessPoolExecutor(1) as process:
         return process.submit(work, *arguments).result()
 
@@ -205,7 +205,7 @@ def fits(case, use):
 
 
 def planned(cases, seed, full):
-    """(case, use) pairs."""
+    """Returns (case, use) pairs."""
     draw = random.Random(f"{seed}/runs")
     common, rest = [], []
     for case in cases:
@@ -226,7 +226,7 @@ def planned(cases, seed, full):
 
 
 def templates(graspmap, good, folder, jobs):
-    """Of each use its outputs of a good input."""
+    """Writes the outputs of each use for a good input."""
     def make(number):
         use, place = commands.USES[number], folder / str(number)
         place.mkdir(parents=True)
@@ -271,7 +271,7 @@ def main():
             by_use.setdefault(use.name, []).append((case, use))
         shutil.rmtree(scratch / "work", ignore_errors=True)
 
-        # One at a time in a folder; long lists in several folders.
+        # One run at a time per folder; long lists use several folders.
         def work(number, some):
             place = Place(some[0][1], earlier[some[0][1].name], scratch / "work" / str(number))
             for case, _ in some:

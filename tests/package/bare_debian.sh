@@ -1,7 +1,7 @@
 #!/bin/sh
 # Installs Debian packages of graspmap in a bare Debian 12 (debootstrap, as root, with this machine's
-# mirror) and runs the demo there, then the Python module if its package is given. Prints how long
-# each took. `scripts/package --test` runs it; no test of the suite does.
+# mirror), runs the demo there, and the Python module if its package is given. Prints the durations.
+# `scripts/package --test` runs it; it is not part of the test suite.
 #
 # bare_debian.sh PACKAGE.deb...
 set -eu
@@ -18,7 +18,7 @@ debootstrap --variant=minbase bookworm "$root" "$mirror" >"$folder/debootstrap.l
 rm -f "$root/etc/apt/sources.list"
 mkdir -p "$root/root/packages"
 cp "$debian" "$root/etc/apt/$(echo "$debian" | cut -d / -f 4-)"
-# Proxies and the like.
+# Proxy settings and other APT configuration.
 for file in /etc/apt/apt.conf.d/*; do
   ! grep -q '^ *Acquire::' "$file" || cp "$file" "$root/etc/apt/apt.conf.d/"
 done

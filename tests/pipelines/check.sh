@@ -1,4 +1,4 @@
-# Shared by the tests of the pipelines; sourced with the program $1 and the source folder $2.
+# Functions of the pipeline tests; sourced with the program $1 and the source folder $2.
 set -eu
 graspmap=$(realpath "$1")
 source=$(realpath "$2")
@@ -10,19 +10,19 @@ fail() {
   exit 1
 }
 
-# Every file is there and not empty.
+# Fails unless every file exists and is not empty.
 require_files() {
   for file in "$@"; do [ -s "$file" ] || fail "$file is missing or empty"; done
 }
 
-# Names, sizes and times of all files below a folder.
+# Prints names, sizes and times of all files below a folder.
 listing() {
   find "$1" -type f -printf '%P %s %T@\n' | sort
 }
 
-# SHA-256 of all files below the folder $1, in its order, but those whose name fits the pattern $2. Of
-# what tells how long a run took, without that: of a manifest the section `run`, its last; of a
-# store's plan, when its inputs were written; of a report, which shows all of these, the name alone.
+# Prints the SHA-256 of all files below the folder $1, sorted, except files whose name matches the pattern
+# $2. Data that differ between runs are excluded: the section `run` of a manifest (the last section), the
+# times of the inputs in the plan of a tile store, and the content of a report.
 digest() {
   (cd "$1" && find . -mindepth 1 ! -type d ! -name "${2:-}" | LC_ALL=C sort | while read -r file; do
     case $file in
@@ -34,7 +34,7 @@ digest() {
   done)
 }
 
-# The processes that were started with GRASPMAP_TEST_RUN=$1 in their environment.
+# Prints the processes that were started with GRASPMAP_TEST_RUN=$1 in their environment.
 processes_of() {
   for found in $(grep -lsxz "GRASPMAP_TEST_RUN=$1" /proc/[0-9]*/environ); do
     process=${found%/environ}
@@ -42,8 +42,8 @@ processes_of() {
   done
 }
 
-# All of them have ended, at once or soon, and nobody holds a lock in the folder $2. One that is about
-# to end has lost its environment before it gives its locks back.
+# Fails unless these processes end soon and no process holds a lock in the folder $2. An ending process
+# loses its environment before it releases its locks.
 require_no_processes() {
   for _ in $(seq 300); do
     if [ -z "$(processes_of "$1")" ] &&

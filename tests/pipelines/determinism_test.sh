@@ -1,8 +1,8 @@
 #!/bin/sh
-# Every output of the demo's pipelines but pictures has the same bytes for any number of threads, in
-# any locale, wherever it runs and whatever the umask; manifests but for their section `run`. On
-# smaller inputs; with FULL=1 on those of pipelines/demo.mk (DEMO_WITH: variables of make), each number
-# of threads twice, and says whether the pictures agree too.
+# Checks that the outputs of the demo's pipelines, except images and the section `run` of manifests, have
+# identical bytes for any number of threads, locale, folder and umask. Uses smaller inputs than
+# pipelines/demo.mk. FULL=1 uses those of pipelines/demo.mk (DEMO_WITH: variables of make), runs each
+# number of threads twice, and reports if the images agree too.
 . "$(dirname "$0")/check.sh"
 if [ -n "${FULL:-}" ]; then
   demo_with=${DEMO_WITH:-}
@@ -12,7 +12,7 @@ else
   runs='1:C 2:de_DE.UTF-8 8:tr_TR.UTF-8'
 fi
 
-# Locales that this machine does not have are made for the test.
+# Generates locales that this machine does not have.
 for locale in de_DE tr_TR; do
   if locale -a | grep -qix "$locale.utf-\?8"; then continue; fi
   mkdir -p "$scratch/locales"
@@ -21,7 +21,7 @@ for locale in de_DE tr_TR; do
   export LOCPATH="$scratch/locales"
 done
 
-# A program that runs graspmap with so many threads where the pipeline does not say how many.
+# Wrapper that sets the number of threads of graspmap if the pipeline does not.
 cat >"$scratch/graspmap" <<END
 #!/bin/sh
 for word in "\$@"; do
@@ -31,7 +31,7 @@ exec "$graspmap" "\$@" --threads "\$GRASPMAP_TEST_THREADS"
 END
 chmod +x "$scratch/graspmap"
 
-# A report tells how long the commands took: two of the same folder are the same.
+# A report contains the durations of commands. Two reports of one folder are identical.
 same_reports() (
   cd "$1"
   LC_ALL=C "$graspmap" report out -o one.html --threads 1 --quiet
@@ -44,7 +44,7 @@ run() {
   threads=${1%%:*}
   locale=${1#*:}
   number=$2
-  # Manifests hold the inputs' paths: OUT is the same, its place another.
+  # Manifests contain the paths of inputs, so OUT is the same path in different folders.
   folder=$scratch/"place $number"
   mkdir "$folder" "$scratch/tmp_$number"
   # shellcheck disable=SC2086 # words

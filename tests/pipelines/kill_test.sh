@@ -1,13 +1,13 @@
 #!/bin/bash
-# A pipeline, killed again and again at random moments and begun once more, ends with the bytes of an
-# undisturbed run, and leaves no temporary file and no process behind. At one moment in three only one
-# of its processes is killed, and the others a little later. KILLS: how often (6); SPACING: of the
-# scene's points; SEED: of the moments; PIECES=1: a scan's way to its map in folders of pieces instead;
-# DEMO=1: the whole demo, scan, scene and report, with the variables of make in DEMO_WITH.
+# Checks that a pipeline that is killed repeatedly at random times and restarted gives the bytes of an
+# undisturbed run and leaves no temporary files or processes. In one of three cases, one process is
+# killed first and the others shortly after. KILLS: number of kills (6). SPACING: spacing of the scene's
+# points. SEED: seed of the times. PIECES=1: runs scan.mk with folders of tiles instead. DEMO=1: runs the
+# whole demo with the variables of make in DEMO_WITH.
 . "$(dirname "$0")/check.sh"
 kills=${KILLS:-6}
 RANDOM=${SEED:-1}
-set -m # a process group a job
+set -m # one process group per job
 if [ -n "${DEMO:-}" ]; then
   pipeline="demo.mk ${DEMO_WITH:-}"
 elif [ -n "${PIECES:-}" ]; then
@@ -26,7 +26,7 @@ start() {
     >>"$scratch/log" 2>&1 &
 }
 wait_ms() { sleep "$(awk -v ms="$1" 'BEGIN { print ms / 1000 }')"; }
-# Most often short, at most four tenths of an undisturbed run.
+# Delays are mostly short and at most 0.4 of the duration of an undisturbed run.
 random_ms() { echo $((took_ms * 4 / 10 * RANDOM / 32768 * RANDOM / 32768 * RANDOM / 32768)); }
 
 began=$(date +%s%N)
@@ -41,7 +41,7 @@ partly=0
 whole_runs=0
 with_temporaries=0
 for ((n = 0; n < kills; ++n)); do
-  # Begun anew when it came to its end.
+  # Restarts the pipeline from the beginning if it was complete.
   require_no_processes "$scratch" "$scratch/out"
   start
   job=$!

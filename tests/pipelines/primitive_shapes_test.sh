@@ -1,6 +1,6 @@
 #!/bin/sh
-# The embedded example, on a coarser cloud: all results appear, tiles of any share give the map that
-# one process gives, a second run does nothing, and a run that lost files makes them again.
+# Tests primitive_shapes.mk on a coarser cloud: all results exist, shares of tiles give the map of a single
+# process, a second run does nothing, and deleted files are recomputed.
 . "$(dirname "$0")/check.sh"
 out=$scratch/demo
 
@@ -15,7 +15,7 @@ for method in thesis corrected; do
   require_files "$folder/map.pcd" "$folder/map.vtp" "$folder/map.pcd.json" "$folder/top.png" \
     "$folder/oblique.png" "$folder/curvature.png" "$folder/roc.png" \
     "$folder/evaluation/summary.md" "$folder/evaluation/roc.svg"
-  # A header and 12 places, each answered.
+  # A header and 12 locations with values.
   [ "$(wc -l <"$folder/lookup.csv")" -eq 13 ] || fail "$folder/lookup.csv has not 12 places"
   "$graspmap" score "$out/terrain.pcd" --config primitive_shapes_prescan --method "$method" \
     -o "$scratch/whole.pcd" --quiet
@@ -32,7 +32,7 @@ run
 [ "$map" = "$(sha256sum <"$out/thesis/map.pcd")" ] || fail "the map made again differs"
 require_files "$out/thesis/top.png"
 
-# Another terrain, gripper or title is seen, even an older file.
+# A changed terrain, gripper or title is detected, even if its file is older.
 cp "$source/data/grippers/scar-e.yaml" "$scratch/mine.yaml"
 printf 'gripper: %s\nvoxel_size_m: 0.02\n' "$scratch/mine.yaml" >"$scratch/scenario.yaml"
 "$graspmap" simulate scene --spacing 0.02 --seed 2 -o "$scratch/other.pcd" --quiet
@@ -51,5 +51,5 @@ sed -i 's/^palm_diameter_mm: 71/palm_diameter_mm: 90/' "$scratch/mine.yaml"
 site SITE="$scratch/other.pcd" TITLE="Bob's site"
 [ "$second" != "$(sha256sum <"$scratch/site/map.pcd")" ] || fail "another gripper was not seen"
 if site SITE="no such.pcd" 2>"$scratch/errors"; then fail "a name with a space was taken"; fi
-grep -q 'holds a space' "$scratch/errors" || fail "no clear error for a name with a space"
+grep -q 'contains a space' "$scratch/errors" || fail "no clear error for a name with a space"
 echo "passed"

@@ -1,6 +1,6 @@
 #!/bin/sh
-# A small simulated scan from the site to the map: cloud and surface lie on the true mesh, the site
-# is cut, places are found, a second run does nothing, a run that lost files makes the same again.
+# Tests rock_site.mk on a small simulated scan: cloud and surface agree with the true mesh, the site is
+# cropped, locations are found, a second run does nothing, and deleted files are recomputed identically.
 . "$(dirname "$0")/check.sh"
 out=$scratch/rocks
 
@@ -17,8 +17,8 @@ require_files "$out/site.png" "$out/scan.db" "$out/scan.db.json" "$out/scan/scan
   "$out/scan/spot_check.txt" "$out/scan/spot_check.csv" "$out/scan/map/map.pcd" \
   "$out/scan/map/top.png" "$out/scan/map/lookup.csv"
 grep -q '^nodes: 12$' "$out/scan/scan.txt" || fail "info does not count 12 nodes"
-# Noise alone is 5 to 12 mm at these ranges; with true poses the cloud is better than one view, and
-# the surface better than the cloud.
+# The noise is 5 to 12 mm at these ranges. With true poses, the cloud is more accurate than one view, and
+# the surface more accurate than the cloud.
 for rmse in $(sed -n 's/^rmse: \([0-9.]*\) mm$/\1/p' "$out/scan/accuracy.txt"); do
   awk -v rmse="$rmse" 'BEGIN { exit !(rmse > 0 && rmse < 4) }' || fail "$rmse mm off the truth"
 done
@@ -28,7 +28,7 @@ mean=$(sed -n 's/^mean of .* locations: \([0-9.]*\) m.*/\1/p' "$out/scan/spot_ch
 awk -v mean="$mean" 'BEGIN { exit !(mean > 0 && mean < 0.004) }' || fail "the edges are $mean m off"
 [ "$(wc -l <"$out/scan/map/lookup.csv")" -eq 31 ] || fail "not 30 places were looked up"
 
-# Photographs are laid on by the poses that the cloud was made by.
+# The texture uses the poses of the fused cloud.
 grep -q 'fused_poses.tum' "$out/scan/model.glb.json" || fail "the texture has other poses"
 
 before=$(listing "$out")
@@ -44,7 +44,7 @@ run POSES=ground-truth
 [ "$cloud" = "$(sha256sum <"$out/scan/cloud.ply")" ] || fail "the cloud made again differs"
 [ "$terrain" = "$(sha256sum <"$out/scan/terrain.pcd")" ] || fail "the samples made again differ"
 
-# Other poses and another seed are seen.
+# Changed poses and a changed seed are detected.
 scan_to() {
   make --no-print-directory -f "$source/pipelines/scan.mk" OUT="$out/scan" GRASPMAP="$graspmap" "$@"
 }
@@ -52,7 +52,7 @@ scan_to SCAN="$out/scan.db" POSES=odometry "$out/scan/cloud.ply"
 [ "$cloud" != "$(sha256sum <"$out/scan/cloud.ply")" ] || fail "other poses were not seen"
 run SEED=2 "$out/scan.db"
 [ "$scan" != "$(sha256sum <"$out/scan.db")" ] || fail "another seed was not seen"
-# So is another scan, older than what was made of the first.
+# Another scan is detected, even if its file is older than the results.
 cp "$out/scan.db" "$scratch/other.db"
 touch -d 2001-01-01 "$scratch/other.db"
 before=$(listing "$out/scan" | grep '^scan.txt ')

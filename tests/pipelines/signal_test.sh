@@ -1,10 +1,10 @@
 #!/bin/bash
-# A pipeline that is told to end, by SIGTERM to make alone or by SIGTERM and SIGINT to all of its
-# processes, ends by that signal, leaves no process and no half-made file behind, and can be resumed.
-# Two at once in one folder: the second says so and harms nothing.
+# Checks that a pipeline that receives SIGTERM (only make) or SIGTERM and SIGINT (all processes) ends by
+# that signal, leaves no processes or partial files, and can be resumed. If two pipelines run in one
+# folder, the second reports an error and changes nothing.
 . "$(dirname "$0")/check.sh"
 RANDOM=${SEED:-1}
-set -m # a process group a job
+set -m # one process group per job
 
 start() {
   (cd "$scratch" && GRASPMAP_TEST_RUN=$scratch exec make --no-print-directory \
@@ -12,7 +12,7 @@ start() {
     GRASPMAP="$graspmap" -j2) >>"$scratch/log" 2>&1 &
 }
 
-# Two at once, and the undisturbed run.
+# Two pipelines at the same time, of which the first is the undisturbed run.
 began=$(date +%s%N)
 start
 first=$!

@@ -1,5 +1,5 @@
 #!/bin/sh
-# The real test site from its cloud to pictures.
+# Tests site.mk on the real test site, from its cloud to images.
 . "$(dirname "$0")/check.sh"
 if [ -z "${GRASPMAP_DATA:-}" ]; then
   echo "skipped: GRASPMAP_DATA is not set"
@@ -22,7 +22,7 @@ found=$(cut -d, -f5 "$out/lookup.csv" | grep -c -x 1)
 before=$(listing "$out")
 run -j2
 [ "$before" = "$(listing "$out")" ] || fail "the second run changed files"
-# Other parameters make another map.
+# Changed parameters change the map.
 run -j2 SCORE='--solid-voxel-threshold 200'
 [ "$before" != "$(listing "$out")" ] || fail "a changed parameter was not seen"
 echo "passed"

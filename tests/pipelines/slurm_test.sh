@@ -1,6 +1,6 @@
 #!/bin/sh
-# A terrain's tiles as a job array of a real Slurm with two nodes on this machine: one task is killed
-# while it works, Slurm does it again, and the merged map is the one that a single process makes.
+# Tests job arrays over the tiles of a terrain with a real Slurm of two nodes on this machine: one task is
+# killed while it runs, Slurm requeues it, and the merged map is identical to that of a single process.
 . "$(dirname "$0")/check.sh"
 for program in slurmctld slurmd sbatch munged; do
   PATH=$PATH:/usr/sbin command -v $program >/dev/null || {
@@ -19,8 +19,8 @@ SLURM_LOCAL=$scratch/slurm
 export SLURM_LOCAL
 slurm_local=$source/scripts/slurm-local
 
-# The first try of share 2 is killed after 0.15 s. Even if it has ended before, its task
-# reports the exit code of SIGKILL.
+# Kills the first try of share 2 after 0.15 s. Even if the try ended earlier, its task reports the exit
+# code of SIGKILL.
 cat >"$scratch/graspmap" <<END
 #!/bin/sh
 if [ "\${SLURM_ARRAY_TASK_ID:-}" = 2 ] && [ "\${SLURM_RESTART_COUNT:-0}" = 0 ]; then
@@ -42,8 +42,8 @@ eval "$("$slurm_local" start)"
 [ "$(sinfo --noheader --Node --format=%N%t | tr '\n' ' ')" = "node1idle node2idle " ] ||
   fail "not two idle nodes: $(sinfo --Node)"
 
-# Slurm leaves a task that was put back alone for two minutes; a few seconds are enough for its nodes
-# to tell the new try from the old one.
+# Slurm delays a requeued task for two minutes. A few seconds suffice for its nodes to distinguish the
+# new try from the old one.
 pending_again() {
   squeue --noheader --states=PENDING --array --format='%A %r' 2>/dev/null | sed -n 's/ BeginTime//p'
 }
@@ -74,8 +74,8 @@ for node in node1 node2; do
   grep -q "on $node\$" "$out"/logs/*.log || fail "$node did nothing"
 done
 
-# A gripper on a mesh at each voxel, and at the same time the pieces of a mesh: again the files of a
-# single process.
+# Tests of a gripper on a mesh at each voxel, and tiles of a mesh at the same time: the files are identical
+# to those of a single process.
 "$graspmap" simulate site --edge-length 0.05 -o "$scratch/site" --quiet
 "$graspmap" resample "$scratch/site/mesh.ply" --radius 0.03 -o "$scratch/site.pcd" --quiet
 held() {
@@ -114,7 +114,7 @@ run map TERRAIN="$site" SHARES=4
 [ "$before" = "$(listing "$out")" ] || fail "the second run changed files"
 [ "$jobs" = "$(scontrol --oneliner show jobs | wc -l)" ] || fail "the second run submitted jobs"
 
-# A terrain that cannot be used fails at once and is not tried again.
+# An invalid terrain fails at once and is not retried.
 echo "no cloud" >"$scratch/bad.pcd"
 if run TERRAIN="$scratch/bad.pcd" OUT="$scratch/bad" SHARES=1 2>"$scratch/errors"; then
   fail "a broken terrain was taken"

@@ -1,7 +1,7 @@
 #!/bin/sh
-# The study of a wall and of rocks, coarse: tables of places like the thesis's B 2-3 and B 2-4, in
-# situ only what was measured, the body inclined, the published tables where they are, a report; a
-# second run does nothing, another variable is seen.
+# Tests study.mk on a coarse wall and coarse rocks: tables of locations like the thesis's B 2-3 and B 2-4,
+# values in situ only where the robot measured, the inclined body, the published tables if they exist,
+# the report. A second run does nothing, and a changed variable is detected.
 . "$(dirname "$0")/check.sh"
 out=$scratch/study
 
@@ -10,7 +10,7 @@ run() {
     SCENARIOS="3 4" METHODS=thesis STAGES="published grasp report" PLACES=20 TRIALS="--trials 2 --draws 2" INCLINATIONS=25 EDGE=0.03 COUNT=30000 \
     PANORAMA="--stride 3" "$@"
 }
-# Column $2 of a table by its name, without the head.
+# Prints the column $2 of a table without its header.
 column() {
   awk -F, -v name="$2" '/^#/ { next }
     !head { for (n = 1; n <= NF; ++n) if ($n == name) column = n; head = 1; next }
@@ -28,7 +28,7 @@ for scenario in 3_bouldering_wall 4_artificial_rocks; do
 done
 require_files "$out/report.html"
 
-# Every place has its row; pre-scanned each has a value, in situ some have, and none has where the
+# Every location has a row. Pre-scanned, each has a value. In situ, some have a value, but none where the
 # robot measured nothing, interpolated or not.
 rocks=$out/4_artificial_rocks/thesis/table.csv
 wall=$out/3_bouldering_wall/thesis/table.csv
@@ -47,14 +47,14 @@ for count in "$rocks 30" "$wall 58"; do
 done
 if column "$wall" prescan | grep -qv '^[01]$'; then fail "the wall's verdicts are not 1 or 0"; fi
 column "$rocks" prescan | grep -q '^0\.[0-9]' || fail "the rocks have no scores"
-# Combined is never more than the score alone.
+# The combined criterion never accepts more than the score alone.
 [ "$(column "$wall" prescan_combined | grep -c 1)" -le "$(column "$wall" prescan | grep -c 1)" ] ||
   fail "the combined criterion holds where the score does not"
 [ "$(cut -d, -f1 "$out/3_bouldering_wall/thesis/evaluation/accuracy.csv" | tr '\n' ' ')" = \
   "case prescan_combined realtime_raw realtime_interpolated realtime_combined " ] ||
   fail "the wall's cases are not evaluated"
 
-# The plane of a level robot is the ground; inclined it still is, roughly.
+# A level robot's plane is the ground. An inclined robot's plane is approximately the ground.
 planes=$out/4_artificial_rocks/poses/planes.csv
 [ "$(cut -d, -f1,2 "$planes" | tr '\n' ' ')" = "direction,inclination_deg level,0 forward,25 \
 backward,25 left,25 right,25 " ] || fail "other poses: $(cat "$planes")"
@@ -83,6 +83,6 @@ run -j2 LOOKUP="--mode maximum --radius 0.05" >"$scratch/log"
   fail "the look-up changed the map"
 for wrong in SCENARIOS=5 METHODS=theses STAGES=all OUT= 'OUT=two words'; do
   if run "$wrong" >/dev/null 2>"$scratch/errors"; then fail "$wrong was taken"; fi
-  grep -q 'none of\|not set\|holds a space' "$scratch/errors" || fail "no clear error for $wrong"
+  grep -q 'none of\|not set\|contains a space' "$scratch/errors" || fail "no clear error for $wrong"
 done
 echo "passed"

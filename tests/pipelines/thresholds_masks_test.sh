@@ -1,6 +1,6 @@
 #!/bin/sh
-# The threshold study and the masks side by side, on coarse ground: all results appear, tables have
-# one row per map, a second run does nothing.
+# Tests thresholds.mk and masks.mk on coarse ground: all results exist, tables have one row per map, a
+# second run does nothing.
 . "$(dirname "$0")/check.sh"
 out=$scratch/out
 

@@ -1,4 +1,4 @@
-"""What the tests of the Python module share: its place, and commands to compare with.
+"""Code shared by the tests of the Python module: its location, and commands as a reference.
 
 Each test program is called with the build folder and, where it asks for one, the folder of the
 manual's example, which holds a scan and what the commands made of it.

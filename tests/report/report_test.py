@@ -1,9 +1,10 @@
-"""The report of a small run in a headless Chromium: it opens without errors, its views of maps and
-scenes turn, places are chosen in table and view, it fits a telephone, and its text is there without JavaScript.
+"""Tests the report of a small run in a headless Chromium: it opens without errors, its views of maps and
+scenes rotate, locations can be selected in the table and in the view, it fits a phone's screen, and its
+text is readable without JavaScript.
 
     report_test.py GRASPMAP SOURCE_FOLDER
 
-Ends with 77 where Chromium, chromedriver or three.js are not installed."""
+Exits with 77 if Chromium, chromedriver or three.js are not installed."""
 
 import os
 import pathlib
@@ -53,7 +54,7 @@ def make_run(graspmap, folder):
     (folder / 'places.csv').write_text('x,y,z\n0,0,0\n')
     call('grasp', folder / 'floor.off', '--points', folder / 'places.csv', '--trials', '1',
          '--draws', '1', '--scenes', run / 'scenes', '-o', folder / 'trials.csv')
-    # Any picture will do.
+    # An arbitrary image.
     shutil.copy(pathlib.Path(sys.argv[2]) / 'pipelines/primitive_shapes.png', run / 'top.png')
     (run / f'{ATTACK}.txt').write_text(f'The first words. {ATTACK}')
     (run / 'broken.png').write_text('no picture')
@@ -76,7 +77,7 @@ class Page:
         return int(self.browser.run(f'return {figure}.dataset.drawn || "0"'))
 
     def settle(self, figure=FIGURE):
-        """Until all that was asked for is drawn."""
+        """Waits until all requested images are drawn."""
         wait_for('the view is at rest',
                  lambda: self.browser.run(f'return {figure}.dataset.busy === undefined'))
 
@@ -84,7 +85,7 @@ class Page:
         return self.browser.run(f'return {figure}.querySelector("canvas").toDataURL()')
 
     def colors(self, figure):
-        """The share of the canvas's pixels of each kind."""
+        """Returns the share of the canvas's pixels of each kind."""
         return self.browser.run(f'''
             const canvas = {figure}.querySelector("canvas");
             const data = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
@@ -134,7 +135,7 @@ def on_a_desk(report):
         turned = page.picture()
         check(turned != first, 'turning the map did not change the picture')
 
-        # A place chosen in the table comes into the middle of the view.
+        # A location selected in the table moves to the center of the view.
         browser.run('document.querySelector("figure.map tr[data-place=\\"1\\"] button").click()')
         wait_for('the row is chosen', lambda: page.selected() == 'H25')
         page.settle()
@@ -142,7 +143,7 @@ def on_a_desk(report):
         chosen = page.picture()
         check(chosen != turned, 'choosing a place did not change the picture')
 
-        # Whichever was chosen, the place in the middle is found again by a click.
+        # A click on the center of the view selects the location there.
         browser.run('document.querySelector("figure.map tr[data-place=\\"0\\"] button").click()')
         wait_for('the other row is chosen', lambda: page.selected() == ATTACK)
         page.settle()
@@ -159,7 +160,7 @@ def on_a_desk(report):
             check(page.picture() != before, f'{mode} shows the same picture')
             check(browser.run(f'return {FIGURE}.querySelector(".legend[data-mode={mode}]").hidden')
                   is False, f'the legend of {mode} is not shown')
-        # Forces: as a color, at the pointer, and the probability of another load.
+        # Forces: as a color and at the pointer, and the probability for another load.
         for mode in ('force', 'score'):
             before = page.picture()
             browser.run(f'{FIGURE}.querySelector("button[data-mode={mode}]").click()')

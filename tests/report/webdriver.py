@@ -1,5 +1,5 @@
-"""A headless Chromium by the W3C WebDriver protocol (https://www.w3.org/TR/webdriver2), through
-chromedriver and the standard library alone."""
+"""Client of the W3C WebDriver protocol (https://www.w3.org/TR/webdriver2) for a headless Chromium, with
+chromedriver and the standard library only."""
 
 import base64
 import json
@@ -15,7 +15,7 @@ ELEMENT = 'element-6066-11e4-a52e-4f735466cecf'
 
 
 class Browser:
-    """One session; `preferences` as Chromium keeps them in its profile."""
+    """Browser session. `preferences` are those of a Chromium profile."""
 
     def __init__(self, width=1280, height=900, preferences=None, arguments=()):
         self.folder = tempfile.mkdtemp()
@@ -75,7 +75,7 @@ class Browser:
         self.command('POST', '/url', {'url': 'file://' + os.path.abspath(path)})
 
     def run(self, script, *arguments):
-        """`script` as the body of a function; what it returns."""
+        """Runs `script` as the body of a function and returns its result."""
         return self.command('POST', '/execute/sync', {'script': script, 'args': list(arguments)})
 
     def find(self, selector):
@@ -85,7 +85,7 @@ class Browser:
         return self.command('GET', f'/element/{self.find(selector)}/text')
 
     def screenshot(self, selector=None):
-        """PNG of an element or of the window."""
+        """Returns a PNG image of an element or of the window."""
         place = f'/element/{self.find(selector)}' if selector else ''
         return base64.b64decode(self.command('GET', f'{place}/screenshot'))
 
@@ -101,7 +101,7 @@ class Browser:
         return self.command('POST', '/goog/cdp/execute', {'cmd': name, 'params': parameters})
 
     def drag(self, start, by):
-        """With the left button from a point of the window, by so many pixels; (0, 0) is a click."""
+        """Drags with the left button from a point of the window by (x, y) pixels; (0, 0) is a click."""
         self.command('POST', '/actions', {'actions': [{
             'type': 'pointer', 'id': 'mouse', 'parameters': {'pointerType': 'mouse'}, 'actions': [
                 {'type': 'pointerMove', 'x': int(start[0]), 'y': int(start[1]), 'duration': 0},

@@ -1,7 +1,7 @@
-"""Bags of ROS 2 without ROS and without graspmap: SQLite by Python, CDR (XCDR1) by hand.
+"""Reads and writes bags of ROS 2 without ROS and graspmap, with Python's SQLite and its own CDR (XCDR1).
 
-  copy IN OUT   a folder of .db3 as big-endian CDR, with metadata of version 9, in two files
-  show IN       the messages of a folder that graspmap wrote, as JSON
+  copy IN OUT   writes a folder of .db3 files as big-endian CDR, with metadata of version 9, in two files
+  show IN       prints the messages of a folder that graspmap wrote, as JSON
 """
 import json
 import pathlib
@@ -9,7 +9,7 @@ import sqlite3
 import struct
 import sys
 
-# Fields by the published definitions; [] a sequence, [N] an array.
+# Fields of the published message definitions: [] is a sequence, [N] an array.
 TYPES = {
     "Time": "i:sec I:nanosec",
     "Header": "Time:stamp s:frame_id",
@@ -138,7 +138,7 @@ def copy(source, target):
     middle = len(messages) // 2
     for n, part in enumerate((messages[:middle], messages[middle:])):
         with sqlite3.connect(folder / f"run_{n}.db3") as database:
-            # As rosbag2 since Iron: more columns, and no index.
+            # Format of rosbag2 since Iron: more columns, and no index.
             database.execute("CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT "
                              "NULL, serialization_format TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL, "
                              "type_description_hash TEXT NOT NULL)")

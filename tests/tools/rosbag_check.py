@@ -1,7 +1,7 @@
-"""Bags as Debian's python3-rosbag, which shares no code with librosbag, reads and writes them.
+"""Reads and writes bags with Debian's python3-rosbag, which shares no code with librosbag.
 
-rosbag_check.py show BAG        what it holds, as JSON
-rosbag_check.py copy BAG COPY   the same messages, compressed with bz2, images in the other byte order
+rosbag_check.py show BAG        prints its messages as JSON
+rosbag_check.py copy BAG COPY   copies it, compressed with bz2, with images in the other byte order
 """
 import json
 import struct
