@@ -26,6 +26,7 @@ struct RefinementInput {
   // Matches of pairs of frames, kept for matching again with another calibration; nullptr for long
   // scans, whose features are compared again.
   KnownMatches* known_matches = nullptr;
+  Pose color_from_depth = Pose::Identity();  // by which the depth of `scan` has been registered
 };
 
 // Frames are shared between states; a stage that changes frames makes others.
