@@ -1,6 +1,7 @@
 // Published properties of depth cameras, of data/sensors/NAME.yaml.
 #pragma once
 
+#include <filesystem>
 #include <string>
 
 #include "libmap/core/parameters.h"
@@ -22,8 +23,10 @@ struct SensorModel {
 };
 void bind(ParameterTable& table, SensorModel& model);
 
-// A path, or the name of a file in data/sensors; "d435" and "ipad" will do. Throws Error: unknown
-// name (with the nearest known one), or a file that cannot be read.
+// The file of a model: a path, or the name of a file in data/sensors; "d435" and "ipad" are short
+// names. Throws Error: unknown name (with the nearest known one).
+std::filesystem::path sensor_file(const std::string& name);
+// Throws Error: as sensor_file, or a file that cannot be read.
 SensorModel read_sensor_model(const std::string& name);
 
 }  // namespace libmap

@@ -291,9 +291,8 @@ Alternative climb(const EdgeScore& score, Alternative best, const Alternative& p
 // are added up image by image.
 Alternative coarse_search(const EdgeScore& score, const Alternative& pixel) {
   std::array<std::vector<double>, coarse_factors.size()> means;
-  parallel_each(coarse_factors.size(), [&](std::size_t k) {
-    means[k] = score.shifted_means(coarse_factors[k]);
-  });
+  parallel_each(coarse_factors.size(),
+                [&](std::size_t k) { means[k] = score.shifted_means(coarse_factors[k]); });
   Alternative best = Alternative::Zero();
   double highest = -1.0;
   for (std::size_t k = 0; k < means.size(); ++k)
@@ -406,7 +405,8 @@ std::string EdgeAgreement::sentence() const {
                             to_fixed_text(displacement_px, 0) + " +- " +
                             to_fixed_text(uncertainty_px, 0) +
                             " px from those of the images, as from a depth camera ";
-  if (is_scaled()) return found + "of " + to_fixed_text(focal_factor, 2) + " times the focal length";
+  if (is_scaled())
+    return found + "of " + to_fixed_text(focal_factor, 2) + " times the focal length";
   return found + to_fixed_text(1e3 * color_from_depth.translation().norm(), 0) + " mm and " +
          to_fixed_text(turn_deg, 1) + " deg away";
 }

@@ -296,13 +296,7 @@ RefinementOptions with_sensor(RefinementOptions options) {
   const auto set = [](double& field, double unset, double value) {
     if (field == unset) field = value;
   };
-  DepthPlaneOptions& planes = options.features.planes;
-  const DepthPlaneOptions& unset = defaults.features.planes;
-  set(planes.min_depth_m, unset.min_depth_m, model.near_m);
-  set(planes.max_depth_m, unset.max_depth_m, model.far_m);
-  if (has_noise(planes, unset.noise))
-    planes.noise = {std::max(1e-6, model.noise_m), model.noise_of_range, model.noise_of_square,
-                    planes.noise.lateral_px};
+  apply(model, options.features.planes);
   BundleAdjustmentOptions& bundle = options.bundle_adjustment;
   const CalibrationBounds& bounds = defaults.bundle_adjustment.bounds;
   set(bundle.bounds.frame_time_s, bounds.frame_time_s, model.frame_time_s);

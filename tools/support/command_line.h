@@ -60,6 +60,9 @@ class Command {
   libmap::ParameterTable& parameters();
 
   // Resolves the value of --config, e.g. a scenario's name to a file. Default: a path.
+  // A parameter that names a file of parameters, weaker than flags and --config; "auto": none.
+  void preset(const std::string& key,
+              std::function<std::filesystem::path(const std::string&)> resolver);
   void config_resolver(std::function<std::filesystem::path(const std::string&)> resolver);
 
   // Parses, applies --config and then the flags, runs `body`. Returns the exit code: 0 done,

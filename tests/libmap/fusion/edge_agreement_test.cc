@@ -57,8 +57,7 @@ ColorImage picture(const Camera& camera, const Pose& eye, std::mt19937_64& engin
       nearest = along;
       brightness = 50.0 + 35.0 * static_cast<double>(k * 2 % 5);
     }
-    const auto gray =
-        static_cast<std::uint8_t>(std::clamp(brightness + noise(engine), 0.0, 255.0));
+    const auto gray = static_cast<std::uint8_t>(std::clamp(brightness + noise(engine), 0.0, 255.0));
     image.pixels[n] = {gray, gray, gray};
   }
   return image;
@@ -76,11 +75,12 @@ MemoryScan scan_with(const Pose& color_from_depth, double focal_factor, int fram
   PoseGraph graph;
   for (int n = 0; n < frames; ++n) {
     const double angle = 0.4 * n;
-    const Pose eye = looking({1.6 * std::cos(angle), 1.6 * std::sin(angle), 0.7 + 0.03 * n},
-                             {0, 0, 0.05}) *
-                     camera.base_from_camera;
+    const Pose eye =
+        looking({1.6 * std::cos(angle), 1.6 * std::sin(angle), 0.7 + 0.03 * n}, {0, 0, 0.05}) *
+        camera.base_from_camera;
     scan.add(camera,
-             graspmap_test::render_depth(ground, depth_camera, eye * color_from_depth, {0.001, 0.001}, engine),
+             graspmap_test::render_depth(ground, depth_camera, eye * color_from_depth,
+                                         {0.001, 0.001}, engine),
              picture(camera, eye, engine));
     GraphNode node;
     node.id = n + 1;
@@ -107,15 +107,15 @@ TEST(EdgeAgreement, RegisteredDepthAgrees) {
   EXPECT_FALSE(found.is_scaled());
   EXPECT_EQ(found.sentence(), "");
   // Errors below half a degree are those of a refinement, not of this check.
-  EXPECT_FALSE(check_edge_agreement(scan_with(displaced({0.003, 0, 0}, {0, 0.2, 0}), 1.0))
-                   .is_displaced());
+  EXPECT_FALSE(
+      check_edge_agreement(scan_with(displaced({0.003, 0, 0}, {0, 0.2, 0}), 1.0)).is_displaced());
 }
 
 // The place and direction of the depth camera, by where they put points in the image.
 TEST(EdgeAgreement, DisplacedDepthIsFoundAndEstimated) {
-  for (const Pose& truth : {displaced({0.025, 0, 0}, {0, 1.5, 0}),
-                            displaced({-0.02, 0.015, 0}, {1.0, -0.8, 0.8}),
-                            displaced({0, -0.03, 0}, {-3.0, 0.5, 0}), displaced({0.06, 0, 0}, {0, 0, 0})}) {
+  for (const Pose& truth :
+       {displaced({0.025, 0, 0}, {0, 1.5, 0}), displaced({-0.02, 0.015, 0}, {1.0, -0.8, 0.8}),
+        displaced({0, -0.03, 0}, {-3.0, 0.5, 0}), displaced({0.06, 0, 0}, {0, 0, 0})}) {
     const EdgeAgreement found = check_edge_agreement(scan_with(truth, 1.0));
     EXPECT_TRUE(found.is_displaced());
     EXPECT_FALSE(found.is_scaled());

@@ -27,8 +27,8 @@ TexturedScan displaced_scan(const Pose& color_from_depth, double focal_factor) {
   depth_camera.fx *= focal_factor;
   depth_camera.fy *= focal_factor;
   for (auto& [node, frame] : scan.frames)
-    frame.depth = register_depth(frame.depth, textured_camera(), depth_camera,
-                                 color_from_depth.inverse());
+    frame.depth =
+        register_depth(frame.depth, textured_camera(), depth_camera, color_from_depth.inverse());
   return scan;
 }
 
@@ -85,8 +85,7 @@ TEST(DepthRegistration, IsAddedBeforeThatOfTheRefinement) {
   fine.translation() = Eigen::Vector3d(0, 0.002, 0.001);
   calibration.color_from_depth = {fine};
   add_registration(displacement(), 1, calibration);
-  EXPECT_TRUE(
-      is_near(calibration.color_from_depth.front(), fine * displacement(), 1e-12, 1e-12));
+  EXPECT_TRUE(is_near(calibration.color_from_depth.front(), fine * displacement(), 1e-12, 1e-12));
 }
 
 }  // namespace depth_registration_test
