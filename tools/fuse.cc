@@ -1,5 +1,6 @@
 // graspmap fuse: fuses the depth images of a scan into one oriented, colored cloud.
 #include "libmap/fusion/depth_fusion.h"
+#include "libmap/fusion/edge_agreement.h"
 #include "libmap/fusion/pose_consistency.h"
 #include "libmap/io/cloud_io.h"
 #include "libmap/poses/trajectory_io.h"
@@ -209,6 +210,24 @@ void tell_consistency(const libmap::ScanSource& scan, const libmap::Trajectory& 
     run.warn("{}: {}", taken.source, warning);
 }
 
+// Colors of depth that is not registered are those of other places. Depth of another focal length
+// is wrong itself.
+void check_registration(const libmap::ScanSource& scan, const FuseOptions& options, Run& run) {
+  if (!options.fusion.color) return;
+  const libmap::EdgeAgreement edges =
+      run.timed("registration of depth", [&] { return libmap::check_edge_agreement(scan); });
+  run.detail("edges of depth are {:.1f} px off those of {} images", edges.displacement_px,
+             edges.frames);
+  if (!edges.is_displaced()) return;
+  if (edges.is_scaled())
+    throw libmap::Error(edges.sentence(), {.file = options.scan,
+                                           .field = "depth_calibration",
+                                           .bound = "a depth camera in scan.yaml (of convert SCAN "
+                                                    "-o FOLDER), or --no-color"});
+  run.warn("{}: {}: refine --write-calibration estimates it for --calibration", options.scan,
+           edges.sentence());
+}
+
 void fuse(FuseOptions options, Run& run) {
   std::vector<std::string> inputs = scan_inputs(options.scan, options.poses);
   inputs.push_back(options.calibration.source);
@@ -234,6 +253,7 @@ void fuse(FuseOptions options, Run& run) {
     if (folder->is_complete()) return;
   }
   tell_consistency(*scan, poses, options.poses, run);
+  check_registration(*scan, options, run);
   in_file(options.scan,
           [&] { make_tiles(options, *scan, poses, folder ? &*folder : nullptr, run); });
 }

@@ -1,5 +1,6 @@
 // graspmap simulate scan: simulates a handheld scan of a mesh or a large terrain.
 #include "libmap/camera/camera_io.h"
+#include "libmap/camera/sensor_model.h"
 #include "libmap/core/data_folder.h"
 #include "libmap/io/cloud_io.h"
 #include "libmap/io/cloud_pieces.h"
@@ -23,6 +24,7 @@ struct SimulateScanOptions {
   std::string output;
   std::string camera;
   std::string target = "auto";
+  std::string sensor = "auto";
   std::string trajectory;
   libmap::ScanSimulationOptions simulation;
   libmap::RtabmapWriterOptions writer;
@@ -32,6 +34,9 @@ constexpr std::size_t spool_buffer_bytes = std::size_t{32} << 20U;
 
 void bind(libmap::ParameterTable& table, SimulateScanOptions& options) {
   libmap::ScanSimulationOptions& simulation = options.simulation;
+  table.add("sensor", options.sensor,
+            "depth camera, a name in data/sensors or a file: camera, noise, range, timing and "
+            "faults that no other option sets; auto: the defaults");
   table.add("camera", options.camera,
             "calibration file of the camera (.yaml), or one of the toolkit's: realsense-d435, "
             "ipad-lidar; empty: a Kinect v2, 512 x 424 pixels");
@@ -222,5 +227,6 @@ int graspmap_tools::simulate_scan(int argc, char** argv) {
   command.parameters().add_overrides("refine", for_refine);
   command.config_resolver(
       [](const std::string& name) { return libmap::find_data_file("sensors", name); });
+  command.preset("sensor", libmap::sensor_file);
   return command.run(argc, argv, [&](Run& run) { simulate(options, run); });
 }

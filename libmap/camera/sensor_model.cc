@@ -35,15 +35,17 @@ void bind(ParameterTable& table, SensorModel& model) {
             "maximum systematic depth error: term proportional to range, m per m");
 }
 
+std::filesystem::path sensor_file(const std::string& name) {
+  return find_data_file("sensors", name == "ipad"   ? "ipad-lidar"
+                                   : name == "d435" ? "realsense-d435"
+                                                    : name);
+}
+
 SensorModel read_sensor_model(const std::string& name) {
   SensorModel model;
   ParameterTable table;
   bind(table, model);
-  const bool is_short = name == "d435" || name == "ipad";
-  const std::string path =
-      find_data_file("sensors",
-                     is_short ? (name == "ipad" ? "ipad-lidar" : "realsense-d435") : name)
-          .string();
+  const std::string path = sensor_file(name).string();
   read_yaml(read_whole_file(path, max_bytes), path, [&](const YAML::Node& root) {
     if (!root.IsMap()) throw Error("not a map of keys and values");
     // All other keys belong to the simulation.

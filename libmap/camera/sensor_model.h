@@ -1,6 +1,7 @@
 // Reads published properties of depth cameras from data/sensors/NAME.yaml.
 #pragma once
 
+#include <filesystem>
 #include <string>
 
 #include "libmap/core/parameters.h"
@@ -22,8 +23,10 @@ struct SensorModel {
 };
 void bind(ParameterTable& table, SensorModel& model);
 
-// Reads a model by path, by the name of a file in data/sensors, or by the short names "d435" and
-// "ipad". Throws Error: an unknown name (with the nearest known one), or an invalid file.
+// Returns the file of a model: a path, the name of a file in data/sensors, or one of the short names
+// "d435" and "ipad". Throws Error: an unknown name (with the nearest known one).
+std::filesystem::path sensor_file(const std::string& name);
+// Reads the model from sensor_file(name). Throws Error as sensor_file does, or for an invalid file.
 SensorModel read_sensor_model(const std::string& name);
 
 }  // namespace libmap

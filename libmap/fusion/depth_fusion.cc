@@ -8,6 +8,7 @@
 #include <span>
 
 #include "libmap/camera/rgbd_frame.h"
+#include "libmap/camera/sensor_model.h"
 #include "libmap/core/error.h"
 #include "libmap/core/memory_budget.h"
 #include "libmap/core/parallel.h"
@@ -64,11 +65,16 @@ struct CoarseFrame {
   std::optional<Error> fault;  // survey only; none for a usable frame
 };
 
+DepthFusionOptions with_sensor(DepthFusionOptions options) {
+  if (options.sensor != "auto") apply(read_sensor_model(options.sensor), options.planes);
+  return options;
+}
+
 class Fusion {
  public:
   Fusion(const ScanSource& scan, const Trajectory& world_from_base,
          const DepthFusionOptions& options, Progress& progress, const FusionSurvey* known)
-      : options_(options),
+      : options_(with_sensor(options)),
         progress_(&progress),
         world_from_base_(world_from_base),
         images_(scan, {.stereo = options.stereo, .strict = options.strict}) {

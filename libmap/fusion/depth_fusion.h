@@ -34,6 +34,9 @@ namespace libmap {
 
 struct DepthFusionOptions {
   double voxel_size_m = 0.01;  // > 0
+  // Name in data/sensors or a path: its useful range and noise where other options have their
+  // defaults; "auto": the defaults, a Kinect v2's.
+  std::string sensor = "auto";
   DepthPlaneOptions planes{};
   double disc_radius_voxels = 1.5;  // > 0: radius of the discs in which measurements are averaged
   // >= 0: standard deviation of a whole frame along a normal. Prevents the nearest frame from

@@ -28,6 +28,9 @@ void describe_surface(ResultTable& table, const FusionCounts& counts) {
 void bind(ParameterTable& table, DepthFusionOptions& options) {
   DepthPlaneOptions& planes = options.planes;
   table.add("voxel_size_m", options.voxel_size_m, positive, "size of a voxel; one point per voxel");
+  table.add("sensor", options.sensor,
+            "depth camera, a name in data/sensors or a file: useful range and noise that no other "
+            "option sets; auto: a Kinect v2");
   table.add("min_depth_m", planes.min_depth_m, positive, "minimum depth of measurements");
   table.add("max_depth_m", planes.max_depth_m, positive, "maximum depth of measurements");
   table.add("max_incidence_deg", planes.max_incidence_deg, {0, 89.5, true, false},
@@ -36,6 +39,8 @@ void bind(ParameterTable& table, DepthFusionOptions& options) {
             "standard deviation of depth at range 0");
   table.add("range_noise", planes.noise.axial_of_range, not_negative,
             "standard deviation of depth added by each meter of range, m/m");
+  table.add("square_noise", planes.noise.axial_of_square, not_negative,
+            "standard deviation of depth added by range squared, 1/m");
   table.add("lateral_noise_px", planes.noise.lateral_px, not_negative,
             "standard deviation of measurements across the line of sight");
   table.add("plane_radius_px", planes.radius_px, {1, 7},

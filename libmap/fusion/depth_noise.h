@@ -17,6 +17,7 @@ struct DepthNoise {
   double axial_at(double z_m) const {
     return axial_m + (axial_of_range + axial_of_square * z_m) * z_m;
   }
+  bool operator==(const DepthNoise&) const = default;
 };
 
 struct DepthSensor {
@@ -25,5 +26,9 @@ struct DepthSensor {
   double max_incidence_deg = 85.0;  // maximum angle between line of sight and normal
   DepthNoise noise{};
 };
+
+struct SensorModel;
+// The model's useful range and noise, where the sensor has the default ones.
+void apply(const SensorModel& model, DepthSensor& sensor);
 
 }  // namespace libmap

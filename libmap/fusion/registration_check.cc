@@ -128,7 +128,7 @@ RegistrationCheck check_registration(FusionFrames& images, std::span<const Fusio
   const std::vector<Anchor> anchors = find_anchors(before);
   std::vector<PairSums> depth(anchors.size() * partners);
   std::vector<PairSums> color(anchors.size() * partners);
-  const double noise = sensor.noise.axial_of_range + sensor.noise.axial_m;
+  const double noise = sensor.noise.axial_at(1.0);
   const auto depth_cost = [&](float off) {
     return std::log1p(off * off / (2.0 * noise * noise) / cost_scale);
   };

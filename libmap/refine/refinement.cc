@@ -9,7 +9,9 @@
 #include "libmap/camera/sensor_model.h"
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
+#include "libmap/fusion/pose_consistency.h"
 #include "libmap/optimize/graph_covariance.h"
+#include "libmap/refine/depth_registration.h"
 #include "libmap/refine/noise_estimate.h"
 #include "libmap/refine/refinement_stages.h"
 
@@ -150,6 +152,24 @@ bool has_noise(const DepthSensor& sensor, const DepthNoise& noise) {
          sensor.noise.axial_of_square == noise.axial_of_square;
 }
 
+// Poses that the depth images contradict follow another convention or unit. Sessions are in frames
+// of their own, of which the largest is compared.
+void warn_of_contradictions(Run& run) {
+  const RefinementState& state = run.state;
+  if (state.poses.empty()) return;
+  const auto largest =
+      std::max_element(state.parts.begin(), state.parts.end(),
+                       [](const auto& a, const auto& b) { return a.size() < b.size(); });
+  Trajectory poses = trajectory_at(run.input.scan.graph(), state.poses);
+  if (largest != state.parts.end())
+    std::erase_if(poses, [&](const TrajectoryPose& pose) {
+      return std::find(largest->begin(), largest->end(), pose.node) == largest->end();
+    });
+  const PoseConsistency found = check_pose_consistency(run.input.scan, poses);
+  if (std::string warning = found.warning(); !warning.empty())
+    run.state.warnings.push_back("stored poses: " + std::move(warning));
+}
+
 void start(Run& run) {
   const RefinementOptions& options = run.input.options;
   const PoseGraph& graph = run.input.scan.graph();
@@ -175,6 +195,7 @@ void start(Run& run) {
       state.warnings.push_back(std::to_string(run.result.without_pose.size()) +
                                " nodes have no pose from odometry or links and are left out");
   }
+  warn_of_contradictions(run);
   run.report({.name = "start: " + initial.source});
 }
 
@@ -276,13 +297,7 @@ RefinementOptions with_sensor(RefinementOptions options) {
   const auto set = [](double& field, double unset, double value) {
     if (field == unset) field = value;
   };
-  DepthPlaneOptions& planes = options.features.planes;
-  const DepthPlaneOptions& unset = defaults.features.planes;
-  set(planes.min_depth_m, unset.min_depth_m, model.near_m);
-  set(planes.max_depth_m, unset.max_depth_m, model.far_m);
-  if (has_noise(planes, unset.noise))
-    planes.noise = {std::max(1e-6, model.noise_m), model.noise_of_range, model.noise_of_square,
-                    planes.noise.lateral_px};
+  apply(model, options.features.planes);
   BundleAdjustmentOptions& bundle = options.bundle_adjustment;
   const CalibrationBounds& bounds = defaults.bundle_adjustment.bounds;
   set(bundle.bounds.frame_time_s, bounds.frame_time_s, model.frame_time_s);
@@ -442,6 +457,7 @@ RefinementResult finish(const RefinementInput& input, RefinementState state,
     (link.rejected ? result.rejected_links : result.links).push_back(link.link);
   }
   result.calibration = std::move(state.calibration);
+  add_registration(input.color_from_depth, result.cameras.size(), result.calibration);
   result.findings = findings(result.calibration, result.deviations, result.cameras);
   if (!has_noise(input.options.features.planes, state.noise))
     result.findings.push_back(result.noise);
@@ -469,6 +485,11 @@ void link_by_depth(Run& run) {
   if (run.propose(std::move(stage)))
     run.result.stages.back().figures.emplace_back("rejected_by_optimization",
                                                   drop_rejected_links(run.state));
+}
+
+bool may_calibrate(const RefinementOptions& options) {
+  return options.intrinsics != IntrinsicsMode::fixed || options.correct_depth ||
+         options.register_depth || options.estimate_timing;
 }
 
 bool has_matches(const RefinementState& state) {
@@ -515,8 +536,14 @@ void bind(ParameterTable& table, RefinementOptions& options) {
             "focal length and principal point: as stored, or estimated; auto: estimated if the "
             "held-out matches then fit better");
   table.add("correct_depth", options.correct_depth,
-            "estimate a depth correction by range and radius if held-out observations then fit "
-            "better");
+            "estimate a correction of depth by range and radius if the held-out data fit better "
+            "with it");
+  table.add("register_depth", options.register_depth,
+            "estimate the registration of depth to color if the held-out data fit better with it; "
+            "otherwise displaced edges are only a warning");
+  table.add("estimate_timing", options.estimate_timing,
+            "estimate the delay of depth and the time of an image's rows if the held-out data fit "
+            "better with them");
   table.add("scale_from", options.scale_from,
             {{"depth", ScaleSource::depth}, {"odometry", ScaleSource::odometry}},
             "source of the scale if no factor, known lengths or board are given");
@@ -527,12 +554,16 @@ void bind(ParameterTable& table, RefinementOptions& options) {
   table.add("seed", options.seed, not_negative, "random seed");
 }
 
-RefinementResult refine_poses(const ScanSource& scan, const RefinementOptions& given,
+RefinementResult refine_poses(const ScanSource& given_scan, const RefinementOptions& given,
                               Progress& progress, const FeatureCache& cache) {
   const RefinementOptions options = with_sensor(given);
+  const CoarseRegistration coarse = register_coarsely(given_scan, options.register_depth);
+  const ScanSource& scan = coarse.scan ? *coarse.scan : given_scan;
   Run run{.input = {scan, options, progress}};
+  run.input.color_from_depth = coarse.color_from_depth;
   RefinementState& state = run.state;
   state.noise = options.features.planes.noise;
+  if (!coarse.finding.empty()) state.warnings.push_back(coarse.finding);
   start(run);
   require_one_scale(options);
   find_frames(run, cache);
@@ -547,8 +578,7 @@ RefinementResult refine_poses(const ScanSource& scan, const RefinementOptions& g
   } else {
     const bool bundle = options.bundle && has_matches(state);
     if (bundle) run.propose(bundle_stage(run.input, state));
-    if (bundle && (options.intrinsics != IntrinsicsMode::fixed || options.correct_depth))
-      calibrate_sensor(run);
+    if (bundle && may_calibrate(options)) calibrate_sensor(run);
     drop_descriptors(state);
     matches.clear();
     if (options.icp.mode != IcpMode::off) run.propose(surface_stage(run.input, state));

@@ -46,7 +46,10 @@ struct RefinementOptions {
   // Name in data/sensors or a path. Its noise, useful range, timing and bounds replace options that
   // have their default values. "auto": the noise is estimated.
   std::string sensor = "auto";
-  bool correct_depth = true;  // estimate a depth correction if held-out observations fit better
+  // Parts of a calibration that are estimated if the held-out data fit better with them.
+  bool correct_depth = true;    // bend of depth by range and radius
+  bool register_depth = true;   // registration of depth to color
+  bool estimate_timing = true;  // delay of depth, and time of the rows of an image
   FeatureOptions features{};
   VisualOdometryOptions odometry{};
   LoopClosureDetectionOptions closures{};

@@ -65,7 +65,7 @@ CalibrationChoice choice_of(const RefinementOptions& options, const SensorCalibr
   choice.start = known;
   if (known.empty()) {
     choice.parts = {options.intrinsics != IntrinsicsMode::fixed, options.correct_depth,
-                    options.correct_depth, options.correct_depth};
+                    options.register_depth, options.estimate_timing};
   } else {
     choice.parts = parts_of(known);
     choice.leave_out = choice.parts.timing;

@@ -27,6 +27,7 @@ struct RefinementInput {
   // Matches of pairs of frames, cached for matching with another calibration; nullptr for long
   // scans, whose descriptors are compared again.
   KnownMatches* known_matches = nullptr;
+  Pose color_from_depth = Pose::Identity();  // by which the depth of `scan` has been registered
 };
 
 // Frames are shared between states; a stage that changes frames creates new ones.

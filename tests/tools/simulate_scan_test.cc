@@ -173,6 +173,27 @@ TEST(SimulateScanCommand, TerrainAlongASerpentine) {
   EXPECT_GT(manifest["results"]["path_length_m"], 2.0);
 }
 
+// A sensor is weaker than flags and the values of --config.
+TEST(SimulateScanCommand, TakesASensorByName) {
+  write_site();
+  const auto made = [&](const Words& options) {
+    Words words = scan({"-o", "scan.db", "--frames", "2", "--force"});
+    words.insert(words.end(), options.begin(), options.end());
+    EXPECT_TRUE(succeeded(graspmap(words)));
+    return content(scratch("scan.db"));
+  };
+  const std::string by_name = made({"--sensor", "kinect-v1"});
+  EXPECT_EQ(by_name, made({"--config", "kinect-v1"}));
+  EXPECT_NE(by_name, made({"--sensor", "auto"}));
+  EXPECT_EQ(made({"--sensor", "kinect-v1", "--noise-of-square", "0.003"}),
+            made({"--config", "kinect-v1", "--noise-of-square", "0.003"}));
+  write_text(scratch("near.yaml"), "sensor: kinect-v1\nnear_m: 0.7\n");
+  EXPECT_EQ(made({"--config", "near.yaml"}), made({"--sensor", "kinect-v1", "--near", "0.7"}));
+  EXPECT_EQ(made({"--sensor", "d435"}), made({"--sensor", "realsense-d435"}));
+  EXPECT_TRUE(bad_input(graspmap(scan({"-o", "x.db", "--sensor", "kinekt-v1"})),
+                        {"kinekt-v1", "kinect-v1"}));
+}
+
 TEST(SimulateScanCommand, AlongAGivenTrajectory) {
   write_ground();
   write_text(scratch("way.tum"),

@@ -182,6 +182,8 @@ struct Command::Parts {
   CLI::App app;
   libmap::ParameterTable table;
   std::function<fs::path(const std::string&)> config_resolver;
+  std::string preset_key;  // empty: there is none
+  std::function<fs::path(const std::string&)> preset_resolver;
 
   RunOptions run_options;
   std::string config;
@@ -199,6 +201,8 @@ struct Command::Parts {
   void add_common_options();
   void add_parameter_flags();
   void apply_parameters();
+  void apply_preset();
+  std::optional<fs::path> preset_file() const;
   libmap::Error placed(const libmap::Error& error) const;
   // Returns the exit code if the command is complete, for example after --help.
   std::optional<int> parse(int argc, char** argv);
@@ -253,6 +257,11 @@ libmap::ParameterTable& Command::parameters() { return parts_->table; }
 
 void Command::config_resolver(std::function<fs::path(const std::string&)> resolver) {
   parts_->config_resolver = std::move(resolver);
+}
+
+void Command::preset(const std::string& key, std::function<fs::path(const std::string&)> resolver) {
+  parts_->preset_key = key;
+  parts_->preset_resolver = std::move(resolver);
 }
 
 void Command::Parts::add_common_options() {
@@ -318,6 +327,21 @@ void Command::Parts::apply_parameters() {
   }
 }
 
+std::optional<fs::path> Command::Parts::preset_file() const {
+  const libmap::Parameter* parameter = table.find(preset_key);
+  if (parameter == nullptr || parameter->get() == "auto") return std::nullopt;
+  return preset_resolver(parameter->get());
+}
+
+// Reads the preset, then applies --config and the flags again, which take precedence.
+void Command::Parts::apply_preset() {
+  const std::optional<fs::path> path = preset_file();
+  if (!path) return;
+  libmap::set_from_yaml(table, libmap::read_whole_file(*path, 1U << 24U), path->string());
+  configured.clear();
+  apply_parameters();
+}
+
 // Adds the file of --config to an error about a value from that file.
 libmap::Error Command::Parts::placed(const libmap::Error& error) const {
   const libmap::Parameter* parameter = table.find(error.context().field);
@@ -375,6 +399,7 @@ std::optional<int> Command::Parts::parse(int argc, char** argv) {
                                                     : error.what());
   }
   apply_parameters();
+  apply_preset();
   if (!print_config) return std::nullopt;
   std::cout << libmap::to_yaml(table);
   require_printed();
@@ -396,6 +421,7 @@ void Command::Parts::work(const std::function<void(Run&)>& body) {
   Run run(name, run_options, *bar);
   run.manifest().add_parameters(table);
   if (!config.empty()) run.add_input(config_file());
+  if (const auto preset = preset_file()) run.add_input(*preset);
   body(run);
   bar->end();
   require_printed();

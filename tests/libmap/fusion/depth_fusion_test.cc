@@ -8,6 +8,7 @@
 #include <numbers>
 #include <set>
 
+#include "libmap/camera/sensor_model.h"
 #include "libmap/core/parallel.h"
 #include "tests/libmap/fusion/depth_scenes.h"
 #include "tests/libmap/fusion/fusion_checks.h"
@@ -364,6 +365,29 @@ TEST(DepthFusion, RealScanLiesOnItsTrueGround) {
   }
   ASSERT_GT(heights.size(), 1000U);
   EXPECT_LT(rms(heights), 0.012);
+}
+
+// What no option sets is the sensor's.
+TEST(DepthSensorModel, FillsDefaultsAlone) {
+  const SensorModel model{.noise_m = 0.001, .noise_of_square = 0.002, .near_m = 0.5, .far_m = 3.0};
+  DepthSensor sensor;
+  apply(model, sensor);
+  EXPECT_EQ(sensor.min_depth_m, 0.5);
+  EXPECT_EQ(sensor.max_depth_m, 3.0);
+  EXPECT_EQ(sensor.noise, (DepthNoise{0.001, 0.0, 0.002, DepthNoise{}.lateral_px}));
+  EXPECT_DOUBLE_EQ(sensor.noise.axial_at(2.0), 0.009);
+  DepthSensor given;
+  given.max_depth_m = 2.5;
+  given.noise.axial_of_range = 0.01;
+  given.noise.lateral_px = 1.0;
+  apply(model, given);
+  EXPECT_EQ(given.min_depth_m, 0.5);
+  EXPECT_EQ(given.max_depth_m, 2.5);
+  EXPECT_EQ(given.noise, (DepthNoise{0.002, 0.01, 0.0, 1.0}));
+  DepthSensor lateral;
+  lateral.noise.lateral_px = 0.5;
+  apply(model, lateral);
+  EXPECT_EQ(lateral.noise, (DepthNoise{0.001, 0.0, 0.002, 0.5}));
 }
 
 }  // namespace depth_fusion_test

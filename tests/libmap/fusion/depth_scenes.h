@@ -144,6 +144,8 @@ class MemoryScan : public libmap::ScanSource {
     poses.push_back({node, static_cast<double>(node), world_from_base});
   }
 
+  void set_graph(libmap::PoseGraph graph) { graph_ = std::move(graph); }
+
   std::map<int, libmap::RgbdFrame> frames;
   std::map<int, bool> broken;
   libmap::Trajectory poses;

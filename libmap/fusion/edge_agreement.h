@@ -1,0 +1,39 @@
+// Agreement of depth edges and image edges: detects depth that is not registered to color.
+#pragma once
+
+#include <cstddef>
+#include <string>
+
+#include "libmap/core/pose.h"
+#include "libmap/scan/scan_source.h"
+
+namespace libmap {
+
+// How well the edges of depth images agree with those of the color images.
+struct EdgeAgreement {
+  std::size_t frames = 0;
+  std::size_t edges = 0;  // pixels
+  // Mean contrast of the color images at the edges of depth, 0 to 1: as stored, and by the
+  // alternative: another place and focal length of the depth camera.
+  double stored = 0.0;
+  double aligned = 0.0;
+  // Gain of the alternative in frames that it was not estimated from, in standard errors.
+  double significance = 0.0;
+  double displacement_px = 0.0;      // RMS displacement of the edges, pixels of depth
+  double uncertainty_px = 0.0;       // RMS difference of the alternatives by halves of the frames
+  double min_displacement_px = 0.0;  // below which the images agree
+  Pose color_from_depth = Pose::Identity();  // the alternative, without a shift along the axis
+  double focal_factor = 1.0;                 // focal length of depth, relative to the stored one
+
+  bool is_displaced() const;
+  // The depth camera has clearly another focal length than stored.
+  bool is_scaled() const;
+  // States the displacement; empty if the images agree.
+  std::string sentence() const;
+};
+
+// Compares up to 24 frames of a scan with one camera and color. Frames that cannot be read are left
+// out.
+EdgeAgreement check_edge_agreement(const ScanSource& scan);
+
+}  // namespace libmap
