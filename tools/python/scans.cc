@@ -101,7 +101,7 @@ template <typename Number, typename Pixel>
 py::object pixels_of(const libmap::Image<Pixel>& image, py::handle owner) {
   if (image.empty()) return py::none();
   Shape shape = {image.height, image.width};
-  if (sizeof(Pixel) != sizeof(Number)) shape.push_back(sizeof(Pixel) / sizeof(Number));
+  if constexpr (sizeof(Pixel) != sizeof(Number)) shape.push_back(sizeof(Pixel) / sizeof(Number));
   return view(reinterpret_cast<const Number*>(image.pixels.data()), std::move(shape), owner);
 }
 

@@ -36,10 +36,7 @@ using Shape = std::vector<py::ssize_t>;
 // none: rows one after the other.
 template <typename Number>
 py::array view(const Number* data, Shape shape, py::handle owner, Shape strides = {}) {
-  py::array array =
-      strides.empty()
-          ? py::array(py::dtype::of<Number>(), std::move(shape), data, owner)
-          : py::array(py::dtype::of<Number>(), std::move(shape), std::move(strides), data, owner);
+  py::array array(py::dtype::of<Number>(), std::move(shape), std::move(strides), data, owner);
   array.attr("setflags")(py::arg("write") = false);
   return array;
 }
