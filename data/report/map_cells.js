@@ -1,11 +1,11 @@
-// The voxels of a map as cubes, drawn by WebGL.
+// Draws the voxels of a map as cubes with WebGL.
 'use strict';
 
 const palette = JSON.parse(document.getElementById('palette').textContent);
 const FLAGS = {convex: 16, graspable: 32, obstacle: 64};
 
-// One WebGL context for all views: browsers allow few. Each view copies the picture to a canvas of
-// its own, which also keeps it for the printer.
+// One WebGL context for all views, because browsers allow few. Each view copies the image to a separate
+// canvas, which is also used for printing.
 let renderer = null;
 let pickTarget = null;
 function sharedRenderer() {
@@ -32,8 +32,8 @@ const FRAGMENT = `
   varying vec3 color;
   void main() { gl_FragColor = vec4(color, 1.0); }`;
 
-// A unit cube without its bottom. Tops have the legend's color, sides darker ones; these end just
-// below the top, so that those between neighbors of one height do not shine through.
+// Unit cube without bottom. Tops have the color of the legend, sides are darker. Sides end just below the
+// top, so that they are not visible between neighbors of equal height.
 function cubeFaces() {
   const t = 0.96;
   const faces = [
@@ -63,11 +63,11 @@ function bytesOf(base64) {
   return bytes;
 }
 
-// The normal distribution to 2e-4 (Bowling et al. 2009), and its quantiles to 4e-3 (Tukey).
+// Normal distribution with an error of 2e-4 (Bowling et al. 2009), and its quantiles with 4e-3 (Tukey).
 const normal = (z) => 1 / (1 + Math.exp(-1.5976 * z - 0.07056 * z * z * z));
 const quantile = (p) => 4.91 * (p ** 0.14 - (1 - p) ** 0.14);
 const TAIL = 1.645; // quantile of 0.95
-const TYPICAL_SPREAD = 0.7; // of ln(force), where one quantile alone is known
+const TYPICAL_SPREAD = 0.7; // spread of ln(force) if only one quantile is known
 
 const lnForce = (byte) => (byte - 1) * 0.04 - 3;
 const inNewtons = (force) => Number(force.toPrecision(2)) + ' N';
@@ -92,7 +92,7 @@ class CellForces {
     return knots.sort((a, b) => a[0] - b[0]);
   }
 
-  // Linear in ln(load) between the knots and beyond them.
+  // Piecewise linear in ln(load), also outside of the knots.
   probability(n, load) {
     const knots = this.knots(n);
     if (!this.high[n]) return 0;
@@ -202,7 +202,7 @@ class MapCells {
     this.tint.needsUpdate = true;
   }
 
-  // The number of the cell that `camera` shows at a pixel; -1: none.
+  // Returns the index of the cell that `camera` shows at a pixel; -1 if there is none.
   pick(camera, width, height, x, y) {
     if (!this.geometry) return -1;
     if (!pickTarget) pickTarget = new THREE.WebGLRenderTarget(1, 1);
@@ -219,7 +219,7 @@ class MapCells {
     return pixel[3] === 0 ? -1 : pixel[0] + 256 * pixel[1] + 65536 * pixel[2];
   }
 
-  // The picture of `camera`: the canvas that all views share, until the next one draws.
+  // Returns the image of `camera`: the shared canvas, valid until the next view is drawn.
   draw(camera, width, height) {
     if (!this.geometry) this.makeGeometry();
     const shared = sharedRenderer();

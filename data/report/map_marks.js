@@ -1,4 +1,4 @@
-// Looked-up places and axes, drawn over the picture of a map.
+// Draws looked-up locations and axes over the image of a map.
 'use strict';
 
 const dark = window.matchMedia('(prefers-color-scheme: dark)');
@@ -12,7 +12,7 @@ class MapMarks {
     this.selected = -1;
   }
 
-  // In CSS pixels of the canvas.
+  // Position in CSS pixels of the canvas.
   project(place, camera) {
     const at = place.clone().project(camera);
     return {
@@ -79,7 +79,7 @@ class MapMarks {
     c.stroke();
   }
 
-  // Where it covers no other label and no mark; the chosen one always.
+  // Labels that would cover another label or mark are omitted, except the selected one.
   drawLabel(one, taken) {
     const c = this.context;
     const chosen = one.n === this.selected;

@@ -1,8 +1,8 @@
-// The 3-D view of a map: a camera that is turned, tools, and places chosen in table or view.
+// 3-D view of a map: an orbiting camera, tools, and locations selected in the table or in the view.
 'use strict';
 
 const calm = window.matchMedia('(prefers-reduced-motion: reduce)');
-const OBLIQUE = [-0.35, -0.75, 0.62]; // from the map's middle to the camera
+const OBLIQUE = [-0.35, -0.75, 0.62]; // direction from the center of the map to the camera
 
 class MapView {
   constructor(figure) {
@@ -18,7 +18,7 @@ class MapView {
     this.marks = new MapMarks(this.canvas, this.data.markers, this.data.cell_size_m);
     this.size = this.cells.size;
     this.middle = this.size.clone().multiplyScalar(0.5);
-    this.reach = this.size.length(); // how far the camera stands, in cells
+    this.reach = this.size.length(); // distance of the camera, in cells
     this.setUpCamera();
     this.setUpTools();
     this.setUpTable();
@@ -32,7 +32,7 @@ class MapView {
     this.camera.up.set(0, 0, 1);
     this.controls = new THREE.OrbitControls(this.camera, this.canvas);
     this.controls.enableKeys = false;
-    this.controls.enableZoom = false; // until the view is chosen: the wheel scrolls the page
+    this.controls.enableZoom = false; // the wheel scrolls the page until the view is selected
     this.controls.screenSpacePanning = true;
     this.controls.minDistance = this.reach / 30;
     this.controls.maxDistance = this.reach * 6;
@@ -48,7 +48,7 @@ class MapView {
     this.resetCamera('oblique');
   }
 
-  // Far enough that the whole map is in the picture, whatever its shape.
+  // Distance at which the whole map is in the image.
   resetCamera(name) {
     const direction = name === 'top' ? new THREE.Vector3(0, -1e-3, 1)
                                      : new THREE.Vector3(...OBLIQUE);
@@ -71,7 +71,7 @@ class MapView {
       const point = new THREE.Vector3(
         corner & 1 ? this.size.x : 0, corner & 2 ? this.size.y : 0, corner & 4 ? this.size.z : 0);
       point.applyMatrix4(toCamera);
-      const depth = point.z + this.reach; // towards the camera, from the middle
+      const depth = point.z + this.reach; // from the center towards the camera
       distance = Math.max(distance, Math.abs(point.x) / side + depth, Math.abs(point.y) / up + depth);
     }
     return distance;
@@ -120,7 +120,7 @@ class MapView {
       });
   }
 
-  // A slider of the load, on a logarithmic scale around the map's own, and readings at the pointer.
+  // Slider of the load, on a logarithmic scale around the map's load, and values at the pointer.
   setUpForces() {
     const slider = this.figure.querySelector('.tools input');
     const reading = this.figure.querySelector('.reading');
@@ -168,7 +168,7 @@ class MapView {
     }
   }
 
-  // A press that does not move picks the nearest place.
+  // A click selects the nearest location.
   setUpPicking() {
     let start = null;
     this.canvas.addEventListener('pointerdown', (event) => {
@@ -196,7 +196,7 @@ class MapView {
     this.ask();
   }
 
-  // Within its box alone: the page stays where it is.
+  // Scrolls only the table, not the page.
   scrollTo(row) {
     const box = row.closest('.scroll');
     const inner = row.getBoundingClientRect();
@@ -204,7 +204,7 @@ class MapView {
     box.scrollTop += inner.top - outer.top - (outer.height - inner.height) / 2;
   }
 
-  // Nearer, and from the outside of the map, so that nothing stands before the place.
+  // Moves closer, on the outer side of the map, so that nothing occludes the location.
   turnTo(place) {
     const direction = place.clone().sub(this.middle).setZ(0);
     if (direction.length() < 0.05 * this.reach)
@@ -227,7 +227,7 @@ class MapView {
     this.ask();
   }
 
-  // The canvas in place of the picture.
+  // Replaces the image by the canvas.
   show() {
     this.viewport.classList.add('live');
     this.canvas.hidden = false;
@@ -271,7 +271,7 @@ class MapView {
 
   draw() {
     const scale = this.fit();
-    // As near and far as the map needs: depths stay fine enough for flush faces.
+    // The narrowest depth range of the map, for sufficient depth resolution of adjacent faces.
     const distance = this.camera.position.distanceTo(this.middle);
     this.camera.near = Math.max(distance - this.reach, this.reach / 200);
     this.camera.far = distance + this.reach;

@@ -1,10 +1,9 @@
-// The page of `graspmap report`: 3-D views of maps and pictures at full size. All that it adds is
-// worked from what stands in the page.
+// Page of `graspmap report`: 3-D views of maps, and images at full size, from data in the page.
 'use strict';
 
-const MAX_LIVE = 3; // views whose geometry is kept at a time
+const MAX_LIVE = 3; // maximum number of views with loaded geometry
 
-// Views are made when they come into sight; the geometry of those longest out of it is dropped.
+// Views are created when they become visible. The geometry of the views hidden longest is dropped.
 function startViews() {
   const views = new Map();
   const recent = [];
@@ -37,7 +36,7 @@ function tellThatNoView() {
   }
 }
 
-// A picture at full size on a click.
+// A click shows an image at full size.
 function startPictures() {
   const dialog = document.createElement('dialog');
   const large = document.createElement('img');

@@ -1,7 +1,7 @@
-// A colored mesh in place of a map's voxels, drawn by WebGL.
+// Draws a colored mesh instead of the voxels of a map with WebGL.
 'use strict';
 
-// Lit as `graspmap render` does: from the upper left behind the camera, both sides.
+// Lighting as in `graspmap render`: from the upper left behind the camera, on both sides.
 const SCENE_VERTEX = `
   precision highp float;
   uniform mat4 projectionMatrix, modelViewMatrix;

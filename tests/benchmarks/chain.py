@@ -63,7 +63,7 @@ def table_of(runs):
     lines = ["| side m, frames | " + " | ".join(STAGES) + " |", "|---|" + "---|" * len(STAGES)]
     for run in runs:
         lines.append(f"| {run['side_m']}, {run['frames']} | " + " | ".join(
-            "{processor_s:.1f} s, {peak_mib:.0f} MiB".format(**run["stages"][name])
+            "{processor_s:.1f}, {peak_mib:.0f}".format(**run["stages"][name])
             if name in run["stages"] else "not run" for name in STAGES) + " |")
     if len(runs) > 1:
         lines.append("| exponents of area | " + " | ".join(

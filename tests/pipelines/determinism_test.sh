@@ -54,7 +54,7 @@ run() {
     LC_ALL=$locale LANG=$locale TMPDIR=$scratch/tmp_$number GRASPMAP_TEST_THREADS=$threads \
       make --no-print-directory -f "$source/pipelines/demo.mk" OUT=out $demo_with \
       GRASPMAP="$scratch/graspmap" -j2
-  ) >"$scratch/log" 2>&1 || { cat "$scratch/log" >&2; fail "run $1 did not end well"; }
+  ) >"$scratch/log" 2>&1 || { cat "$scratch/log" >&2; fail "run $1 failed"; }
   digest "$folder/out" '*.png' >"$scratch/digests"
   digest "$folder/out" '*.[!p]*' >"$scratch/pictures"
   same_reports "$folder"

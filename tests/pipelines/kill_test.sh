@@ -54,7 +54,7 @@ for ((n = 0; n < kills; ++n)); do
   if kill -KILL -- "-$job" 2>/dev/null; then killed=$((killed + 1)); fi
   if wait "$job" 2>/dev/null; then
     whole_runs=$((whole_runs + 1))
-    diff <(echo "$expected") <(digest "$scratch/out") || fail "a run that was killed before ended with other bytes"
+    diff <(echo "$expected") <(digest "$scratch/out") || fail "a restarted run gave different bytes"
     rm -rf "$scratch/out"
   elif [ -n "$(find "$scratch/out" -name '*.partial*' 2>/dev/null)" ]; then
     with_temporaries=$((with_temporaries + 1))

@@ -29,7 +29,7 @@ run -j2
 map=$(sha256sum <"$out/thesis/map.pcd")
 rm "$out/thesis/tiles/2-of-3.pcd" "$out/thesis/top.png"
 run
-[ "$map" = "$(sha256sum <"$out/thesis/map.pcd")" ] || fail "the map made again differs"
+[ "$map" = "$(sha256sum <"$out/thesis/map.pcd")" ] || fail "the recomputed map differs"
 require_files "$out/thesis/top.png"
 
 # A changed terrain, gripper or title is detected, even if its file is older.
@@ -45,11 +45,11 @@ site SITE="$out/terrain.pcd"
 first=$(sha256sum <"$scratch/site/map.pcd")
 site SITE="$scratch/other.pcd" TITLE="Bob's site"
 second=$(sha256sum <"$scratch/site/map.pcd")
-[ "$first" != "$second" ] || fail "another terrain was not seen"
+[ "$first" != "$second" ] || fail "a changed terrain was not detected"
 sleep 1
 sed -i 's/^palm_diameter_mm: 71/palm_diameter_mm: 90/' "$scratch/mine.yaml"
 site SITE="$scratch/other.pcd" TITLE="Bob's site"
-[ "$second" != "$(sha256sum <"$scratch/site/map.pcd")" ] || fail "another gripper was not seen"
-if site SITE="no such.pcd" 2>"$scratch/errors"; then fail "a name with a space was taken"; fi
+[ "$second" != "$(sha256sum <"$scratch/site/map.pcd")" ] || fail "a changed gripper was not detected"
+if site SITE="no such.pcd" 2>"$scratch/errors"; then fail "a name with a space was accepted"; fi
 grep -q 'contains a space' "$scratch/errors" || fail "no clear error for a name with a space"
 echo "passed"

@@ -22,7 +22,7 @@ until [ -n "$(find "$scratch/out" -name 'terrain.pcd' 2>/dev/null)" ]; do
 done
 if (cd "$scratch" && make --no-print-directory -f "$source/pipelines/primitive_shapes.mk" OUT=out \
   GRASPMAP="$graspmap") >"$scratch/second" 2>&1; then
-  fail "two at once, and the second does not say so"
+  fail "a second run in the folder does not fail"
 fi
 grep -qx 'out: another make works in this folder' "$scratch/second" || fail "$(cat "$scratch/second")"
 wait "$first" || { cat "$scratch/log" >&2; fail "the first of two runs failed"; }
@@ -56,7 +56,7 @@ for _ in $(seq "${TIMES:-2}"); do
   tell TERM 143 group
   tell INT 130 group
 done
-[ "$ended" -gt 0 ] || fail "no run was told to end in time"
+[ "$ended" -gt 0 ] || fail "no run received the signal in time"
 start
 wait $! || { tail -n 20 "$scratch/log" >&2; fail "the run after the last signal failed"; }
 diff <(echo "$expected") <(digest "$scratch/out") || fail "outputs differ after $ended signals"

@@ -24,5 +24,5 @@ run -j2
 [ "$before" = "$(listing "$out")" ] || fail "the second run changed files"
 # Changed parameters change the map.
 run -j2 SCORE='--solid-voxel-threshold 200'
-[ "$before" != "$(listing "$out")" ] || fail "a changed parameter was not seen"
+[ "$before" != "$(listing "$out")" ] || fail "a changed parameter was not detected"
 echo "passed"

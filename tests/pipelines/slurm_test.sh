@@ -65,11 +65,11 @@ run map TERRAIN="$site" SHARES=4
 cmp "$scratch/local.pcd" "$out/map.pcd" || fail "the map by Slurm differs from the local one"
 "$graspmap" info --verify "$out/map.tiles" >/dev/null || fail "the store is not sound"
 
-[ "$(cat "$out"/logs/*.log | grep -c ', try 1, ')" -eq 4 ] || fail "not four tasks were run"
+[ "$(cat "$out"/logs/*.log | grep -c ', try 1, ')" -eq 4 ] || fail "the number of tasks is not four"
 grep -q 'graspmap ended with 137' "$out/logs/2.log" || fail "task 2 was not killed"
-grep -q 'share 2 of 4, try 2,' "$out/logs/2.log" || fail "task 2 was not done again"
+grep -q 'share 2 of 4, try 2,' "$out/logs/2.log" || fail "task 2 was not repeated"
 scontrol --oneliner show jobs | grep 'ArrayTaskId=2 ' | grep -q 'JobState=COMPLETED .*Restarts=1 ' ||
-  fail "Slurm does not know of the restart of task 2"
+  fail "Slurm does not report a restart of task 2"
 for node in node1 node2; do
   grep -q "on $node\$" "$out"/logs/*.log || fail "$node did nothing"
 done
@@ -91,7 +91,7 @@ cmp "$scratch/held.pcd" "$scratch/held/held.pcd" || fail "the test by Slurm diff
 diff -r "$scratch/mesh" "$scratch/held/mesh" || fail "the mesh by Slurm differs from the local one"
 [ "$(cat "$scratch"/held/mesh_logs/*.log | grep -c ', try 1, ')" -eq 3 ] || fail "not three shares"
 grep -q 'share 2 of 3, try 2,' "$scratch/held/mesh_logs/2.log" || fail "no second try of a killed mesh"
-[ ! -e "$scratch/held/mesh.progress" ] || fail "the pieces were left"
+[ ! -e "$scratch/held/mesh.progress" ] || fail "the pieces were not removed"
 "$graspmap" simulate scan "$scratch/site/mesh.ply" --frames 6 --loops 1 -o "$scratch/scan.db" --quiet
 scan() {
   run "$@" OUT="$scratch/held" SHARES=2 MESH="$scratch/mesh" SCAN="$scratch/scan.db" \
@@ -117,11 +117,11 @@ run map TERRAIN="$site" SHARES=4
 # An invalid terrain fails at once and is not retried.
 echo "no cloud" >"$scratch/bad.pcd"
 if run TERRAIN="$scratch/bad.pcd" OUT="$scratch/bad" SHARES=1 2>"$scratch/errors"; then
-  fail "a broken terrain was taken"
+  fail "a broken terrain was accepted"
 fi
 grep -q 'tasks failed' "$scratch/errors" || fail "no clear error for a broken terrain"
 grep -q 'bad.pcd' "$scratch/bad/logs/1.log" || fail "the log does not name the broken terrain"
-grep -q 'try 2' "$scratch/bad/logs/1.log" && fail "bad input was tried again"
+grep -q 'try 2' "$scratch/bad/logs/1.log" && fail "bad input was retried"
 
 "$slurm_local" stop
 [ ! -e "$SLURM_LOCAL" ] || fail "slurm-local stop left its folder"

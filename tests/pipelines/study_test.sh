@@ -61,7 +61,7 @@ backward,25 left,25 right,25 " ] || fail "other poses: $(cat "$planes")"
 awk -F, 'NR == 2 && !($5 < 2) { exit 1 } NR > 2 && !($5 < 10) { exit 1 }' "$planes" ||
   fail "the plane is not the ground: $(cat "$planes")"
 [ "$(head -n 1 "$out/4_artificial_rocks/poses/places_thesis.csv" | tr ',' '\n' | tail -n 5 |
-  tr '\n' ' ')" = "level forward_25 backward_25 left_25 right_25 " ] || fail "no column a pose"
+  tr '\n' ' ')" = "level forward_25 backward_25 left_25 right_25 " ] || fail "the number of columns is not that of the poses"
 
 if [ -n "${GRASPMAP_DATA:-}" ]; then
   for rate in "artificial_rocks prescan 0.7333" "artificial_rocks realtime_raw 0.6875" \
@@ -78,11 +78,11 @@ run -j2 >"$scratch/log"
 [ "$before" = "$(listing "$out")" ] || fail "the second run changed files"
 map=$(sha256sum <"$out/4_artificial_rocks/thesis/prescan/map.pcd")
 run -j2 LOOKUP="--mode maximum --radius 0.05" >"$scratch/log"
-[ "$before" != "$(listing "$out")" ] || fail "another way of looking up was not seen"
+[ "$before" != "$(listing "$out")" ] || fail "changed flags of the look-up were not detected"
 [ "$map" = "$(sha256sum <"$out/4_artificial_rocks/thesis/prescan/map.pcd")" ] ||
   fail "the look-up changed the map"
 for wrong in SCENARIOS=5 METHODS=theses STAGES=all OUT= 'OUT=two words'; do
-  if run "$wrong" >/dev/null 2>"$scratch/errors"; then fail "$wrong was taken"; fi
+  if run "$wrong" >/dev/null 2>"$scratch/errors"; then fail "$wrong was accepted"; fi
   grep -q 'none of\|not set\|contains a space' "$scratch/errors" || fail "no clear error for $wrong"
 done
 echo "passed"

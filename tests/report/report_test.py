@@ -117,23 +117,23 @@ class Page:
         messages = [one['message'] for one in self.browser.console()]
         check(not messages, f'the console says: {messages}')
         check(self.browser.run('return document.querySelectorAll("[onerror]").length') == 0,
-              'something of the data became a tag')
+              'data were interpreted as HTML')
         check(self.browser.run('return performance.getEntriesByType("resource")'
                                '.filter(e => !e.name.startsWith("data:")).length') == 0,
-              'something was loaded')
+              'the page loaded a resource')
 
 
-def on_a_desk(report):
+def on_a_desktop(report):
     with Browser(1280, 900) as browser:
         page = Page(browser, report)
-        check('<img' in browser.text('h1'), 'the title is not shown as it stands')
+        check('<img' in browser.text('h1'), 'the title is not escaped')
         page.show_view()
         first = page.picture()
 
         browser.drag(page.middle(), (120, 40))
         page.settle()
         turned = page.picture()
-        check(turned != first, 'turning the map did not change the picture')
+        check(turned != first, 'rotating the map did not change the image')
 
         # A location selected in the table moves to the center of the view.
         browser.run('document.querySelector("figure.map tr[data-place=\\"1\\"] button").click()')
@@ -141,7 +141,7 @@ def on_a_desk(report):
         page.settle()
         check(page.selected_row() == 'H25', 'the row is not marked')
         chosen = page.picture()
-        check(chosen != turned, 'choosing a place did not change the picture')
+        check(chosen != turned, 'selecting a location did not change the image')
 
         # A click on the center of the view selects the location there.
         browser.run('document.querySelector("figure.map tr[data-place=\\"0\\"] button").click()')
@@ -200,7 +200,7 @@ def on_a_desk(report):
         page.check_no_errors()
 
 
-def on_a_telephone(report):
+def on_a_phone(report):
     with Browser(700, 800) as browser:
         browser.resize(360, 740)
         page = Page(browser, report)
@@ -235,7 +235,7 @@ def main():
         return 77
     with tempfile.TemporaryDirectory() as folder:
         report = make_run(sys.argv[1], pathlib.Path(folder))
-        for part in (on_a_desk, on_a_telephone, without_javascript, without_webgl):
+        for part in (on_a_desktop, on_a_phone, without_javascript, without_webgl):
             begin = time.monotonic()
             part(report)
             print(f'{part.__name__}: passed in {time.monotonic() - begin:.1f} s')

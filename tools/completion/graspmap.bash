@@ -1,11 +1,11 @@
-# Completion of graspmap for bash, with the package bash-completion. Commands, flags and the values
-# that a flag can take are read off `graspmap --help` and `graspmap COMMAND --help`.
+# Completion of graspmap for bash, with the package bash-completion. Commands, flags and their values are
+# read from `graspmap --help` and `graspmap COMMAND --help`.
 
 _graspmap_commands() {
   "$1" --help 2>/dev/null | sed -n "s/^  \([a-z][a-z-]*\) .*/\1/p"
 }
 
-# The words that `simulate` takes.
+# Words after `simulate`.
 _graspmap_subcommands() {
   "$1" "$2" --help 2>/dev/null | sed -n '/^WHAT:/,/^$/ s/^  \([a-z][a-z-]*\) .*/\1/p'
 }
