@@ -19,8 +19,7 @@ class Excerpt : public ScanSource {
   Excerpt(std::unique_ptr<ScanSource> scan, std::size_t first, std::size_t count)
       : scan_(std::move(scan)), graph_(scan_->graph()) {
     const auto begin = graph_.nodes.begin() + static_cast<std::ptrdiff_t>(first);
-    graph_.nodes =
-        std::vector<GraphNode>(begin, begin + static_cast<std::ptrdiff_t>(count));
+    graph_.nodes = std::vector<GraphNode>(begin, begin + static_cast<std::ptrdiff_t>(count));
   }
 
   const std::filesystem::path& path() const override { return scan_->path(); }
@@ -49,7 +48,8 @@ void expect_possible(const SensorCalibration& calibration) {
     for (double z = 0.5; z < 5.0; z += 0.1)
       for (const double radius2 : {0.0, 0.5, 1.0})
         EXPECT_LT(std::abs(depth.bend(z, radius2)), 0.01 + 0.02 * z) << z;
-  for (const IntrinsicsStep& step : calibration.intrinsics) EXPECT_LT(std::abs(step.fx_share), 0.08);
+  for (const IntrinsicsStep& step : calibration.intrinsics)
+    EXPECT_LT(std::abs(step.fx_share), 0.08);
   for (const Pose& pose : calibration.color_from_depth) EXPECT_LT(pose.translation().norm(), 0.08);
 }
 
