@@ -94,7 +94,8 @@ class PairTest {
   const TriangleMesh& mesh_;
 };
 
-// Conservative bounding box in single precision.
+// Conservative bounding box in single precision, relative to a vertex of the mesh: single precision
+// has steps of half a meter in UTM coordinates.
 struct Box {
   std::array<float, 3> low = {HUGE_VALF, HUGE_VALF, HUGE_VALF};
   std::array<float, 3> high = {-HUGE_VALF, -HUGE_VALF, -HUGE_VALF};
@@ -113,9 +114,11 @@ struct Box {
 
 Box box_of(const TriangleMesh& mesh, std::uint32_t triangle) {
   Box box;
+  const Eigen::Vector3d& origin = mesh.vertices[mesh.triangles.front()[0]];
   for (const std::uint32_t v : mesh.triangles[triangle])
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const auto value = static_cast<float>(mesh.vertices[v][static_cast<Eigen::Index>(axis)]);
+      const auto along = static_cast<Eigen::Index>(axis);
+      const auto value = static_cast<float>(mesh.vertices[v][along] - origin[along]);
       // Exceeds the rounding error.
       const float margin = std::numeric_limits<float>::epsilon() * std::abs(value) +
                            std::numeric_limits<float>::min();

@@ -276,6 +276,18 @@ TEST(SelfIntersections, Touching) {
   EXPECT_EQ(pairs({}, {0, 2, 1}), 0U);                                   // the same corners
 }
 
+// In map coordinates, whose single-precision steps are as large as the triangles. The shift is
+// exact.
+TEST(SelfIntersections, TheSameFarFromTheOrigin) {
+  TriangleMesh mesh = graspmap_test::geodesic_mesh(4, 1.0);
+  for (Eigen::Vector3d& v : mesh.vertices)
+    for (double& x : v) x = std::round(65536.0 * (x + uniform(-0.08, 0.08))) / 65536.0;
+  const auto near = libmap::find_self_intersections(mesh);
+  for (Eigen::Vector3d& v : mesh.vertices) v += Eigen::Vector3d(451230.0, 5412340.0, 812.0);
+  ASSERT_GT(near.size(), 20U);
+  EXPECT_EQ(libmap::find_self_intersections(mesh), near);
+}
+
 TEST(SelfIntersections, OnlyOfMarkedTriangles) {
   TriangleMesh mesh = graspmap_test::geodesic_mesh(4, 1.0);
   for (Eigen::Vector3d& v : mesh.vertices)
