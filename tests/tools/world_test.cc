@@ -102,14 +102,14 @@ TEST(WorldCommand, FramesAreNamed) {
 TEST(WorldCommand, BadInputWritesNothing) {
   write_site();
   write_map("other.ply", 5.0);
-  graspmap_test::write_text("empty.ply",
+  graspmap_test::write_text(scratch("empty.ply"),
                             "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\n"
                             "property float y\nproperty float z\nelement face 0\n"
                             "property list uchar int vertex_indices\nend_header\n"
                             "0 0 0\n1 0 0\n0 1 0\n");
-  graspmap_test::write_text("none.yaml", "depth_scale_m: 0.001\ncameras: []\n");
+  graspmap_test::write_text(scratch("none.yaml"), "depth_scale_m: 0.001\ncameras: []\n");
   graspmap_test::write_text(
-      "name.yaml",
+      scratch("name.yaml"),
       "cameras:\n  - name: a::b\n    image_width: 64\n    image_height: 36\n    camera_matrix: "
       "[33, 0, 31, 0, 33, 17, 0, 0, 1]\n    position_m: [0, 0, 0]\n    roll_pitch_yaw_deg: [0, 0, "
       "0]\n");
