@@ -83,13 +83,9 @@ libmap::WorldRig read_world_rig(const WorldCommandOptions& options,
   run.manifest().transforms.emplace_back("site_from_robot", rig.world_from_robot);
   for (const libmap::RigCamera& camera : rig.rig.cameras)
     in_file(file, [&] { libmap::require_world_name(camera.name, "name of a camera"); });
-  const auto is_plain = [](const libmap::RigCamera& one) {
-    const libmap::Camera& lens = one.camera;
-    return !lens.is_distorted() && std::abs(lens.fx / lens.fy - 1) < 0.01;
-  };
-  if (!std::all_of(rig.rig.cameras.begin(), rig.rig.cameras.end(), is_plain))
-    run.warn("{}: simulators know no lens distortion, and MuJoCo square pixels only",
-             file.string());
+  for (const libmap::RigCamera& camera : rig.rig.cameras)
+    if (camera.camera.is_distorted())
+      run.warn("{}: simulators do not know the distortion of its lens", camera.name);
   return rig;
 }
 

@@ -8,8 +8,8 @@
 
 namespace libmap {
 
-// The hull of one triangle, or of two neighbors that make a nearly flat convex quadrilateral, and a
-// corner behind their center.
+// The hull of one triangle, or of several neighbors with a nearly flat convex outline, and a corner
+// behind their center.
 struct ConvexPiece {
   Eigen::Vector3d center = Eigen::Vector3d::Zero();
   std::vector<Eigen::Vector3d> corners_m;  // from `center`; the last one is behind
@@ -17,8 +17,8 @@ struct ConvexPiece {
 
 struct ConvexPieces {
   std::vector<ConvexPiece> pieces;
-  // No point of the marked triangles is outside the pieces, and no point of a quadrilateral's hull
-  // is farther in front of its triangles than this.
+  // No point of the marked triangles is outside the pieces, and no point of a piece's outer faces
+  // is farther from its triangles than this.
   double deviation_m = 0.0;
 };
 

@@ -12,8 +12,7 @@ namespace libmap {
 
 namespace {
 
-// Mean accelerations at the surface, m/s2 (NASA's planetary fact sheets; 9.81 as in the issue of a
-// nominal Earth).
+// Accelerations at the surface, m/s2.
 constexpr std::array<std::pair<const char*, double>, 3> bodies{
     {{"earth", 9.81}, {"moon", 1.62}, {"mars", 3.71}}};
 

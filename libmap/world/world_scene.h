@@ -18,7 +18,7 @@
 namespace libmap {
 
 struct WorldOptions {
-  double collision_error_m = 0.002;  // > 0: between the collision mesh and the visual one
+  double collision_error_m = 0.0014;  // > 0: between the collision mesh and the visual one
   HeightFieldOptions field{};
   double piece_depth_m = 0.02;    // > 0: maximum depth of the convex pieces
   std::string gravity = "earth";  // m/s2 downwards, or earth, moon, mars

@@ -27,7 +27,7 @@ namespace {
 constexpr double weld_share = 1e-7;
 // Vertices of the collision mesh are multiples of this; so MJCF rounds, ten times as coarse.
 constexpr double rounding_m = 1e-6;
-constexpr double bulge_share = 0.5;
+constexpr double bulge_share = 0.7;
 
 struct CollisionMesh {
   TriangleMesh mesh;

@@ -31,7 +31,7 @@ void write_map(const std::string& name, double x_m) {
     for (double y = -0.3; y < -0.1; y += 0.02)
       map.positions.emplace_back(x + x_m, y, graspmap_test::wavy_height(x, y));
   std::vector<double>& score = map.add_field("score", libmap::ScalarType::float32).values;
-  for (std::size_t n = 0; n < map.size(); ++n) score.push_back(0.35 + 0.3 * (n % 3));
+  for (std::size_t n = 0; n < map.size(); ++n) score[n] = 0.35 + 0.3 * static_cast<double>(n % 3);
   for (const char* name_of_axis : {"approach_x", "approach_y", "approach_z"})
     map.add_field(name_of_axis, libmap::ScalarType::float32)
         .values.assign(map.size(), std::string(name_of_axis) == "approach_z" ? 1.0 : 0.0);
@@ -49,9 +49,9 @@ std::map<std::string, std::string> files_of(const fs::path& folder) {
 TEST(WorldCommand, TheSameBytesForAnyNumberOfThreadsAndASecondRun) {
   write_site();
   write_map("map.ply", 0.0);
-  const std::vector<std::string> words = {"convert", "site.ply",    "-o",      "rocks.world",
-                                          "--map",   "map.ply",     "--footholds", "map.ply",
-                                          "--rig",   "scar-e",      "--gravity",   "mars"};
+  const std::vector<std::string> words = {"convert", "site.ply", "-o",          "rocks.world",
+                                          "--map",   "map.ply",  "--footholds", "map.ply",
+                                          "--rig",   "scar-e",   "--gravity",   "mars"};
   ASSERT_TRUE(succeeded(graspmap(words)));
   const auto first = files_of(scratch("rocks.world"));
   EXPECT_TRUE(first.contains("meshes/site_visual_0_0.png"));
@@ -102,14 +102,14 @@ TEST(WorldCommand, FramesAreNamed) {
 TEST(WorldCommand, BadInputWritesNothing) {
   write_site();
   write_map("other.ply", 5.0);
-  graspmap_test::write_text("empty.ply",
+  graspmap_test::write_text(scratch("empty.ply"),
                             "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\n"
                             "property float y\nproperty float z\nelement face 0\n"
                             "property list uchar int vertex_indices\nend_header\n"
                             "0 0 0\n1 0 0\n0 1 0\n");
-  graspmap_test::write_text("none.yaml", "depth_scale_m: 0.001\ncameras: []\n");
+  graspmap_test::write_text(scratch("none.yaml"), "depth_scale_m: 0.001\ncameras: []\n");
   graspmap_test::write_text(
-      "name.yaml",
+      scratch("name.yaml"),
       "cameras:\n  - name: a::b\n    image_width: 64\n    image_height: 36\n    camera_matrix: "
       "[33, 0, 31, 0, 33, 17, 0, 0, 1]\n    position_m: [0, 0, 0]\n    roll_pitch_yaw_deg: [0, 0, "
       "0]\n");
@@ -128,8 +128,8 @@ TEST(WorldCommand, BadInputWritesNothing) {
   EXPECT_TRUE(bad_input(convert({"site.ply", "-o", "a::b.world"}), {"a::b", "SDF"}));
   EXPECT_TRUE(bad_input(convert({"site.ply", "-o", "world.world"}), {"world", "SDF"}));
   EXPECT_TRUE(bad_input(convert({"site.ply", "-o", "x.world", "--gravity", "venus"}), {"venus"}));
-  EXPECT_TRUE(
-      bad_input(convert({"site.ply", "-o", "x.world", "--map", "site.ply"}), {"site.ply", "score"}));
+  EXPECT_TRUE(bad_input(convert({"site.ply", "-o", "x.world", "--map", "site.ply"}),
+                        {"site.ply", "score"}));
   EXPECT_EQ(names_in_scratch(), before);
 }
 

@@ -122,7 +122,7 @@ TEST(ConvexPieces, AreBehindTheSurface) {
   for (const libmap::ConvexPieces* pieces : {&one_by_one, &pairs}) {
     std::size_t triangles = 0;
     for (const libmap::ConvexPiece& piece : pieces->pieces) {
-      triangles += piece.corners_m.size() - 3;
+      triangles += piece.corners_m.size() - 3;  // of a fan without a corner inside
       for (const Eigen::Vector3d& corner : piece.corners_m)
         EXPECT_LE((piece.center + corner - Eigen::Vector3d(1, 2, 3)).norm(), 0.2 + 1e-9);
       const double depth = piece.corners_m.back().norm();

@@ -1,12 +1,15 @@
 #include <gtest/gtest.h>
 #include <mujoco/mujoco.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <sdf/sdf.hh>
 
 #include "libmap/core/file_output.h"
+#include "libmap/core/text.h"
 #include "libmap/io/mesh_io.h"
+#include "libmap/mesh/surface_distance.h"
 #include "libmap/simulate/robot_cameras.h"
 #include "libmap/world/world_writer.h"
 #include "tests/libmap/world/world_samples.h"
@@ -151,6 +154,31 @@ TEST(WorldFiles, TheRigSeesTheCollisionMeshAsTheVisualOne) {
   const libmap::TriangleMesh mesh = ground_with_boulder();
   write_sample(folder, scene, mesh);
   expect_same_depth(mesh, folder, *scene.rig);
+}
+
+// Points of both surfaces against distances by Embree.
+TEST(WorldFiles, TheCollisionMeshIsWithinItsBound) {
+  const libmap::TriangleMesh mesh = ground_with_boulder();
+  for (const double error_m : {0.0005, 0.003}) {
+    const fs::path folder = scratch_folder() / libmap::to_text(error_m);
+    libmap::WorldScene scene;
+    scene.name = "bound";
+    scene.options.collision_error_m = error_m;
+    const libmap::WorldReport report = write_sample(folder, scene, mesh);
+    EXPECT_LE(report.collision_deviation_m, error_m);
+    EXPECT_LT(report.collision_triangles, report.visual_triangles / 2);
+    const libmap::TriangleMesh collision =
+        libmap::read_mesh(folder / "meshes/site_collision.obj").mesh;
+    EXPECT_EQ(collision.triangles.size(), report.collision_triangles);
+    for (const auto& [from, to] : {std::pair(&mesh, &collision), {&collision, &mesh}}) {
+      std::vector<Eigen::Vector3d> points = from->vertices;
+      for (const libmap::SurfacePoint& point : libmap::sample_surface(*from, 1e5, 1))
+        points.push_back(point.position);
+      const std::vector<double> distances = libmap::distances_to_surface(points, *to);
+      EXPECT_LE(*std::max_element(distances.begin(), distances.end()),
+                report.collision_deviation_m + 1e-6);
+    }
+  }
 }
 
 TEST(WorldFiles, ForbiddenNames) {
