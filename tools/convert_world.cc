@@ -4,7 +4,7 @@
 #include "libmap/geometry/spatial_index.h"
 #include "libmap/io/cloud_io.h"
 #include "libmap/io/mesh_io.h"
-#include "libmap/mesh/mesh_piece_index.h"
+#include "libmap/mesh/mesh_tile_index.h"
 #include "libmap/mesh/ray_caster.h"
 #include "libmap/texture/textured_mesh_io.h"
 #include "libmap/world/world_writer.h"
@@ -12,7 +12,7 @@
 #include "tools/support/foothold_file.h"
 #include "tools/support/map_frame.h"
 #include "tools/support/placement.h"
-#include "tools/support/usages.h"
+#include "tools/support/subcommands.h"
 
 using namespace graspmap_tools;
 
@@ -130,7 +130,7 @@ std::vector<libmap::WorldModel> write_models(const fs::path& folder,
     return {write(input)};
   }
   constexpr double margin_cells = 4.0;
-  libmap::MeshPieceIndex pieces(libmap::mesh_pieces(options.site));
+  libmap::MeshTileIndex pieces(libmap::mesh_tiles(options.site));
   std::vector<libmap::WorldModel> models;
   for (std::size_t n = 0; n < pieces.size(); ++n)
     models.push_back(write(
@@ -148,7 +148,7 @@ void write_world(const WorldCommandOptions& options, Run& run) {
   const auto names = libmap::world_file_names();
   run.claim_output_tree(options.output, names, {options.site, options.map, options.footholds});
   scene.options = options.world;
-  carry_frame(options.site, run);
+  copy_frame(options.site, run);
   const libmap::WorldScores scores = read_scores(options.map, run);
   scene.footholds = read_footholds(options.footholds, run);
   if (!options.rig.empty())

@@ -2,7 +2,7 @@
 #include "libmap/poses/trajectory_io.h"
 #include "libmap/refine/refinement.h"
 #include "libmap/scan/colmap_builder.h"
-#include "libmap/scan/picture_file.h"
+#include "libmap/scan/image_export.h"
 #include "libmap/scan/rtabmap_writer.h"
 #include "tools/support/command_line.h"
 #include "tools/support/refine_report.h"
@@ -53,7 +53,7 @@ void say_stage(const libmap::StageReport& stage, Run& run) {
   if (stage.rejected_error)
     run.detail("  rejected: {:.2f} mm, {:.3f} deg", 1e3 * stage.rejected_error->absolute.rmse_m,
                stage.rejected_error->absolute.mean_rotation_deg);
-  for (const auto& [name, value] : stage.figures) run.detail("  {} {:.6g}", name, value);
+  for (const auto& [name, value] : stage.metrics) run.detail("  {} {:.6g}", name, value);
   for (const auto& [name, group] : stage.groups)
     run.detail(
         "  {}: {} links, {} rejected, deviations x {:.3g} and x {:.3g}, rms {:.2f} mm {:.3f} deg",
@@ -79,9 +79,9 @@ libmap::ColmapModel model_of(const libmap::Trajectory& poses, const libmap::Scan
   for (const libmap::TrajectoryPose& pose : poses) {
     try {
       const std::vector<libmap::CameraView> views =
-          libmap::read_pictures(scan, pose.node, {.color = true, .depth = false});
+          libmap::read_views(scan, pose.node, {.color = true, .depth = false});
       for (std::size_t c = 0; c < views.size(); ++c)
-        builder.add_image(libmap::picture_file(scan, pose.node, views, c).name, views[c],
+        builder.add_image(libmap::image_file_of(scan, pose.node, views, c).name, views[c],
                           pose.world_from_base * views[c].color_camera.base_from_camera);
     } catch (const libmap::Error& error) {
       run.warn(std::string(error.what()) + "; its pose is not in the model of COLMAP");
@@ -225,7 +225,7 @@ std::optional<libmap::CameraFile> claim_outputs(const RefineOptions& options, Ru
   }
   auto camera = known_camera(options.calibration, options.scans.front(), {}, run);
   if (camera)
-    refuse_given({{"--write-calibration", !options.new_calibration.empty()},
+    reject_given({{"--write-calibration", !options.new_calibration.empty()},
                   {"--write-database", !options.database.empty()}},
                  "cannot be combined with --calibration: it starts from the stored camera");
   if (!options.database.empty()) claim_database(options, run);

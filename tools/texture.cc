@@ -15,8 +15,8 @@
 // JSON of the exposure, which shares and resumed runs read bit for bit.
 namespace libmap {
 
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(TextureExposure, gains, vignetting, observations, spread_before,
-                                   spread)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(TextureExposure, gains, vignetting, observations, log_color_deviation_before,
+                                   log_color_deviation)
 
 }  // namespace libmap
 
@@ -169,7 +169,7 @@ void texture(TextureCommandOptions options, Run& run) {
   if (!fs::is_directory(options.mesh)) libmap::require_mesh_format(options.mesh);
   run.claim_output(options.output, inputs_of(options));
   run.require_own_companions(options.output,
-                             libmap::companions_of_model(options.output, options.writing));
+                             libmap::additional_model_files(options.output, options.writing));
   const auto scan = scan_of(options, run);
   const libmap::Trajectory poses = poses_of(options, *scan, run);
   const libmap::TextureResult result = textured(options, *scan, poses, run);
@@ -202,15 +202,15 @@ void make_models(const TextureCommandOptions& options, const libmap::ScanSource&
   // Large arrays are returned to the system after each tile, because the heap would fragment.
   mallopt(M_MMAP_THRESHOLD, 1 << 20);
   const std::vector<std::string> names = stems_of(pieces);
-  libmap::MeshPieceIndex index(pieces);
-  libmap::PieceTexturing texturing(index, options.margin_m, scan, poses, options.texture,
+  libmap::MeshTileIndex index(pieces);
+  libmap::TileTexturing texturing(index, options.margin_m, scan, poses, options.texture,
                                    run.progress());
-  const TileFolder::Facts found =
-      output.begin([&] { return TileFolder::Facts(texturing.find_exposure()); });
+  const TileFolder::TileData found =
+      output.begin([&] { return TileFolder::TileData(texturing.find_exposure()); });
   if (found.is_null()) return;  // --dry-run
   const auto exposure = found.get<libmap::TextureExposure>();
   const auto make = [&](std::size_t n, const fs::path& to) {
-    const libmap::PieceTexturing::Piece tile = texturing.make(n, exposure);
+    const libmap::TileTexturing::Piece tile = texturing.make(n, exposure);
     libmap::textured_mesh_files(to, tile.model, options.writing).front().write(to);
     return facts_of(tile.counts);
   };
@@ -230,7 +230,7 @@ void make_models(const TextureCommandOptions& options, const libmap::ScanSource&
 }
 
 void texture_in_pieces(TextureCommandOptions options, Run& run) {
-  const std::vector<fs::path> pieces = libmap::mesh_pieces(options.mesh);
+  const std::vector<fs::path> pieces = libmap::mesh_tiles(options.mesh);
   const std::vector<std::string> names = tile_folder_names(options.output, pieces, model_extension);
   const auto scan = scan_of(options, run);
   const libmap::Trajectory poses = poses_of(options, *scan, run);

@@ -179,7 +179,7 @@ double deviation(const TriangleMesh& original, const TriangleMesh& smaller, doub
     if (one.nearest_there != none) marks[one.nearest_there] = true;
   for (std::size_t t = 0; t < back.size(); ++t)
     if (back[t].nearest_there != none) marks[t] = true;
-  grow_marks(original, rings, marks);
+  dilate_mask(original, rings, marks);
   for (std::size_t t = 0; t < marks.size(); ++t)
     if (marks[t])
       for (const std::uint32_t v : original.triangles[t]) locked[v] = true;
@@ -226,7 +226,7 @@ MeshDecimation decimate_triangles(TriangleMesh& mesh, double max_error_m) {
     for (const Deviation& one : *way)
       if (one.nearest_there == none) result.deviation_m = std::max(result.deviation_m, one.bound_m);
   // So that the restored triangles overlap the others.
-  grow_marks(mesh, 1, restore);
+  dilate_mask(mesh, 1, restore);
   append_mesh(select_triangles(mesh, restore), smaller);
   if (smaller.triangles.size() >= mesh.triangles.size()) return {};
   result.removed_triangles = mesh.triangles.size() - smaller.triangles.size();

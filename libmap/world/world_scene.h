@@ -38,7 +38,7 @@ void require_world_name(const std::string& name, const std::string& field);
 // A mesh to look at.
 struct WorldVisual {
   std::string file;     // .obj in the folder of meshes
-  std::string texture;  // picture beside it; empty: none
+  std::string texture;  // image beside it; empty: none
   Color color{160, 160, 160};
 };
 

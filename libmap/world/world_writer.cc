@@ -44,7 +44,7 @@ CollisionMesh make_collision_mesh(const TriangleMesh& visual, double max_error_m
   const std::vector<bool> repeated = repeated_triangles(collision.mesh.triangles);
   std::vector<bool> keep(repeated.size());
   for (std::size_t t = 0; t < keep.size(); ++t)
-    keep[t] = !repeated[t] && !names_a_vertex_twice(collision.mesh.triangles[t]);
+    keep[t] = !repeated[t] && !has_repeated_vertex(collision.mesh.triangles[t]);
   collision.mesh = select_triangles(collision.mesh, keep);
   const std::vector<Eigen::Vector3d> before = collision.mesh.vertices;
   make_manifold(collision.mesh);

@@ -29,7 +29,7 @@ PYBIND11_MODULE(_core, module) {
   graspmap_python::add_surfaces(module);
   graspmap_python::add_maps(module);
   graspmap_python::add_grasps(module);
-  graspmap_python::add_pictures(module);
+  graspmap_python::add_images(module);
   graspmap_python::define(module, "options", &options, {"stage"});
   graspmap_python::define(module, "results", &results, {"stage"});
   module.def("stages", [] {

@@ -43,7 +43,7 @@ std::vector<Surface> objects() {
 }
 
 // Each object has its own brightness, with noise.
-ColorImage picture(const Camera& camera, const Pose& eye, std::mt19937_64& engine) {
+ColorImage image(const Camera& camera, const Pose& eye, std::mt19937_64& engine) {
   const std::vector<Surface> all = objects();
   std::normal_distribution<double> noise(0.0, 6.0);
   ColorImage image(camera.width, camera.height);
@@ -81,7 +81,7 @@ MemoryScan scan_with(const Pose& color_from_depth, double focal_factor, int fram
     scan.add(camera,
              graspmap_test::render_depth(ground, depth_camera, eye * color_from_depth,
                                          {0.001, 0.001}, engine),
-             picture(camera, eye, engine));
+             image(camera, eye, engine));
     GraphNode node;
     node.id = n + 1;
     graph.nodes.push_back(node);
@@ -90,7 +90,7 @@ MemoryScan scan_with(const Pose& color_from_depth, double focal_factor, int fram
   return scan;
 }
 
-Pose displaced(const Eigen::Vector3d& shift_m, const Eigen::Vector3d& turn_deg) {
+Pose displace_vertices(const Eigen::Vector3d& shift_m, const Eigen::Vector3d& turn_deg) {
   Pose pose = Pose::Identity();
   pose.linear() = rotation_of(std::numbers::pi / 180.0 * turn_deg).toRotationMatrix();
   pose.translation() = shift_m;
@@ -108,14 +108,14 @@ TEST(EdgeAgreement, RegisteredDepthAgrees) {
   EXPECT_EQ(found.sentence(), "");
   // Errors below half a degree are those of a refinement, not of this check.
   EXPECT_FALSE(
-      check_edge_agreement(scan_with(displaced({0.003, 0, 0}, {0, 0.2, 0}), 1.0)).is_displaced());
+      check_edge_agreement(scan_with(displace_vertices({0.003, 0, 0}, {0, 0.2, 0}), 1.0)).is_displaced());
 }
 
 // The place and direction of the depth camera, by where they put points in the image.
 TEST(EdgeAgreement, DisplacedDepthIsFoundAndEstimated) {
   for (const Pose& truth :
-       {displaced({0.025, 0, 0}, {0, 1.5, 0}), displaced({-0.02, 0.015, 0}, {1.0, -0.8, 0.8}),
-        displaced({0, -0.03, 0}, {-3.0, 0.5, 0}), displaced({0.06, 0, 0}, {0, 0, 0})}) {
+       {displace_vertices({0.025, 0, 0}, {0, 1.5, 0}), displace_vertices({-0.02, 0.015, 0}, {1.0, -0.8, 0.8}),
+        displace_vertices({0, -0.03, 0}, {-3.0, 0.5, 0}), displace_vertices({0.06, 0, 0}, {0, 0, 0})}) {
     const EdgeAgreement found = check_edge_agreement(scan_with(truth, 1.0));
     EXPECT_TRUE(found.is_displaced());
     EXPECT_FALSE(found.is_scaled());
@@ -136,14 +136,14 @@ TEST(EdgeAgreement, DisplacedDepthIsFoundAndEstimated) {
 TEST(EdgeAgreement, AnotherFocalLengthIsNamed) {
   for (const double factor : {0.9, 1.12}) {
     const EdgeAgreement found =
-        check_edge_agreement(scan_with(displaced({0.02, 0, 0}, {0, 0, 0}), factor));
+        check_edge_agreement(scan_with(displace_vertices({0.02, 0, 0}, {0, 0, 0}), factor));
     EXPECT_TRUE(found.is_scaled()) << factor;
     EXPECT_NEAR(found.focal_factor, factor, 0.015);
   }
 }
 
 TEST(EdgeAgreement, TheSameForAnyNumberOfThreads) {
-  const MemoryScan scan = scan_with(displaced({0.025, 0, 0}, {0, 1.5, 0}), 1.0, 8);
+  const MemoryScan scan = scan_with(displace_vertices({0.025, 0, 0}, {0, 1.5, 0}), 1.0, 8);
   const auto checked_by = [&](unsigned threads) {
     const ThreadLimit limit(threads);
     return check_edge_agreement(scan);
@@ -157,7 +157,7 @@ TEST(EdgeAgreement, TheSameForAnyNumberOfThreads) {
 
 // What cannot be compared is not displaced.
 TEST(EdgeAgreement, TooLittleIsNoDisplacement) {
-  const Pose wrong = displaced({0.05, 0, 0}, {0, 3, 0});
+  const Pose wrong = displace_vertices({0.05, 0, 0}, {0, 3, 0});
   EXPECT_FALSE(check_edge_agreement(MemoryScan()).is_displaced());
   EXPECT_FALSE(check_edge_agreement(scan_with(wrong, 1.0, 3)).is_displaced());
   MemoryScan scan = scan_with(wrong, 1.0, 8);
@@ -171,7 +171,7 @@ TEST(EdgeAgreement, TooLittleIsNoDisplacement) {
   scan = scan_with(wrong, 1.0, 8);
   for (auto& [node, frame] : scan.frames) frame.color = ColorImage(256, 192, {90, 90, 90});
   EXPECT_FALSE(check_edge_agreement(scan).is_displaced());
-  // Pictures of something else.
+  // Images of something else.
   std::mt19937_64 engine = random_engine();
   for (auto& [node, frame] : scan.frames)
     for (Color& pixel : frame.color.pixels)

@@ -37,7 +37,7 @@ Excerpt sequence() {
   return {open_scan(graspmap_test::data_folder() / "sequences" / "tum_fr1_rpy"), 150, 40};
 }
 
-// As a Kinect v1 may be: one picture takes 33 ms.
+// As a Kinect v1 may be: one image takes 33 ms.
 void expect_possible(const SensorCalibration& calibration) {
   for (const CameraTiming& timing : calibration.timing) {
     EXPECT_LT(std::abs(timing.depth_delay_s), 0.033);
@@ -49,7 +49,7 @@ void expect_possible(const SensorCalibration& calibration) {
       for (const double radius2 : {0.0, 0.5, 1.0})
         EXPECT_LT(std::abs(depth.bend(z, radius2)), 0.01 + 0.02 * z) << z;
   for (const IntrinsicsStep& step : calibration.intrinsics)
-    EXPECT_LT(std::abs(step.fx_share), 0.08);
+    EXPECT_LT(std::abs(step.fx_relative), 0.08);
   for (const Pose& pose : calibration.color_from_depth) EXPECT_LT(pose.translation().norm(), 0.08);
 }
 
