@@ -108,8 +108,9 @@ std::vector<Eigen::Vector3d> find_convex_points(
     const PointCloud& terrain, const VoxelLattice& lattice, const std::vector<TileBounds>& tiles,
     CurvatureExtent curvature_at, const ConvexityStage& stage, TileDetectionResult& result) {
   if (curvature_at == CurvatureExtent::all_points)
-    return convex_among(stage.average_per_voxel ? voxel_means(terrain, lattice.voxel_size_m) : terrain,
-                        std::nullopt, stage, result);
+    return convex_among(
+        stage.average_per_voxel ? voxel_means(terrain, lattice.voxel_size_m) : terrain,
+        std::nullopt, stage, result);
   const double reach_m = stage.distance_m + curvature_reach_m(stage.curvature) +
                          margin_voxels(stage) * lattice.voxel_size_m;
   PointCloud nearby =

@@ -46,8 +46,8 @@ MapContent content_of(const Scenario& scenario);
 struct ConvexityStage {
   CurvatureOptions curvature;
   bool average_per_voxel = true;  // averages points per voxel, so that density has no effect
-  double zero_plane_m = 0.0;   // CurvatureMethod::thesis: lower bound of convex points
-  double distance_m = 0.01;    // maximum distance of a convex voxel from a convex point
+  double zero_plane_m = 0.0;      // CurvatureMethod::thesis: lower bound of convex points
+  double distance_m = 0.01;       // maximum distance of a convex voxel from a convex point
 };
 
 // Conditions for a scored voxel to be graspable.

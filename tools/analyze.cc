@@ -75,8 +75,8 @@ ReadMap read_map(const std::string& file, Run& run) {
   map.cloud = libmap::read_cloud(file).cloud;
   map.manifest = libmap::read_manifest_of(file);
   map.voxels = in_file(file, [&] {
-    return libgtd::voxel_map_of(
-        map.cloud, map.manifest ? libgtd::map_info(*map.manifest) : libgtd::MapInfo{});
+    return libgtd::voxel_map_of(map.cloud,
+                                map.manifest ? libgtd::map_info(*map.manifest) : libgtd::MapInfo{});
   });
   if (!map.manifest)
     run.warn(file +
@@ -245,7 +245,7 @@ void write_chart(const fs::path& folder, const std::string& name, const libmap::
 }
 
 void write_images(const fs::path& folder, const AnalyzeOptions& options, const ReadMap& map,
-                    const Analysis& analysis, const Comparison* comparison) {
+                  const Analysis& analysis, const Comparison* comparison) {
   const libmap::VirtualDisplay display;
   const std::string name = short_name(options.map);
   const libgtd::MapAnalysis& ground = analysis.ground;
@@ -259,7 +259,7 @@ void write_images(const fs::path& folder, const AnalyzeOptions& options, const R
     libmap::write_text(folder / file, libmap::to_png(drawn));
   };
   map_image.title = fmt::format("{}: {} regions, stride {:g} m", name,
-                              analysis.regions.regions.size(), options.reach.stride_m);
+                                analysis.regions.regions.size(), options.reach.stride_m);
   write("regions.png", draw_regions(map_image, analysis.regions, analysis.reach));
   if (comparison == nullptr) return;
   const libgtd::MapChange& change = comparison->change;
@@ -306,7 +306,7 @@ void analyze(AnalyzeOptions& options, Run& run) {
     return tabulate_maps(options.maps, options.folder, options.table, run);
   }
   reject_changed<MapTableOptions>(options.table, graspmap_tools::bind,
-                              "requires several maps or --expected");
+                                  "requires several maps or --expected");
   options.map = options.maps.front();
   if (options.other.empty() && options.transform != "auto")
     throw libmap::Error("requires --against OTHER",

@@ -103,7 +103,7 @@ const BoardPhoto& first_readable(const std::vector<BoardPhoto>& photos) {
 }
 
 std::vector<BoardPhoto> read_photos(const std::vector<std::string>& files,
-                                   const libmap::Chessboard& board, Run& run) {
+                                    const libmap::Chessboard& board, Run& run) {
   std::vector<BoardPhoto> photos(files.size());
   run.progress().begin("boards", files.size());
   libmap::parallel_each(files.size(), [&](std::size_t n) {
@@ -129,7 +129,7 @@ std::vector<BoardPhoto> read_photos(const std::vector<std::string>& files,
 }
 
 std::vector<libmap::BoardImage> boards_of(const std::vector<BoardPhoto>& photos,
-                                            const CalibrateOptions& options, Run& run) {
+                                          const CalibrateOptions& options, Run& run) {
   std::vector<libmap::BoardImage> boards;
   for (const BoardPhoto& photo : photos)
     if (photo.corners) boards.push_back({photo.name, *photo.corners});
@@ -185,7 +185,7 @@ std::string summary(const CameraCalibrationResult& result, const CalibrateOption
 }
 
 libmap::Table photo_table(const std::vector<BoardPhoto>& photos,
-                            const CameraCalibrationResult& result) {
+                          const CameraCalibrationResult& result) {
   libmap::Table table;
   table.columns = {"image", "used", "rms_px", "max_px", "distance_m", "tilt_deg"};
   for (const BoardPhoto& photo : photos) {
@@ -198,8 +198,8 @@ libmap::Table photo_table(const std::vector<BoardPhoto>& photos,
       table.rows.push_back({photo.name,
                             photo.fault      ? "unreadable"
                             : !photo.corners ? "no board"
-                            : is_repeated      ? "repeated"
-                                               : "rejected",
+                            : is_repeated    ? "repeated"
+                                             : "rejected",
                             "", "", "", ""});
       continue;
     }
@@ -218,11 +218,10 @@ libmap::Table residual_table(const CameraCalibrationResult& result,
   const auto columns = static_cast<std::size_t>(board.columns);
   for (const CalibratedImage& photo : result.images)
     for (std::size_t n = 0; n < photo.corners.size(); ++n)
-      table.rows.push_back({photo.name, std::to_string(n / columns), std::to_string(n % columns),
-                            libmap::to_text(photo.corners[n].x()),
-                            libmap::to_text(photo.corners[n].y()),
-                            libmap::to_text(photo.residuals_px[n].x()),
-                            libmap::to_text(photo.residuals_px[n].y())});
+      table.rows.push_back(
+          {photo.name, std::to_string(n / columns), std::to_string(n % columns),
+           libmap::to_text(photo.corners[n].x()), libmap::to_text(photo.corners[n].y()),
+           libmap::to_text(photo.residuals_px[n].x()), libmap::to_text(photo.residuals_px[n].y())});
   return table;
 }
 
@@ -385,8 +384,8 @@ void calibrate(CalibrateOptions& options, Run& run) {
     throw libmap::Error("a camera is written as YAML",
                         {.file = options.output, .bound = "a name.yaml"});
   if (!options.report.empty()) run.claim_output_folder(options.report);
-  const std::vector<BoardPhoto> photos = run.timed(
-      "find boards", [&] { return read_photos(files, options.calibration.board, run); });
+  const std::vector<BoardPhoto> photos =
+      run.timed("find boards", [&] { return read_photos(files, options.calibration.board, run); });
   for (const std::string& file : files) run.add_input(file);
   const std::vector<libmap::BoardImage> boards = boards_of(photos, options, run);
   const CameraCalibrationResult result = run.timed("calibrate", [&] {

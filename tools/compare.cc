@@ -462,5 +462,5 @@ int main(int argc, char** argv) {
   const bool edges =
       std::any_of(argv, argv + argc, [](const std::string& word) { return word == "--edges"; });
   return run_subcommand(argc, argv, {compare_surfaces, compare_edges},
-                   edges ? compare_edges : compare_surfaces);
+                        edges ? compare_edges : compare_surfaces);
 }

@@ -144,7 +144,8 @@ bool convert_textured(const ConvertOptions& options, Run& run) {
     return false;
   }
   const libmap::TexturedMeshWriteOptions writing;
-  run.require_own_companions(options.output, libmap::additional_model_files(options.output, writing));
+  run.require_own_companions(options.output,
+                             libmap::additional_model_files(options.output, writing));
   run.add_results({{"pages", model.pages.size()}});
   add_input(options, run);
   Run::Files writers;
@@ -321,5 +322,5 @@ Subcommand* subcommand_of(const Words& words) {
 
 int main(int argc, char** argv) {
   return run_subcommand(argc, argv, {convert_file, convert_scan, convert_bag, convert_world},
-                   subcommand_of(words_of(argc, argv)));
+                        subcommand_of(words_of(argc, argv)));
 }

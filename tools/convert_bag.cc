@@ -222,7 +222,7 @@ libmap::BagTargets targets_of(const CloudFile& footholds, double arrow_m) {
   targets.arrow_m = arrow_m;
   for (const FootholdMark& mark : foothold_marks(footholds.cloud, footholds.path))
     targets.targets.push_back({mark.position, mark.approach, libmap::score_color(mark.score),
-                             fmt::format("{}: {:.2f}", targets.targets.size() + 1, mark.score)});
+                               fmt::format("{}: {:.2f}", targets.targets.size() + 1, mark.score)});
   return targets;
 }
 

@@ -59,7 +59,7 @@ struct FrameResult {
 };
 
 FrameResult find_images(const libmap::ScanSource& scan, const libmap::TrajectoryPose& pose,
-                          const libmap::Pose& world_from_map, const ImageOptions& options) {
+                        const libmap::Pose& world_from_map, const ImageOptions& options) {
   FrameResult result;
   try {
     const std::vector<libmap::CameraView> views =
@@ -81,8 +81,8 @@ FrameResult find_images(const libmap::ScanSource& scan, const libmap::Trajectory
 }
 
 std::vector<ScanImage> find_images(const libmap::ScanSource& scan, const libmap::Trajectory& poses,
-                                   const libmap::Pose& world_from_map,
-                                   const ImageOptions& options, bool strict, Run& run) {
+                                   const libmap::Pose& world_from_map, const ImageOptions& options,
+                                   bool strict, Run& run) {
   std::vector<ScanImage> images;
   run.progress().begin("pictures", poses.size());
   for (std::size_t first = 0; first < poses.size(); first += batch_size) {
@@ -119,12 +119,11 @@ std::vector<ScanImage> selected(const std::vector<ScanImage>& images, const Imag
 
 // Writes the image, unless `folder` is empty.
 libmap::BundlerView write_bundler_image(const libmap::ScanSource& scan, const ScanImage& image,
-                                  const fs::path& folder) {
+                                        const fs::path& folder) {
   const libmap::CameraView view =
       libmap::read_views(scan, image.node, {.color = true, .depth = false})[image.camera];
-  libmap::BundlerView written{
-      "images/" + libmap::image_file_name(image.node, image.camera, ".jpg"),
-      libmap::centered_pinhole(view.color_camera), image.world_from_camera};
+  libmap::BundlerView written{"images/" + libmap::image_file_name(image.node, image.camera, ".jpg"),
+                              libmap::centered_pinhole(view.color_camera), image.world_from_camera};
   if (!folder.empty())
     libmap::write_text(folder / written.image, libmap::encode_jpeg(libmap::resample_image(
                                                    view.color, view.color_camera, written.camera)));
@@ -139,8 +138,8 @@ void write_bundler(const ImageOptions& options, const std::vector<ScanImage>& al
   run.write_output_tree(options.bundler, bundler_names, [&](const fs::path& folder) {
     if (!folder.empty()) fs::create_directory(folder / "images");
     std::vector<libmap::BundlerView> views(kept.size());
-    libmap::parallel_each(kept.size(),
-                          [&](std::size_t n) { views[n] = write_bundler_image(scan, kept[n], folder); });
+    libmap::parallel_each(
+        kept.size(), [&](std::size_t n) { views[n] = write_bundler_image(scan, kept[n], folder); });
     if (folder.empty()) return;
     libmap::write_text(folder / "bundle.out", libmap::to_bundle_text(views));
     libmap::write_text(folder / "list.txt", libmap::to_bundler_list(views));
@@ -154,7 +153,7 @@ struct ColmapView {
 
 // Reads the image with its depth; writes the image, unless `folder` is empty.
 ColmapView copy_image(const libmap::ScanSource& scan, const ScanImage& image,
-                           const fs::path& folder) {
+                      const fs::path& folder) {
   std::vector<libmap::CameraView> views = libmap::read_views(scan, image.node, {});
   const libmap::ImageFile file = libmap::image_file_of(scan, image.node, views, image.camera);
   if (!folder.empty()) libmap::write_text(folder / "images" / file.name, file.bytes);
@@ -221,7 +220,7 @@ void claim_image_folders(const ImageOptions& options, const std::string& scan, R
 // sparse/cameras.txt, images.txt, points3D.txt and all images as stored. Broken frames are left out
 // with a warning. Throws Error for them if `strict`.
 void write_image_folders(ImageOptions& options, const libmap::ScanSource& scan, bool strict,
-                           Run& run) {
+                         Run& run) {
   const libmap::Trajectory poses = find_poses(scan, options.poses, strict, run);
   const libmap::Pose world_from_map = parse_transform(options.transform, "--transform");
   const std::vector<ScanImage> images =

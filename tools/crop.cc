@@ -181,14 +181,14 @@ void tell_site(const libmap::CropReport& report, const libmap::Bounds3d& bounds,
     std::vector<double> corners;
     for (const Eigen::Vector2d& corner : report.outline)
       corners.insert(corners.end(), {corner.x(), corner.y()});
-    run.add_results({{"outline_area_m2", libmap::XyPolygon(report.outline).area_m2()},
-                     {"outline_m", corners}});
+    run.add_results(
+        {{"outline_area_m2", libmap::XyPolygon(report.outline).area_m2()}, {"outline_m", corners}});
   }
   run.say("size: {:.3f} x {:.3f} x {:.3f} m", size.x(), size.y(), size.z());
 }
 
 void report_crop(const CropCommandOptions& options, const libmap::CropReport& report,
-          const libmap::Bounds3d& bounds, Run& run) {
+                 const libmap::Bounds3d& bounds, Run& run) {
   run.add_input(options.input);
   if (!options.polygon.empty()) run.add_input(options.polygon);
   // The new site_from_map includes that of an input that was cropped before.

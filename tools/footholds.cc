@@ -52,9 +52,9 @@ std::string gripper_of(const FootholdTrialsOptions& options,
 
 // Drops footholds that are not on the mesh. Returns the positions of the others in its frame.
 std::vector<Eigen::Vector3d> positions_on(const libgtd::Ground& ground,
-                                       const libmap::Pose& mesh_from_map,
-                                       const libmap::PointCloud& map, double max_distance_m,
-                                       std::vector<libgtd::Foothold>& footholds) {
+                                          const libmap::Pose& mesh_from_map,
+                                          const libmap::PointCloud& map, double max_distance_m,
+                                          std::vector<libgtd::Foothold>& footholds) {
   std::vector<Eigen::Vector3d> positions;
   std::erase_if(footholds, [&](const libgtd::Foothold& foothold) {
     const Eigen::Vector3d position = mesh_from_map * map.positions[foothold.map_point];

@@ -10,8 +10,8 @@
 #include "tools/support/command_line.h"
 #include "tools/support/results.h"
 #include "tools/support/scan_poses.h"
-#include "tools/support/tile_folder.h"
 #include "tools/support/subcommands.h"
+#include "tools/support/tile_folder.h"
 
 // JSON of the survey, which shares and resumed runs read bit for bit.
 namespace libmap {
@@ -52,7 +52,8 @@ struct FuseOptions {
 void report_contradictions(const libmap::DepthFusionResult& result, Run& run) {
   constexpr double usual_share = 0.06;
   const libmap::SurfacePointCounts& points = result.points;
-  const auto dropped = static_cast<double>(points.seen_through + points.missed + points.contradicted);
+  const auto dropped =
+      static_cast<double>(points.seen_through + points.missed + points.contradicted);
   if (dropped < usual_share * (dropped + static_cast<double>(result.points_made))) return;
   run.say(
       "{} points dropped because frames contradict each other, for example after a motion: {} seen "
@@ -150,7 +151,8 @@ void make_tiles(const FuseOptions& options, const libmap::ScanSource& scan,
     fusion.emplace(scan, poses, options.fusion, tile_m, run.progress());
     return TileFolder::TileData(fusion->survey());
   };
-  const TileFolder::TileData found = folder == nullptr ? TileFolder::TileData() : folder->begin(survey);
+  const TileFolder::TileData found =
+      folder == nullptr ? TileFolder::TileData() : folder->begin(survey);
   if (!fusion && found.is_null()) survey();
   if (!fusion) {
     const auto known = found.get<libmap::FusionSurvey>();
@@ -295,5 +297,5 @@ int fuse_scan(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   return run_subcommand(argc, argv, {fuse_scan, fuse_rig},
-                   argc > 1 && names_rig(argc, argv) ? fuse_rig : fuse_scan);
+                        argc > 1 && names_rig(argc, argv) ? fuse_rig : fuse_scan);
 }

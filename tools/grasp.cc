@@ -33,7 +33,7 @@ using namespace graspmap_tools;
 namespace {
 
 struct GraspScenesOptions {
-  std::string folder;               // empty: no scenes
+  std::string folder;                  // empty: no scenes
   std::vector<std::string> locations;  // empty: all locations
 };
 
@@ -79,8 +79,9 @@ std::vector<std::size_t> rows_of(const libmap::Table& locations,
   for (const std::string& location : listed) {
     const auto found = std::find(names.begin(), names.end(), location);
     if (found == names.end())
-      throw libmap::Error("is not a listed location" + libmap::did_you_mean(location, names),
-                          {.file = locations.file, .field = "--scene-locations", .value = location});
+      throw libmap::Error(
+          "is not a listed location" + libmap::did_you_mean(location, names),
+          {.file = locations.file, .field = "--scene-locations", .value = location});
     const auto row = static_cast<std::size_t>(found - names.begin());
     if (std::find(rows.begin(), rows.end(), row) == rows.end()) rows.push_back(row);
   }
@@ -112,7 +113,8 @@ std::string description(const libgtd::LocationResult& result, const libgtd::Tria
 // Claims the folder. Throws Error if another command wrote it, or for locations without a folder.
 void claim_scenes(const GraspScenesOptions& options, Run& run) {
   if (!options.folder.empty()) return run.claim_output_folder(options.folder);
-  if (!options.locations.empty()) throw libmap::Error("requires --scenes", {.field = "--scene-locations"});
+  if (!options.locations.empty())
+    throw libmap::Error("requires --scenes", {.field = "--scene-locations"});
 }
 
 // Returns the scenes to write. Throws Error for a location that is not in the table, two with the
@@ -124,11 +126,12 @@ std::vector<GraspScene> scenes_of(const libmap::Table& locations,
   std::vector<std::size_t> rows = rows_of(locations, options.locations);
   if (options.locations.empty()) {
     if (names.size() > max_unlisted_scenes)
-      throw libmap::Error("too many locations for one scene each: select some with --scene-locations",
-                          {.file = locations.file,
-                           .field = "locations",
-                           .value = std::to_string(names.size()),
-                           .bound = "<= " + std::to_string(max_unlisted_scenes)});
+      throw libmap::Error(
+          "too many locations for one scene each: select some with --scene-locations",
+          {.file = locations.file,
+           .field = "locations",
+           .value = std::to_string(names.size()),
+           .bound = "<= " + std::to_string(max_unlisted_scenes)});
     for (std::size_t row = 0; row < names.size(); ++row) rows.push_back(row);
   }
   std::vector<GraspScene> scenes;
@@ -279,7 +282,7 @@ void grasp_voxels(GraspCommandOptions& options, Run& run) {
   const auto file = libmap::find_data_file("grippers", options.gripper);
   const libgtd::Gripper gripper = read_with_fingers(file, options);
   GroundTiles ground(options.mesh, gripper, options.grasp.closing.start_height_m,
-                      [&](const libmap::TriangleMesh& mesh) { return ground_of(mesh, options); });
+                     [&](const libmap::TriangleMesh& mesh) { return ground_of(mesh, options); });
   run.add_input(options.mesh);
   run.add_input(is_tile_store(options.map) ? store_index_path(options.map).string() : options.map);
   for (const auto& used : libgtd::gripper_files(file)) run.add_input(used);

@@ -86,7 +86,8 @@ Eigen::Vector3d center_of(const GripperMask& mask, const Eigen::Vector3i& voxel)
          (voxel - Eigen::Vector3i(mask.pivot_xy, mask.pivot_xy, mask.pivot_z)).cast<double>();
 }
 
-libmap::Scene scene_of(const GripperMask& mask, const CellOfPixel& cell_of_pixel, int width, int height) {
+libmap::Scene scene_of(const GripperMask& mask, const CellOfPixel& cell_of_pixel, int width,
+                       int height) {
   libmap::Scene scene;
   for (const KindLook& look : looks) {
     libmap::PointCloud cloud;

@@ -228,7 +228,7 @@ struct Totals {
 std::string name_of(const libmap::XyTile& tile) { return libmap::tile_file_name(tile, ""); }
 
 Totals assemble(const MeshOptions& options, const TileFolder& output,
-                    const std::vector<libmap::XyTile>& tiles, const fs::path& folder, Run& run) {
+                const std::vector<libmap::XyTile>& tiles, const fs::path& folder, Run& run) {
   libmap::SurfaceIslands islands;
   for (const libmap::XyTile& tile : tiles) {
     const TileFolder::TileData facts = output.facts(name_of(tile));
@@ -270,10 +270,10 @@ void make_tiles(const MeshOptions& options, TileFolder& output, Run& run) {
   std::map<libmap::XyTile, std::size_t> points_in_tiles;
   libmap::TileIndex index = run.timed("survey", [&] {
     return libmap::TileIndex(libmap::cloud_tiles(options.cloud),
-                              [&](const libmap::PointCloud& piece) {
-                                survey.add(piece, options.surface.reconstruction.weigh_by_error);
-                                libmap::add_surface_tiles(piece, options.surface, points_in_tiles);
-                              });
+                             [&](const libmap::PointCloud& piece) {
+                               survey.add(piece, options.surface.reconstruction.weigh_by_error);
+                               libmap::add_surface_tiles(piece, options.surface, points_in_tiles);
+                             });
   });
   check_points(options.cloud, index.points(), index.dropped_points(), run);
   if (survey.dropped_points() > 0)

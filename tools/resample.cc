@@ -55,7 +55,7 @@ void resample(const ResampleOptions& options, Run& run) {
 
 // Samples and writes the mesh tile by tile.
 void write_tiles(const std::vector<fs::path>& pieces, libmap::TileSampler& sampler,
-                  const fs::path& folder, Run& run) {
+                 const fs::path& folder, Run& run) {
   std::size_t points = 0;
   double area_m2 = 0.0;
   double smallest_m = std::numeric_limits<double>::infinity();

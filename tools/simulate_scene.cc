@@ -71,7 +71,7 @@ void write_surface(const libmap::PrimitiveScene& scene, const SimulateOptions& o
 
 void simulate(const SimulateOptions& options, Run& run) {
   reject_changed(options, options.mesh ? bind_cloud : bind_mesh,
-             options.mesh ? "cannot be combined with --mesh" : "requires --mesh");
+                 options.mesh ? "cannot be combined with --mesh" : "requires --mesh");
   if (options.mesh)
     libmap::require_mesh_format(options.output);
   else

@@ -4,8 +4,8 @@
 #include "libmap/simulate/terrain_tiles.h"
 #include "tools/support/command_line.h"
 #include "tools/support/option_values.h"
-#include "tools/support/tile_folder.h"
 #include "tools/support/subcommands.h"
+#include "tools/support/tile_folder.h"
 
 using namespace graspmap_tools;
 
@@ -21,8 +21,8 @@ struct SimulateTerrainOptions {
 
 // Makes and writes the tiles one by one. Returns the number of points.
 std::size_t write_tiles(const SimulateTerrainOptions& options,
-                         const std::vector<libmap::XyTile>& pieces, const fs::path& folder,
-                         Run& run) {
+                        const std::vector<libmap::XyTile>& pieces, const fs::path& folder,
+                        Run& run) {
   run.progress().begin("pieces", pieces.size());
   std::vector<std::size_t> points(pieces.size());
   libmap::parallel_each(pieces.size(), [&](std::size_t n) {

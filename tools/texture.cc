@@ -15,8 +15,8 @@
 // JSON of the exposure, which shares and resumed runs read bit for bit.
 namespace libmap {
 
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(TextureExposure, gains, vignetting, observations, log_color_deviation_before,
-                                   log_color_deviation)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(TextureExposure, gains, vignetting, observations,
+                                   log_color_deviation_before, log_color_deviation)
 
 }  // namespace libmap
 
@@ -204,7 +204,7 @@ void make_models(const TextureCommandOptions& options, const libmap::ScanSource&
   const std::vector<std::string> names = stems_of(pieces);
   libmap::MeshTileIndex index(pieces);
   libmap::TileTexturing texturing(index, options.margin_m, scan, poses, options.texture,
-                                   run.progress());
+                                  run.progress());
   const TileFolder::TileData found =
       output.begin([&] { return TileFolder::TileData(texturing.find_exposure()); });
   if (found.is_null()) return;  // --dry-run

@@ -109,8 +109,9 @@ class Site {
       return close_gripper(patch_, gripper_, poses_[pose], options_.closing);
     constexpr std::uint64_t of_surface = 0x73757266616365;
     const std::uint64_t key = libmap::mix_bits(libmap::mix_bits(key_, of_surface), pose);
-    return close_gripper(displace_vertices(patch_, options_.surface.correlation_m, options_.seed, key),
-                         gripper_, poses_[pose], options_.closing);
+    return close_gripper(
+        displace_vertices(patch_, options_.surface.correlation_m, options_.seed, key), gripper_,
+        poses_[pose], options_.closing);
   }
 
  private:

@@ -21,7 +21,8 @@ GripCandidates::GripCandidates(const libmap::TriangleMesh& mesh, const Gripper& 
   const FingerGeometry finger = finger_geometry(gripper);
   init_grid(mesh, options.cell_m);
   for (const libmap::Triangle& triangle : mesh.triangles)
-    add_triangle({mesh.vertices[triangle[0]], mesh.vertices[triangle[1]], mesh.vertices[triangle[2]]});
+    add_triangle(
+        {mesh.vertices[triangle[0]], mesh.vertices[triangle[1]], mesh.vertices[triangle[2]]});
   const double radius = finger.tip(finger.opening_rad, finger.curl_rad).x();
   const auto reach = static_cast<std::int64_t>(radius / cell_m_);
   for (std::int64_t i = -reach; i <= reach; ++i)

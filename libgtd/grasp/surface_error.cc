@@ -117,7 +117,7 @@ double RandomField::at(const Eigen::Vector3d& position) {
 }
 
 GroundPatch displace_vertices(const GroundPatch& patch, double correlation_m, std::uint64_t seed,
-                      std::uint64_t key) {
+                              std::uint64_t key) {
   GroundPatch drawn = patch;
   if (patch.vertex_errors_m.empty()) return drawn;
   Eigen::AlignedBox3d box;

@@ -171,7 +171,8 @@ ClosingPath make_closing_path(const Gripper& gripper, double voxel_size_m, doubl
       std::max(1, static_cast<int>(std::ceil(path.finger_length_m / (0.5 * voxel_size_m))));
   for (int n = 0; n <= parts; ++n) {
     const double along = path.finger_length_m * n / parts;
-    path.open.push_back(point_at(opening, std::min(along, proximal), std::max(0.0, along - proximal)));
+    path.open.push_back(
+        point_at(opening, std::min(along, proximal), std::max(0.0, along - proximal)));
   }
   return path;
 }

@@ -13,8 +13,8 @@
 
 #include "libmap/core/angle.h"
 #include "libmap/core/error.h"
-#include "libmap/core/sandboxed_process.h"
 #include "libmap/core/pose.h"
+#include "libmap/core/sandboxed_process.h"
 
 namespace libgtd {
 

@@ -37,6 +37,6 @@ void bind(libmap::ParameterTable& table, UrdfMapping& mapping);
 // is not tangential to the circle of joints, fingers that are not evenly spaced or differ by more
 // than 0.1 mm or 0.1 degrees, lengths above 1 m, and angles above 2 pi.
 std::vector<std::pair<std::string, std::string>> read_urdf_dimensions(const std::string& xml,
-                                                                  const UrdfMapping& mapping);
+                                                                      const UrdfMapping& mapping);
 
 }  // namespace libgtd

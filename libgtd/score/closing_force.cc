@@ -615,8 +615,9 @@ void for_each_block(const VoxelGrid& grid, const std::vector<std::size_t>& pivot
       const auto& [block, members] = listed[b];
       const int i = block.first * closing_block_columns;
       const int j = block.second * closing_block_columns;
-      use(members, Heights(grid, expanded({i, i + closing_block_columns, j, j + closing_block_columns},
-                                       reach, reach)));
+      use(members,
+          Heights(grid, expanded({i, i + closing_block_columns, j, j + closing_block_columns},
+                                 reach, reach)));
     }
   });
 }

@@ -111,8 +111,8 @@ void slide(std::uint16_t* sums, const std::uint16_t* entering, const std::uint16
 // Sums of pairs of neighbors.
 inline Numbers pairs_of(const Numbers& sums) { return (sums & 0xffff) + (sums >> 16); }
 
-void add_runs(const std::uint16_t* sums, const std::uint32_t* bit_offsets, std::size_t bit_offset_count,
-              std::size_t length, std::uint32_t* totals) {
+void add_runs(const std::uint16_t* sums, const std::uint32_t* bit_offsets,
+              std::size_t bit_offset_count, std::size_t length, std::uint32_t* totals) {
   constexpr std::size_t step = sizeof(Numbers) / sizeof(std::uint16_t);
   std::uint16_t kept[step] = {};  // values of the last register
   for (std::size_t y = 0; y < length % step; ++y) kept[y] = 0xffff;
@@ -170,7 +170,8 @@ std::size_t find_cells(const double* const points[3], std::size_t count,
 #pragma GCC unroll 3
     for (int a = 0; a < 3; ++a) {
       const double* axis = lattice.axes[a];
-      const Lanes cell_position = axis[0] * offset[0] + axis[1] * offset[1] + axis[2] * offset[2] + 0.5;
+      const Lanes cell_position =
+          axis[0] * offset[0] + axis[1] * offset[1] + axis[2] * offset[2] + 0.5;
       const double begin = box.low[a];
       const double end = begin + box.size[a];
       is_inside &= (cell_position >= begin) & (cell_position < end);  // false for NaN

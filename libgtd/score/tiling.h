@@ -30,9 +30,9 @@ struct ForceEstimate {
 struct ScoredVoxel {
   Voxel voxel;
   VoxelCounts counts;
-  double score = 0.0;          // score_percent / 100
-  bool border = false;         // the window of the mask leaves the scanned area
-  ForceEstimate force{};       // calibrated only
+  double score = 0.0;                  // score_percent / 100
+  bool border = false;                 // the window of the mask leaves the scanned area
+  ForceEstimate force{};               // calibrated only
   double outward_fall_fraction = 1.0;  // corrected only, see outward_shares
 };
 

@@ -131,8 +131,8 @@ std::vector<std::uint8_t> find_tilted_edges(const std::vector<Voxel>& voxels,
         pivots_here.push_back(pivots[n]);
       });
       if (here.empty()) continue;
-      const std::vector<std::uint8_t> found =
-          terrain.find_edges(pivots_here, unscanned_columns(grid, expanded(tiles[t], reach, reach)));
+      const std::vector<std::uint8_t> found = terrain.find_edges(
+          pivots_here, unscanned_columns(grid, expanded(tiles[t], reach, reach)));
       for (std::size_t n = 0; n < here.size(); ++n) edges[here[n]] = found[n];
     }
   });
@@ -231,7 +231,8 @@ class TiltedTerrain::Window {
         cell_position += lattice.axes[a][b] * (run.center[b] - lattice.origin[b]);
         half += std::abs(lattice.axes[a][b]) * run.half[b];
       }
-      if (cell_position + half < box_.low[a] || cell_position - half > box_.low[a] + box_.size[a]) return false;
+      if (cell_position + half < box_.low[a] || cell_position - half > box_.low[a] + box_.size[a])
+        return false;
     }
     return true;
   }

@@ -116,7 +116,7 @@ ChunkedMask cut_into_chunks(const GripperMask& mask, const Wanted& wanted) {
         if (column(plane, x, y) == 0) continue;
         MaskChunk& chunk = cut.chunks.emplace_back();
         cut.first_bits.push_back({static_cast<std::size_t>(plane), static_cast<std::size_t>(x),
-                              static_cast<std::size_t>(y)});
+                                  static_cast<std::size_t>(y)});
         const int count = static_cast<int>(MaskChunk::columns);
         for (int c = 0; c < count; ++c)
           chunk.bits[c] = y + c < mask.side ? column(plane, x, y + c) : std::uint16_t{0};

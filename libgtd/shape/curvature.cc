@@ -141,8 +141,8 @@ class QuadricFitter {
 
   std::optional<Surface> fit_at(const Vector3d& position) {
     const NeighborLoops::Coordinates neighbors = neighbors_.coordinates();
-    const std::size_t count =
-        loops_.select(candidates_.coordinates(), candidates_.count(), position.data(), radius_, neighbors);
+    const std::size_t count = loops_.select(candidates_.coordinates(), candidates_.count(),
+                                            position.data(), radius_, neighbors);
     Matrix3d frame;
     Matrix6d matrix;
     Vector6d right, quadric;

@@ -6,15 +6,16 @@ using Register [[gnu::vector_size(GRASPMAP_REGISTER)]] = double;
 using Lanes [[gnu::vector_size(NeighborLoops::lanes * sizeof(double))]] = double;
 
 template <typename Vector>
-inline void load_coordinates(const NeighborLoops::Coordinates& coordinates, std::size_t at, Vector& x, Vector& y,
-                        Vector& z) {
+inline void load_coordinates(const NeighborLoops::Coordinates& coordinates, std::size_t at,
+                             Vector& x, Vector& y, Vector& z) {
   __builtin_memcpy(&x, coordinates.x + at, sizeof(Vector));
   __builtin_memcpy(&y, coordinates.y + at, sizeof(Vector));
   __builtin_memcpy(&z, coordinates.z + at, sizeof(Vector));
 }
 
-std::size_t select(const NeighborLoops::Coordinates& candidates, std::size_t count, const double* center,
-                   double radius, const NeighborLoops::Coordinates& neighbors) {
+std::size_t select(const NeighborLoops::Coordinates& candidates, std::size_t count,
+                   const double* center, double radius,
+                   const NeighborLoops::Coordinates& neighbors) {
   constexpr std::size_t width = GRASPMAP_REGISTER / sizeof(double);
   const double inverse = 1 / radius;
   const double limit = radius * radius;
@@ -76,8 +77,8 @@ void sum_moments(const NeighborLoops::Coordinates& neighbors, std::size_t count,
   join_lanes(s, sums);
 }
 
-void sum_quadric(const NeighborLoops::Coordinates& neighbors, std::size_t count, const double* frame,
-                 double* sums) {
+void sum_quadric(const NeighborLoops::Coordinates& neighbors, std::size_t count,
+                 const double* frame, double* sums) {
   Lanes s[NeighborLoops::quadric_sums] = {};
   for (std::size_t k = 0; k < count; k += NeighborLoops::lanes) {
     Lanes x, y, z;

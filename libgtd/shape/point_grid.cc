@@ -123,7 +123,7 @@ void CoordinateRows::make_room(std::size_t count) {
 }
 
 std::vector<Eigen::Vector3d> sorted_by_cell(const PointGrid& grid,
-                                         const std::vector<Eigen::Vector3d>& points) {
+                                            const std::vector<Eigen::Vector3d>& points) {
   std::vector<Eigen::Vector3d> cell_sorted;
   cell_sorted.reserve(grid.order().size());
   for (const std::uint32_t i : grid.order()) cell_sorted.push_back(points[i]);
@@ -149,8 +149,8 @@ void CellSurroundings::enter(const PointGrid::Cell& cell, std::int64_t reach) {
     put(Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity()));
 }
 
-Eigen::Matrix3d covariance_of(const NeighborLoops& loops, const NeighborLoops::Coordinates& neighbors,
-                              std::size_t count) {
+Eigen::Matrix3d covariance_of(const NeighborLoops& loops,
+                              const NeighborLoops::Coordinates& neighbors, std::size_t count) {
   std::array<double, NeighborLoops::moments> m;
   loops.sum_moments(neighbors, count, m.data());
   for (double& sum : m) sum /= static_cast<double>(count);

@@ -98,17 +98,17 @@ class CoordinateRows {
 
 // Returns the points in the order of the grid, for access by cells.
 std::vector<Eigen::Vector3d> sorted_by_cell(const PointGrid& grid,
-                                         const std::vector<Eigen::Vector3d>& points);
+                                            const std::vector<Eigen::Vector3d>& points);
 
 // Returns the covariance of `count` neighbors, in the squared unit of their coordinates.
-Eigen::Matrix3d covariance_of(const NeighborLoops& loops, const NeighborLoops::Coordinates& neighbors,
-                              std::size_t count);
+Eigen::Matrix3d covariance_of(const NeighborLoops& loops,
+                              const NeighborLoops::Coordinates& neighbors, std::size_t count);
 
 // Points around a cell of a grid, gathered once for all queries in this cell.
 class CellSurroundings {
  public:
-  // `cell_sorted` are the points in the order of the grid, in any frame and unit. Both arguments must
-  // outlive this object.
+  // `cell_sorted` are the points in the order of the grid, in any frame and unit. Both arguments
+  // must outlive this object.
   CellSurroundings(const PointGrid& grid, const std::vector<Eigen::Vector3d>& cell_sorted)
       : grid_(grid), cell_sorted_(cell_sorted) {}
 

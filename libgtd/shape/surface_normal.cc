@@ -42,8 +42,8 @@ class PlaneFitter {
   // Fits at a position in the cell entered last.
   SurfaceNormal fit(const Vector3d& position, const Vector3d& outside) {
     const NeighborLoops::Coordinates neighbors = neighbors_.coordinates();
-    const std::size_t count =
-        loops_.select(candidates_.coordinates(), candidates_.count(), position.data(), radius_, neighbors);
+    const std::size_t count = loops_.select(candidates_.coordinates(), candidates_.count(),
+                                            position.data(), radius_, neighbors);
     if (count < 3) return {};
     Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
     solver.computeDirect(covariance_of(loops_, neighbors, count));
@@ -96,8 +96,8 @@ std::vector<SurfaceNormal> fit_surface_normals(const libmap::PointCloud& cloud,
       fitter.enter(groups.cells()[c]);
       for (std::uint32_t n = groups.ranges()[c].first; n < groups.ranges()[c].last; ++n) {
         const std::uint32_t at = groups.order()[n];
-        normals[at] = fitter.fit(
-            positions[at], outsides.empty() ? Vector3d::Zero().eval() : outsides[at].cast<double>());
+        normals[at] = fitter.fit(positions[at], outsides.empty() ? Vector3d::Zero().eval()
+                                                                 : outsides[at].cast<double>());
       }
     }
   });

@@ -166,7 +166,7 @@ libmap::PointCloud voxel_means(const libmap::PointCloud& terrain, double voxel_s
 }
 
 std::vector<Eigen::Vector3f> voxel_centroids(const std::vector<Eigen::Vector3f>& points,
-                                               double leaf_m) {
+                                             double leaf_m) {
   require_voxel_size(leaf_m);
   if (points.empty()) return {};
   const float inverse_leaf = 1.0F / static_cast<float>(leaf_m);

@@ -119,7 +119,7 @@ VoxelGrid voxelize_thesis(const std::vector<Eigen::Vector3f>& points_in_terrain,
 // Returns the centroid of the points in each cell floor(p * (1 / leaf_m)) in single precision, in
 // ascending order of z, y, x, as the author's program does before and during voxelization.
 std::vector<Eigen::Vector3f> voxel_centroids(const std::vector<Eigen::Vector3f>& points,
-                                               double leaf_m);
+                                             double leaf_m);
 
 // Returns the values of a field. Throws Error naming the field if it is missing.
 const std::vector<double>& values_of(const libmap::PointCloud& map, const char* name);

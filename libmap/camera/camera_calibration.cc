@@ -198,7 +198,7 @@ BoardFit fit_camera(const BoardCorners& corners, int width, int height, LensMode
 }
 
 CalibratedImage calibrated(const BoardImage& image, const Camera& camera, const Pose& pose,
-                             const Chessboard& board) {
+                           const Chessboard& board) {
   CalibratedImage result;
   result.name = image.name;
   result.camera_from_board = pose;
@@ -241,8 +241,8 @@ bool shows_the_same(const BoardImage& a, const BoardImage& b) {
   return std::min(forward, backward) < static_cast<double>(count) * same_point_px * same_point_px;
 }
 
-CameraCalibrationResult calibrate_once(const std::vector<BoardImage>& images, int width,
-                                       int height, const CameraCalibrationOptions& options) {
+CameraCalibrationResult calibrate_once(const std::vector<BoardImage>& images, int width, int height,
+                                       const CameraCalibrationOptions& options) {
   if (images.size() < min_images)
     throw Error("too few distinct images of the board",
                 {.field = "pictures",
@@ -277,7 +277,7 @@ CameraCalibrationResult calibrate_once(const std::vector<BoardImage>& images, in
 // Index of an image that is inconsistent with a camera that fits all others, for example because of
 // wrongly ordered corners; nullopt if there is none.
 std::optional<std::size_t> find_odd_image(const std::vector<BoardImage>& images, int width,
-                                            int height, const CameraCalibrationOptions& options) {
+                                          int height, const CameraCalibrationOptions& options) {
   constexpr double times_the_median = 5.0;
   if (images.size() <= min_images) return std::nullopt;
   const BoardCorners corners = corners_of(images, options.board);

@@ -78,7 +78,7 @@ ColorImage resample_image(const ColorImage& image, const Camera& from, const Cam
         const Eigen::Vector2d pixel =
             distort_to_pixel(from, {(column - to.cx) / to.fx, (row - to.cy) / to.fy});
         source_pixels.at<cv::Vec2f>(row, column) = {static_cast<float>(pixel.x()),
-                                             static_cast<float>(pixel.y())};
+                                                    static_cast<float>(pixel.y())};
       }
   });
   ColorImage result(to.width, to.height);

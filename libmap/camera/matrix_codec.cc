@@ -81,7 +81,7 @@ StoredMatrix read_matrix_header(std::string_view blob) {
 }
 
 void for_each_matrix_chunk(std::string_view blob,
-                       const std::function<void(std::string_view bytes)>& use) {
+                           const std::function<void(std::string_view bytes)>& use) {
   const StoredMatrix matrix = read_matrix_header(blob);
   const std::string_view packed = blob.substr(0, blob.size() - trailer_bytes);
   const std::uint64_t wanted = checked_bytes(matrix, packed.size());

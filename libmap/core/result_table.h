@@ -35,7 +35,7 @@ struct NamedResult {
   std::string key;                     // with its unit: "radius_m"
   std::string description;             // one line
   ManifestValue type;                  // a default value of the type of `value`
-  bool may_be_absent;                       // true for optionals
+  bool may_be_absent;                  // true for optionals
   std::optional<ManifestValue> value;  // nullopt: null in JSON, omitted in the manifest
 
  private:

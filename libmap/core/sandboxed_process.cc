@@ -71,7 +71,7 @@ void bound_memory(std::uint64_t max_data_bytes) {
 void SandboxedProcess::CloseFile::operator()(std::FILE* file) const { std::fclose(file); }
 
 SandboxedProcess::SandboxedProcess(std::uint64_t max_data_bytes,
-                               const std::function<void(const Write&)>& work) {
+                                   const std::function<void(const Write&)>& work) {
   int ends[2] = {-1, -1};
   if (pipe2(ends, O_CLOEXEC) == 0) {
     process_ = fork();

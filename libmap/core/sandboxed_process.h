@@ -109,7 +109,7 @@ class SandboxReader {
 // sends and receives the result. Throws Error with the reason `broken` if the child crashes.
 template <typename Result, typename Make, typename Pass>
 Result run_sandboxed(std::uint64_t max_data_bytes, const std::string& broken, const Make& make,
-                   const Pass& pass) {
+                     const Pass& pass) {
   SandboxedProcess process(max_data_bytes, [&](const SandboxedProcess::Write& write) {
     SandboxWriter output(write);
     try {

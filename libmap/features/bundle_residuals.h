@@ -67,7 +67,7 @@ class CalibratedFeature {
         weight_(1.0 / static_cast<double>(feature.pixel_noise_px),
                 1.0 / static_cast<double>(feature.pixel_noise_px),
                 1.0 / static_cast<double>(calibrated.has_depth ? feature.depth_noise_m
-                                                                 : unknown_depth_m)),
+                                                               : unknown_depth_m)),
         calibrated_(calibrated) {}
 
   const CalibratedObservation& calibrated() const { return calibrated_; }

@@ -204,7 +204,8 @@ bool DepthSurface::nearest_to(const Eigen::Vector3d& point_in_camera, SurfacePat
   return at(static_cast<int>(column), static_cast<int>(row), element);
 }
 
-bool DepthSurface::interpolated_at(const Eigen::Vector3d& point_in_camera, SurfacePatch& element) const {
+bool DepthSurface::interpolated_at(const Eigen::Vector3d& point_in_camera,
+                                   SurfacePatch& element) const {
   const auto in_grid = grid_position(point_in_camera);
   if (!in_grid) return false;
   const double left = std::floor(in_grid->x());

@@ -111,7 +111,7 @@ class DepthCheck : public Json::json_sax_t {
 };
 
 FrameFeatures decode(std::string_view bytes, FeatureType type,
-                       const std::vector<Camera>& depth_cameras) {
+                     const std::vector<Camera>& depth_cameras) {
   if (!DepthCheck::passes(bytes)) throw Error("not CBOR or nested too deeply");
   const Json json = Json::from_cbor(bytes);
   if (json.at("version") != format_version) throw Error("unknown format version");

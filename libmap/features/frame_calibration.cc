@@ -66,8 +66,9 @@ DepthCorrection correction_for(const std::vector<FrameFeatures>& frames, std::si
 Eigen::Vector2f moved_ray(const Feature& feature, const Camera& camera,
                           const IntrinsicsStep& step) {
   const Eigen::Vector2d ray = feature.ray.cast<double>();
-  return Eigen::Vector2d((camera.fx * ray.x() - step.cx_px) / (camera.fx * (1.0 + step.fx_relative)),
-                         (camera.fy * ray.y() - step.cy_px) / (camera.fy * (1.0 + step.fy_relative)))
+  return Eigen::Vector2d(
+             (camera.fx * ray.x() - step.cx_px) / (camera.fx * (1.0 + step.fx_relative)),
+             (camera.fy * ray.y() - step.cy_px) / (camera.fy * (1.0 + step.fy_relative)))
       .cast<float>();
 }
 

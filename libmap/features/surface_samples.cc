@@ -49,7 +49,7 @@ std::vector<PlacedElement> surface_samples(const FrameFeatures& frame, int count
 }
 
 bool element_at(const FrameFeatures& frame, const Eigen::Vector3d& point_in_base,
-                    PlacedElement& element) {
+                PlacedElement& element) {
   for (const DepthSurface& surface : frame.surfaces) {
     const Pose& base_from_camera = surface.camera().base_from_camera;
     SurfacePatch seen;

@@ -25,6 +25,6 @@ std::vector<PlacedElement> surface_samples(const FrameFeatures& frame, int count
 // Finds the element at the projection of the point, in the first camera that has one. Returns false
 // if there is none.
 bool element_at(const FrameFeatures& frame, const Eigen::Vector3d& point_in_base,
-                    PlacedElement& element);
+                PlacedElement& element);
 
 }  // namespace libmap

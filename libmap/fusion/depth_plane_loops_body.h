@@ -234,7 +234,8 @@ inline Floats turned(const float* row, const Floats& x, const Floats& y, const F
 }
 
 void place(const DepthPlaneLoops::Planes& planes, const float* ray_x, const float* ray_y, int count,
-           const DepthPlaneLoops::Placement& placement, const DepthPlaneLoops::PlacedElements& placed) {
+           const DepthPlaneLoops::Placement& placement,
+           const DepthPlaneLoops::PlacedElements& placed) {
   for (int x = 0; x < count; x += width) {
     if (!any(planes.support + x)) continue;
     const Floats depth = load<Floats>(planes.depth_m + x);

@@ -389,8 +389,9 @@ DepthPixelCounts add_depth_planes(const DepthImage& depth, const PixelRays& rays
   const Loops::Placement placement = placement_of(grid_from_camera, options.noise, voxel_size_m);
   std::vector<std::uint8_t> only;
   if (fitted == FittedPixels::in_cells) {
-    only = cells.subsampling_level > 0 ? pixels_in(depth, rays, placement, options.max_depth_m, cells)
-                              : pixels_around(depth, rays, placement, options, voxel_size_m, cells);
+    only = cells.subsampling_level > 0
+               ? pixels_in(depth, rays, placement, options.max_depth_m, cells)
+               : pixels_around(depth, rays, placement, options, voxel_size_m, cells);
     if (only.empty()) return {};
   }
   const Loops& loops = depth_plane_loops_of(best_instruction_set());
@@ -399,14 +400,15 @@ DepthPixelCounts add_depth_planes(const DepthImage& depth, const PixelRays& rays
   std::vector<float> numbers(7 * stride);
   const auto numbers_at = [&](std::size_t n) { return numbers.data() + n * stride; };
   const Loops::PlacedElements placed{{numbers_at(0), numbers_at(1), numbers_at(2)},
-                             {numbers_at(3), numbers_at(4), numbers_at(5)},
-                             numbers_at(6)};
+                                     {numbers_at(3), numbers_at(4), numbers_at(5)},
+                                     numbers_at(6)};
   return each_plane_row(depth, rays, options, only, [&](int y, const Loops::Planes& planes) {
     const std::size_t first = row_begin(depth, y);
     loops.place(planes, &rays.x[first], &rays.y[first], depth.width, placement, placed);
     for (std::size_t x = 0; x < width; ++x) {
       if (planes.support[x] == 0) continue;
-      const Eigen::Vector3f position(placed.position[0][x], placed.position[1][x], placed.position[2][x]);
+      const Eigen::Vector3f position(placed.position[0][x], placed.position[1][x],
+                                     placed.position[2][x]);
       if (!cells.contains(position.head<2>())) continue;
       voxels.add(position, {placed.normal[0][x], placed.normal[1][x], placed.normal[2][x]},
                  placed.weight[x]);

@@ -19,7 +19,8 @@ SurfaceVoxels::Sum& SurfaceVoxels::side_of(const VoxelSide& voxel, const Eigen::
   return sums_[number];
 }
 
-void SurfaceVoxels::add(const Eigen::Vector3f& position, const Eigen::Vector3f& normal, float weight) {
+void SurfaceVoxels::add(const Eigen::Vector3f& position, const Eigen::Vector3f& normal,
+                        float weight) {
   const Eigen::Array3f floor = position.array().floor();
   if (!((floor.abs() < static_cast<float>(voxel_cell_limit - 2)).all())) return;
   Sum& sum = side_of({floor.cast<int>().matrix(), 0}, normal);
@@ -63,7 +64,7 @@ struct Piece {
   Eigen::Vector3f normal = Eigen::Vector3f::Zero();
   int axis = 2;                   // of the column
   float height = 0.0F;            // along the axis, on the column's center line
-  bool is_selected = false;            // selected for its column
+  bool is_selected = false;       // selected for its column
   std::array<bool, 4> is_edge{};  // true for neighboring columns without surface
 };
 

@@ -25,8 +25,8 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
-#include "libmap/core/sandboxed_process.h"
 #include "libmap/core/output_lock.h"
+#include "libmap/core/sandboxed_process.h"
 #include "libmap/core/text.h"
 #include "libmap/io/corner_key.h"
 
@@ -314,8 +314,8 @@ DecodedModel model_of(const aiScene& scene, MeshBuilder& builder) {
   for (unsigned m = 0; m < scene.mNumMaterials; ++m) {
     std::optional<TextureImage> image = image_of(scene, *scene.mMaterials[m]);
     if (!image) continue;
-    const auto same = std::find_if(
-        result.images.begin(), result.images.end(), [&](const TextureImage& other) {
+    const auto same =
+        std::find_if(result.images.begin(), result.images.end(), [&](const TextureImage& other) {
           return other.path == image->path && other.bytes == image->bytes;
         });
     page_of_material[m] = static_cast<std::int32_t>(same - result.images.begin());
@@ -370,20 +370,20 @@ DecodedModel decode_guarded(std::uint64_t file_bytes, const std::function<Decode
   // Memory for assimp's scene, the mesh and its bytes; a line of OBJ needs some hundred bytes.
   const std::uint64_t memory = (std::uint64_t{1} << 30) + 100 * file_bytes;
   return run_sandboxed<DecodedModel>(memory, "is broken: the library for its format crashed on it",
-                                   decode, [](auto& pipe, DecodedModel& decoded) {
-                                     TexturedMesh& model = decoded.model;
-                                     pipe.array(model.mesh.vertices);
-                                     pipe.array(model.mesh.triangles);
-                                     pipe.array(model.mesh.vertex_normals);
-                                     pipe.array(model.mesh.vertex_colors);
-                                     pipe.array(model.texture_coordinates);
-                                     pipe.array(model.page_of_triangle);
-                                     pipe.size(decoded.images);
-                                     for (TextureImage& image : decoded.images) {
-                                       pipe.array(image.bytes);
-                                       pipe.array(image.path);
-                                     }
-                                   });
+                                     decode, [](auto& pipe, DecodedModel& decoded) {
+                                       TexturedMesh& model = decoded.model;
+                                       pipe.array(model.mesh.vertices);
+                                       pipe.array(model.mesh.triangles);
+                                       pipe.array(model.mesh.vertex_normals);
+                                       pipe.array(model.mesh.vertex_colors);
+                                       pipe.array(model.texture_coordinates);
+                                       pipe.array(model.page_of_triangle);
+                                       pipe.size(decoded.images);
+                                       for (TextureImage& image : decoded.images) {
+                                         pipe.array(image.bytes);
+                                         pipe.array(image.path);
+                                       }
+                                     });
 }
 
 Error not_written(const Assimp::Exporter& exporter) {

@@ -34,8 +34,8 @@ TileIndex::TileIndex(std::vector<std::filesystem::path> tiles, const Visit& visi
 }
 
 const PointCloud& TileIndex::cloud_of(const Tile& tile) {
-  const auto kept = std::find_if(kept_.begin(), kept_.end(),
-                                 [&](const auto& one) { return one.first == &tile; });
+  const auto kept =
+      std::find_if(kept_.begin(), kept_.end(), [&](const auto& one) { return one.first == &tile; });
   if (kept != kept_.end()) {
     kept_.splice(kept_.begin(), kept_, kept);
     return kept_.front().second;

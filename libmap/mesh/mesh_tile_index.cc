@@ -67,8 +67,8 @@ MeshTileIndex::MeshTileIndex(std::vector<std::filesystem::path> tiles) {
 }
 
 const TriangleMesh& MeshTileIndex::mesh_of(const Tile& tile) {
-  const auto found = std::find_if(kept_.begin(), kept_.end(),
-                                  [&](const auto& one) { return one.first == &tile; });
+  const auto found =
+      std::find_if(kept_.begin(), kept_.end(), [&](const auto& one) { return one.first == &tile; });
   if (found != kept_.end()) {
     kept_.splice(kept_.begin(), kept_, found);
     return kept_.front().second;

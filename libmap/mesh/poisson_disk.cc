@@ -181,7 +181,7 @@ TileSampler::TileSampler(std::vector<Bounds3d> boxes, const PoissonDiskOptions& 
 }
 
 PoissonDiskResult TileSampler::sample(const TriangleMesh& mesh, std::size_t number,
-                                       Progress& progress) {
+                                      Progress& progress) {
   if (!(surface_area(mesh) > 0.0)) return {};
   SampledSurface surface = surface_of(mesh);
   surface.others = std::move(near_[number]);

@@ -84,7 +84,8 @@ struct ReferenceSurface::MeshShape : Shape {
   NearestSurfacePoint nearest(const Eigen::Vector3d& point) const override {
     constexpr double on_edge = 1e-6;  // barycentric coordinates below this are on the edge
     const SurfacePoint found = surface.nearest(point);
-    NearestSurfacePoint found_point{found.position, Eigen::Vector3d::Zero(), found.distance_m, false};
+    NearestSurfacePoint found_point{found.position, Eigen::Vector3d::Zero(), found.distance_m,
+                                    false};
     const std::uint32_t t = found.triangle;
     const std::array<double, 3> share = shares(t, found.position);
     std::size_t zeros = 0;
@@ -148,7 +149,8 @@ struct ReferenceSurface::CloudShape : Shape {
       const Eigen::Vector3d along = offset - offset.dot(normal) * normal;
       const double reach = along.norm();
       found_point.on_border = reach > disc_radius_m;
-      found_point.position += found_point.on_border ? Eigen::Vector3d(disc_radius_m / reach * along) : along;
+      found_point.position +=
+          found_point.on_border ? Eigen::Vector3d(disc_radius_m / reach * along) : along;
     }
     found_point.distance_m = (point - found_point.position).norm();
     return found_point;

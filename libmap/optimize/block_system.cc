@@ -100,7 +100,8 @@ BlockSolver::BlockSolver(const BlockSystem& system, double damping)
       }
   for (std::size_t n = 0; n < system.size(); ++n)
     for (Eigen::Index r = 0; r < 6; ++r)
-      for (Eigen::Index c = 0; c <= r; ++c) add(row_of(n) + r, row_of(n) + c, r == c ? damping : 0.0);
+      for (Eigen::Index c = 0; c <= r; ++c)
+        add(row_of(n) + r, row_of(n) + c, r == c ? damping : 0.0);
   Sparse matrix(parts_->size, parts_->size);
   matrix.setFromTriplets(entries.begin(), entries.end());
   parts_->solver.compute(matrix);

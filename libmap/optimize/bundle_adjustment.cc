@@ -134,10 +134,10 @@ class Adjustment {
   std::size_t cameras_ = 0;                   // number of cameras; 0 if none is refined
   std::vector<DepthCorrection> corrections_;  // zero corrections that define the knots
   SensorCalibration start_;
-  std::map<int, std::size_t> row_;  // row of a node's pose
-  std::vector<Eigen::Index> first_;   // first parameter of a camera
-  std::vector<bool> sees_;            // true for cameras with observations
-  double mean_later_s_ = 0.0;         // of FrameFeatures::depth_later_s
+  std::map<int, std::size_t> row_;   // row of a node's pose
+  std::vector<Eigen::Index> first_;  // first parameter of a camera
+  std::vector<bool> sees_;           // true for cameras with observations
+  double mean_later_s_ = 0.0;        // of FrameFeatures::depth_later_s
   double later_deviation_s_ = 0.0;
   std::vector<Eigen::Index> free_;   // indices of the free parameters
   std::vector<std::size_t> points_;  // track of each point
@@ -172,7 +172,7 @@ Adjustment::Adjustment(const std::vector<FrameFeatures>& frames,
 }
 
 void Adjustment::init_params(const SensorCalibration& start,
-                               const std::vector<GraphComponent>& components) {
+                             const std::vector<GraphComponent>& components) {
   if (options_.refine_registration) start_.color_from_depth = start.color_from_depth;
   if (options_.refine_timing) {
     start_.timing = start.timing;
@@ -194,8 +194,8 @@ void Adjustment::init_params(const SensorCalibration& start,
     own[timing_at + 1] = start_.timing[n].rolling_shutter_s;
     if (options_.refine_intrinsics && n < start.intrinsics.size()) {
       const IntrinsicsStep& step = start.intrinsics[n];
-      Eigen::Map<Eigen::Vector4d>(own + intrinsics_at) << step.fx_relative, step.fy_relative, step.cx_px,
-          step.cy_px;
+      Eigen::Map<Eigen::Vector4d>(own + intrinsics_at) << step.fx_relative, step.fy_relative,
+          step.cx_px, step.cy_px;
     }
     if (n >= corrections_.size() || n >= start.depth.size() ||
         !has_same_knots(corrections_[n], start.depth[n]))
@@ -340,7 +340,8 @@ void Adjustment::add_depth_priors(std::size_t camera, Priors& priors) {
 // that least squares with both as measurements overestimates times.
 double Adjustment::motion_scale() const {
   // Varying delays of the stamps determine the scale.
-  if (!problem_.moving || problem_.fix_cameras || later_deviation_s_ > observable_delay_s) return 1.0;
+  if (!problem_.moving || problem_.fix_cameras || later_deviation_s_ > observable_delay_s)
+    return 1.0;
   double mixed = 0.0;
   double squares = 0.0;
   for (std::size_t n = 0; n < state_.motions.size(); ++n) {
@@ -526,7 +527,8 @@ std::optional<std::string> exceeded_bound(const SensorCalibration& calibration,
                      1e3 * bounds.deviations * registration_prior_m, " mm");
   for (const DepthCorrection& depth : calibration.depth)
     for (const auto& [z, bend] : largest_bends(depth))
-      if (const double most = bounds.max_depth_correction_m + bounds.max_depth_correction_per_m * z; bend >= most)
+      if (const double most = bounds.max_depth_correction_m + bounds.max_depth_correction_per_m * z;
+          bend >= most)
         return exceeds("depth correction", 1e3 * bend, 1e3 * most, " mm") + " at a depth of " +
                to_fixed_text(z, 1) + " m";
   return std::nullopt;

@@ -8,9 +8,9 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
-#include "libmap/core/sandboxed_process.h"
 #include "libmap/core/manifest.h"
 #include "libmap/core/memory_budget.h"
+#include "libmap/core/sandboxed_process.h"
 #include "libmap/core/text.h"
 #include "libmap/raster/raster_module.h"
 

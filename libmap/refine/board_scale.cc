@@ -62,10 +62,12 @@ struct PlacedBoard {
 }
 
 // Returns nullopt if the frame has no pose or a corner has no ray.
-std::optional<BoardObservation> sight_of(const BoardView& view, const std::vector<FrameFeatures>& frames,
-                              const SensorCalibration& calibration,
-                              const std::map<int, Pose>& map_from_base,
-                              const std::map<int, Matrix6d>& covariance, const Chessboard& board) {
+std::optional<BoardObservation> sight_of(const BoardView& view,
+                                         const std::vector<FrameFeatures>& frames,
+                                         const SensorCalibration& calibration,
+                                         const std::map<int, Pose>& map_from_base,
+                                         const std::map<int, Matrix6d>& covariance,
+                                         const Chessboard& board) {
   const auto found = std::find_if(frames.begin(), frames.end(), [&](const FrameFeatures& frame) {
     return frame.node == view.node;
   });
@@ -101,14 +103,15 @@ std::optional<BoardObservation> sight_of(const BoardView& view, const std::vecto
 
 // Mean squared distance between found and projected corners, px^2; nullopt if one is behind the
 // camera.
-std::optional<double> squared_distance(const BoardObservation& observation, const PlacedBoard& board,
-                                       const Corners& corners) {
+std::optional<double> squared_distance(const BoardObservation& observation,
+                                       const PlacedBoard& board, const Corners& corners) {
   double sum = 0.0;
   for (std::size_t n = 0; n < corners.size(); ++n) {
     const Eigen::Vector3d point =
         observation.in_camera(board.map_from_board * Eigen::Vector3d(board.size * corners[n]));
     if (!(point.z() > 0.0)) return std::nullopt;
-    sum += observation.focal_px.cwiseProduct(point.hnormalized() - observation.rays[n]).squaredNorm();
+    sum +=
+        observation.focal_px.cwiseProduct(point.hnormalized() - observation.rays[n]).squaredNorm();
   }
   return sum / static_cast<double>(corners.size());
 }
@@ -130,22 +133,24 @@ std::vector<Corners> orders_of(const Chessboard& board) {
   return orders;
 }
 
-using OrderedObservation = std::pair<BoardObservation, Corners>;  // with the board's corners in the view's order
+using OrderedObservation =
+    std::pair<BoardObservation, Corners>;  // with the board's corners in the view's order
 struct AgreeingSights {
   PlacedBoard board{};
   std::vector<OrderedObservation> observations{};
 };
 
 // Views that agree with the board's pose from the view `first` within half of the board's size.
-AgreeingSights sights_that_agree(const std::vector<BoardObservation>& observations, std::size_t first,
-                                 const std::vector<Corners>& orders) {
+AgreeingSights sights_that_agree(const std::vector<BoardObservation>& observations,
+                                 std::size_t first, const std::vector<Corners>& orders) {
   AgreeingSights agreeing;
   const BoardObservation& reference = observations[first];
   agreeing.board.map_from_board =
       reference.map_from_base * reference.base_from_camera * reference.camera_from_board;
   for (const BoardObservation& observation : observations) {
     const double extent_px =
-        observation.focal_px.cwiseProduct(observation.rays.back() - observation.rays.front()).norm();
+        observation.focal_px.cwiseProduct(observation.rays.back() - observation.rays.front())
+            .norm();
     double least = std::pow(0.5 * extent_px, 2);
     const Corners* best = nullptr;
     for (const Corners& order : orders)
@@ -164,7 +169,8 @@ AgreeingSights sights_that_agree(const std::vector<BoardObservation>& observatio
 using Sums = Eigen::Matrix<double, 14, 14>;  // [J r H]^T [J r H]
 using System = Eigen::Matrix<double, 8, 8>;  // [J r]^T [J r], weighted
 
-Sums sums_of(const BoardObservation& observation, const Corners& corners, const PlacedBoard& board) {
+Sums sums_of(const BoardObservation& observation, const Corners& corners,
+             const PlacedBoard& board) {
   const Eigen::Matrix3d camera_from_base = observation.base_from_camera.linear().transpose();
   const Pose base_from_board = observation.map_from_base.inverse() * board.map_from_board;
   const Eigen::Matrix3d turn = camera_from_base * base_from_board.linear();
@@ -332,7 +338,8 @@ ScaleEstimate scale_by_board(const std::vector<FrameFeatures>& frames,
       observations.push_back(std::move(*observation));
   const std::vector<Corners> orders = orders_of(board);
   AgreeingSights best;
-  for (std::size_t n = 0; n < observations.size() && 2 * best.observations.size() < observations.size(); ++n) {
+  for (std::size_t n = 0;
+       n < observations.size() && 2 * best.observations.size() < observations.size(); ++n) {
     AgreeingSights agreeing = sights_that_agree(observations, n, orders);
     if (agreeing.observations.size() > best.observations.size()) best = std::move(agreeing);
   }
@@ -351,7 +358,8 @@ ScaleEstimate scale_by_board(const std::vector<FrameFeatures>& frames,
   scale.factor = 1.0 / found->board.size;
   scale.lengths = best.observations.size();
   for (const double disagreement : disagreements) scale.chi_square += disagreement;
-  scale.chi_square /= freedom_of_pose * static_cast<double>(best.observations.size()) - freedom_of_board;
+  scale.chi_square /=
+      freedom_of_pose * static_cast<double>(best.observations.size()) - freedom_of_board;
   const double share = std::sqrt(found->size_variance * std::max(1.0, scale.chi_square));
   scale.deviation = scale.factor * share;
   if (!(share <= max_deviation))

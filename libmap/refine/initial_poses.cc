@@ -30,7 +30,8 @@ bool is_between_nodes(const PoseLink& link) {
 // nothing changes. known(node) returns true if the node has a value. tell(link, node) passes the
 // value of the link's other end to `node` and returns true if the node accepts it.
 template <typename Known, typename Propagate>
-void spread_by_links(const std::vector<PoseLink>& links, const Known& known, const Propagate& propagate) {
+void spread_by_links(const std::vector<PoseLink>& links, const Known& known,
+                     const Propagate& propagate) {
   std::map<int, std::vector<std::size_t>> links_of;
   // Ordered by pass, then by index in the list. A link acts once, when one end has a value.
   using Turn = std::pair<std::size_t, std::size_t>;

@@ -96,7 +96,8 @@ class LostFrames {
       candidates.push_back(pose(other) * link->from_from_to);
     }
     if (links.empty()) return false;
-    if (!is_near(candidates.front(), candidates.back(), sides_agree_m, sides_agree_rad)) return false;
+    if (!is_near(candidates.front(), candidates.back(), sides_agree_m, sides_agree_rad))
+      return false;
     move_part(frame, links.front().from, candidates.front());
     result_.depth_links.insert(result_.depth_links.end(), links.begin(), links.end());
     return true;

@@ -301,8 +301,10 @@ RefinementOptions with_sensor(RefinementOptions options) {
   BundleAdjustmentOptions& bundle = options.bundle_adjustment;
   const CalibrationBounds& bounds = defaults.bundle_adjustment.bounds;
   set(bundle.bounds.frame_time_s, bounds.frame_time_s, model.frame_time_s);
-  set(bundle.bounds.max_depth_correction_m, bounds.max_depth_correction_m, model.max_depth_correction_m);
-  set(bundle.bounds.max_depth_correction_per_m, bounds.max_depth_correction_per_m, model.max_depth_correction_per_m);
+  set(bundle.bounds.max_depth_correction_m, bounds.max_depth_correction_m,
+      model.max_depth_correction_m);
+  set(bundle.bounds.max_depth_correction_per_m, bounds.max_depth_correction_per_m,
+      model.max_depth_correction_per_m);
   bundle.timing_mean = {model.depth_delay_s, model.rolling_shutter_s};
   return options;
 }

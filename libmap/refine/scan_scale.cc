@@ -33,15 +33,15 @@ struct MeasuredEnd {
 [[noreturn]] void refuse(const KnownLength::End& length_end, const std::string& reason,
                          const std::string& bound) {
   throw Error(reason, {.field = "known length",
-                       .value = std::to_string(length_end.node) + ":" + to_text(length_end.pixel.x()) + ":" +
-                                to_text(length_end.pixel.y()),
+                       .value = std::to_string(length_end.node) + ":" +
+                                to_text(length_end.pixel.x()) + ":" + to_text(length_end.pixel.y()),
                        .bound = bound});
 }
 
 MeasuredEnd measured_end(const KnownLength::End& length_end,
-                             const std::vector<FrameFeatures>& frames,
-                             const SensorCalibration& calibration,
-                             const std::map<int, Pose>& map_from_base) {
+                         const std::vector<FrameFeatures>& frames,
+                         const SensorCalibration& calibration,
+                         const std::map<int, Pose>& map_from_base) {
   const auto found = std::find_if(frames.begin(), frames.end(), [&](const FrameFeatures& frame) {
     return frame.node == length_end.node;
   });

@@ -404,7 +404,8 @@ BundleAdjustmentResult vary_calibration(const CalibrationInput& input,
   return result;
 }
 
-void estimate_motions(const CalibrationInput& input, bool fixes_poses, SensorCalibration& calibration) {
+void estimate_motions(const CalibrationInput& input, bool fixes_poses,
+                      SensorCalibration& calibration) {
   const std::vector<FrameFeatures>& frames = input.frames;
   BundleAdjustmentOptions moving = with_free(parts_of(calibration), input.options);
   moving.fixes_poses = fixes_poses;
@@ -439,7 +440,7 @@ void estimate_motions(const CalibrationInput& input, bool fixes_poses, SensorCal
 }
 
 bool is_similar_registration(const SensorCalibration& a, const SensorCalibration& b, double shift_m,
-                           double turn_rad, double time_s) {
+                             double turn_rad, double time_s) {
   const std::size_t cameras = std::max(
       {a.color_from_depth.size(), b.color_from_depth.size(), a.timing.size(), b.timing.size()});
   const auto pose_of = [](const SensorCalibration& of, std::size_t n) {
@@ -494,7 +495,8 @@ std::vector<std::string> findings(const SensorCalibration& calibration,
   };
   for (std::size_t n = 0; n < std::min(calibration.intrinsics.size(), cameras.size()); ++n) {
     const IntrinsicsStep& step = calibration.intrinsics[n];
-    const double percent = 100.0 * (1.0 / (1.0 + 0.5 * (step.fx_relative + step.fy_relative)) - 1.0);
+    const double percent =
+        100.0 * (1.0 / (1.0 + 0.5 * (step.fx_relative + step.fy_relative)) - 1.0);
     sentences.push_back(of_camera(n) + "stored focal length " +
                         to_fixed_text(std::abs(percent), 2) + " % too " +
                         (percent > 0.0 ? "large" : "small") + ", principal point off by " +

@@ -110,7 +110,7 @@ class Tracker {
   std::vector<bool> known_;
   std::map<int, std::size_t> known_part_;            // by node, also for nodes without a frame
   std::set<std::size_t> fixed_;                      // parts with known poses
-  std::set<std::size_t> separate_parts_;                      // parts without a known relation to others
+  std::set<std::size_t> separate_parts_;             // parts without a known relation to others
   std::map<std::size_t, std::size_t> loss_of_part_;  // index of the loss that began a part
   std::size_t parts_ = 0;
   std::map<FramePair, Trial> trials_;
@@ -323,9 +323,9 @@ bool Tracker::relocalize(std::size_t frame) {
   const RelocalizationCandidate* best = nullptr;
   std::pair<std::size_t, std::size_t> most{1, 0};  // agreeing sightings, inliers
   for (const RelocalizationCandidate& sighting : sightings) {
-    const auto votes = static_cast<std::size_t>(
-        std::count_if(sightings.begin(), sightings.end(),
-                      [&](const RelocalizationCandidate& other) { return agree(sighting, other); }));
+    const auto votes = static_cast<std::size_t>(std::count_if(
+        sightings.begin(), sightings.end(),
+        [&](const RelocalizationCandidate& other) { return agree(sighting, other); }));
     if (votes < 2 || std::pair(votes, sighting.inliers) <= most) continue;
     most = {votes, sighting.inliers};
     best = &sighting;

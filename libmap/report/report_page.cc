@@ -29,8 +29,7 @@ std::string gaps_html(const std::vector<ReportGap>& gaps) {
 
 std::string image_html(const ReportImage& image, const std::string& alternative) {
   std::string size;
-  if (image.width > 0)
-    size = fmt::format(" width=\"{}\" height=\"{}\"", image.width, image.height);
+  if (image.width > 0) size = fmt::format(" width=\"{}\" height=\"{}\"", image.width, image.height);
   return "<img alt=\"" + escape_html(alternative) + "\"" + size +
          " src=\"data:" + image.media_type + ";base64," + to_base64(image.bytes) + "\">";
 }
@@ -108,8 +107,8 @@ class PageWriter {
         html += "<span class=\"label\">" + escape_html(image.label) + "</span>";
       html += "</div>\n";
       if (!image.change.empty())
-        changes += (changes.empty() ? "" : "; ") + fs::path(image.file).filename().string() +
-                   ": " + image.change;
+        changes += (changes.empty() ? "" : "; ") + fs::path(image.file).filename().string() + ": " +
+                   image.change;
     }
     html += "</div>\n";
     std::string whole = figure("picture", number, item, html, images.front().file);
@@ -280,14 +279,12 @@ FittedPage fit_report_page(ReportContent content, const PageAssets& assets, std:
   FittedPage page;
   do {
     for (page.image_level = 0; page.image_level <= max_image_level; ++page.image_level) {
-      parallel_each(images.size(), [&](std::size_t n) {
-        *images[n] = fit_image(originals[n], page.image_level);
-      });
+      parallel_each(images.size(),
+                    [&](std::size_t n) { *images[n] = fit_image(originals[n], page.image_level); });
       page.html = report_page(content, assets);
       if (page.html.size() <= max_bytes) {
-        page.changed_images = static_cast<std::size_t>(
-            std::count_if(images.begin(), images.end(),
-                          [](const auto* one) { return !one->change.empty(); }));
+        page.changed_images = static_cast<std::size_t>(std::count_if(
+            images.begin(), images.end(), [](const auto* one) { return !one->change.empty(); }));
         return page;
       }
       if (images.empty()) break;  // higher levels change nothing

@@ -319,7 +319,7 @@ TimingTable timing_table(const std::vector<std::pair<std::string, std::vector<Ma
   TimingTable table;
   for (const auto& one : cases) table.cases.push_back(one.first);
   std::map<std::pair<std::string, std::string>, std::size_t> row_of;  // by command and step
-  std::map<std::string, std::size_t> rank_of;                           // by command
+  std::map<std::string, std::size_t> rank_of;                         // by command
   for (std::size_t n = 0; n < cases.size(); ++n) {
     std::vector<unsigned>& threads = table.threads.emplace_back();
     for (const Manifest& manifest : cases[n].second) {

@@ -133,7 +133,8 @@ void ColmapBuilder::add_points(int id, const CameraView& view, const Pose& world
       if (!ray) continue;
       const DepthPixel depth_pixel_at = depth_pixel(view, *ray);
       const double depth = depth_at(view.depth, depth_pixel_at.x, depth_pixel_at.y);
-      if (!(depth > 0.0) || !is_smooth(view.depth, depth_pixel_at, options_.depth_tolerance)) continue;
+      if (!(depth > 0.0) || !is_smooth(view.depth, depth_pixel_at, options_.depth_tolerance))
+        continue;
       const std::int64_t point = static_cast<std::int64_t>(model_.points.size()) + 1;
       model_.points.emplace(
           point, ColmapPoint{.position = world_from_camera * (depth * ray->homogeneous()),

@@ -20,7 +20,7 @@ std::string image_file_name(int node, std::size_t camera, const std::string& ext
 }
 
 ImageFile image_file_of(const ScanSource& scan, int node, const std::vector<CameraView>& views,
-                         std::size_t camera) {
+                        std::size_t camera) {
   ImageFile file;
   const auto* database = dynamic_cast<const RtabmapDatabase*>(&scan);
   file.bytes = database != nullptr && views.size() == 1 ? database->read_blobs(node).image

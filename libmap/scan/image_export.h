@@ -23,7 +23,7 @@ struct ImageFile {
 
 // Returns the image file of one camera; `views` are the views of the node's frame, with color.
 ImageFile image_file_of(const ScanSource& scan, int node, const std::vector<CameraView>& views,
-                         std::size_t camera);
+                        std::size_t camera);
 
 // Reads the views of a node's frame. Throws Error naming the node if it has no color image or no
 // calibration.

@@ -217,8 +217,8 @@ void bind_to_nodes(const std::vector<CameraPose>& cameras, ImportedPoses& result
   for (const auto& [node, candidates] : poses) {
     const Pose mean = mean_of(candidates);
     for (const Pose& pose : candidates)
-      result.max_rig_deviation_m = std::max(result.max_rig_deviation_m,
-                                                (pose.translation() - mean.translation()).norm());
+      result.max_rig_deviation_m =
+          std::max(result.max_rig_deviation_m, (pose.translation() - mean.translation()).norm());
     result.trajectory.poses.push_back({node, stamps.at(node), mean});
   }
 }

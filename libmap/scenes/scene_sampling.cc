@@ -91,7 +91,8 @@ class Sampler {
   }
 
   void draw_tile(const Patch& patch, const Eigen::Vector2d& corner, const Eigen::Vector2d& tile,
-                 RandomStream& random, std::vector<SurfaceTruth>& samples, double& missing_points) const {
+                 RandomStream& random, std::vector<SurfaceTruth>& samples,
+                 double& missing_points) const {
     const Stretch stretch = stretch_of(patch, corner, tile);
     const double wanted = tile.prod() * stretch.area / spacing_ / spacing_ + missing_points;
     // The longer side compensates the rounding of the shorter one.

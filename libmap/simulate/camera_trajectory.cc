@@ -110,7 +110,8 @@ double loop_share(double loop, int loops) {
 }
 
 // Position on the path without sway; `loop` is the number of loops from the start.
-Eigen::Vector3d position_on(const CameraRoute& way, const CameraTrajectoryOptions& options, double loop) {
+Eigen::Vector3d position_on(const CameraRoute& way, const CameraTrajectoryOptions& options,
+                            double loop) {
   const double share = loop_share(loop, options.loops);
   const double radius = way.radius + share * (way.last_radius - way.radius);
   const double height = way.height + share * (way.last_height - way.height);
@@ -216,7 +217,7 @@ class Serpentine {
     const double along = way_m - lane * period;
     const double forward = lane % 2 == 0 ? 1.0 : -1.0;
     Eigen::Vector2d in_plane(0.5 * straight_ + forward * (along - 0.5 * straight_),
-                          2.0 * radius_ * lane);
+                             2.0 * radius_ * lane);
     if (along > straight_ && lane + 1 < lanes_) {
       const double angle = (along - straight_) / radius_;
       in_plane.x() = 0.5 * straight_ * (1.0 + forward) + forward * radius_ * std::sin(angle);

@@ -102,8 +102,7 @@ ParameterTable ground_parameters(SiteGround& ground) {
   ParameterTable table;
   table.add("size_x_m", ground.size_x_m, ground_size_range, "length along x, m");
   table.add("size_y_m", ground.size_y_m, ground_size_range, "length along y, m");
-  table.add("unevenness_m", ground.relief_m, Range{0.0, 1.0},
-            "maximum height of random relief, m");
+  table.add("unevenness_m", ground.relief_m, Range{0.0, 1.0}, "maximum height of random relief, m");
   table.add("tilt_deg", ground.tilt_deg, Range{0.0, 135.0},
             "tilt of the ground, degrees; 90: a wall");
   table.add("texture", ground.texture,

@@ -104,7 +104,8 @@ std::vector<ExtraBody> extra_bodies(const TriangleMesh& mesh, const ScanEvents& 
   }
   if (events.stone_moved_frame > 0) {
     const auto lying_at = [&](double x) {
-      return at_position({x, middle.y(), ground_height(mesh, x, middle.y()) + 0.8 * stone_radii.z()});
+      return at_position(
+          {x, middle.y(), ground_height(mesh, x, middle.y()) + 0.8 * stone_radii.z()});
     };
     const Pose before = lying_at(middle.x() - 0.5 * stone_shift_m);
     const Pose after = lying_at(middle.x() + 0.5 * stone_shift_m);

@@ -63,7 +63,7 @@ class TerrainSurface {
   };
   Eigen::AlignedBox2d rectangle_of(const TilePosition& tile) const;
   std::vector<TilePosition> tiles_in_view(const std::vector<Pose>& world_from_camera,
-                                    const ViewRange& range) const;
+                                          const ViewRange& range) const;
   Square make(const TilePosition& tile) const;
   void load(const std::vector<TilePosition>& tiles);
   void evict();

@@ -75,7 +75,8 @@ RockyTerrain::RockyTerrain(const RockyTerrainOptions& options,
 }
 
 double RockyTerrain::ground(double x_m, double y_m) const {
-  const Eigen::Vector3d position(x_m / options_.relief_length_m, y_m / options_.relief_length_m, 0.5);
+  const Eigen::Vector3d position(x_m / options_.relief_length_m, y_m / options_.relief_length_m,
+                                 0.5);
   return options_.relief_m * fractal_noise(position, mix_bits(options_.seed, relief_stream), 4);
 }
 

@@ -79,14 +79,13 @@ TopView make_top_view(const PointCloud& cloud, const BorderBandOptions& options)
   view.cell = std::max(
       {options.cell_m, std::sqrt(size.x() * size.y() / max_band_cells), size.maxCoeff() / 20000.0});
   view.levels = Image<double>(static_cast<int>(size.x() / view.cell) + 1,
-                                 static_cast<int>(size.y() / view.cell) + 1, 0.0);
+                              static_cast<int>(size.y() / view.cell) + 1, 0.0);
   Image<int> counts(view.levels.width, view.levels.height);
   for (const std::size_t n : used) {
     const Vector2d index = (cloud.positions[n].head<2>() - low) / view.cell;
     const std::size_t cell = counts.index(std::min(static_cast<int>(index.x()), counts.width - 1),
                                           std::min(static_cast<int>(index.y()), counts.height - 1));
-    view.levels.pixels[cell] +=
-        *std::min_element(cloud.colors[n].begin(), cloud.colors[n].end());
+    view.levels.pixels[cell] += *std::min_element(cloud.colors[n].begin(), cloud.colors[n].end());
     ++counts.pixels[cell];
   }
   for (std::size_t n = 0; n < counts.pixels.size(); ++n)
@@ -168,7 +167,8 @@ std::vector<Line> lines_along(const std::vector<Vector2d>& locations, const Axis
   for (const double at : peaks_of(across)) {
     std::vector<int> white(along.counts.size());
     for (const Vector2d& position : locations)
-      if (std::abs(position[axis] - at) <= 1.5 * across.bin) white[along.bin_of(position[1 - axis])] = 1;
+      if (std::abs(position[axis] - at) <= 1.5 * across.bin)
+        white[along.bin_of(position[1 - axis])] = 1;
     Line line{at, std::vector<int>(white.size() + 1)};
     for (std::size_t n = 0; n < white.size(); ++n) line.sums[n + 1] = line.sums[n] + white[n];
     lines.push_back(std::move(line));

@@ -365,7 +365,7 @@ CropCloudResult crop_cloud(const PointCloud& cloud, const CropOptions& options) 
 }
 
 CropReport crop_mesh_tiles(const EachMesh& each, const CropOptions& options,
-                            const std::function<void(TriangleMesh)>& use) {
+                           const std::function<void(TriangleMesh)>& use) {
   double area = 0.0;
   Eigen::AlignedBox3d box;
   each([&](const TriangleMesh& mesh) {
@@ -427,7 +427,7 @@ CropReport crop_mesh_tiles(const EachMesh& each, const CropOptions& options,
 CropMeshResult crop_mesh(const TriangleMesh& mesh, const CropOptions& options) {
   CropMeshResult result;
   result.report = crop_mesh_tiles([&](const UseMesh& use) { use(mesh); }, options,
-                                   [&](TriangleMesh cut) { result.mesh = std::move(cut); });
+                                  [&](TriangleMesh cut) { result.mesh = std::move(cut); });
   return result;
 }
 

@@ -12,8 +12,8 @@
 #include "libmap/geometry/normal_sides.h"
 #include "libmap/site/border_band.h"
 #include "libmap/site/ground_plane.h"
-#include "libmap/site/xy_polygon.h"
 #include "libmap/site/site_rectangle.h"
+#include "libmap/site/xy_polygon.h"
 
 namespace libmap {
 
@@ -78,6 +78,6 @@ CropMeshResult crop_mesh(const TriangleMesh& mesh, const CropOptions& options);
 using UseMesh = std::function<void(const TriangleMesh& mesh)>;
 using EachMesh = std::function<void(const UseMesh& use)>;
 CropReport crop_mesh_tiles(const EachMesh& each, const CropOptions& options,
-                            const std::function<void(TriangleMesh)>& use);
+                           const std::function<void(TriangleMesh)>& use);
 
 }  // namespace libmap

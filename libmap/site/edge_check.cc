@@ -15,7 +15,8 @@
 namespace libmap {
 
 void bind(ParameterTable& table, EdgeCheckOptions& options) {
-  table.add("places", options.positions_per_edge, {1.0, 10000.0}, "number of positions along each edge");
+  table.add("places", options.positions_per_edge, {1.0, 10000.0},
+            "number of positions along each edge");
   table.add("inset_m", options.inset_m, not_negative, "distance of the positions from the edge");
 }
 
@@ -108,7 +109,8 @@ HeightFunction heights_of(const TriangleMesh& mesh, double from_z) {
   const auto caster = std::make_shared<const RayCaster>(mesh);
   const double top = std::min(from_z, bounds_of(mesh.vertices).max.z() + 1.0);
   return [caster, top](const Eigen::Vector2d& position) -> std::optional<double> {
-    const auto hit = caster->cast({position.x(), position.y(), top}, Eigen::Vector3d(0.0, 0.0, -1.0));
+    const auto hit =
+        caster->cast({position.x(), position.y(), top}, Eigen::Vector3d(0.0, 0.0, -1.0));
     if (!hit) return std::nullopt;
     return top - hit->distance;
   };

@@ -40,8 +40,8 @@ HeightFunction heights_of(const std::vector<Eigen::Vector3d>& points, double rad
                           int min_points);
 
 struct EdgeCheckOptions {
-  int positions_per_edge = 7;         // >= 1: positions per edge, at the centers of as many equal parts
-  double inset_m = 0.05;  // >= 0: distance of the positions from the edge
+  int positions_per_edge = 7;  // >= 1: positions per edge, at the centers of as many equal parts
+  double inset_m = 0.05;       // >= 0: distance of the positions from the edge
 };
 void bind(ParameterTable& table, EdgeCheckOptions& options);
 

@@ -146,7 +146,7 @@ double share_above(const Plane& plane, const Points& points) {
 
 // True if `other` is below `ground`, the plane with more points.
 bool is_below(const Candidate& other, const Candidate& ground, const Eigen::Vector3d& up,
-                double tolerance) {
+              double tolerance) {
   const double above_other = share_above(other.plane, ground.points);
   const double above_ground = share_above(ground.plane, other.points);
   if (std::abs(above_other - above_ground) > 0.25) return above_other > above_ground;

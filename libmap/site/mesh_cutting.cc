@@ -306,7 +306,8 @@ void require_finite(const TriangleMesh& mesh) {
 
 enum class Location : char { outside, inside, on_border };
 
-Location location_of(const TriangleMesh& mesh, const Triangle& corners, const ExtrudedPolygon& prism) {
+Location location_of(const TriangleMesh& mesh, const Triangle& corners,
+                     const ExtrudedPolygon& prism) {
   const Vector3d& a = mesh.vertices[corners[0]];
   const Vector3d& b = mesh.vertices[corners[1]];
   const Vector3d& c = mesh.vertices[corners[2]];
@@ -315,7 +316,8 @@ Location location_of(const TriangleMesh& mesh, const Triangle& corners, const Ex
   if (high.z() < prism.min_z || low.z() > prism.max_z) return Location::outside;
   const bool across = low.z() < prism.min_z || high.z() > prism.max_z;
   if (prism.polygon) {
-    if (!prism.polygon->edges_near(low.head<2>(), high.head<2>()).empty()) return Location::on_border;
+    if (!prism.polygon->edges_near(low.head<2>(), high.head<2>()).empty())
+      return Location::on_border;
     if (!prism.polygon->contains(a.head<2>())) return Location::outside;
   }
   return across ? Location::on_border : Location::inside;

@@ -165,8 +165,8 @@ class TurnedGround {
       return true;
     });
     mean /= static_cast<double>(positions.size());
-    const Vector2d nearest =
-        *std::min_element(positions.begin(), positions.end(), [&](const Vector2d& a, const Vector2d& b) {
+    const Vector2d nearest = *std::min_element(
+        positions.begin(), positions.end(), [&](const Vector2d& a, const Vector2d& b) {
           return (a - mean).squaredNorm() < (b - mean).squaredNorm();
         });
     return place(nearest.x(), nearest.y());

@@ -103,9 +103,10 @@ void XyPolygon::require_simple() const {
   const auto count = static_cast<std::uint32_t>(corners_.size());
   const auto end = [&](std::uint32_t n) -> const Vector2d& { return corners_[(n + 1) % count]; };
   const auto crossing = [&](std::uint32_t a, std::uint32_t b) {
-    return Error("the outline crosses or touches itself",
-                 {.field = "edge from " + text_of(corners_[a]) + " to " + text_of(end(a)),
-                  .value = "meeting the edge from " + text_of(corners_[b]) + " to " + text_of(end(b))});
+    return Error(
+        "the outline crosses or touches itself",
+        {.field = "edge from " + text_of(corners_[a]) + " to " + text_of(end(a)),
+         .value = "meeting the edge from " + text_of(corners_[b]) + " to " + text_of(end(b))});
   };
   for (const std::vector<std::uint32_t>& strip : strips_)
     for (std::size_t i = 0; i < strip.size(); ++i)
@@ -142,7 +143,7 @@ bool XyPolygon::contains(const Vector2d& point) const {
 }
 
 std::vector<std::uint32_t> XyPolygon::edges_near(const Vector2d& box_min,
-                                                   const Vector2d& box_max) const {
+                                                 const Vector2d& box_max) const {
   std::vector<std::uint32_t> edges;
   if ((box_max.array() < min_.array()).any() || (box_min.array() > max_.array()).any())
     return edges;

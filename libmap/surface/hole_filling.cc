@@ -244,7 +244,7 @@ class HolePatcher {
 
   // True if each edge of the patch has two triangles, and no triangle is degenerate.
   bool is_valid(const std::vector<Eigen::Vector3d>& positions, const std::vector<Triangle>& around,
-              const HolePatch& patch) const {
+                const HolePatch& patch) const {
     TriangleMesh joined;
     joined.vertices = positions;
     joined.vertices.insert(joined.vertices.end(), patch.new_vertices.begin(),

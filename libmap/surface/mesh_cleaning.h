@@ -67,7 +67,7 @@ struct MeshCleaningResult {
   // Removed because they intersected others or were degenerate, without triangles around them.
   std::size_t intersecting_triangles = 0;
   std::size_t closing_triangles = 0;  // new triangles in the resulting holes
-  std::size_t unclosed_holes = 0;        // resulting holes that stay open
+  std::size_t unclosed_holes = 0;     // resulting holes that stay open
   std::size_t remaining_intersecting_triangles = 0;
   HoleFilling filling;  // in step 5
   MeshDecimation decimation;

@@ -61,7 +61,7 @@ double max_known_spacing(const SurfaceReconstructionOptions& options) {
 // 1 / (d^2 + radius^2). Integer fields take the nearest point's value. NaN is ignored. `tree`
 // contains the cloud's positions.
 void transfer_values(const PointCloud& cloud, const PointTree& tree, double cell_size_m,
-                  TriangleMesh& mesh) {
+                     TriangleMesh& mesh) {
   const double radius_m = 0.5 * cell_size_m;
   const double max_m = max_value_cells * cell_size_m;
   const std::size_t count = mesh.vertices.size();
@@ -178,10 +178,10 @@ class Reconstruction {
   double area_m2_ = 0.0;  // estimated from number and spacing of the points; not set for a part
   const ScalarField* errors_ = nullptr;
   PoissonProblem problem_;
-  std::vector<SurfaceSample> samples_;   // relative to the origin
+  std::vector<SurfaceSample> samples_;      // relative to the origin
   std::vector<Eigen::Vector3d> positions_;  // positions of the samples, relative to the origin
-  std::optional<PointTree> tree_;        // of places_
-  std::vector<double> spacings_m_;       // local distance between samples
+  std::optional<PointTree> tree_;           // of places_
+  std::vector<double> spacings_m_;          // local distance between samples
   SurfaceReconstructionResult result_;
 };
 
@@ -403,8 +403,10 @@ void CloudStatistics::add(const PointCloud& cloud, bool weigh_by_error) {
       continue;
     }
     const Eigen::Vector3d& sample_position = cloud.positions[n];
-    bounds_.min = points_ == 0 ? sample_position : Eigen::Vector3d(bounds_.min.cwiseMin(sample_position));
-    bounds_.max = points_ == 0 ? sample_position : Eigen::Vector3d(bounds_.max.cwiseMax(sample_position));
+    bounds_.min =
+        points_ == 0 ? sample_position : Eigen::Vector3d(bounds_.min.cwiseMin(sample_position));
+    bounds_.max =
+        points_ == 0 ? sample_position : Eigen::Vector3d(bounds_.max.cwiseMax(sample_position));
     ++points_;
     if (errors != nullptr && errors->values[n] > 0.0 && std::isfinite(errors->values[n]))
       ++errors_[std::bit_cast<std::uint64_t>(errors->values[n]) >> dropped_bits];

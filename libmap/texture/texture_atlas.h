@@ -81,6 +81,6 @@ std::size_t pack_rectangles(std::vector<PackedRectangle>& rectangles, int page_s
 
 // Returns the texel of a world point on its chart's page; (0, 0) is the center of the first texel.
 Eigen::Vector2d texel_of(const TextureChart& chart, const PhotoProjector& projector,
-                              const Eigen::Vector3d& point);
+                         const Eigen::Vector3d& point);
 
 }  // namespace libmap

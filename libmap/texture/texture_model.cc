@@ -267,8 +267,8 @@ class TileTexturing::Work {
 };
 
 TileTexturing::TileTexturing(MeshTileIndex& pieces, double margin_m, const ScanSource& scan,
-                               const Trajectory& world_from_base, const TextureOptions& options,
-                               Progress& progress)
+                             const Trajectory& world_from_base, const TextureOptions& options,
+                             Progress& progress)
     : work_(new Work{
           pieces, margin_m,
           Texturing(scan, world_from_base, options, progress, max_image_bytes_in_pieces)}) {}

@@ -92,8 +92,8 @@ class TileTexturing {
   // Only the mesh within `margin_m` of a piece is considered as an occluder. `pieces`, `scan` and
   // `progress` must outlive this object.
   TileTexturing(MeshTileIndex& pieces, double margin_m, const ScanSource& scan,
-                 const Trajectory& world_from_base, const TextureOptions& options,
-                 Progress& progress = no_progress());
+                const Trajectory& world_from_base, const TextureOptions& options,
+                Progress& progress = no_progress());
   ~TileTexturing();
 
   // Estimates the common exposure from all pieces.

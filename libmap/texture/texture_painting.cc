@@ -116,7 +116,7 @@ PlaneTriangle ChartPainter::on_chart(std::uint32_t triangle) const {
   const Eigen::Vector2d corner_of_chart(chart_->column, chart_->row);
   for (std::size_t k = 0; k < 3; ++k)
     corners[k] = texel_of(*chart_, paint_.photos[chart_->photo].projector,
-                               model_.mesh.vertices[model_.mesh.triangles[triangle][k]]) -
+                          model_.mesh.vertices[model_.mesh.triangles[triangle][k]]) -
                  corner_of_chart;
   return PlaneTriangle(corners);
 }
@@ -237,7 +237,7 @@ void ChartPainter::paint_triangle(std::int32_t local, std::span<const std::uint3
       const int sample_column = s % samples;
       const int sample_row = s / samples;
       const Eigen::Vector2d texel_position(column + (sample_column + 0.5) / samples - 0.5,
-                                  row + (sample_row + 0.5) / samples - 0.5);
+                                           row + (sample_row + 0.5) / samples - 0.5);
       Eigen::Vector3d weights = plane.weights(texel_position).cwiseMax(0.0);
       weights /= weights.sum();
       color += color_at(triangle, weights);

@@ -94,7 +94,9 @@ class ViewFinder {
     bool any_asked_in_image = false;  // in the current photograph
   };
 
-  bool wants_views() const { return request_.views_per_vertex > 0 || request_.views_per_triangle > 0; }
+  bool wants_views() const {
+    return request_.views_per_vertex > 0 || request_.views_per_triangle > 0;
+  }
   // Returns true if the current photograph may show a part of the ball within max_depth_m.
   bool may_show(const Eigen::Vector3d& center, double radius_m) const {
     const double z =
@@ -128,7 +130,9 @@ class ViewFinder {
   Eigen::Vector3d side_of(const Triangle& t, std::size_t k) const {
     return mesh_.vertices[t[(k + 1) % 3]] - mesh_.vertices[t[k]];
   }
-  const Eigen::Vector3d& normal_of(std::size_t rated) const { return normals_[index_of_rated_[rated]]; }
+  const Eigen::Vector3d& normal_of(std::size_t rated) const {
+    return normals_[index_of_rated_[rated]];
+  }
   float rate(std::size_t triangle, double sharpness) const;
   float quality_at(std::uint32_t vertex) const;
   float longest_side_px(const Triangle& triangle) const;
@@ -149,9 +153,9 @@ class ViewFinder {
   Eigen::Vector3d center_ = Eigen::Vector3d::Zero();
   double radius_m_ = 0.0;
   std::vector<std::uint32_t> rated_;
-  std::vector<Eigen::Vector3d> normals_;  // one per rated triangle
-  std::vector<std::uint32_t> index_of_rated_;   // per triangle: its index in rated_
-  std::vector<std::uint32_t> order_;      // vertices, by blocks
+  std::vector<Eigen::Vector3d> normals_;       // one per rated triangle
+  std::vector<std::uint32_t> index_of_rated_;  // per triangle: its index in rated_
+  std::vector<std::uint32_t> order_;           // vertices, by blocks
   std::vector<Block> blocks_;
   // State of the current photograph. Blocks that are not in view are outside the image.
   const PhotoProjector* projector_ = nullptr;

@@ -101,8 +101,7 @@ void write_textured_obj(const fs::path& path, const TexturedMesh& model, std::os
   for (const TextureCorner& corner : united.corners) {
     // OBJ measures v from the bottom.
     const Eigen::Vector2d uv = corner.coordinate.cast<double>();
-    out << "vt" +
-               numbers(Eigen::Vector2f(corner.coordinate.x(), static_cast<float>(1.0 - uv.y())));
+    out << "vt" + numbers(Eigen::Vector2f(corner.coordinate.x(), static_cast<float>(1.0 - uv.y())));
   }
   const bool has_normals = !model.mesh.vertex_normals.empty();
   for (const Eigen::Vector3f& normal : model.mesh.vertex_normals) out << "vn" + numbers(normal);
@@ -183,8 +182,7 @@ void write_textured_glb(const fs::path& path, const TexturedMesh& model,
   std::vector<ModelPart> parts = parts_of(model);
   std::vector<EncodedImage> images;
   for (const ColorImage& page : model.pages)
-    images.push_back(
-        {encode_page(page, options), file_extension(options.image_format).substr(1)});
+    images.push_back({encode_page(page, options), file_extension(options.image_format).substr(1)});
   require_room_in_glb(parts, images);
   write_model_by_assimp(path, std::move(parts), std::move(images));
 }
@@ -203,7 +201,7 @@ fs::path texture_page_path(const fs::path& model, std::size_t page, ImageFormat 
 }
 
 std::vector<fs::path> additional_model_files(const fs::path& model,
-                                          const TexturedMeshWriteOptions& options) {
+                                             const TexturedMeshWriteOptions& options) {
   if (format_of(model) != ".obj") return {};
   return {texture_page_path(model, 0, options.image_format), material_path(model)};
 }

@@ -11,7 +11,7 @@ namespace libmap {
 namespace {
 
 constexpr double cell_px_per_font_px = 30.0;  // cell width in pixels per pixel of the font size
-constexpr double caption_height = 2.0;  // this and the following heights are in font sizes
+constexpr double caption_height = 2.0;        // this and the following heights are in font sizes
 constexpr double title_height = 2.6;
 constexpr double gap = 0.8;  // between cells
 
@@ -64,8 +64,8 @@ bool any_scene(const std::vector<SheetCell>& cells) {
 }
 
 // Places the rows of cells from `top`, with titles, captions and scale bars. Returns their bottom.
-double plan_rows(const std::vector<SheetCell>& cells, const ImageGridOptions& options,
-                 double left, double top, int cell_height, SheetLayout& layout) {
+double plan_rows(const std::vector<SheetCell>& cells, const ImageGridOptions& options, double left,
+                 double top, int cell_height, SheetLayout& layout) {
   const double f = layout.font_px;
   const double step_x = options.cell_width_px + std::round(gap * f);
   const bool captions = std::any_of(cells.begin(), cells.end(),
@@ -155,7 +155,7 @@ Contents look_at(const std::vector<SheetCell>& cells, const ImageGridOptions& op
 std::optional<double> aspect_of(const SheetCell& cell, const std::optional<Bounds3d>& extent) {
   if (!extent)
     return cell.image.width > 0 ? std::optional(1.0 * cell.image.height / cell.image.width)
-                                  : std::nullopt;
+                                : std::nullopt;
   const Eigen::Vector3d size = extent->max - extent->min;
   switch (cell.view) {
     case Viewpoint::top:

@@ -47,8 +47,8 @@ PointCloud rocks(const Eigen::Vector3d& shift = Eigen::Vector3d::Zero()) {
 }
 
 // `count` files in a folder: strips along x, or every count-th point.
-void write_tiles(const std::string& folder, const PointCloud& cloud, std::size_t count,
-                  bool strips, const std::string& extension = ".pcd") {
+void write_tiles(const std::string& folder, const PointCloud& cloud, std::size_t count, bool strips,
+                 const std::string& extension = ".pcd") {
   fs::create_directories(scratch(folder));
   for (std::size_t piece = 0; piece < count; ++piece) {
     std::vector<std::size_t> indices;

@@ -454,7 +454,8 @@ int Command::run(int argc, char** argv, const std::function<void(Run&)>& body) {
   }
 }
 
-int run_subcommand(int argc, char** argv, std::initializer_list<Subcommand*> subcommands, Subcommand* chosen) {
+int run_subcommand(int argc, char** argv, std::initializer_list<Subcommand*> subcommands,
+                   Subcommand* chosen) {
   int exit_code = chosen(argc, argv);
   const bool asks_for_help = std::any_of(
       argv, argv + argc, [](const std::string& word) { return word == "--help" || word == "-h"; });

@@ -24,7 +24,7 @@ class UsageError : public libmap::Error {
 // Throws Error with the flag of the first parameter of `bind` that differs from its default.
 template <typename Options>
 void reject_changed(const Options& options, void (*bind)(libmap::ParameterTable&, Options&),
-                const std::string& reason) {
+                    const std::string& reason) {
   if (const auto key = libmap::changed_key(options, bind))
     throw libmap::Error(reason, {.field = libmap::flag_of(*key)});
 }
@@ -80,6 +80,7 @@ class Command {
 // Runs the chosen usage of a command with several usages, each with its own Command and options.
 // --help of the first usage shows all. Returns the exit code.
 using Subcommand = int(int argc, char** argv);
-int run_subcommand(int argc, char** argv, std::initializer_list<Subcommand*> subcommands, Subcommand* chosen);
+int run_subcommand(int argc, char** argv, std::initializer_list<Subcommand*> subcommands,
+                   Subcommand* chosen);
 
 }  // namespace graspmap_tools

@@ -249,7 +249,8 @@ class MapGrasping {
     libmap::parallel_each(members.size(), grain, [&](std::size_t n) {
       const Eigen::Vector3d position = mesh_from_map_ * points.positions[members[n]];
       // The filter is valid only for approach from above.
-      if (options_.approach == libgtd::ApproachDirection::up && !piece.from_above.may_hold(position))
+      if (options_.approach == libgtd::ApproachDirection::up &&
+          !piece.from_above.may_hold(position))
         return;
       if (piece.ground.distance(position, options_.max_distance_m)) candidates[n] = position;
     });
@@ -345,7 +346,7 @@ GroundTiles::Kept::Kept(std::size_t of, libmap::TriangleMesh around, const Groun
       number(of) {}
 
 GroundTiles::GroundTiles(const std::string& mesh, const libgtd::Gripper& gripper,
-                           double start_height_m, MakeGround make_ground)
+                         double start_height_m, MakeGround make_ground)
     : gripper_(gripper),
       start_height_m_(start_height_m),
       make_ground_(std::move(make_ground)),

@@ -33,7 +33,7 @@ class GroundTiles {
 
   // Throws Error naming the unreadable file or the gripper's missing section.
   GroundTiles(const std::string& mesh, const libgtd::Gripper& gripper, double start_height_m,
-               MakeGround make_ground);
+              MakeGround make_ground);
 
   // Returns the index of the tile at the position, by x and y; of several, the one with the nearest
   // center. Returns the nearest tile if none is there.
@@ -54,7 +54,7 @@ class GroundTiles {
   MakeGround make_ground_;
   std::vector<std::filesystem::path> files_;
   std::optional<libmap::MeshTileIndex> index_;  // only for several files
-  std::list<Kept> kept_;                         // last used first
+  std::list<Kept> kept_;                        // last used first
 };
 
 struct GraspMapInput {

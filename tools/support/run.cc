@@ -150,7 +150,8 @@ void Run::add_input(const fs::path& path) {
   }
   manifest_.add_input(path);
   const fs::path folder_path = path.lexically_relative(libmap::data_folder());
-  if (!folder_path.empty() && *folder_path.begin() != "..") manifest_.inputs.back().path = folder_path.string();
+  if (!folder_path.empty() && *folder_path.begin() != "..")
+    manifest_.inputs.back().path = folder_path.string();
 }
 
 void Run::say(const std::string& text) {

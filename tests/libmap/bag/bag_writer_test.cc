@@ -38,8 +38,8 @@ std::map<std::string, std::string> messages_of(const fs::path& path) {
 BagTargets targets() {
   BagTargets result{"/footholds", "/foothold_poses", "terrain", 0.08, {}};
   result.targets = {{{1, 2, 3}, {0, 0, -1}, {255, 0, 51}, "1: 0.98"},
-                   {{0, 0, 0}, {0, 2, 0}, {0, 100, 0}, "2: 0.91"},
-                   {{4, 5, 6}, {3, -1, -2}, {0, 100, 0}, "3: 0.90"}};
+                    {{0, 0, 0}, {0, 2, 0}, {0, 100, 0}, "2: 0.91"},
+                    {{4, 5, 6}, {3, -1, -2}, {0, 100, 0}, "3: 0.90"}};
   return result;
 }
 

@@ -62,7 +62,7 @@ std::vector<Lens> lenses() {
 
 // Corners where they are, with Gaussian noise: no image is painted.
 std::vector<BoardImage> noisy_corners(const Camera& camera, const std::vector<Pose>& poses,
-                                        double sigma_px) {
+                                      double sigma_px) {
   Camera one_pixel = camera;  // the painter's rays are not wanted
   one_pixel.width = one_pixel.height = 1;
   const ChessboardPainter painter(one_pixel, 1);

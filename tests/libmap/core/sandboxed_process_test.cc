@@ -37,7 +37,8 @@ TEST(SandboxedProcess, ItsFallIsNotOurs) {
   std::string read(3, '\0');
   EXPECT_FALSE(killed.read(read.data(), 3));
   EXPECT_EQ(killed.end(), " (signal 9)");
-  SandboxedProcess thrown(memory, [](const SandboxedProcess::Write&) { throw std::logic_error("x"); });
+  SandboxedProcess thrown(memory,
+                          [](const SandboxedProcess::Write&) { throw std::logic_error("x"); });
   EXPECT_FALSE(thrown.read(read.data(), 1));
   EXPECT_EQ(thrown.end(), "");
 }

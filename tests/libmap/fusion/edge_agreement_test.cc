@@ -107,15 +107,16 @@ TEST(EdgeAgreement, RegisteredDepthAgrees) {
   EXPECT_FALSE(found.is_scaled());
   EXPECT_EQ(found.sentence(), "");
   // Errors below half a degree are those of a refinement, not of this check.
-  EXPECT_FALSE(
-      check_edge_agreement(scan_with(displace_vertices({0.003, 0, 0}, {0, 0.2, 0}), 1.0)).is_displaced());
+  EXPECT_FALSE(check_edge_agreement(scan_with(displace_vertices({0.003, 0, 0}, {0, 0.2, 0}), 1.0))
+                   .is_displaced());
 }
 
 // The place and direction of the depth camera, by where they put points in the image.
 TEST(EdgeAgreement, DisplacedDepthIsFoundAndEstimated) {
-  for (const Pose& truth :
-       {displace_vertices({0.025, 0, 0}, {0, 1.5, 0}), displace_vertices({-0.02, 0.015, 0}, {1.0, -0.8, 0.8}),
-        displace_vertices({0, -0.03, 0}, {-3.0, 0.5, 0}), displace_vertices({0.06, 0, 0}, {0, 0, 0})}) {
+  for (const Pose& truth : {displace_vertices({0.025, 0, 0}, {0, 1.5, 0}),
+                            displace_vertices({-0.02, 0.015, 0}, {1.0, -0.8, 0.8}),
+                            displace_vertices({0, -0.03, 0}, {-3.0, 0.5, 0}),
+                            displace_vertices({0.06, 0, 0}, {0, 0, 0})}) {
     const EdgeAgreement found = check_edge_agreement(scan_with(truth, 1.0));
     EXPECT_TRUE(found.is_displaced());
     EXPECT_FALSE(found.is_scaled());

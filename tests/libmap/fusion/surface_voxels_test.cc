@@ -53,7 +53,7 @@ SurfaceVoxels thick_plane(const Eigen::Vector3f& normal, int half) {
   SurfaceVoxels voxels;
   for (int n = 0; n < 400 * half * half; ++n) {
     Eigen::Vector3f position(static_cast<float>(uniform(-half, half)),
-                          static_cast<float>(uniform(-half, half)), 0);
+                             static_cast<float>(uniform(-half, half)), 0);
     place.z() = -(normal.x() * place.x() + normal.y() * place.y()) / normal.z();
     voxels.add(place + static_cast<float>(uniform(-0.4, 0.4)) * normal, normal, 1.0F);
   }

@@ -14,9 +14,9 @@ namespace cloud_tiles_test {
 using graspmap_test::error_of;
 using graspmap_test::scratch_folder;
 using graspmap_test::uniform;
-using libmap::TileStream;
 using libmap::PointCloud;
 using libmap::PointStream;
+using libmap::TileStream;
 
 PointCloud random_cloud(std::size_t count, bool normals) {
   PointCloud cloud;
@@ -44,7 +44,7 @@ TEST(CloudTiles, BlocksAreFullAndHoldAllPointsInOrder) {
   const PointCloud third = random_cloud(11, true);
   first.positions[3].x() = std::nan("");
   const TileStream stream({write("a.pcd", first), write("b.ply", second, {.big_endian = true}),
-                            write("empty.pcd", PointCloud{}), write("c.csv", third)});
+                           write("empty.pcd", PointCloud{}), write("c.csv", third)});
   std::vector<Eigen::Vector3d> expected = first.positions;
   expected.erase(expected.begin() + 3);
   expected.insert(expected.end(), second.positions.begin(), second.positions.end());

@@ -41,7 +41,7 @@ TEST(SensorCalibration, AllFramesHaveMotions) {
   calibration.timing = {{0.0, 0.06}};
   for (const bool fixes_poses : {false, true}) {
     libmap::estimate_motions({way.frames, links, way.truth, {}, way.components, {}}, fixes_poses,
-                         calibration);
+                             calibration);
     ASSERT_EQ(calibration.motion.size(), way.frames.size());
     for (const auto& [node, motion] : calibration.motion)
       EXPECT_NEAR(motion.y(), 0.6 * std::cos(1.5 * 0.3 * node), node == alone ? 0.1 : 0.03) << node;

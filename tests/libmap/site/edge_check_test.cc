@@ -26,8 +26,8 @@ void expect_near(const Eigen::Vector2d& actual, const Eigen::Vector2d& expected,
 }
 
 TEST(EdgeCheck, PlacesGoRoundTheSiteFromItsLowerLeftCorner) {
-  const EdgeCheckResult result =
-      check_edges(corners_of({-1.5, -1}, {1.5, 2}), zero, zero, {.positions_per_edge = 3, .inset_m = 0.1});
+  const EdgeCheckResult result = check_edges(corners_of({-1.5, -1}, {1.5, 2}), zero, zero,
+                                             {.positions_per_edge = 3, .inset_m = 0.1});
   expect_near(result.edges[0][0].position, {-1.0, -0.9});
   expect_near(result.edges[0][2].position, {1.0, -0.9});
   expect_near(result.edges[1][0].position, {1.4, -0.5});

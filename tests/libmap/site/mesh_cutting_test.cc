@@ -171,7 +171,7 @@ TEST(MeshCutting, OutlineInsideOneTriangle) {
 TEST(MeshCutting, ThroughVerticesAndAlongEdges) {
   const TriangleMesh mesh = field_mesh(20, 1, waves);  // spacing of 0.1
   const XyPolygon on_grid = make_rectangle({mesh.vertices[3].x(), mesh.vertices[4 * 21].y()},
-                                             {mesh.vertices[15].x(), mesh.vertices[17 * 21].y()});
+                                           {mesh.vertices[15].x(), mesh.vertices[17 * 21].y()});
   const TriangleMesh cut = cut_mesh(mesh, {on_grid});
   EXPECT_EQ(cut.triangles.size(), 2U * 12 * 13) << "no triangle is cut";
   EXPECT_EQ(cut.vertices.size(), 13U * 14);

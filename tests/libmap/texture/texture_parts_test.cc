@@ -282,8 +282,7 @@ TEST(TextureAtlas, TexelsAreThePhotographsPixels) {
   ASSERT_EQ(atlas.charts.size(), 1U);
   for (const Eigen::Vector3d& vertex : c.mesh.vertices) {
     const Eigen::Vector2d pixel = c.photos[1].projector.project(vertex).head<2>();
-    const Eigen::Vector2d texel =
-        libmap::texel_of(atlas.charts[0], c.photos[1].projector, vertex);
+    const Eigen::Vector2d texel = libmap::texel_of(atlas.charts[0], c.photos[1].projector, vertex);
     const Eigen::Vector2d shift = texel - pixel;
     EXPECT_NEAR(shift.x(), std::round(shift.x()), 1e-9);
     EXPECT_NEAR(shift.y(), std::round(shift.y()), 1e-9);
