@@ -44,14 +44,14 @@ void bind(libmap::ParameterTable& table, ReportCommandOptions& options) {
 }
 
 // Bytes per cell in the page: at most eleven, in base64.
-constexpr double bytes_a_cell = 44.0 / 3.0;
+constexpr double bytes_per_cell = 44.0 / 3.0;
 // Maximum shares of the page for maps and for scenes.
 constexpr double maps_share = 0.4;
 constexpr double scenes_share = 0.4;
 
-std::size_t cells_a_map(const ReportCommandOptions& options, const libmap::PlannedSection& plan) {
+std::size_t cells_per_map(const ReportCommandOptions& options, const libmap::PlannedSection& plan) {
   const std::size_t maps = plan.count(libmap::ItemKind::map);
-  const double affordable = maps_share * options.max_size_mb * 1e6 / bytes_a_cell /
+  const double affordable = maps_share * options.max_size_mb * 1e6 / bytes_per_cell /
                             static_cast<double>(std::max<std::size_t>(maps, 1));
   return static_cast<std::size_t>(std::min(affordable, static_cast<double>(options.max_cells)));
 }
@@ -112,7 +112,7 @@ DownsampledMap read_cloud_map(const fs::path& path, std::size_t max_cells) {
     map.options.lattice = {lattice->voxel_size_m, lattice->origin_m};
   else if (!whole.empty())
     map.options.lattice = libmap::lattice_of(whole);
-  int& width = map.options.voxels_a_cell;
+  int& width = map.options.voxels_per_cell;
   width = first_width(map.voxels, max_cells);
   do {
     map.points = width == 1 ? whole : libgtd::thin_map_in_cubes(whole, width);
@@ -138,7 +138,7 @@ DownsampledMap read_store_map(const fs::path& path, std::size_t max_cells) {
   const auto& index = tiles.index();
   map.voxels = index.voxels();
   const std::optional<libmap::Manifest> manifest = index.manifest;
-  int& width = map.options.voxels_a_cell;
+  int& width = map.options.voxels_per_cell;
   width = first_width(map.voxels, max_cells);
   do {
     map.points = thin_tiles(tiles, width);
@@ -195,7 +195,7 @@ void make_report(ReportCommandOptions& options, Run& run) {
   if (extension != ".html" && extension != ".htm")
     throw libmap::Error("reports are written as .html", {.file = options.output});
   run.claim_output(options.output);
-  const std::size_t max_cells = cells_a_map(options, plan);
+  const std::size_t max_cells = cells_per_map(options, plan);
   const bool has_views = (max_cells > 0 && plan.count(libmap::ItemKind::map) > 0) ||
                          plan.count(libmap::ItemKind::scene) > 0;
   const bool with_views = !options.no_views && has_views;

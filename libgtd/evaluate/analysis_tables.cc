@@ -25,10 +25,10 @@ std::string text(std::optional<double> value) { return value ? text(*value) : st
 
 void add_place(const Eigen::Vector3d& place, std::vector<std::string>& row) {
   // Rounds to micrometers. Single precision would round UTM coordinates to decimeters.
-  constexpr double steps_a_m = 1e6;
+  constexpr double steps_per_m = 1e6;
   for (const double coordinate : place)
     row.push_back(std::isfinite(coordinate)
-                      ? libmap::to_text(std::round(coordinate * steps_a_m) / steps_a_m)
+                      ? libmap::to_text(std::round(coordinate * steps_per_m) / steps_per_m)
                       : std::string());
 }
 

@@ -183,8 +183,8 @@ void triangulate_strip(const Points& points, Strip& strip) {
   strip.open.erase(std::unique(strip.open.begin(), strip.open.end()), strip.open.end());
 }
 
-std::vector<Strip> cut_into_strips(const Points& points, std::size_t points_a_strip) {
-  std::vector<Strip> strips(std::max<std::size_t>(1, points.size() / points_a_strip));
+std::vector<Strip> cut_into_strips(const Points& points, std::size_t points_per_strip) {
+  std::vector<Strip> strips(std::max<std::size_t>(1, points.size() / points_per_strip));
   std::vector<double> lines;
   if (strips.size() > 1) {
     // A sample is sufficient to place the lines.
@@ -261,8 +261,8 @@ void triangulate_between(const Points& points, const std::vector<Strip>& strips,
 
 }  // namespace
 
-PlanarTriangulation triangulate_in_plane(const Points& points, std::size_t points_a_strip) {
-  std::vector<Strip> strips = cut_into_strips(points, std::max<std::size_t>(points_a_strip, 1));
+PlanarTriangulation triangulate_in_plane(const Points& points, std::size_t points_per_strip) {
+  std::vector<Strip> strips = cut_into_strips(points, std::max<std::size_t>(points_per_strip, 1));
   libmap::parallel_each(strips.size(),
                         [&](std::size_t s) { triangulate_strip(points, strips[s]); });
   PlanarTriangulation whole;

@@ -19,7 +19,7 @@ namespace libmap {
 
 namespace {
 
-constexpr std::size_t pieces_a_block = 128;
+constexpr std::size_t pieces_per_block = 128;
 
 const Fragment whole{0, {Eigen::Vector2d(0.0, 0.0), {1.0, 0.0}, {0.0, 1.0}}};
 
@@ -123,9 +123,9 @@ PlacedFragment SurfacePieces::piece(std::size_t number) const {
 
 void SurfacePieces::add_blocks(std::size_t begin, std::size_t end) {
   const std::size_t first = blocks_.size();
-  blocks_.resize(first + (end - begin + pieces_a_block - 1) / pieces_a_block);
-  parallel_for(end - begin, pieces_a_block, [&](std::size_t from, std::size_t to) {
-    blocks_[first + from / pieces_a_block] = measured(begin + from, begin + to);
+  blocks_.resize(first + (end - begin + pieces_per_block - 1) / pieces_per_block);
+  parallel_for(end - begin, pieces_per_block, [&](std::size_t from, std::size_t to) {
+    blocks_[first + from / pieces_per_block] = measured(begin + from, begin + to);
   });
 }
 
@@ -157,7 +157,7 @@ constexpr double first_gap_size = 1.0 / 3.0;
 constexpr double smallest_gap = 1e-3;
 
 constexpr std::size_t gaps_per_chunk = 256;
-constexpr double samples_a_part = 131072.0;
+constexpr double samples_per_part = 131072.0;
 constexpr std::size_t max_pieces = 30'000'000;
 
 // Darts per round over the whole surface, relative to the expected number of samples.
@@ -314,7 +314,7 @@ class Sampler {
   // Processes the surface in parts, to limit the memory for gaps.
   void fill_gaps(Progress& progress) {
     const std::vector<SurfaceBlock>& blocks = pieces_.blocks();
-    const double max_m2 = samples_a_part * radius_m_ * radius_m_ / saturation_density;
+    const double max_m2 = samples_per_part * radius_m_ * radius_m_ / saturation_density;
     progress.begin("gaps", blocks.size());
     std::uint64_t round = dart_rounds.size();
     for (std::size_t begin = 0; begin < blocks.size();) {

@@ -28,7 +28,7 @@ std::vector<HalfEdge> by_lower_vertex(const std::vector<Triangle>& triangles, st
   const auto for_each = [&](const auto& body) {
     for (HalfEdge t = 0; t < triangles.size(); ++t) {
       const Triangle& corners = triangles[t];
-      if (names_a_vertex_twice(corners)) continue;
+      if (has_repeated_vertex(corners)) continue;
       for (HalfEdge k = 0; k < 3; ++k) body(std::min(corners[k], corners[(k + 1) % 3]), 3 * t + k);
     }
   };

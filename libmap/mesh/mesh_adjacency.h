@@ -24,7 +24,7 @@ inline std::uint32_t target_of(const std::vector<Triangle>& triangles, HalfEdge 
 inline Eigen::Vector3d along(const TriangleMesh& mesh, HalfEdge h) {
   return mesh.vertices[target_of(mesh.triangles, h)] - mesh.vertices[source_of(mesh.triangles, h)];
 }
-inline bool names_a_vertex_twice(const Triangle& t) {
+inline bool has_repeated_vertex(const Triangle& t) {
   return t[0] == t[1] || t[1] == t[2] || t[2] == t[0];
 }
 

@@ -28,13 +28,13 @@ struct SubScan {
 
 constexpr std::size_t max_frames = 80;
 // Consecutive frames determine motions; runs that are far apart in time show different views.
-constexpr std::size_t frames_a_run = 10;
+constexpr std::size_t frames_per_run = 10;
 constexpr std::size_t min_run_links = 10;  // to the selected runs
 
 // Selects runs of consecutive frames: first the run with most links, then runs that are linked to
 // the selected ones and farthest from them in time, last the runs with most links to them.
 std::set<std::size_t> joined_frames(std::size_t frames, const std::vector<FeatureLink>& links) {
-  const std::size_t length = frames <= max_frames ? 1 : frames_a_run;
+  const std::size_t length = frames <= max_frames ? 1 : frames_per_run;
   const std::size_t runs = (frames + length - 1) / length;
   std::vector<std::map<std::size_t, std::size_t>> joined(runs);
   std::vector<std::size_t> all(runs, 0);
@@ -120,7 +120,7 @@ BundleAdjustmentOptions with_free(const CalibrationParts& parts, BundleAdjustmen
 
 constexpr int max_rounds = 4;
 // Motions are estimated in windows of consecutive frames.
-constexpr std::size_t frames_a_window = 64;
+constexpr std::size_t frames_per_window = 64;
 constexpr std::size_t frames_beside = 8;    // margin on each side, whose motions are not used
 constexpr double max_interpolated_s = 1.0;  // maximum gap for interpolating motions
 constexpr int motion_rounds = 2;            // other motions hit other points of the depth planes
@@ -391,9 +391,9 @@ void find_motions(const CalibrationInput& input, bool hold_poses, SensorCalibrat
   moving.tolerance = rough_tolerance;
   SensorCalibration start = calibration;
   std::map<int, Vector6d> motions;
-  for (std::size_t first = 0; first < frames.size(); first += frames_a_window) {
+  for (std::size_t first = 0; first < frames.size(); first += frames_per_window) {
     std::set<std::size_t> window;
-    const std::size_t end = std::min(frames.size(), first + frames_a_window);
+    const std::size_t end = std::min(frames.size(), first + frames_per_window);
     for (std::size_t f = first - std::min(first, frames_beside);
          f < std::min(frames.size(), end + frames_beside); ++f)
       window.insert(f);

@@ -103,13 +103,13 @@ MapLattice lattice_of(const PointCloud& map) {
 MapView make_map_view(const PointCloud& map, const MapViewOptions& options) {
   MapView view;
   view.voxels = map.size();
-  view.voxels_a_cell = options.voxels_a_cell;
+  view.voxels_per_cell = options.voxels_per_cell;
   if (map.empty()) return view;
   const MapLattice lattice = options.lattice ? *options.lattice : lattice_of(map);
-  view.cell_size_m = lattice.voxel_size_m * options.voxels_a_cell;
+  view.cell_size_m = lattice.voxel_size_m * options.voxels_per_cell;
   const std::array<Field, 3> voxels = voxel_fields(map);
   const auto cell_of = [&](std::size_t axis, std::size_t n) {
-    return std::floor((*voxels[axis])[n] / options.voxels_a_cell);
+    return std::floor((*voxels[axis])[n] / options.voxels_per_cell);
   };
   view.cells.resize(map.size());
   for (std::size_t axis = 0; axis < 3; ++axis) {

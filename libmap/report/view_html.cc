@@ -168,9 +168,9 @@ std::string tools_html(const MapView& view) {
 std::string description(const MapView& view) {
   std::string text =
       fmt::format("{} cells of {} mm", view.cells.size(), short_number(view.cell_size_m * 1e3));
-  if (view.cells.size() < view.voxels || view.voxels_a_cell > 1)
+  if (view.cells.size() < view.voxels || view.voxels_per_cell > 1)
     text += fmt::format(", one voxel shown for each cube of {0} x {0} x {0} of the map's {1}",
-                        view.voxels_a_cell, view.voxels);
+                        view.voxels_per_cell, view.voxels);
   return text + ".";
 }
 

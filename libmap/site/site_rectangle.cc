@@ -22,8 +22,8 @@ using Eigen::Vector2d;
 using Mask = Image<std::uint8_t>;
 
 constexpr double max_cells = 1e6;
-constexpr double max_on_a_side = 20000.0;
-constexpr double min_on_a_site = 20.0;  // cells along the shorter side of the site
+constexpr double max_per_side = 20000.0;
+constexpr double min_on_site = 20.0;  // cells along the shorter side of the site
 
 // Summed-area table: sums of a mask over rectangles in constant time (Crow 1984).
 class AreaTable {
@@ -80,7 +80,7 @@ Ground make_ground(const std::vector<Vector2d>& points, const SiteRectangleOptio
   }
   const double area = (high - low).x() * (high - low).y();
   ground.cell = std::max(
-      {options.cell_m, std::sqrt(area / max_cells), (high - low).maxCoeff() / max_on_a_side});
+      {options.cell_m, std::sqrt(area / max_cells), (high - low).maxCoeff() / max_per_side});
   // A closing by `reach` cells in each direction fills gaps of 2 * reach cells.
   const int reach = static_cast<int>(std::ceil(options.max_gap_m / ground.cell / 2.0));
   const int rim = reach + 2;
@@ -269,7 +269,7 @@ SiteRectangle find_site_rectangle(const std::vector<Vector2d>& points, const Vec
   require_ranges(size_m, options);
   if (points.empty()) throw Error("no data to find a site in");
   const Ground ground = make_ground(points, options);
-  if (ground.cell > std::max(options.cell_m, size_m.minCoeff() / min_on_a_site))
+  if (ground.cell > std::max(options.cell_m, size_m.minCoeff() / min_on_site))
     throw Error("the data extend too far for a site of this size; remove stray points",
                 {.field = "size of the data",
                  .value = to_fixed_text(ground.cell * ground.mask.width, 0) + " x " +

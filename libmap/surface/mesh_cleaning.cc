@@ -213,7 +213,7 @@ void smooth_mesh(TriangleMesh& mesh, int iterations) {
 bool is_oriented_manifold(const TriangleMesh& mesh) {
   const MeshReport report = report_mesh(mesh, {.self_intersections = false});
   return report.is_manifold() && report.is_oriented() &&
-         std::none_of(mesh.triangles.begin(), mesh.triangles.end(), names_a_vertex_twice);
+         std::none_of(mesh.triangles.begin(), mesh.triangles.end(), has_repeated_vertex);
 }
 
 class Cleaning {
@@ -281,7 +281,7 @@ class Cleaning {
       mesh = select_triangles(mesh, std::vector<bool>(mesh.triangles.size(), true));
     result_.merged_vertices = weld_vertices(mesh, merge_distance());
     std::vector<bool> drop(mesh.triangles.size());
-    for (std::size_t t = 0; t < drop.size(); ++t) drop[t] = names_a_vertex_twice(mesh.triangles[t]);
+    for (std::size_t t = 0; t < drop.size(); ++t) drop[t] = has_repeated_vertex(mesh.triangles[t]);
     result_.degenerate_triangles += count_of(drop);
     const std::vector<bool> repeated = repeated_triangles(mesh.triangles);
     for (std::size_t t = 0; t < drop.size(); ++t)

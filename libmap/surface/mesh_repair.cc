@@ -165,7 +165,7 @@ std::vector<bool> degenerate_triangles(const TriangleMesh& mesh) {
   std::vector<bool> marks(mesh.triangles.size(), false);
   for (std::size_t t = 0; t < marks.size(); ++t)
     marks[t] =
-        names_a_vertex_twice(mesh.triangles[t]) || lowest_height(mesh, mesh.triangles[t]) <= lowest;
+        has_repeated_vertex(mesh.triangles[t]) || lowest_height(mesh, mesh.triangles[t]) <= lowest;
   return marks;
 }
 

@@ -17,7 +17,7 @@ namespace libmap {
 namespace {
 
 // Maximum number of candidate views per triangle.
-constexpr std::size_t views_a_triangle = 12;
+constexpr std::size_t views_per_triangle = 12;
 // Number of vertices whose colors are compared between photographs, and its minimum per piece.
 constexpr std::size_t observed_vertices = 20000;
 constexpr std::size_t min_observed_vertices = 200;
@@ -68,7 +68,7 @@ class Texturing {
   }
   MeshWithMargin cut_finely(MeshWithMargin part) const;
   TextureViewRequest views_of(const MeshWithMargin& part) const {
-    return {part.triangles, views_a_triangle, static_cast<std::size_t>(options_.blend_views) + 1,
+    return {part.triangles, views_per_triangle, static_cast<std::size_t>(options_.blend_views) + 1,
             0};
   }
   // The model keeps the vertices of the margin, which no triangle uses.

@@ -288,9 +288,9 @@ void paint_texture(const TextureAtlas& atlas, const TexturePaint& paint, Texture
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
     return atlas.charts[a].photo < atlas.charts[b].photo;
   });
-  constexpr std::size_t charts_a_task = 8;
+  constexpr std::size_t charts_per_task = 8;
   progress.begin("texture", order.size());
-  parallel_for(order.size(), charts_a_task, [&](std::size_t begin, std::size_t end) {
+  parallel_for(order.size(), charts_per_task, [&](std::size_t begin, std::size_t end) {
     ChartPainter painter(paint, model);
     for (std::size_t i = begin; i < end; ++i) painter.paint(atlas.charts[order[i]]);
     progress.advance(end - begin);

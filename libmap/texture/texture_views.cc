@@ -94,7 +94,9 @@ class ViewFinder {
     bool any_asked_in_image = false;  // in the current photograph
   };
 
-  bool wants_views() const { return request_.views_a_vertex > 0 || request_.views_a_triangle > 0; }
+  bool wants_views() const {
+    return request_.views_per_vertex > 0 || request_.views_per_triangle > 0;
+  }
   // Returns true if the current photograph may show a part of the ball within max_depth_m.
   bool may_show(const Eigen::Vector3d& center, double radius_m) const {
     const double z =
@@ -393,12 +395,12 @@ float ViewFinder::quality_at(std::uint32_t v) const {
 }
 
 void ViewFinder::keep(std::uint32_t photo) {
-  if (request_.views_a_triangle > 0)
+  if (request_.views_per_triangle > 0)
     each_rated([&](std::uint32_t t) {
       if (t < request_.triangles && qualities_[t] > 0.0F)
         views_.of_triangles.insert(t, {photo, qualities_[t]});
     });
-  if (request_.views_a_vertex > 0)
+  if (request_.views_per_vertex > 0)
     each_block([&](const Block& block) {
       for (const std::uint32_t v : block.vertices) {
         const float quality = is_asked_[v] ? quality_at(v) : 0.0F;
@@ -455,12 +457,12 @@ TextureViews find_texture_views(const TriangleMesh& mesh, const TexturePhotos& p
                                 const TextureViewOptions& options,
                                 const TextureViewRequest& request, Progress& progress) {
   TextureViews views;
-  views.of_triangles = ViewTable(request.triangles, request.views_a_triangle);
+  views.of_triangles = ViewTable(request.triangles, request.views_per_triangle);
   std::size_t vertices = 0;
   for (std::size_t t = 0; t < request.triangles; ++t)
     for (const std::uint32_t v : mesh.triangles[t])
       vertices = std::max<std::size_t>(vertices, v + 1);
-  views.of_vertices = ViewTable(vertices, request.views_a_vertex);
+  views.of_vertices = ViewTable(vertices, request.views_per_vertex);
   ViewFinder finder(mesh, photos, options, request, views);
   progress.begin("views", photos.size());
   for (std::size_t photo = 0; photo < photos.size(); ++photo) {

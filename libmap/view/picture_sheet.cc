@@ -10,8 +10,8 @@
 namespace libmap {
 namespace {
 
-constexpr double pixels_a_font = 30.0;  // cell width in pixels per pixel of the font size
-constexpr double caption_height = 2.0;  // this and the following heights are in font sizes
+constexpr double cell_px_per_font_px = 30.0;  // cell width in pixels per pixel of the font size
+constexpr double caption_height = 2.0;        // this and the following heights are in font sizes
 constexpr double title_height = 2.6;
 constexpr double gap = 0.8;  // between cells
 
@@ -291,7 +291,7 @@ SheetLayout plan_sheet(const std::vector<SheetCell>& cells, const PictureSheetOp
   check_titles("column_titles", options.column_titles.size(), layout.columns);
   check_titles("row_titles", options.row_titles.size(), rows_of(cells.size(), layout.columns));
   layout.font_px =
-      std::clamp(static_cast<int>(options.cell_width_px / pixels_a_font), min_font_px, 40);
+      std::clamp(static_cast<int>(options.cell_width_px / cell_px_per_font_px), min_font_px, 40);
   const double f = layout.font_px;
   double top = options.title.empty() ? std::round(gap * f) : std::round(title_height * f);
   const TextStyle head{.size_px = layout.font_px, .bold = true};

@@ -59,7 +59,8 @@ TEST(MapView, CellsLieOnTheLattice) {
 }
 
 TEST(MapView, CubesOfVoxels) {
-  const MapView view = libmap::make_map_view(map_of(voxels, 0.01, {0, 0, 0}), {.voxels_a_cell = 3});
+  const MapView view =
+      libmap::make_map_view(map_of(voxels, 0.01, {0, 0, 0}), {.voxels_per_cell = 3});
   EXPECT_NEAR(view.cell_size_m, 0.03, 1e-12);
   // i: floor(-4 / 3) = -2 is the lowest; 3 / 3 = 1.
   EXPECT_EQ(view.cells[0].place[0], 0);
