@@ -58,7 +58,7 @@ class StreamedDetection {
       if (count == 0 || count > max_points_) continue;
       const PointCloud cloud = points_.points_in(places.low, places.high);
       const VoxelGrid grid = voxelize(cloud.positions, scenario_.voxel_size_m);
-      lone += count_lone(grid.voxels);
+      lone += count_isolated(grid.voxels);
       voxels += grid.voxels.size();
       points.insert(points.end(), cloud.positions.begin(), cloud.positions.end());
     }
@@ -165,7 +165,7 @@ class StreamedDetection {
     grid.min = frame_.min;
     grid.max = frame_.max;
     const TileDetectionResult found =
-        detect_tiles({cloud, cloud, grid}, mask_, parts, CurvatureAt::points_near_tiles,
+        detect_tiles({cloud, cloud, grid}, mask_, parts, CurvatureExtent::points_near_tiles,
                      tile_detection_options(mask_, scenario_));
     for (const MapVoxel& voxel : found.voxels)
       results.at(tile_of(voxel.voxel, tile_voxels_)).voxels.push_back(voxel);

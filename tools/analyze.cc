@@ -75,8 +75,8 @@ ReadMap read_map(const std::string& file, Run& run) {
   map.cloud = libmap::read_cloud(file).cloud;
   map.manifest = libmap::read_manifest_of(file);
   map.voxels = in_file(file, [&] {
-    return libgtd::voxel_map_of(
-        map.cloud, map.manifest ? libgtd::facts_of(*map.manifest) : libgtd::MapFacts{});
+    return libgtd::voxel_map_of(map.cloud,
+                                map.manifest ? libgtd::map_info(*map.manifest) : libgtd::MapInfo{});
   });
   if (!map.manifest)
     run.warn(file +
@@ -300,13 +300,13 @@ void analyze(AnalyzeOptions& options, Run& run) {
   if (options.maps.size() > 1 || !options.table.expected.empty()) {
     if (!options.other.empty())
       throw UsageError("--against requires one MAP without --expected; --pairs compares several");
-    refuse_set(options, bind_one, "requires one map without --expected");
+    reject_changed(options, bind_one, "requires one map without --expected");
     options.table.points_frame = options.points_frame;
     options.table.pictures = options.pictures;
     return tabulate_maps(options.maps, options.folder, options.table, run);
   }
-  refuse_set<MapTableOptions>(options.table, graspmap_tools::bind,
-                              "requires several maps or --expected");
+  reject_changed<MapTableOptions>(options.table, graspmap_tools::bind,
+                                  "requires several maps or --expected");
   options.map = options.maps.front();
   if (options.other.empty() && options.transform != "auto")
     throw libmap::Error("requires --against OTHER",

@@ -16,7 +16,7 @@
 #include "tools/support/map_frame.h"
 #include "tools/support/placement.h"
 #include "tools/support/results.h"
-#include "tools/support/usages.h"
+#include "tools/support/subcommands.h"
 
 using namespace graspmap_tools;
 
@@ -461,6 +461,6 @@ int compare_surfaces(int argc, char** argv) {
 int main(int argc, char** argv) {
   const bool edges =
       std::any_of(argv, argv + argc, [](const std::string& word) { return word == "--edges"; });
-  return run_usage(argc, argv, {compare_surfaces, compare_edges},
-                   edges ? compare_edges : compare_surfaces);
+  return run_subcommand(argc, argv, {compare_surfaces, compare_edges},
+                        edges ? compare_edges : compare_surfaces);
 }

@@ -16,7 +16,7 @@
 #include "tools/support/map_tiles.h"
 #include "tools/support/placement.h"
 #include "tools/support/scan_poses.h"
-#include "tools/support/usages.h"
+#include "tools/support/subcommands.h"
 
 using namespace graspmap_tools;
 
@@ -382,7 +382,7 @@ void extract(ExtractOptions& options, Run& run) {
   const bool pictures = options.pictures.wanted();
   const PictureOptions unset;
   if (!pictures)
-    refuse_given({{"--poses", options.pictures.poses.source != unset.poses.source},
+    reject_given({{"--poses", options.pictures.poses.source != unset.poses.source},
                   {"--transform", options.pictures.transform != unset.transform},
                   {"--keep", options.pictures.keep != unset.keep}},
                  "requires --bundler or --colmap: a folder contains the scan's own poses");

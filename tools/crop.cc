@@ -73,7 +73,7 @@ std::vector<Eigen::Vector2d> polygon_of(const std::string& file) {
   std::vector<Eigen::Vector2d> corners;
   for (std::size_t row = 0; row < table.rows.size(); ++row)
     corners.emplace_back(table.number(row, x), table.number(row, y));
-  return in_file(file, [&] { return libmap::PlanPolygon(corners).corners(); });
+  return in_file(file, [&] { return libmap::XyPolygon(corners).corners(); });
 }
 
 void read_region(CropCommandOptions& options) {
@@ -181,14 +181,14 @@ void tell_site(const libmap::CropReport& report, const libmap::Bounds3d& bounds,
     std::vector<double> corners;
     for (const Eigen::Vector2d& corner : report.outline)
       corners.insert(corners.end(), {corner.x(), corner.y()});
-    run.add_results({{"outline_area_m2", libmap::PlanPolygon(report.outline).area_m2()},
-                     {"outline_m", corners}});
+    run.add_results(
+        {{"outline_area_m2", libmap::XyPolygon(report.outline).area_m2()}, {"outline_m", corners}});
   }
   run.say("size: {:.3f} x {:.3f} x {:.3f} m", size.x(), size.y(), size.z());
 }
 
-void tell(const CropCommandOptions& options, const libmap::CropReport& report,
-          const libmap::Bounds3d& bounds, Run& run) {
+void report_crop(const CropCommandOptions& options, const libmap::CropReport& report,
+                 const libmap::Bounds3d& bounds, Run& run) {
   run.add_input(options.input);
   if (!options.polygon.empty()) run.add_input(options.polygon);
   // The new site_from_map includes that of an input that was cropped before.
@@ -213,7 +213,7 @@ void crop_cloud(const CropCommandOptions& options, Run& run) {
     run.warn("{} points without a position were dropped", read.dropped_points);
   const libmap::CropCloudResult result =
       run.timed("crop", [&] { return libmap::crop_cloud(read.cloud, options.crop); });
-  tell(options, result.report, libmap::bounds_of(result.cloud.positions), run);
+  report_crop(options, result.report, libmap::bounds_of(result.cloud.positions), run);
   run.add_results({{"points", result.cloud.size()}});
   run.say("{} of {} points", result.cloud.size(), read.cloud.size());
   write_site(options, run, [&](const fs::path& to) { libmap::write_cloud(to, result.cloud); });
@@ -223,7 +223,7 @@ void crop_mesh(const CropCommandOptions& options, Run& run) {
   const libmap::TriangleMesh mesh = libmap::read_mesh(options.input).mesh;
   const libmap::CropMeshResult result =
       run.timed("crop", [&] { return libmap::crop_mesh(mesh, options.crop); });
-  tell(options, result.report, libmap::bounds_of(result.mesh.vertices), run);
+  report_crop(options, result.report, libmap::bounds_of(result.mesh.vertices), run);
   const double area = libmap::surface_area(result.mesh);
   run.add_results({{"surface_area_m2", area},
                    {"vertices", result.mesh.vertices.size()},
@@ -254,7 +254,7 @@ void crop_pieces(const CropCommandOptions& options, const std::vector<fs::path>&
   };
   const libmap::CropReport report =
       run.timed("crop", [&] { return libmap::crop_mesh_pieces(each, options.crop, write); });
-  tell(options, report, {box.min(), box.max()}, run);
+  report_crop(options, report, {box.min(), box.max()}, run);
   run.add_results({{"pieces", written}, {"surface_area_m2", area_m2}, {"triangles", triangles}});
   run.say("{} triangles in {} of {} tiles, {:.3f} m2 of surface", triangles, written, pieces.size(),
           area_m2);

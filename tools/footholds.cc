@@ -182,7 +182,7 @@ libgtd::FootholdResult search(const FootholdsCommandOptions& options, const libm
 }
 
 void find_footholds(const FootholdsCommandOptions& options, Run& run) {
-  if (options.trials.mesh.empty()) refuse_set(options.trials, &bind, "requires --mesh");
+  if (options.trials.mesh.empty()) reject_changed(options.trials, &bind, "requires --mesh");
   libmap::require_cloud_format(options.output);
   run.claim_output(options.output, {options.map, options.trials.mesh});
   const libmap::PointCloud map = libmap::read_cloud(options.map).cloud;

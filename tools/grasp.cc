@@ -154,7 +154,7 @@ void write_scenes(const GraspScenesOptions& options, const std::vector<GraspScen
     const libgtd::LocationResult& result = input.results[scene.row];
     const libgtd::Trial trial =
         libgtd::repeat_trial(input.ground, input.gripper, result.location, input.options,
-                             result.shown_pose, result.shown_draw);
+                             result.median_pose, result.median_draw);
     run.add_results({{scene.file, description(result, trial, load_n)}});
     files.emplace_back(scene.file, [=, &input](const std::filesystem::path& temporary) {
       libmap::write_mesh(temporary, libgtd::trial_scene(input.mesh, input.gripper, trial, load_n));
@@ -265,7 +265,7 @@ libgtd::Ground ground_of(const libmap::TriangleMesh& mesh, const GraspCommandOpt
 }
 
 void grasp_voxels(GraspCommandOptions& options, Run& run) {
-  refuse_given({{"--scenes", !options.scenes.folder.empty()},
+  reject_given({{"--scenes", !options.scenes.folder.empty()},
                 {"--scene-of", !options.scenes.places.empty()},
                 {"--more-loads", !options.more_loads.empty()},
                 {"--prefix", !options.prefix.empty()}},
@@ -293,7 +293,7 @@ void grasp_voxels(GraspCommandOptions& options, Run& run) {
 }
 
 void grasp_places(GraspCommandOptions& options, Run& run) {
-  refuse_given({{"--tile", options.tile != GraspCommandOptions{}.tile}}, "requires --map");
+  reject_given({{"--tile", options.tile != GraspCommandOptions{}.tile}}, "requires --map");
   if (libmap::format_of(options.output) != ".csv")
     throw libmap::Error("results are written as .csv", {.file = options.output});
   run.claim_output(options.output, {options.mesh, options.points});
@@ -302,7 +302,7 @@ void grasp_places(GraspCommandOptions& options, Run& run) {
     if (!load || !(*load > 0.0))
       throw libmap::Error("is not a load",
                           {.field = "--more-loads", .value = text, .bound = "> 0"});
-    options.grasp.more_loads_n.push_back(*load);
+    options.grasp.extra_loads_n.push_back(*load);
   }
   claim_scenes(options.scenes, run);
   options.grasp.sequential = options.sequential == SequentialTest::on;
@@ -326,7 +326,7 @@ void grasp_places(GraspCommandOptions& options, Run& run) {
   } catch (const libmap::Error& error) {
     throw error.in_file(options.points);
   }
-  for (const std::string& name : libgtd::grasp_columns(options.grasp.more_loads_n)) {
+  for (const std::string& name : libgtd::grasp_columns(options.grasp.extra_loads_n)) {
     const std::string column = options.prefix + name;
     if (table.find_column(column))
       throw libmap::Error("the locations already have this column",
@@ -451,7 +451,7 @@ void plan_next_pulls(const GraspCommandOptions& options, Run& run) {
 
 void grasp(GraspCommandOptions& options, Run& run) {
   if (!options.pulls.empty()) {
-    refuse_given({{"--points", !options.points.empty()},
+    reject_given({{"--points", !options.points.empty()},
                   {"--map", !options.map.empty()},
                   {"--plan", !options.plan.empty()}},
                  "cannot be combined with --fit");
@@ -462,7 +462,7 @@ void grasp(GraspCommandOptions& options, Run& run) {
                          ? "--points LOCATIONS.csv, --map MAP or --fit PULLS.csv is missing"
                          : "--points and --map cannot be combined");
   if (!options.plan.empty()) {
-    refuse_given({{"--map", !options.map.empty()}}, "cannot be combined with --plan");
+    reject_given({{"--map", !options.map.empty()}}, "cannot be combined with --plan");
     return plan_next_pulls(options, run);
   }
   options.map.empty() ? grasp_places(options, run) : grasp_voxels(options, run);

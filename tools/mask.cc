@@ -235,7 +235,7 @@ void mask(const MaskOptions& options, Run& run) {
   if (extension != ".txt" && extension != ".png") libmap::require_cloud_format(options.output);
   if (options.sections && extension != ".png")
     throw libmap::Error("sections are drawn as .png", {.file = options.output});
-  if (!options.sections) refuse_set(options, bind_sections, "requires --sections");
+  if (!options.sections) reject_changed(options, bind_sections, "requires --sections");
   if (options.view != MaskOptions{}.view && (options.sections || extension != ".png"))
     throw libmap::Error("requires an image (.png) without --sections", {.field = "--view"});
   run.claim_output(options.output);

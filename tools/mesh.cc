@@ -190,12 +190,12 @@ void mesh(const MeshOptions& options, Run& run) {
   });
   if (options.report || options.json) report(options, cloud, surface, run);
   run.add_input(options.cloud);
-  carry_frame(options.cloud, run);
+  copy_frame(options.cloud, run);
   run.write_output(options.output,
                    [&](const auto& temporary) { libmap::write_mesh(temporary, surface); });
 }
 
-TileFolder::Facts facts_of(const libmap::SurfaceTile& made) {
+TileFolder::TileData facts_of(const libmap::SurfaceTile& made) {
   return {{"vertices", made.mesh.vertices.size()},
           {"triangles", made.mesh.triangles.size()},
           {"area_m2", libmap::surface_area(made.mesh)},
@@ -215,7 +215,7 @@ struct Totals {
          {"triangles", mesh.triangles.size()},
          {"area_m2", libmap::surface_area(mesh)}});
   }
-  void add(const TileFolder::Facts& facts) {
+  void add(const TileFolder::TileData& facts) {
     const auto count = facts.at("triangles").get<std::int64_t>();
     pieces += count > 0 ? 1 : 0;
     vertices += facts.at("vertices").get<std::int64_t>();
@@ -227,11 +227,11 @@ struct Totals {
 // File name of a tile, without extension.
 std::string name_of(const libmap::XyTile& tile) { return libmap::tile_file_name(tile, ""); }
 
-Totals put_together(const MeshOptions& options, const TileFolder& output,
-                    const std::vector<libmap::XyTile>& tiles, const fs::path& folder, Run& run) {
+Totals assemble(const MeshOptions& options, const TileFolder& output,
+                const std::vector<libmap::XyTile>& tiles, const fs::path& folder, Run& run) {
   libmap::SurfaceIslands islands;
   for (const libmap::XyTile& tile : tiles) {
-    const TileFolder::Facts facts = output.facts(name_of(tile));
+    const TileFolder::TileData facts = output.facts(name_of(tile));
     libmap::SurfaceTile made;
     facts.at("component_areas_m2").get_to(made.component_areas_m2);
     facts.at("seams").get_to(made.seams);
@@ -240,7 +240,7 @@ Totals put_together(const MeshOptions& options, const TileFolder& output,
   const libmap::SurfaceIslands::Dropped dropped = islands.dropped(options.surface.cleaning);
   Totals totals;
   for (const libmap::XyTile& tile : tiles) {
-    const TileFolder::Facts facts = output.facts(name_of(tile));
+    const TileFolder::TileData facts = output.facts(name_of(tile));
     const fs::path to = folder / libmap::tile_file_name(tile, ".ply");
     const auto components = dropped.find(tile);
     if (components != dropped.end()) {
@@ -266,7 +266,7 @@ Totals put_together(const MeshOptions& options, const TileFolder& output,
 
 // Makes and writes the tiles one by one.
 void make_tiles(const MeshOptions& options, TileFolder& output, Run& run) {
-  libmap::SurfaceSurvey survey;
+  libmap::CloudStatistics survey;
   std::map<libmap::XyTile, std::size_t> points_in_tiles;
   libmap::PieceIndex index = run.timed("survey", [&] {
     return libmap::PieceIndex(libmap::cloud_pieces(options.cloud),
@@ -289,15 +289,15 @@ void make_tiles(const MeshOptions& options, TileFolder& output, Run& run) {
     names.push_back(name_of(tile));
   }
   const auto make = [&](std::size_t n, const fs::path& to) {
-    const libmap::PlanBox box =
-        libmap::plan_box_of(tiles[n], options.surface.tile_m, options.surface.margin_m());
+    const libmap::XyBox box =
+        libmap::xy_box_of(tiles[n], options.surface.tile_m, options.surface.margin_m());
     const libmap::SurfaceTile made = libmap::make_surface_tile(
         index.points_in(box.min(), box.max()), survey, tiles[n], options.surface);
     if (!made.mesh.triangles.empty()) libmap::write_mesh(to, made.mesh);
     return facts_of(made);
   };
   const auto finish = [&](const fs::path& folder) {
-    const Totals totals = put_together(options, output, tiles, folder, run);
+    const Totals totals = assemble(options, output, tiles, folder, run);
     run.say("{} points -> {} triangles in {} tiles", index.points(), totals.triangles,
             totals.pieces);
   };
@@ -314,7 +314,7 @@ void mesh_in_tiles(const MeshOptions& options, Run& run) {
   options.surface.check();
   in_file(options.cloud, [&] {
     run.add_input(options.cloud);
-    carry_frame(options.cloud, run);
+    copy_frame(options.cloud, run);
     TileFolder output(options.output, tile_folder_names(options.output), {options.cloud},
                       libmap::parse_share(options.tile), run);
     if (!output.is_complete()) make_tiles(options, output, run);

@@ -53,7 +53,7 @@ void say_stage(const libmap::StageReport& stage, Run& run) {
   if (stage.rejected_error)
     run.detail("  rejected: {:.2f} mm, {:.3f} deg", 1e3 * stage.rejected_error->absolute.rmse_m,
                stage.rejected_error->absolute.mean_rotation_deg);
-  for (const auto& [name, value] : stage.figures) run.detail("  {} {:.6g}", name, value);
+  for (const auto& [name, value] : stage.metrics) run.detail("  {} {:.6g}", name, value);
   for (const auto& [name, group] : stage.groups)
     run.detail(
         "  {}: {} links, {} rejected, deviations x {:.3g} and x {:.3g}, rms {:.2f} mm {:.3f} deg",
@@ -225,7 +225,7 @@ std::optional<libmap::CameraFile> claim_outputs(const RefineOptions& options, Ru
   }
   auto camera = known_camera(options.calibration, options.scans.front(), {}, run);
   if (camera)
-    refuse_given({{"--write-calibration", !options.new_calibration.empty()},
+    reject_given({{"--write-calibration", !options.new_calibration.empty()},
                   {"--write-database", !options.database.empty()}},
                  "cannot be combined with --calibration: it starts from the stored camera");
   if (!options.database.empty()) claim_database(options, run);

@@ -181,7 +181,7 @@ MapWindow read_window(const MapTiles& tiles, const std::optional<Eigen::AlignedB
   if (window.cloud.empty()) throw libmap::Error("contains no part of the map", {.field = "--box"});
   if (window.columns_per_point > 1) {
     window.cloud = libgtd::downsample_map(window.cloud, window.columns_per_point);
-    libgtd::center_in_squares(tiles.index(), window.columns_per_point, window.cloud);
+    libgtd::snap_to_squares(tiles.index(), window.columns_per_point, window.cloud);
   }
   return window;
 }
@@ -280,7 +280,7 @@ void bind(libmap::ParameterTable& table, SceneFileOptions& options) {
 
 // Reads a cloud, mesh, graspability map or tile store. Throws Error naming the file.
 SceneFile read_scene(const std::string& file, const SceneFileOptions& options, Run& run) {
-  if (options.points.empty()) refuse_set(options, bind_points, "requires --points");
+  if (options.points.empty()) reject_changed(options, bind_points, "requires --points");
   try {
     return scene_of(file, options, run);
   } catch (const libmap::Error& error) {
@@ -393,7 +393,7 @@ std::vector<libmap::SheetCell> read_cells(const RenderOptions& options, Run& run
 libmap::ColorImage draw_several(RenderOptions& options, Run& run) {
   if (options.view.view == libmap::Viewpoint::camera)
     throw libmap::Error("requires a single file", {.field = "--view", .value = "camera"});
-  refuse_set(options, bind_one, "requires a single file");
+  reject_changed(options, bind_one, "requires a single file");
   // Maps of one cloud have the same orientation in the image.
   if (options.scene.heading == MapHeading::automatic) options.scene.heading = MapHeading::input;
   options.sheet.column_titles = split_texts(options.column_titles);

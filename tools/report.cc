@@ -107,7 +107,7 @@ DownsampledMap read_cloud_map(const fs::path& path, std::size_t max_cells) {
       libmap::transform_cloud(libmap::read_cloud(path).cloud, terrain_from_map(manifest));
   DownsampledMap map;
   map.voxels = whole.size();
-  const auto lattice = manifest ? libgtd::facts_of(*manifest).lattice : std::nullopt;
+  const auto lattice = manifest ? libgtd::map_info(*manifest).lattice : std::nullopt;
   if (lattice)
     map.options.lattice = {lattice->voxel_size_m, lattice->origin_m};
   else if (!whole.empty())
@@ -115,7 +115,7 @@ DownsampledMap read_cloud_map(const fs::path& path, std::size_t max_cells) {
   int& width = map.options.voxels_per_cell;
   width = first_width(map.voxels, max_cells);
   do {
-    map.points = width == 1 ? whole : libgtd::thin_map_in_cubes(whole, width);
+    map.points = width == 1 ? whole : libgtd::voxel_downsample_map(whole, width);
   } while (map.points.size() > max_cells && ++width > 0);
   if (manifest) set_parameters(*manifest, map.options);
   return map;
@@ -125,10 +125,10 @@ DownsampledMap read_cloud_map(const fs::path& path, std::size_t max_cells) {
 libmap::PointCloud thin_tiles(const MapTiles& tiles, int width) {
   std::vector<libmap::PointCloud> parts(tiles.index().tiles.size());
   libmap::parallel_each(parts.size(), [&](std::size_t n) {
-    parts[n] = libgtd::thin_map_in_cubes(tiles.load(n), width);
+    parts[n] = libgtd::voxel_downsample_map(tiles.load(n), width);
   });
   // Cubes shared by two tiles have one point from each tile.
-  return libgtd::thin_map_in_cubes(libgtd::merge_map_clouds(parts), width);
+  return libgtd::voxel_downsample_map(libgtd::merge_map_clouds(parts), width);
 }
 
 // Downsamples a tile store to the same cells tile by tile, because it may exceed the memory.
@@ -203,7 +203,7 @@ void make_report(ReportCommandOptions& options, Run& run) {
   double bytes_left = scenes_share * options.max_size_mb * 1e6;
   const libmap::ReportReadResult read = run.timed("read", [&] {
     return libmap::read_report_content(
-        plan, {.folder = options.folder, .left_out = options.output},
+        plan, {.folder = options.folder, .excluded = options.output},
         [&](const fs::path& map, const auto& lookup) {
           return load_map_view(map, lookup, max_cells, run);
         },

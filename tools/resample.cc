@@ -47,7 +47,7 @@ void resample(const ResampleOptions& options, Run& run) {
   run.add_input(options.mesh);
   const libmap::PoissonDiskResult result = in_file(
       options.mesh, [&] { return libmap::sample_poisson_disk(mesh, sampling, run.progress()); });
-  carry_frame(options.mesh, run);
+  copy_frame(options.mesh, run);
   tell_results(result, sampling.count, run);
   run.write_output(options.output,
                    [&](const auto& temporary) { libmap::write_cloud(temporary, result.cloud); });
@@ -88,7 +88,7 @@ void resample_pieces(const ResampleOptions& options, Run& run) {
     boxes.push_back(libmap::bounds_of(libmap::read_mesh(piece).mesh.vertices));
   run.add_input(options.mesh);
   libmap::PieceSampler sampler(std::move(boxes), options.sampling);
-  carry_frame(options.mesh, run);
+  copy_frame(options.mesh, run);
   run.write_output_tree(options.output, names, [&](const fs::path& folder) {
     if (!folder.empty()) write_pieces(pieces, sampler, folder, run);
   });

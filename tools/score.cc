@@ -146,7 +146,7 @@ class StoreScoring {
   void score() {
     if (run_.options().dry_run) return;
     libmap::TileJournal journal = run_.timed(
-        "plan", [&] { return store_.begin(options_.detection.share, [&] { agree_on_plan(); }); });
+        "plan", [&] { return store_.begin(options_.detection.share, [&] { check_plan(); }); });
     const std::vector<TileNumber> wanted = run_.timed("check", [&] {
       return store_.missing(
           plan_, libgtd::tiles_of(frame_, tiling_.tile_voxels, options_.detection.share));
@@ -173,7 +173,7 @@ class StoreScoring {
  private:
   // Resumes the earlier plan if its parameters and inputs are the same, else writes a new one. The
   // caller must have locked the store.
-  void agree_on_plan() {
+  void check_plan() {
     const auto earlier = run_.options().force ? std::nullopt : store_.plan();
     if (!earlier && !run_.options().force) require_no_index(store_);
     plan_.terrain =
@@ -197,7 +197,7 @@ class StoreScoring {
       make_frame();
       if (earlier)
         plan_.kept =
-            libgtd::untouched_tiles(store_.done(*earlier), *earlier, plan_, frame_, tiling_);
+            libgtd::unaffected_tiles(store_.done(*earlier), *earlier, plan_, frame_, tiling_);
       else
         store_.clear();
       store_.set_plan(plan_);
@@ -255,7 +255,7 @@ class StoreScoring {
     const libgtd::PointsRectangle rectangle = libgtd::points_for(wanted, frame_, tiling_);
     std::vector<fs::path> files;
     for (const TerrainFile& file : plan_.terrain)
-      if (libgtd::touches(file, rectangle, frame_)) files.emplace_back(file.input.path);
+      if (libgtd::may_intersect(file, rectangle, frame_)) files.emplace_back(file.input.path);
     const bool are_all = wanted.size() == libgtd::tiles_of(frame_, tiling_.tile_voxels).size();
     const auto all = libmap::PointStream::Need::positions_and_normals;
     libmap::PieceStream(files).for_each_block(all, [&](const libmap::PointCloud& block) {

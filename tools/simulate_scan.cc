@@ -10,7 +10,7 @@
 #include "libmap/simulate/scan_simulation.h"
 #include "tools/support/command_line.h"
 #include "tools/support/option_values.h"
-#include "tools/support/usages.h"
+#include "tools/support/subcommands.h"
 
 using namespace graspmap_tools;
 
@@ -98,12 +98,12 @@ libmap::Trajectory given_poses(const SimulateScanOptions& options) {
   libmap::CameraTrajectoryOptions path = options.simulation.trajectory;
   path.frame_interval_s = libmap::CameraTrajectoryOptions{}.frame_interval_s;
   const std::string reason = "cannot be combined with --trajectory, which has the camera's poses";
-  refuse_set(path, libmap::bind, reason);
-  refuse_given({{"--target", options.target != "auto"}}, reason);
+  reject_changed(path, libmap::bind, reason);
+  reject_given({{"--target", options.target != "auto"}}, reason);
   return in_file(options.trajectory, [&] {
     const libmap::TrajectoryFile file = libmap::read_trajectory(options.trajectory);
     if (file.of_cameras) throw libmap::Error("has poses of cameras, not of the camera's body");
-    return libmap::numbered(file.poses, frame_interval_s);
+    return libmap::assign_nodes_and_stamps(file.poses, frame_interval_s);
   });
 }
 
@@ -151,7 +151,7 @@ void scan_terrain(const SimulateScanOptions& options, const libmap::Trajectory& 
     throw libmap::Error("requires a mesh",
                         {.field = "--path", .value = "loops", .bound = "auto or serpentine"});
   const libmap::ScanEvents& events = options.simulation.events;
-  refuse_given({{"--walker-first-frame", events.walker_first_frame > 0},
+  reject_given({{"--walker-first-frame", events.walker_first_frame > 0},
                 {"--stone-moved-frame", events.stone_moved_frame > 0},
                 {"--ceiling-first-frame", events.ceiling_first_frame > 0},
                 {"--multipath", options.simulation.faults.depth.multipath > 0.0}},

@@ -8,7 +8,7 @@
 #include "libmap/scenes/scene_mesh.h"
 #include "libmap/scenes/scene_sampling.h"
 #include "tools/support/command_line.h"
-#include "tools/support/usages.h"
+#include "tools/support/subcommands.h"
 
 using namespace graspmap_tools;
 
@@ -70,8 +70,8 @@ void write_surface(const libmap::PrimitiveScene& scene, const SimulateOptions& o
 }
 
 void simulate(const SimulateOptions& options, Run& run) {
-  refuse_set(options, options.mesh ? bind_cloud : bind_mesh,
-             options.mesh ? "cannot be combined with --mesh" : "requires --mesh");
+  reject_changed(options, options.mesh ? bind_cloud : bind_mesh,
+                 options.mesh ? "cannot be combined with --mesh" : "requires --mesh");
   if (options.mesh)
     libmap::require_mesh_format(options.output);
   else

@@ -7,7 +7,7 @@
 #include "libmap/simulate/rock_site.h"
 #include "libmap/simulate/site_mesh.h"
 #include "tools/support/command_line.h"
-#include "tools/support/usages.h"
+#include "tools/support/subcommands.h"
 
 using namespace graspmap_tools;
 

@@ -4,8 +4,8 @@
 #include "libmap/simulate/terrain_pieces.h"
 #include "tools/support/command_line.h"
 #include "tools/support/option_values.h"
+#include "tools/support/subcommands.h"
 #include "tools/support/tile_folder.h"
-#include "tools/support/usages.h"
 
 using namespace graspmap_tools;
 

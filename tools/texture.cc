@@ -15,8 +15,8 @@
 // JSON of the exposure, which shares and resumed runs read bit for bit.
 namespace libmap {
 
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(TextureExposure, gains, vignetting, observations, spread_before,
-                                   spread)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(TextureExposure, gains, vignetting, observations,
+                                   log_color_deviation_before, log_color_deviation)
 
 }  // namespace libmap
 
@@ -169,7 +169,7 @@ void texture(TextureCommandOptions options, Run& run) {
   if (!fs::is_directory(options.mesh)) libmap::require_mesh_format(options.mesh);
   run.claim_output(options.output, inputs_of(options));
   run.require_own_companions(options.output,
-                             libmap::companions_of_model(options.output, options.writing));
+                             libmap::additional_model_files(options.output, options.writing));
   const auto scan = scan_of(options, run);
   const libmap::Trajectory poses = poses_of(options, *scan, run);
   const libmap::TextureResult result = textured(options, *scan, poses, run);
@@ -205,8 +205,8 @@ void make_models(const TextureCommandOptions& options, const libmap::ScanSource&
   libmap::MeshPieceIndex index(pieces);
   libmap::PieceTexturing texturing(index, options.margin_m, scan, poses, options.texture,
                                    run.progress());
-  const TileFolder::Facts found =
-      output.begin([&] { return TileFolder::Facts(texturing.find_exposure()); });
+  const TileFolder::TileData found =
+      output.begin([&] { return TileFolder::TileData(texturing.find_exposure()); });
   if (found.is_null()) return;  // --dry-run
   const auto exposure = found.get<libmap::TextureExposure>();
   const auto make = [&](std::size_t n, const fs::path& to) {

@@ -116,8 +116,8 @@ double RandomField::at(const Eigen::Vector3d& place) {
   return std::clamp(sum / std::sqrt(squares), -most_deviations, most_deviations);
 }
 
-GroundPatch displaced(const GroundPatch& patch, double correlation_m, std::uint64_t seed,
-                      std::uint64_t key) {
+GroundPatch displace_vertices(const GroundPatch& patch, double correlation_m, std::uint64_t seed,
+                              std::uint64_t key) {
   GroundPatch drawn = patch;
   if (patch.vertex_errors_m.empty()) return drawn;
   Eigen::AlignedBox3d box;

@@ -53,7 +53,7 @@ class RandomField {
 
 // Returns the patch with its vertices displaced along their normals by their errors times a random
 // field. A patch without errors is returned unchanged.
-GroundPatch displaced(const GroundPatch& patch, double correlation_m, std::uint64_t seed,
-                      std::uint64_t key);
+GroundPatch displace_vertices(const GroundPatch& patch, double correlation_m, std::uint64_t seed,
+                              std::uint64_t key);
 
 }  // namespace libgtd

@@ -13,7 +13,7 @@
 #include <optional>
 #include <utility>
 
-#include "libgtd/gripper/cloned_loops.h"
+#include "libgtd/gripper/target_clones.h"
 #include "libgtd/score/scanned_area.h"
 #include "libmap/core/angle.h"
 #include "libmap/core/parallel.h"
@@ -615,8 +615,9 @@ void for_each_block(const VoxelGrid& grid, const std::vector<std::size_t>& pivot
       const auto& [place, members] = listed[b];
       const int i = place.first * closing_block_columns;
       const int j = place.second * closing_block_columns;
-      use(members, Heights(grid, grown({i, i + closing_block_columns, j, j + closing_block_columns},
-                                       reach, reach)));
+      use(members,
+          Heights(grid, expanded({i, i + closing_block_columns, j, j + closing_block_columns},
+                                 reach, reach)));
     }
   });
 }

@@ -118,7 +118,7 @@ class FootholdSearch {
     std::vector<std::size_t> order(candidates.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
     const auto is_before = [&](std::size_t a, std::size_t b) {
-      return is_place_before(place_of(candidates[a]), place_of(candidates[b]));
+      return is_position_less(place_of(candidates[a]), place_of(candidates[b]));
     };
     std::sort(order.begin(), order.end(), is_before);
     libmap::parallel_for(candidates.size(), 256, [&](std::size_t begin, std::size_t end) {
@@ -126,7 +126,7 @@ class FootholdSearch {
       for (std::size_t n = begin; n < end; ++n) {
         Foothold& candidate = candidates[order[n]];
         const Foothold* last = n == begin ? nullptr : &candidates[order[n - 1]];
-        if (last != nullptr && is_same_place(place_of(candidate), place_of(*last))) {
+        if (last != nullptr && is_same_position(place_of(candidate), place_of(*last))) {
           candidate.mean_score = last->mean_score;
           candidate.graspable_points = last->graspable_points;
         } else {

@@ -131,8 +131,8 @@ std::vector<std::uint8_t> find_tilted_edges(const std::vector<Voxel>& voxels,
         pivots_here.push_back(pivots[n]);
       });
       if (here.empty()) continue;
-      const std::vector<std::uint8_t> found =
-          terrain.find_edges(pivots_here, unscanned_columns(grid, grown(tiles[t], reach, reach)));
+      const std::vector<std::uint8_t> found = terrain.find_edges(
+          pivots_here, unscanned_columns(grid, expanded(tiles[t], reach, reach)));
       for (std::size_t n = 0; n < here.size(); ++n) edges[here[n]] = found[n];
     }
   });

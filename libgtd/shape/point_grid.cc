@@ -122,12 +122,12 @@ void CoordinateRows::make_room(std::size_t count) {
   values_.resize(3 * stride_);
 }
 
-std::vector<Eigen::Vector3d> in_order_of(const PointGrid& grid,
-                                         const std::vector<Eigen::Vector3d>& points) {
-  std::vector<Eigen::Vector3d> in_order;
-  in_order.reserve(grid.order().size());
-  for (const std::uint32_t i : grid.order()) in_order.push_back(points[i]);
-  return in_order;
+std::vector<Eigen::Vector3d> sorted_by_cell(const PointGrid& grid,
+                                            const std::vector<Eigen::Vector3d>& points) {
+  std::vector<Eigen::Vector3d> cell_sorted;
+  cell_sorted.reserve(grid.order().size());
+  for (const std::uint32_t i : grid.order()) cell_sorted.push_back(points[i]);
+  return cell_sorted;
 }
 
 void CellSurroundings::enter(const PointGrid::Cell& cell, std::int64_t reach) {
@@ -144,7 +144,7 @@ void CellSurroundings::enter(const PointGrid::Cell& cell, std::int64_t reach) {
     to.z[n++] = p.z();
   };
   for (const PointGrid::Range& run : runs_)
-    for (std::uint32_t k = run.first; k < run.last; ++k) put(in_order_[k]);
+    for (std::uint32_t k = run.first; k < run.last; ++k) put(cell_sorted_[k]);
   for (std::size_t k = 0; k < NeighborLoops::lanes; ++k)
     put(Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity()));
 }

@@ -68,18 +68,18 @@ class PointGrid {
 
 // Bits of a position. Points with the same bits have the same neighborhood results. Zeros of
 // different sign differ, because sums of differences may depend on the sign.
-inline std::array<std::uint64_t, 3> place_bits(const Eigen::Vector3d& place) {
+inline std::array<std::uint64_t, 3> position_bits(const Eigen::Vector3d& place) {
   return {std::bit_cast<std::uint64_t>(place.x()), std::bit_cast<std::uint64_t>(place.y()),
           std::bit_cast<std::uint64_t>(place.z())};
 }
 
-inline bool is_same_place(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  return place_bits(a) == place_bits(b);
+inline bool is_same_position(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return position_bits(a) == position_bits(b);
 }
 
 // Total order in which points of the same bits are adjacent.
-inline bool is_place_before(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  return place_bits(a) < place_bits(b);
+inline bool is_position_less(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return position_bits(a) < position_bits(b);
 }
 
 // Coordinates, one array per axis, with room for a full set of lanes at the end of each.
@@ -97,8 +97,8 @@ class CoordinateRows {
 };
 
 // Returns the points in the order of the grid, for access by cells.
-std::vector<Eigen::Vector3d> in_order_of(const PointGrid& grid,
-                                         const std::vector<Eigen::Vector3d>& points);
+std::vector<Eigen::Vector3d> sorted_by_cell(const PointGrid& grid,
+                                            const std::vector<Eigen::Vector3d>& points);
 
 // Returns the covariance of `count` neighbors, in the squared unit of their coordinates.
 Eigen::Matrix3d covariance_of(const NeighborLoops& loops, const NeighborLoops::Places& neighbors,
@@ -107,10 +107,10 @@ Eigen::Matrix3d covariance_of(const NeighborLoops& loops, const NeighborLoops::P
 // Points around a cell of a grid, gathered once for all queries in this cell.
 class CellSurroundings {
  public:
-  // `in_order` are the points in the order of the grid, in any frame and unit. Both arguments must
-  // outlive this object.
-  CellSurroundings(const PointGrid& grid, const std::vector<Eigen::Vector3d>& in_order)
-      : grid_(grid), in_order_(in_order) {}
+  // `cell_sorted` are the points in the order of the grid, in any frame and unit. Both arguments
+  // must outlive this object.
+  CellSurroundings(const PointGrid& grid, const std::vector<Eigen::Vector3d>& cell_sorted)
+      : grid_(grid), cell_sorted_(cell_sorted) {}
 
   // Gathers the points of all cells at most `reach` cells away along each axis, in the order of the
   // grid; infinite points follow up to a full set of lanes.
@@ -122,7 +122,7 @@ class CellSurroundings {
 
  private:
   const PointGrid& grid_;
-  const std::vector<Eigen::Vector3d>& in_order_;
+  const std::vector<Eigen::Vector3d>& cell_sorted_;
   std::vector<PointGrid::Range> runs_;
   std::vector<std::size_t> run_ends_;
   CoordinateRows rows_;

@@ -30,9 +30,9 @@ SurfaceNormal facing(const Vector3d& fitted, const Vector3d& outside, const Vect
 
 class PlaneFitter {
  public:
-  PlaneFitter(const PointGrid& grid, const std::vector<Vector3d>& in_order, double radius,
+  PlaneFitter(const PointGrid& grid, const std::vector<Vector3d>& cell_sorted, double radius,
               const Vector3d& up)
-      : candidates_(grid, in_order), radius_(radius), up_(up.normalized()) {}
+      : candidates_(grid, cell_sorted), radius_(radius), up_(up.normalized()) {}
 
   void enter(const PointGrid::Cell& cell) {
     candidates_.enter(cell, 2);
@@ -88,10 +88,10 @@ std::vector<SurfaceNormal> fit_surface_normals(const libmap::PointCloud& cloud,
   const double cell_m = options.radius_m * (0.5 + 1e-6);
   const PointGrid grid(cloud.positions, cell_m);
   const PointGrid groups(places, cell_m);
-  const std::vector<Vector3d> in_order = in_order_of(grid, cloud.positions);
+  const std::vector<Vector3d> cell_sorted = sorted_by_cell(grid, cloud.positions);
   std::vector<SurfaceNormal> normals(places.size());
   libmap::parallel_for(groups.cells().size(), 16, [&](std::size_t begin, std::size_t end) {
-    PlaneFitter fitter(grid, in_order, options.radius_m, options.up);
+    PlaneFitter fitter(grid, cell_sorted, options.radius_m, options.up);
     for (std::size_t c = begin; c < end; ++c) {
       fitter.enter(groups.cells()[c]);
       for (std::uint32_t n = groups.ranges()[c].first; n < groups.ranges()[c].last; ++n) {

@@ -34,7 +34,7 @@ constexpr std::uint32_t hilbert_cells = 4096;  // cells per side
 constexpr unsigned hilbert_bits = 24;
 
 // Index of a cell of a 4096 x 4096 square on the Hilbert curve (Hilbert 1891).
-std::uint32_t hilbert_place(std::uint32_t x, std::uint32_t y) {
+std::uint32_t hilbert_index(std::uint32_t x, std::uint32_t y) {
   std::uint32_t place = 0;
   for (std::uint32_t bit = hilbert_cells / 2; bit > 0; bit /= 2) {
     const std::uint32_t right = (x & bit) != 0 ? 1 : 0;
@@ -76,7 +76,7 @@ void sort_along_hilbert(const Points& points, Indices& members) {
   items.reserve(members.size());
   for (const std::uint32_t i : members)
     items.push_back(
-        {hilbert_place(cell(points[i].x() - low.x()), cell(points[i].y() - low.y())), i});
+        {hilbert_index(cell(points[i].x() - low.x()), cell(points[i].y() - low.y())), i});
   radix_sort(items, hilbert_bits, [](const Item& item) { return item.place; });
   for (std::size_t n = 0; n < items.size(); ++n) members[n] = items[n].index;
 }

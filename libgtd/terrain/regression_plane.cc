@@ -204,7 +204,7 @@ constexpr std::size_t cells_per_chunk = 4096;
 constexpr double max_median_ratio = 0.5;
 constexpr double min_cosine = 0.7071067811865476;  // to the start's normal: 45 deg
 constexpr int hypotheses = 500;
-constexpr std::size_t max_looked_at = 4000;
+constexpr std::size_t max_sampled = 4000;
 constexpr int max_steps = 200;
 constexpr double converged_rad = 1e-9;
 
@@ -222,7 +222,7 @@ std::vector<Vector3d> cell_means(const libmap::PointStream& points, const Fitted
     for (const Vector3d& position : block.positions) {
       if (!position.allFinite()) continue;
       const Vector3d place = start.axes.transpose() * (position - start.centroid) / start.extent_m;
-      libmap::VoxelPlace voxel;
+      libmap::VoxelSide voxel;
       for (int axis = 0; axis < 3; ++axis)
         voxel.cell[axis] = static_cast<int>(std::llround(place[axis] * cells_per_extent));
       const std::uint32_t cell = cells.find_or_add(pack(voxel));
@@ -273,16 +273,16 @@ double median_height(const std::vector<Vector3d>& places, const Plane& plane) {
 // Least median of squares (Rousseeuw 1984): of planes through three positions, the plane with the
 // minimum median of the absolute heights, on a subsample of positions.
 Plane least_median(const std::vector<Vector3d>& places, const Plane& start) {
-  std::vector<Vector3d> looked_at;
-  const std::size_t step = places.size() / max_looked_at + 1;
-  for (std::size_t n = 0; n < places.size(); n += step) looked_at.push_back(places[n]);
+  std::vector<Vector3d> sampled;
+  const std::size_t step = places.size() / max_sampled + 1;
+  for (std::size_t n = 0; n < places.size(); n += step) sampled.push_back(places[n]);
   libmap::RandomStream random(1, 0);
   Plane best = start;
-  double least = median_height(looked_at, start);
+  double least = median_height(sampled, start);
   for (int n = 0; n < hypotheses; ++n) {
-    const Vector3d& a = looked_at[random.below(looked_at.size())];
-    const Vector3d& b = looked_at[random.below(looked_at.size())];
-    const Vector3d& c = looked_at[random.below(looked_at.size())];
+    const Vector3d& a = sampled[random.below(sampled.size())];
+    const Vector3d& b = sampled[random.below(sampled.size())];
+    const Vector3d& c = sampled[random.below(sampled.size())];
     Plane plane;
     plane.normal = (b - a).cross(c - a);
     const double length = plane.normal.norm();
@@ -290,7 +290,7 @@ Plane least_median(const std::vector<Vector3d>& places, const Plane& start) {
     plane.normal /= plane.normal.dot(start.normal) < 0.0 ? -length : length;
     if (!(plane.normal.dot(start.normal) > min_cosine)) continue;
     plane.offset = plane.normal.dot(a);
-    const double median = median_height(looked_at, plane);
+    const double median = median_height(sampled, plane);
     if (median >= least) continue;
     least = median;
     best = plane;

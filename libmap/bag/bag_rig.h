@@ -70,7 +70,8 @@ std::vector<std::string> names_in_rig_folder(const BagRigPlan& plan);
 struct BagRigExport {
   std::size_t images = 0;
   std::vector<SynchronizedSet> sets{};  // sets of the plan without unusable images
-  std::size_t pixels_beyond = 0;  // pixels whose depth exceeds 16 bits at the camera's depth scale
+  std::size_t overflow_pixels =
+      0;  // pixels whose depth exceeds 16 bits at the camera's depth scale
   // Number of unusable images, and the reason for the first one of each camera.
   std::size_t broken = 0;
   std::vector<std::string> warnings{};

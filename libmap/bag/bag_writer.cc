@@ -133,7 +133,7 @@ void write_bag(const fs::path& path, BagFormat format, const BagContent& content
     message.header = header(cloud.frame);
     bag.write(cloud.topic, message.header, message, true);
   }
-  for (const BagPlaces& places : content.places) {
+  for (const BagTargets& places : content.places) {
     const Header own = header(places.frame);
     bag.write(places.marker_topic, own, encode_markers(places, own), true);
     ros_message::PoseArray poses = encode_poses(places.places);

@@ -92,16 +92,16 @@ ros_message::TransformStamped encode_transform(const BagTransform& transform) {
   return message;
 }
 
-ros_message::PoseArray encode_poses(const std::vector<BagPlace>& places) {
+ros_message::PoseArray encode_poses(const std::vector<BagTarget>& places) {
   ros_message::PoseArray message;
-  for (const BagPlace& place : places) {
+  for (const BagTarget& place : places) {
     message.poses.push_back(
         {to_ros_point(place.place), to_ros_rotation(axes_along(place.direction))});
   }
   return message;
 }
 
-ros_message::MarkerArray encode_markers(const BagPlaces& places,
+ros_message::MarkerArray encode_markers(const BagTargets& places,
                                         const ros_message::Header& header) {
   ros_message::MarkerArray message;
   const double length = places.arrow_m;
@@ -109,7 +109,7 @@ ros_message::MarkerArray encode_markers(const BagPlaces& places,
   balls.scale = {{length / 4, length / 4, length / 4}};
   balls.color.a = 1.0F;
   std::int32_t id = 0;
-  for (const BagPlace& place : places.places) {
+  for (const BagTarget& place : places.places) {
     balls.points.push_back(to_ros_point(place.place));
     balls.colors.push_back(to_ros_color(place.color));
     Marker arrow = marker_of("approach", id, Marker::ARROW, header);

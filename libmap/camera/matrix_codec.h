@@ -56,8 +56,8 @@ inline constexpr std::uint64_t max_matrix_bytes = std::uint64_t{1} << 26;
 StoredMatrix decode_matrix(std::string_view blob);
 // Decodes a matrix of any size piecewise, in constant memory. All pieces except the last have a
 // multiple of 8 bytes. Throws Error as decode_matrix does.
-void each_matrix_piece(std::string_view blob,
-                       const std::function<void(std::string_view bytes)>& use);
+void for_each_matrix_chunk(std::string_view blob,
+                           const std::function<void(std::string_view bytes)>& use);
 std::string encode_matrix(const StoredMatrix& matrix);
 
 // Decodes a text, stored as a matrix of one row of int8 ending with NUL. Throws Error for any other

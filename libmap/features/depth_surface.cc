@@ -195,7 +195,7 @@ std::optional<Eigen::Vector2d> DepthSurface::place_of(
       (camera_.fy * point_in_camera.y() / point_in_camera.z() + camera_.cy) / step_px_);
 }
 
-bool DepthSurface::seen_at(const Eigen::Vector3d& point_in_camera, SurfacePatch& element) const {
+bool DepthSurface::nearest_to(const Eigen::Vector3d& point_in_camera, SurfacePatch& element) const {
   const auto place = place_of(point_in_camera);
   if (!place) return false;
   const double column = std::round(place->x());
@@ -204,13 +204,14 @@ bool DepthSurface::seen_at(const Eigen::Vector3d& point_in_camera, SurfacePatch&
   return at(static_cast<int>(column), static_cast<int>(row), element);
 }
 
-bool DepthSurface::met_at(const Eigen::Vector3d& point_in_camera, SurfacePatch& element) const {
+bool DepthSurface::interpolated_at(const Eigen::Vector3d& point_in_camera,
+                                   SurfacePatch& element) const {
   const auto place = place_of(point_in_camera);
   if (!place) return false;
   const double left = std::floor(place->x());
   const double top = std::floor(place->y());
   if (!(left >= 0.0 && left < columns_ - 1 && top >= 0.0 && top < rows_ - 1))
-    return seen_at(point_in_camera, element);
+    return nearest_to(point_in_camera, element);
   const double u = place->x() - left;
   const double v = place->y() - top;
   const Eigen::Vector3d ray = point_in_camera / point_in_camera.z();
@@ -223,7 +224,7 @@ bool DepthSurface::met_at(const Eigen::Vector3d& point_in_camera, SurfacePatch& 
     const int down = corner >> 1;
     SurfacePatch plane;
     if (!at(static_cast<int>(left) + right, static_cast<int>(top) + down, plane))
-      return seen_at(point_in_camera, element);
+      return nearest_to(point_in_camera, element);
     const double weight = (right == 1 ? u : 1.0 - u) * (down == 1 ? v : 1.0 - v);
     const double met_m = plane.normal.dot(plane.point) / plane.normal.dot(ray);
     least_m = std::min(least_m, met_m);
@@ -233,7 +234,7 @@ bool DepthSurface::met_at(const Eigen::Vector3d& point_in_camera, SurfacePatch& 
     blend.noise_m += weight * plane.noise_m;
   }
   if (!(least_m > 0.0 && most_m - least_m < most_step * most_m))
-    return seen_at(point_in_camera, element);
+    return nearest_to(point_in_camera, element);
   element = blend;
   element.point = depth_m * ray;
   element.normal.normalize();

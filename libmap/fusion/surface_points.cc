@@ -267,7 +267,7 @@ void PointMaker::spread_contradiction() {
     if (block_of[n] == VoxelIndex::none || is_contradicted_[n] != 0 || is_moved[block_of[n]] == 0)
       continue;
     is_contradicted_[n] = 1;
-    counts_.beside += wanted(surface_.elements[n]);
+    counts_.contradicted += wanted(surface_.elements[n]);
   }
 }
 
@@ -279,7 +279,7 @@ bool PointMaker::is_confirmed(const SurfaceElement& element, const RefinedElemen
   }
   if (element.extended &&
       std::abs(static_cast<double>(refined.shift_m)) > max_extended_shift * voxel_size_m_) {
-    counts_.bent_away += wanted(element);
+    counts_.beyond_edge += wanted(element);
     return false;
   }
   return true;
@@ -329,7 +329,7 @@ void PointMaker::drop_echoes() {
   std::vector<char> is_surplus(points_.size(), 0);
   parallel_for(points_.size(), 4096, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
-      VoxelPlace place = unpack(index_.keys()[n]);
+      VoxelSide place = unpack(index_.keys()[n]);
       int axis = 2;
       points_[n].normal.cwiseAbs().maxCoeff(&axis);
       place.cell[axis] -= 1;

@@ -11,7 +11,7 @@
 
 namespace libmap {
 
-SurfaceVoxels::Sum& SurfaceVoxels::side_of(const VoxelPlace& place, const Eigen::Vector3f& normal) {
+SurfaceVoxels::Sum& SurfaceVoxels::side_of(const VoxelSide& place, const Eigen::Vector3f& normal) {
   std::uint32_t number = index_.find_or_add(pack({place.cell, 0}));
   if (number < sums_.size() && sums_[number].normal.dot(normal) < 0.0F)
     number = index_.find_or_add(pack({place.cell, 1}));
@@ -42,7 +42,7 @@ SurfaceVoxels SurfaceVoxels::in(const TileMask& cells) const {
 
 void SurfaceVoxels::merge(const Frame& frame, const TileMask& cells) {
   for (std::size_t n = 0; n < frame.sums.size(); ++n) {
-    const VoxelPlace place = unpack(frame.keys[n]);
+    const VoxelSide place = unpack(frame.keys[n]);
     if (!cells.has_cell(place.cell.head<2>())) continue;
     const Sum& more = frame.sums[n];
     Sum& sum = side_of(place, more.normal);
@@ -63,7 +63,7 @@ struct Piece {
   Eigen::Vector3f normal = Eigen::Vector3f::Zero();
   int axis = 2;                   // of the column
   float height = 0.0F;            // along the axis, on the column's center line
-  bool speaks = false;            // selected for its column
+  bool is_selected = false;       // selected for its column
   std::array<bool, 4> is_edge{};  // true for neighboring columns without surface
 };
 
@@ -72,8 +72,8 @@ class ElementMaker {
   ElementMaker(const SurfaceVoxels& voxels, bool extend) : voxels_(voxels), pieces_(voxels.size()) {
     each_piece([&](std::size_t n) { pieces_[n] = piece_of(n); });
     each_piece([&](std::size_t n) {
-      pieces_[n].speaks = speaks_for_column(n);
-      for (std::size_t step = 0; extend && pieces_[n].speaks && step < 4; ++step)
+      pieces_[n].is_selected = speaks_for_column(n);
+      for (std::size_t step = 0; extend && pieces_[n].is_selected && step < 4; ++step)
         pieces_[n].is_edge[step] = is_empty(neighbor(n, step), pieces_[n]);
     });
   }
@@ -81,8 +81,8 @@ class ElementMaker {
   std::vector<SurfaceElement> run() {
     for (std::size_t n = 0; n < pieces_.size(); ++n) {
       const Piece& piece = pieces_[n];
-      if (!piece.speaks) continue;
-      const VoxelPlace place = unpack(key_of(n));
+      if (!piece.is_selected) continue;
+      const VoxelSide place = unpack(key_of(n));
       found_.emplace_back(z_order(key_of(n)),
                           element(place.cell, piece.axis, piece.height, piece.normal, false));
       for (std::size_t step = 0; step < 4; ++step)
@@ -90,7 +90,7 @@ class ElementMaker {
     }
     for (std::size_t n = 0; n < beside_.size(); ++n) {
       const Beside& one = beside_[n];
-      const VoxelPlace place = unpack(beside_index_.keys()[n]);
+      const VoxelSide place = unpack(beside_index_.keys()[n]);
       found_.emplace_back(
           z_order(beside_index_.keys()[n]),
           element(place.cell, one.axis, one.height / one.weight, one.normal.normalized(), true));
@@ -136,7 +136,7 @@ class ElementMaker {
 
   bool speaks_for_column(std::size_t n) const {
     const Piece& piece = pieces_[n];
-    const VoxelPlace place = unpack(key_of(n));
+    const VoxelSide place = unpack(key_of(n));
     const int cell = place.cell[piece.axis];
     for (const int beside : {cell - 1, cell + 1}) {
       const auto other = piece_at(place.cell, piece.axis, beside, piece.normal);
@@ -152,7 +152,7 @@ class ElementMaker {
 
   // Continuation of a piece in an adjacent column.
   struct Neighbor {
-    VoxelPlace place;
+    VoxelSide place;
     float height = 0.0F;
   };
 

@@ -43,7 +43,7 @@ class SurfaceVoxels {
   const std::vector<Sum>& sums() const { return sums_; }
 
  private:
-  Sum& side_of(const VoxelPlace& place, const Eigen::Vector3f& normal);
+  Sum& side_of(const VoxelSide& place, const Eigen::Vector3f& normal);
 
   VoxelIndex index_;
   std::vector<Sum> sums_;

@@ -25,8 +25,8 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
-#include "libmap/core/guarded_process.h"
 #include "libmap/core/output_lock.h"
+#include "libmap/core/sandboxed_process.h"
 #include "libmap/core/text.h"
 #include "libmap/io/corner_key.h"
 
@@ -369,21 +369,21 @@ auto decode(const std::string& format, const Read& read, const Take& take) {
 DecodedModel decode_guarded(std::uint64_t file_bytes, const std::function<DecodedModel()>& decode) {
   // Memory for assimp's scene, the mesh and its bytes; a line of OBJ needs some hundred bytes.
   const std::uint64_t memory = (std::uint64_t{1} << 30) + 100 * file_bytes;
-  return run_guarded<DecodedModel>(memory, "is broken: the library for its format crashed on it",
-                                   decode, [](auto& pipe, DecodedModel& decoded) {
-                                     TexturedMesh& model = decoded.model;
-                                     pipe.array(model.mesh.vertices);
-                                     pipe.array(model.mesh.triangles);
-                                     pipe.array(model.mesh.vertex_normals);
-                                     pipe.array(model.mesh.vertex_colors);
-                                     pipe.array(model.texture_coordinates);
-                                     pipe.array(model.page_of_triangle);
-                                     pipe.size(decoded.pictures);
-                                     for (TexturePicture& picture : decoded.pictures) {
-                                       pipe.array(picture.bytes);
-                                       pipe.array(picture.path);
-                                     }
-                                   });
+  return run_sandboxed<DecodedModel>(memory, "is broken: the library for its format crashed on it",
+                                     decode, [](auto& pipe, DecodedModel& decoded) {
+                                       TexturedMesh& model = decoded.model;
+                                       pipe.array(model.mesh.vertices);
+                                       pipe.array(model.mesh.triangles);
+                                       pipe.array(model.mesh.vertex_normals);
+                                       pipe.array(model.mesh.vertex_colors);
+                                       pipe.array(model.texture_coordinates);
+                                       pipe.array(model.page_of_triangle);
+                                       pipe.size(decoded.pictures);
+                                       for (TexturePicture& picture : decoded.pictures) {
+                                         pipe.array(picture.bytes);
+                                         pipe.array(picture.path);
+                                       }
+                                     });
 }
 
 Error not_written(const Assimp::Exporter& exporter) {

@@ -88,7 +88,7 @@ struct DiskSamples {
 // radius cover 0.547 of the plane.
 inline constexpr double saturation_density = 0.6965;
 // Approximate share of the samples that darts over the whole surface find.
-inline constexpr double share_of_darts = 0.808;
+inline constexpr double dart_fraction = 0.808;
 
 // Throws darts over the whole surface. Then, if goes_on(samples so far), it fills the gaps;
 // otherwise the samples are not maximal. Throws Error if the mesh is too large for the radius.

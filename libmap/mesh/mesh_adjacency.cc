@@ -170,7 +170,7 @@ std::vector<std::vector<HalfEdge>> boundary_loops(const std::vector<Triangle>& t
   return loops;
 }
 
-void grow_marks(const TriangleMesh& mesh, int rings, std::vector<bool>& marks) {
+void dilate_mask(const TriangleMesh& mesh, int rings, std::vector<bool>& marks) {
   std::vector<bool> touched(mesh.vertices.size());
   for (int ring = 0; ring < rings; ++ring) {
     touched.assign(mesh.vertices.size(), false);

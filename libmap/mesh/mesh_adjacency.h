@@ -74,7 +74,7 @@ std::vector<std::vector<HalfEdge>> boundary_loops(const std::vector<Triangle>& t
                                                   const std::vector<HalfEdge>& opposite);
 
 // Dilates the marks by `rings` rings of triangles that share a vertex with a marked triangle.
-void grow_marks(const TriangleMesh& mesh, int rings, std::vector<bool>& marks);
+void dilate_mask(const TriangleMesh& mesh, int rings, std::vector<bool>& marks);
 
 // Largest distance between two points, m. For more than 2,000 points it is up to 0.2 % too small.
 double diameter_of(const std::vector<Eigen::Vector3d>& points);

@@ -54,7 +54,7 @@ Color blended(const std::array<Color, N>& colors, const std::array<double, N>& w
 template <std::size_t N>
 double blended(const ScalarField& field, const std::array<std::uint32_t, N>& vertices,
                const std::array<double, N>& weights) {
-  if (is_whole(field.type)) {
+  if (is_integer(field.type)) {
     const auto nearest = std::max_element(weights.begin(), weights.end()) - weights.begin();
     return field.values[vertices[static_cast<std::size_t>(nearest)]];
   }

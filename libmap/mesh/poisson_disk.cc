@@ -120,7 +120,7 @@ class CountSearch {
   RandomStream random_;
   double radius_ = 0.0;
   double thrown_ = 0.0;
-  double share_of_darts_ = share_of_darts;
+  double share_of_darts_ = dart_fraction;
   bool is_full_ = false;  // the last try filled the gaps
   double too_small_ = 0.0;
   double too_large_ = std::numeric_limits<double>::infinity();

@@ -21,7 +21,7 @@ struct ReferenceSurface::Shape {
   Shape(const Shape&) = delete;
   Shape& operator=(const Shape&) = delete;
   virtual ~Shape() = default;
-  virtual NearestPlace nearest(const Eigen::Vector3d& point) const = 0;
+  virtual NearestSurfacePoint nearest(const Eigen::Vector3d& point) const = 0;
 };
 
 namespace {
@@ -81,10 +81,10 @@ struct ReferenceSurface::MeshShape : Shape {
     return result;
   }
 
-  NearestPlace nearest(const Eigen::Vector3d& point) const override {
+  NearestSurfacePoint nearest(const Eigen::Vector3d& point) const override {
     constexpr double on_edge = 1e-6;  // barycentric coordinates below this are on the edge
     const SurfacePoint found = surface.nearest(point);
-    NearestPlace place{found.position, Eigen::Vector3d::Zero(), found.distance_m, false};
+    NearestSurfacePoint place{found.position, Eigen::Vector3d::Zero(), found.distance_m, false};
     const std::uint32_t t = found.triangle;
     const std::array<double, 3> share = shares(t, found.position);
     std::size_t zeros = 0;
@@ -138,11 +138,11 @@ struct ReferenceSurface::CloudShape : Shape {
     }
   }
 
-  NearestPlace nearest(const Eigen::Vector3d& point) const override {
+  NearestSurfacePoint nearest(const Eigen::Vector3d& point) const override {
     const NeighborPoint neighbor = tree->nearest(point);
     const Eigen::Vector3d& center = points[neighbor.index];
     const Eigen::Vector3d& normal = normals[neighbor.index];
-    NearestPlace place{center, normal, 0.0, false};
+    NearestSurfacePoint place{center, normal, 0.0, false};
     if (normal.squaredNorm() > 0.0) {
       const Eigen::Vector3d offset = point - center;
       const Eigen::Vector3d along = offset - offset.dot(normal) * normal;
@@ -165,7 +165,7 @@ ReferenceSurface& ReferenceSurface::operator=(ReferenceSurface&&) noexcept = def
 
 bool ReferenceSurface::is_oriented() const { return shape_->is_oriented; }
 const Bounds3d& ReferenceSurface::bounds() const { return shape_->bounds; }
-NearestPlace ReferenceSurface::nearest(const Eigen::Vector3d& point) const {
+NearestSurfacePoint ReferenceSurface::nearest(const Eigen::Vector3d& point) const {
   return shape_->nearest(point);
 }
 
@@ -173,7 +173,7 @@ PointDistances distances_to(const ReferenceSurface& surface,
                             const std::vector<Eigen::Vector3d>& points) {
   PointDistances distances{std::vector<double>(points.size()), std::vector<double>(points.size())};
   parallel_each(points.size(), points_per_chunk, [&](std::size_t n) {
-    const NearestPlace place = surface.nearest(points[n]);
+    const NearestSurfacePoint place = surface.nearest(points[n]);
     distances.distance_m[n] = place.distance_m;
     distances.signed_distance_m[n] =
         surface.is_oriented() ? place.signed_distance_m(points[n]) : place.distance_m;

@@ -46,7 +46,7 @@ std::vector<Eigen::Vector3d> downsampled(const std::vector<Eigen::Vector3d>& poi
 
 struct Pair {
   Eigen::Vector3d point;  // moved
-  NearestPlace place;
+  NearestSurfacePoint place;
   double weight = 0.0;
 };
 

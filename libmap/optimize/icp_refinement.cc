@@ -98,7 +98,7 @@ class Alignment {
     const auto pose = result_.map_from_base.find(frames_[frame].node);
     return pose == result_.map_from_base.end() ? nullptr : &pose->second;
   }
-  PairEquations half_of(const std::vector<BaseElement>& samples, std::size_t onto,
+  PairEquations half_of(const std::vector<PlacedElement>& samples, std::size_t onto,
                         const Pose& onto_from_from, bool from_is_a, double max_distance_m,
                         std::uint64_t cell_share) const;
   std::vector<PairEquations> all_equations(double max_distance_m, std::uint64_t cell_share) const;
@@ -120,15 +120,15 @@ class Alignment {
 
 // Equations of a frame's samples against the planes of `onto`, in steps (t, r) of a_from_b. If the
 // frame is b, a sample p moves to p + t + r x p before a_from_b; if it is a, by the inverse.
-PairEquations Alignment::half_of(const std::vector<BaseElement>& samples, std::size_t onto,
+PairEquations Alignment::half_of(const std::vector<PlacedElement>& samples, std::size_t onto,
                                  const Pose& onto_from_from, bool from_is_a, double max_distance_m,
                                  std::uint64_t cell_share) const {
   PairEquations equations;
   const double min_cosine = std::cos(options_.max_normal_angle_deg * std::numbers::pi / 180.0);
-  for (const BaseElement& sample : samples) {
+  for (const PlacedElement& sample : samples) {
     const Eigen::Vector3d point = onto_from_from * sample.point;
-    BaseElement plane;
-    if (!seen_from_base(frames_[onto], point, plane)) continue;
+    PlacedElement plane;
+    if (!element_at(frames_[onto], point, plane)) continue;
     const Eigen::Vector3d normal = onto_from_from.linear() * sample.normal;
     if (plane.normal.dot(normal) < min_cosine) continue;
     const double distance = plane.normal.dot(point - plane.point);
@@ -226,7 +226,7 @@ std::vector<PairEquations> Alignment::all_equations(double max_distance_m,
   std::vector<PairEquations> of_second(pairs_.size());
   parallel_each(frames_.size(), [&](std::size_t frame) {
     if (pairs_of_frame[frame].empty()) return;
-    const std::vector<BaseElement> samples =
+    const std::vector<PlacedElement> samples =
         surface_samples(frames_[frame], options_.samples, SampleUse::estimation);
     for (const std::size_t n : pairs_of_frame[frame]) {
       const bool is_a = pairs_[n].first == frame;
@@ -393,11 +393,11 @@ IcpResult Alignment::run(const std::vector<PoseLink>& links, Progress& progress)
 double agreement_of(const FrameFeatures& a, const FrameFeatures& b, const Pose& b_from_a) {
   double seen = 0.0;
   double agreed = 0.0;
-  for (const BaseElement& sample :
+  for (const PlacedElement& sample :
        surface_samples(a, pair_agreement_samples, SampleUse::estimation)) {
-    BaseElement element;
+    PlacedElement element;
     const Eigen::Vector3d point = b_from_a * sample.point;
-    if (!seen_from_base(b, point, element)) continue;
+    if (!element_at(b, point, element)) continue;
     const double above = element.normal.dot(point - element.point);
     const double allowed = pair_agreement_m + 3.0 * std::hypot(element.noise_m, sample.noise_m);
     if (above < -allowed) continue;

@@ -60,7 +60,7 @@ MeasuredPlace measured_place(const KnownLength::Place& place,
            "0:0 to " + std::to_string(camera.width - 1) + ":" + std::to_string(camera.height - 1));
   SurfacePatch element;
   if (frame.surfaces.empty() ||
-      !frame.surfaces.front().seen_at(guessed_depth_m * ray->homogeneous(), element))
+      !frame.surfaces.front().nearest_to(guessed_depth_m * ray->homogeneous(), element))
     refuse(place, "no depth was measured there", "a pixel on a surface");
   // Intersects the ray with the plane of the nearest element.
   const double depth = element.normal.dot(element.point) / element.normal.dot(ray->homogeneous());

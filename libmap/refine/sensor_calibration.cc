@@ -121,7 +121,7 @@ BundleAdjustmentOptions with_free(const CalibrationParts& parts, BundleAdjustmen
 constexpr int max_rounds = 4;
 // Motions are estimated in windows of consecutive frames.
 constexpr std::size_t frames_per_window = 64;
-constexpr std::size_t frames_beside = 8;    // margin on each side, whose motions are not used
+constexpr std::size_t window_margin = 8;    // margin on each side, whose motions are not used
 constexpr double max_interpolated_s = 1.0;  // maximum gap for interpolating motions
 constexpr int motion_rounds = 2;            // other motions hit other points of the depth planes
 // Minimum relative gain in the held-out costs; faults of a sensor change them by tens of percent. A
@@ -154,7 +154,7 @@ Candidate try_model(const CalibrationParts& model, const SubScan& part,
                                          part.components, free, {}, start);
     const SensorCalibration& found = candidate.adjustment.calibration;
     if (!model.registration && !model.timing) break;
-    if (takes_depth_from_near(start, found, 1e-4, 5e-5, 3e-4)) break;
+    if (is_similar_registration(start, found, 1e-4, 5e-5, 3e-4)) break;
     poses = candidate.adjustment.map_from_base;
     start = found;
   }
@@ -336,7 +336,7 @@ CalibrationEstimate ModelSearch::run() {
     if (timed_ && (!is_good(best_) || is_needed(best_.costs, timed_->costs, min_timing_gain)))
       use_timing_alone();
   }
-  if (is_good(best_) && choice_.settle) {
+  if (is_good(best_) && choice_.converge) {
     Candidate settled = try_model(best_.model, part_, options_, best_.adjustment.calibration,
                                   best_.adjustment.map_from_base, 1);
     if (is_good(settled)) best_ = std::move(settled);
@@ -383,24 +383,25 @@ BundleAdjustmentResult vary_calibration(const CalibrationInput& input,
   return result;
 }
 
-void find_motions(const CalibrationInput& input, bool hold_poses, SensorCalibration& calibration) {
+void estimate_motions(const CalibrationInput& input, bool fixes_poses,
+                      SensorCalibration& calibration) {
   const std::vector<FrameFeatures>& frames = input.frames;
   BundleAdjustmentOptions moving = with_free(parts_of(calibration), input.options);
-  moving.hold_poses = hold_poses;
-  moving.refine_timing = moving.hold_cameras = true;
+  moving.fixes_poses = fixes_poses;
+  moving.refine_timing = moving.fixes_cameras = true;
   moving.tolerance = rough_tolerance;
   SensorCalibration start = calibration;
   std::map<int, Vector6d> motions;
   for (std::size_t first = 0; first < frames.size(); first += frames_per_window) {
     std::set<std::size_t> window;
     const std::size_t end = std::min(frames.size(), first + frames_per_window);
-    for (std::size_t f = first - std::min(first, frames_beside);
-         f < std::min(frames.size(), end + frames_beside); ++f)
+    for (std::size_t f = first - std::min(first, window_margin);
+         f < std::min(frames.size(), end + window_margin); ++f)
       window.insert(f);
     const SubScan part = sub_scan_of(input, window);
     std::map<int, Pose> poses = part.poses;
     start.motion = calibration.motion;
-    for (int round = 0; round < (hold_poses ? 1 : motion_rounds); ++round) {
+    for (int round = 0; round < (fixes_poses ? 1 : motion_rounds); ++round) {
       BundleAdjustmentResult adjusted =
           adjust_bundle(part.frames, part.tracks.tracks, poses, part.graph_links, part.components,
                         moving, {}, start);
@@ -417,8 +418,8 @@ void find_motions(const CalibrationInput& input, bool hold_poses, SensorCalibrat
   interpolate_motions(frames, calibration.motion);
 }
 
-bool takes_depth_from_near(const SensorCalibration& a, const SensorCalibration& b, double shift_m,
-                           double turn_rad, double time_s) {
+bool is_similar_registration(const SensorCalibration& a, const SensorCalibration& b, double shift_m,
+                             double turn_rad, double time_s) {
   const std::size_t cameras = std::max(
       {a.color_from_depth.size(), b.color_from_depth.size(), a.timing.size(), b.timing.size()});
   const auto pose_of = [](const SensorCalibration& of, std::size_t n) {
@@ -473,7 +474,8 @@ std::vector<std::string> findings(const SensorCalibration& calibration,
   };
   for (std::size_t n = 0; n < std::min(calibration.intrinsics.size(), cameras.size()); ++n) {
     const IntrinsicsStep& step = calibration.intrinsics[n];
-    const double percent = 100.0 * (1.0 / (1.0 + 0.5 * (step.fx_share + step.fy_share)) - 1.0);
+    const double percent =
+        100.0 * (1.0 / (1.0 + 0.5 * (step.fx_relative + step.fy_relative)) - 1.0);
     sentences.push_back(of_camera(n) + "stored focal length " +
                         to_fixed_text(std::abs(percent), 2) + " % too " +
                         (percent > 0.0 ? "large" : "small") + ", principal point off by " +

@@ -259,7 +259,7 @@ class Reader {
 
   void add_sources(ReportContent& content) {
     content.sources = manifests_below(root_, false);
-    const std::string itself = options_.left_out.lexically_normal().string();
+    const std::string itself = options_.excluded.lexically_normal().string();
     std::erase_if(content.sources, [&](const ReportSource& source) {
       return fs::path(source.output).lexically_normal() == itself ||
              source.manifest.command == "report";

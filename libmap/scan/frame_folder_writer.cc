@@ -43,7 +43,7 @@ void make_folder(const fs::path& folder) {
 
 // True if stamps identify the poses of a trajectory. Nodes without a pose must be too far in time
 // from the poses of other nodes to be assigned one.
-bool do_stamps_tell_nodes(const PoseGraph& graph, const Trajectory& trajectory) {
+bool stamps_identify_nodes(const PoseGraph& graph, const Trajectory& trajectory) {
   const double pairing_tolerance_s = FrameFolderOptions().pairing_tolerance_s;
   std::set<double> stamps;
   for (const GraphNode& node : graph.nodes) stamps.insert(node.stamp_s);
@@ -166,7 +166,7 @@ void FrameFolderWriter::write_poses(const PoseGraph& graph) const {
   for (const auto& [source, name] : sources) {
     const Trajectory trajectory = trajectory_of(graph, source);
     if (trajectory.empty()) continue;
-    const bool with_nodes = !do_stamps_tell_nodes(graph, trajectory);
+    const bool with_nodes = !stamps_identify_nodes(graph, trajectory);
     write_text(folder_ / name, to_tum(trajectory, with_nodes));
   }
   Trajectory vertices = trajectory_of(graph, PoseSource::optimized);

@@ -217,8 +217,8 @@ void bind_to_nodes(const std::vector<CameraPose>& cameras, ImportedPoses& result
   for (const auto& [node, candidates] : poses) {
     const Pose mean = mean_of(candidates);
     for (const Pose& pose : candidates)
-      result.largest_rig_deviation_m = std::max(result.largest_rig_deviation_m,
-                                                (pose.translation() - mean.translation()).norm());
+      result.max_rig_deviation_m =
+          std::max(result.max_rig_deviation_m, (pose.translation() - mean.translation()).norm());
     result.trajectory.poses.push_back({node, stamps.at(node), mean});
   }
 }
@@ -303,7 +303,7 @@ ImportedPoses import_poses(const fs::path& path, const ScanSource& scan,
       cameras = poses_of_images(file.images, scan, result.warnings);
       result.poses_in_file = file.images.size();
     }
-    result.trajectory.foreign = result.poses_in_file - cameras.size();
+    result.trajectory.unmatched = result.poses_in_file - cameras.size();
     const std::map<int, Pose> own = own_poses(scan.graph());
     result.scale = options.scale > 0.0 ? options.scale : fitting_scale(cameras, own);
     bind_to_nodes(cameras, result);

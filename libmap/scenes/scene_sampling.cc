@@ -83,17 +83,18 @@ class Sampler {
     const double tiles_x = bent ? steps_of(2.0 * face.half_x, 12.0 * spacing_) : 1.0;
     const double tiles_y = bent ? steps_of(2.0 * face.half_y, 12.0 * spacing_) : 1.0;
     const Eigen::Vector2d tile(2.0 * face.half_x / tiles_x, 2.0 * face.half_y / tiles_y);
-    double owed = 0.0;  // points missing so far because of rounding to whole rows
+    double missing_points = 0.0;  // points missing so far because of rounding to whole rows
     for (double j = 0.0; j < tiles_y; j += 1.0)
       for (double i = 0.0; i < tiles_x; i += 1.0)
         draw_tile(patch, {i * tile.x() - face.half_x, j * tile.y() - face.half_y}, tile, random,
-                  samples, owed);
+                  samples, missing_points);
   }
 
   void draw_tile(const Patch& patch, const Eigen::Vector2d& corner, const Eigen::Vector2d& tile,
-                 RandomStream& random, std::vector<SurfaceTruth>& samples, double& owed) const {
+                 RandomStream& random, std::vector<SurfaceTruth>& samples,
+                 double& missing_points) const {
     const Stretch stretch = stretch_of(patch, corner, tile);
-    const double wanted = tile.prod() * stretch.area / spacing_ / spacing_ + owed;
+    const double wanted = tile.prod() * stretch.area / spacing_ / spacing_ + missing_points;
     // The longer side compensates the rounding of the shorter one.
     const bool is_wide = tile.x() > tile.y();
     const double across =
@@ -101,7 +102,7 @@ class Sampler {
     const double along = std::max(1.0, std::round(wanted / across));
     const double columns = is_wide ? along : across;
     const double rows = is_wide ? across : along;
-    owed = wanted - columns * rows;
+    missing_points = wanted - columns * rows;
     for (double row = 0.0; row < rows; row += 1.0) {
       for (double column = 0.0; column < columns; column += 1.0) {
         const double x = corner.x() + tile.x() * (column + place(random)) / columns;

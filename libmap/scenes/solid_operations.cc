@@ -61,7 +61,7 @@ Solid to_solid(Mesh& mesh) {
     solid.triangles.push_back(triangle);
     solid.labels.push_back(labels[face]);
   }
-  return in_order(solid);
+  return sort_solid(solid);
 }
 
 // Copies the labels of faces to their parts and copies.
@@ -229,7 +229,7 @@ class FacetRefiner {
 
   Solid refine() {
     for (const auto& [label, region] : regions_of(solid_)) refine_region(region, label);
-    return in_order(result_);
+    return sort_solid(result_);
   }
 
  private:

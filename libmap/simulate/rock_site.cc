@@ -102,8 +102,7 @@ ParameterTable ground_parameters(SiteGround& ground) {
   ParameterTable table;
   table.add("size_x_m", ground.size_x_m, ground_size_range, "length along x, m");
   table.add("size_y_m", ground.size_y_m, ground_size_range, "length along y, m");
-  table.add("unevenness_m", ground.unevenness_m, Range{0.0, 1.0},
-            "maximum height of random relief, m");
+  table.add("unevenness_m", ground.relief_m, Range{0.0, 1.0}, "maximum height of random relief, m");
   table.add("tilt_deg", ground.tilt_deg, Range{0.0, 135.0},
             "tilt of the ground, degrees; 90: a wall");
   table.add("texture", ground.texture,
@@ -228,7 +227,7 @@ void place_rocks(RockSite& site, std::vector<RockToPlace> rocks) {
 }
 
 GroundRelief::GroundRelief(const RockSite& site)
-    : unevenness_m_(site.ground.unevenness_m), seed_(mix_bits(site.seed, 3)) {
+    : unevenness_m_(site.ground.relief_m), seed_(mix_bits(site.seed, 3)) {
   if (site.bumps.empty()) return;
   PrimitiveScene scene;
   scene.shapes.push_back({Plane{site.ground.size_x_m, site.ground.size_y_m}, {}, "ground"});

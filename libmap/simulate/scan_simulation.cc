@@ -169,8 +169,8 @@ ViewRange ScanCamera::range() const {
       1.0 + 0.01 * std::abs(faults.scale_percent) +
       far_deviations * (options_.depth.noise_of_range + options_.depth.noise_of_square * far_m);
   const double seen_m = far_m * widest + far_deviations * options_.depth.noise_m +
-                        std::abs(options_.depth.depth_offset_m) + std::abs(faults.wiggle_m) +
-                        std::abs(faults.corner_m);
+                        std::abs(options_.depth.depth_offset_m) +
+                        std::abs(faults.periodic_error_m) + std::abs(faults.corner_m);
   ViewRange range = view_range(rays_, seen_m);
   const ViewRange of_depth = view_range(depth_rays_, seen_m);
   range.rays.extend(of_depth.rays);

@@ -141,7 +141,7 @@ TerrainSurface::Square TerrainSurface::make(const Place& place) const {
   square.points = mesh.vertices.size();
   if (!mesh.triangles.empty())
     square.surface.emplace(mesh, TextureSource::rock, options_.texture_seed,
-                           ShadingNormals::of_vertices);
+                           ShadingNormals::per_vertex);
   return square;
 }
 
@@ -162,7 +162,7 @@ std::size_t TerrainSurface::points_in_memory() const {
 }
 
 // Drops the least recently used squares until at most kept_points are left.
-void TerrainSurface::forget() {
+void TerrainSurface::evict() {
   std::size_t points = points_in_memory();
   while (points > options_.kept_points) {
     const auto oldest = std::min_element(
@@ -188,7 +188,7 @@ std::vector<VisibleSurface> TerrainSurface::seen_from(
   for (const Place& place : all)
     if (const auto known = squares_.find(place); known != squares_.end())
       known->second.last_use = uses_;
-  forget();  // before loading more squares
+  evict();  // before loading more squares
   load(all);
   std::vector<VisibleSurface> surfaces;
   for (const std::vector<Place>& places : of_camera) {

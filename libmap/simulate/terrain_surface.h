@@ -66,7 +66,7 @@ class TerrainSurface {
                                     const ViewRange& range) const;
   Square make(const Place& place) const;
   void load(const std::vector<Place>& places);
-  void forget();
+  void evict();
 
   const PointTileStore& points_;
   const GroundHeights& heights_;

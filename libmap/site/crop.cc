@@ -110,9 +110,9 @@ void lay_rectangle(const Source& source, const CropOptions& options, const Pose&
   }
   const Pose turn = turn_about(source.middle, *options.yaw_deg);
   const Pose from_rectangle = turn_about(rectangle.center, rectangle.yaw_deg);
-  const PlanPolygon straight = make_rectangle(rectangle.center - half, rectangle.center + half);
+  const XyPolygon straight = make_rectangle(rectangle.center - half, rectangle.center + half);
   plan.cut_from_map = turn * level;
-  plan.prism.polygon = PlanPolygon(moved(straight.corners(), turn * from_rectangle));
+  plan.prism.polygon = XyPolygon(moved(straight.corners(), turn * from_rectangle));
 }
 
 void lay_border(const Source& source, const CropOptions& options, const Pose& level, Plan& plan) {
@@ -126,7 +126,7 @@ void lay_border(const Source& source, const CropOptions& options, const Pose& le
   const Pose turn = options.yaw_deg ? turn_about(source.middle, *options.yaw_deg)
                                     : turn_about(center, -yaw_of(corners));
   plan.cut_from_map = turn * level;
-  plan.prism.polygon = PlanPolygon(moved(corners, turn));
+  plan.prism.polygon = XyPolygon(moved(corners, turn));
 }
 
 // Plans the cut along the given box or polygon.
@@ -136,7 +136,7 @@ void lay_given(const Source& source, const CropOptions& options, const Pose& lev
     plan.site_from_cut = turned;
   else
     plan.cut_from_map = turned;
-  if (options.region == CropRegion::polygon) plan.prism.polygon = PlanPolygon(options.polygon);
+  if (options.region == CropRegion::polygon) plan.prism.polygon = XyPolygon(options.polygon);
   if (options.region != CropRegion::box) return;
   plan.prism.polygon = make_rectangle(options.box.min.head<2>(), options.box.max.head<2>());
   plan.prism.min_z = options.box.min.z();
@@ -145,7 +145,7 @@ void lay_given(const Source& source, const CropOptions& options, const Pose& lev
 
 // Moves the center of the outline's bounding box to x = y = 0.
 void center_outline(const CropOptions& options, Plan& plan) {
-  const PlanPolygon& outline = *plan.prism.polygon;
+  const XyPolygon& outline = *plan.prism.polygon;
   const Vector2d middle = (outline.min() + outline.max()) / 2.0;
   Pose shift = Pose::Identity();
   shift.translation().head<2>() = -middle;
@@ -157,7 +157,7 @@ void center_outline(const CropOptions& options, Plan& plan) {
   }
   std::vector<Vector2d> corners = outline.corners();
   for (Vector2d& corner : corners) corner -= middle;
-  plan.prism.polygon = PlanPolygon(std::move(corners));
+  plan.prism.polygon = XyPolygon(std::move(corners));
 }
 
 void require_sound(const CropOptions& options) {

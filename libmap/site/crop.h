@@ -12,8 +12,8 @@
 #include "libmap/geometry/normal_sides.h"
 #include "libmap/site/border_band.h"
 #include "libmap/site/ground_plane.h"
-#include "libmap/site/plan_polygon.h"
 #include "libmap/site/site_rectangle.h"
+#include "libmap/site/xy_polygon.h"
 
 namespace libmap {
 

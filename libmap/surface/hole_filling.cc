@@ -145,7 +145,7 @@ struct Reach {
 // For each loop, true if it is the outer boundary of its component.
 std::vector<bool> outer_boundaries(const TriangleMesh& mesh, const MeshComponents& components,
                                    const std::vector<BoundaryLoop>& loops,
-                                   const std::optional<PlanBox>& known) {
+                                   const std::optional<XyBox>& known) {
   constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
   std::vector<std::size_t> longest(components.areas_m2.size(), none);
   std::vector<double> length(components.areas_m2.size(), -1.0);
@@ -219,7 +219,7 @@ class HolePatcher {
     result.patch = patch_hole(
         positions, triangles, place_in(result.vertices, source_of(mesh_.triangles, loop[0])),
         place_in(result.vertices, target_of(mesh_.triangles, loop[0])), shape);
-    if (!stands(positions, triangles, result.patch)) result.patch = {};
+    if (!is_valid(positions, triangles, result.patch)) result.patch = {};
     return result;
   }
 
@@ -243,8 +243,8 @@ class HolePatcher {
   }
 
   // True if each edge of the patch has two triangles, and no triangle is degenerate.
-  bool stands(const std::vector<Eigen::Vector3d>& positions, const std::vector<Triangle>& around,
-              const HolePatch& patch) const {
+  bool is_valid(const std::vector<Eigen::Vector3d>& positions, const std::vector<Triangle>& around,
+                const HolePatch& patch) const {
     TriangleMesh joined;
     joined.vertices = positions;
     joined.vertices.insert(joined.vertices.end(), patch.new_vertices.begin(),
@@ -294,7 +294,7 @@ void append_patch_vertex(TriangleMesh& mesh, const Eigen::Vector3d& position,
       mesh.vertex_colors[added][c] = static_cast<std::uint8_t>(std::clamp(
           std::lround(mean([&](std::uint32_t v) { return mesh.vertex_colors[v][c]; })), 0L, 255L));
   for (ScalarField& field : mesh.vertex_fields)
-    if (!is_whole(field.type))
+    if (!is_integer(field.type))
       field.values[added] = mean([&](std::uint32_t v) { return field.values[v]; });
 }
 
@@ -356,7 +356,7 @@ std::vector<bool> free_patches(const TriangleMesh& base, const std::vector<Bound
 }  // namespace
 
 std::vector<bool> components_beyond(const TriangleMesh& mesh, const MeshComponents& components,
-                                    const std::optional<PlanBox>& known) {
+                                    const std::optional<XyBox>& known) {
   std::vector<bool> are_beyond(components.areas_m2.size(), false);
   if (!known) return are_beyond;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
@@ -367,7 +367,7 @@ std::vector<bool> components_beyond(const TriangleMesh& mesh, const MeshComponen
 }
 
 std::vector<BoundaryLoop> find_holes(const TriangleMesh& mesh, double max_hole_m,
-                                     const std::optional<PlanBox>& known) {
+                                     const std::optional<XyBox>& known) {
   const std::vector<HalfEdge> opposite = opposites_of(mesh);
   std::vector<BoundaryLoop> loops = boundary_loops(mesh.triangles, opposite);
   if (loops.empty()) return {};
@@ -379,7 +379,7 @@ std::vector<BoundaryLoop> find_holes(const TriangleMesh& mesh, double max_hole_m
     const std::vector<Eigen::Vector3d> positions = positions_of(mesh, loops[n]);
     Eigen::AlignedBox3d box;
     for (const Eigen::Vector3d& p : positions) box.extend(p);
-    if (known && !known->contains(PlanBox(box.min().head<2>(), box.max().head<2>()))) continue;
+    if (known && !known->contains(XyBox(box.min().head<2>(), box.max().head<2>()))) continue;
     // The longest side of the box is a lower bound of the diameter, its diagonal an upper bound.
     if (box.sizes().maxCoeff() > max_hole_m) continue;
     if (box.diagonal().norm() <= max_hole_m || diameter_of(positions) <= max_hole_m)

@@ -97,7 +97,7 @@ void mark_boundary(TriangleMesh& mesh) {
 }
 
 void remove_triangles(TriangleMesh& mesh, std::vector<bool> marks, int rings, double min_gap_m) {
-  grow_marks(mesh, rings, marks);
+  dilate_mask(mesh, rings, marks);
   const MeshComponents components = connected_components(mesh);
   mesh.face_fields.push_back(
       {std::string(component_field), ScalarType::float64,
@@ -134,7 +134,7 @@ void repair_intersections(double min_gap_m, MeshCleaningResult& result) {
     faces = bad_faces(mesh);
   }
   result.remaining_intersecting_triangles = count_of(faces);
-  result.open_places += new_loops(mesh).size();
+  result.unclosed_holes += new_loops(mesh).size();
   for (double& mark : filled_marks(mesh).values) {
     if (mark == 1.0) ++result.closing_triangles;
     if (mark != 0.0) mark = 1.0;

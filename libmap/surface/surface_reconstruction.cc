@@ -60,8 +60,8 @@ double max_known_spacing(const SurfaceReconstructionOptions& options) {
 // Sets colors and fields of the vertices to the mean over the 4 nearest points, weighted by
 // 1 / (d^2 + radius^2). Integer fields take the nearest point's value. NaN is ignored. `tree`
 // contains the cloud's positions.
-void carry_values(const PointCloud& cloud, const PointTree& tree, double cell_size_m,
-                  TriangleMesh& mesh) {
+void transfer_values(const PointCloud& cloud, const PointTree& tree, double cell_size_m,
+                     TriangleMesh& mesh) {
   const double radius_m = 0.5 * cell_size_m;
   const double max_m = max_value_cells * cell_size_m;
   const std::size_t count = mesh.vertices.size();
@@ -92,7 +92,7 @@ void carry_values(const PointCloud& cloud, const PointTree& tree, double cell_si
       const ScalarField& field = cloud.fields[f];
       double& value = mesh.vertex_fields[f].values[v];
       value = field.values[neighbors.front().index];
-      if (is_whole(field.type)) continue;
+      if (is_integer(field.type)) continue;
       double sum = 0.0;
       double weights = 0.0;
       for (const NeighborPoint& point : neighbors) {
@@ -114,7 +114,7 @@ struct UsedPoint {
 class Reconstruction {
  public:
   // `survey` describes the whole cloud of which `cloud` is a part; nullptr: `cloud` is the whole.
-  Reconstruction(const PointCloud& cloud, const SurfaceSurvey* survey,
+  Reconstruction(const PointCloud& cloud, const CloudStatistics* survey,
                  const SurfaceReconstructionOptions& options, Progress& progress)
       : cloud_(cloud), options_(options), progress_(progress), is_part_(survey != nullptr) {
     if (is_part_) survey_ = *survey;
@@ -141,7 +141,7 @@ class Reconstruction {
     });
     timed("trimming", [&] { trim(surface); });
     timed("values", [&] {
-      carry_values(cloud_, PointTree(cloud_.positions), result_.cell_size_m, result_.mesh);
+      transfer_values(cloud_, PointTree(cloud_.positions), result_.cell_size_m, result_.mesh);
       result_.mesh.vertex_normals = estimate_vertex_normals(result_.mesh);
     });
     return std::move(result_);
@@ -171,7 +171,7 @@ class Reconstruction {
   const SurfaceReconstructionOptions& options_;
   Progress& progress_;
   bool is_part_;
-  SurfaceSurvey survey_;
+  CloudStatistics survey_;
   std::vector<std::size_t> used_;
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
   double median_error_m_ = 0.0;
@@ -394,7 +394,7 @@ void Reconstruction::trim(TriangleMesh& surface) {
 
 }  // namespace
 
-void SurfaceSurvey::add(const PointCloud& cloud, bool weigh_by_error) {
+void CloudStatistics::add(const PointCloud& cloud, bool weigh_by_error) {
   if (!cloud.empty() && !cloud.has_normals()) throw Error("the cloud has no normals");
   const ScalarField* errors = weigh_by_error ? cloud.find_field("expected_error") : nullptr;
   for (std::size_t n = 0; n < cloud.size(); ++n) {
@@ -411,7 +411,7 @@ void SurfaceSurvey::add(const PointCloud& cloud, bool weigh_by_error) {
   }
 }
 
-double SurfaceSurvey::median_error_m() const {
+double CloudStatistics::median_error_m() const {
   std::size_t count = 0;
   for (const auto& [bits, number] : errors_) count += number;
   std::size_t below = 0;
@@ -448,7 +448,7 @@ SurfaceReconstructionResult reconstruct_surface(const PointCloud& cloud,
   return Reconstruction(cloud, nullptr, options, progress).run(announce);
 }
 
-SurfaceReconstructionResult reconstruct_part(const PointCloud& part, const SurfaceSurvey& survey,
+SurfaceReconstructionResult reconstruct_part(const PointCloud& part, const CloudStatistics& survey,
                                              const SurfaceReconstructionOptions& options,
                                              Progress& progress) {
   check_parameters(options);

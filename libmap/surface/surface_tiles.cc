@@ -102,7 +102,7 @@ double SurfaceTileOptions::margin_m() const {
          surface_margin_m(reconstruction);
 }
 
-PlanBox plan_box_of(const XyTile& tile, double tile_m, double margin_m) {
+XyBox xy_box_of(const XyTile& tile, double tile_m, double margin_m) {
   const Eigen::Vector2d low =
       Eigen::Vector2d(static_cast<double>(tile.i), static_cast<double>(tile.j)) * tile_m;
   return {low.array() - margin_m, low.array() + tile_m + margin_m};
@@ -132,7 +132,7 @@ void add_surface_tiles(const PointCloud& cloud, const SurfaceTileOptions& option
   }
 }
 
-SurfaceTile make_surface_tile(const PointCloud& points, const SurfaceSurvey& survey,
+SurfaceTile make_surface_tile(const PointCloud& points, const CloudStatistics& survey,
                               const XyTile& tile, const SurfaceTileOptions& options,
                               Progress& progress) {
   options.check();
@@ -140,10 +140,10 @@ SurfaceTile make_surface_tile(const PointCloud& points, const SurfaceSurvey& sur
   made.reconstruction = reconstruct_part(points, survey, options.reconstruction, progress);
   const double cell_m = options.reconstruction.cell_size_m;
   MeshCleaningOptions cleaning = options.cleaning;
-  cleaning.known = plan_box_of(tile, options.tile_m, cleaning_margin_m(options));
+  cleaning.known = xy_box_of(tile, options.tile_m, cleaning_margin_m(options));
   cleaning.min_island_share = 0.0;
-  const PlanBox cut =
-      plan_box_of(tile, options.tile_m, cleaning_margin_m(options) + triangle_cells * cell_m);
+  const XyBox cut =
+      xy_box_of(tile, options.tile_m, cleaning_margin_m(options) + triangle_cells * cell_m);
   const TriangleMesh around = select_triangles(
       made.reconstruction.mesh,
       triangles_at(made.reconstruction.mesh,

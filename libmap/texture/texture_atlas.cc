@@ -230,8 +230,8 @@ void AtlasMaker::pack(TextureAtlas& atlas) const {
 
 }  // namespace
 
-Eigen::Vector2d place_on_page(const TextureChart& chart, const PhotoProjector& projector,
-                              const Eigen::Vector3d& point) {
+Eigen::Vector2d texel_of(const TextureChart& chart, const PhotoProjector& projector,
+                         const Eigen::Vector3d& point) {
   return Eigen::Vector2d(chart.column, chart.row) +
          chart.scale * (pixel_of(projector, point) - chart.origin);
 }
@@ -258,9 +258,9 @@ TexturedMesh TextureAtlas::make_model(const TriangleMesh& mesh, const TexturePho
     for (const std::uint32_t t : chart.triangles) {
       model.page_of_triangle[t] = chart.page;
       for (std::size_t k = 0; k < 3; ++k)
-        model.texture_coordinates[t][k] =
-            coordinate(chart.page, place_on_page(chart, photos[chart.photo].projector,
-                                                 mesh.vertices[mesh.triangles[t][k]]));
+        model.texture_coordinates[t][k] = coordinate(
+            chart.page,
+            texel_of(chart, photos[chart.photo].projector, mesh.vertices[mesh.triangles[t][k]]));
     }
   });
   return model;

@@ -178,13 +178,13 @@ void ExposureFit::fit_vignetting() {
 TextureExposure ExposureFit::solve() {
   TextureExposure result;
   result.observations = observations_.size();
-  result.spread_before = weigh();
-  result.spread = result.spread_before;
+  result.log_color_deviation_before = weigh();
+  result.log_color_deviation = result.log_color_deviation_before;
   // Gains and vignetting are nearly independent, so they are estimated alternately.
   for (int round = 0; round < rounds && !observations_.empty(); ++round) {
     if (options_.vignetting) fit_vignetting();
     if (options_.gains) fit_gains();
-    result.spread = weigh();
+    result.log_color_deviation = weigh();
   }
   for (Eigen::Index photo = 0; photo < gains_.rows(); ++photo)
     result.gains.emplace_back(gains_.row(photo).transpose().array().exp().cast<float>());
@@ -201,7 +201,7 @@ Eigen::Vector3f TextureExposure::factor(std::size_t photo, double radius2) const
   return static_cast<float>(std::exp(shade)) * gains[photo];
 }
 
-TextureExposure even_out_exposure(std::span<const ColorObservation> observations,
+TextureExposure estimate_exposure(std::span<const ColorObservation> observations,
                                   std::size_t photos, const ExposureOptions& options) {
   return ExposureFit(observations, photos, options).solve();
 }

@@ -107,7 +107,7 @@ MeshWithMargin Texturing::cut_finely(MeshWithMargin part) const {
 void Texturing::even_out(std::vector<ColorObservation> observations) {
   timed("exposure", [&] {
     look_up_colors(*photos_, observations);
-    report_.exposure = even_out_exposure(observations, photos_->size(), options_.exposure);
+    report_.exposure = estimate_exposure(observations, photos_->size(), options_.exposure);
   });
 }
 
@@ -129,9 +129,9 @@ void Texturing::count_charts(const TextureAtlas& atlas, const TriangleMesh& mesh
     for (const std::uint32_t t : chart.triangles) {
       const PhotoProjector& projector = (*photos_)[chart.photo].projector;
       const Triangle& corners = mesh.triangles[t];
-      const Eigen::Vector2d a = place_on_page(chart, projector, mesh.vertices[corners[0]]);
-      const Eigen::Vector2d ab = place_on_page(chart, projector, mesh.vertices[corners[1]]) - a;
-      const Eigen::Vector2d ac = place_on_page(chart, projector, mesh.vertices[corners[2]]) - a;
+      const Eigen::Vector2d a = texel_of(chart, projector, mesh.vertices[corners[0]]);
+      const Eigen::Vector2d ab = texel_of(chart, projector, mesh.vertices[corners[1]]) - a;
+      const Eigen::Vector2d ac = texel_of(chart, projector, mesh.vertices[corners[2]]) - a;
       report_.texels += 0.5 * std::abs(ab.x() * ac.y() - ab.y() * ac.x());
     }
 }
@@ -154,8 +154,8 @@ TexturedMesh Texturing::paint(MeshWithMargin part, TextureViews views, Progress&
   count_charts(atlas, mesh);
   return timed("painting", [&] {
     TexturedMesh model = atlas.make_model(mesh, *photos_);
-    const BlendingShares shares =
-        share_views(views.of_vertices, options_.blend_views, options_.blend_exponent);
+    const BlendingWeights shares =
+        blending_weights(views.of_vertices, options_.blend_views, options_.blend_exponent);
     paint_texture(atlas, {*photos_, report_.exposure, shares, options_.unseen_color}, model,
                   progress);
     return model;
@@ -323,9 +323,9 @@ void describe(ResultTable& table, const TextureReport& report) {
   table.add("photographs", report.photos, "number of photographs");
   table.add("skipped_frames", report.skipped.size(), "frames that could not be used");
   describe(table, static_cast<const TextureCounts&>(report));
-  table.add("color_spread_before", exposure.spread_before,
+  table.add("color_spread_before", exposure.log_color_deviation_before,
             "standard deviation of the log color of a location between photographs");
-  table.add("color_spread", exposure.spread,
+  table.add("color_spread", exposure.log_color_deviation,
             "standard deviation of the log color of a location, exposure corrected");
   table.add("exposure_gains", gains, "gain of red, green and blue of each photograph");
   table.add("vignetting", exposure.vignetting, "coefficients of the vignetting");

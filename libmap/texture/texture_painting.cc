@@ -115,8 +115,8 @@ PlaneTriangle ChartPainter::on_chart(std::uint32_t triangle) const {
   std::array<Eigen::Vector2d, 3> corners;
   const Eigen::Vector2d corner_of_chart(chart_->column, chart_->row);
   for (std::size_t k = 0; k < 3; ++k)
-    corners[k] = place_on_page(*chart_, paint_.photos[chart_->photo].projector,
-                               model_.mesh.vertices[model_.mesh.triangles[triangle][k]]) -
+    corners[k] = texel_of(*chart_, paint_.photos[chart_->photo].projector,
+                          model_.mesh.vertices[model_.mesh.triangles[triangle][k]]) -
                  corner_of_chart;
   return PlaneTriangle(corners);
 }
@@ -188,7 +188,7 @@ void ChartPainter::gather_shares(std::uint32_t triangle) {
     }
     found->at_corners[corner] += share;
   };
-  const BlendingShares& all = paint_.shares;
+  const BlendingWeights& all = paint_.shares;
   for (int k = 0; k < 3; ++k) {
     const std::uint32_t vertex = model_.mesh.triangles[triangle][static_cast<std::size_t>(k)];
     const std::uint32_t first = all.first[vertex];
@@ -256,8 +256,8 @@ void paint_neutral(const TextureAtlas& atlas, const Color& color, TexturedMesh& 
 
 }  // namespace
 
-BlendingShares share_views(const ViewTable& of_vertices, int views, double exponent) {
-  BlendingShares result;
+BlendingWeights blending_weights(const ViewTable& of_vertices, int views, double exponent) {
+  BlendingWeights result;
   result.first.push_back(0);
   for (std::size_t v = 0; v < of_vertices.rows(); ++v) {
     const auto all = of_vertices[v];

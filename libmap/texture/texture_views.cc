@@ -79,7 +79,7 @@ class ViewFinder {
     cast_to_vertices();
     test_triangles();
     if (wants_views()) {
-      devalue_occluded_edges();
+      reduce_quality_at_occluders();
       keep(static_cast<std::uint32_t>(photo));
     }
     observe(static_cast<std::uint32_t>(photo));
@@ -109,7 +109,7 @@ class ViewFinder {
   void find_blocks_in_view();
   void project();
   bool is_beside_occluder(std::size_t triangle) const;
-  void devalue_occluded_edges();
+  void reduce_quality_at_occluders();
   // Visits the blocks in view in parallel.
   template <typename Use>
   void each_block(const Use& use) const {
@@ -130,7 +130,9 @@ class ViewFinder {
   Eigen::Vector3d side_of(const Triangle& t, std::size_t k) const {
     return mesh_.vertices[t[(k + 1) % 3]] - mesh_.vertices[t[k]];
   }
-  const Eigen::Vector3d& normal_of(std::size_t rated) const { return normals_[place_of_[rated]]; }
+  const Eigen::Vector3d& normal_of(std::size_t rated) const {
+    return normals_[index_of_rated_[rated]];
+  }
   float rate(std::size_t triangle, double sharpness) const;
   float quality_at(std::uint32_t vertex) const;
   float longest_side_px(const Triangle& triangle) const;
@@ -151,9 +153,9 @@ class ViewFinder {
   Eigen::Vector3d center_ = Eigen::Vector3d::Zero();
   double radius_m_ = 0.0;
   std::vector<std::uint32_t> rated_;
-  std::vector<Eigen::Vector3d> normals_;  // one per rated triangle
-  std::vector<std::uint32_t> place_of_;   // per triangle: its index in rated_
-  std::vector<std::uint32_t> order_;      // vertices, by blocks
+  std::vector<Eigen::Vector3d> normals_;       // one per rated triangle
+  std::vector<std::uint32_t> index_of_rated_;  // per triangle: its index in rated_
+  std::vector<std::uint32_t> order_;           // vertices, by blocks
   std::vector<Block> blocks_;
   // State of the current photograph. Blocks that are not in view are outside the image.
   const PhotoProjector* projector_ = nullptr;
@@ -200,7 +202,7 @@ void ViewFinder::make_blocks() {
   VoxelIndex cubes;
   std::vector<std::uint32_t> block_of(mesh_.vertices.size());
   for (std::size_t v = 0; v < block_of.size(); ++v) {
-    VoxelPlace cube;
+    VoxelSide cube;
     for (int axis = 0; axis < 3; ++axis)
       cube.cell[axis] = static_cast<int>(std::llround(mesh_.vertices[v][axis] / block_m));
     block_of[v] = cubes.find_or_add(pack(cube));
@@ -231,10 +233,10 @@ void ViewFinder::make_blocks() {
   for (Block& block : blocks_)
     for (const std::uint32_t v : block.vertices) block.box.extend(mesh_.vertices[v]);
   std::erase_if(blocks_, [](const Block& block) { return block.vertices.empty(); });
-  place_of_.resize(mesh_.triangles.size());
+  index_of_rated_.resize(mesh_.triangles.size());
   normals_.reserve(rated_.size());
   for (const std::uint32_t t : rated_) {
-    place_of_[t] = static_cast<std::uint32_t>(normals_.size());
+    index_of_rated_[t] = static_cast<std::uint32_t>(normals_.size());
     normals_.push_back(area_normal(mesh_, mesh_.triangles[t]).normalized());
   }
 }
@@ -277,7 +279,7 @@ bool ViewFinder::is_beside_occluder(std::size_t t) const {
                               occluder_tolerances * options_.occlusion_tolerance_m);
 }
 
-void ViewFinder::devalue_occluded_edges() {
+void ViewFinder::reduce_quality_at_occluders() {
   if (options_.occlusion_margin_px == 0) return;
   cells_.begin(*projector_);
   for (const Block* block : in_view_)

@@ -202,8 +202,8 @@ fs::path texture_page_path(const fs::path& model, std::size_t page, ImageFormat 
          (model.stem().string() + "_" + std::to_string(page) + file_extension(format));
 }
 
-std::vector<fs::path> companions_of_model(const fs::path& model,
-                                          const TexturedMeshWriteOptions& options) {
+std::vector<fs::path> additional_model_files(const fs::path& model,
+                                             const TexturedMeshWriteOptions& options) {
   if (format_of(model) != ".obj") return {};
   return {texture_page_path(model, 0, options.image_format), material_path(model)};
 }

@@ -101,12 +101,12 @@ void TileStore::open() const {
 }
 
 TileJournal TileStore::begin(const TileShare& share,
-                             const std::function<void()>& agree_on_plan) const {
+                             const std::function<void()>& check_plan) const {
   const bool is_new = !fs::exists(folder_);
   open();
   try {
     const FileLock held = lock();
-    agree_on_plan();
+    check_plan();
     return {folder_, share};
   } catch (...) {
     if (is_new) remove_if_bare();

@@ -90,7 +90,7 @@ class TiledMap {
     if (const auto index = index_of(known))
       index_ = *index;
     else
-      index_.lattice = libgtd::voxel_map_of(cloud_, libgtd::facts_of(known)).lattice;
+      index_.lattice = libgtd::voxel_map_of(cloud_, libgtd::map_info(known)).lattice;
     index_.manifest = known;
     constexpr double tile_m = 0.5;
     index_.tile_voxels = std::max(1, static_cast<int>(tile_m / index_.lattice.voxel_size_m));
@@ -146,7 +146,7 @@ class MapGrasping {
   void grasp() {
     if (run_.options().dry_run) return;
     std::optional<libmap::TileJournal> journal =
-        store_.begin(input_.share, [this] { agree_on_plan(); });
+        store_.begin(input_.share, [this] { check_plan(); });
     const std::vector<TileNumber> missing = store_.missing(
         plan_, libgtd::tiles_of(
                    {.plane = {}, .lattice = {}, .min = plan_.index.min, .max = plan_.index.max},
@@ -188,7 +188,7 @@ class MapGrasping {
 
   // Resumes the store's plan if it is of the same mesh, map and parameters, else writes a new one.
   // The caller must have locked the store.
-  void agree_on_plan() {
+  void check_plan() {
     const bool is_forced = run_.options().force && is_store();
     const auto earlier = is_forced ? std::nullopt : store_.plan();
     plan_.index = map_.index();

@@ -45,7 +45,7 @@ ReadMap summarize_one(const std::string& file, const MapTableOptions& options,
   const libmap::PointCloud cloud = libmap::read_cloud(file).cloud;
   libgtd::MapSummaryOptions own = libgtd::summary_options(map.manifest);
   own.graspability_threshold = map.cutoff = cutoff_of(options, own);
-  read.voxels = libgtd::voxel_map_of(cloud, libgtd::facts_of(map.manifest));
+  read.voxels = libgtd::voxel_map_of(cloud, libgtd::map_info(map.manifest));
   if (map.manifest.find_parameter("zero_plane_m") == nullptr)
     run.warn(file +
              ": has no manifest with the zero plane; all its points are assumed to be above");

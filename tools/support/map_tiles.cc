@@ -19,7 +19,7 @@ std::filesystem::path store_index_path(const std::string& store) {
 }
 
 std::optional<libgtd::TileStoreIndex> index_of(const libmap::Manifest& manifest) {
-  const auto lattice = libgtd::facts_of(manifest).lattice;
+  const auto lattice = libgtd::map_info(manifest).lattice;
   if (!lattice) return std::nullopt;
   libgtd::TileStoreIndex index;
   index.lattice = *lattice;

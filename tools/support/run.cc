@@ -101,7 +101,7 @@ void make_folder(const fs::path& folder) {
 
 }  // namespace
 
-std::string message_text(const std::string& text) {
+std::string sanitize_text(const std::string& text) {
   if (text.size() <= max_message_bytes) return printable(text);
   std::size_t head = max_message_bytes / 2;
   std::size_t tail = text.size() - max_message_bytes / 2;
@@ -155,10 +155,10 @@ void Run::add_input(const fs::path& path) {
 
 void Run::say(const std::string& text) {
   std::istringstream lines(text);
-  for (std::string line; std::getline(lines, line);) spdlog::info("{}", message_text(line));
+  for (std::string line; std::getline(lines, line);) spdlog::info("{}", sanitize_text(line));
 }
-void Run::warn(const std::string& text) { spdlog::warn("{}", message_text(text)); }
-void Run::detail(const std::string& text) { spdlog::debug("{}", message_text(text)); }
+void Run::warn(const std::string& text) { spdlog::warn("{}", sanitize_text(text)); }
+void Run::detail(const std::string& text) { spdlog::debug("{}", sanitize_text(text)); }
 
 void Run::add_timings(const std::vector<std::pair<std::string, double>>& timings_s,
                       const std::string& stage) {

@@ -30,7 +30,7 @@ using libmap::in_file;
 // Converts a text, possibly from a file, to one line of printable UTF-8 for a terminal. Control
 // characters and invalid bytes become \xNN, line breaks become spaces; a long text is shortened in
 // the middle.
-std::string message_text(const std::string& text);
+std::string sanitize_text(const std::string& text);
 
 // Removes a trailing slash: "maps/" and "maps" are the same folder with the same manifest.
 std::string without_trailing_slash(std::string path);

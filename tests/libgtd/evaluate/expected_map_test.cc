@@ -234,7 +234,7 @@ TEST(MapSummary, CountsByHand) {
   map.add_field("i", libmap::ScalarType::int32).values = {0, 1, 2, 3, 4};
   map.add_field("j", libmap::ScalarType::int32).values = {0, 0, 0, 0, 0};
   map.add_field("k", libmap::ScalarType::int32).values = {0, 0, 0, 0, -10};
-  libgtd::MapFacts facts;
+  libgtd::MapInfo facts;
   facts.zero_plane_m = 0.0;
   const auto summary =
       libgtd::summarize_map(map, libgtd::voxel_map_of(map, facts),

@@ -113,7 +113,7 @@ TEST(BagRig, EncodingsOfDepth) {
       ElementsAre(
           ElementsAre(3000, 3000, 3000, 3000, 3010, 3010, 3010, 3010, 3020, 3020, 3020, 3020),
           ElementsAre(15000, 0, 0, 0, 0, 1, 65534, 0, 0, 1000, 2000, 3000), testing::Each(65535)));
-  EXPECT_EQ(libmap::export_bag_rig(bag_path(), fine, {}).pixels_beyond, 2U);
+  EXPECT_EQ(libmap::export_bag_rig(bag_path(), fine, {}).overflow_pixels, 2U);
   // Units of the bag's 16-bit images other than millimeters are kept.
   EXPECT_EQ(images_of(plan({.depth_unit_m = 0.00025}), "a")[0][0], 300);
 }

@@ -19,7 +19,7 @@ using graspmap_test::read_text;
 using graspmap_test::scratch_folder;
 using libmap::BagContent;
 using libmap::BagFormat;
-using libmap::BagPlaces;
+using libmap::BagTargets;
 using testing::HasSubstr;
 
 fs::path bag_path() { return scratch_folder() / "a.bag"; }
@@ -35,8 +35,8 @@ std::map<std::string, std::string> messages_of(const fs::path& path) {
   return messages;
 }
 
-BagPlaces places() {
-  BagPlaces result{"/footholds", "/foothold_poses", "terrain", 0.08, {}};
+BagTargets places() {
+  BagTargets result{"/footholds", "/foothold_poses", "terrain", 0.08, {}};
   result.places = {{{1, 2, 3}, {0, 0, -1}, {255, 0, 51}, "1: 0.98"},
                    {{0, 0, 0}, {0, 2, 0}, {0, 100, 0}, "2: 0.91"},
                    {{4, 5, 6}, {3, -1, -2}, {0, 100, 0}, "3: 0.90"}};

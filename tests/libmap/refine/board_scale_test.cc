@@ -221,11 +221,11 @@ TEST(BoardScale, RefinedPosesHaveTheScaleOfTheBoard) {
   const libmap::RefinementResult result = libmap::refine_poses(scan, options);
   EXPECT_LT(rmse_m(result), 0.002);
   ASSERT_EQ(result.stages.back().name, "scale");
-  std::map<std::string, double> figures(result.stages.back().figures.begin(),
-                                        result.stages.back().figures.end());
-  EXPECT_GE(figures.at("lengths"), 8.0);
-  EXPECT_LT(figures.at("deviation"), 0.001);
-  EXPECT_NEAR(figures.at("factor"), 1.0 / 1.008, 3.0 * figures.at("deviation"));
+  std::map<std::string, double> metrics(result.stages.back().metrics.begin(),
+                                        result.stages.back().metrics.end());
+  EXPECT_GE(metrics.at("lengths"), 8.0);
+  EXPECT_LT(metrics.at("deviation"), 0.001);
+  EXPECT_NEAR(metrics.at("factor"), 1.0 / 1.008, 3.0 * metrics.at("deviation"));
   EXPECT_TRUE(result.scale.ends_with("images: corrected")) << result.scale;
   options.known_lengths = {{{1, {60, 100}}, {2, {90, 110}}, 1.0}};
   EXPECT_EQ(error_of([&] { libmap::refine_poses(scan, options); }).context().field, "board");

@@ -50,7 +50,7 @@ const libmap::StageReport& stage_of(const RefinementResult& result, const std::s
 }
 
 double figure(const libmap::StageReport& stage, const std::string& name) {
-  for (const auto& [known, value] : stage.figures)
+  for (const auto& [known, value] : stage.metrics)
     if (known == name) return value;
   throw std::runtime_error("no figure " + name);
 }

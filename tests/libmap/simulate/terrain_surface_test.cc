@@ -169,7 +169,7 @@ TEST(TerrainSurface, StreamedIsWholeWhateverWasSeenBefore) {
   const Eigen::AlignedBox2d all(Eigen::Vector2d(-1, -1), Eigen::Vector2d(7, 7));
   const double radius = 5.0 * ground.heights.spacing_m();
   const VisibleSurface whole(libmap::triangulate_plan(cloud.positions, all, radius),
-                             libmap::TextureSource::rock, 1, libmap::ShadingNormals::of_vertices);
+                             libmap::TextureSource::rock, 1, libmap::ShadingNormals::per_vertex);
   const libmap::ViewRays rays = small_rays();
   const double far_m = 2.5;
   TerrainSurface fleeting(ground.points, ground.heights,

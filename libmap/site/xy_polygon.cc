@@ -1,4 +1,4 @@
-#include "libmap/site/plan_polygon.h"
+#include "libmap/site/xy_polygon.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -55,7 +55,7 @@ std::string corner_name(std::size_t n) { return "corner " + std::to_string(n + 1
 
 }  // namespace
 
-PlanPolygon::PlanPolygon(std::vector<Vector2d> corners) : corners_(std::move(corners)) {
+XyPolygon::XyPolygon(std::vector<Vector2d> corners) : corners_(std::move(corners)) {
   for (std::size_t n = 0; n < corners_.size(); ++n)
     if (!corners_[n].allFinite())
       throw Error("not a position", {.field = corner_name(n), .value = place(corners_[n])});
@@ -81,14 +81,14 @@ PlanPolygon::PlanPolygon(std::vector<Vector2d> corners) : corners_(std::move(cor
   if (!(area_m2_ > on_border_m * (max_ - min_).norm())) throw Error("the outline encloses no area");
 }
 
-std::size_t PlanPolygon::strip_of(double y) const {
+std::size_t XyPolygon::strip_of(double y) const {
   const double height = max_.y() - min_.y();
   const double share = height > 0.0 ? (y - min_.y()) / height : 0.0;
   const auto count = static_cast<double>(strips_.size());
   return static_cast<std::size_t>(std::clamp(std::floor(share * count), 0.0, count - 1.0));
 }
 
-void PlanPolygon::make_strips() {
+void XyPolygon::make_strips() {
   strips_.resize(std::min(corners_.size(), max_strips));
   for (std::uint32_t n = 0; n < corners_.size(); ++n) {
     const double a = corners_[n].y();
@@ -99,7 +99,7 @@ void PlanPolygon::make_strips() {
   }
 }
 
-void PlanPolygon::require_simple() const {
+void XyPolygon::require_simple() const {
   const auto count = static_cast<std::uint32_t>(corners_.size());
   const auto end = [&](std::uint32_t n) -> const Vector2d& { return corners_[(n + 1) % count]; };
   const auto crossing = [&](std::uint32_t a, std::uint32_t b) {
@@ -124,7 +124,7 @@ void PlanPolygon::require_simple() const {
       }
 }
 
-bool PlanPolygon::contains(const Vector2d& point) const {
+bool XyPolygon::contains(const Vector2d& point) const {
   if ((point.array() < min_.array() - on_border_m).any() ||
       (point.array() > max_.array() + on_border_m).any())
     return false;
@@ -141,8 +141,8 @@ bool PlanPolygon::contains(const Vector2d& point) const {
   return inside;
 }
 
-std::vector<std::uint32_t> PlanPolygon::edges_near(const Vector2d& box_min,
-                                                   const Vector2d& box_max) const {
+std::vector<std::uint32_t> XyPolygon::edges_near(const Vector2d& box_min,
+                                                 const Vector2d& box_max) const {
   std::vector<std::uint32_t> edges;
   if ((box_max.array() < min_.array()).any() || (box_min.array() > max_.array()).any())
     return edges;
@@ -166,8 +166,8 @@ std::vector<std::uint32_t> PlanPolygon::edges_near(const Vector2d& box_min,
   return edges;
 }
 
-PlanPolygon make_rectangle(const Vector2d& min, const Vector2d& max) {
-  return PlanPolygon({min, {max.x(), min.y()}, max, {min.x(), max.y()}});
+XyPolygon make_rectangle(const Vector2d& min, const Vector2d& max) {
+  return XyPolygon({min, {max.x(), min.y()}, max, {min.x(), max.y()}});
 }
 
 PointCloud clip_cloud(const PointCloud& cloud, const ExtrudedPolygon& prism) {

@@ -1,4 +1,4 @@
-#include "libmap/core/guarded_process.h"
+#include "libmap/core/sandboxed_process.h"
 
 #include <gtest/gtest.h>
 
@@ -10,15 +10,15 @@
 #include "tests/support/lower_limit.h"
 #include "tests/support/test_support.h"
 
-namespace guarded_process_test {
+namespace sandboxed_process_test {
 
-using libmap::GuardedProcess;
+using libmap::SandboxedProcess;
 
 constexpr std::uint64_t memory = std::uint64_t{1} << 30;
 
-TEST(GuardedProcess, WhatItWritesIsRead) {
+TEST(SandboxedProcess, WhatItWritesIsRead) {
   const std::string text(1 << 20, 'x');  // more than the buffer of a pipe
-  GuardedProcess process(memory, [&](const GuardedProcess::Write& write) {
+  SandboxedProcess process(memory, [&](const SandboxedProcess::Write& write) {
     write(text);
     write("end");
   });
@@ -29,32 +29,33 @@ TEST(GuardedProcess, WhatItWritesIsRead) {
   EXPECT_EQ(process.end(), "");
 }
 
-TEST(GuardedProcess, ItsFallIsNotOurs) {
-  GuardedProcess killed(memory, [](const GuardedProcess::Write& write) {
+TEST(SandboxedProcess, ItsFallIsNotOurs) {
+  SandboxedProcess killed(memory, [](const SandboxedProcess::Write& write) {
     write("ab");
     raise(SIGKILL);
   });
   std::string read(3, '\0');
   EXPECT_FALSE(killed.read(read.data(), 3));
   EXPECT_EQ(killed.end(), " (signal 9)");
-  GuardedProcess thrown(memory, [](const GuardedProcess::Write&) { throw std::logic_error("x"); });
+  SandboxedProcess thrown(memory,
+                          [](const SandboxedProcess::Write&) { throw std::logic_error("x"); });
   EXPECT_FALSE(thrown.read(read.data(), 1));
   EXPECT_EQ(thrown.end(), "");
 }
 
-TEST(GuardedProcess, EndsWithItsReader) {
-  const GuardedProcess process(memory, [](const GuardedProcess::Write& write) {
+TEST(SandboxedProcess, EndsWithItsReader) {
+  const SandboxedProcess process(memory, [](const SandboxedProcess::Write& write) {
     while (true) write("for ever");
   });
 }
 
-TEST(GuardedProcess, NoneWithoutFiles) {
+TEST(SandboxedProcess, NoneWithoutFiles) {
   const libmap::Error error = graspmap_test::error_of([] {
     const graspmap_test::LowerLimit no_file(RLIMIT_NOFILE, 0);
-    const GuardedProcess process(memory, [](const GuardedProcess::Write&) {});
+    const SandboxedProcess process(memory, [](const SandboxedProcess::Write&) {});
   });
   EXPECT_EQ(error.reason(), "cannot start a child process: Too many open files");
   EXPECT_EQ(error.kind(), libmap::ErrorKind::failed);
 }
 
-}  // namespace guarded_process_test
+}  // namespace sandboxed_process_test

@@ -16,16 +16,16 @@
 
 namespace libmap {
 
-class GuardedProcess {
+class SandboxedProcess {
  public:
   using Write = std::function<void(std::string_view bytes)>;
 
   // Calls work(write) in a child process without terminal output and with at most `max_data_bytes`
   // of memory. read() returns the written bytes. Throws Error (failed) if no process can start.
-  GuardedProcess(std::uint64_t max_data_bytes, const std::function<void(const Write&)>& work);
-  ~GuardedProcess();  // ends the child
-  GuardedProcess(const GuardedProcess&) = delete;
-  GuardedProcess& operator=(const GuardedProcess&) = delete;
+  SandboxedProcess(std::uint64_t max_data_bytes, const std::function<void(const Write&)>& work);
+  ~SandboxedProcess();  // ends the child
+  SandboxedProcess(const SandboxedProcess&) = delete;
+  SandboxedProcess& operator=(const SandboxedProcess&) = delete;
 
   // Reads the next bytes. Returns false if the child ended before it had written `count` bytes.
   bool read(void* bytes, std::size_t count);
@@ -41,11 +41,11 @@ class GuardedProcess {
   std::unique_ptr<std::FILE, CloseFile> pipe_;
 };
 
-// Writing end of the pipe. It has the same functions as GuardedInput, so that one template both
+// Writing end of the pipe. It has the same functions as SandboxReader, so that one template both
 // sends and receives a result.
-class GuardedOutput {
+class SandboxWriter {
  public:
-  explicit GuardedOutput(const GuardedProcess::Write& write) : write_(write) {}
+  explicit SandboxWriter(const SandboxedProcess::Write& write) : write_(write) {}
 
   // Sends a number or a trivially copyable struct.
   template <typename Value>
@@ -67,14 +67,14 @@ class GuardedOutput {
   void error(const Error* error);
 
  private:
-  const GuardedProcess::Write& write_;
+  const SandboxedProcess::Write& write_;
 };
 
 // Reading end of the pipe. If the data end too early, each function throws Error with the reason
 // `broken` and the cause of the child's end.
-class GuardedInput {
+class SandboxReader {
  public:
-  GuardedInput(GuardedProcess& process, std::string broken)
+  SandboxReader(SandboxedProcess& process, std::string broken)
       : process_(process), broken_(std::move(broken)) {}
 
   template <typename Value>
@@ -101,17 +101,17 @@ class GuardedInput {
     if (!process_.read(bytes, count)) throw Error(broken_ + process_.end());
   }
 
-  GuardedProcess& process_;
+  SandboxedProcess& process_;
   std::string broken_;
 };
 
 // Calls make() in a child process and returns its result or throws its Error. pass(end, result)
 // sends and receives the result. Throws Error with the reason `broken` if the child crashes.
 template <typename Result, typename Make, typename Pass>
-Result run_guarded(std::uint64_t max_data_bytes, const std::string& broken, const Make& make,
-                   const Pass& pass) {
-  GuardedProcess process(max_data_bytes, [&](const GuardedProcess::Write& write) {
-    GuardedOutput output(write);
+Result run_sandboxed(std::uint64_t max_data_bytes, const std::string& broken, const Make& make,
+                     const Pass& pass) {
+  SandboxedProcess process(max_data_bytes, [&](const SandboxedProcess::Write& write) {
+    SandboxWriter output(write);
     try {
       Result result = make();
       output.error(nullptr);
@@ -120,7 +120,7 @@ Result run_guarded(std::uint64_t max_data_bytes, const std::string& broken, cons
       output.error(&error);
     }
   });
-  GuardedInput input(process, broken);
+  SandboxReader input(process, broken);
   input.error();
   Result result;
   pass(input, result);

@@ -17,11 +17,11 @@ inline double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   return a.x() * b.y() - a.y() * b.x();
 }
 
-class PlanPolygon {
+class XyPolygon {
  public:
   // Takes corners in either orientation. Drops a last corner equal to the first. Throws Error:
   // fewer than three corners, not finite, two at one position, edges that cross or touch, no area.
-  explicit PlanPolygon(std::vector<Eigen::Vector2d> corners);
+  explicit XyPolygon(std::vector<Eigen::Vector2d> corners);
 
   // Counter-clockwise.
   const std::vector<Eigen::Vector2d>& corners() const { return corners_; }
@@ -49,11 +49,11 @@ class PlanPolygon {
 };
 
 // The rectangle from min to max.
-PlanPolygon make_rectangle(const Eigen::Vector2d& min, const Eigen::Vector2d& max);
+XyPolygon make_rectangle(const Eigen::Vector2d& min, const Eigen::Vector2d& max);
 
 // Polygon extruded between two heights. Without a polygon, it contains all points between them.
 struct ExtrudedPolygon {
-  std::optional<PlanPolygon> polygon{};
+  std::optional<XyPolygon> polygon{};
   double min_z = -std::numeric_limits<double>::infinity();
   double max_z = std::numeric_limits<double>::infinity();
 

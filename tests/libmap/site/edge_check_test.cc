@@ -1,4 +1,4 @@
-#include "libmap/site/spot_check.h"
+#include "libmap/site/edge_check.h"
 
 #include <gmock/gmock.h>
 
@@ -10,7 +10,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace spot_check_test {
+namespace edge_check_test {
 
 using graspmap_test::error_of;
 using graspmap_test::square_mesh;
@@ -25,8 +25,8 @@ void expect_near(const Eigen::Vector2d& actual, const Eigen::Vector2d& expected,
       << actual.transpose() << " is not " << expected.transpose();
 }
 
-TEST(SpotCheck, PlacesGoRoundTheSiteFromItsLowerLeftCorner) {
-  const SpotCheckResult result =
+TEST(EdgeCheck, PlacesGoRoundTheSiteFromItsLowerLeftCorner) {
+  const EdgeCheckResult result =
       check_edges(corners_of({-1.5, -1}, {1.5, 2}), zero, zero, {.places = 3, .inset_m = 0.1});
   expect_near(result.edges[0][0].position, {-1.0, -0.9});
   expect_near(result.edges[0][2].position, {1.0, -0.9});
@@ -37,18 +37,18 @@ TEST(SpotCheck, PlacesGoRoundTheSiteFromItsLowerLeftCorner) {
   EXPECT_EQ(result.measured, 12U);
 }
 
-TEST(SpotCheck, ErrorsOfATiltedPlaneInClosedForm) {
+TEST(EdgeCheck, ErrorsOfATiltedPlaneInClosedForm) {
   // z = 0.01 x - 0.02 y + 0.001.
   TriangleMesh mesh = square_mesh(0.0, 2.0);
   for (Eigen::Vector3d& v : mesh.vertices) v.z() = 0.01 * v.x() - 0.02 * v.y() + 0.001;
-  const SpotCheckResult result =
+  const EdgeCheckResult result =
       check_edges(corners_of({-1.5, -1.5}, {1.5, 1.5}), heights_of(mesh), zero);
   double sum = 0.0;
   double signed_sum = 0.0;
   for (std::size_t e = 0; e < 4; ++e) {
     ASSERT_EQ(result.edges[e].size(), 7U);
     double of_edge = 0.0;
-    for (const SpotCheckPlace& place : result.edges[e]) {
+    for (const EdgeCheckPoint& place : result.edges[e]) {
       const double truth = 0.01 * place.position.x() - 0.02 * place.position.y() + 0.001;
       ASSERT_TRUE(place.error_m());
       ASSERT_NEAR(*place.error_m(), truth, 1e-9);
@@ -65,22 +65,22 @@ TEST(SpotCheck, ErrorsOfATiltedPlaneInClosedForm) {
   EXPECT_NEAR(result.max_abs_error_m, 0.01 * 1.5 * 6 / 7 + 0.02 * 1.45 + 0.001, 1e-9);
 }
 
-TEST(SpotCheck, TruthIsTakenAtTheSamePlace) {
+TEST(EdgeCheck, TruthIsTakenAtTheSamePlace) {
   TriangleMesh truth = square_mesh(0.0, 2.0);
   for (Eigen::Vector3d& v : truth.vertices) v.z() = 0.3 * v.x();
   TriangleMesh mesh = truth;
   for (Eigen::Vector3d& v : mesh.vertices) v.z() -= 0.004;
-  const SpotCheckResult result =
+  const EdgeCheckResult result =
       check_edges(corners_of({-1, -1}, {1, 1}), heights_of(mesh), heights_of(truth));
   EXPECT_NEAR(result.mean_abs_error_m, 0.004, 1e-9);
   EXPECT_NEAR(result.mean_error_m, -0.004, 1e-9);
 }
 
-TEST(SpotCheck, PlacesWithoutDataAreEmptyNotZero) {
+TEST(EdgeCheck, PlacesWithoutDataAreEmptyNotZero) {
   // Only x < 0 was measured.
   TriangleMesh mesh = square_mesh(0.002, 2.0);
   for (Eigen::Vector3d& v : mesh.vertices) v.x() = std::min(v.x(), 0.0);
-  const SpotCheckResult result =
+  const EdgeCheckResult result =
       check_edges(corners_of({-1, -1}, {1, 1}), heights_of(mesh), zero, {.places = 4});
   EXPECT_EQ(result.measured, 8U);
   EXPECT_EQ(result.missing, 8U);
@@ -99,7 +99,7 @@ TEST(SpotCheck, PlacesWithoutDataAreEmptyNotZero) {
               HasSubstr("no position"));
 }
 
-TEST(SpotCheck, HeightsOfACloudAreMedians) {
+TEST(EdgeCheck, HeightsOfACloudAreMedians) {
   std::vector<Eigen::Vector3d> points = {{0, 0, 0.01}, {0.01, 0, 0.03}, {0, 0.01, 0.02},
                                          {0.03, 0, 9}, {0.015, 0, 5},   {1, 1, 0.5}};
   const HeightFunction four = heights_of(points, 0.02, 3);
@@ -110,7 +110,7 @@ TEST(SpotCheck, HeightsOfACloudAreMedians) {
   EXPECT_FALSE(heights_of({}, 0.02, 1)({0, 0}));
 }
 
-TEST(SpotCheck, HeightsOfAMeshAreSeenFromAbove) {
+TEST(EdgeCheck, HeightsOfAMeshAreSeenFromAbove) {
   TriangleMesh mesh = graspmap_test::join_meshes(square_mesh(0.0), square_mesh(1.0, 0.5));
   EXPECT_NEAR(*heights_of(mesh)({0.1, 0.2}), 1.0, 1e-12);
   EXPECT_NEAR(*heights_of(mesh)({0.7, 0.2}), 0.0, 1e-12);
@@ -118,7 +118,7 @@ TEST(SpotCheck, HeightsOfAMeshAreSeenFromAbove) {
   EXPECT_FALSE(heights_of(mesh)({1.2, 0.2}));
 }
 
-TEST(SpotCheck, LeastRectangleOfATurnedSite) {
+TEST(EdgeCheck, LeastRectangleOfATurnedSite) {
   for (const double degrees : {0.0, 12.0, -30.0, 44.0}) {
     const Eigen::Rotation2Dd turn(degrees * M_PI / 180);
     std::vector<Eigen::Vector3d> points;
@@ -143,7 +143,7 @@ TEST(SpotCheck, LeastRectangleOfATurnedSite) {
   }
 }
 
-TEST(SpotCheck, SitesThatCannotBe) {
+TEST(EdgeCheck, SitesThatCannotBe) {
   EXPECT_THAT(error_of([] { bounding_corners({}, false); }).what(), HasSubstr("no point"));
   for (const bool turned : {false, true}) {
     EXPECT_THAT(error_of([&] {
@@ -164,5 +164,5 @@ TEST(SpotCheck, SitesThatCannotBe) {
               HasSubstr("inset_m"));
 }
 
-}  // namespace spot_check_test
+}  // namespace edge_check_test
 }  // namespace libmap

@@ -1,4 +1,4 @@
-#include "libmap/site/spot_check.h"
+#include "libmap/site/edge_check.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,11 +10,11 @@
 #include "libmap/core/text.h"
 #include "libmap/geometry/spatial_index.h"
 #include "libmap/mesh/ray_caster.h"
-#include "libmap/site/plan_polygon.h"
+#include "libmap/site/xy_polygon.h"
 
 namespace libmap {
 
-void bind(ParameterTable& table, SpotCheckOptions& options) {
+void bind(ParameterTable& table, EdgeCheckOptions& options) {
   table.add("places", options.places, {1.0, 10000.0}, "number of positions along each edge");
   table.add("inset_m", options.inset_m, not_negative, "distance of the positions from the edge");
 }
@@ -142,7 +142,7 @@ HeightFunction heights_of(const std::vector<Eigen::Vector3d>& points, double rad
 
 namespace {
 
-void check(const SpotCheckOptions& options, const SiteCorners& site) {
+void check(const EdgeCheckOptions& options, const SiteCorners& site) {
   check_parameters(options);
   const double least = std::min((site.corners[1] - site.corners[0]).norm(),
                                 (site.corners[2] - site.corners[1]).norm());
@@ -153,12 +153,12 @@ void check(const SpotCheckOptions& options, const SiteCorners& site) {
                  .bound = "< " + to_text(static_cast<float>(least / 2)) + ", half a side"});
 }
 
-void summarize(SpotCheckResult& result) {
+void summarize(EdgeCheckResult& result) {
   double sum = 0.0;
   for (std::size_t e = 0; e < result.edges.size(); ++e) {
     double of_edge = 0.0;
     std::size_t count = 0;
-    for (const SpotCheckPlace& place : result.edges[e]) {
+    for (const EdgeCheckPoint& place : result.edges[e]) {
       const auto error = place.error_m();
       if (!error) {
         ++result.missing;
@@ -180,17 +180,17 @@ void summarize(SpotCheckResult& result) {
 
 }  // namespace
 
-SpotCheckResult check_edges(const SiteCorners& site, const HeightFunction& surface,
-                            const HeightFunction& ground, const SpotCheckOptions& options) {
+EdgeCheckResult check_edges(const SiteCorners& site, const HeightFunction& surface,
+                            const HeightFunction& ground, const EdgeCheckOptions& options) {
   check(options, site);
-  SpotCheckResult result;
+  EdgeCheckResult result;
   for (std::size_t e = 0; e < 4; ++e) {
     const Eigen::Vector2d& from = site.corners[e];
     const Eigen::Vector2d along = site.corners[(e + 1) % 4] - from;
     const Eigen::Vector2d inwards = Eigen::Vector2d(-along.y(), along.x()).normalized();
     for (int n = 0; n < options.places; ++n) {
       const double share = (n + 0.5) / options.places;
-      SpotCheckPlace& place = result.edges[e].emplace_back();
+      EdgeCheckPoint& place = result.edges[e].emplace_back();
       place.position = from + share * along + options.inset_m * inwards;
       place.height_m = surface(place.position);
       place.ground_m = ground(place.position);

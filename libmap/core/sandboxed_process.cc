@@ -1,4 +1,4 @@
-#include "libmap/core/guarded_process.h"
+#include "libmap/core/sandboxed_process.h"
 
 #include <fcntl.h>
 #include <sys/prctl.h>
@@ -51,7 +51,7 @@ void bound_memory(std::uint64_t max_data_bytes) {
 }
 
 [[noreturn]] void serve(int pipe, std::uint64_t max_data_bytes,
-                        const std::function<void(const GuardedProcess::Write&)>& work) {
+                        const std::function<void(const SandboxedProcess::Write&)>& work) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   for (const int signal : {SIGSEGV, SIGBUS, SIGABRT, SIGFPE, SIGPIPE}) std::signal(signal, SIG_DFL);
   // The child ends with its parent: a signal to both must not look like damaged input.
@@ -68,10 +68,10 @@ void bound_memory(std::uint64_t max_data_bytes) {
 
 }  // namespace
 
-void GuardedProcess::CloseFile::operator()(std::FILE* file) const { std::fclose(file); }
+void SandboxedProcess::CloseFile::operator()(std::FILE* file) const { std::fclose(file); }
 
-GuardedProcess::GuardedProcess(std::uint64_t max_data_bytes,
-                               const std::function<void(const Write&)>& work) {
+SandboxedProcess::SandboxedProcess(std::uint64_t max_data_bytes,
+                                   const std::function<void(const Write&)>& work) {
   int ends[2] = {-1, -1};
   if (pipe2(ends, O_CLOEXEC) == 0) {
     process_ = fork();
@@ -87,13 +87,13 @@ GuardedProcess::GuardedProcess(std::uint64_t max_data_bytes,
                 ErrorKind::failed);
 }
 
-GuardedProcess::~GuardedProcess() { end(); }
+SandboxedProcess::~SandboxedProcess() { end(); }
 
-bool GuardedProcess::read(void* bytes, std::size_t count) {
+bool SandboxedProcess::read(void* bytes, std::size_t count) {
   return count == 0 || std::fread(bytes, count, 1, pipe_.get()) == 1;
 }
 
-std::string GuardedProcess::end() {
+std::string SandboxedProcess::end() {
   pipe_.reset();  // ends a child that still writes
   int status = 0;
   if (process_ > 0)
@@ -102,7 +102,7 @@ std::string GuardedProcess::end() {
   return WIFSIGNALED(status) ? " (signal " + std::to_string(WTERMSIG(status)) + ")" : "";
 }
 
-void GuardedOutput::error(const Error* error) {
+void SandboxWriter::error(const Error* error) {
   array(error == nullptr ? std::string() : error->reason());
   if (error == nullptr) return;
   for (const std::string& text :
@@ -111,7 +111,7 @@ void GuardedOutput::error(const Error* error) {
   value(error->kind());
 }
 
-void GuardedInput::error() {
+void SandboxReader::error() {
   std::string reason;
   array(reason);
   if (reason.empty()) return;

@@ -8,7 +8,7 @@
 #include "libmap/io/mesh_io.h"
 #include "tests/tools/tool_test_support.h"
 
-namespace spot_check_test {
+namespace edge_check_test {
 
 using graspmap_test::bad_input;
 using graspmap_test::content;
@@ -189,4 +189,4 @@ TEST(SpotCheckCommand, TrueMeshOfTheTestSite) {
   EXPECT_EQ(json.at("published_mean_m"), 0.04);
 }
 
-}  // namespace spot_check_test
+}  // namespace edge_check_test

@@ -1,4 +1,4 @@
-#include "libmap/site/plan_polygon.h"
+#include "libmap/site/xy_polygon.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace plan_polygon_test {
+namespace xy_polygon_test {
 
 using Eigen::Vector2d;
 using graspmap_test::error_of;
@@ -39,10 +39,10 @@ bool winds_around(const Corners& corners, const Vector2d& point) {
   return std::abs(turned) > std::numbers::pi;
 }
 
-TEST(PlanPolygon, InsideAsTheWindingNumberSays) {
+TEST(XyPolygon, InsideAsTheWindingNumberSays) {
   for (const int count : {3, 4, 7, 40, 1500}) {
     const Corners corners = random_star(count);
-    const PlanPolygon outline(corners);
+    const XyPolygon outline(corners);
     for (int n = 0; n < 150; ++n) {
       const Vector2d point(uniform(-2, 2), uniform(-2, 2));
       ASSERT_EQ(outline.contains(point), winds_around(corners, point)) << count;
@@ -50,10 +50,10 @@ TEST(PlanPolygon, InsideAsTheWindingNumberSays) {
   }
 }
 
-TEST(PlanPolygon, PointsLevelWithCorners) {
+TEST(XyPolygon, PointsLevelWithCorners) {
   const Corners corners = {{0, 0}, {2, -2}, {4, 0}, {6, -2}, {8, 0}, {6, 0},
                            {7, 2}, {5, 4},  {4, 2}, {3, 4},  {1, 2}, {2, 1}};
-  const PlanPolygon outline(corners);
+  const XyPolygon outline(corners);
   int inside = 0;
   for (double x = -0.5; x <= 9; x += 0.5)
     for (double y = -3; y <= 5; y += 1) {
@@ -72,9 +72,9 @@ TEST(PlanPolygon, PointsLevelWithCorners) {
   EXPECT_GT(inside, 40);
 }
 
-TEST(PlanPolygon, BorderBelongsToIt) {
+TEST(XyPolygon, BorderBelongsToIt) {
   const Corners corners = {{0, 0}, {4, 0}, {4, 3}, {2, 1}, {0, 3}};
-  const PlanPolygon outline(corners);
+  const XyPolygon outline(corners);
   EXPECT_NEAR(outline.area_m2(), 8, 1e-12);
   for (std::size_t n = 0; n < 5; ++n)
     for (const double t : {0.0, 0.25, 1.0}) {
@@ -90,20 +90,20 @@ TEST(PlanPolygon, BorderBelongsToIt) {
   EXPECT_FALSE(outline.contains({-1, 0}));
 }
 
-TEST(PlanPolygon, EitherWayRoundAndClosedOrNot) {
-  const PlanPolygon one({{0, 0}, {2, 0}, {2, 1}});
-  const PlanPolygon other({{0, 0}, {2, 1}, {2, 0}, {0, 0}});
+TEST(XyPolygon, EitherWayRoundAndClosedOrNot) {
+  const XyPolygon one({{0, 0}, {2, 0}, {2, 1}});
+  const XyPolygon other({{0, 0}, {2, 1}, {2, 0}, {0, 0}});
   EXPECT_EQ(one.corners(), other.corners());
   EXPECT_EQ(one.area_m2(), 1);
 }
 
-TEST(PlanPolygon, FarFromTheOrigin) {
+TEST(XyPolygon, FarFromTheOrigin) {
   const Vector2d far(500000.25, -4200000.5);
   Corners corners = random_star(30);
-  const PlanPolygon near(corners);
+  const XyPolygon near(corners);
   Corners shifted = corners;
   for (Vector2d& corner : shifted) corner += far;
-  const PlanPolygon outline(shifted);
+  const XyPolygon outline(shifted);
   EXPECT_NEAR(outline.area_m2(), near.area_m2(), 1e-7);
   for (int n = 0; n < 500; ++n) {
     const Vector2d point(uniform(-2, 2), uniform(-2, 2));
@@ -111,8 +111,8 @@ TEST(PlanPolygon, FarFromTheOrigin) {
   }
 }
 
-TEST(PlanPolygon, EdgesNearABox) {
-  const PlanPolygon outline(random_star(200));
+TEST(XyPolygon, EdgesNearABox) {
+  const XyPolygon outline(random_star(200));
   const Corners& corners = outline.corners();
   for (int n = 0; n < 300; ++n) {
     const Vector2d low(uniform(-2, 2), uniform(-2, 2));
@@ -131,9 +131,9 @@ TEST(PlanPolygon, EdgesNearABox) {
   EXPECT_TRUE(make_rectangle({0, 0}, {9, 9}).edges_near({4, 4}, {5, 5}).empty());
 }
 
-TEST(PlanPolygon, WhatIsNone) {
+TEST(XyPolygon, WhatIsNone) {
   const auto reason = [](const Corners& corners) {
-    return error_of([&] { const PlanPolygon outline(corners); }).what() + std::string();
+    return error_of([&] { const XyPolygon outline(corners); }).what() + std::string();
   };
   const auto says = [](const std::string& text, const std::string& part) {
     return text.find(part) != std::string::npos;
@@ -152,7 +152,7 @@ TEST(PlanPolygon, WhatIsNone) {
   EXPECT_TRUE(says(reason({{0, 0}, {4, 0}, {4, 4}, {4, -1}, {0, -1}}), "crosses or touches"));
 }
 
-TEST(PlanPolygon, CloudsAreCutWithAllTheirFields) {
+TEST(XyPolygon, CloudsAreCutWithAllTheirFields) {
   PointCloud cloud;
   for (int x = 0; x <= 4; ++x)
     for (int y = 0; y <= 4; ++y) cloud.positions.emplace_back(x, y, x);
@@ -168,5 +168,5 @@ TEST(PlanPolygon, CloudsAreCutWithAllTheirFields) {
   EXPECT_EQ(clip_cloud(cloud, {}).size(), 25U);
 }
 
-}  // namespace plan_polygon_test
+}  // namespace xy_polygon_test
 }  // namespace libmap

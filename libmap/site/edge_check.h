@@ -39,13 +39,13 @@ HeightFunction heights_of(const TriangleMesh& mesh,
 HeightFunction heights_of(const std::vector<Eigen::Vector3d>& points, double radius_m,
                           int min_points);
 
-struct SpotCheckOptions {
+struct EdgeCheckOptions {
   int places = 7;         // >= 1: positions per edge, at the centers of as many equal parts
   double inset_m = 0.05;  // >= 0: distance of the positions from the edge
 };
-void bind(ParameterTable& table, SpotCheckOptions& options);
+void bind(ParameterTable& table, EdgeCheckOptions& options);
 
-struct SpotCheckPlace {
+struct EdgeCheckPoint {
   Eigen::Vector2d position = Eigen::Vector2d::Zero();
   std::optional<double> height_m{};
   std::optional<double> ground_m{};
@@ -57,8 +57,8 @@ struct SpotCheckPlace {
   }
 };
 
-struct SpotCheckResult {
-  std::array<std::vector<SpotCheckPlace>, 4> edges;  // a, b, c, d
+struct EdgeCheckResult {
+  std::array<std::vector<EdgeCheckPoint>, 4> edges;  // a, b, c, d
   std::array<std::optional<double>, 4> mean_m;       // mean absolute error by edge
   std::size_t measured = 0;                          // positions with an error
   std::size_t missing = 0;                           // positions without
@@ -69,7 +69,7 @@ struct SpotCheckResult {
 
 // Compares `surface` with `ground` at positions along the site's edges. Throws Error: options out
 // of their ranges, an inset of half a side or more, no position where both have a height.
-SpotCheckResult check_edges(const SiteCorners& site, const HeightFunction& surface,
-                            const HeightFunction& ground, const SpotCheckOptions& options = {});
+EdgeCheckResult check_edges(const SiteCorners& site, const HeightFunction& surface,
+                            const HeightFunction& ground, const EdgeCheckOptions& options = {});
 
 }  // namespace libmap
