@@ -79,10 +79,10 @@ class TilesWithMargin {
 
 std::vector<std::size_t> points_within(const PointCloud& cloud, const VoxelLattice& lattice,
                                        const std::vector<TileBounds>& tiles, double margin_m) {
-  const TilesWithMargin places(lattice, tiles, margin_m);
+  const TilesWithMargin rectangles(lattice, tiles, margin_m);
   std::vector<std::size_t> within;
   for (std::size_t n = 0; n < cloud.size(); ++n)
-    if (places.hold(cloud.positions[n])) within.push_back(n);
+    if (rectangles.hold(cloud.positions[n])) within.push_back(n);
   return within;
 }
 

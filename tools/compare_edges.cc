@@ -149,8 +149,8 @@ libmap::HeightFunction heights_in(const std::optional<libmap::Bounds3d>& box, Ed
   }
   if (!box) return libmap::heights_of(*shape.mesh);
   return [heights = libmap::heights_of(*shape.mesh, box->max.z()),
-          bottom = box->min.z()](const Eigen::Vector2d& place) {
-    const std::optional<double> height = heights(place);
+          bottom = box->min.z()](const Eigen::Vector2d& position) {
+    const std::optional<double> height = heights(position);
     return height && *height >= bottom ? height : std::nullopt;
   };
 }
@@ -185,8 +185,8 @@ libmap::Table table_of(const libmap::EdgeCheckResult& result) {
   for (std::size_t e = 0; e < result.edges.size(); ++e) {
     std::vector<std::string>& row = table.rows.emplace_back();
     row.emplace_back(edge_names[e]);
-    for (const libmap::EdgeCheckPoint& place : result.edges[e])
-      row.push_back(cell_of(place.error_m()));
+    for (const libmap::EdgeCheckPoint& edge_point : result.edges[e])
+      row.push_back(cell_of(edge_point.error_m()));
     row.push_back(cell_of(result.mean_m[e]));
   }
   return table;
@@ -204,15 +204,15 @@ Json check_json(const Check& check, const SpotCheckCommandOptions& options) {
   const libmap::EdgeCheckResult& result = check.result;
   Json edges = Json::array();
   for (std::size_t e = 0; e < result.edges.size(); ++e) {
-    Json places = Json::array();
-    for (const libmap::EdgeCheckPoint& place : result.edges[e])
-      places.push_back(to_json({{"x_m", place.position.x()},
-                                {"y_m", place.position.y()},
-                                {"z_m", place.height_m},
-                                {"ground_m", place.ground_m},
-                                {"error_m", place.error_m()}}));
+    Json points = Json::array();
+    for (const libmap::EdgeCheckPoint& edge_point : result.edges[e])
+      points.push_back(to_json({{"x_m", edge_point.position.x()},
+                                {"y_m", edge_point.position.y()},
+                                {"z_m", edge_point.height_m},
+                                {"ground_m", edge_point.ground_m},
+                                {"error_m", edge_point.error_m()}}));
     edges.push_back(to_json({{"edge", edge_names[e]}, {"mean_m", result.mean_m[e]}}));
-    edges.back()["places"] = places;
+    edges.back()["places"] = points;
   }
   Json corners = Json::array();
   for (const Eigen::Vector2d& corner : check.site.corners)

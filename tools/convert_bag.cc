@@ -214,7 +214,7 @@ PointCloud curvature_map(const CloudFile& map) {
   return cloud;
 }
 
-libmap::BagTargets places_of(const CloudFile& footholds, double arrow_m) {
+libmap::BagTargets targets_of(const CloudFile& footholds, double arrow_m) {
   const auto field = [&](const char* name) -> const std::vector<double>& {
     const libmap::ScalarField* found = footholds.cloud.find_field(name);
     if (found) return found->values;
@@ -225,20 +225,21 @@ libmap::BagTargets places_of(const CloudFile& footholds, double arrow_m) {
   const std::vector<double>& y = field("approach_y");
   const std::vector<double>& z = field("approach_z");
   const std::vector<double>& score = field("score");
-  libmap::BagTargets places;
-  places.marker_topic = "/footholds";
-  places.pose_topic = "/foothold_poses";
-  places.arrow_m = arrow_m;
+  libmap::BagTargets targets;
+  targets.marker_topic = "/footholds";
+  targets.pose_topic = "/foothold_poses";
+  targets.arrow_m = arrow_m;
   for (std::size_t n = 0; n < footholds.cloud.size(); ++n) {
     const Eigen::Vector3d approach(x[n], y[n], z[n]);
     if (!approach.allFinite() || approach.norm() < 1e-9)
       throw libmap::Error(
           "is not a direction",
           {.file = footholds.path, .field = fmt::format("approach of foothold {}", n + 1)});
-    places.places.push_back({footholds.cloud.positions[n], approach, libmap::score_color(score[n]),
-                             fmt::format("{}: {:.2f}", n + 1, score[n])});
+    targets.targets.push_back({footholds.cloud.positions[n], approach,
+                               libmap::score_color(score[n]),
+                               fmt::format("{}: {:.2f}", n + 1, score[n])});
   }
-  return places;
+  return targets;
 }
 
 // Stamp of the messages: --stamp, else the panorama's stamp in the inputs' manifests.
@@ -341,8 +342,8 @@ void write_claimed_bag(const BagCommandOptions& options, Run& run, const Write& 
 void add_results(const libmap::BagContent& content, Run& run) {
   for (const libmap::BagCloud& cloud : content.clouds)
     run.add_results({{cloud.topic + ".points", cloud.cloud.size()}});
-  for (const libmap::BagTargets& places : content.places)
-    run.add_results({{"footholds", places.places.size()}});
+  for (const libmap::BagTargets& targets : content.targets)
+    run.add_results({{"footholds", targets.targets.size()}});
   for (const libmap::BagGrid& grid : content.grids)
     run.add_results(
         {{"cells_x", grid.columns}, {"cells_y", grid.rows}, {"cell_size_m", grid.cell_m}});
@@ -378,8 +379,8 @@ void write_map_bag(const BagCommandOptions& options, Run& run) {
                                 ? run.timed("curvature", [&] { return curvature_map(map); })
                                 : read(options.curvature, run).cloud});
   if (footholds) {
-    content.places.push_back(places_of(*footholds, options.arrow_m));
-    content.places.back().frame = frame_id(footholds->frame(), terrain_frame);
+    content.targets.push_back(targets_of(*footholds, options.arrow_m));
+    content.targets.back().frame = frame_id(footholds->frame(), terrain_frame);
   }
   if (libmap::bag_format_of(options.output) != libmap::BagFormat::ros1)
     add_grid(map, map_frame, options, content, run);

@@ -51,18 +51,18 @@ std::string gripper_of(const FootholdTrialsOptions& options,
 }
 
 // Drops footholds that are not on the mesh. Returns the positions of the others in its frame.
-std::vector<Eigen::Vector3d> places_on(const libgtd::Ground& ground,
-                                       const libmap::Pose& mesh_from_map,
-                                       const libmap::PointCloud& map, double max_distance_m,
-                                       std::vector<libgtd::Foothold>& footholds) {
-  std::vector<Eigen::Vector3d> places;
+std::vector<Eigen::Vector3d> positions_on(const libgtd::Ground& ground,
+                                          const libmap::Pose& mesh_from_map,
+                                          const libmap::PointCloud& map, double max_distance_m,
+                                          std::vector<libgtd::Foothold>& footholds) {
+  std::vector<Eigen::Vector3d> positions;
   std::erase_if(footholds, [&](const libgtd::Foothold& foothold) {
-    const Eigen::Vector3d place = mesh_from_map * map.positions[foothold.map_point];
-    const bool is_on_mesh = ground.distance(place, max_distance_m).has_value();
-    if (is_on_mesh) places.push_back(place);
+    const Eigen::Vector3d position = mesh_from_map * map.positions[foothold.map_point];
+    const bool is_on_mesh = ground.distance(position, max_distance_m).has_value();
+    if (is_on_mesh) positions.push_back(position);
     return !is_on_mesh;
   });
-  return places;
+  return positions;
 }
 
 void bind(libmap::ParameterTable& table, FootholdTrialsOptions& options) {
@@ -91,15 +91,15 @@ std::vector<libgtd::LocationResult> test_footholds(const FootholdTrialsOptions& 
   const auto ground = in_file(options.mesh, [&] { return libgtd::Ground(mesh); });
   std::vector<libgtd::Foothold>& footholds = result.footholds;
   const std::size_t found = footholds.size();
-  const std::vector<Eigen::Vector3d> places = places_on(
+  const std::vector<Eigen::Vector3d> positions = positions_on(
       ground, map_from_input(manifest).inverse(), map, options.grasp.max_distance_m, footholds);
-  if (places.empty() && found > 0)
+  if (positions.empty() && found > 0)
     throw libmap::Error("none of the map's footholds is on the mesh", {.file = options.mesh});
-  if (places.size() < found)
+  if (positions.size() < found)
     run.warn("{}: {} of {} footholds are not on the mesh and are left out", options.mesh,
-             found - places.size(), found);
+             found - positions.size(), found);
   const std::vector<libgtd::LocationResult> trials = run.timed("grasp", [&] {
-    return libgtd::test_grasps(ground, gripper, places, options.grasp, run.progress());
+    return libgtd::test_grasps(ground, gripper, positions, options.grasp, run.progress());
   });
   std::vector<std::size_t> order(trials.size());
   std::iota(order.begin(), order.end(), std::size_t{0});

@@ -33,8 +33,8 @@ using namespace graspmap_tools;
 namespace {
 
 struct GraspScenesOptions {
-  std::string folder;               // empty: no scenes
-  std::vector<std::string> places;  // empty: all locations
+  std::string folder;                  // empty: no scenes
+  std::vector<std::string> locations;  // empty: all locations
 };
 
 struct GraspScene {
@@ -53,8 +53,8 @@ struct GraspScenesInput {
 constexpr std::size_t max_unlisted_scenes = 100;
 
 // File name of a location: special characters become '_'.
-std::string file_of(const std::string& place) {
-  std::string name = place.substr(0, 100);
+std::string file_of(const std::string& location) {
+  std::string name = location.substr(0, 100);
   for (char& letter : name) {
     const bool is_plain = (letter >= 'a' && letter <= 'z') || (letter >= 'A' && letter <= 'Z') ||
                           (letter >= '0' && letter <= '9') || letter == '-' || letter == '.';
@@ -64,24 +64,24 @@ std::string file_of(const std::string& place) {
   return name + ".ply";
 }
 
-std::vector<std::string> places_of(const libmap::Table& locations) {
+std::vector<std::string> names_of(const libmap::Table& locations) {
   const auto column = locations.find_column("place");
-  std::vector<std::string> places;
+  std::vector<std::string> names;
   for (std::size_t row = 0; row < locations.rows.size(); ++row)
-    places.push_back(column ? locations.rows[row][*column] : std::to_string(row + 1));
-  return places;
+    names.push_back(column ? locations.rows[row][*column] : std::to_string(row + 1));
+  return names;
 }
 
 std::vector<std::size_t> rows_of(const libmap::Table& locations,
                                  const std::vector<std::string>& listed) {
-  const std::vector<std::string> places = places_of(locations);
+  const std::vector<std::string> names = names_of(locations);
   std::vector<std::size_t> rows;
-  for (const std::string& place : listed) {
-    const auto found = std::find(places.begin(), places.end(), place);
-    if (found == places.end())
-      throw libmap::Error("is not a listed location" + libmap::did_you_mean(place, places),
-                          {.file = locations.file, .field = "--scene-of", .value = place});
-    const auto row = static_cast<std::size_t>(found - places.begin());
+  for (const std::string& location : listed) {
+    const auto found = std::find(names.begin(), names.end(), location);
+    if (found == names.end())
+      throw libmap::Error("is not a listed location" + libmap::did_you_mean(location, names),
+                          {.file = locations.file, .field = "--scene-of", .value = location});
+    const auto row = static_cast<std::size_t>(found - names.begin());
     if (std::find(rows.begin(), rows.end(), row) == rows.end()) rows.push_back(row);
   }
   return rows;
@@ -112,7 +112,7 @@ std::string description(const libgtd::LocationResult& result, const libgtd::Tria
 // Claims the folder. Throws Error if another command wrote it, or for locations without a folder.
 void claim_scenes(const GraspScenesOptions& options, Run& run) {
   if (!options.folder.empty()) return run.claim_output_folder(options.folder);
-  if (!options.places.empty()) throw libmap::Error("requires --scenes", {.field = "--scene-of"});
+  if (!options.locations.empty()) throw libmap::Error("requires --scenes", {.field = "--scene-of"});
 }
 
 // Returns the scenes to write. Throws Error for a location that is not in the table, two with the
@@ -120,25 +120,25 @@ void claim_scenes(const GraspScenesOptions& options, Run& run) {
 std::vector<GraspScene> scenes_of(const libmap::Table& locations,
                                   const GraspScenesOptions& options) {
   if (options.folder.empty()) return {};
-  const std::vector<std::string> places = places_of(locations);
-  std::vector<std::size_t> rows = rows_of(locations, options.places);
-  if (options.places.empty()) {
-    if (places.size() > max_unlisted_scenes)
+  const std::vector<std::string> names = names_of(locations);
+  std::vector<std::size_t> rows = rows_of(locations, options.locations);
+  if (options.locations.empty()) {
+    if (names.size() > max_unlisted_scenes)
       throw libmap::Error("too many locations for one scene each: select some with --scene-of",
                           {.file = locations.file,
                            .field = "locations",
-                           .value = std::to_string(places.size()),
+                           .value = std::to_string(names.size()),
                            .bound = "<= " + std::to_string(max_unlisted_scenes)});
-    for (std::size_t row = 0; row < places.size(); ++row) rows.push_back(row);
+    for (std::size_t row = 0; row < names.size(); ++row) rows.push_back(row);
   }
   std::vector<GraspScene> scenes;
   for (const std::size_t row : rows) {
-    const std::string file = file_of(places[row]);
+    const std::string file = file_of(names[row]);
     for (const GraspScene& other : scenes)
       if (other.file == file)
         throw libmap::Error(
             fmt::format("the scenes of rows {} and {} have the same name", other.row + 1, row + 1),
-            {.file = locations.file, .field = "place", .value = "'" + places[row] + "'"});
+            {.file = locations.file, .field = "place", .value = "'" + names[row] + "'"});
     scenes.push_back({row, file});
   }
   return scenes;
@@ -266,7 +266,7 @@ libgtd::Ground ground_of(const libmap::TriangleMesh& mesh, const GraspCommandOpt
 
 void grasp_voxels(GraspCommandOptions& options, Run& run) {
   reject_given({{"--scenes", !options.scenes.folder.empty()},
-                {"--scene-of", !options.scenes.places.empty()},
+                {"--scene-of", !options.scenes.locations.empty()},
                 {"--more-loads", !options.more_loads.empty()},
                 {"--prefix", !options.prefix.empty()}},
                "requires --points");
@@ -435,9 +435,9 @@ void plan_next_pulls(const GraspCommandOptions& options, Run& run) {
   libmap::Table planned;
   planned.columns = {"place",    "x",           "y",      "z",
                      "tilt_deg", "azimuth_deg", "load_n", "information_bits"};
-  const std::vector<std::string> places = places_of(table);
+  const std::vector<std::string> names = names_of(table);
   for (const libgtd::PlannedPull& plan : plans) {
-    std::vector<std::string> row{places[plan.location]};
+    std::vector<std::string> row{names[plan.location]};
     for (const double value : locations[plan.location]) row.push_back(libmap::to_text(value));
     row.push_back(std::to_string(plan.direction.tilt_deg));
     row.push_back(std::to_string(plan.direction.azimuth_deg));
@@ -497,7 +497,7 @@ int main(int argc, char** argv) {
   command.option("--scenes", "FOLDER", options.scenes.folder,
                  "folder for scenes of one trial per location, with nearly the median force: "
                  "FOLDER/PLACE.ply, by the column 'place' or the row");
-  command.option("--scene-of", "PLACES", options.scenes.places,
+  command.option("--scene-of", "PLACES", options.scenes.locations,
                  "locations of the scenes; default: all");
   for (const char* key : {"friction", "asperity-min", "asperity-max", "engagement-rate", "drag"}) {
     std::string name = key;

@@ -79,20 +79,21 @@ constexpr double square_share = 0.94;  // drawn share of a voxel's side, which l
 constexpr double offset_share = 0.1;   // distance of dimension lines, as a share of the mask's side
 
 // Index of a voxel by its two coordinates in a section.
-using PlaceInMask = std::function<Eigen::Vector3i(int, int)>;
+using CellOfPixel = std::function<Eigen::Vector3i(int, int)>;
 
 Eigen::Vector3d center_of(const GripperMask& mask, const Eigen::Vector3i& voxel) {
   return mask.voxel_size_m *
          (voxel - Eigen::Vector3i(mask.pivot_xy, mask.pivot_xy, mask.pivot_z)).cast<double>();
 }
 
-libmap::Scene scene_of(const GripperMask& mask, const PlaceInMask& place, int width, int height) {
+libmap::Scene scene_of(const GripperMask& mask, const CellOfPixel& cell_of_pixel, int width,
+                       int height) {
   libmap::Scene scene;
   for (const KindLook& look : looks) {
     libmap::PointCloud cloud;
     for (int u = 0; u < width; ++u)
       for (int v = 0; v < height; ++v) {
-        const Eigen::Vector3i at = place(u, v);
+        const Eigen::Vector3i at = cell_of_pixel(u, v);
         if (kind_of(mask, at) == look.kind) cloud.positions.push_back(center_of(mask, at));
       }
     if (cloud.empty()) continue;

@@ -99,8 +99,8 @@ double RandomField::node(const Eigen::Array3i& number) {
   return known;
 }
 
-double RandomField::at(const Eigen::Vector3d& place) {
-  const Eigen::Array3d cell = place.array() / length_m_ + shift_;
+double RandomField::at(const Eigen::Vector3d& position) {
+  const Eigen::Array3d cell = position.array() / length_m_ + shift_;
   const Eigen::Array3d low = cell.floor();
   const Eigen::Array3d share = cell - low;
   const Eigen::Array3i first = low.max(-1e9).min(1e9).cast<int>();

@@ -38,7 +38,7 @@ class RandomField {
   // Nodes in `box` are cached, so that positions inside it are fast.
   RandomField(double length_m, std::uint64_t seed, std::uint64_t key,
               const Eigen::AlignedBox3d& box);
-  double at(const Eigen::Vector3d& place);
+  double at(const Eigen::Vector3d& position);
 
  private:
   double node(const Eigen::Array3i& number);

@@ -52,7 +52,7 @@ std::vector<std::vector<std::size_t>> blocks_of(const VoxelGrid& grid, const Til
   }
   std::vector<std::vector<std::size_t>> listed;
   listed.reserve(blocks.size());
-  for (auto& [place, members] : blocks) listed.push_back(std::move(members));
+  for (auto& [corner, members] : blocks) listed.push_back(std::move(members));
   return listed;
 }
 

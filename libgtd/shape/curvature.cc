@@ -43,7 +43,7 @@ bool tangent_frame(const Matrix3d& covariance, Matrix3d& frame) {
 }
 
 // Normal equations of w = f + d u + e v + a u^2 + b u v + c v^2.
-void normal_equations(const NeighborLoops& loops, const NeighborLoops::Places& neighbors,
+void normal_equations(const NeighborLoops& loops, const NeighborLoops::Coordinates& neighbors,
                       std::size_t count, const Matrix3d& frame, Matrix6d& matrix, Vector6d& right) {
   std::array<double, NeighborLoops::quadric_sums> m;
   loops.sum_quadric(neighbors, count, frame.data(), m.data());
@@ -110,10 +110,10 @@ class QuadricFitter {
 
   // Fits at a point of the cell entered last.
   Curvature fit(std::size_t point) {
-    const Vector3d& place = cloud_.positions[point];
-    if (!is_fitted_ || !is_same_position(place, place_)) {
-      surface_ = fit_at(place);
-      place_ = place;
+    const Vector3d& position = cloud_.positions[point];
+    if (!is_fitted_ || !is_same_position(position, position_)) {
+      surface_ = fit_at(position);
+      position_ = position;
       is_fitted_ = true;
     }
     if (!surface_) return {};
@@ -139,10 +139,10 @@ class QuadricFitter {
     std::array<double, 2> bending;
   };
 
-  std::optional<Surface> fit_at(const Vector3d& place) {
-    const NeighborLoops::Places neighbors = neighbors_.places();
-    const std::size_t count =
-        loops_.select(candidates_.places(), candidates_.count(), place.data(), radius_, neighbors);
+  std::optional<Surface> fit_at(const Vector3d& position) {
+    const NeighborLoops::Coordinates neighbors = neighbors_.coordinates();
+    const std::size_t count = loops_.select(candidates_.coordinates(), candidates_.count(),
+                                            position.data(), radius_, neighbors);
     Matrix3d frame;
     Matrix6d matrix;
     Vector6d right, quadric;
@@ -162,7 +162,7 @@ class QuadricFitter {
   CoordinateRows neighbors_;
   // Last fit, shared by coincident points.
   bool is_fitted_ = false;
-  Vector3d place_ = Vector3d::Zero();
+  Vector3d position_ = Vector3d::Zero();
   std::optional<Surface> surface_;
 };
 

@@ -73,15 +73,15 @@ void PointGrid::sort_by_cell(const std::vector<Eigen::Vector3d>& points) {
   columns_.push_back({0, cells_.size()});
 }
 
-bool PointGrid::reaches(const Eigen::Vector3d& place) const {
-  return (place.array() >= low_.array() - cell_size_m_).all() &&
-         (place.array() <= high_.array() + cell_size_m_).all();
+bool PointGrid::reaches(const Eigen::Vector3d& position) const {
+  return (position.array() >= low_.array() - cell_size_m_).all() &&
+         (position.array() <= high_.array() + cell_size_m_).all();
 }
 
-PointGrid::Cell PointGrid::cell_of(const Eigen::Vector3d& place) const {
+PointGrid::Cell PointGrid::cell_of(const Eigen::Vector3d& position) const {
   Cell cell;
   for (int a = 0; a < 3; ++a)
-    cell[static_cast<std::size_t>(a)] = floor_to<std::int64_t>(place[a] / cell_size_m_);
+    cell[static_cast<std::size_t>(a)] = floor_to<std::int64_t>(position[a] / cell_size_m_);
   return cell;
 }
 
@@ -136,7 +136,7 @@ void CellSurroundings::enter(const PointGrid::Cell& cell, std::int64_t reach) {
   count_ = 0;
   for (const PointGrid::Range& run : runs_) run_ends_.push_back(count_ += run.last - run.first);
   rows_.make_room(count_);
-  const NeighborLoops::Places to = rows_.places();
+  const NeighborLoops::Coordinates to = rows_.coordinates();
   std::size_t n = 0;
   const auto put = [&](const Eigen::Vector3d& p) {
     to.x[n] = p.x();
@@ -149,8 +149,8 @@ void CellSurroundings::enter(const PointGrid::Cell& cell, std::int64_t reach) {
     put(Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity()));
 }
 
-Eigen::Matrix3d covariance_of(const NeighborLoops& loops, const NeighborLoops::Places& neighbors,
-                              std::size_t count) {
+Eigen::Matrix3d covariance_of(const NeighborLoops& loops,
+                              const NeighborLoops::Coordinates& neighbors, std::size_t count) {
   std::array<double, NeighborLoops::moments> m;
   loops.sum_moments(neighbors, count, m.data());
   for (double& sum : m) sum /= static_cast<double>(count);

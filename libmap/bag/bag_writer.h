@@ -22,7 +22,7 @@ struct BagCloud {
 
 // Position with an approach direction.
 struct BagTarget {
-  Eigen::Vector3d place = Eigen::Vector3d::Zero();
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
   Eigen::Vector3d direction = Eigen::Vector3d::UnitX();  // any length > 0
   Color color{};
   std::string text{};
@@ -39,7 +39,7 @@ struct BagTargets {
   std::string pose_topic{};
   std::string frame{};
   double arrow_m = 0.08;  // length of an arrow; a ball's radius is an eighth of it
-  std::vector<BagTarget> places{};
+  std::vector<BagTarget> targets{};
 };
 
 // Grid of square cells in a frame's x-y plane as grid_map_msgs/GridMap and nav_msgs/OccupancyGrid.
@@ -84,7 +84,7 @@ struct BagContent {
   double stamp_s = 1.0;                    // stamp of all messages, 1e-9 to 2^32 - 1 (ROS 2: 2^31)
   std::vector<BagTransform> transforms{};  // /tf_static
   std::vector<BagCloud> clouds{};
-  std::vector<BagTargets> places{};
+  std::vector<BagTargets> targets{};
   std::vector<BagGrid> grids{};  // ROS 2 only
 };
 

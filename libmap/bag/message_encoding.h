@@ -27,10 +27,10 @@ ros_message::CameraInfo encode_camera_info(const Camera& camera);
 ros_message::TransformStamped encode_transform(const BagTransform& transform);
 
 // Encodes poses whose x axis is the direction.
-ros_message::PoseArray encode_poses(const std::vector<BagTarget>& places);
+ros_message::PoseArray encode_poses(const std::vector<BagTarget>& targets);
 
 // Encodes, for each position, an arrow that ends there and its text, and one list of balls for all.
-ros_message::MarkerArray encode_markers(const BagTargets& places,
+ros_message::MarkerArray encode_markers(const BagTargets& targets,
                                         const ros_message::Header& header);
 
 // Encodes layers from the corner of largest x and y, x first, the reverse order of BagGrid's

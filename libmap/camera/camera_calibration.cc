@@ -20,7 +20,7 @@ namespace {
 constexpr std::size_t min_pictures = 3;
 constexpr int min_side = 3;  // corners
 constexpr int max_side = 100;
-constexpr double same_place_px = 1.0;
+constexpr double same_point_px = 1.0;
 // Maximum relative standard deviation of the focal length for a determined camera.
 constexpr double max_relative_deviation = 0.2;
 
@@ -238,7 +238,7 @@ bool shows_the_same(const BoardPicture& a, const BoardPicture& b) {
     forward += (a.corners[n] - b.corners[n]).squaredNorm();
     backward += (a.corners[n] - b.corners[count - 1 - n]).squaredNorm();
   }
-  return std::min(forward, backward) < static_cast<double>(count) * same_place_px * same_place_px;
+  return std::min(forward, backward) < static_cast<double>(count) * same_point_px * same_point_px;
 }
 
 CameraCalibrationResult calibrate_once(const std::vector<BoardPicture>& pictures, int width,
@@ -400,10 +400,10 @@ GrayImage stretch_contrast(const Image<std::uint16_t>& image) {
   if (image.empty()) return gray;
   std::vector<std::uint16_t> sorted = image.pixels;
   const auto percentile = [&](std::size_t percent) {
-    const std::size_t place = (sorted.size() - 1) * percent / 100;
-    std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(place),
+    const std::size_t index = (sorted.size() - 1) * percent / 100;
+    std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(index),
                      sorted.end());
-    return static_cast<double>(sorted[place]);
+    return static_cast<double>(sorted[index]);
   };
   const double low = percentile(1);
   const double high = std::max(percentile(99), low + 1);

@@ -79,7 +79,7 @@ class DepthSurface {
   void find_rays();
   Eigen::Vector2d ray_at(int column, int row) const;
   // Projection of a point, in steps of the grid; nullopt if it is not in the image.
-  std::optional<Eigen::Vector2d> place_of(const Eigen::Vector3d& point_in_camera) const;
+  std::optional<Eigen::Vector2d> grid_position(const Eigen::Vector3d& point_in_camera) const;
   std::size_t index(int column, int row) const {
     return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
            static_cast<std::size_t>(column);

@@ -25,13 +25,13 @@ std::vector<int> best_matches(const Eigen::MatrixXf& similarities, double max_ra
   for (Eigen::Index column = 0; column < similarities.cols(); ++column) {
     float first = -2.0F;
     float second = -2.0F;
-    int place = -1;
+    int nearest = -1;
     for (Eigen::Index row = 0; row < similarities.rows(); ++row) {
       const float value = similarities(row, column);
       if (value > first) {
         second = first;
         first = value;
-        place = static_cast<int>(row);
+        nearest = static_cast<int>(row);
       } else if (value > second) {
         second = value;
       }
@@ -39,8 +39,8 @@ std::vector<int> best_matches(const Eigen::MatrixXf& similarities, double max_ra
     // |x - y|^2 = 2 - 2 x.y for unit vectors; max() covers rounding.
     const float best_square = std::max(0.0F, 1.0F - first);
     const float next_square = std::max(0.0F, 1.0F - second);
-    if (place >= 0 && (max_ratio >= 1.0 || best_square < limit * next_square))
-      best[static_cast<std::size_t>(column)] = place;
+    if (nearest >= 0 && (max_ratio >= 1.0 || best_square < limit * next_square))
+      best[static_cast<std::size_t>(column)] = nearest;
   }
   return best;
 }

@@ -327,8 +327,8 @@ std::vector<std::uint8_t> pixels_in(const DepthImage& depth, const PixelRays& ra
   const auto max_depth = static_cast<float>(max_depth_m);
   std::vector<std::uint8_t> are_in(depth.pixels.size(), 0);
   const auto width = static_cast<std::size_t>(depth.width);
-  std::vector<float> places(2 * (width + Loops::lanes));
-  float* const x = places.data();
+  std::vector<float> coordinates(2 * (width + Loops::lanes));
+  float* const x = coordinates.data();
   float* const y = x + width + Loops::lanes;
   for (int row = 0; row < depth.height; ++row) {
     const std::size_t first = row_begin(depth, row);
@@ -399,18 +399,19 @@ DepthPixelCounts add_depth_planes(const DepthImage& depth, const PixelRays& rays
   const std::size_t stride = width + Loops::lanes;
   std::vector<float> numbers(7 * stride);
   const auto numbers_at = [&](std::size_t n) { return numbers.data() + n * stride; };
-  const Loops::Places places{{numbers_at(0), numbers_at(1), numbers_at(2)},
-                             {numbers_at(3), numbers_at(4), numbers_at(5)},
-                             numbers_at(6)};
+  const Loops::PlacedElements placed{{numbers_at(0), numbers_at(1), numbers_at(2)},
+                                     {numbers_at(3), numbers_at(4), numbers_at(5)},
+                                     numbers_at(6)};
   return each_plane_row(depth, rays, options, only, [&](int y, const Loops::Planes& planes) {
     const std::size_t first = row_begin(depth, y);
-    loops.place(planes, &rays.x[first], &rays.y[first], depth.width, placement, places);
+    loops.place(planes, &rays.x[first], &rays.y[first], depth.width, placement, placed);
     for (std::size_t x = 0; x < width; ++x) {
       if (planes.support[x] == 0) continue;
-      const Eigen::Vector3f place(places.place[0][x], places.place[1][x], places.place[2][x]);
-      if (!cells.contains(place.head<2>())) continue;
-      voxels.add(place, {places.normal[0][x], places.normal[1][x], places.normal[2][x]},
-                 places.weight[x]);
+      const Eigen::Vector3f position(placed.position[0][x], placed.position[1][x],
+                                     placed.position[2][x]);
+      if (!cells.contains(position.head<2>())) continue;
+      voxels.add(position, {placed.normal[0][x], placed.normal[1][x], placed.normal[2][x]},
+                 placed.weight[x]);
     }
   });
 }

@@ -24,17 +24,17 @@ struct TileMask {
   }
   // Returns true in one of ten squares of 4 x 4 columns, which validate a registration and are not
   // used by it. The position is in voxels.
-  static bool is_held_out(const Eigen::Vector2f& place) {
-    const Eigen::Array2i square = (place.array() / 4.0F).floor().cast<int>();
+  static bool is_held_out(const Eigen::Vector2f& position) {
+    const Eigen::Array2i square = (position.array() / 4.0F).floor().cast<int>();
     return mix_bits(~static_cast<std::uint64_t>(square.x()),
                     static_cast<std::uint64_t>(square.y())) %
                10 ==
            0;
   }
   // Returns true if the position, in voxels, is in a selected column.
-  bool contains(const Eigen::Vector2f& place) const {
-    return (place.array().abs() < static_cast<float>(voxel_cell_limit)).all() &&
-           has_cell(place.array().floor().cast<int>());
+  bool contains(const Eigen::Vector2f& position) const {
+    return (position.array().abs() < static_cast<float>(voxel_cell_limit)).all() &&
+           has_cell(position.array().floor().cast<int>());
   }
 
   TileMask grown(int cells) const { return {low - cells, high + cells, subsampling_level}; }

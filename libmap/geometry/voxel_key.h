@@ -56,10 +56,10 @@ inline std::uint64_t scramble(std::uint64_t key) {
 
 }  // namespace voxel_key
 
-inline std::uint64_t pack(const VoxelSide& place) {
+inline std::uint64_t pack(const VoxelSide& voxel) {
   using voxel_key::axis_bits;
-  return axis_bits(place.cell.x()) << 43U | axis_bits(place.cell.y()) << 22U |
-         axis_bits(place.cell.z()) << 1U | static_cast<std::uint64_t>(place.side);
+  return axis_bits(voxel.cell.x()) << 43U | axis_bits(voxel.cell.y()) << 22U |
+         axis_bits(voxel.cell.z()) << 1U | static_cast<std::uint64_t>(voxel.side);
 }
 
 inline VoxelSide unpack(std::uint64_t key) {

@@ -58,8 +58,8 @@ PointCloud PieceIndex::points_in(const Eigen::Vector2d& low, const Eigen::Vector
     const PointCloud& cloud = cloud_of(piece);
     std::vector<std::size_t> inside;
     for (std::size_t n = 0; n < cloud.size(); ++n) {
-      const auto place = cloud.positions[n].head<2>().array();
-      if ((place >= low.array()).all() && (place < high.array()).all()) inside.push_back(n);
+      const auto position = cloud.positions[n].head<2>().array();
+      if ((position >= low.array()).all() && (position < high.array()).all()) inside.push_back(n);
     }
     append_cloud(select_points(cloud, inside), found);
   }

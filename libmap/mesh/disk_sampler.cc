@@ -165,7 +165,7 @@ constexpr std::array<double, 5> dart_rounds = {0.5, 0.5, 1.0, 2.0, 4.0};
 
 struct Candidate {
   double order;  // random priority; smallest first
-  TrianglePoint place;
+  TrianglePoint triangle_point;
   Eigen::Vector3d position;
 };
 
@@ -300,13 +300,13 @@ class Sampler {
       accept(darts(round, dart_rounds[round] * std::max(expected_, 1.0) / surface_.area_m2));
       progress.advance(1);
     }
-    if (goes_on(places_.size())) fill_gaps(progress);
+    if (goes_on(triangle_points_.size())) fill_gaps(progress);
     progress.end();
     DiskSamples result;
-    result.positions.reserve(places_.size());
+    result.positions.reserve(triangle_points_.size());
     for (std::size_t n = surface_.others.size(); n < samples_.size(); ++n)
       result.positions.push_back(samples_[n]);
-    result.places = std::move(places_);
+    result.triangle_points = std::move(triangle_points_);
     return result;
   }
 
@@ -332,8 +332,8 @@ class Sampler {
 
   bool place(const Fragment& fragment, RandomStream& random, Candidate& candidate) const {
     const double first = random.uniform();
-    candidate.place = point_of(fragment, first, random.uniform());
-    candidate.position = position_on(surface_.mesh, candidate.place);
+    candidate.triangle_point = point_of(fragment, first, random.uniform());
+    candidate.position = position_on(surface_.mesh, candidate.triangle_point);
     if (surface_.rounding_m > 0.0) candidate.position = rounded_to_single(candidate.position);
     return !samples_.any_nearer(candidate.position, radius_m_, min_square_m2_);
   }
@@ -396,7 +396,7 @@ class Sampler {
     for (const Candidate& candidate : candidates) {
       if (samples_.any_nearer(candidate.position, radius_m_, min_square_m2_)) continue;
       samples_.add(candidate.position);
-      places_.push_back(candidate.place);
+      triangle_points_.push_back(candidate.triangle_point);
     }
   }
 
@@ -436,7 +436,7 @@ class Sampler {
   std::uint64_t seed_;
   double expected_;
   GrowingGrid samples_;
-  std::vector<TrianglePoint> places_;
+  std::vector<TrianglePoint> triangle_points_;
   SurfacePieces pieces_;
 };
 

@@ -81,7 +81,7 @@ struct SampledSurface {
 
 struct DiskSamples {
   std::vector<Eigen::Vector3d> positions;
-  std::vector<TrianglePoint> places;  // positions on the mesh before rounding
+  std::vector<TrianglePoint> triangle_points;  // positions on the mesh before rounding
 };
 
 // Saturation density of random discs in the plane: samples * radius^2 / area. Discs of half the

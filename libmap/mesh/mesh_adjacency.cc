@@ -34,9 +34,9 @@ std::vector<HalfEdge> by_lower_vertex(const std::vector<Triangle>& triangles, st
   };
   for_each([&](std::uint32_t low, HalfEdge) { ++bucket[low + 1]; });
   std::partial_sum(bucket.begin(), bucket.end(), bucket.begin());
-  std::vector<std::uint32_t> place(bucket.begin(), bucket.end() - 1);
+  std::vector<std::uint32_t> next(bucket.begin(), bucket.end() - 1);
   std::vector<HalfEdge> sorted(bucket.back());
-  for_each([&](std::uint32_t low, HalfEdge h) { sorted[place[low]++] = h; });
+  for_each([&](std::uint32_t low, HalfEdge h) { sorted[next[low]++] = h; });
   return sorted;
 }
 
@@ -128,10 +128,10 @@ VertexTriangles triangles_at_vertices(const std::vector<Triangle>& triangles,
   for (const Triangle& t : triangles)
     for (const std::uint32_t v : t) ++result.first[v + 1];
   std::partial_sum(result.first.begin(), result.first.end(), result.first.begin());
-  std::vector<std::uint32_t> place(result.first.begin(), result.first.end() - 1);
+  std::vector<std::uint32_t> next(result.first.begin(), result.first.end() - 1);
   result.triangles.resize(result.first.back());
   for (std::uint32_t t = 0; t < triangles.size(); ++t)
-    for (const std::uint32_t v : triangles[t]) result.triangles[place[v]++] = t;
+    for (const std::uint32_t v : triangles[t]) result.triangles[next[v]++] = t;
   return result;
 }
 

@@ -129,9 +129,9 @@ MeshComponents connected_components(const TriangleMesh& mesh) {
     const Triangle& corners = mesh.triangles[t];
     for (std::size_t k = 0; k < 3; ++k) {
       const auto [low, high] = std::minmax(corners[k], corners[(k + 1) % 3]);
-      const auto [place, is_new] =
+      const auto [entry, is_new] =
           triangle_at.try_emplace((static_cast<std::uint64_t>(low) << 32U) | high, t);
-      if (!is_new) sets.join(place->second, t);
+      if (!is_new) sets.join(entry->second, t);
     }
   }
   return numbered(mesh, sets);

@@ -152,7 +152,7 @@ PoissonDiskResult sample(const SampledSurface& surface, const PoissonDiskOptions
   result.relative_radius =
       result.smallest_distance_m / (2.0 * std::sqrt(per_sample_m2 / (2.0 * std::numbers::sqrt3)));
   result.cloud = timed(result.timings_s, "attributes",
-                       [&] { return points_on_surface(surface.mesh, samples.places); });
+                       [&] { return points_on_surface(surface.mesh, samples.triangle_points); });
   result.cloud.positions = std::move(samples.positions);
   return result;
 }

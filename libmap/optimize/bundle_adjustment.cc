@@ -117,7 +117,7 @@ class Adjustment {
   const Feature& feature(const Observation& seen) const {
     return frames_[seen.frame].features[seen.feature];
   }
-  bool has_pose(const Observation& seen) const { return place_.contains(frames_[seen.frame].node); }
+  bool has_pose(const Observation& seen) const { return row_.contains(frames_[seen.frame].node); }
   void init_params(const SensorCalibration& start, const std::vector<GraphComponent>& components);
   void add_observations();
   CalibratedObservation calibrated(const Observation& seen) const;
@@ -134,10 +134,10 @@ class Adjustment {
   std::size_t cameras_ = 0;                   // number of cameras; 0 if none is refined
   std::vector<DepthCorrection> corrections_;  // zero corrections that define the knots
   SensorCalibration start_;
-  std::map<int, std::size_t> place_;  // row of a node's pose
-  std::vector<Eigen::Index> first_;   // first parameter of a camera
-  std::vector<bool> sees_;            // true for cameras with observations
-  double mean_later_s_ = 0.0;         // of FrameFeatures::depth_later_s
+  std::map<int, std::size_t> row_;   // row of a node's pose
+  std::vector<Eigen::Index> first_;  // first parameter of a camera
+  std::vector<bool> sees_;           // true for cameras with observations
+  double mean_later_s_ = 0.0;        // of FrameFeatures::depth_later_s
   double later_deviation_s_ = 0.0;
   std::vector<Eigen::Index> free_;   // indices of the free parameters
   std::vector<std::size_t> points_;  // track of each point
@@ -157,13 +157,13 @@ Adjustment::Adjustment(const std::vector<FrameFeatures>& frames,
           corrections_for(frames, options.refine_depth ? cameras_ : 0, options.depth_knot_m)),
       sees_(cameras_, false) {
   state_.poses = poses;
-  for (const auto& [node, pose] : poses) place_.emplace(node, place_.size());
+  for (const auto& [node, pose] : poses) row_.emplace(node, row_.size());
   problem_.robust_scale = options.robust_scale;
   problem_.fix_cameras = options.fixes_cameras;
-  problem_.fixed.assign(place_.size(), options.fixes_poses);
+  problem_.fixed.assign(row_.size(), options.fixes_poses);
   for (const GraphComponent& component : components)
-    if (const auto place = place_.find(component.gauge_node); place != place_.end())
-      problem_.fixed[place->second] = true;
+    if (const auto entry = row_.find(component.gauge_node); entry != row_.end())
+      problem_.fixed[entry->second] = true;
   init_params(start, components);
   add_observations();
   Priors priors(state_.camera_params.size());
@@ -234,7 +234,7 @@ void Adjustment::add_observations() {
       const Feature& its = feature(seen);
       sum += state_.poses.at(frame.node) * frame.point_in_base(seen.feature);
       problem_.observations.push_back(
-          {place_.at(frame.node), cameras_ > 0 ? first_[its.camera] : 0,
+          {row_.at(frame.node), cameras_ > 0 ? first_[its.camera] : 0,
            CalibratedFeature(its, frame.cameras[its.camera], calibrated(seen))});
       if (cameras_ > 0) sees_[its.camera] = true;
     }
@@ -375,8 +375,8 @@ SensorCalibration Adjustment::calibration(const JointState& state, double motion
     }
   }
   for (const FrameFeatures& frame : frames_)
-    if (const auto place = place_.find(frame.node); problem_.moving && place != place_.end())
-      found.motion.emplace(frame.node, state.motions[place->second] / motion_scale);
+    if (const auto entry = row_.find(frame.node); problem_.moving && entry != row_.end())
+      found.motion.emplace(frame.node, state.motions[entry->second] / motion_scale);
   return found;
 }
 

@@ -92,15 +92,15 @@ std::vector<FramePair> overlapping_pairs(const std::vector<FrameFeatures>& frame
   for (std::size_t n = 0; n < components.size(); ++n)
     for (const int node : components[n].nodes) component_of[node] = n;
   std::vector<PosedFrame> posed;
-  std::vector<Eigen::Vector3d> places;
+  std::vector<Eigen::Vector3d> positions;
   for (std::size_t f = 0; f < frames.size(); ++f) {
     const auto pose = map_from_base.find(frames[f].node);
     if (pose == map_from_base.end()) continue;
     posed.push_back({f, frames[f].node, pose->second});
-    places.emplace_back(pose->second.translation());
+    positions.emplace_back(pose->second.translation());
   }
   if (posed.empty()) return {};
-  const PointTree neighbors(places);
+  const PointTree neighbors(positions);
   std::vector<std::vector<FramePair>> of_frame(posed.size());
   parallel_for(posed.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {

@@ -238,12 +238,12 @@ void JointSolver::optimize_points(JointState& state, int point_iterations) const
 
 JointState JointSolver::stepped(const Eigen::VectorXd& step) const {
   JointState after = state_;
-  std::size_t place = 0;
+  std::size_t node_index = 0;
   for (auto& [node, pose] : after.poses) {
-    const Eigen::Index row = node_size_ * static_cast<Eigen::Index>(place);
-    if (!problem_.fixed[place]) pose = moved(pose, step.segment<6>(row));
-    if (problem_.moving) after.motions[place] += step.segment<6>(row + 6);
-    ++place;
+    const Eigen::Index row = node_size_ * static_cast<Eigen::Index>(node_index);
+    if (!problem_.fixed[node_index]) pose = moved(pose, step.segment<6>(row));
+    if (problem_.moving) after.motions[node_index] += step.segment<6>(row + 6);
+    ++node_index;
   }
   after.camera_params += step.tail(params_);
   optimize_points(after, 1);

@@ -127,8 +127,8 @@ Eigen::Vector3d point_of(const DemInfo& info, const DemBlock& block, std::size_t
   const auto n = static_cast<std::int64_t>(pixel);
   const Eigen::Vector3d center(static_cast<double>(block.column + n % block.columns) + 0.5,
                                static_cast<double>(block.row + n / block.columns) + 0.5, 1.0);
-  const Eigen::Vector2d place = info.local_from_pixel * center;
-  return {place.x(), place.y(), block.heights_m[pixel]};
+  const Eigen::Vector2d position = info.local_from_pixel * center;
+  return {position.x(), position.y(), block.heights_m[pixel]};
 }
 
 PointCloud read_dem_cloud(const fs::path& path, std::size_t* undeclared) {

@@ -73,19 +73,19 @@ std::set<std::size_t> joined_frames(std::size_t frames, const std::vector<Featur
 
 SubScan sub_scan_of(const CalibrationInput& input, const std::set<std::size_t>& chosen) {
   SubScan part;
-  std::map<std::size_t, std::size_t> place;
+  std::map<std::size_t, std::size_t> index_of;
   for (const std::size_t f : chosen) {
     const auto pose = input.map_from_base.find(input.frames[f].node);
     if (pose == input.map_from_base.end()) continue;
-    place.emplace(f, part.frames.size());
+    index_of.emplace(f, part.frames.size());
     part.frames.push_back(input.frames[f]);
     part.frames.back().descriptors = {};
     part.poses.insert(*pose);
   }
   for (const FeatureLink& link : input.links) {
-    const auto a = place.find(link.frames.first);
-    const auto b = place.find(link.frames.second);
-    if (a == place.end() || b == place.end()) continue;
+    const auto a = index_of.find(link.frames.first);
+    const auto b = index_of.find(link.frames.second);
+    if (a == index_of.end() || b == index_of.end()) continue;
     part.links.push_back(link);
     part.links.back().frames = {a->second, b->second};
   }
@@ -484,11 +484,11 @@ std::vector<std::string> findings(const SensorCalibration& calibration,
   for (std::size_t n = 0; n < std::min(calibration.depth.size(), cameras.size()); ++n) {
     const DepthCorrection& depth = calibration.depth[n];
     if (depth.spline_m.empty()) continue;
-    constexpr int places = 100;
+    constexpr int depths = 100;
     double lowest = depth.bend(depth.first_m, 0.0);
     double highest = lowest;
-    for (int k = 0; k <= places; ++k) {
-      const double z = depth.first_m + (depth.last_m() - depth.first_m) * k / places;
+    for (int k = 0; k <= depths; ++k) {
+      const double z = depth.first_m + (depth.last_m() - depth.first_m) * k / depths;
       lowest = std::min(lowest, depth.bend(z, 0.0));
       highest = std::max(highest, depth.bend(z, 0.0));
     }

@@ -27,7 +27,7 @@ struct MapMarker {
 
 // A cell of the view.
 struct MapCell {
-  std::array<std::uint16_t, 3> place{};  // index on the cell lattice, relative to the lowest cell
+  std::array<std::uint16_t, 3> index{};  // index on the cell lattice, relative to the lowest cell
   std::uint8_t colors_and_flags = 0;     // color class in the lower four bits, flags above
 };
 

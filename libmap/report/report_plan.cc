@@ -128,7 +128,7 @@ class Finder {
     PlannedItem parameters{.kind = ItemKind::parameters};
     for (const fs::path& map : maps_) {
       parameters.files.push_back(map);
-      parameters.labels.push_back(place_of(map));
+      parameters.labels.push_back(label_of(map));
     }
     parameters.caption = maps_.size() == 1 ? "The map of this run." : "The maps of this run.";
     return {std::move(parameters)};
@@ -142,7 +142,7 @@ class Finder {
       const fs::path folder = map.parent_path();
       if (!known.insert(folder).second) continue;
       auto& [name, outputs] = timings.cases.emplace_back();
-      name = maps_in(folder) == 1 ? place_of(map) : name_of(folder);
+      name = maps_in(folder) == 1 ? label_of(map) : name_of(folder);
       for (const ReportSource& source : manifests_below(folder, true))
         if (source.error.empty() && folder_with_map_of(source.output) == folder)
           outputs.emplace_back(source.output);
@@ -160,14 +160,14 @@ class Finder {
 
   // Manifest of an output, cached because each map is compared with all files beside it.
   const std::optional<Manifest>& manifest_of(const fs::path& output) {
-    const auto [place, added] = manifests_.try_emplace(output);
-    if (!added) return place->second;
+    const auto [cached, added] = manifests_.try_emplace(output);
+    if (!added) return cached->second;
     try {
-      place->second = read_manifest_of(output);
+      cached->second = read_manifest_of(output);
     } catch (const Error&) {
-      place->second.reset();  // unreadable manifests are ignored
+      cached->second.reset();  // unreadable manifests are ignored
     }
-    return place->second;
+    return cached->second;
   }
 
   // Nearest parent folder of `output` with a map.
@@ -183,7 +183,7 @@ class Finder {
   }
 
   // Name of a map: its folder, or its path if it is in the run's folder or beside other maps.
-  std::string place_of(const fs::path& map) const {
+  std::string label_of(const fs::path& map) const {
     const bool alone = map.parent_path() != root_ && maps_in(map.parent_path()) == 1;
     return alone ? name_of(map.parent_path()) : map.lexically_relative(root_).string();
   }

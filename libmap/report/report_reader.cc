@@ -295,9 +295,9 @@ ReportTable read_report_table(const fs::path& path, const TableColumns& columns,
     shown.lines = head.lines;
   else if (all.rows.size() > max_rows)
     shown.lines = all.rows.size() + 1;
-  std::vector<std::size_t> places;
+  std::vector<std::size_t> column_indices;
   for (const auto& [name, heading] : columns) {
-    places.push_back(all.column(name));
+    column_indices.push_back(all.column(name));
     shown.table.columns.push_back(name);
     shown.headings.push_back(heading);
   }
@@ -310,7 +310,7 @@ ReportTable read_report_table(const fs::path& path, const TableColumns& columns,
   shown.table.file = all.file;
   for (const std::vector<std::string>& row : all.rows) {
     std::vector<std::string>& cells = shown.table.rows.emplace_back();
-    for (const std::size_t place : places) cells.push_back(row[place]);
+    for (const std::size_t entry : column_indices) cells.push_back(row[entry]);
   }
   return shown;
 }
@@ -318,21 +318,21 @@ ReportTable read_report_table(const fs::path& path, const TableColumns& columns,
 TimingTable timing_table(const std::vector<std::pair<std::string, std::vector<Manifest>>>& cases) {
   TimingTable table;
   for (const auto& one : cases) table.cases.push_back(one.first);
-  std::map<std::pair<std::string, std::string>, std::size_t> place_of;  // by command and step
-  std::map<std::string, std::size_t> rank_of;                           // by command
+  std::map<std::pair<std::string, std::string>, std::size_t> row_of;  // by command and step
+  std::map<std::string, std::size_t> rank_of;                         // by command
   for (std::size_t n = 0; n < cases.size(); ++n) {
     std::vector<unsigned>& threads = table.threads.emplace_back();
     for (const Manifest& manifest : cases[n].second) {
       if (std::find(threads.begin(), threads.end(), manifest.threads) == threads.end())
         threads.push_back(manifest.threads);
       for (const auto& [step, seconds] : manifest.timings_s) {
-        const auto [place, is_new] =
-            place_of.try_emplace({manifest.command, step}, table.rows.size());
+        const auto [entry, is_new] =
+            row_of.try_emplace({manifest.command, step}, table.rows.size());
         rank_of.try_emplace(manifest.command, rank_of.size());
         if (is_new)
           table.rows.push_back(
               {manifest.command, step, std::vector<std::optional<double>>(cases.size())});
-        std::optional<double>& cell = table.rows[place->second].seconds[n];
+        std::optional<double>& cell = table.rows[entry->second].seconds[n];
         table.sums = table.sums || cell.has_value();
         cell = cell.value_or(0.0) + seconds;
       }

@@ -49,9 +49,9 @@ std::string cell_bytes(const MapView& view) {
   std::string bytes;
   bytes.reserve(view.cells.size() * 7);
   for (const MapCell& cell : view.cells)
-    for (const unsigned place : cell.place) {
-      bytes += static_cast<char>(place & 255U);
-      bytes += static_cast<char>(place >> 8U);
+    for (const unsigned index : cell.index) {
+      bytes += static_cast<char>(index & 255U);
+      bytes += static_cast<char>(index >> 8U);
     }
   for (const MapCell& cell : view.cells) bytes += static_cast<char>(cell.colors_and_flags);
   return bytes;

@@ -129,8 +129,8 @@ void FrameFolderWriter::write_nodes(const PoseGraph& graph) const {
   table.columns = {"node",  "session", "weight",      "stamp_s",    "label",    "color",
                    "depth", "right",   "calibration", "baseline_m", "velocity", "gps"};
   for (const GraphNode& node : graph.nodes) {
-    const auto place = files_.find(node.id);
-    const Files of_node = place == files_.end() ? Files() : place->second;
+    const auto entry = files_.find(node.id);
+    const Files of_node = entry == files_.end() ? Files() : entry->second;
     std::string gps;
     if (node.gps)
       gps = join({node.gps->stamp_s, node.gps->longitude_deg, node.gps->latitude_deg,
@@ -147,12 +147,12 @@ std::size_t FrameFolderWriter::write_associations(const PoseGraph& graph) const 
   std::string text = "# stamp color stamp depth\n";
   std::size_t count = 0;
   for (const GraphNode& node : graph.nodes) {
-    const auto place = files_.find(node.id);
-    if (place == files_.end() || place->second.color.empty() || place->second.depth.empty())
+    const auto entry = files_.find(node.id);
+    if (entry == files_.end() || entry->second.color.empty() || entry->second.depth.empty())
       continue;
     const std::string stamp = stamp_text(node.stamp_s);
-    for (const std::string& word : {stamp, place->second.color, stamp}) (text += word) += ' ';
-    (text += place->second.depth) += '\n';
+    for (const std::string& word : {stamp, entry->second.color, stamp}) (text += word) += ' ';
+    (text += entry->second.depth) += '\n';
     ++count;
   }
   write_text(folder_ / files::associations, text);

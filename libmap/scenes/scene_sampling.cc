@@ -56,7 +56,7 @@ class Sampler {
 
  private:
   // Relative position of a sample in its grid cell, 0 to 1.
-  double place(RandomStream& random) const { return 0.5 + jitter_ * (random.uniform() - 0.5); }
+  double jittered(RandomStream& random) const { return 0.5 + jitter_ * (random.uniform() - 0.5); }
 
   void draw_segment(const Patch& patch, RandomStream& random,
                     std::vector<SurfaceTruth>& samples) const {
@@ -68,8 +68,8 @@ class Sampler {
       const double columns = steps_of(segment.area_between(t0, t1) / spacing_, spacing_);
       const double phase = random.uniform();
       for (double column = 0.0; column < columns; column += 1.0) {
-        const double angle = 2.0 * pi * (column + phase + place(random)) / columns;
-        const double t = segment.t_of_area_share(t0, t1, place(random));
+        const double angle = 2.0 * pi * (column + phase + jittered(random)) / columns;
+        const double t = segment.t_of_area_share(t0, t1, jittered(random));
         samples.push_back(geometry_.on_profile(*patch.solid, patch.segment, t, angle));
       }
     }
@@ -105,8 +105,8 @@ class Sampler {
     missing_points = wanted - columns * rows;
     for (double row = 0.0; row < rows; row += 1.0) {
       for (double column = 0.0; column < columns; column += 1.0) {
-        const double x = corner.x() + tile.x() * (column + place(random)) / columns;
-        const double y = corner.y() + tile.y() * (row + place(random)) / rows;
+        const double x = corner.x() + tile.x() * (column + jittered(random)) / columns;
+        const double y = corner.y() + tile.y() * (row + jittered(random)) / rows;
         samples.push_back(geometry_.on_face(*patch.solid, *patch.face, x, y));
       }
     }

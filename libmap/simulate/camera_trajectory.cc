@@ -216,14 +216,14 @@ class Serpentine {
                      : 0;
     const double along = way_m - lane * period;
     const double forward = lane % 2 == 0 ? 1.0 : -1.0;
-    Eigen::Vector2d place(0.5 * straight_ + forward * (along - 0.5 * straight_),
-                          2.0 * radius_ * lane);
+    Eigen::Vector2d in_plane(0.5 * straight_ + forward * (along - 0.5 * straight_),
+                             2.0 * radius_ * lane);
     if (along > straight_ && lane + 1 < lanes_) {
       const double angle = (along - straight_) / radius_;
-      place.x() = 0.5 * straight_ * (1.0 + forward) + forward * radius_ * std::sin(angle);
-      place.y() += radius_ * (1.0 - std::cos(angle));
+      in_plane.x() = 0.5 * straight_ * (1.0 + forward) + forward * radius_ * std::sin(angle);
+      in_plane.y() += radius_ * (1.0 - std::cos(angle));
     }
-    return in_lanes(low_ + place);
+    return in_lanes(low_ + in_plane);
   }
 
  private:
@@ -320,8 +320,8 @@ CameraMotion serpentine_motion(const GroundHeights& ground, const CameraTrajecto
     const double time_s = static_cast<double>(frame) * options.frame_interval_s + after_s;
     const double way_m = way.length() * time_s / (options.frame_interval_s * options.frames);
     const auto on_ground = [&](double at_m) {
-      const Eigen::Vector2d place = way.at(at_m);
-      return Eigen::Vector3d(place.x(), place.y(), heights.height(place));
+      const Eigen::Vector2d in_plane = way.at(at_m);
+      return Eigen::Vector3d(in_plane.x(), in_plane.y(), heights.height(in_plane));
     };
     return hand.pose(on_ground(way_m) + height_m * Eigen::Vector3d::UnitZ(),
                      on_ground(way_m + ahead_m), time_s);

@@ -75,8 +75,9 @@ RockyTerrain::RockyTerrain(const RockyTerrainOptions& options,
 }
 
 double RockyTerrain::ground(double x_m, double y_m) const {
-  const Eigen::Vector3d place(x_m / options_.relief_length_m, y_m / options_.relief_length_m, 0.5);
-  return options_.relief_m * fractal_noise(place, mix_bits(options_.seed, relief_stream), 4);
+  const Eigen::Vector3d position(x_m / options_.relief_length_m, y_m / options_.relief_length_m,
+                                 0.5);
+  return options_.relief_m * fractal_noise(position, mix_bits(options_.seed, relief_stream), 4);
 }
 
 // A block with inward sloping walls, shoulders and a nearly flat top.
@@ -162,8 +163,8 @@ void RockyTerrain::sort_into_buckets() {
   }
 }
 
-double RockyTerrain::height_over_foot(const Rock& rock, const Eigen::Vector2d& place) {
-  const Eigen::Vector2d offset = place - rock.center;
+double RockyTerrain::height_over_foot(const Rock& rock, const Eigen::Vector2d& position) {
+  const Eigen::Vector2d offset = position - rock.center;
   if (offset.squaredNorm() > rock.reach_m * rock.reach_m) return -HUGE_VAL;
   if (rock.facets.empty()) {
     const double squared = (rock.unit_from_plan * offset).squaredNorm();
@@ -177,14 +178,14 @@ double RockyTerrain::height_over_foot(const Rock& rock, const Eigen::Vector2d& p
 }
 
 double RockyTerrain::height(double x_m, double y_m) const {
-  const Eigen::Vector2d place(x_m, y_m);
-  const Eigen::Vector2d bucket = (place - rectangle_m_.min()) / bucket_m;
+  const Eigen::Vector2d position(x_m, y_m);
+  const Eigen::Vector2d bucket = (position - rectangle_m_.min()) / bucket_m;
   const auto column = std::min(static_cast<std::size_t>(std::max(bucket.x(), 0.0)), columns_ - 1);
   const auto row =
       std::min(static_cast<std::size_t>(std::max(bucket.y(), 0.0)), buckets_.size() / columns_ - 1);
   double height = ground(x_m, y_m);
   for (const std::uint32_t r : buckets_[row * columns_ + column])
-    height = std::max(height, rocks_[r].foot_m + height_over_foot(rocks_[r], place));
+    height = std::max(height, rocks_[r].foot_m + height_over_foot(rocks_[r], position));
   const Eigen::Vector3d fine(x_m / roughness_length_m, y_m / roughness_length_m, 0.5);
   return height +
          options_.roughness_m * fractal_noise(fine, mix_bits(options_.seed, roughness_stream), 3);
@@ -205,10 +206,10 @@ struct CellRange {
   std::int64_t last = 0;
   std::size_t count() const { return static_cast<std::size_t>(last - first); }
 };
-CellRange cells_of_piece(std::int64_t place, double size_m, const TerrainPiecesOptions& options) {
+CellRange cells_of_piece(std::int64_t tile, double size_m, const TerrainPiecesOptions& options) {
   const std::int64_t side = cells_in(options.piece_m, options.spacing_m);
   const std::int64_t end = cells_in(size_m, options.spacing_m);
-  return {std::min(place * side, end), std::min((place + 1) * side, end)};
+  return {std::min(tile * side, end), std::min((tile + 1) * side, end)};
 }
 
 // Draws the points of one cell of the plan.
@@ -314,12 +315,12 @@ PointCloud sample_piece(const TerrainPiecesOptions& options, const XyTile& piece
   const double spacing = options.spacing_m;
   const CellRange x = cells_of_piece(piece.i, options.size_x_m, options);
   const CellRange y = cells_of_piece(piece.j, options.size_y_m, options);
-  const auto place = [&](std::int64_t a, std::int64_t b) {
+  const auto corner_at = [&](std::int64_t a, std::int64_t b) {
     return Eigen::Vector2d(static_cast<double>(a) * spacing, static_cast<double>(b) * spacing);
   };
   // One additional cell, because slopes are forward differences.
   const RockyTerrain terrain(options.terrain,
-                             {place(x.first, y.first), place(x.last + 1, y.last + 1)});
+                             {corner_at(x.first, y.first), corner_at(x.last + 1, y.last + 1)});
   const CellSampler sampler(terrain, options);
   PointCloud cloud;
   cloud.positions.reserve(x.count() * y.count() * 5 / 4);

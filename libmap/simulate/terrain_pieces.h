@@ -62,7 +62,7 @@ class RockyTerrain {
   Rock draw_cobble(double height_m, std::uint64_t seed) const;
   void add_rocks_of_cell(std::int64_t i, std::int64_t j);
   void sort_into_buckets();
-  static double height_over_foot(const Rock& rock, const Eigen::Vector2d& place);
+  static double height_over_foot(const Rock& rock, const Eigen::Vector2d& position);
 
   RockyTerrainOptions options_;
   Eigen::AlignedBox2d rectangle_m_;

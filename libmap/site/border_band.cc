@@ -35,8 +35,8 @@ struct Picture {
   Image<double> levels;  // mean over points of min(red, green, blue); `unseen` without points
 
   // Bilinear interpolation between the seen cells around a position.
-  double at(const Vector2d& place) const {
-    const Vector2d index = (place - corner) / cell - Vector2d::Constant(0.5);
+  double at(const Vector2d& position) const {
+    const Vector2d index = (position - corner) / cell - Vector2d::Constant(0.5);
     const Vector2d low(std::floor(index.x()), std::floor(index.y()));
     if (!(low.x() >= 0.0 && low.y() >= 0.0 && low.x() < levels.width - 1 &&
           low.y() < levels.height - 1))
@@ -130,15 +130,15 @@ struct Axis {
   }
 };
 
-Axis make_axis(const std::vector<Vector2d>& places, Eigen::Index axis, double bin) {
-  double low = places.front()[axis];
+Axis make_axis(const std::vector<Vector2d>& locations, Eigen::Index axis, double bin) {
+  double low = locations.front()[axis];
   double high = low;
-  for (const Vector2d& place : places) {
-    low = std::min(low, place[axis]);
-    high = std::max(high, place[axis]);
+  for (const Vector2d& position : locations) {
+    low = std::min(low, position[axis]);
+    high = std::max(high, position[axis]);
   }
   Axis result{low, bin, std::vector<double>(static_cast<std::size_t>((high - low) / bin) + 1)};
-  for (const Vector2d& place : places) result.counts[result.bin_of(place[axis])] += 1.0;
+  for (const Vector2d& position : locations) result.counts[result.bin_of(position[axis])] += 1.0;
   return result;
 }
 
@@ -155,20 +155,21 @@ std::vector<double> peaks_of(const Axis& axis) {
                    [&](std::size_t a, std::size_t b) { return counts[a] > counts[b]; });
   peaks.resize(std::min(peaks.size(), max_lines));
   std::sort(peaks.begin(), peaks.end());
-  std::vector<double> places;
-  places.reserve(peaks.size());
+  std::vector<double> locations;
+  locations.reserve(peaks.size());
   for (const std::size_t n : peaks)
-    places.push_back(axis.first + (static_cast<double>(n) + 0.5) * axis.bin);
-  return places;
+    locations.push_back(axis.first + (static_cast<double>(n) + 0.5) * axis.bin);
+  return locations;
 }
 
-std::vector<Line> lines_along(const std::vector<Vector2d>& places, const Axis& across,
+std::vector<Line> lines_along(const std::vector<Vector2d>& locations, const Axis& across,
                               const Axis& along, Eigen::Index axis) {
   std::vector<Line> lines;
   for (const double at : peaks_of(across)) {
     std::vector<int> white(along.counts.size());
-    for (const Vector2d& place : places)
-      if (std::abs(place[axis] - at) <= 1.5 * across.bin) white[along.bin_of(place[1 - axis])] = 1;
+    for (const Vector2d& position : locations)
+      if (std::abs(position[axis] - at) <= 1.5 * across.bin)
+        white[along.bin_of(position[1 - axis])] = 1;
     Line line{at, std::vector<int>(white.size() + 1)};
     for (std::size_t n = 0; n < white.size(); ++n) line.sums[n + 1] = line.sums[n] + white[n];
     lines.push_back(std::move(line));
@@ -194,13 +195,13 @@ struct Frame {
 Frame best_frame(const std::vector<Vector2d>& white, double yaw_deg, double bin,
                  const BorderBandOptions& options) {
   const Eigen::Rotation2Dd turn(-yaw_deg * std::numbers::pi / 180.0);
-  std::vector<Vector2d> places;
-  places.reserve(white.size());
-  for (const Vector2d& place : white) places.push_back(turn * place);
-  const Axis x = make_axis(places, 0, bin);
-  const Axis y = make_axis(places, 1, bin);
-  const std::vector<Line> upright = lines_along(places, x, y, 0);
-  const std::vector<Line> level = lines_along(places, y, x, 1);
+  std::vector<Vector2d> locations;
+  locations.reserve(white.size());
+  for (const Vector2d& position : white) locations.push_back(turn * position);
+  const Axis x = make_axis(locations, 0, bin);
+  const Axis y = make_axis(locations, 1, bin);
+  const std::vector<Line> upright = lines_along(locations, x, y, 0);
+  const std::vector<Line> level = lines_along(locations, y, x, 1);
   Frame best;
   best.yaw_deg = yaw_deg;
   for (std::size_t left = 0; left < upright.size(); ++left)

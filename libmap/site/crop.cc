@@ -27,8 +27,8 @@ constexpr double ground_samples = 100000.0;  // of a mesh
 constexpr double max_view_samples = 4e6;
 constexpr double max_side_samples = 2e6;  // of few triangles
 
-Pose turn_about(const Vector2d& place, double yaw_deg) {
-  const Vector3d pivot(place.x(), place.y(), 0.0);
+Pose turn_about(const Vector2d& pivot_m, double yaw_deg) {
+  const Vector3d pivot(pivot_m.x(), pivot_m.y(), 0.0);
   Pose turn = make_pose_from_rpy(Vector3d::Zero(), {0.0, 0.0, yaw_deg});
   turn.translation() = pivot - turn.linear() * pivot;
   return turn;
@@ -37,10 +37,10 @@ Pose turn_about(const Vector2d& place, double yaw_deg) {
 bool is_identity(const Pose& pose) { return pose.matrix().isIdentity(0.0); }
 
 std::vector<Vector2d> seen_from_above(const std::vector<Vector3d>& points) {
-  std::vector<Vector2d> places;
-  places.reserve(points.size());
-  for (const Vector3d& point : points) places.emplace_back(point.head<2>());
-  return places;
+  std::vector<Vector2d> plan_points;
+  plan_points.reserve(points.size());
+  for (const Vector3d& point : points) plan_points.emplace_back(point.head<2>());
+  return plan_points;
 }
 
 // Motion of the map and the shape of the cut.

@@ -15,7 +15,8 @@
 namespace libmap {
 
 void bind(ParameterTable& table, EdgeCheckOptions& options) {
-  table.add("places", options.places, {1.0, 10000.0}, "number of positions along each edge");
+  table.add("places", options.positions_per_edge, {1.0, 10000.0},
+            "number of positions along each edge");
   table.add("inset_m", options.inset_m, not_negative, "distance of the positions from the edge");
 }
 
@@ -54,9 +55,9 @@ TurnedBox box_at(const std::vector<Eigen::Vector2d>& points, double angle) {
   const Eigen::Vector2d v(-u.y(), u.x());
   TurnedBox box{angle, {u.dot(points[0]), v.dot(points[0])}, {u.dot(points[0]), v.dot(points[0])}};
   for (const Eigen::Vector2d& point : points) {
-    const Eigen::Vector2d place(u.dot(point), v.dot(point));
-    box.min = box.min.cwiseMin(place);
-    box.max = box.max.cwiseMax(place);
+    const Eigen::Vector2d rotated(u.dot(point), v.dot(point));
+    box.min = box.min.cwiseMin(rotated);
+    box.max = box.max.cwiseMax(rotated);
   }
   return box;
 }
@@ -92,12 +93,12 @@ SiteCorners corners_of(const TurnedBox& box) {
 
 SiteCorners bounding_corners(const std::vector<Eigen::Vector3d>& points, bool turned) {
   if (points.empty()) throw Error("no points to place a site around");
-  std::vector<Eigen::Vector2d> places;
-  places.reserve(points.size());
-  for (const Eigen::Vector3d& point : points) places.emplace_back(point.head<2>());
-  if (!turned) return corners_of(box_at(places, 0.0));
-  const std::vector<Eigen::Vector2d> hull = convex_hull(places);
-  return corners_of(min_box(hull.empty() ? places : hull));
+  std::vector<Eigen::Vector2d> plan_points;
+  plan_points.reserve(points.size());
+  for (const Eigen::Vector3d& point : points) plan_points.emplace_back(point.head<2>());
+  if (!turned) return corners_of(box_at(plan_points, 0.0));
+  const std::vector<Eigen::Vector2d> hull = convex_hull(plan_points);
+  return corners_of(min_box(hull.empty() ? plan_points : hull));
 }
 
 SiteCorners corners_of(const Eigen::Vector2d& min, const Eigen::Vector2d& max) {
@@ -107,8 +108,9 @@ SiteCorners corners_of(const Eigen::Vector2d& min, const Eigen::Vector2d& max) {
 HeightFunction heights_of(const TriangleMesh& mesh, double from_z) {
   const auto caster = std::make_shared<const RayCaster>(mesh);
   const double top = std::min(from_z, bounds_of(mesh.vertices).max.z() + 1.0);
-  return [caster, top](const Eigen::Vector2d& place) -> std::optional<double> {
-    const auto hit = caster->cast({place.x(), place.y(), top}, Eigen::Vector3d(0.0, 0.0, -1.0));
+  return [caster, top](const Eigen::Vector2d& position) -> std::optional<double> {
+    const auto hit =
+        caster->cast({position.x(), position.y(), top}, Eigen::Vector3d(0.0, 0.0, -1.0));
     if (!hit) return std::nullopt;
     return top - hit->distance;
   };
@@ -128,10 +130,10 @@ HeightFunction heights_of(const std::vector<Eigen::Vector3d>& points, double rad
     columns->heights.push_back(point.z());
   }
   columns->tree.emplace(columns->feet);
-  return [columns, radius_m, min_points](const Eigen::Vector2d& place) -> std::optional<double> {
+  return [columns, radius_m, min_points](const Eigen::Vector2d& position) -> std::optional<double> {
     std::vector<double> heights;
     for (const NeighborPoint& neighbor :
-         columns->tree->within({place.x(), place.y(), 0.0}, radius_m))
+         columns->tree->within({position.x(), position.y(), 0.0}, radius_m))
       heights.push_back(columns->heights[neighbor.index]);
     if (heights.empty() || heights.size() < static_cast<std::size_t>(std::max(min_points, 0)))
       return std::nullopt;
@@ -158,8 +160,8 @@ void summarize(EdgeCheckResult& result) {
   for (std::size_t e = 0; e < result.edges.size(); ++e) {
     double of_edge = 0.0;
     std::size_t count = 0;
-    for (const EdgeCheckPoint& place : result.edges[e]) {
-      const auto error = place.error_m();
+    for (const EdgeCheckPoint& point : result.edges[e]) {
+      const auto error = point.error_m();
       if (!error) {
         ++result.missing;
         continue;
@@ -188,12 +190,12 @@ EdgeCheckResult check_edges(const SiteCorners& site, const HeightFunction& surfa
     const Eigen::Vector2d& from = site.corners[e];
     const Eigen::Vector2d along = site.corners[(e + 1) % 4] - from;
     const Eigen::Vector2d inwards = Eigen::Vector2d(-along.y(), along.x()).normalized();
-    for (int n = 0; n < options.places; ++n) {
-      const double share = (n + 0.5) / options.places;
-      EdgeCheckPoint& place = result.edges[e].emplace_back();
-      place.position = from + share * along + options.inset_m * inwards;
-      place.height_m = surface(place.position);
-      place.ground_m = ground(place.position);
+    for (int n = 0; n < options.positions_per_edge; ++n) {
+      const double share = (n + 0.5) / options.positions_per_edge;
+      EdgeCheckPoint& point = result.edges[e].emplace_back();
+      point.position = from + share * along + options.inset_m * inwards;
+      point.height_m = surface(point.position);
+      point.ground_m = ground(point.position);
     }
   }
   summarize(result);

@@ -29,7 +29,7 @@ SiteCorners bounding_corners(const std::vector<Eigen::Vector3d>& points, bool tu
 SiteCorners corners_of(const Eigen::Vector2d& min, const Eigen::Vector2d& max);
 
 // Height of a surface at a position in the x-y plane, m; nullopt if there is no surface.
-using HeightFunction = std::function<std::optional<double>(const Eigen::Vector2d& place)>;
+using HeightFunction = std::function<std::optional<double>(const Eigen::Vector2d& position)>;
 
 // Height of the first intersection of a mesh with a vertical ray downwards from `from_z`.
 HeightFunction heights_of(const TriangleMesh& mesh,
@@ -40,8 +40,8 @@ HeightFunction heights_of(const std::vector<Eigen::Vector3d>& points, double rad
                           int min_points);
 
 struct EdgeCheckOptions {
-  int places = 7;         // >= 1: positions per edge, at the centers of as many equal parts
-  double inset_m = 0.05;  // >= 0: distance of the positions from the edge
+  int positions_per_edge = 7;  // >= 1: positions per edge, at the centers of as many equal parts
+  double inset_m = 0.05;       // >= 0: distance of the positions from the edge
 };
 void bind(ParameterTable& table, EdgeCheckOptions& options);
 

@@ -47,7 +47,7 @@ bool segments_meet(const Vector2d& a, const Vector2d& b, const Vector2d& c, cons
          (a_side == 0 && in_box_of(c, d, a)) || (b_side == 0 && in_box_of(c, d, b));
 }
 
-std::string place(const Vector2d& point) {
+std::string text_of(const Vector2d& point) {
   return "(" + to_text(point.x()) + ", " + to_text(point.y()) + ")";
 }
 
@@ -58,7 +58,7 @@ std::string corner_name(std::size_t n) { return "corner " + std::to_string(n + 1
 XyPolygon::XyPolygon(std::vector<Vector2d> corners) : corners_(std::move(corners)) {
   for (std::size_t n = 0; n < corners_.size(); ++n)
     if (!corners_[n].allFinite())
-      throw Error("not a position", {.field = corner_name(n), .value = place(corners_[n])});
+      throw Error("not a position", {.field = corner_name(n), .value = text_of(corners_[n])});
   if (corners_.size() > 3 && corners_.front() == corners_.back()) corners_.pop_back();
   if (corners_.size() < 3)
     throw Error("the outline has too few corners",
@@ -69,7 +69,7 @@ XyPolygon::XyPolygon(std::vector<Vector2d> corners) : corners_(std::move(corners
     const Vector2d& next = corners_[(n + 1) % corners_.size()];
     if ((next - corners_[n]).norm() <= on_border_m)
       throw Error("duplicate corner of the outline",
-                  {.field = corner_name(n), .value = place(corners_[n])});
+                  {.field = corner_name(n), .value = text_of(corners_[n])});
     twice += cross(corners_[n] - corners_.front(), next - corners_.front());
     min_ = min_.cwiseMin(corners_[n]);
     max_ = max_.cwiseMax(corners_[n]);
@@ -103,9 +103,10 @@ void XyPolygon::require_simple() const {
   const auto count = static_cast<std::uint32_t>(corners_.size());
   const auto end = [&](std::uint32_t n) -> const Vector2d& { return corners_[(n + 1) % count]; };
   const auto crossing = [&](std::uint32_t a, std::uint32_t b) {
-    return Error("the outline crosses or touches itself",
-                 {.field = "edge from " + place(corners_[a]) + " to " + place(end(a)),
-                  .value = "meeting the edge from " + place(corners_[b]) + " to " + place(end(b))});
+    return Error(
+        "the outline crosses or touches itself",
+        {.field = "edge from " + text_of(corners_[a]) + " to " + text_of(end(a)),
+         .value = "meeting the edge from " + text_of(corners_[b]) + " to " + text_of(end(b))});
   };
   for (const std::vector<std::uint32_t>& strip : strips_)
     for (std::size_t i = 0; i < strip.size(); ++i)

@@ -195,7 +195,7 @@ std::vector<std::uint32_t> named_vertices(const std::vector<Triangle>& triangles
   return vertices;
 }
 
-std::uint32_t place_in(const std::vector<std::uint32_t>& sorted, std::uint32_t value) {
+std::uint32_t index_in(const std::vector<std::uint32_t>& sorted, std::uint32_t value) {
   return static_cast<std::uint32_t>(std::lower_bound(sorted.begin(), sorted.end(), value) -
                                     sorted.begin());
 }
@@ -215,10 +215,10 @@ class HolePatcher {
     std::vector<Eigen::Vector3d> positions;
     for (const std::uint32_t v : result.vertices) positions.push_back(mesh_.vertices[v]);
     for (Triangle& t : triangles)
-      for (std::uint32_t& v : t) v = place_in(result.vertices, v);
+      for (std::uint32_t& v : t) v = index_in(result.vertices, v);
     result.patch = patch_hole(
-        positions, triangles, place_in(result.vertices, source_of(mesh_.triangles, loop[0])),
-        place_in(result.vertices, target_of(mesh_.triangles, loop[0])), shape);
+        positions, triangles, index_in(result.vertices, source_of(mesh_.triangles, loop[0])),
+        index_in(result.vertices, target_of(mesh_.triangles, loop[0])), shape);
     if (!is_valid(positions, triangles, result.patch)) result.patch = {};
     return result;
   }
@@ -300,14 +300,14 @@ void append_patch_vertex(TriangleMesh& mesh, const Eigen::Vector3d& position,
 
 // Triangle at the edge of the boundary nearest to `place`.
 std::uint32_t nearest_triangle(const TriangleMesh& mesh, const BoundaryLoop& loop,
-                               const Eigen::Vector3d& place) {
+                               const Eigen::Vector3d& near_to) {
   double nearest = std::numeric_limits<double>::infinity();
   std::uint32_t triangle = loop.front() / 3;
   for (const HalfEdge h : loop) {
     const Eigen::Vector3d middle = (mesh.vertices[source_of(mesh.triangles, h)] +
                                     mesh.vertices[target_of(mesh.triangles, h)]) /
                                    2.0;
-    const double here = (middle - place).squaredNorm();
+    const double here = (middle - near_to).squaredNorm();
     if (here >= nearest) continue;
     nearest = here;
     triangle = h / 3;
@@ -325,8 +325,8 @@ void append_patch(TriangleMesh& mesh, const BoundaryLoop& loop, const PlacedPatc
   for (Triangle triangle : placed.patch.triangles) {
     for (std::uint32_t& v : triangle)
       v = v < old_count ? placed.vertices[v] : first_new + (v - old_count);
-    const Eigen::Vector3d place = center_of(mesh, triangle);
-    const std::uint32_t source = nearest_triangle(mesh, loop, place);
+    const Eigen::Vector3d near_to = center_of(mesh, triangle);
+    const std::uint32_t source = nearest_triangle(mesh, loop, near_to);
     mesh.triangles.push_back(triangle);
     for (ScalarField& field : mesh.face_fields)
       field.values.push_back(field.name == filled_field ? 1.0 : field.values[source]);

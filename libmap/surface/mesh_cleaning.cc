@@ -170,11 +170,11 @@ Neighbors neighbors_of(const TriangleMesh& mesh) {
       if (!stays[v]) ++result.first[v + 1];
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v) result.first[v + 1] += result.first[v];
   result.vertices.resize(result.first.back());
-  std::vector<std::uint32_t> place(result.first.begin(), result.first.end() - 1);
+  std::vector<std::uint32_t> next(result.first.begin(), result.first.end() - 1);
   for (std::size_t e = 0; e < edges.size(); ++e) {
     const auto [a, b] = ends(e);
-    if (!stays[a]) result.vertices[place[a]++] = b;
-    if (!stays[b]) result.vertices[place[b]++] = a;
+    if (!stays[a]) result.vertices[next[a]++] = b;
+    if (!stays[b]) result.vertices[next[b]++] = a;
   }
   return result;
 }

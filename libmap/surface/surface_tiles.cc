@@ -124,9 +124,9 @@ void add_surface_tiles(const PointCloud& cloud, const SurfaceTileOptions& option
     if (!(position.head<2>().cwiseAbs().maxCoeff() < max_tiles * options.tile_m))
       throw Error("too small for the coordinates of the cloud",
                   {.field = "tile_size_m", .value = to_text(options.tile_m)});
-    const Eigen::Vector2d place = position.head<2>();
-    const XyTile low = xy_tile_at(place.array() - reach, options.tile_m);
-    const XyTile high = xy_tile_at(place.array() + reach, options.tile_m);
+    const Eigen::Vector2d in_plane = position.head<2>();
+    const XyTile low = xy_tile_at(in_plane.array() - reach, options.tile_m);
+    const XyTile high = xy_tile_at(in_plane.array() + reach, options.tile_m);
     for (std::int64_t i = low.i; i <= high.i; ++i)
       for (std::int64_t j = low.j; j <= high.j; ++j) ++points_in_tiles[{i, j}];
   }

@@ -38,9 +38,9 @@ class PlaneTriangle {
     inverse_ /= area;
   }
   bool flat() const { return flat_; }
-  Eigen::Vector3d weights(const Eigen::Vector2d& place) const {
+  Eigen::Vector3d weights(const Eigen::Vector2d& texel_position) const {
     if (flat_) return Eigen::Vector3d::Constant(1.0 / 3.0);
-    const Eigen::Vector2d uv = inverse_ * (place - corners_[0]);
+    const Eigen::Vector2d uv = inverse_ * (texel_position - corners_[0]);
     return {1.0 - uv.x() - uv.y(), uv.x(), uv.y()};
   }
   const std::array<Eigen::Vector2d, 3>& corners() const { return corners_; }
@@ -236,9 +236,9 @@ void ChartPainter::paint_triangle(std::int32_t local, std::span<const std::uint3
     for (int s = 0; s < samples * samples; ++s) {
       const int sample_column = s % samples;
       const int sample_row = s / samples;
-      const Eigen::Vector2d place(column + (sample_column + 0.5) / samples - 0.5,
-                                  row + (sample_row + 0.5) / samples - 0.5);
-      Eigen::Vector3d weights = plane.weights(place).cwiseMax(0.0);
+      const Eigen::Vector2d texel_position(column + (sample_column + 0.5) / samples - 0.5,
+                                           row + (sample_row + 0.5) / samples - 0.5);
+      Eigen::Vector3d weights = plane.weights(texel_position).cwiseMax(0.0);
       weights /= weights.sum();
       color += color_at(triangle, weights);
     }

@@ -426,15 +426,15 @@ ViewTable::ViewTable(std::size_t rows, std::size_t capacity)
 
 void ViewTable::insert(std::size_t row, ViewQuality view) {
   ViewQuality* const first = entries_.data() + row * capacity_;
-  std::size_t place = counts_[row];
+  std::size_t slot = counts_[row];
   const auto before = [](const ViewQuality& a, const ViewQuality& b) {
     return a.quality != b.quality ? a.quality > b.quality : a.photo < b.photo;
   };
-  if (place == capacity_ && !before(view, first[capacity_ - 1])) return;
-  if (place < capacity_) ++counts_[row];
-  place = std::min(place, capacity_ - 1);
-  for (; place > 0 && before(view, first[place - 1]); --place) first[place] = first[place - 1];
-  first[place] = view;
+  if (slot == capacity_ && !before(view, first[capacity_ - 1])) return;
+  if (slot < capacity_) ++counts_[row];
+  slot = std::min(slot, capacity_ - 1);
+  for (; slot > 0 && before(view, first[slot - 1]); --slot) first[slot] = first[slot - 1];
+  first[slot] = view;
 }
 
 void look_up_colors(const TexturePhotos& photos, std::vector<ColorObservation>& observations) {

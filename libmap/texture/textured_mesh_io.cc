@@ -100,9 +100,8 @@ void write_textured_obj(const fs::path& path, const TexturedMesh& model, std::os
   const UnitedCorners united = unite_corners(model);
   for (const TextureCorner& corner : united.corners) {
     // OBJ measures v from the bottom.
-    const Eigen::Vector2d place = corner.coordinate.cast<double>();
-    out << "vt" +
-               numbers(Eigen::Vector2f(corner.coordinate.x(), static_cast<float>(1.0 - place.y())));
+    const Eigen::Vector2d uv = corner.coordinate.cast<double>();
+    out << "vt" + numbers(Eigen::Vector2f(corner.coordinate.x(), static_cast<float>(1.0 - uv.y())));
   }
   const bool has_normals = !model.mesh.vertex_normals.empty();
   for (const Eigen::Vector3f& normal : model.mesh.vertex_normals) out << "vn" + numbers(normal);

@@ -450,12 +450,12 @@ void draw_dimension_lines(const ScenePage& page, const SceneCamera& camera,
     draw_arrow(middle, to, width, ink, canvas);
     const Eigen::Vector2d along = (to - from).normalized();
     TextStyle style{.size_px = page.font_px, .align = TextAlign::center};
-    Eigen::Vector2d place = middle - Eigen::Vector2d(0.0, 0.8 * f);
+    Eigen::Vector2d label_position = middle - Eigen::Vector2d(0.0, 0.8 * f);
     if (std::abs(along.y()) > std::abs(along.x())) {
       style.align = TextAlign::left;
-      place = middle + Eigen::Vector2d(0.6 * f, 0.0);
+      label_position = middle + Eigen::Vector2d(0.6 * f, 0.0);
     }
-    canvas.text(place, line.text, style);
+    canvas.text(label_position, line.text, style);
   }
 }
 

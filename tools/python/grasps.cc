@@ -102,10 +102,10 @@ py::dict grasp(const libmap::TriangleMesh& mesh, const py::object& points,
   options.trials.pull_limits = pull_limits;
   options.trials.check();
   const libgtd::Gripper gripper = libgtd::find_gripper(options.gripper, options.overrides);
-  const std::vector<Eigen::Vector3d> places = positions_from(points, "points");
+  const std::vector<Eigen::Vector3d> positions = positions_from(points, "points");
   const libgtd::Ground ground(mesh, errors_of(mesh, surface_error, options.trials.surface));
   const Results results = run(threads, progress, [&](libmap::Progress& bar) {
-    return libgtd::test_grasps(ground, gripper, places, options.trials, bar);
+    return libgtd::test_grasps(ground, gripper, positions, options.trials, bar);
   });
   return results_of(results, options.trials);
 }

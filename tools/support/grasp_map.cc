@@ -247,11 +247,12 @@ class MapGrasping {
     std::vector<std::optional<Eigen::Vector3d>> candidates(members.size());
     constexpr std::size_t grain = 256;
     libmap::parallel_each(members.size(), grain, [&](std::size_t n) {
-      const Eigen::Vector3d place = mesh_from_map_ * points.positions[members[n]];
+      const Eigen::Vector3d position = mesh_from_map_ * points.positions[members[n]];
       // The filter is valid only for approach from above.
-      if (options_.approach == libgtd::ApproachDirection::up && !piece.from_above.may_hold(place))
+      if (options_.approach == libgtd::ApproachDirection::up &&
+          !piece.from_above.may_hold(position))
         return;
-      if (piece.ground.distance(place, options_.max_distance_m)) candidates[n] = place;
+      if (piece.ground.distance(position, options_.max_distance_m)) candidates[n] = position;
     });
     return candidates;
   }
@@ -264,11 +265,11 @@ class MapGrasping {
     for (const auto& [number, members] : by_piece(points)) {
       const GroundPieces::Piece& piece = ground_.piece(number);
       const auto candidates = candidates_of(piece, points, members);
-      std::vector<Eigen::Vector3d> places;
+      std::vector<Eigen::Vector3d> positions;
       for (const auto& candidate : candidates)
-        if (candidate) places.push_back(*candidate);
-      steps.advance(members.size() - places.size());
-      const auto results = libgtd::test_grasps(piece.ground, gripper_, places, options_, steps);
+        if (candidate) positions.push_back(*candidate);
+      steps.advance(members.size() - positions.size());
+      const auto results = libgtd::test_grasps(piece.ground, gripper_, positions, options_, steps);
       auto next = results.begin();
       for (std::size_t n = 0; n < members.size(); ++n) {
         const Values values = candidates[n] ? values_of(*next++) : no_candidate;
@@ -355,9 +356,9 @@ GroundPieces::GroundPieces(const std::string& mesh, const libgtd::Gripper& gripp
   if (files_.size() > 1) index_.emplace(files_);
 }
 
-std::size_t GroundPieces::piece_at(const Eigen::Vector3d& place) const {
+std::size_t GroundPieces::piece_at(const Eigen::Vector3d& position) const {
   if (!index_) return 0;
-  const Eigen::Vector2d point = place.head<2>();
+  const Eigen::Vector2d point = position.head<2>();
   std::size_t best = 0;
   std::pair least(std::numeric_limits<double>::infinity(), 0.0);
   for (std::size_t n = 0; n < index_->size(); ++n) {

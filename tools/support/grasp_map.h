@@ -37,7 +37,7 @@ class GroundPieces {
 
   // Returns the index of the tile at the position, by x and y; of several, the one with the nearest
   // center. Returns the nearest tile if none is there.
-  std::size_t piece_at(const Eigen::Vector3d& place) const;
+  std::size_t piece_at(const Eigen::Vector3d& position) const;
 
   // Returns the tile with this index; the reference is valid until two other tiles are requested.
   const Piece& piece(std::size_t number);

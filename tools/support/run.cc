@@ -149,8 +149,9 @@ void Run::add_input(const fs::path& path) {
     return;
   }
   manifest_.add_input(path);
-  const fs::path place = path.lexically_relative(libmap::data_folder());
-  if (!place.empty() && *place.begin() != "..") manifest_.inputs.back().path = place.string();
+  const fs::path folder_path = path.lexically_relative(libmap::data_folder());
+  if (!folder_path.empty() && *folder_path.begin() != "..")
+    manifest_.inputs.back().path = folder_path.string();
 }
 
 void Run::say(const std::string& text) {
@@ -251,9 +252,9 @@ void Run::write_outputs(const fs::path& path, const Files& files) {
 void Run::claim_output_folder(const fs::path& given) {
   require_own_folder(given, ": --force writes into it");
   const fs::path folder = without_trailing_slash(given.string());
-  const fs::path place = folder.has_parent_path() ? folder.parent_path() : ".";
-  if (options_.dry_run && !fs::exists(place)) return;
-  make_folder(place);
+  const fs::path folder_path = folder.has_parent_path() ? folder.parent_path() : ".";
+  if (options_.dry_run && !fs::exists(folder_path)) return;
+  make_folder(folder_path);
   claim_manifest(folder);
 }
 

@@ -72,9 +72,9 @@ TEST(ExpectedMap, CountsByHand) {
   EXPECT_DOUBLE_EQ(*result.regions[1].mean_score, 0.475);
   EXPECT_EQ(result.regions[2].voxels, 1U);
   // "no" is predicted graspable: one of its two voxels reaches the cutoff.
-  EXPECT_EQ(result.places.true_positives, 1U);
-  EXPECT_EQ(result.places.false_positives, 1U);
-  EXPECT_EQ(result.places.size(), 2U);
+  EXPECT_EQ(result.region_confusion.true_positives, 1U);
+  EXPECT_EQ(result.region_confusion.false_positives, 1U);
+  EXPECT_EQ(result.region_confusion.size(), 2U);
 }
 
 // As in all other counts, an obstacle is not graspable, even with the flag.

@@ -26,8 +26,8 @@ void expect_near(const Eigen::Vector2d& actual, const Eigen::Vector2d& expected,
 }
 
 TEST(EdgeCheck, PlacesGoRoundTheSiteFromItsLowerLeftCorner) {
-  const EdgeCheckResult result =
-      check_edges(corners_of({-1.5, -1}, {1.5, 2}), zero, zero, {.places = 3, .inset_m = 0.1});
+  const EdgeCheckResult result = check_edges(corners_of({-1.5, -1}, {1.5, 2}), zero, zero,
+                                             {.positions_per_edge = 3, .inset_m = 0.1});
   expect_near(result.edges[0][0].position, {-1.0, -0.9});
   expect_near(result.edges[0][2].position, {1.0, -0.9});
   expect_near(result.edges[1][0].position, {1.4, -0.5});
@@ -81,7 +81,7 @@ TEST(EdgeCheck, PlacesWithoutDataAreEmptyNotZero) {
   TriangleMesh mesh = square_mesh(0.002, 2.0);
   for (Eigen::Vector3d& v : mesh.vertices) v.x() = std::min(v.x(), 0.0);
   const EdgeCheckResult result =
-      check_edges(corners_of({-1, -1}, {1, 1}), heights_of(mesh), zero, {.places = 4});
+      check_edges(corners_of({-1, -1}, {1, 1}), heights_of(mesh), zero, {.positions_per_edge = 4});
   EXPECT_EQ(result.measured, 8U);
   EXPECT_EQ(result.missing, 8U);
   EXPECT_FALSE(result.edges[1][0].height_m);
@@ -158,7 +158,7 @@ TEST(EdgeCheck, SitesThatCannotBe) {
   const SiteCorners site = corners_of({0, 0}, {1, 2});
   EXPECT_THAT(error_of([&] { check_edges(site, zero, zero, {.inset_m = 0.5}); }).what(),
               HasSubstr("inset_m is 0.5"));
-  EXPECT_THAT(error_of([&] { check_edges(site, zero, zero, {.places = 0}); }).what(),
+  EXPECT_THAT(error_of([&] { check_edges(site, zero, zero, {.positions_per_edge = 0}); }).what(),
               HasSubstr("places is 0"));
   EXPECT_THAT(error_of([&] { check_edges(site, zero, zero, {.inset_m = NAN}); }).what(),
               HasSubstr("inset_m"));
