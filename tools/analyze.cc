@@ -3,7 +3,7 @@
 #include "libmap/io/cloud_io.h"
 #include "libmap/view/image_io.h"
 #include "libmap/view/offscreen.h"
-#include "tools/support/analysis_pictures.h"
+#include "tools/support/analysis_images.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
 #include "tools/support/map_table.h"
@@ -27,7 +27,7 @@ struct AnalyzeOptions {
   std::string start = no_start;
   PointFrame points_frame = PointFrame::input;
   std::string transform = "auto";
-  bool pictures = true;
+  bool images = true;
   libgtd::MapSurfaceOptions surface;
   libgtd::MapAnalysisOptions analysis;
   libgtd::MapRegionOptions regions;
@@ -56,7 +56,7 @@ void bind(libmap::ParameterTable& table, AnalyzeOptions& options) {
   table.add("points_frame", options.points_frame, point_frame_names(),
             "frame of the start or of the expected regions: of the scored cloud, the terrain, or "
             "the map before it was cropped");
-  table.add("pictures", options.pictures, "draw images and charts");
+  table.add("pictures", options.images, "draw images and charts");
   bind(table, options.table);
 }
 
@@ -244,8 +244,8 @@ void write_chart(const fs::path& folder, const std::string& name, const libmap::
   libmap::write_text(folder / (name + ".png"), libmap::to_png(libmap::draw_chart(chart)));
 }
 
-void write_pictures(const fs::path& folder, const AnalyzeOptions& options, const ReadMap& map,
-                    const Analysis& analysis, const Comparison* comparison) {
+void write_images(const fs::path& folder, const AnalyzeOptions& options, const ReadMap& map,
+                  const Analysis& analysis, const Comparison* comparison) {
   const libmap::VirtualDisplay display;
   const std::string name = short_name(options.map);
   const libgtd::MapAnalysis& ground = analysis.ground;
@@ -254,21 +254,21 @@ void write_pictures(const fs::path& folder, const AnalyzeOptions& options, const
               ground_chart(ground.by_height, "height [m]", "Graspable ground by height, " + name));
   write_chart(folder, "by_slope",
               ground_chart(ground.by_slope, "slope [deg]", "Graspable ground by slope, " + name));
-  MapPicture picture{map.voxels, analysis.surface, ""};
-  const auto write = [&](const char* file, const libmap::ColorImage& image) {
-    libmap::write_text(folder / file, libmap::to_png(image));
+  MapImage map_image{map.voxels, analysis.surface, ""};
+  const auto write = [&](const char* file, const libmap::ColorImage& drawn) {
+    libmap::write_text(folder / file, libmap::to_png(drawn));
   };
-  picture.title = fmt::format("{}: {} regions, stride {:g} m", name,
-                              analysis.regions.regions.size(), options.reach.stride_m);
-  write("regions.png", draw_regions(picture, analysis.regions, analysis.reach));
+  map_image.title = fmt::format("{}: {} regions, stride {:g} m", name,
+                                analysis.regions.regions.size(), options.reach.stride_m);
+  write("regions.png", draw_regions(map_image, analysis.regions, analysis.reach));
   if (comparison == nullptr) return;
   const libgtd::MapChange& change = comparison->change;
-  picture.title = fmt::format(
+  map_image.title = fmt::format(
       "MAP {}, OTHER {}{}", name, short_name(options.other),
       change.evaluated.kappa ? fmt::format(": kappa {:.2f}", change.evaluated.kappa->value) : "");
-  write("change.png", draw_change(picture, change, comparison->other.voxels,
+  write("change.png", draw_change(map_image, change, comparison->other.voxels,
                                   comparison->map_terrain_from_other_terrain));
-  write("change_score.png", draw_score_change(picture, change, comparison->other.voxels));
+  write("change_score.png", draw_score_change(map_image, change, comparison->other.voxels));
 }
 
 void write_tables(const fs::path& folder, const AnalyzeOptions& options, const ReadMap& map,
@@ -302,7 +302,7 @@ void analyze(AnalyzeOptions& options, Run& run) {
       throw UsageError("--against requires one MAP without --expected; --pairs compares several");
     reject_changed(options, bind_one, "requires one map without --expected");
     options.table.points_frame = options.points_frame;
-    options.table.pictures = options.pictures;
+    options.table.images = options.images;
     return tabulate_maps(options.maps, options.folder, options.table, run);
   }
   reject_changed<MapTableOptions>(options.table, graspmap_tools::bind,
@@ -330,7 +330,7 @@ void analyze(AnalyzeOptions& options, Run& run) {
   run.write_output_tree(options.folder, output_names, [&](const fs::path& folder) {
     if (folder.empty()) return;
     write_tables(folder, options, map, analysis, against);
-    if (options.pictures) write_pictures(folder, options, map, analysis, against);
+    if (options.images) write_images(folder, options, map, analysis, against);
   });
 }
 

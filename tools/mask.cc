@@ -6,7 +6,7 @@
 #include "libgtd/gripper/gripper_mask.h"
 #include "libmap/core/data_folder.h"
 #include "libmap/io/cloud_io.h"
-#include "libmap/view/picture_sheet.h"
+#include "libmap/view/image_grid.h"
 #include "libmap/view/scene_view.h"
 #include "tools/support/command_line.h"
 
@@ -205,7 +205,7 @@ libmap::Legend mask_legend(const GripperMask& mask) {
 }
 
 std::string to_sections(const GripperMask& mask, const MaskOptions& options) {
-  libmap::PictureSheetOptions sheet;
+  libmap::ImageGridOptions sheet;
   sheet.columns = 3;
   sheet.cell_width_px = options.cell_width_px;
   sheet.title = fmt::format("{}: {} x {} x {} voxels", title_of(mask, options), mask.side,
@@ -215,7 +215,7 @@ std::string to_sections(const GripperMask& mask, const MaskOptions& options) {
   return libmap::to_png(libmap::draw_sheet(mask_sections(mask, options.section_layer), sheet));
 }
 
-std::string to_picture(const GripperMask& mask, const MaskOptions& options) {
+std::string to_image(const GripperMask& mask, const MaskOptions& options) {
   if (options.sections) return to_sections(mask, options);
   libmap::SceneLayer layer;
   layer.shape = to_cloud(mask);
@@ -250,7 +250,7 @@ void mask(const MaskOptions& options, Run& run) {
     if (extension == ".txt")
       libmap::write_text(temporary, to_text(made));
     else if (extension == ".png")
-      libmap::write_text(temporary, to_picture(made, options));
+      libmap::write_text(temporary, to_image(made, options));
     else
       libmap::write_cloud(temporary, to_cloud(made));
   });

@@ -2,7 +2,7 @@
 #include "libmap/poses/trajectory_io.h"
 #include "libmap/refine/refinement.h"
 #include "libmap/scan/colmap_builder.h"
-#include "libmap/scan/picture_file.h"
+#include "libmap/scan/image_export.h"
 #include "libmap/scan/rtabmap_writer.h"
 #include "tools/support/command_line.h"
 #include "tools/support/refine_report.h"
@@ -79,9 +79,9 @@ libmap::ColmapModel model_of(const libmap::Trajectory& poses, const libmap::Scan
   for (const libmap::TrajectoryPose& pose : poses) {
     try {
       const std::vector<libmap::CameraView> views =
-          libmap::read_pictures(scan, pose.node, {.color = true, .depth = false});
+          libmap::read_views(scan, pose.node, {.color = true, .depth = false});
       for (std::size_t c = 0; c < views.size(); ++c)
-        builder.add_image(libmap::picture_file(scan, pose.node, views, c).name, views[c],
+        builder.add_image(libmap::image_file_of(scan, pose.node, views, c).name, views[c],
                           pose.world_from_base * views[c].color_camera.base_from_camera);
     } catch (const libmap::Error& error) {
       run.warn(std::string(error.what()) + "; its pose is not in the model of COLMAP");

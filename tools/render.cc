@@ -13,7 +13,7 @@
 #include "libmap/io/mesh_io.h"
 #include "libmap/texture/textured_mesh_io.h"
 #include "libmap/tiles/xy_tile.h"
-#include "libmap/view/picture_sheet.h"
+#include "libmap/view/image_grid.h"
 #include "libmap/view/scene_view.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
@@ -304,7 +304,7 @@ struct RenderOptions {
   std::string captions;
   std::string column_titles;
   std::string row_titles;
-  libmap::PictureSheetOptions sheet;
+  libmap::ImageGridOptions sheet;
 };
 
 // Options of an image of one file.
@@ -316,7 +316,7 @@ void bind_one(libmap::ParameterTable& table, RenderOptions& options) {
 
 // Options of a page of several files.
 void bind_page(libmap::ParameterTable& table, RenderOptions& options) {
-  libmap::PictureSheetOptions& sheet = options.sheet;
+  libmap::ImageGridOptions& sheet = options.sheet;
   table.add("columns", sheet.columns, libmap::Range{0, 1000},
             "for several files: number of columns of cells; 0: for an approximately square page");
   table.add("cell_width_px", sheet.cell_width_px, libmap::Range{16, 16384},
@@ -365,11 +365,11 @@ libmap::ColorImage draw_one(RenderOptions& options, Run& run) {
   return image;
 }
 
-libmap::ColorImage read_picture(const std::string& file) {
+libmap::ColorImage read_image(const std::string& file) {
   constexpr std::uint64_t max_file_bytes = std::uint64_t{1} << 30;
   return in_file(file, [&] {
     return libmap::decode_color(libmap::read_whole_file(file, max_file_bytes),
-                                libmap::max_picture_pixels);
+                                libmap::max_decoded_pixels);
   });
 }
 
@@ -383,7 +383,7 @@ std::vector<libmap::SheetCell> read_cells(const RenderOptions& options, Run& run
                                                    : std::filesystem::path(file).stem().string();
     cell.view = options.view.view;
     if (libmap::format_of(file) == ".png")
-      cell.picture = read_picture(file);
+      cell.image = read_image(file);
     else
       cell.scene = [&options, &run, file] { return read_scene(file, options.scene, run).scene; };
   }

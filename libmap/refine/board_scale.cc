@@ -16,7 +16,7 @@
 #include "libmap/features/bundle_residuals.h"
 #include "libmap/geometry/least_squares.h"
 #include "libmap/geometry/rigid_motion.h"
-#include "libmap/scan/picture_file.h"
+#include "libmap/scan/image_export.h"
 
 namespace libmap {
 
@@ -303,14 +303,14 @@ std::vector<BoardView> find_boards(const ScanSource& scan, const std::vector<Fra
   progress.begin("board", frames.size());
   parallel_each(frames.size(), [&](std::size_t n) {
     progress.advance(1);
-    std::vector<CameraView> pictures;
+    std::vector<CameraView> images;
     try {
-      pictures = read_pictures(scan, frames[n].node, {.color = true, .depth = false});
+      images = read_views(scan, frames[n].node, {.color = true, .depth = false});
     } catch (const Error&) {
       return;  // a frame without images
     }
-    for (std::size_t camera = 0; camera < pictures.size(); ++camera)
-      if (auto corners = find_chessboard(luminance(pictures[camera].color), board))
+    for (std::size_t camera = 0; camera < images.size(); ++camera)
+      if (auto corners = find_chessboard(luminance(images[camera].color), board))
         found[n].push_back({frames[n].node, camera, std::move(*corners)});
   });
   progress.end();

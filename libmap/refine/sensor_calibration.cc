@@ -439,14 +439,14 @@ bool is_similar_registration(const SensorCalibration& a, const SensorCalibration
   return true;
 }
 
-CameraFile calibrated_camera(const Camera& stored, const Camera& picture,
+CameraFile calibrated_camera(const Camera& stored, const Camera& image,
                              const SensorCalibration& calibration, const PoseGraph& graph) {
   CameraFile file{.camera = stored};
   if (!calibration.intrinsics.empty()) {
     // The step is in pixels of the images, which may be smaller than the stored camera's.
     IntrinsicsStep step = calibration.intrinsics.front();
-    step.cx_px *= static_cast<double>(stored.width) / picture.width;
-    step.cy_px *= static_cast<double>(stored.height) / picture.height;
+    step.cx_px *= static_cast<double>(stored.width) / image.width;
+    step.cy_px *= static_cast<double>(stored.height) / image.height;
     file.camera = moved(stored, step);
   }
   if (!calibration.color_from_depth.empty())

@@ -78,9 +78,9 @@ void estimate_motions(const CalibrationInput& input, bool fixes_poses,
 bool is_similar_registration(const SensorCalibration& a, const SensorCalibration& b, double shift_m,
                              double turn_rad, double time_s);
 
-// Returns the first camera with the calibration applied, for a file. `picture` is the camera of its
+// Returns the first camera with the calibration applied, for a file. `image` is the camera of its
 // images; `graph` contains the time stamps of the nodes.
-CameraFile calibrated_camera(const Camera& stored, const Camera& picture,
+CameraFile calibrated_camera(const Camera& stored, const Camera& image,
                              const SensorCalibration& calibration, const PoseGraph& graph);
 
 // Returns one sentence per fault that was corrected; `deviations` are

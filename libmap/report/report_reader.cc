@@ -9,7 +9,7 @@
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
 #include "libmap/core/text.h"
-#include "libmap/report/picture_fit.h"
+#include "libmap/report/image_fit.h"
 
 namespace libmap {
 
@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::uint64_t max_picture_bytes = std::uint64_t{64} << 20;
+constexpr std::uint64_t max_image_bytes = std::uint64_t{64} << 20;
 // Commands whose running times are shown, in this order.
 constexpr std::array timed_commands = {
     "simulate scene", "simulate site", "simulate cameras", "fuse",   "mesh",     "crop",
@@ -115,8 +115,8 @@ class Reader {
     ReportItem item{.caption = plan.caption};
     if (plan.files.size() == 1) item.source = name_of(plan.files.front());
     switch (plan.kind) {
-      case ItemKind::picture:
-        read_pictures(plan, item);
+      case ItemKind::image:
+        read_images(plan, item);
         break;
       case ItemKind::table:
         fill(item, plan.files.front(), [&] {
@@ -146,25 +146,25 @@ class Reader {
     return item;
   }
 
-  std::optional<ReportPicture> read_picture(const fs::path& path, ReportItem& item) {
-    std::optional<ReportPicture> picture;
+  std::optional<ReportImage> read_image(const fs::path& path, ReportItem& item) {
+    std::optional<ReportImage> image;
     fill(item, path, [&] {
-      picture = read_picture_bytes(read_whole_file(path, max_picture_bytes));
-      picture->file = name_of(path);
+      image = read_image_bytes(read_whole_file(path, max_image_bytes));
+      image->file = name_of(path);
       use(path);
     });
-    return picture;
+    return image;
   }
 
-  void read_pictures(const PlannedItem& plan, ReportItem& item) {
-    ReportPictures pictures;
+  void read_images(const PlannedItem& plan, ReportItem& item) {
+    ReportImages images;
     for (std::size_t n = 0; n < plan.files.size(); ++n) {
-      auto picture = read_picture(plan.files[n], item);
-      if (!picture) continue;
-      if (!plan.labels.empty()) picture->label = plan.labels[n];
-      pictures.push_back(std::move(*picture));
+      auto image = read_image(plan.files[n], item);
+      if (!image) continue;
+      if (!plan.labels.empty()) image->label = plan.labels[n];
+      images.push_back(std::move(*image));
     }
-    if (!pictures.empty()) item.body = std::move(pictures);
+    if (!images.empty()) item.body = std::move(images);
   }
 
   void read_map(const PlannedItem& plan, ReportItem& item) {
@@ -175,7 +175,7 @@ class Reader {
       map.view = load_map_(path, map.locations ? std::optional(plan.lookup) : std::nullopt);
       use(path);
       if (map.locations) name_markers(plan.lookup, map);
-      if (!plan.picture.empty()) map.still = read_picture(plan.picture, item);
+      if (!plan.image.empty()) map.still = read_image(plan.image, item);
       item.body = std::move(map);
     });
   }

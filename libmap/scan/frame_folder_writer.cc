@@ -14,7 +14,7 @@
 #include "libmap/core/text.h"
 #include "libmap/poses/trajectory_text.h"
 #include "libmap/scan/frame_folder.h"
-#include "libmap/scan/picture_file.h"
+#include "libmap/scan/image_export.h"
 
 namespace libmap {
 
@@ -76,7 +76,7 @@ FrameFolderWriter::FrameFolderWriter(fs::path folder) : folder_(std::move(folder
 
 std::string FrameFolderWriter::write_image(const char* folder, int node, const std::string& bytes) {
   const ImageFormat format = image_format(bytes).value_or(ImageFormat::png);
-  std::string name = std::string(folder) + "/" + picture_name(node, 0, file_extension(format));
+  std::string name = std::string(folder) + "/" + image_file_name(node, 0, file_extension(format));
   write_text(folder_ / name, bytes);
   return name;
 }

@@ -124,7 +124,7 @@ class ScanCamera {
   }
   SurfaceView view(std::size_t n, const VisibleSurface& surface, const ViewRays& rays,
                    const VisibleSurface::PoseOfRow& world_from_camera, bool with_color) const;
-  SurfaceView picture_view(std::size_t n, const VisibleSurface& surface) const;
+  SurfaceView image_view(std::size_t n, const VisibleSurface& surface) const;
   ColorImage photo_of(SurfaceView& view, std::size_t n, std::uint64_t key) const;
 
   const ScanSimulationOptions& options_;
@@ -177,7 +177,7 @@ ViewRange ScanCamera::range() const {
   return range;
 }
 
-SurfaceView ScanCamera::picture_view(std::size_t n, const VisibleSurface& surface) const {
+SurfaceView ScanCamera::image_view(std::size_t n, const VisibleSurface& surface) const {
   const double row_s = faults_.rolling_shutter_s / std::max(1, rays_.height - 1);
   const Pose middle = world_from_camera(n, 0.0);
   return view(
@@ -205,7 +205,7 @@ ColorImage ScanCamera::photo_of(SurfaceView& view, std::size_t n, std::uint64_t 
 DepthMeasurement ScanCamera::take(std::size_t n, const VisibleSurface& surface,
                                   RgbdFrame& frame) const {
   const auto key = frame_key + 4 * static_cast<std::uint64_t>(n);
-  SurfaceView view = picture_view(n, surface);
+  SurfaceView view = image_view(n, surface);
   frame.cameras = {stored_camera(options_.camera, faults_)};
   frame.color = photo_of(view, n, key);
   const Pose world_from_depth = world_from_depth_camera(n);

@@ -156,12 +156,12 @@ ModelPart part_of(const TexturedMesh& model, const UnitedCorners& united, std::i
 
 // glTF stores lengths in 32 bits. Assimp does not check them.
 void require_room_in_glb(const std::vector<ModelPart>& parts,
-                         const std::vector<EncodedPicture>& pictures) {
+                         const std::vector<EncodedImage>& images) {
   std::size_t bytes = std::size_t{1} << 20;  // JSON part
   for (const ModelPart& part : parts)
     bytes += part.mesh.vertices.size() * (3 + 3 + 2) * sizeof(float) +
              part.mesh.triangles.size() * 3 * sizeof(std::uint32_t);
-  for (const EncodedPicture& picture : pictures) bytes += picture.bytes.size();
+  for (const EncodedImage& image : images) bytes += image.bytes.size();
   if (bytes > std::numeric_limits<std::uint32_t>::max())
     throw Error("too large for .glb: write an .obj instead",
                 {.field = "size", .value = std::to_string(bytes) + " bytes", .bound = "< 4 GB"});
@@ -180,18 +180,17 @@ std::vector<ModelPart> parts_of(const TexturedMesh& model) {
 void write_textured_glb(const fs::path& path, const TexturedMesh& model,
                         const TexturedMeshWriteOptions& options) {
   std::vector<ModelPart> parts = parts_of(model);
-  std::vector<EncodedPicture> pictures;
+  std::vector<EncodedImage> images;
   for (const ColorImage& page : model.pages)
-    pictures.push_back(
-        {encode_page(page, options), file_extension(options.image_format).substr(1)});
-  require_room_in_glb(parts, pictures);
-  write_model_by_assimp(path, std::move(parts), std::move(pictures));
+    images.push_back({encode_page(page, options), file_extension(options.image_format).substr(1)});
+  require_room_in_glb(parts, images);
+  write_model_by_assimp(path, std::move(parts), std::move(images));
 }
 
-ColorImage read_picture(const TexturePicture& picture, const fs::path& model) {
-  if (!picture.bytes.empty()) return decode_color(picture.bytes, max_picture_pixels);
-  const fs::path path = model.parent_path() / picture.path;
-  return in_file(path, [&] { return decode_color(read_whole_file(path), max_picture_pixels); });
+ColorImage read_image(const TextureImage& image, const fs::path& model) {
+  if (!image.bytes.empty()) return decode_color(image.bytes, max_decoded_pixels);
+  const fs::path path = model.parent_path() / image.path;
+  return in_file(path, [&] { return decode_color(read_whole_file(path), max_decoded_pixels); });
 }
 
 }  // namespace
@@ -256,8 +255,8 @@ TexturedMesh read_textured_mesh(const fs::path& path) {
   return in_file(path, [&] {
     DecodedModel decoded = decode_model_by_assimp(path, format_of(path).substr(1));
     if (decoded.model.mesh.triangles.empty()) throw Error("contains no triangle");
-    for (const TexturePicture& picture : decoded.pictures)
-      decoded.model.pages.push_back(read_picture(picture, path));
+    for (const TextureImage& image : decoded.images)
+      decoded.model.pages.push_back(read_image(image, path));
     decoded.model.check();
     return std::move(decoded.model);
   });

@@ -270,7 +270,7 @@ TEST(Compare, IcpSaysWhatItCannotDo) {
                         {"points.ply", "without normals"}));
 }
 
-TEST(Compare, PictureOfSignedDistances) {
+TEST(Compare, ImageOfSignedDistances) {
   write_square_and_points();
   // The left half lies above the square, the right one below it.
   libmap::PointCloud cloud;

@@ -194,7 +194,7 @@ void tabulate_maps(const std::vector<std::string>& map_files, const std::string&
                          return compare_all(maps, voxels);
                        }))));
   if (expected) files.emplace_back("regions.csv", table(libgtd::region_table(maps, *expected)));
-  if (options.pictures) {
+  if (options.images) {
     try {
       add_charts(files, rows, histograms, options);
     } catch (const libmap::Error& error) {

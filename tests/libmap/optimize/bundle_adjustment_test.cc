@@ -213,7 +213,7 @@ TEST(BundleAdjustment, TellsBentDepthFromAFalseFocalLength) {
   EXPECT_NEAR(sum / count, 1.008, 5e-3);
 }
 
-TEST(BundleAdjustment, FindsTheTimeOfThePicturesRows) {
+TEST(BundleAdjustment, FindsTheTimeOfTheImagesRows) {
   const auto points = random_points(150);
   const Way way = way_with_rows(points, 0.06);
   libmap::BundleAdjustmentOptions options;

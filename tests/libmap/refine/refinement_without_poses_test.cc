@@ -55,7 +55,7 @@ double figure(const libmap::StageReport& stage, const std::string& name) {
   throw std::runtime_error("no figure " + name);
 }
 
-TEST(RefinementWithoutPoses, PicturesAloneGiveTheWay) {
+TEST(RefinementWithoutPoses, ImagesAloneGiveTheWay) {
   TexturedScan scan = loop_of(8);
   forget_poses(scan);
   const RefinementResult result = libmap::refine_poses(scan, small_options());
@@ -124,7 +124,7 @@ TEST(RefinementWithoutPoses, TwoSessionsBecomeOneMap) {
 }
 
 // Images without features are tracked by depth, from the pose by constant motion.
-TEST(RefinementWithoutPoses, DepthLeadsOverBlurredPictures) {
+TEST(RefinementWithoutPoses, DepthLeadsOverBlurredImages) {
   TexturedScan scan = loop_of(10);
   for (const int node : {4, 5, 8}) {
     libmap::ColorImage& color = scan.frames.at(node).color;

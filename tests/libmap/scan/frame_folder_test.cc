@@ -301,7 +301,7 @@ TEST_F(TumFolder, FollowsItsOptions) {
   EXPECT_NE(std::string(error.what()).find("depth_unit_m"), std::string::npos);
 }
 
-// A wall at 2 m before a depth camera of half the size, 40 cm to the right: the left of the picture
+// A wall at 2 m before a depth camera of half the size, 40 cm to the right: the left of the image
 // has no depth.
 TEST_F(TumFolder, RegistersADepthCameraToColor) {
   write_color("1.png");

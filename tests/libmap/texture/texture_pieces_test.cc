@@ -62,7 +62,7 @@ std::vector<TexturedMesh> textured(const TriangleMesh& mesh, const PaintedScan& 
   return models;
 }
 
-// The vertices all of whose triangles are in the picture and near enough.
+// The vertices all of whose triangles are in the image and near enough.
 std::vector<bool> shown_vertices(const TriangleMesh& mesh, const libmap::PhotoProjector& projector,
                                  const libmap::TextureViewOptions& options) {
   const auto is_shown = [&](std::uint32_t v) {

@@ -29,7 +29,7 @@ std::string variable(const char* name) {
   return value != nullptr ? value : "(unset)";
 }
 
-ColorImage small_picture() {
+ColorImage small_image() {
   Scene scene;
   PointCloud cloud;
   cloud.positions = {{0, 0, 0}, {1, 1, 0}};
@@ -65,7 +65,7 @@ TEST_F(VirtualDisplayTest, ADisplayThatAnswersIsUsed) {
     const VirtualDisplay inner;
     EXPECT_FALSE(inner.started());
     EXPECT_EQ(variable("DISPLAY"), name);
-    EXPECT_EQ(small_picture().pixels.size(), 64U * 64);
+    EXPECT_EQ(small_image().pixels.size(), 64U * 64);
   }
   EXPECT_EQ(variable("DISPLAY"), name);
   EXPECT_TRUE(runs(outer.process_id()));
@@ -82,8 +82,8 @@ TEST_F(VirtualDisplayTest, ADeadDisplayIsReplacedAndRestored) {
 }
 
 TEST_F(VirtualDisplayTest, DrawsOneAfterTheOtherWithServersOfTheirOwn) {
-  const ColorImage first = small_picture();
-  EXPECT_EQ(small_picture(), first);
+  const ColorImage first = small_image();
+  EXPECT_EQ(small_image(), first);
   EXPECT_EQ(variable("DISPLAY"), "(unset)");
   // No child is left behind, neither running nor as a zombie; the thread sanitizer has one of its
   // own.
@@ -178,7 +178,7 @@ TEST(DrawOffscreen, WhatVtkSaysIsTheReason) {
   EXPECT_STREQ(error.what(), "VTK failed to render the image: ERROR: no such shader at all");
 }
 
-TEST(DrawOffscreen, APictureWithoutPixelsCannotBeReadBack) {
+TEST(DrawOffscreen, AImageWithoutPixelsCannotBeReadBack) {
   const Error error = error_of([] { draw_offscreen(0, 0, [](vtkRenderWindow&) {}); });
   EXPECT_EQ(error.kind(), ErrorKind::failed);
   EXPECT_STREQ(error.what(), "the image could not be read back from OpenGL");

@@ -10,14 +10,14 @@ namespace libmap {
 
 // Reads a PNG, JPEG or SVG, recognized by its content. Decodes PNG and JPEG once to check them.
 // Throws Error: another format, a damaged image, or an SVG above 4 MiB.
-ReportPicture read_picture_bytes(std::string bytes);
+ReportImage read_image_bytes(std::string bytes);
 
 // Highest level of reduction; level 0 changes nothing.
-inline constexpr int max_picture_level = 7;
+inline constexpr int max_image_level = 7;
 
-// Encodes the image as JPEG, from level 2 on also with fewer pixels. Returns `picture` if that is
+// Encodes the image as JPEG, from level 2 on also with fewer pixels. Returns `image` if that is
 // smaller, or if it is SVG.
-ReportPicture fit_picture(const ReportPicture& picture, int level);
+ReportImage fit_image(const ReportImage& report_image, int level);
 
 // Scales an image down by averaging over the area of each new pixel. `width` and `height` are >= 1.
 ColorImage shrink_image(const ColorImage& image, int width, int height);

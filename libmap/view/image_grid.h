@@ -18,15 +18,15 @@ namespace libmap {
 // Images are scaled down if they are larger than the cell.
 struct SheetCell {
   std::string caption;
-  std::function<Scene()> scene{};  // empty: show `picture`
+  std::function<Scene()> scene{};  // empty: show `image`
   Viewpoint view = Viewpoint::top;
-  ColorImage picture{};
+  ColorImage image{};
 };
 
 // Group of scenes with the same view extent: the whole sheet, or each row.
 enum class SharedView { sheet, row };
 
-struct PictureSheetOptions {
+struct ImageGridOptions {
   int columns = 0;  // 0: minimum number with a page at least as wide as high
   int cell_width_px = 480;
   int cell_height_px = 0;  // 0: from the aspect ratio of the cells' content
@@ -57,12 +57,12 @@ struct SheetLayout {
 // Plans the layout. `aspect` is the height of a cell over its width, used if the options do not set
 // the height. Throws Error: no cell, columns, a size or the sheet out of bounds, an invalid
 // background, more titles than rows or columns.
-SheetLayout plan_sheet(const std::vector<SheetCell>& cells, const PictureSheetOptions& options,
+SheetLayout plan_sheet(const std::vector<SheetCell>& cells, const ImageGridOptions& options,
                        const std::vector<Legend>& legends, double aspect);
 
 // Draws the sheet. Continuous color scales with the same title share one range, which covers the
 // ranges of all scenes. Throws Error as plan_sheet and render_scene do, and what a cell's `scene`
 // throws; (failed) if rendering is not possible.
-ColorImage draw_sheet(const std::vector<SheetCell>& cells, const PictureSheetOptions& options);
+ColorImage draw_sheet(const std::vector<SheetCell>& cells, const ImageGridOptions& options);
 
 }  // namespace libmap

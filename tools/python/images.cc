@@ -6,12 +6,12 @@ namespace graspmap_python {
 
 namespace {
 
-struct PictureOptions {
+struct ImageOptions {
   libmap::SceneViewOptions view;
   libmap::SceneLayer layer;
 };
 
-void bind(libmap::ParameterTable& table, PictureOptions& options) {
+void bind(libmap::ParameterTable& table, ImageOptions& options) {
   libmap::bind(table, options.view);
   libmap::bind(table, options.layer);
   libmap::bind_single(table, options.view);
@@ -38,7 +38,7 @@ py::array render(const Shown& shown, const py::object& markers,
                  const std::vector<std::string>& labels, std::optional<double> zero_plane_m,
                  const py::object& terrain_from_scene, const py::object& camera_position,
                  const py::object& camera_target, const py::dict& values) {
-  auto options = options_from<PictureOptions>(values);
+  auto options = options_from<ImageOptions>(values);
   std::visit([&](const auto& shape) { options.layer.shape = *shape; }, shown);
   if (zero_plane_m) options.layer.coloring.zero_plane_m = *zero_plane_m;
   if (!camera_position.is_none())
@@ -75,10 +75,10 @@ py::bytes to_png(const py::object& pixels) {
 
 }  // namespace
 
-void add_pictures(py::module_& module) {
+void add_images(py::module_& module) {
   module.def("render", &render);
   module.def("to_png", &to_png);
-  add_stage<PictureOptions>("render");
+  add_stage<ImageOptions>("render");
 }
 
 }  // namespace graspmap_python

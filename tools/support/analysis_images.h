@@ -19,7 +19,7 @@ libmap::Chart histogram_chart(const libgtd::MapAnalysis& analysis, const std::st
 libmap::Chart ground_chart(const std::vector<libgtd::GroundBin>& bins,
                            const std::string& axis_title, const std::string& title);
 
-struct MapPicture {
+struct MapImage {
   const libgtd::VoxelMap& map;
   const libgtd::MapSurface& surface;
   std::string title;
@@ -27,16 +27,16 @@ struct MapPicture {
 
 // Draws the map from above: regions colored by reachability, the largest ones numbered, other
 // ground darker with slope.
-libmap::ColorImage draw_regions(const MapPicture& picture, const libgtd::MapRegionResult& regions,
+libmap::ColorImage draw_regions(const MapImage& image, const libgtd::MapRegionResult& regions,
                                 const libgtd::RegionReach& reach);
 
 // Draws the map from above, with voxels that are graspable in both maps or in one only.
-libmap::ColorImage draw_change(const MapPicture& picture, const libgtd::MapChange& change,
+libmap::ColorImage draw_change(const MapImage& image, const libgtd::MapChange& change,
                                const libgtd::VoxelMap& other,
                                const libmap::Pose& map_terrain_from_other_terrain);
 
 // Draws the map from above, colored by the difference of both scores.
-libmap::ColorImage draw_score_change(const MapPicture& picture, const libgtd::MapChange& change,
+libmap::ColorImage draw_score_change(const MapImage& image, const libgtd::MapChange& change,
                                      const libgtd::VoxelMap& other);
 
 }  // namespace graspmap_tools

@@ -1,4 +1,4 @@
-#include "libmap/view/picture_sheet.h"
+#include "libmap/view/image_grid.h"
 
 #include <gmock/gmock.h>
 
@@ -10,7 +10,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace picture_sheet_test {
+namespace image_grid_test {
 
 using graspmap_test::error_of;
 using ::testing::HasSubstr;
@@ -40,10 +40,10 @@ SheetCell cell_of(const std::string& caption, const Scene& scene) {
   return cell;
 }
 
-SheetCell cell_of(const std::string& caption, const ColorImage& picture) {
+SheetCell cell_of(const std::string& caption, const ColorImage& image) {
   SheetCell cell;
   cell.caption = caption;
-  cell.picture = picture;
+  cell.image = image;
   return cell;
 }
 
@@ -51,7 +51,7 @@ Color at(const ColorImage& image, double x, double y) {
   return image.at(static_cast<int>(x), static_cast<int>(y));
 }
 
-class PictureSheetTest : public ::testing::Test {
+class ImageGridTest : public ::testing::Test {
  protected:
   void SetUp() override { display_ = std::make_unique<VirtualDisplay>(); }
 
@@ -63,7 +63,7 @@ TEST(PlanSheet, PartsNeverOverlap) {
   for (const int cells : {1, 2, 3, 5, 12}) {
     for (const int columns : {0, 1, 3, 4}) {
       for (const SharedView shared : {SharedView::sheet, SharedView::row}) {
-        PictureSheetOptions options;
+        ImageGridOptions options;
         options.columns = columns;
         options.title = "All of them";
         options.column_titles = {"first column"};
@@ -89,7 +89,7 @@ TEST(PlanSheet, PartsNeverOverlap) {
   }
 }
 
-TEST_F(PictureSheetTest, PicturesStandInTheirCellsUnchanged) {
+TEST_F(ImageGridTest, ImagesStandInTheirCellsUnchanged) {
   ColorImage first(100, 80);
   ColorImage second(100, 80);
   for (int y = 0; y < 80; ++y) {
@@ -98,7 +98,7 @@ TEST_F(PictureSheetTest, PicturesStandInTheirCellsUnchanged) {
       second.at(x, y) = {std::uint8_t(2 * x), 9, std::uint8_t(y)};
     }
   }
-  PictureSheetOptions options;
+  ImageGridOptions options;
   options.columns = 2;
   options.cell_width_px = 100;
   options.cell_height_px = 80;
@@ -110,21 +110,21 @@ TEST_F(PictureSheetTest, PicturesStandInTheirCellsUnchanged) {
   ASSERT_EQ(sheet.height, layout.height);
   for (std::size_t i = 0; i < cells.size(); ++i) {
     const PixelRect& cell = layout.cells[i];
-    const ColorImage& picture = cells[i].picture;
+    const ColorImage& image = cells[i].image;
     for (int y = 0; y < 80; ++y)
       for (int x = 0; x < 100; ++x)
-        ASSERT_EQ(at(sheet, cell.left + x, cell.top + y), picture.at(x, y)) << i << " " << x;
+        ASSERT_EQ(at(sheet, cell.left + x, cell.top + y), image.at(x, y)) << i << " " << x;
   }
   EXPECT_EQ(at(sheet, layout.cells[0].right() + 1, layout.cells[0].top + 5),
             (Color{255, 255, 255}));
 }
 
-TEST_F(PictureSheetTest, LargePicturesAreMadeSmallerSmallOnesKept) {
+TEST_F(ImageGridTest, LargeImagesAreMadeSmallerSmallOnesKept) {
   ColorImage wide(400, 100, red);
   for (int y = 0; y < 100; ++y)
     for (int x = 200; x < 400; ++x) wide.at(x, y) = blue;
   const ColorImage small(10, 10, red);
-  PictureSheetOptions options;
+  ImageGridOptions options;
   options.columns = 2;
   options.cell_width_px = options.cell_height_px = 100;
   const std::vector<SheetCell> cells = {cell_of("", wide), cell_of("", small)};
@@ -145,10 +145,10 @@ TEST_F(PictureSheetTest, LargePicturesAreMadeSmallerSmallOnesKept) {
 
 // One square is 2 m wide, the other 1 m and 3 m beside it: in a shared view the second is half as
 // wide and lies where it does in the first's.
-TEST_F(PictureSheetTest, ScenesShareScaleAndPlace) {
+TEST_F(ImageGridTest, ScenesShareScaleAndPlace) {
   const std::vector<SheetCell> cells = {cell_of("", square_at({0, 0, 0}, red, 2.0)),
                                         cell_of("", square_at({3.5, 0, 0}, blue, 1.0))};
-  PictureSheetOptions options;
+  ImageGridOptions options;
   options.columns = 2;
   options.cell_width_px = 200;
   options.cell_height_px = 100;
@@ -179,7 +179,7 @@ TEST_F(PictureSheetTest, ScenesShareScaleAndPlace) {
 }
 
 // Two scenes with different values share one color range.
-TEST_F(PictureSheetTest, ContinuousColorsShareTheirRange) {
+TEST_F(ImageGridTest, ContinuousColorsShareTheirRange) {
   const auto scene = [](double low, double high) {
     PointCloud cloud;
     cloud.positions = {{0, 0, 0}, {1, 0, 0}};
@@ -195,7 +195,7 @@ TEST_F(PictureSheetTest, ContinuousColorsShareTheirRange) {
     return made;
   };
   const std::vector<SheetCell> cells = {cell_of("", scene(0, 1)), cell_of("", scene(1, 4))};
-  PictureSheetOptions options;
+  ImageGridOptions options;
   options.columns = 2;
   options.cell_width_px = 200;
   options.cell_height_px = 100;
@@ -210,7 +210,7 @@ TEST_F(PictureSheetTest, ContinuousColorsShareTheirRange) {
   EXPECT_EQ(color(1, 0.75), viridis(1.0));
 }
 
-TEST_F(PictureSheetTest, ADimensionLineIsDrawnAtItsEnds) {
+TEST_F(ImageGridTest, ADimensionLineIsDrawnAtItsEnds) {
   Scene scene = square_at({0, 0, 0}, red, 1.0);
   scene.dimension_lines.push_back({{-0.5, -1, 0}, {0.5, -1, 0}, "1 m"});
   SceneViewOptions view;
@@ -228,10 +228,10 @@ TEST_F(PictureSheetTest, ADimensionLineIsDrawnAtItsEnds) {
   EXPECT_FALSE(dark(left.x() + 1.0 * camera.scale_px + 3, left.y()));
 }
 
-TEST(PictureSheet, WhatCannotBeDrawnIsAnError) {
+TEST(ImageGrid, WhatCannotBeDrawnIsAnError) {
   const std::vector<SheetCell> one = {cell_of("", ColorImage(10, 10, red))};
   EXPECT_THAT(error_of([] { draw_sheet({}, {}); }).what(), HasSubstr("no cells"));
-  PictureSheetOptions options;
+  ImageGridOptions options;
   options.cell_width_px = 3;
   EXPECT_THAT(error_of([&] { draw_sheet(one, options); }).what(), HasSubstr("cell_width_px"));
   options.cell_width_px = 16384;
@@ -241,5 +241,5 @@ TEST(PictureSheet, WhatCannotBeDrawnIsAnError) {
   EXPECT_THAT(error_of([&] { draw_sheet(one, options); }).what(), HasSubstr("column_titles"));
 }
 
-}  // namespace picture_sheet_test
+}  // namespace image_grid_test
 }  // namespace libmap

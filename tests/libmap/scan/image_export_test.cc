@@ -1,4 +1,4 @@
-#include "libmap/scan/picture_file.h"
+#include "libmap/scan/image_export.h"
 
 #include <gtest/gtest.h>
 
@@ -8,39 +8,39 @@
 #include "tests/libmap/scan/sample_database.h"
 #include "tests/support/test_support.h"
 
-namespace picture_file_test {
+namespace image_export_test {
 
 using namespace graspmap_test;
 using libmap::RtabmapDatabase;
 
-TEST(PictureFile, NamesSortByNodeThenCamera) {
-  EXPECT_EQ(libmap::picture_name(12, 0, ".jpg"), "000012.jpg");
-  EXPECT_EQ(libmap::picture_name(12, 1, ".png"), "000012_1.png");
-  EXPECT_EQ(libmap::picture_name(1234567, 0, ".png"), "1234567.png");
+TEST(ImageExport, NamesSortByNodeThenCamera) {
+  EXPECT_EQ(libmap::image_file_name(12, 0, ".jpg"), "000012.jpg");
+  EXPECT_EQ(libmap::image_file_name(12, 1, ".png"), "000012_1.png");
+  EXPECT_EQ(libmap::image_file_name(1234567, 0, ".png"), "1234567.png");
 }
 
-TEST(PictureFile, HoldsTheStoredBytesOfTheOnlyCamera) {
+TEST(ImageExport, HoldsTheStoredBytesOfTheOnlyCamera) {
   const std::filesystem::path file = sample_file();
   const std::string jpeg = libmap::encode_jpeg(sample_color(1), 60);
   execute(file, "UPDATE Data SET image = ? WHERE id = 1", {jpeg});
   const RtabmapDatabase scan(file);
-  const auto views = libmap::read_pictures(scan, 1, {});
+  const auto views = libmap::read_views(scan, 1, {});
   ASSERT_EQ(views.size(), 1U);
-  const libmap::PictureFile picture = libmap::picture_file(scan, 1, views, 0);
-  EXPECT_EQ(picture.name, "000001.jpg");
-  EXPECT_EQ(picture.bytes, jpeg);
+  const libmap::ImageFile image = libmap::image_file_of(scan, 1, views, 0);
+  EXPECT_EQ(image.name, "000001.jpg");
+  EXPECT_EQ(image.bytes, jpeg);
 }
 
-TEST(PictureFile, NodesWithoutColorOrCalibrationAreNamed) {
+TEST(ImageExport, NodesWithoutColorOrCalibrationAreNamed) {
   const std::filesystem::path file = sample_file();
   execute(file, "UPDATE Data SET image = NULL WHERE id = 1");
   execute(file, "UPDATE Data SET calibration = NULL WHERE id = 2");
   const RtabmapDatabase scan(file);
   const auto refusal_of = [&](int node) {
-    return std::string(error_of([&] { libmap::read_pictures(scan, node, {}); }).what());
+    return std::string(error_of([&] { libmap::read_views(scan, node, {}); }).what());
   };
   EXPECT_EQ(refusal_of(1), file.string() + ": node 1: has no color image");
   EXPECT_EQ(refusal_of(2), file.string() + ": node 2: has no calibration");
 }
 
-}  // namespace picture_file_test
+}  // namespace image_export_test

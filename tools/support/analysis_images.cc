@@ -1,4 +1,4 @@
-#include "tools/support/analysis_pictures.h"
+#include "tools/support/analysis_images.h"
 
 #include <algorithm>
 #include <cmath>
@@ -165,9 +165,9 @@ libmap::Chart ground_chart(const std::vector<libgtd::GroundBin>& bins,
   return chart;
 }
 
-libmap::ColorImage draw_regions(const MapPicture& picture, const libgtd::MapRegionResult& regions,
+libmap::ColorImage draw_regions(const MapImage& image, const libgtd::MapRegionResult& regions,
                                 const libgtd::RegionReach& reach) {
-  libmap::PointCloud cloud = cloud_of(picture.map, picture.surface);
+  libmap::PointCloud cloud = cloud_of(image.map, image.surface);
   std::vector<libmap::Marker> markers;
   for (std::size_t r = 0; r < regions.regions.size(); ++r) {
     const bool reachable = reach.access[r].reachable;
@@ -176,7 +176,7 @@ libmap::ColorImage draw_regions(const MapPicture& picture, const libgtd::MapRegi
                                                              : unreachable_color;
     for (const std::uint32_t voxel : regions.regions[r].voxels) cloud.colors[voxel] = color;
     if (r < max_labels)
-      markers.push_back({.position = picture.map.center_in_terrain(regions.regions[r].best_voxel),
+      markers.push_back({.position = image.map.center_in_terrain(regions.regions[r].best_voxel),
                          .label = std::to_string(r + 1)});
   }
   libmap::Coloring coloring = own_colors(cloud, "graspable regions",
@@ -186,18 +186,18 @@ libmap::ColorImage draw_regions(const MapPicture& picture, const libgtd::MapRegi
                                           {obstacle_color, "obstacle"},
                                           {libmap::below_plane_color, "below zero plane"}},
                                          "other ground");
-  return draw(std::move(cloud), std::move(coloring), picture.title, std::move(markers));
+  return draw(std::move(cloud), std::move(coloring), image.title, std::move(markers));
 }
 
-libmap::ColorImage draw_change(const MapPicture& picture, const libgtd::MapChange& change,
+libmap::ColorImage draw_change(const MapImage& image, const libgtd::MapChange& change,
                                const libgtd::VoxelMap& other,
                                const libmap::Pose& map_terrain_from_other_terrain) {
-  libmap::PointCloud cloud = cloud_of(picture.map, picture.surface);
+  libmap::PointCloud cloud = cloud_of(image.map, image.surface);
   const auto paint = [&](std::size_t n, ChangeClass one) {
     cloud.colors[n] = change_color(one, cloud.colors[n]);
   };
   for (const libgtd::VoxelPair& pair : change.pairs)
-    paint(pair.map, libgtd::class_of(picture.map, other, pair));
+    paint(pair.map, libgtd::class_of(image.map, other, pair));
   // Between different lattices, many voxels have no partner by chance.
   if (change.matching == libgtd::VoxelMatching::lattice) {
     for (const std::uint32_t n : change.only_map) paint(n, ChangeClass::only_map);
@@ -213,18 +213,18 @@ libmap::ColorImage draw_change(const MapPicture& picture, const libgtd::MapChang
                                           {only_one_color, "ground of one map"},
                                           {libmap::below_plane_color, "below zero plane"}},
                                          "neither");
-  return draw(std::move(cloud), std::move(coloring), picture.title);
+  return draw(std::move(cloud), std::move(coloring), image.title);
 }
 
-libmap::ColorImage draw_score_change(const MapPicture& picture, const libgtd::MapChange& change,
+libmap::ColorImage draw_score_change(const MapImage& image, const libgtd::MapChange& change,
                                      const libgtd::VoxelMap& other) {
   constexpr const char* name = "score, OTHER - MAP";
   libmap::PointCloud cloud;
   libmap::ScalarField field{name, libmap::ScalarType::float32, {}};
   for (const libgtd::VoxelPair& pair : change.pairs) {
-    cloud.positions.push_back(picture.map.center_in_terrain(pair.map));
+    cloud.positions.push_back(image.map.center_in_terrain(pair.map));
     field.values.push_back(static_cast<double>(other.scores[pair.other]) -
-                           static_cast<double>(picture.map.scores[pair.map]));
+                           static_cast<double>(image.map.scores[pair.map]));
   }
   cloud.fields.push_back(std::move(field));
   libmap::Coloring coloring;
@@ -233,7 +233,7 @@ libmap::ColorImage draw_score_change(const MapPicture& picture, const libgtd::Ma
   coloring.scale = libmap::ColorScale::diverging;
   coloring.range_min = -0.5;
   coloring.range_max = 0.5;
-  return draw(std::move(cloud), std::move(coloring), picture.title);
+  return draw(std::move(cloud), std::move(coloring), image.title);
 }
 
 }  // namespace graspmap_tools

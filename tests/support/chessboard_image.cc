@@ -1,4 +1,4 @@
-#include "tests/support/chessboard_picture.h"
+#include "tests/support/chessboard_image.h"
 
 #include <algorithm>
 #include <cmath>
@@ -82,9 +82,9 @@ libmap::Image<float> ChessboardPainter::paint(const PaintedBoard& board,
                                               const Pose& camera_from_board) const {
   const Pose board_from_camera = camera_from_board.inverse();
   const Eigen::Vector3d eye = board_from_camera.translation();
-  libmap::Image<float> picture(camera_.width, camera_.height);
+  libmap::Image<float> photo(camera_.width, camera_.height);
   const auto per_pixel = static_cast<std::size_t>(samples_ * samples_);
-  for (std::size_t pixel = 0; pixel < picture.pixels.size(); ++pixel) {
+  for (std::size_t pixel = 0; pixel < photo.pixels.size(); ++pixel) {
     float sum = 0;
     for (std::size_t n = 0; n < per_pixel; ++n) {
       const Eigen::Vector2d& ray = rays_[pixel * per_pixel + n];
@@ -96,9 +96,9 @@ libmap::Image<float> ChessboardPainter::paint(const PaintedBoard& board,
           hits ? intensity(board, eye.x() + reach * direction.x(), eye.y() + reach * direction.y())
                : gray;
     }
-    picture.pixels[pixel] = sum / static_cast<float>(per_pixel);
+    photo.pixels[pixel] = sum / static_cast<float>(per_pixel);
   }
-  return picture;
+  return photo;
 }
 
 std::vector<Eigen::Vector2d> ChessboardPainter::corners(const PaintedBoard& board,
@@ -134,8 +134,8 @@ std::vector<Pose> board_poses(const Camera& camera, const PaintedBoard& board, i
   return poses;
 }
 
-libmap::GrayImage photographed(const libmap::Image<float>& picture, double blur_px, double noise) {
-  libmap::Image<float> image = picture;
+libmap::GrayImage photographed(const libmap::Image<float>& photo, double blur_px, double noise) {
+  libmap::Image<float> image = photo;
   if (blur_px > 0) {
     const int reach = static_cast<int>(std::ceil(3 * blur_px));
     std::vector<float> weights;

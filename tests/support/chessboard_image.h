@@ -42,6 +42,6 @@ std::vector<libmap::Pose> board_poses(const libmap::Camera& camera, const Painte
                                       int count, double max_tilt_deg, double margin_px = 12);
 
 // Applies a Gaussian blur of `blur_px`, Gaussian noise of `noise` gray levels, and rounding.
-libmap::GrayImage photographed(const libmap::Image<float>& picture, double blur_px, double noise);
+libmap::GrayImage photographed(const libmap::Image<float>& photo, double blur_px, double noise);
 
 }  // namespace graspmap_test

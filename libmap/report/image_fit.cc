@@ -1,4 +1,4 @@
-#include "libmap/report/picture_fit.h"
+#include "libmap/report/image_fit.h"
 
 #include <algorithm>
 #include <array>
@@ -13,11 +13,11 @@ namespace libmap {
 
 namespace {
 
-struct PictureLevel {
+struct ImageLevel {
   int max_side;
   int quality;
 };
-constexpr std::array<PictureLevel, max_picture_level + 1> levels{
+constexpr std::array<ImageLevel, max_image_level + 1> levels{
     {{0, 0}, {100'000, 92}, {1400, 90}, {1100, 88}, {900, 85}, {700, 82}, {520, 80}, {360, 75}}};
 
 constexpr std::size_t max_svg_bytes = std::size_t{4} << 20;
@@ -33,7 +33,7 @@ bool is_svg(std::string_view bytes) {
 ColorImage decode_on_white(const std::string& bytes) {
   const auto info = read_image_info(bytes);
   if (!info || info->channels != 4 || info->bits != 8)
-    return decode_color(bytes, max_picture_pixels);
+    return decode_color(bytes, max_decoded_pixels);
   const RgbaImage image = decode_rgba(bytes);
   ColorImage flat(image.width, image.height);
   for (std::size_t n = 0; n < image.pixels.size(); ++n)
@@ -47,24 +47,24 @@ ColorImage decode_on_white(const std::string& bytes) {
 
 }  // namespace
 
-ReportPicture read_picture_bytes(std::string bytes) {
-  ReportPicture picture;
+ReportImage read_image_bytes(std::string bytes) {
+  ReportImage report_image;
   if (is_svg(bytes)) {
     if (bytes.size() > max_svg_bytes)
       throw Error("too large for a page", {.value = std::to_string(bytes.size()) + " bytes",
                                            .bound = "<= " + std::to_string(max_svg_bytes)});
-    picture.media_type = "image/svg+xml";
-    picture.bytes = std::move(bytes);
-    return picture;
+    report_image.media_type = "image/svg+xml";
+    report_image.bytes = std::move(bytes);
+    return report_image;
   }
   const auto format = image_format(bytes);
   if (!format) throw Error("not a PNG, JPEG or SVG image");
-  const ColorImage image = decode_color(bytes, max_picture_pixels);
-  picture.media_type = *format == ImageFormat::png ? "image/png" : "image/jpeg";
-  picture.width = image.width;
-  picture.height = image.height;
-  picture.bytes = std::move(bytes);
-  return picture;
+  const ColorImage image = decode_color(bytes, max_decoded_pixels);
+  report_image.media_type = *format == ImageFormat::png ? "image/png" : "image/jpeg";
+  report_image.width = image.width;
+  report_image.height = image.height;
+  report_image.bytes = std::move(bytes);
+  return report_image;
 }
 
 ColorImage shrink_image(const ColorImage& image, int width, int height) {
@@ -77,10 +77,10 @@ ColorImage shrink_image(const ColorImage& image, int width, int height) {
   return small;
 }
 
-ReportPicture fit_picture(const ReportPicture& picture, int level) {
-  if (level <= 0 || picture.media_type == "image/svg+xml") return picture;
-  const PictureLevel& bound = levels[static_cast<std::size_t>(std::min(level, max_picture_level))];
-  ColorImage image = decode_on_white(picture.bytes);
+ReportImage fit_image(const ReportImage& report_image, int level) {
+  if (level <= 0 || report_image.media_type == "image/svg+xml") return report_image;
+  const ImageLevel& bound = levels[static_cast<std::size_t>(std::min(level, max_image_level))];
+  ColorImage image = decode_on_white(report_image.bytes);
   const int side = std::max(image.width, image.height);
   const bool scaled = side > bound.max_side;
   if (scaled) {
@@ -90,14 +90,14 @@ ReportPicture fit_picture(const ReportPicture& picture, int level) {
     };
     image = shrink_image(image, shrunk(image.width), shrunk(image.height));
   }
-  ReportPicture fitted = picture;
+  ReportImage fitted = report_image;
   fitted.bytes = encode_jpeg(image, bound.quality);
-  if (fitted.bytes.size() >= picture.bytes.size()) return picture;
+  if (fitted.bytes.size() >= report_image.bytes.size()) return report_image;
   fitted.media_type = "image/jpeg";
   fitted.change = "JPEG, quality " + std::to_string(bound.quality);
   if (scaled)
     fitted.change += ", " + std::to_string(image.width) + " instead of " +
-                     std::to_string(picture.width) + " pixels wide";
+                     std::to_string(report_image.width) + " pixels wide";
   fitted.width = image.width;
   fitted.height = image.height;
   return fitted;

@@ -1,4 +1,4 @@
-#include "libmap/view/picture_sheet.h"
+#include "libmap/view/image_grid.h"
 
 #include <algorithm>
 #include <cmath>
@@ -23,7 +23,7 @@ void check_whole(const char* field, int value, int low, int high) {
                  .bound = ">= " + std::to_string(low) + " and <= " + std::to_string(high)});
 }
 
-void check(const std::vector<SheetCell>& cells, const PictureSheetOptions& options) {
+void check(const std::vector<SheetCell>& cells, const ImageGridOptions& options) {
   if (cells.empty()) throw Error("the sheet has no cells");
   check_whole("columns", options.columns, 0, 1000);
   check_whole("cell_width_px", options.cell_width_px, 16, max_side_px);
@@ -43,7 +43,7 @@ int rows_of(std::size_t cells, int columns) {
   return (static_cast<int>(cells) + columns - 1) / columns;
 }
 
-int columns_of(const PictureSheetOptions& options, std::size_t cells, int height) {
+int columns_of(const ImageGridOptions& options, std::size_t cells, int height) {
   const int count = static_cast<int>(cells);
   if (options.columns > 0) return std::min(options.columns, count);
   int columns = 1;
@@ -64,8 +64,8 @@ bool any_scene(const std::vector<SheetCell>& cells) {
 }
 
 // Places the rows of cells from `top`, with titles, captions and scale bars. Returns their bottom.
-double plan_rows(const std::vector<SheetCell>& cells, const PictureSheetOptions& options,
-                 double left, double top, int cell_height, SheetLayout& layout) {
+double plan_rows(const std::vector<SheetCell>& cells, const ImageGridOptions& options, double left,
+                 double top, int cell_height, SheetLayout& layout) {
   const double f = layout.font_px;
   const double step_x = options.cell_width_px + std::round(gap * f);
   const bool captions = std::any_of(cells.begin(), cells.end(),
@@ -136,7 +136,7 @@ void join_legend(const Legend& legend, std::vector<Legend>& legends) {
   add_legend(legend, legends);
 }
 
-Contents look_at(const std::vector<SheetCell>& cells, const PictureSheetOptions& options) {
+Contents look_at(const std::vector<SheetCell>& cells, const ImageGridOptions& options) {
   Contents contents;
   contents.legends = options.legends;
   for (const SheetCell& cell : cells) {
@@ -154,8 +154,8 @@ Contents look_at(const std::vector<SheetCell>& cells, const PictureSheetOptions&
 // Height over width of a cell's content in its view; nullopt for a perspective view.
 std::optional<double> aspect_of(const SheetCell& cell, const std::optional<Bounds3d>& extent) {
   if (!extent)
-    return cell.picture.width > 0 ? std::optional(1.0 * cell.picture.height / cell.picture.width)
-                                  : std::nullopt;
+    return cell.image.width > 0 ? std::optional(1.0 * cell.image.height / cell.image.width)
+                                : std::nullopt;
   const Eigen::Vector3d size = extent->max - extent->min;
   switch (cell.view) {
     case Viewpoint::top:
@@ -231,7 +231,7 @@ void draw_text(const PixelRect& rect, const std::string& text, TextStyle style, 
               shortened_text(text, style, rect.width - 0.4 * style.size_px), style);
 }
 
-void draw_page(const std::vector<SheetCell>& cells, const PictureSheetOptions& options,
+void draw_page(const std::vector<SheetCell>& cells, const ImageGridOptions& options,
                const std::vector<Legend>& legends, const SheetLayout& layout, Canvas& canvas) {
   const TextStyle plain{.size_px = layout.font_px};
   TextStyle head = plain;
@@ -257,7 +257,7 @@ struct DrawnScene {
 
 DrawnScene draw_scene(const SheetCell& cell, const PixelRect& rect,
                       const std::optional<Bounds3d>& extent, const std::vector<Legend>& legends,
-                      const PictureSheetOptions& options, int font_px) {
+                      const ImageGridOptions& options, int font_px) {
   const int width = static_cast<int>(rect.width);
   const int height = static_cast<int>(rect.height);
   Scene scene = cell.scene();
@@ -279,7 +279,7 @@ DrawnScene draw_scene(const SheetCell& cell, const PixelRect& rect,
 
 }  // namespace
 
-SheetLayout plan_sheet(const std::vector<SheetCell>& cells, const PictureSheetOptions& options,
+SheetLayout plan_sheet(const std::vector<SheetCell>& cells, const ImageGridOptions& options,
                        const std::vector<Legend>& legends, double aspect) {
   check(cells, options);
   SheetLayout layout;
@@ -316,7 +316,7 @@ SheetLayout plan_sheet(const std::vector<SheetCell>& cells, const PictureSheetOp
   return layout;
 }
 
-ColorImage draw_sheet(const std::vector<SheetCell>& cells, const PictureSheetOptions& options) {
+ColorImage draw_sheet(const std::vector<SheetCell>& cells, const ImageGridOptions& options) {
   check(cells, options);
   const Contents contents = look_at(cells, options);
   const SheetLayout layout =
@@ -333,7 +333,7 @@ ColorImage draw_sheet(const std::vector<SheetCell>& cells, const PictureSheetOpt
     if (cells[i].scene)
       drawn = draw_scene(cells[i], layout.cells[i], extents[i], contents.legends, options,
                          layout.font_px);
-    const ColorImage& image = cells[i].scene ? drawn.image : cells[i].picture;
+    const ColorImage& image = cells[i].scene ? drawn.image : cells[i].image;
     canvas.image(image, fitted(image, layout.cells[i]));
     // The scale bar of a row is that of its first orthographic scene.
     const std::size_t row = i / static_cast<std::size_t>(layout.columns);

@@ -1,4 +1,4 @@
-#include "libmap/scan/picture_file.h"
+#include "libmap/scan/image_export.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,25 +12,25 @@
 
 namespace libmap {
 
-std::string picture_name(int node, std::size_t camera, const std::string& extension) {
+std::string image_file_name(int node, std::size_t camera, const std::string& extension) {
   constexpr std::size_t digits = 6;
   const std::string number = std::to_string(node);
   return std::string(digits - std::min(digits, number.size()), '0') + number +
          (camera == 0 ? std::string() : "_" + std::to_string(camera)) + extension;
 }
 
-PictureFile picture_file(const ScanSource& scan, int node, const std::vector<CameraView>& views,
-                         std::size_t camera) {
-  PictureFile file;
+ImageFile image_file_of(const ScanSource& scan, int node, const std::vector<CameraView>& views,
+                        std::size_t camera) {
+  ImageFile file;
   const auto* database = dynamic_cast<const RtabmapDatabase*>(&scan);
   file.bytes = database != nullptr && views.size() == 1 ? database->read_blobs(node).image
                                                         : encode_png(views[camera].color);
   const ImageFormat format = image_format(file.bytes).value_or(ImageFormat::png);
-  file.name = picture_name(node, camera, file_extension(format));
+  file.name = image_file_name(node, camera, file_extension(format));
   return file;
 }
 
-std::vector<CameraView> read_pictures(const ScanSource& scan, int node, FrameParts parts) {
+std::vector<CameraView> read_views(const ScanSource& scan, int node, FrameParts parts) {
   const RgbdFrame frame = scan.read_frame(node, parts);
   const std::string name = "node " + std::to_string(node);
   if (frame.color.empty())

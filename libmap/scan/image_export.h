@@ -14,20 +14,20 @@
 namespace libmap {
 
 // Returns "000012.jpg" for camera 0 of node 12, "000012_1.png" for camera 1.
-std::string picture_name(int node, std::size_t camera, const std::string& extension);
+std::string image_file_name(int node, std::size_t camera, const std::string& extension);
 
-struct PictureFile {
+struct ImageFile {
   std::string name{};
   std::string bytes{};  // the stored bytes if they contain this image only; else a PNG
 };
 
 // Returns the image file of one camera; `views` are the views of the node's frame, with color.
-PictureFile picture_file(const ScanSource& scan, int node, const std::vector<CameraView>& views,
-                         std::size_t camera);
+ImageFile image_file_of(const ScanSource& scan, int node, const std::vector<CameraView>& views,
+                        std::size_t camera);
 
 // Reads the views of a node's frame. Throws Error naming the node if it has no color image or no
 // calibration.
-std::vector<CameraView> read_pictures(const ScanSource& scan, int node, FrameParts parts);
+std::vector<CameraView> read_views(const ScanSource& scan, int node, FrameParts parts);
 
 struct ViewSelectionOptions {
   double radius_m = 0.5;    // >= 0, distance of the camera positions; 0: all views are kept
