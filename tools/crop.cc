@@ -253,7 +253,7 @@ void crop_pieces(const CropCommandOptions& options, const std::vector<fs::path>&
     libmap::write_mesh(folder / (piece.stem().string() + ".ply"), mesh);
   };
   const libmap::CropReport report =
-      run.timed("crop", [&] { return libmap::crop_mesh_pieces(each, options.crop, write); });
+      run.timed("crop", [&] { return libmap::crop_mesh_tiles(each, options.crop, write); });
   report_crop(options, report, {box.min(), box.max()}, run);
   run.add_results({{"pieces", written}, {"surface_area_m2", area_m2}, {"triangles", triangles}});
   run.say("{} triangles in {} of {} tiles, {:.3f} m2 of surface", triangles, written, pieces.size(),
@@ -261,7 +261,7 @@ void crop_pieces(const CropCommandOptions& options, const std::vector<fs::path>&
 }
 
 void crop_folder(const CropCommandOptions& options, Run& run) {
-  const std::vector<fs::path> pieces = libmap::mesh_pieces(options.input);
+  const std::vector<fs::path> pieces = libmap::mesh_tiles(options.input);
   const std::vector<std::string> names = tile_folder_names(options.output, pieces, ".ply");
   run.claim_output_tree(options.output, names, {options.input, options.polygon});
   run.write_output_tree(options.output, names, [&](const fs::path& folder) {

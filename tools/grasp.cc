@@ -278,8 +278,8 @@ void grasp_voxels(GraspCommandOptions& options, Run& run) {
   require_map_output(input, run);
   const auto file = libmap::find_data_file("grippers", options.gripper);
   const libgtd::Gripper gripper = read_with_fingers(file, options);
-  GroundPieces ground(options.mesh, gripper, options.grasp.closing.start_height_m,
-                      [&](const libmap::TriangleMesh& mesh) { return ground_of(mesh, options); });
+  GroundTiles ground(options.mesh, gripper, options.grasp.closing.start_height_m,
+                     [&](const libmap::TriangleMesh& mesh) { return ground_of(mesh, options); });
   run.add_input(options.mesh);
   run.add_input(is_tile_store(options.map) ? store_index_path(options.map).string() : options.map);
   for (const auto& used : libgtd::gripper_files(file)) run.add_input(used);

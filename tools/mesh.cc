@@ -7,7 +7,7 @@
 #include "libmap/geometry/normal_sides.h"
 #include "libmap/io/cloud_io.h"
 #include "libmap/io/mesh_io.h"
-#include "libmap/io/piece_index.h"
+#include "libmap/io/tile_index.h"
 #include "libmap/mesh/mesh_parts.h"
 #include "libmap/mesh/surface_distance.h"
 #include "libmap/surface/mesh_cleaning.h"
@@ -268,12 +268,12 @@ Totals assemble(const MeshOptions& options, const TileFolder& output,
 void make_tiles(const MeshOptions& options, TileFolder& output, Run& run) {
   libmap::CloudStatistics survey;
   std::map<libmap::XyTile, std::size_t> points_in_tiles;
-  libmap::PieceIndex index = run.timed("survey", [&] {
-    return libmap::PieceIndex(libmap::cloud_pieces(options.cloud),
-                              [&](const libmap::PointCloud& piece) {
-                                survey.add(piece, options.surface.reconstruction.weigh_by_error);
-                                libmap::add_surface_tiles(piece, options.surface, points_in_tiles);
-                              });
+  libmap::TileIndex index = run.timed("survey", [&] {
+    return libmap::TileIndex(libmap::cloud_tiles(options.cloud),
+                             [&](const libmap::PointCloud& piece) {
+                               survey.add(piece, options.surface.reconstruction.weigh_by_error);
+                               libmap::add_surface_tiles(piece, options.surface, points_in_tiles);
+                             });
   });
   check_points(options.cloud, index.points(), index.dropped_points(), run);
   if (survey.dropped_points() > 0)

@@ -54,8 +54,8 @@ void resample(const ResampleOptions& options, Run& run) {
 }
 
 // Samples and writes the mesh tile by tile.
-void write_pieces(const std::vector<fs::path>& pieces, libmap::PieceSampler& sampler,
-                  const fs::path& folder, Run& run) {
+void write_tiles(const std::vector<fs::path>& pieces, libmap::TileSampler& sampler,
+                 const fs::path& folder, Run& run) {
   std::size_t points = 0;
   double area_m2 = 0.0;
   double smallest_m = std::numeric_limits<double>::infinity();
@@ -80,17 +80,17 @@ void write_pieces(const std::vector<fs::path>& pieces, libmap::PieceSampler& sam
 
 void resample_pieces(const ResampleOptions& options, Run& run) {
   require_one_of_radius_and_count(options.sampling);
-  const std::vector<fs::path> pieces = libmap::mesh_pieces(options.mesh);
+  const std::vector<fs::path> pieces = libmap::mesh_tiles(options.mesh);
   const std::vector<std::string> names = tile_folder_names(options.output, pieces, ".pcd");
   run.claim_output_tree(options.output, names, {options.mesh});
   std::vector<libmap::Bounds3d> boxes;
   for (const fs::path& piece : pieces)
     boxes.push_back(libmap::bounds_of(libmap::read_mesh(piece).mesh.vertices));
   run.add_input(options.mesh);
-  libmap::PieceSampler sampler(std::move(boxes), options.sampling);
+  libmap::TileSampler sampler(std::move(boxes), options.sampling);
   copy_frame(options.mesh, run);
   run.write_output_tree(options.output, names, [&](const fs::path& folder) {
-    if (!folder.empty()) write_pieces(pieces, sampler, folder, run);
+    if (!folder.empty()) write_tiles(pieces, sampler, folder, run);
   });
 }
 

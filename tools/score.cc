@@ -9,7 +9,7 @@
 #include "libmap/core/parallel.h"
 #include "libmap/geometry/normal_sides.h"
 #include "libmap/io/cloud_io.h"
-#include "libmap/io/cloud_pieces.h"
+#include "libmap/io/cloud_tiles.h"
 #include "libmap/raster/dem_reader.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
@@ -60,14 +60,14 @@ void report_plane(const libgtd::RegressionPlane& plane, const std::string& terra
 
 // Returns true for a DEM or a folder of DEM tiles, whose z is up.
 bool is_dem(const std::string& terrain) {
-  return fs::exists(terrain) && libmap::is_dem_path(libmap::cloud_pieces(terrain).front());
+  return fs::exists(terrain) && libmap::is_dem_path(libmap::cloud_tiles(terrain).front());
 }
 
 // Throws Error for a mesh, whose vertices do not sample its surface.
 void refuse_mesh(const std::string& terrain) {
   if (!fs::exists(terrain)) return;
   fs::path first = terrain;
-  if (fs::is_directory(terrain)) first = libmap::cloud_pieces(terrain).front();
+  if (fs::is_directory(terrain)) first = libmap::cloud_tiles(terrain).front();
   const std::string format = libmap::format_of(first);
   if (format == ".obj" || format == ".stl" || format == ".off" || format == ".glb" ||
       (format == ".ply" && libmap::read_cloud_info(first).faces > 0))
@@ -136,7 +136,7 @@ class StoreScoring {
       : options_(options),
         run_(run),
         store_(options.store),
-        stream_(libmap::cloud_pieces(options.terrain)),
+        stream_(libmap::cloud_tiles(options.terrain)),
         tiling_(options.detection) {
     if (fs::is_directory(options.store) && fs::is_directory(options.terrain) &&
         fs::equivalent(options.store, options.terrain))
@@ -258,7 +258,7 @@ class StoreScoring {
       if (libgtd::may_intersect(file, rectangle, frame_)) files.emplace_back(file.input.path);
     const bool are_all = wanted.size() == libgtd::tiles_of(frame_, tiling_.tile_voxels).size();
     const auto all = libmap::PointStream::Need::positions_and_normals;
-    libmap::PieceStream(files).for_each_block(all, [&](const libmap::PointCloud& block) {
+    libmap::TileStream(files).for_each_block(all, [&](const libmap::PointCloud& block) {
       const libmap::PointCloud terrain = libgtd::to_terrain(block, frame_);
       libgtd::require_in_frame(terrain, frame_, store_.plan_path());
       if (are_all) return points.add(terrain);
@@ -308,7 +308,7 @@ class StoreScoring {
   const ScoreStoreOptions& options_;
   Run& run_;
   libgtd::MapTileStore store_;
-  libmap::PieceStream stream_;
+  libmap::TileStream stream_;
   libgtd::StoreTiling tiling_;
   libgtd::TilePlan plan_;
   libgtd::TerrainFrame frame_;
@@ -381,8 +381,8 @@ void say_result(const libgtd::DetectionResult& result, const ScoreOptions& optio
 }
 
 // Reads a cloud file, or the tiles of a folder one by one.
-libmap::PiecesReadResult read_terrain(const std::string& path) {
-  if (std::filesystem::is_directory(path)) return libmap::read_pieces(libmap::cloud_pieces(path));
+libmap::TilesReadResult read_terrain(const std::string& path) {
+  if (std::filesystem::is_directory(path)) return libmap::read_tiles(libmap::cloud_tiles(path));
   libmap::CloudReadResult read = libmap::read_cloud(path);
   return {std::move(read.cloud), read.dropped_points};
 }
@@ -426,7 +426,7 @@ void score(ScoreOptions& options, Run& run) {
     throw libmap::Error("requires a tile store, MAP.tiles", {.field = "--points-at-once"});
   libmap::require_cloud_format(options.output);
   run.claim_output(options.output, {options.terrain});
-  const libmap::PiecesReadResult read =
+  const libmap::TilesReadResult read =
       run.timed("read", [&] { return read_terrain(options.terrain); });
   require_points(read.cloud.size(), read.dropped_points, options.terrain, run);
   if (scenario.orientation == libgtd::Orientation::surface && !read.cloud.has_normals())
@@ -438,7 +438,7 @@ void score(ScoreOptions& options, Run& run) {
     return libgtd::detect(read.cloud, options.detection, run.progress());
   });
   run.manifest().parameters.emplace_back("tile", options.tile);
-  for (const auto& piece : libmap::cloud_pieces(options.terrain)) run.add_input(piece);
+  for (const auto& piece : libmap::cloud_tiles(options.terrain)) run.add_input(piece);
   for (const auto& input : libgtd::gripper_files(gripper_file)) run.add_input(input);
   add_results(result, options, run);
   carry_transforms(options.terrain, run);

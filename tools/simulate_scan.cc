@@ -2,7 +2,7 @@
 #include "libmap/camera/camera_io.h"
 #include "libmap/core/data_folder.h"
 #include "libmap/io/cloud_io.h"
-#include "libmap/io/cloud_pieces.h"
+#include "libmap/io/cloud_tiles.h"
 #include "libmap/io/mesh_io.h"
 #include "libmap/poses/trajectory_error.h"
 #include "libmap/poses/trajectory_io.h"
@@ -156,7 +156,7 @@ void scan_terrain(const SimulateScanOptions& options, const libmap::Trajectory& 
                 {"--ceiling-first-frame", events.ceiling_first_frame > 0},
                 {"--multipath", options.simulation.faults.depth.multipath > 0.0}},
                "requires a mesh as scene");
-  const libmap::PieceStream stream(libmap::cloud_pieces(options.scene));
+  const libmap::TileStream stream(libmap::cloud_tiles(options.scene));
   add_inputs(stream.pieces(), options, run);
   run.manifest().frame = "terrain";
   run.write_output(options.output, [&](const fs::path& temporary) {

@@ -202,15 +202,15 @@ void make_models(const TextureCommandOptions& options, const libmap::ScanSource&
   // Large arrays are returned to the system after each tile, because the heap would fragment.
   mallopt(M_MMAP_THRESHOLD, 1 << 20);
   const std::vector<std::string> names = stems_of(pieces);
-  libmap::MeshPieceIndex index(pieces);
-  libmap::PieceTexturing texturing(index, options.margin_m, scan, poses, options.texture,
-                                   run.progress());
+  libmap::MeshTileIndex index(pieces);
+  libmap::TileTexturing texturing(index, options.margin_m, scan, poses, options.texture,
+                                  run.progress());
   const TileFolder::TileData found =
       output.begin([&] { return TileFolder::TileData(texturing.find_exposure()); });
   if (found.is_null()) return;  // --dry-run
   const auto exposure = found.get<libmap::TextureExposure>();
   const auto make = [&](std::size_t n, const fs::path& to) {
-    const libmap::PieceTexturing::Piece tile = texturing.make(n, exposure);
+    const libmap::TileTexturing::Piece tile = texturing.make(n, exposure);
     libmap::textured_mesh_files(to, tile.model, options.writing).front().write(to);
     return facts_of(tile.counts);
   };
@@ -230,7 +230,7 @@ void make_models(const TextureCommandOptions& options, const libmap::ScanSource&
 }
 
 void texture_in_pieces(TextureCommandOptions options, Run& run) {
-  const std::vector<fs::path> pieces = libmap::mesh_pieces(options.mesh);
+  const std::vector<fs::path> pieces = libmap::mesh_tiles(options.mesh);
   const std::vector<std::string> names = tile_folder_names(options.output, pieces, model_extension);
   const auto scan = scan_of(options, run);
   const libmap::Trajectory poses = poses_of(options, *scan, run);

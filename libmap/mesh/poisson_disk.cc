@@ -172,7 +172,7 @@ PoissonDiskResult sample_poisson_disk(const TriangleMesh& mesh, const PoissonDis
   return sample(surface_of(mesh), options, progress);
 }
 
-PieceSampler::PieceSampler(std::vector<Bounds3d> boxes, const PoissonDiskOptions& options)
+TileSampler::TileSampler(std::vector<Bounds3d> boxes, const PoissonDiskOptions& options)
     : boxes_(std::move(boxes)), options_(options), near_(boxes_.size()) {
   check_parameters(options);
   if (options.count > 0)
@@ -180,8 +180,8 @@ PieceSampler::PieceSampler(std::vector<Bounds3d> boxes, const PoissonDiskOptions
                 {.field = "count", .value = std::to_string(options.count), .bound = "0"});
 }
 
-PoissonDiskResult PieceSampler::sample(const TriangleMesh& mesh, std::size_t number,
-                                       Progress& progress) {
+PoissonDiskResult TileSampler::sample(const TriangleMesh& mesh, std::size_t number,
+                                      Progress& progress) {
   if (!(surface_area(mesh) > 0.0)) return {};
   SampledSurface surface = surface_of(mesh);
   surface.others = std::move(near_[number]);

@@ -99,18 +99,18 @@ TerrainSurface::TerrainSurface(const PointTileStore& points, const GroundHeights
   square_m_ = GroundHeights::cell_m * std::max(1.0, cells);
 }
 
-Eigen::AlignedBox2d TerrainSurface::rectangle_of(const TileIndex& tile) const {
+Eigen::AlignedBox2d TerrainSurface::rectangle_of(const TilePosition& tile) const {
   const Eigen::Vector2d low = square_m_ * Eigen::Vector2d(static_cast<double>(tile.first),
                                                           static_cast<double>(tile.second));
   return {low, low + Eigen::Vector2d::Constant(square_m_)};
 }
 
-std::vector<TerrainSurface::TileIndex> TerrainSurface::tiles_in_view(
+std::vector<TerrainSurface::TilePosition> TerrainSurface::tiles_in_view(
     const std::vector<Pose>& world_from_camera, const ViewRange& range) const {
   // Radius around the camera: range along the rays in the image corners.
   const Eigen::Vector2d widest = range.rays.min().cwiseAbs().cwiseMax(range.rays.max().cwiseAbs());
   const double reach = range.far_m * widest.homogeneous().norm();
-  std::vector<TileIndex> tiles;
+  std::vector<TilePosition> tiles;
   for (const Pose& pose : world_from_camera) {
     const Pose camera_from_world = pose.inverse();
     const Eigen::Vector2d here = pose.translation().head<2>();
@@ -131,7 +131,7 @@ std::vector<TerrainSurface::TileIndex> TerrainSurface::tiles_in_view(
   return tiles;
 }
 
-TerrainSurface::Square TerrainSurface::make(const TileIndex& tile) const {
+TerrainSurface::Square TerrainSurface::make(const TilePosition& tile) const {
   const Eigen::AlignedBox2d rectangle = rectangle_of(tile);
   const Eigen::Vector2d margin = Eigen::Vector2d::Constant(margin_radii * max_radius_m_);
   const TriangleMesh mesh = triangulate_plan(
@@ -145,9 +145,9 @@ TerrainSurface::Square TerrainSurface::make(const TileIndex& tile) const {
   return square;
 }
 
-void TerrainSurface::load(const std::vector<TileIndex>& tiles) {
-  std::vector<TileIndex> missing;
-  for (const TileIndex& tile : tiles)
+void TerrainSurface::load(const std::vector<TilePosition>& tiles) {
+  std::vector<TilePosition> missing;
+  for (const TilePosition& tile : tiles)
     if (!squares_.contains(tile)) missing.push_back(tile);
   std::vector<Square> made(missing.size());
   parallel_each(missing.size(), [&](std::size_t n) { made[n] = make(missing[n]); });
@@ -177,23 +177,23 @@ void TerrainSurface::evict() {
 std::vector<VisibleSurface> TerrainSurface::seen_from(
     const std::vector<std::vector<Pose>>& world_from_camera, const ViewRange& range) {
   ++uses_;
-  std::vector<std::vector<TileIndex>> of_camera;
-  std::vector<TileIndex> all;
+  std::vector<std::vector<TilePosition>> of_camera;
+  std::vector<TilePosition> all;
   for (const std::vector<Pose>& poses : world_from_camera) {
     of_camera.push_back(tiles_in_view(poses, range));
     all.insert(all.end(), of_camera.back().begin(), of_camera.back().end());
   }
   std::sort(all.begin(), all.end());
   all.erase(std::unique(all.begin(), all.end()), all.end());
-  for (const TileIndex& tile : all)
+  for (const TilePosition& tile : all)
     if (const auto known = squares_.find(tile); known != squares_.end())
       known->second.last_use = uses_;
   evict();  // before loading more squares
   load(all);
   std::vector<VisibleSurface> surfaces;
-  for (const std::vector<TileIndex>& tiles : of_camera) {
+  for (const std::vector<TilePosition>& tiles : of_camera) {
     std::vector<VisibleSurface> parts;
-    for (const TileIndex& tile : tiles) {
+    for (const TilePosition& tile : tiles) {
       Square& square = squares_.at(tile);
       square.last_use = uses_;
       if (square.surface) parts.push_back(*square.surface);

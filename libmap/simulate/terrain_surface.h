@@ -55,17 +55,17 @@ class TerrainSurface {
   std::size_t points_in_memory() const;
 
  private:
-  using TileIndex = std::pair<std::int64_t, std::int64_t>;
+  using TilePosition = std::pair<std::int64_t, std::int64_t>;
   struct Square {
     std::optional<VisibleSurface> surface;  // nullopt if there is no triangle
     std::size_t points = 0;
     std::uint64_t last_use = 0;
   };
-  Eigen::AlignedBox2d rectangle_of(const TileIndex& tile) const;
-  std::vector<TileIndex> tiles_in_view(const std::vector<Pose>& world_from_camera,
-                                       const ViewRange& range) const;
-  Square make(const TileIndex& tile) const;
-  void load(const std::vector<TileIndex>& tiles);
+  Eigen::AlignedBox2d rectangle_of(const TilePosition& tile) const;
+  std::vector<TilePosition> tiles_in_view(const std::vector<Pose>& world_from_camera,
+                                          const ViewRange& range) const;
+  Square make(const TilePosition& tile) const;
+  void load(const std::vector<TilePosition>& tiles);
   void evict();
 
   const PointTileStore& points_;
@@ -73,7 +73,7 @@ class TerrainSurface {
   TerrainSurfaceOptions options_;
   double square_m_ = 0.0;
   double max_radius_m_ = 0.0;
-  std::map<TileIndex, Square> squares_;
+  std::map<TilePosition, Square> squares_;
   std::uint64_t uses_ = 0;
   std::size_t made_ = 0;
 };

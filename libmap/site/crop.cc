@@ -364,8 +364,8 @@ CropCloudResult crop_cloud(const PointCloud& cloud, const CropOptions& options) 
   return {std::move(inside), std::move(plan.report)};
 }
 
-CropReport crop_mesh_pieces(const EachMesh& each, const CropOptions& options,
-                            const std::function<void(TriangleMesh)>& use) {
+CropReport crop_mesh_tiles(const EachMesh& each, const CropOptions& options,
+                           const std::function<void(TriangleMesh)>& use) {
   double area = 0.0;
   Eigen::AlignedBox3d box;
   each([&](const TriangleMesh& mesh) {
@@ -426,8 +426,8 @@ CropReport crop_mesh_pieces(const EachMesh& each, const CropOptions& options,
 
 CropMeshResult crop_mesh(const TriangleMesh& mesh, const CropOptions& options) {
   CropMeshResult result;
-  result.report = crop_mesh_pieces([&](const UseMesh& use) { use(mesh); }, options,
-                                   [&](TriangleMesh cut) { result.mesh = std::move(cut); });
+  result.report = crop_mesh_tiles([&](const UseMesh& use) { use(mesh); }, options,
+                                  [&](TriangleMesh cut) { result.mesh = std::move(cut); });
   return result;
 }
 

@@ -77,7 +77,7 @@ CropMeshResult crop_mesh(const TriangleMesh& mesh, const CropOptions& options);
 // crop_mesh.
 using UseMesh = std::function<void(const TriangleMesh& mesh)>;
 using EachMesh = std::function<void(const UseMesh& use)>;
-CropReport crop_mesh_pieces(const EachMesh& each, const CropOptions& options,
-                            const std::function<void(TriangleMesh)>& use);
+CropReport crop_mesh_tiles(const EachMesh& each, const CropOptions& options,
+                           const std::function<void(TriangleMesh)>& use);
 
 }  // namespace libmap

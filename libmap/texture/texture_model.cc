@@ -56,9 +56,9 @@ class Texturing {
             const TextureOptions& options, Progress& progress, std::size_t max_kept_bytes);
 
   TextureResult whole(const TriangleMesh& mesh);
-  std::vector<ColorObservation> observe(MeshPieceIndex& index, double margin_m);
+  std::vector<ColorObservation> observe(MeshTileIndex& index, double margin_m);
   void even_out(std::vector<ColorObservation> observations);
-  PieceTexturing::Piece piece(MeshWithMargin part);
+  TileTexturing::Piece piece(MeshWithMargin part);
   TextureReport& report() { return report_; }
 
  private:
@@ -181,7 +181,7 @@ TextureResult Texturing::whole(const TriangleMesh& mesh) {
 }
 
 // Collects color observations from all pieces.
-std::vector<ColorObservation> Texturing::observe(MeshPieceIndex& index, double margin_m) {
+std::vector<ColorObservation> Texturing::observe(MeshTileIndex& index, double margin_m) {
   const std::size_t wanted = std::max(min_observed_vertices, observed_vertices / index.size());
   std::vector<ColorObservation> all;
   std::size_t before = 0;
@@ -201,7 +201,7 @@ std::vector<ColorObservation> Texturing::observe(MeshPieceIndex& index, double m
   return all;
 }
 
-PieceTexturing::Piece Texturing::piece(MeshWithMargin part) {
+TileTexturing::Piece Texturing::piece(MeshWithMargin part) {
   static_cast<TextureCounts&>(report_) = {};
   const std::size_t uncut = part.triangles;
   part = timed("cutting", [&] { return cut_finely(std::move(part)); });
@@ -259,33 +259,33 @@ TextureResult texture_mesh(const TriangleMesh& mesh, const ScanSource& scan,
   return Texturing(scan, world_from_base, options, progress, max_image_bytes).whole(mesh);
 }
 
-class PieceTexturing::Work {
+class TileTexturing::Work {
  public:
-  MeshPieceIndex& index;
+  MeshTileIndex& index;
   double margin_m;
   Texturing texturing;
 };
 
-PieceTexturing::PieceTexturing(MeshPieceIndex& pieces, double margin_m, const ScanSource& scan,
-                               const Trajectory& world_from_base, const TextureOptions& options,
-                               Progress& progress)
+TileTexturing::TileTexturing(MeshTileIndex& pieces, double margin_m, const ScanSource& scan,
+                             const Trajectory& world_from_base, const TextureOptions& options,
+                             Progress& progress)
     : work_(new Work{
           pieces, margin_m,
           Texturing(scan, world_from_base, options, progress, max_image_bytes_in_pieces)}) {}
 
-PieceTexturing::~PieceTexturing() = default;
+TileTexturing::~TileTexturing() = default;
 
-TextureExposure PieceTexturing::find_exposure() {
+TextureExposure TileTexturing::find_exposure() {
   work_->texturing.even_out(work_->texturing.observe(work_->index, work_->margin_m));
   return work_->texturing.report().exposure;
 }
 
-PieceTexturing::Piece PieceTexturing::make(std::size_t piece, const TextureExposure& exposure) {
+TileTexturing::Piece TileTexturing::make(std::size_t piece, const TextureExposure& exposure) {
   work_->texturing.report().exposure = exposure;
   return work_->texturing.piece(work_->index.with_margin(piece, work_->margin_m));
 }
 
-TextureReport PieceTexturing::report() const {
+TextureReport TileTexturing::report() const {
   TextureReport report = work_->texturing.report();
   static_cast<TextureCounts&>(report) = {};
   return report;

@@ -47,8 +47,8 @@ PointCloud rocks(const Eigen::Vector3d& shift = Eigen::Vector3d::Zero()) {
 }
 
 // `count` files in a folder: strips along x, or every count-th point.
-void write_pieces(const std::string& folder, const PointCloud& cloud, std::size_t count,
-                  bool strips, const std::string& extension = ".pcd") {
+void write_tiles(const std::string& folder, const PointCloud& cloud, std::size_t count, bool strips,
+                 const std::string& extension = ".pcd") {
   fs::create_directories(scratch(folder));
   for (std::size_t piece = 0; piece < count; ++piece) {
     std::vector<std::size_t> indices;
@@ -127,7 +127,7 @@ class ScoreStore : public testing::TestWithParam<Case> {};
 
 TEST_P(ScoreStore, IsTheMapInOneFile) {
   const Case& given = GetParam();
-  write_pieces("in", rocks(), given.pieces, given.strips);
+  write_tiles("in", rocks(), given.pieces, given.strips);
   ASSERT_TRUE(succeeded(score("in", "whole.pcd", given.flags)));
   for (int share = given.shares; share >= 1; --share) {
     Words words = given.flags;
@@ -171,7 +171,7 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& one) { return std::string(one.param.name); });
 
 TEST(ScoreStoreTerrain, FarFromTheOrigin) {
-  write_pieces("in", rocks({1e5, -2e5, 300}), 3, false);
+  write_tiles("in", rocks({1e5, -2e5, 300}), 3, false);
   for (const char* plane : {"fit", "none"}) {
     ASSERT_TRUE(succeeded(score("in", "whole.pcd", {"--plane", plane})));
     ASSERT_TRUE(succeeded(
@@ -186,7 +186,7 @@ TEST(ScoreStoreTerrain, TilesOfDifferentPrecision) {
   const PointCloud far = rocks({700, 0, 0});
   cloud.positions.insert(cloud.positions.end(), far.positions.begin(), far.positions.end());
   cloud.normals.insert(cloud.normals.end(), far.normals.begin(), far.normals.end());
-  write_pieces("in", cloud, 1, true);
+  write_tiles("in", cloud, 1, true);
   const Words flags = {"--plane", "none", "--tile-size", "1"};
   ASSERT_TRUE(succeeded(score("in", "whole.pcd", flags)));
   ASSERT_TRUE(succeeded(score("in", "m.tiles", flags)));
@@ -215,7 +215,7 @@ TEST(ScoreStoreTerrain, InAnyFormat) {
 }
 
 TEST(ScoreStoreTerrain, NamesWithSpacesAndASlash) {
-  write_pieces("the terrain", rocks(), 2, true);
+  write_tiles("the terrain", rocks(), 2, true);
   ASSERT_TRUE(succeeded(score("the terrain", "my map.tiles/")));
   EXPECT_EQ(index_of("my map.tiles").manifest.inputs.front().path, "the terrain/piece_0.pcd");
   EXPECT_TRUE(fs::exists(scratch("my map.tiles.json")));
@@ -223,13 +223,13 @@ TEST(ScoreStoreTerrain, NamesWithSpacesAndASlash) {
 
 TEST(ScoreStoreTerrain, WithoutPointsOrWithPointsWithoutAPosition) {
   PointCloud cloud;
-  write_pieces("in", cloud, 2, true);
+  write_tiles("in", cloud, 2, true);
   EXPECT_TRUE(bad_input(score("in", "m.tiles"), {"in: ", "no points"}));
   EXPECT_FALSE(fs::exists(scratch("m.tiles/index.json")));
   cloud = rocks();
   cloud.positions[77].y() = std::nan("");
   cloud.positions[78].x() = INFINITY;
-  write_pieces("in", cloud, 2, true);
+  write_tiles("in", cloud, 2, true);
   ASSERT_TRUE(succeeded(score("in", "whole.pcd")));
   ASSERT_TRUE(succeeded(score("in", "m.tiles")));
   EXPECT_EQ(merged("m.tiles"), content("whole.pcd"));
@@ -237,7 +237,7 @@ TEST(ScoreStoreTerrain, WithoutPointsOrWithPointsWithoutAPosition) {
 
 TEST(ScoreStoreTerrain, PiecesThatDoNotFit) {
   PointCloud cloud = rocks();
-  write_pieces("in", cloud, 1, true);
+  write_tiles("in", cloud, 1, true);
   cloud.normals.clear();
   libmap::write_cloud(scratch("in/second.pcd"), cloud);
   EXPECT_TRUE(bad_input(score("in", "m.tiles"), {"second.pcd", "no normals"}));
@@ -249,7 +249,7 @@ TEST(ScoreStoreTerrain, PiecesThatDoNotFit) {
 }
 
 TEST(ScoreStoreOptions, WhatNeedsTheCloudInMemory) {
-  write_pieces("in", rocks(), 1, true);
+  write_tiles("in", rocks(), 1, true);
   for (const char* method : {"thesis", "envelope"})
     EXPECT_TRUE(bad_input(score("in", "m.tiles", {"--method", method}), {method, "MAP.pcd"}));
   EXPECT_TRUE(bad_input(score("in", "m.tiles", {"--interpolation"}), {"interpolation", "MAP.pcd"}));
@@ -261,14 +261,14 @@ TEST(ScoreStoreOptions, WhatNeedsTheCloudInMemory) {
 }
 
 TEST(ScoreStoreOptions, DryRunWritesNothing) {
-  write_pieces("in", rocks(), 1, true);
+  write_tiles("in", rocks(), 1, true);
   ASSERT_TRUE(succeeded(score("in", "m.tiles", {"--dry-run"})));
   EXPECT_FALSE(fs::exists(scratch("m.tiles")));
 }
 
 class ScoreStoreAgain : public testing::Test {
  protected:
-  ScoreStoreAgain() { write_pieces("in", rocks(), 2, true); }
+  ScoreStoreAgain() { write_tiles("in", rocks(), 2, true); }
 };
 
 TEST_F(ScoreStoreAgain, SecondRunScoresNothing) {
@@ -448,7 +448,7 @@ TEST_F(ScoreStoreAgain, KilledAtAnyMoment) {
 TEST(ScoreStoreAppend, NewPiecesRedoWhatTheyTouch) {
   const Words none = {"--plane", "none"};
   const Words append = {"--plane", "none", "--append"};
-  write_pieces("in", rocks(), 3, true);
+  write_tiles("in", rocks(), 3, true);
   ASSERT_TRUE(succeeded(score("in", "all.tiles", none)));
   fs::rename(scratch("in/piece_1.pcd"), scratch("piece_1.pcd"));
   ASSERT_TRUE(succeeded(score("in", "m.tiles", none)));
@@ -469,7 +469,7 @@ TEST(ScoreStoreAppend, NewPiecesRedoWhatTheyTouch) {
 }
 
 TEST(ScoreStoreAppend, OnlyWhereOldTilesStayAsTheyAre) {
-  write_pieces("in", rocks(), 3, true);
+  write_tiles("in", rocks(), 3, true);
   fs::rename(scratch("in/piece_2.pcd"), scratch("piece_2.pcd"));
   ASSERT_TRUE(succeeded(score("in", "m.tiles")));
   ASSERT_TRUE(succeeded(score("in", "n.tiles", {"--plane", "none", "--method", "climblab"})));

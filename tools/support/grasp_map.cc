@@ -127,7 +127,7 @@ class TiledMap {
 
 class MapGrasping {
  public:
-  MapGrasping(const GraspMapInput& input, GroundPieces& ground, const libgtd::Gripper& gripper,
+  MapGrasping(const GraspMapInput& input, GroundTiles& ground, const libgtd::Gripper& gripper,
               const libgtd::GraspOptions& options, Run& run)
       : input_(input),
         gripper_(gripper),
@@ -236,13 +236,13 @@ class MapGrasping {
   std::map<std::size_t, std::vector<std::size_t>> by_piece(const libmap::PointCloud& points) const {
     std::map<std::size_t, std::vector<std::size_t>> members;
     for (std::size_t n = 0; n < points.size(); ++n)
-      members[ground_.piece_at(mesh_from_map_ * points.positions[n])].push_back(n);
+      members[ground_.tile_at(mesh_from_map_ * points.positions[n])].push_back(n);
     return members;
   }
 
   // Returns one entry per member: its position if it is a candidate, else nullopt.
   std::vector<std::optional<Eigen::Vector3d>> candidates_of(
-      const GroundPieces::Piece& piece, const libmap::PointCloud& points,
+      const GroundTiles::Piece& piece, const libmap::PointCloud& points,
       const std::vector<std::size_t>& members) const {
     std::vector<std::optional<Eigen::Vector3d>> candidates(members.size());
     constexpr std::size_t grain = 256;
@@ -263,7 +263,7 @@ class MapGrasping {
     for (std::size_t field = 0; field < field_count; ++field)
       fields[field] = &points.add_field(grasp_fields()[field], libmap::ScalarType::float32).values;
     for (const auto& [number, members] : by_piece(points)) {
-      const GroundPieces::Piece& piece = ground_.piece(number);
+      const GroundTiles::Piece& piece = ground_.piece(number);
       const auto candidates = candidates_of(piece, points, members);
       std::vector<Eigen::Vector3d> positions;
       for (const auto& candidate : candidates)
@@ -331,7 +331,7 @@ class MapGrasping {
   const libgtd::GraspOptions& options_;
   Run& run_;
   TiledMap map_;
-  GroundPieces& ground_;
+  GroundTiles& ground_;
   libmap::Pose mesh_from_map_;
   libgtd::MapTileStore store_;
   libgtd::TilePlan plan_;
@@ -339,24 +339,24 @@ class MapGrasping {
 
 }  // namespace
 
-GroundPieces::Kept::Kept(std::size_t of, libmap::TriangleMesh around, const GroundPieces& pieces)
+GroundTiles::Kept::Kept(std::size_t of, libmap::TriangleMesh around, const GroundTiles& pieces)
     : Piece{.mesh = std::move(around),
             .ground = pieces.make_ground_(mesh),
             .from_above = {mesh, pieces.gripper_, {.start_height_m = pieces.start_height_m_}}},
       number(of) {}
 
-GroundPieces::GroundPieces(const std::string& mesh, const libgtd::Gripper& gripper,
-                           double start_height_m, MakeGround make_ground)
+GroundTiles::GroundTiles(const std::string& mesh, const libgtd::Gripper& gripper,
+                         double start_height_m, MakeGround make_ground)
     : gripper_(gripper),
       start_height_m_(start_height_m),
       make_ground_(std::move(make_ground)),
-      files_(libmap::mesh_pieces(mesh)) {
+      files_(libmap::mesh_tiles(mesh)) {
   const libgtd::FingerGeometry finger = libgtd::finger_geometry(gripper);
   margin_m_ = 2.0 * finger.tip(finger.opening_rad, finger.curl_rad).x() + extra_margin_m;
   if (files_.size() > 1) index_.emplace(files_);
 }
 
-std::size_t GroundPieces::piece_at(const Eigen::Vector3d& position) const {
+std::size_t GroundTiles::tile_at(const Eigen::Vector3d& position) const {
   if (!index_) return 0;
   const Eigen::Vector2d point = position.head<2>();
   std::size_t best = 0;
@@ -372,7 +372,7 @@ std::size_t GroundPieces::piece_at(const Eigen::Vector3d& position) const {
   return best;
 }
 
-const GroundPieces::Piece& GroundPieces::piece(std::size_t number) {
+const GroundTiles::Piece& GroundTiles::piece(std::size_t number) {
   const auto found = std::find_if(kept_.begin(), kept_.end(),
                                   [&](const Kept& one) { return one.number == number; });
   if (found != kept_.end()) {
@@ -412,7 +412,7 @@ void require_map_output(const GraspMapInput& input, Run& run) {
                         {.field = "--force"});
 }
 
-void grasp_map(const GraspMapInput& input, GroundPieces& ground, const libgtd::Gripper& gripper,
+void grasp_map(const GraspMapInput& input, GroundTiles& ground, const libgtd::Gripper& gripper,
                const libgtd::GraspOptions& options, Run& run) {
   MapGrasping(input, ground, gripper, options, run).grasp();
 }

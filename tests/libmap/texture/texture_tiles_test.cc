@@ -9,19 +9,19 @@
 #include "libmap/mesh/mesh_parts.h"
 #include "libmap/texture/texture_model.h"
 #include "tests/libmap/mesh/mesh_samples.h"
-#include "tests/libmap/mesh/piece_samples.h"
+#include "tests/libmap/mesh/tile_samples.h"
 #include "tests/libmap/texture/painted_scan.h"
 #include "tests/libmap/texture/textured_samples.h"
 #include "tests/support/test_support.h"
 
-namespace texture_pieces_test {
+namespace texture_tiles_test {
 
 using graspmap_test::circle_of_cameras;
 using graspmap_test::grid_mesh;
 using graspmap_test::PaintedScan;
 using graspmap_test::small_camera;
 using graspmap_test::soft_marks;
-using libmap::MeshPieceIndex;
+using libmap::MeshTileIndex;
 using libmap::TexturedMesh;
 using libmap::TextureOptions;
 using libmap::TextureReport;
@@ -40,20 +40,20 @@ TriangleMesh ground(int cells, double size_m) {
   return mesh;
 }
 
-MeshPieceIndex pieces_of(const TriangleMesh& mesh) {
-  return MeshPieceIndex(graspmap_test::write_pieces(mesh, tile_m, graspmap_test::scratch_folder()));
+MeshTileIndex pieces_of(const TriangleMesh& mesh) {
+  return MeshTileIndex(graspmap_test::write_tiles(mesh, tile_m, graspmap_test::scratch_folder()));
 }
 
 std::vector<TexturedMesh> textured(const TriangleMesh& mesh, const PaintedScan& scan,
                                    const TextureOptions& options, double margin_m,
                                    TextureReport& report) {
-  MeshPieceIndex index = pieces_of(mesh);
-  libmap::PieceTexturing texturing(index, margin_m, scan, scan.poses(), options);
+  MeshTileIndex index = pieces_of(mesh);
+  libmap::TileTexturing texturing(index, margin_m, scan, scan.poses(), options);
   const libmap::TextureExposure exposure = texturing.find_exposure();
   report = texturing.report();
   std::vector<TexturedMesh> models;
   for (std::size_t n = 0; n < index.size(); ++n) {
-    libmap::PieceTexturing::Piece piece = texturing.make(n, exposure);
+    libmap::TileTexturing::Piece piece = texturing.make(n, exposure);
     piece.model.check();
     libmap::merge_into<libmap::TextureCounts>(report, piece.counts);
     models.push_back(std::move(piece.model));
@@ -137,7 +137,7 @@ double difference_of(const std::vector<TexturedMesh>& models, const TexturedMesh
   return sum / static_cast<double>(count);
 }
 
-TEST(TexturePieces, ColorsAreThoseOfTheWholeMeshAndMeetAtSeams) {
+TEST(TextureTiles, ColorsAreThoseOfTheWholeMeshAndMeetAtSeams) {
   const TriangleMesh mesh = ground(40, 0.8);
   PaintedScan scan(mesh, marks, small_camera(), circle_of_cameras(8, 0.4, 0.8));
   std::vector<Eigen::Vector3d> gains;
@@ -160,7 +160,7 @@ TEST(TexturePieces, ColorsAreThoseOfTheWholeMeshAndMeetAtSeams) {
     EXPECT_LT((report.exposure.gains[i] - whole.exposure.gains[i]).norm(), 0.01F);
 }
 
-TEST(TexturePieces, LongSidesAreCutAlikeOnBothSidesOfASeam) {
+TEST(TextureTiles, LongSidesAreCutAlikeOnBothSidesOfASeam) {
   const TriangleMesh mesh = ground(8, 0.72);
   const PaintedScan scan(mesh, marks, small_camera(), circle_of_cameras(6, 0.4, 0.8));
   TextureReport report;
@@ -171,11 +171,11 @@ TEST(TexturePieces, LongSidesAreCutAlikeOnBothSidesOfASeam) {
   EXPECT_LE(seams.max, 3.0);
 }
 
-TEST(TexturePieces, VerticesOnSeamsAreSeenAlikeByBothPieces) {
+TEST(TextureTiles, VerticesOnSeamsAreSeenAlikeByBothPieces) {
   const TriangleMesh mesh = ground(40, 0.8);
   const PaintedScan scan(mesh, marks, small_camera(), circle_of_cameras(8, 0.4, 0.8));
   const libmap::TexturePhotos photos(scan, scan.poses(), true, libmap::no_progress(), 1 << 24);
-  MeshPieceIndex index = pieces_of(mesh);
+  MeshTileIndex index = pieces_of(mesh);
   std::map<Position, std::vector<libmap::ViewQuality>> seen;
   int common = 0;
   for (std::size_t piece = 0; piece < index.size(); ++piece) {
@@ -240,7 +240,7 @@ TEST(TextureViews, VerticesAreSeenWhereThePhotographShowsAllTheirTriangles) {
 }
 
 // A red plate in separate pieces occludes the ground of other pieces.
-TEST(TexturePieces, NeighborsHideWhatIsBehindThem) {
+TEST(TextureTiles, NeighborsHideWhatIsBehindThem) {
   const std::size_t of_ground = 2 * 50 * 50;
   TriangleMesh plate = grid_mesh(12, 0.24, 0.25);
   for (Eigen::Vector3d& vertex : plate.vertices) vertex.x() += 0.16;
@@ -266,16 +266,16 @@ TEST(TexturePieces, NeighborsHideWhatIsBehindThem) {
   EXPECT_GT(red_places(0.0), 20);
 }
 
-TEST(TexturePieces, OnePieceIsTheWholeMesh) {
+TEST(TextureTiles, OnePieceIsTheWholeMesh) {
   const TriangleMesh mesh = ground(12, 0.36);
   const PaintedScan scan(mesh, marks, small_camera(), circle_of_cameras(5, 0.4, 0.8));
   libmap::write_mesh(graspmap_test::scratch_folder() / "piece_0_0.ply", mesh);
-  MeshPieceIndex index({graspmap_test::scratch_folder() / "piece_0_0.ply"});
+  MeshTileIndex index({graspmap_test::scratch_folder() / "piece_0_0.ply"});
   const libmap::TextureResult whole = libmap::texture_mesh(
       libmap::read_mesh(graspmap_test::scratch_folder() / "piece_0_0.ply").mesh, scan,
       scan.poses());
-  libmap::PieceTexturing texturing(index, 2.0, scan, scan.poses(), {});
-  const libmap::PieceTexturing::Piece piece = texturing.make(0, texturing.find_exposure());
+  libmap::TileTexturing texturing(index, 2.0, scan, scan.poses(), {});
+  const libmap::TileTexturing::Piece piece = texturing.make(0, texturing.find_exposure());
   EXPECT_EQ(piece.model.texture_coordinates, whole.model.texture_coordinates);
   ASSERT_EQ(piece.model.pages.size(), whole.model.pages.size());
   for (std::size_t page = 0; page < whole.model.pages.size(); ++page)
@@ -283,7 +283,7 @@ TEST(TexturePieces, OnePieceIsTheWholeMesh) {
   EXPECT_EQ(piece.counts.charts, whole.charts);
 }
 
-TEST(TexturePieces, APieceThatNobodySeesIsGray) {
+TEST(TextureTiles, APieceThatNobodySeesIsGray) {
   const TriangleMesh mesh = ground(40, 0.8);
   const PaintedScan scan(mesh, marks, small_camera(),
                          {graspmap_test::looking_at({0.25, 0.25, 0.3}, {0.25, 0.25, 0})});
@@ -300,4 +300,4 @@ TEST(TexturePieces, APieceThatNobodySeesIsGray) {
       std::string::npos);
 }
 
-}  // namespace texture_pieces_test
+}  // namespace texture_tiles_test

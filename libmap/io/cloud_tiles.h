@@ -17,14 +17,14 @@
 namespace libmap {
 
 // Stream of all points of all files in order, in blocks of PointStream::block_points.
-class PieceStream : public PointStream {
+class TileStream : public PointStream {
  public:
   // Reads the headers. Throws Error naming the file if it cannot be read, or if only some files
   // have normals or are DEMs. If the files' viewpoints differ, the viewpoint is the identity
   // (unknown).
-  explicit PieceStream(std::vector<std::filesystem::path> pieces);
+  explicit TileStream(std::vector<std::filesystem::path> tiles);
 
-  const std::vector<std::filesystem::path>& pieces() const { return pieces_; }
+  const std::vector<std::filesystem::path>& tiles() const { return tiles_; }
   bool has_normals() const { return has_normals_; }
   const Pose& viewpoint() const { return viewpoint_; }
   // Georeference of the first DEM; nullopt for other files.
@@ -32,7 +32,7 @@ class PieceStream : public PointStream {
   void for_each_block(Need need, const Visit& visit) const override;
 
  private:
-  std::vector<std::filesystem::path> pieces_;
+  std::vector<std::filesystem::path> tiles_;
   bool has_normals_ = false;
   Pose viewpoint_ = Pose::Identity();
   std::optional<Georeference> georeference_;
@@ -44,15 +44,15 @@ struct TileInfo {
   Bounds3d box;
 };
 // Reads a file and returns its number of points and its bounding box. `georeference` is the
-// PieceStream's. Throws Error naming the file if it cannot be read.
-TileInfo survey_tile(const std::filesystem::path& piece,
+// TileStream's. Throws Error naming the file if it cannot be read.
+TileInfo survey_tile(const std::filesystem::path& tile,
                      const std::optional<Georeference>& georeference = std::nullopt);
 
-struct PiecesReadResult {
+struct TilesReadResult {
   PointCloud cloud;
   std::size_t dropped_points = 0;
 };
-// Reads all files into memory. Throws as PieceStream does.
-PiecesReadResult read_pieces(const std::vector<std::filesystem::path>& pieces);
+// Reads all files into memory. Throws as TileStream does.
+TilesReadResult read_tiles(const std::vector<std::filesystem::path>& tiles);
 
 }  // namespace libmap

@@ -1,4 +1,4 @@
-#include "libmap/io/cloud_pieces.h"
+#include "libmap/io/cloud_tiles.h"
 
 #include <algorithm>
 #include <cmath>
@@ -170,24 +170,24 @@ class CloudBlockReader {
 
 }  // namespace
 
-PieceStream::PieceStream(std::vector<fs::path> pieces) : pieces_(std::move(pieces)) {
+TileStream::TileStream(std::vector<fs::path> tiles) : tiles_(std::move(tiles)) {
   bool is_first = true;
   fs::path first;
-  for (const fs::path& piece : pieces_) {
-    const CloudBlockReader reader(piece, georeference_);
-    if (is_dem_path(piece) != is_dem_path(pieces_.front()))
+  for (const fs::path& tile : tiles_) {
+    const CloudBlockReader reader(tile, georeference_);
+    if (is_dem_path(tile) != is_dem_path(tiles_.front()))
       throw Error("DEMs and clouds have different frames; use separate folders",
-                  {.file = piece.string()});
+                  {.file = tile.string()});
     if (!georeference_) georeference_ = reader.georeference();
     if (reader.is_empty()) continue;
     if (is_first) {
-      first = piece;
+      first = tile;
       has_normals_ = reader.has_normals();
       viewpoint_ = reader.viewpoint();
     } else if (reader.has_normals() != has_normals_) {
       throw Error(has_normals_ ? "has no normals, but " + first.string() + " has"
                                : "has normals, but " + first.string() + " has none",
-                  {.file = piece.string()});
+                  {.file = tile.string()});
     } else if (reader.viewpoint().matrix() != viewpoint_.matrix()) {
       viewpoint_ = Pose::Identity();
     }
@@ -195,11 +195,11 @@ PieceStream::PieceStream(std::vector<fs::path> pieces) : pieces_(std::move(piece
   }
 }
 
-void PieceStream::for_each_block(Need need, const Visit& visit) const {
+void TileStream::for_each_block(Need need, const Visit& visit) const {
   PointCloud block;
   block.viewpoint = viewpoint_;
-  for (const fs::path& piece : pieces_) {
-    CloudBlockReader reader(piece, georeference_);
+  for (const fs::path& tile : tiles_) {
+    CloudBlockReader reader(tile, georeference_);
     if (need == Need::positions) reader.leave_out_normals();
     while (reader.append(block_points - block.size(), block)) {
       if (block.size() < block_points) continue;
@@ -211,9 +211,9 @@ void PieceStream::for_each_block(Need need, const Visit& visit) const {
   if (!block.empty()) visit(block);
 }
 
-TileInfo survey_tile(const fs::path& piece, const std::optional<Georeference>& georeference) {
+TileInfo survey_tile(const fs::path& tile, const std::optional<Georeference>& georeference) {
   TileInfo info;
-  CloudBlockReader reader(piece, georeference);
+  CloudBlockReader reader(tile, georeference);
   reader.leave_out_normals();
   PointCloud block;
   while (reader.append(PointStream::block_points, block)) {
@@ -232,12 +232,12 @@ TileInfo survey_tile(const fs::path& piece, const std::optional<Georeference>& g
   return info;
 }
 
-PiecesReadResult read_pieces(const std::vector<fs::path>& pieces) {
-  PiecesReadResult result;
-  const PieceStream stream(pieces);
+TilesReadResult read_tiles(const std::vector<fs::path>& tiles) {
+  TilesReadResult result;
+  const TileStream stream(tiles);
   result.cloud.viewpoint = stream.viewpoint();
-  for (const fs::path& piece : pieces) {
-    CloudBlockReader reader(piece, stream.georeference());
+  for (const fs::path& tile : tiles) {
+    CloudBlockReader reader(tile, stream.georeference());
     while (reader.append(PointStream::block_points, result.cloud)) {
     }
     result.dropped_points += reader.dropped_points();

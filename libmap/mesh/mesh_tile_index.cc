@@ -1,4 +1,4 @@
-#include "libmap/mesh/mesh_piece_index.h"
+#include "libmap/mesh/mesh_tile_index.h"
 
 #include <algorithm>
 #include <cstdint>
@@ -57,23 +57,23 @@ void append_part_within(const TriangleMesh& other, const Eigen::AlignedBox2d& bo
     for (std::uint32_t& corner : mesh.triangles[t]) corner = same[corner - first_vertex];
 }
 
-MeshPieceIndex::MeshPieceIndex(std::vector<std::filesystem::path> pieces) {
-  for (std::filesystem::path& path : pieces) {
+MeshTileIndex::MeshTileIndex(std::vector<std::filesystem::path> tiles) {
+  for (std::filesystem::path& path : tiles) {
     const TriangleMesh mesh = read_mesh(path).mesh;
     Eigen::AlignedBox2d box;
     for (const Eigen::Vector3d& vertex : mesh.vertices) box.extend(vertex.head<2>());
-    pieces_.push_back({std::move(path), box});
+    tiles_.push_back({std::move(path), box});
   }
 }
 
-const TriangleMesh& MeshPieceIndex::mesh_of(const Piece& piece) {
-  const auto found = std::find_if(kept_.begin(), kept_.end(),
-                                  [&](const auto& one) { return one.first == &piece; });
+const TriangleMesh& MeshTileIndex::mesh_of(const Tile& tile) {
+  const auto found =
+      std::find_if(kept_.begin(), kept_.end(), [&](const auto& one) { return one.first == &tile; });
   if (found != kept_.end()) {
     kept_.splice(kept_.begin(), kept_, found);
     return kept_.front().second;
   }
-  kept_.emplace_front(&piece, read_mesh(piece.path).mesh);
+  kept_.emplace_front(&tile, read_mesh(tile.path).mesh);
   std::size_t triangles = 0;
   for (auto one = kept_.begin(); one != kept_.end();) {
     triangles += one->second.triangles.size();
@@ -83,15 +83,15 @@ const TriangleMesh& MeshPieceIndex::mesh_of(const Piece& piece) {
   return kept_.front().second;
 }
 
-MeshWithMargin MeshPieceIndex::with_margin(std::size_t piece, double margin_m) {
-  MeshWithMargin joined{mesh_of(pieces_[piece]), 0};
+MeshWithMargin MeshTileIndex::with_margin(std::size_t tile, double margin_m) {
+  MeshWithMargin joined{mesh_of(tiles_[tile]), 0};
   joined.triangles = joined.mesh.triangles.size();
   const Eigen::Vector2d margin = Eigen::Vector2d::Constant(margin_m);
-  const Eigen::AlignedBox2d& own = pieces_[piece].box;
+  const Eigen::AlignedBox2d& own = tiles_[tile].box;
   const Eigen::AlignedBox2d box(own.min() - margin, own.max() + margin);
-  for (std::size_t n = 0; n < pieces_.size(); ++n)
-    if (n != piece && box.intersects(pieces_[n].box))
-      append_part_within(mesh_of(pieces_[n]), box, joined.mesh);
+  for (std::size_t n = 0; n < tiles_.size(); ++n)
+    if (n != tile && box.intersects(tiles_[n].box))
+      append_part_within(mesh_of(tiles_[n]), box, joined.mesh);
   return joined;
 }
 

@@ -14,7 +14,7 @@
 #include "libmap/texture/textured_mesh_io.h"
 #include "tests/tools/tool_test_support.h"
 
-namespace pieces_test {
+namespace mesh_tiles_test {
 
 namespace fs = std::filesystem;
 
@@ -138,7 +138,7 @@ TEST(Pieces, OneModelPerPiece) {
   for (const std::string share : {"2/2", "1/2"})
     ASSERT_TRUE(succeeded(graspmap({"fuse", scan, "-o", "cloud_in_shares", "--tile-size", "2",
                                     "--tile", share, "--corrected-poses", "again.tum"})));
-  graspmap_test::expect_same_pieces("cloud_in_shares", "cloud");
+  graspmap_test::expect_same_tiles("cloud_in_shares", "cloud");
   EXPECT_EQ(content("again.tum"), content("poses.tum"));
   texture.back() = "shared";
   for (const std::string share : {"2/3", "3/3", "1/3"}) {
@@ -147,7 +147,7 @@ TEST(Pieces, OneModelPerPiece) {
     words.insert(words.end(), {"--tile", share});
     ASSERT_TRUE(succeeded(graspmap(words)));
   }
-  graspmap_test::expect_same_pieces("shared", "model");
+  graspmap_test::expect_same_tiles("shared", "model");
   // The image equals that of the model in one file.
   texture.back() = "model.glb";
   ASSERT_TRUE(succeeded(graspmap(texture)));
@@ -163,4 +163,4 @@ TEST(Pieces, OneModelPerPiece) {
   EXPECT_LT(different, a.pixels.size() / 100);
 }
 
-}  // namespace pieces_test
+}  // namespace mesh_tiles_test

@@ -1,4 +1,4 @@
-#include "libmap/simulate/terrain_pieces.h"
+#include "libmap/simulate/terrain_tiles.h"
 
 #include <algorithm>
 #include <cmath>
@@ -206,8 +206,8 @@ struct CellRange {
   std::int64_t last = 0;
   std::size_t count() const { return static_cast<std::size_t>(last - first); }
 };
-CellRange cells_of_piece(std::int64_t tile, double size_m, const TerrainPiecesOptions& options) {
-  const std::int64_t side = cells_in(options.piece_m, options.spacing_m);
+CellRange cells_of_tile(std::int64_t tile, double size_m, const TerrainTilesOptions& options) {
+  const std::int64_t side = cells_in(options.tile_m, options.spacing_m);
   const std::int64_t end = cells_in(size_m, options.spacing_m);
   return {std::min(tile * side, end), std::min((tile + 1) * side, end)};
 }
@@ -215,7 +215,7 @@ CellRange cells_of_piece(std::int64_t tile, double size_m, const TerrainPiecesOp
 // Draws the points of one cell of the plan.
 class CellSampler {
  public:
-  CellSampler(const RockyTerrain& terrain, const TerrainPiecesOptions& options)
+  CellSampler(const RockyTerrain& terrain, const TerrainTilesOptions& options)
       : terrain_(terrain),
         spacing_m_(options.spacing_m),
         seed_(mix_bits(options.terrain.seed, points_stream)) {}
@@ -276,45 +276,45 @@ class CellSampler {
 
 }  // namespace
 
-void bind(ParameterTable& table, TerrainPiecesOptions& options) {
+void bind(ParameterTable& table, TerrainTilesOptions& options) {
   table.add("spacing_m", options.spacing_m, Range{1e-4, 10.0}, "mean point spacing, m");
-  table.add("piece_m", options.piece_m, Range{1e-3, 1000.0}, "side of a piece, m");
+  table.add("piece_m", options.tile_m, Range{1e-3, 1000.0}, "side of a piece, m");
   bind(table, options.terrain);
 }
 
-void TerrainPiecesOptions::check() const {
-  TerrainPiecesOptions copy = *this;
+void TerrainTilesOptions::check() const {
+  TerrainTilesOptions copy = *this;
   ParameterTable table;
   bind(table, copy);
   table.add("size_x_m", copy.size_x_m, Range{1e-3, 1e5}, "");
   table.add("size_y_m", copy.size_y_m, Range{1e-3, 1e5}, "");
   table.check();
   terrain.check();
-  const double cells = piece_m / spacing_m;
+  const double cells = tile_m / spacing_m;
   if (cells < 1.0 || cells * cells > 1e8)
     throw Error(
         "too few or too many points per piece",
-        {.field = "piece_m", .value = to_text(piece_m), .bound = "1 to 10,000 times spacing_m"});
-  if (std::ceil(size_x_m / piece_m) * std::ceil(size_y_m / piece_m) > 1e6)
+        {.field = "piece_m", .value = to_text(tile_m), .bound = "1 to 10,000 times spacing_m"});
+  if (std::ceil(size_x_m / tile_m) * std::ceil(size_y_m / tile_m) > 1e6)
     throw Error("too many pieces", {.field = "piece_m",
-                                    .value = to_text(piece_m),
+                                    .value = to_text(tile_m),
                                     .bound = "large enough for at most 1,000,000 pieces"});
 }
 
-std::vector<XyTile> terrain_pieces(const TerrainPiecesOptions& options) {
+std::vector<XyTile> terrain_pieces(const TerrainTilesOptions& options) {
   options.check();
-  std::vector<XyTile> pieces;
-  for (std::int64_t i = 0; cells_of_piece(i, options.size_x_m, options).count() > 0; ++i)
-    for (std::int64_t j = 0; cells_of_piece(j, options.size_y_m, options).count() > 0; ++j)
-      pieces.push_back({i, j});
-  return pieces;
+  std::vector<XyTile> tiles;
+  for (std::int64_t i = 0; cells_of_tile(i, options.size_x_m, options).count() > 0; ++i)
+    for (std::int64_t j = 0; cells_of_tile(j, options.size_y_m, options).count() > 0; ++j)
+      tiles.push_back({i, j});
+  return tiles;
 }
 
-PointCloud sample_piece(const TerrainPiecesOptions& options, const XyTile& piece) {
+PointCloud sample_tile(const TerrainTilesOptions& options, const XyTile& tile) {
   options.check();
   const double spacing = options.spacing_m;
-  const CellRange x = cells_of_piece(piece.i, options.size_x_m, options);
-  const CellRange y = cells_of_piece(piece.j, options.size_y_m, options);
+  const CellRange x = cells_of_tile(tile.i, options.size_x_m, options);
+  const CellRange y = cells_of_tile(tile.j, options.size_y_m, options);
   const auto corner_at = [&](std::int64_t a, std::int64_t b) {
     return Eigen::Vector2d(static_cast<double>(a) * spacing, static_cast<double>(b) * spacing);
   };

@@ -1,4 +1,4 @@
-#include "libmap/io/piece_index.h"
+#include "libmap/io/tile_index.h"
 
 #include <algorithm>
 
@@ -13,34 +13,34 @@ constexpr std::size_t max_kept_points = 4'000'000;
 
 }  // namespace
 
-PieceIndex::PieceIndex(std::vector<std::filesystem::path> pieces, const Visit& visit) {
-  for (std::filesystem::path& path : pieces) {
+TileIndex::TileIndex(std::vector<std::filesystem::path> tiles, const Visit& visit) {
+  for (std::filesystem::path& path : tiles) {
     CloudReadResult read = read_cloud(path);
     dropped_ += read.dropped_points;
     const PointCloud& cloud = read.cloud;
     if (cloud.empty()) continue;
-    if (pieces_.empty()) {
+    if (tiles_.empty()) {
       has_normals_ = cloud.has_normals();
     } else if (cloud.has_normals() != has_normals_) {
-      const std::string first = pieces_.front().path.string();
+      const std::string first = tiles_.front().path.string();
       throw Error(has_normals_ ? "has no normals, but " + first + " has"
                                : "has normals, but " + first + " has none",
                   {.file = path.string()});
     }
     points_ += cloud.size();
     visit(cloud);
-    pieces_.push_back({std::move(path), bounds_of(cloud.positions)});
+    tiles_.push_back({std::move(path), bounds_of(cloud.positions)});
   }
 }
 
-const PointCloud& PieceIndex::cloud_of(const Piece& piece) {
-  const auto kept = std::find_if(kept_.begin(), kept_.end(),
-                                 [&](const auto& one) { return one.first == &piece; });
+const PointCloud& TileIndex::cloud_of(const Tile& tile) {
+  const auto kept =
+      std::find_if(kept_.begin(), kept_.end(), [&](const auto& one) { return one.first == &tile; });
   if (kept != kept_.end()) {
     kept_.splice(kept_.begin(), kept_, kept);
     return kept_.front().second;
   }
-  kept_.emplace_front(&piece, read_cloud(piece.path).cloud);
+  kept_.emplace_front(&tile, read_cloud(tile.path).cloud);
   std::size_t points = 0;
   for (auto one = kept_.begin(); one != kept_.end();) {
     points += one->second.size();
@@ -49,13 +49,13 @@ const PointCloud& PieceIndex::cloud_of(const Piece& piece) {
   return kept_.front().second;
 }
 
-PointCloud PieceIndex::points_in(const Eigen::Vector2d& low, const Eigen::Vector2d& high) {
+PointCloud TileIndex::points_in(const Eigen::Vector2d& low, const Eigen::Vector2d& high) {
   PointCloud found;
-  for (const Piece& piece : pieces_) {
-    if ((piece.box.max.head<2>().array() < low.array()).any() ||
-        (piece.box.min.head<2>().array() >= high.array()).any())
+  for (const Tile& tile : tiles_) {
+    if ((tile.box.max.head<2>().array() < low.array()).any() ||
+        (tile.box.min.head<2>().array() >= high.array()).any())
       continue;
-    const PointCloud& cloud = cloud_of(piece);
+    const PointCloud& cloud = cloud_of(tile);
     std::vector<std::size_t> inside;
     for (std::size_t n = 0; n < cloud.size(); ++n) {
       const auto position = cloud.positions[n].head<2>().array();

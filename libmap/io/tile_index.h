@@ -15,12 +15,12 @@
 
 namespace libmap {
 
-class PieceIndex {
+class TileIndex {
  public:
   // Reads each file once and calls visit(cloud). Throws Error naming the file if it cannot be read,
   // or if only some files have normals.
-  using Visit = std::function<void(const PointCloud& piece)>;
-  PieceIndex(std::vector<std::filesystem::path> pieces, const Visit& visit);
+  using Visit = std::function<void(const PointCloud& tile)>;
+  TileIndex(std::vector<std::filesystem::path> tiles, const Visit& visit);
 
   std::size_t points() const { return points_; }
   std::size_t dropped_points() const { return dropped_; }  // points that are not finite
@@ -30,17 +30,17 @@ class PieceIndex {
   PointCloud points_in(const Eigen::Vector2d& low, const Eigen::Vector2d& high);
 
  private:
-  struct Piece {
+  struct Tile {
     std::filesystem::path path;
     Bounds3d box;
   };
-  const PointCloud& cloud_of(const Piece& piece);
+  const PointCloud& cloud_of(const Tile& tile);
 
-  std::vector<Piece> pieces_;  // files with points
+  std::vector<Tile> tiles_;  // files with points
   bool has_normals_ = false;
   std::size_t points_ = 0;
   std::size_t dropped_ = 0;
-  std::list<std::pair<const Piece*, PointCloud>> kept_;  // cache, the most recently used first
+  std::list<std::pair<const Tile*, PointCloud>> kept_;  // cache, the most recently used first
 };
 
 }  // namespace libmap

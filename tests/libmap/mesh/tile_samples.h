@@ -13,9 +13,9 @@
 namespace graspmap_test {
 
 // Writes one file per square with the triangles whose centers are in it. Returns the sorted paths.
-inline std::vector<std::filesystem::path> write_pieces(const libmap::TriangleMesh& mesh,
-                                                       double tile_m,
-                                                       const std::filesystem::path& folder) {
+inline std::vector<std::filesystem::path> write_tiles(const libmap::TriangleMesh& mesh,
+                                                      double tile_m,
+                                                      const std::filesystem::path& folder) {
   std::map<std::filesystem::path, std::vector<bool>> parts;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     const Eigen::Vector2d center = center_of(mesh, mesh.triangles[t]).head<2>();

@@ -1,4 +1,4 @@
-#include "libmap/io/cloud_pieces.h"
+#include "libmap/io/cloud_tiles.h"
 
 #include <gtest/gtest.h>
 
@@ -9,14 +9,14 @@
 #include "libmap/io/cloud_io.h"
 #include "tests/support/test_support.h"
 
-namespace cloud_pieces_test {
+namespace cloud_tiles_test {
 
 using graspmap_test::error_of;
 using graspmap_test::scratch_folder;
 using graspmap_test::uniform;
-using libmap::PieceStream;
 using libmap::PointCloud;
 using libmap::PointStream;
+using libmap::TileStream;
 
 PointCloud random_cloud(std::size_t count, bool normals) {
   PointCloud cloud;
@@ -37,14 +37,14 @@ std::filesystem::path write(const std::string& name, const PointCloud& cloud,
   return scratch_folder() / name;
 }
 
-TEST(CloudPieces, BlocksAreFullAndHoldAllPointsInOrder) {
+TEST(CloudTiles, BlocksAreFullAndHoldAllPointsInOrder) {
   const std::size_t block = PointStream::block_points;
   PointCloud first = random_cloud(block + 5, true);
   const PointCloud second = random_cloud(block - 7, true);
   const PointCloud third = random_cloud(11, true);
   first.positions[3].x() = std::nan("");
-  const PieceStream stream({write("a.pcd", first), write("b.ply", second, {.big_endian = true}),
-                            write("empty.pcd", PointCloud{}), write("c.csv", third)});
+  const TileStream stream({write("a.pcd", first), write("b.ply", second, {.big_endian = true}),
+                           write("empty.pcd", PointCloud{}), write("c.csv", third)});
   std::vector<Eigen::Vector3d> expected = first.positions;
   expected.erase(expected.begin() + 3);
   expected.insert(expected.end(), second.positions.begin(), second.positions.end());
@@ -69,16 +69,16 @@ TEST(CloudPieces, BlocksAreFullAndHoldAllPointsInOrder) {
   }
 }
 
-TEST(CloudPieces, SameValuesAsReadWhole) {
+TEST(CloudTiles, SameValuesAsReadWhole) {
   for (const char* name : {"a.pcd", "a.ply", "a.csv"}) {
     const auto path = write(name, random_cloud(70001, false));
     const PointCloud whole = libmap::read_cloud(path).cloud;
-    const PointCloud pieces = libmap::read_pieces({path}).cloud;
+    const PointCloud pieces = libmap::read_tiles({path}).cloud;
     EXPECT_EQ(pieces.positions, whole.positions) << name;
   }
 }
 
-TEST(CloudPieces, SurveyCountsAndBounds) {
+TEST(CloudTiles, SurveyCountsAndBounds) {
   PointCloud cloud = random_cloud(100000, true);
   cloud.positions[0] = {std::nan(""), 0, 0};
   cloud.positions[99999] = {50, -60, 7};
@@ -90,30 +90,30 @@ TEST(CloudPieces, SurveyCountsAndBounds) {
   EXPECT_EQ(info.box.max, Eigen::Vector3d(50, 60, 7));
 }
 
-TEST(CloudPieces, ViewpointIsKnownIfAllAgree) {
+TEST(CloudTiles, ViewpointIsKnownIfAllAgree) {
   PointCloud cloud = random_cloud(10, false);
   cloud.viewpoint.translation() = Eigen::Vector3d(1, 2, 3);
   const auto a = write("a.pcd", cloud);
   const auto b = write("b.pcd", cloud);
-  EXPECT_EQ(PieceStream({a, b}).viewpoint().translation(), Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(TileStream({a, b}).viewpoint().translation(), Eigen::Vector3d(1, 2, 3));
   cloud.viewpoint.translation().z() = 4;
   write("b.pcd", cloud);
-  EXPECT_TRUE(PieceStream({a, b}).viewpoint().matrix().isIdentity(0));
+  EXPECT_TRUE(TileStream({a, b}).viewpoint().matrix().isIdentity(0));
 }
 
-TEST(CloudPieces, BadFiles) {
-  EXPECT_NE(std::string(error_of([] { libmap::cloud_pieces("/no/such.pcd"); }).what())
+TEST(CloudTiles, BadFiles) {
+  EXPECT_NE(std::string(error_of([] { libmap::cloud_tiles("/no/such.pcd"); }).what())
                 .find("no such file"),
             std::string::npos);
   const auto path = write("a.pcd", random_cloud(1000, false));
   std::filesystem::resize_file(path, std::filesystem::file_size(path) - 1);
-  EXPECT_NE(std::string(error_of([&] { PieceStream stream({path}); }).what()).find("a.pcd"),
+  EXPECT_NE(std::string(error_of([&] { TileStream stream({path}); }).what()).find("a.pcd"),
             std::string::npos);
   graspmap_test::write_text(scratch_folder() / "b.pcd",
                             "VERSION 0.7\nFIELDS x y\nSIZE 4 4\nTYPE F F\nPOINTS 0\nDATA binary\n");
-  EXPECT_NE(std::string(error_of([&] { PieceStream stream({scratch_folder() / "b.pcd"}); }).what())
+  EXPECT_NE(std::string(error_of([&] { TileStream stream({scratch_folder() / "b.pcd"}); }).what())
                 .find("x, y and z"),
             std::string::npos);
 }
 
-}  // namespace cloud_pieces_test
+}  // namespace cloud_tiles_test

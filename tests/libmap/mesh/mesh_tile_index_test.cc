@@ -1,4 +1,4 @@
-#include "libmap/mesh/mesh_piece_index.h"
+#include "libmap/mesh/mesh_tile_index.h"
 
 #include <gtest/gtest.h>
 
@@ -8,13 +8,13 @@
 #include "libmap/core/single_precision.h"
 #include "libmap/mesh/mesh_adjacency.h"
 #include "tests/libmap/mesh/mesh_samples.h"
-#include "tests/libmap/mesh/piece_samples.h"
+#include "tests/libmap/mesh/tile_samples.h"
 #include "tests/support/test_support.h"
 
-namespace mesh_piece_index_test {
+namespace mesh_tile_index_test {
 
 using graspmap_test::ball_mesh;
-using libmap::MeshPieceIndex;
+using libmap::MeshTileIndex;
 using libmap::MeshWithMargin;
 using libmap::TriangleMesh;
 
@@ -36,10 +36,10 @@ int open_edges(const TriangleMesh& mesh) {
   return count;
 }
 
-TEST(MeshPieceIndex, PiecesAreJoinedToWhatWasCut) {
+TEST(MeshTileIndex, PiecesAreJoinedToWhatWasCut) {
   const TriangleMesh ball = ball_in_files();
   ASSERT_EQ(open_edges(ball), 0);
-  MeshPieceIndex index(graspmap_test::write_pieces(ball, 0.6, graspmap_test::scratch_folder()));
+  MeshTileIndex index(graspmap_test::write_tiles(ball, 0.6, graspmap_test::scratch_folder()));
   ASSERT_GT(index.size(), 4U);
   std::size_t own = 0;
   for (std::size_t piece = 0; piece < index.size(); ++piece) {
@@ -60,9 +60,9 @@ TEST(MeshPieceIndex, PiecesAreJoinedToWhatWasCut) {
   EXPECT_EQ(own, ball.triangles.size());
 }
 
-TEST(MeshPieceIndex, MarginsReachAsFarAsAsked) {
+TEST(MeshTileIndex, MarginsReachAsFarAsAsked) {
   const TriangleMesh ball = ball_in_files();
-  MeshPieceIndex index(graspmap_test::write_pieces(ball, 0.6, graspmap_test::scratch_folder()));
+  MeshTileIndex index(graspmap_test::write_tiles(ball, 0.6, graspmap_test::scratch_folder()));
   const double margin = 0.3;
   const MeshWithMargin joined = index.with_margin(0, margin);
   Eigen::AlignedBox2d box;
@@ -83,4 +83,4 @@ TEST(MeshPieceIndex, MarginsReachAsFarAsAsked) {
   EXPECT_LT(joined.mesh.triangles.size(), ball.triangles.size());
 }
 
-}  // namespace mesh_piece_index_test
+}  // namespace mesh_tile_index_test

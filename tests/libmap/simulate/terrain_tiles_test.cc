@@ -1,5 +1,5 @@
 // Terrain in pieces: the surface depends only on position and seed.
-#include "libmap/simulate/terrain_pieces.h"
+#include "libmap/simulate/terrain_tiles.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace terrain_pieces_test {
+namespace terrain_tiles_test {
 
 using graspmap_test::error_of;
 using graspmap_test::uniform;
@@ -20,11 +20,11 @@ Eigen::AlignedBox2d rectangle(double x0, double y0, double x1, double y1) {
   return {Eigen::Vector2d(x0, y0), Eigen::Vector2d(x1, y1)};
 }
 
-TerrainPiecesOptions small_pieces() {
-  TerrainPiecesOptions options;
+TerrainTilesOptions small_pieces() {
+  TerrainTilesOptions options;
   options.size_x_m = 3.0;
   options.size_y_m = 2.0;
-  options.piece_m = 1.0;
+  options.tile_m = 1.0;
   options.spacing_m = 0.02;
   return options;
 }
@@ -127,11 +127,11 @@ TEST(RockyTerrain, HeightsOfRocksFollowThePowerLaw) {
   EXPECT_NEAR(rocks_above(0.2, 5.0), std::pow(2.0, -2.65), 0.06);
 }
 
-TEST(TerrainPieces, MeetAtTheirSeams) {
-  const TerrainPiecesOptions options = small_pieces();
+TEST(TerrainTiles, MeetAtTheirSeams) {
+  const TerrainTilesOptions options = small_pieces();
   const RockyTerrain terrain(options.terrain, rectangle(0, 0, 3, 2));
   for (const XyTile& piece : terrain_pieces(options)) {
-    const PointCloud cloud = sample_piece(options, piece);
+    const PointCloud cloud = sample_tile(options, piece);
     for (const Eigen::Vector3d& p : cloud.positions) {
       EXPECT_EQ(p.z(), terrain.height(p.x(), p.y()));
       EXPECT_EQ(std::floor(p.x()), piece.i);
@@ -140,27 +140,27 @@ TEST(TerrainPieces, MeetAtTheirSeams) {
   }
 }
 
-TEST(TerrainPieces, DoNotDependOnTheSizeOfTheWhole) {
-  TerrainPiecesOptions large = small_pieces();
+TEST(TerrainTiles, DoNotDependOnTheSizeOfTheWhole) {
+  TerrainTilesOptions large = small_pieces();
   large.size_x_m = 50.0;
   large.size_y_m = 70.0;
-  const PointCloud small = sample_piece(small_pieces(), {1, 1});
-  const PointCloud same = sample_piece(large, {1, 1});
+  const PointCloud small = sample_tile(small_pieces(), {1, 1});
+  const PointCloud same = sample_tile(large, {1, 1});
   EXPECT_EQ(small.positions, same.positions);
   EXPECT_EQ(small.normals, same.normals);
   // A cropped piece is a subset of the complete one.
-  TerrainPiecesOptions cut = small_pieces();
+  TerrainTilesOptions cut = small_pieces();
   cut.size_x_m = 1.5;
-  const PointCloud part = sample_piece(cut, {1, 1});
+  const PointCloud part = sample_tile(cut, {1, 1});
   EXPECT_TRUE(holds_all(small, part));
   EXPECT_GT(part.size(), small.size() * 2 / 5);
   for (const Eigen::Vector3d& p : part.positions) EXPECT_LT(p.x(), 1.5);
 }
 
-TEST(TerrainPieces, CoverThePlanAndTheSlopes) {
-  TerrainPiecesOptions options = small_pieces();
+TEST(TerrainTiles, CoverThePlanAndTheSlopes) {
+  TerrainTilesOptions options = small_pieces();
   options.terrain.rocks_per_m2 = 3.0;
-  const PointCloud cloud = sample_piece(options, {0, 0});
+  const PointCloud cloud = sample_tile(options, {0, 0});
   std::map<std::pair<int, int>, int> cells;
   for (const Eigen::Vector3d& p : cloud.positions)
     ++cells[{static_cast<int>(p.x() / options.spacing_m),
@@ -186,8 +186,8 @@ TEST(TerrainPieces, CoverThePlanAndTheSlopes) {
   EXPECT_NEAR(static_cast<double>(cloud.size()) * 0.02 * 0.02, area, 0.06 * area);
 }
 
-TEST(TerrainPieces, AreAsManyAsTheSizeNeeds) {
-  TerrainPiecesOptions options = small_pieces();
+TEST(TerrainTiles, AreAsManyAsTheSizeNeeds) {
+  TerrainTilesOptions options = small_pieces();
   EXPECT_EQ(terrain_pieces(options).size(), 6U);
   options.size_x_m = 3.02;
   EXPECT_EQ(terrain_pieces(options).size(), 8U);
@@ -195,14 +195,14 @@ TEST(TerrainPieces, AreAsManyAsTheSizeNeeds) {
   EXPECT_EQ(terrain_pieces(options).size(), 2U);
 }
 
-TEST(TerrainPieces, ImpossibleOptionsAreNamed) {
+TEST(TerrainTiles, ImpossibleOptionsAreNamed) {
   const auto field_of = [](const auto& change) {
-    TerrainPiecesOptions options = small_pieces();
+    TerrainTilesOptions options = small_pieces();
     change(options);
     return error_of([&] { terrain_pieces(options); }).context().field;
   };
   EXPECT_EQ(field_of([](auto& o) { o.spacing_m = 0.0; }), "spacing_m");
-  EXPECT_EQ(field_of([](auto& o) { o.piece_m = 0.001; }), "piece_m");
+  EXPECT_EQ(field_of([](auto& o) { o.tile_m = 0.001; }), "piece_m");
   EXPECT_EQ(field_of([](auto& o) {
               o.size_x_m = 90'000;
               o.size_y_m = 90'000;
@@ -213,5 +213,5 @@ TEST(TerrainPieces, ImpossibleOptionsAreNamed) {
   EXPECT_EQ(field_of([](auto& o) { o.terrain.rocks_per_m2 = -1; }), "rocks_per_m2");
 }
 
-}  // namespace terrain_pieces_test
+}  // namespace terrain_tiles_test
 }  // namespace libmap

@@ -25,31 +25,31 @@ struct MeshWithMargin {
 void append_part_within(const TriangleMesh& other, const Eigen::AlignedBox2d& box,
                         TriangleMesh& mesh);
 
-class MeshPieceIndex {
+class MeshTileIndex {
  public:
   // Reads each piece once. Throws Error naming the file that cannot be read.
-  explicit MeshPieceIndex(std::vector<std::filesystem::path> pieces);
+  explicit MeshTileIndex(std::vector<std::filesystem::path> tiles);
 
   // Number of pieces; indices are those of the given paths.
-  std::size_t size() const { return pieces_.size(); }
-  const std::filesystem::path& path(std::size_t piece) const { return pieces_[piece].path; }
+  std::size_t size() const { return tiles_.size(); }
+  const std::filesystem::path& path(std::size_t tile) const { return tiles_[tile].path; }
   // Bounding box in x and y.
-  const Eigen::AlignedBox2d& box(std::size_t piece) const { return pieces_[piece].box; }
+  const Eigen::AlignedBox2d& box(std::size_t tile) const { return tiles_[tile].box; }
 
   // Returns the piece, and the triangles of other pieces with a corner within `margin_m` of its
   // box. Caches recently used pieces, up to 1 million triangles. Throws Error if a file cannot be
   // read.
-  MeshWithMargin with_margin(std::size_t piece, double margin_m);
+  MeshWithMargin with_margin(std::size_t tile, double margin_m);
 
  private:
-  struct Piece {
+  struct Tile {
     std::filesystem::path path;
     Eigen::AlignedBox2d box;
   };
-  const TriangleMesh& mesh_of(const Piece& piece);
+  const TriangleMesh& mesh_of(const Tile& tile);
 
-  std::vector<Piece> pieces_;
-  std::list<std::pair<const Piece*, TriangleMesh>> kept_;  // most recently used first
+  std::vector<Tile> tiles_;
+  std::list<std::pair<const Tile*, TriangleMesh>> kept_;  // most recently used first
 };
 
 }  // namespace libmap

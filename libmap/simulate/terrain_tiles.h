@@ -72,10 +72,10 @@ class RockyTerrain {
   std::vector<std::vector<std::uint32_t>> buckets_;
 };
 
-struct TerrainPiecesOptions {
+struct TerrainTilesOptions {
   double size_x_m = 100.0;  // extent of the terrain, from 0
   double size_y_m = 100.0;
-  double piece_m = 10.0;
+  double tile_m = 10.0;
   double spacing_m = 0.01;
   RockyTerrainOptions terrain;
 
@@ -84,16 +84,16 @@ struct TerrainPiecesOptions {
   void check() const;
 };
 // Binds all fields except the size.
-void bind(ParameterTable& table, TerrainPiecesOptions& options);
+void bind(ParameterTable& table, TerrainTilesOptions& options);
 
-// Pieces that cover the terrain, ascending. Throws Error as TerrainPiecesOptions::check does.
-std::vector<XyTile> terrain_pieces(const TerrainPiecesOptions& options);
+// Pieces that cover the terrain, ascending. Throws Error as TerrainTilesOptions::check does.
+std::vector<XyTile> terrain_pieces(const TerrainTilesOptions& options);
 
 // Points of one piece with normals, m, z up. Each square cell of the plan with side `spacing_m`
 // contains one point per spacing_m^2 of its surface, randomly rounded up or down, at least one. A
 // piece depends only on its index, the seed, the spacing and the terrain; a piece cropped by the
 // terrain's size is a subset of the complete one. Sizes are rounded to multiples of the spacing.
-// Throws Error as TerrainPiecesOptions::check does.
-PointCloud sample_piece(const TerrainPiecesOptions& options, const XyTile& piece);
+// Throws Error as TerrainTilesOptions::check does.
+PointCloud sample_tile(const TerrainTilesOptions& options, const XyTile& tile);
 
 }  // namespace libmap
