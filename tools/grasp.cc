@@ -79,8 +79,9 @@ std::vector<std::size_t> rows_of(const libmap::Table& locations,
   for (const std::string& location : listed) {
     const auto found = std::find(names.begin(), names.end(), location);
     if (found == names.end())
-      throw libmap::Error("is not a listed location" + libmap::did_you_mean(location, names),
-                          {.file = locations.file, .field = "--scene-of", .value = location});
+      throw libmap::Error(
+          "is not a listed location" + libmap::did_you_mean(location, names),
+          {.file = locations.file, .field = "--scene-locations", .value = location});
     const auto row = static_cast<std::size_t>(found - names.begin());
     if (std::find(rows.begin(), rows.end(), row) == rows.end()) rows.push_back(row);
   }
@@ -112,7 +113,8 @@ std::string description(const libgtd::LocationResult& result, const libgtd::Tria
 // Claims the folder. Throws Error if another command wrote it, or for locations without a folder.
 void claim_scenes(const GraspScenesOptions& options, Run& run) {
   if (!options.folder.empty()) return run.claim_output_folder(options.folder);
-  if (!options.locations.empty()) throw libmap::Error("requires --scenes", {.field = "--scene-of"});
+  if (!options.locations.empty())
+    throw libmap::Error("requires --scenes", {.field = "--scene-locations"});
 }
 
 // Returns the scenes to write. Throws Error for a location that is not in the table, two with the
@@ -124,11 +126,12 @@ std::vector<GraspScene> scenes_of(const libmap::Table& locations,
   std::vector<std::size_t> rows = rows_of(locations, options.locations);
   if (options.locations.empty()) {
     if (names.size() > max_unlisted_scenes)
-      throw libmap::Error("too many locations for one scene each: select some with --scene-of",
-                          {.file = locations.file,
-                           .field = "locations",
-                           .value = std::to_string(names.size()),
-                           .bound = "<= " + std::to_string(max_unlisted_scenes)});
+      throw libmap::Error(
+          "too many locations for one scene each: select some with --scene-locations",
+          {.file = locations.file,
+           .field = "locations",
+           .value = std::to_string(names.size()),
+           .bound = "<= " + std::to_string(max_unlisted_scenes)});
     for (std::size_t row = 0; row < names.size(); ++row) rows.push_back(row);
   }
   std::vector<GraspScene> scenes;
@@ -266,7 +269,7 @@ libgtd::Ground ground_of(const libmap::TriangleMesh& mesh, const GraspCommandOpt
 
 void grasp_voxels(GraspCommandOptions& options, Run& run) {
   reject_given({{"--scenes", !options.scenes.folder.empty()},
-                {"--scene-of", !options.scenes.locations.empty()},
+                {"--scene-locations", !options.scenes.locations.empty()},
                 {"--more-loads", !options.more_loads.empty()},
                 {"--prefix", !options.prefix.empty()}},
                "requires --points");
@@ -497,8 +500,9 @@ int main(int argc, char** argv) {
   command.option("--scenes", "FOLDER", options.scenes.folder,
                  "folder for scenes of one trial per location, with nearly the median force: "
                  "FOLDER/PLACE.ply, by the column 'place' or the row");
-  command.option("--scene-of", "PLACES", options.scenes.locations,
+  command.option("--scene-locations", "LOCATIONS", options.scenes.locations,
                  "locations of the scenes; default: all");
+  command.renamed_flag("--scene-of", "--scene-locations");
   for (const char* key : {"friction", "asperity-min", "asperity-max", "engagement-rate", "drag"}) {
     std::string name = key;
     std::replace(name.begin(), name.end(), '-', '_');

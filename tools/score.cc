@@ -126,7 +126,7 @@ struct ScoreStoreOptions {
   std::filesystem::path gripper_file;
   libgtd::MapFrame frame = libgtd::MapFrame::terrain;
   bool append = false;
-  std::size_t points_at_once = 1'000'000;
+  std::size_t max_points_in_memory = 1'000'000;
   libgtd::DetectionOptions detection;  // includes the share
 };
 
@@ -163,7 +163,7 @@ class StoreScoring {
                                   [&](std::vector<libgtd::StreamedTile> tiles) {
                                     libgtd::add_tiles(write(tiles), plan_.key, journal);
                                   },
-                                  run_.progress(), {.max_points = options_.points_at_once});
+                                  run_.progress(), {.max_points = options_.max_points_in_memory});
         });
       });
     }
@@ -329,7 +329,7 @@ struct ScoreOptions {
   std::string tile = "1/1";
   std::string up = "auto";
   bool append = false;
-  std::string points_at_once = "1000000";
+  std::string max_points_in_memory = "1000000";
   libgtd::MapFrame frame = libgtd::MapFrame::terrain;
   libgtd::DetectionOptions detection;
 };
@@ -341,11 +341,11 @@ void bind(libmap::ParameterTable& table, ScoreOptions& options) {
   table.add("frame", options.frame, libgtd::map_frame_names(), "frame of the map's points");
 }
 
-std::size_t parse_points_at_once(const std::string& text) {
+std::size_t parse_max_points(const std::string& text) {
   const auto count = libmap::parse_integer(text);
   if (!count || *count < 1)
     throw libmap::Error("not a number of points",
-                        {.field = "--points-at-once", .value = text, .bound = ">= 1"});
+                        {.field = "--max-points-in-memory", .value = text, .bound = ">= 1"});
   return static_cast<std::size_t>(*count);
 }
 
@@ -415,15 +415,15 @@ void score(ScoreOptions& options, Run& run) {
                       .gripper_file = gripper_file,
                       .frame = options.frame,
                       .append = options.append,
-                      .points_at_once = parse_points_at_once(options.points_at_once),
+                      .max_points_in_memory = parse_max_points(options.max_points_in_memory),
                       .detection = options.detection},
                      run);
     return;
   }
   if (options.append)
     throw libmap::Error("requires a tile store, MAP.tiles", {.field = "--append"});
-  if (options.points_at_once != ScoreOptions{}.points_at_once)
-    throw libmap::Error("requires a tile store, MAP.tiles", {.field = "--points-at-once"});
+  if (options.max_points_in_memory != ScoreOptions{}.max_points_in_memory)
+    throw libmap::Error("requires a tile store, MAP.tiles", {.field = "--max-points-in-memory"});
   libmap::require_cloud_format(options.output);
   run.claim_output(options.output, {options.terrain});
   const libmap::TilesReadResult read =
@@ -459,9 +459,10 @@ int main(int argc, char** argv) {
                  "graspability map (.pcd, .ply, .vtp, .csv), or tile store (.tiles)");
   command.option("--tile", "K/N", options.tile,
                  "score only share K of N of the tiles; `graspmap convert` merges the shares");
-  command.option("--points-at-once", "N", options.points_at_once,
+  command.option("--max-points-in-memory", "N", options.max_points_in_memory,
                  "for a tile store: maximum number of points in memory, about 250 bytes each; the "
                  "map does not depend on it");
+  command.renamed_flag("--points-at-once", "--max-points-in-memory");
   command.flag("--append", options.append,
                "score the tiles affected by files that were added to the terrain's folder");
   bind(command.parameters(), options);

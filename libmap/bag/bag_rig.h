@@ -63,8 +63,9 @@ BagRigPlan plan_bag_rig(const std::filesystem::path& bag, const BagRigOptions& o
                         const std::optional<double>& stamp_s = std::nullopt);
 
 // Table with one line per synchronized set: stamp_s, cameras, spread_s.
-inline constexpr const char* synchronized_sets_file_name = "moments.csv";
-// Names of the entries that export_bag_rig writes: rig.yaml, moments.csv and the cameras' folders.
+inline constexpr const char* synchronized_sets_file_name = "synchronized_sets.csv";
+// Names of the entries that export_bag_rig writes: rig.yaml, synchronized_sets.csv and the cameras'
+// folders.
 std::vector<std::string> names_in_rig_folder(const BagRigPlan& plan);
 
 struct BagRigExport {

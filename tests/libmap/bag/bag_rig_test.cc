@@ -233,7 +233,7 @@ TEST(BagRig, SetsAreChosen) {
   EXPECT_EQ(second.images.size(), 5U);
   EXPECT_EQ(second.all_sets, 5U);
   EXPECT_EQ(images_of(second, "a").size(), 3U);
-  EXPECT_THAT(graspmap_test::read_text(scratch_folder() / "rig" / "moments.csv"),
+  EXPECT_THAT(graspmap_test::read_text(scratch_folder() / "rig" / "synchronized_sets.csv"),
               HasSubstr("stamp_s,cameras,spread_s\n5.000000,2,0.012000\n5.200000,1,0.000000\n"));
   const BagRigPlan one = plan({}, 5.28);
   ASSERT_EQ(one.sets.size(), 1U);
