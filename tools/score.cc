@@ -177,7 +177,7 @@ class StoreScoring {
     const auto earlier = run_.options().force ? std::nullopt : store_.plan();
     if (!earlier && !run_.options().force) require_no_index(store_);
     plan_.terrain =
-        survey(stream_.pieces(), earlier ? earlier->terrain : std::vector<TerrainFile>{},
+        survey(stream_.tiles(), earlier ? earlier->terrain : std::vector<TerrainFile>{},
                stream_.georeference());
     plan_.index.manifest = make_manifest();
     plan_.key = libmap::key_of(plan_.index.manifest);

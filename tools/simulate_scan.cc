@@ -157,7 +157,7 @@ void scan_terrain(const SimulateScanOptions& options, const libmap::Trajectory& 
                 {"--multipath", options.simulation.faults.depth.multipath > 0.0}},
                "requires a mesh as scene");
   const libmap::TileStream stream(libmap::cloud_tiles(options.scene));
-  add_inputs(stream.pieces(), options, run);
+  add_inputs(stream.tiles(), options, run);
   run.manifest().frame = "terrain";
   run.write_output(options.output, [&](const fs::path& temporary) {
     libmap::GroundHeights ground;
@@ -165,7 +165,7 @@ void scan_terrain(const SimulateScanOptions& options, const libmap::Trajectory& 
         temporary.has_parent_path() ? temporary.parent_path() : fs::path("."),
         {.tile_m = libmap::GroundHeights::cell_m, .buffer_bytes = spool_buffer_bytes});
     std::size_t count = 0;
-    for (const fs::path& piece : stream.pieces()) count += libmap::read_cloud_info(piece).points;
+    for (const fs::path& piece : stream.tiles()) count += libmap::read_cloud_info(piece).points;
     run.progress().begin("points", count);
     run.timed("read", [&] {
       stream.for_each_block(libmap::PointStream::Need::positions,

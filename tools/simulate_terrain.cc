@@ -44,7 +44,7 @@ void simulate(SimulateTerrainOptions& options, Run& run) {
         "not a size", {.field = "--size", .value = options.size, .bound = "M or XxY, meters, > 0"});
   options.pieces.size_x_m = size->x();
   options.pieces.size_y_m = size->y();
-  const std::vector<libmap::XyTile> pieces = libmap::terrain_pieces(options.pieces);
+  const std::vector<libmap::XyTile> pieces = libmap::terrain_tiles(options.pieces);
   const std::vector<std::string> names = tile_folder_names(options.output);
   run.claim_output_tree(options.output, names);
   run.manifest().frame = "terrain";

@@ -315,7 +315,7 @@ std::vector<LookupAnswer> look_up_tiles(const TileStoreIndex& index, const TileL
     answers[n].distance_m = HUGE_VAL;
     const Query query{points[n], terrain_from_map * points[n]};
     if (query.in_map.allFinite() && query.in_terrain.allFinite())
-      order.emplace_back(lookup.number_of(place), n);
+      order.emplace_back(lookup.number_of(query), n);
   }
   std::sort(order.begin(), order.end());
   progress.begin("look-up", order.size());

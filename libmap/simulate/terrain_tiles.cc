@@ -301,7 +301,7 @@ void TerrainTilesOptions::check() const {
                                     .bound = "large enough for at most 1,000,000 pieces"});
 }
 
-std::vector<XyTile> terrain_pieces(const TerrainTilesOptions& options) {
+std::vector<XyTile> terrain_tiles(const TerrainTilesOptions& options) {
   options.check();
   std::vector<XyTile> tiles;
   for (std::int64_t i = 0; cells_of_tile(i, options.size_x_m, options).count() > 0; ++i)

@@ -87,7 +87,7 @@ struct TerrainTilesOptions {
 void bind(ParameterTable& table, TerrainTilesOptions& options);
 
 // Pieces that cover the terrain, ascending. Throws Error as TerrainTilesOptions::check does.
-std::vector<XyTile> terrain_pieces(const TerrainTilesOptions& options);
+std::vector<XyTile> terrain_tiles(const TerrainTilesOptions& options);
 
 // Points of one piece with normals, m, z up. Each square cell of the plan with side `spacing_m`
 // contains one point per spacing_m^2 of its surface, randomly rounded up or down, at least one. A

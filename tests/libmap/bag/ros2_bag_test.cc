@@ -193,7 +193,7 @@ BagContent sample_content() {
   BagContent content{.stamp_s = 1600000000.25};
   content.transforms = {{"map", "terrain", libmap::make_pose_from_rpy({1, 2, 3}, {0, 0, 1})}};
   content.clouds = {{"/map", "terrain", small_cloud()}};
-  content.places = {{"/footholds",
+  content.targets = {{"/footholds",
                      "/foothold_poses",
                      "terrain",
                      0.08,

@@ -130,7 +130,7 @@ TEST(RockyTerrain, HeightsOfRocksFollowThePowerLaw) {
 TEST(TerrainTiles, MeetAtTheirSeams) {
   const TerrainTilesOptions options = small_pieces();
   const RockyTerrain terrain(options.terrain, rectangle(0, 0, 3, 2));
-  for (const XyTile& piece : terrain_pieces(options)) {
+  for (const XyTile& piece : terrain_tiles(options)) {
     const PointCloud cloud = sample_tile(options, piece);
     for (const Eigen::Vector3d& p : cloud.positions) {
       EXPECT_EQ(p.z(), terrain.height(p.x(), p.y()));
@@ -188,18 +188,18 @@ TEST(TerrainTiles, CoverThePlanAndTheSlopes) {
 
 TEST(TerrainTiles, AreAsManyAsTheSizeNeeds) {
   TerrainTilesOptions options = small_pieces();
-  EXPECT_EQ(terrain_pieces(options).size(), 6U);
+  EXPECT_EQ(terrain_tiles(options).size(), 6U);
   options.size_x_m = 3.02;
-  EXPECT_EQ(terrain_pieces(options).size(), 8U);
+  EXPECT_EQ(terrain_tiles(options).size(), 8U);
   options.size_x_m = 0.3;
-  EXPECT_EQ(terrain_pieces(options).size(), 2U);
+  EXPECT_EQ(terrain_tiles(options).size(), 2U);
 }
 
 TEST(TerrainTiles, ImpossibleOptionsAreNamed) {
   const auto field_of = [](const auto& change) {
     TerrainTilesOptions options = small_pieces();
     change(options);
-    return error_of([&] { terrain_pieces(options); }).context().field;
+    return error_of([&] { terrain_tiles(options); }).context().field;
   };
   EXPECT_EQ(field_of([](auto& o) { o.spacing_m = 0.0; }), "spacing_m");
   EXPECT_EQ(field_of([](auto& o) { o.tile_m = 0.001; }), "piece_m");
