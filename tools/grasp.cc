@@ -500,8 +500,9 @@ int main(int argc, char** argv) {
   command.option("--scenes", "FOLDER", options.scenes.folder,
                  "folder for scenes of one trial per location, with nearly the median force: "
                  "FOLDER/PLACE.ply, by the column 'place' or the row");
-  command.option("--scene-locations", "PLACES", options.scenes.locations,
+  command.option("--scene-locations", "LOCATIONS", options.scenes.locations,
                  "locations of the scenes; default: all");
+  command.renamed_flag("--scene-of", "--scene-locations");
   for (const char* key : {"friction", "asperity-min", "asperity-max", "engagement-rate", "drag"}) {
     std::string name = key;
     std::replace(name.begin(), name.end(), '-', '_');

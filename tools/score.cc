@@ -461,6 +461,7 @@ int main(int argc, char** argv) {
   command.option("--max-points-in-memory", "N", options.max_points_in_memory,
                  "for a tile store: maximum number of points in memory, about 250 bytes each; the "
                  "map does not depend on it");
+  command.renamed_flag("--points-at-once", "--max-points-in-memory");
   command.flag("--append", options.append,
                "score the tiles affected by files that were added to the terrain's folder");
   bind(command.parameters(), options);

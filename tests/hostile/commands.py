@@ -71,7 +71,7 @@ USES = [
     use(f"score {{x}} {SCORE} -o out.pcd", "cloud", "terrain.pcd", main=True),
     use("score {x} --method thesis --voxel-size 0.03 -o out.vtp", "cloud", "terrain.pcd"),
     use(f"score {{x}} {SCORE} --plane none --interpolation -o out.csv", "cloud", "terrain.pcd"),
-    use(f"score {{x}} {SCORE} --tile-size 0.2 --points-at-once 1000 --force -o out.tiles", "cloud", "terrain.pcd", main=True),
+    use(f"score {{x}} {SCORE} --tile-size 0.2 --max-points-in-memory 1000 --force -o out.tiles", "cloud", "terrain.pcd", main=True),
     use(f"score {{x}} {SCORE} --plane none -o out.pcd", "dem", "dem.tif", main=True),
     use(f"score {{x}} {SCORE} --tile-size 0.2 --force -o out.tiles", "dem", "dem.tif"),
     use("convert {x} -o out.ply", "dem", "dem.tif", main=True),

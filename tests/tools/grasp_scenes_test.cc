@@ -59,7 +59,7 @@ TEST(GraspScenes, OneForEachPlace) {
 
 TEST(GraspScenes, OfListedPlacesOrRows) {
   make_site();
-  ASSERT_TRUE(succeeded(grasp({"--scenes", "scenes", "--scene-of", "P2,A/B"})));
+  ASSERT_TRUE(succeeded(grasp({"--scenes", "scenes", "--scene-locations", "P2,A/B"})));
   EXPECT_EQ(names_in("scenes"), (std::vector<std::string>{"A_B.ply", "P2.ply"}));
   graspmap_test::write_text(scratch("points.csv"), "x,y,z\n0,0,0\n0.2,0,0\n");
   ASSERT_TRUE(succeeded(grasp({"--scenes", "rows", "--scene-of", "2"})));
@@ -70,12 +70,12 @@ TEST(GraspScenes, OfListedPlacesOrRows) {
 
 TEST(GraspScenes, BadInputIsOneLineAndWritesNothing) {
   make_site();
-  EXPECT_TRUE(bad_input(grasp({"--scenes", "scenes", "--scene-of", "P3"}),
-                        {"points.csv", "--scene-of", "P3", "did you mean"}));
-  EXPECT_TRUE(bad_input(grasp({"--scene-of", "P1"}), {"--scene-of", "--scenes"}));
+  EXPECT_TRUE(bad_input(grasp({"--scenes", "scenes", "--scene-locations", "P3"}),
+                        {"points.csv", "--scene-locations", "P3", "did you mean"}));
+  EXPECT_TRUE(bad_input(grasp({"--scene-locations", "P1"}), {"--scene-locations", "--scenes"}));
   graspmap_test::write_text(scratch("points.csv"), "place,x,y,z\nA/B,0,0,0\nA:B,0.2,0,0\n");
   EXPECT_TRUE(bad_input(grasp({"--scenes", "scenes"}), {"points.csv", "rows 1 and 2", "A:B"}));
-  EXPECT_TRUE(succeeded(grasp({"--scenes", "one", "--scene-of", "A:B"})));
+  EXPECT_TRUE(succeeded(grasp({"--scenes", "one", "--scene-locations", "A:B"})));
   std::string many = "x,y,z\n";
   for (int n = 0; n < 101; ++n) many += "0,0,0\n";
   graspmap_test::write_text(scratch("points.csv"), many);
@@ -92,7 +92,7 @@ TEST(GraspScenes, BadInputIsOneLineAndWritesNothing) {
 TEST(GraspScenes, AreDrawnAndShownInTheReport) {
   make_site();
   std::filesystem::create_directory(scratch("run"));
-  ASSERT_TRUE(succeeded(grasp({"--scenes", "run/scenes", "--scene-of", "P1"})));
+  ASSERT_TRUE(succeeded(grasp({"--scenes", "run/scenes", "--scene-locations", "P1"})));
   ASSERT_TRUE(succeeded(graspmap({"render", "run/scenes/P1.ply", "--view", "oblique", "--width",
                                   "400", "--height", "300", "-o", "p.png"})));
   // Another mesh in the folder is not a scene.

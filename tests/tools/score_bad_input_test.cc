@@ -216,8 +216,8 @@ TEST_F(ScoreBadInput, FlagsOutOfTheirBounds) {
   EXPECT_TRUE(bad_input(score({"terrain.pcd", "--up", "0,0,0"}), {}));
   EXPECT_TRUE(bad_input(score({"terrain.pcd", "--up", "0,0,1", "--plane", "none"}),
                         {"--up is 0,0,1", "--plane none"}));
-  EXPECT_TRUE(bad_input(score({"terrain.pcd", "--points-at-once", "5"}),
-                        {"--points-at-once", "tile store"}));
+  EXPECT_TRUE(bad_input(score({"terrain.pcd", "--max-points-in-memory", "5"}),
+                        {"--max-points-in-memory", "tile store"}));
   EXPECT_TRUE(bad_input(score({"terrain.pcd", "--threads", "-1"}), {"--threads is -1"}));
   EXPECT_TRUE(bad_input(score({"terrain.pcd", "--progress", "fancy"}), {"--progress is fancy"}));
   EXPECT_TRUE(bad_input(score({"terrain.pcd", "--graspability-threshold", "1.5"}),

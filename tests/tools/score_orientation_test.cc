@@ -78,7 +78,7 @@ TEST(ScoreOrientation, TileStoreHoldsTheSameMap) {
   write_block();
   const Words surface = {"--orientation", "surface"};
   ASSERT_TRUE(succeeded(score("whole.pcd", surface)));
-  ASSERT_TRUE(succeeded(score("m.tiles", joined(surface, {"--points-at-once", "2000"}))));
+  ASSERT_TRUE(succeeded(score("m.tiles", joined(surface, {"--max-points-in-memory", "2000"}))));
   ASSERT_TRUE(succeeded(graspmap({"convert", "m.tiles", "-o", "merged.pcd"})));
   EXPECT_EQ(content("merged.pcd"), content("whole.pcd"));
 }

@@ -151,23 +151,23 @@ TEST_P(ScoreStore, IsTheMapInOneFile) {
 
 INSTANTIATE_TEST_SUITE_P(
     All, ScoreStore,
-    testing::Values(Case{"one_piece", {}, {}}, Case{"strips", {}, {"--threads", "1"}, 4},
-                    Case{"mixed_pieces", {}, {"--threads", "2"}, 3, false},
-                    Case{"shares", {}, {}, 2, true, 3},
-                    Case{"more_shares_than_tiles", {"--tile-size", "0.7"}, {}, 1, true, 6},
-                    Case{"one_tile", {"--tile-size", "50"}, {}},
-                    Case{"small_tiles", {"--tile-size", "0.05"}, {}, 2, false},
-                    Case{"few_points_at_once", {}, {"--points-at-once", "2000"}, 2, false},
-                    Case{"parts_of_a_tile", {"--tile-size", "5"}, {"--points-at-once", "1000"}},
-                    Case{"no_plane", {"--plane", "none"}, {"--points-at-once", "5000"}, 3},
-                    Case{"climblab", {"--method", "climblab"}, {"--points-at-once", "1000"}, 2},
-                    Case{"no_convexity", {"--curvature-radius", "0"}, {}, 1, true, 2},
-                    Case{"wide_curvature",
-                         {"--curvature-radius", "0.28"},
-                         {"--points-at-once", "1000"},
-                         2,
-                         false},
-                    Case{"input_frame", {"--frame", "input"}, {}, 2}),
+    testing::Values(
+        Case{"one_piece", {}, {}}, Case{"strips", {}, {"--threads", "1"}, 4},
+        Case{"mixed_pieces", {}, {"--threads", "2"}, 3, false}, Case{"shares", {}, {}, 2, true, 3},
+        Case{"more_shares_than_tiles", {"--tile-size", "0.7"}, {}, 1, true, 6},
+        Case{"one_tile", {"--tile-size", "50"}, {}},
+        Case{"small_tiles", {"--tile-size", "0.05"}, {}, 2, false},
+        Case{"few_points_at_once", {}, {"--max-points-in-memory", "2000"}, 2, false},
+        Case{"parts_of_a_tile", {"--tile-size", "5"}, {"--max-points-in-memory", "1000"}},
+        Case{"no_plane", {"--plane", "none"}, {"--points-at-once=5000"}, 3},
+        Case{"climblab", {"--method", "climblab"}, {"--max-points-in-memory", "1000"}, 2},
+        Case{"no_convexity", {"--curvature-radius", "0"}, {}, 1, true, 2},
+        Case{"wide_curvature",
+             {"--curvature-radius", "0.28"},
+             {"--max-points-in-memory", "1000"},
+             2,
+             false},
+        Case{"input_frame", {"--frame", "input"}, {}, 2}),
     [](const auto& one) { return std::string(one.param.name); });
 
 TEST(ScoreStoreTerrain, FarFromTheOrigin) {
@@ -175,7 +175,7 @@ TEST(ScoreStoreTerrain, FarFromTheOrigin) {
   for (const char* plane : {"fit", "none"}) {
     ASSERT_TRUE(succeeded(score("in", "whole.pcd", {"--plane", plane})));
     ASSERT_TRUE(succeeded(
-        score("in", "m.tiles", {"--plane", plane, "--points-at-once", "3000", "--force"})));
+        score("in", "m.tiles", {"--plane", plane, "--max-points-in-memory", "3000", "--force"})));
     EXPECT_EQ(merged("m.tiles"), content("whole.pcd")) << plane;
   }
 }
@@ -255,8 +255,8 @@ TEST(ScoreStoreOptions, WhatNeedsTheCloudInMemory) {
   EXPECT_TRUE(bad_input(score("in", "m.tiles", {"--interpolation"}), {"interpolation", "MAP.pcd"}));
   EXPECT_TRUE(bad_input(score("in", "m.pcd", {"--append"}), {"--append", ".tiles"}));
   EXPECT_TRUE(bad_input(score("in", "m.tiles", {"--force", "--tile", "1/2"}), {"--force"}));
-  EXPECT_TRUE(
-      bad_input(score("in", "m.tiles", {"--points-at-once", "0"}), {"--points-at-once", "0"}));
+  EXPECT_TRUE(bad_input(score("in", "m.tiles", {"--max-points-in-memory", "0"}),
+                        {"--max-points-in-memory", "0"}));
   EXPECT_FALSE(fs::exists(scratch("m.tiles")));
 }
 
@@ -290,7 +290,7 @@ TEST_F(ScoreStoreAgain, SecondRunScoresNothing) {
 TEST_F(ScoreStoreAgain, SharesAndThreadsGiveTheSameBytes) {
   ASSERT_TRUE(succeeded(score("in", "m.tiles", {"--threads", "1"})));
   ASSERT_TRUE(succeeded(score("in", "n.tiles", {"--tile", "2/2", "--threads", "3"})));
-  ASSERT_TRUE(succeeded(score("in", "n.tiles", {"--points-at-once", "3000"})));
+  ASSERT_TRUE(succeeded(score("in", "n.tiles", {"--max-points-in-memory", "3000"})));
   EXPECT_EQ(map_files("n.tiles"), map_files("m.tiles"));
   EXPECT_EQ(journal_lines("n.tiles"), 49u);
 }
@@ -413,7 +413,7 @@ bool score_killed(const IsTime& is_time) {
     setpgid(0, 0);
     if (chdir(folder.c_str()) != 0) _exit(1);
     execl(program.c_str(), "graspmap", "score", "in", "-o", "m.tiles", "--zero-plane", "-0.1",
-          "--tile-size", "0.2", "--points-at-once", "2500", "--quiet", nullptr);
+          "--tile-size", "0.2", "--max-points-in-memory", "2500", "--quiet", nullptr);
     _exit(1);
   }
   setpgid(child, child);
@@ -428,7 +428,7 @@ bool score_killed(const IsTime& is_time) {
 }
 
 TEST_F(ScoreStoreAgain, KilledAtAnyMoment) {
-  ASSERT_TRUE(succeeded(score("in", "n.tiles", {"--points-at-once", "2500"})));
+  ASSERT_TRUE(succeeded(score("in", "n.tiles", {"--max-points-in-memory", "2500"})));
   const auto files = map_files("n.tiles");
   fs::remove_all(scratch("m.tiles"));
   // Killed while it plans, then after more and more tiles; each run resumes the last one.
@@ -439,7 +439,7 @@ TEST_F(ScoreStoreAgain, KilledAtAnyMoment) {
     killed += score_killed([&] { return journal_lines("m.tiles") >= lines; }) ? 1 : 0;
   EXPECT_GE(killed, 5);
   EXPECT_FALSE(fs::exists(scratch("m.tiles/index.json")));
-  ASSERT_TRUE(succeeded(score("in", "m.tiles", {"--points-at-once", "2500"})));
+  ASSERT_TRUE(succeeded(score("in", "m.tiles", {"--max-points-in-memory", "2500"})));
   EXPECT_EQ(map_files("m.tiles"), files);
   // No completed tile was made again.
   EXPECT_EQ(journal_lines("m.tiles"), 49u);

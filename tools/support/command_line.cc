@@ -208,6 +208,8 @@ struct Command::Parts {
   std::optional<int> parse(int argc, char** argv);
   void work(const std::function<void(Run&)>& body);
   std::map<std::string, std::string> former_flags;
+  std::map<std::string, std::string> renamed_flags;  // flag by its earlier name
+  std::vector<std::string> with_current_flags(int argc, char** argv) const;
   std::optional<std::string> unknown_flag(int argc, char** argv) const;
   int usage_error(const std::string& message) const;
 };
@@ -234,6 +236,10 @@ void Command::output(std::string& path, const std::string& description, bool req
 
 void Command::former_flag(const std::string& name, const std::string& now) {
   parts_->former_flags[name] = now;
+}
+
+void Command::renamed_flag(const std::string& earlier, const std::string& now) {
+  parts_->renamed_flags[earlier] = now;
 }
 
 void Command::flag(const std::string& name, bool& value, const std::string& description) {
@@ -352,6 +358,19 @@ libmap::Error Command::Parts::placed(const libmap::Error& error) const {
   return is_configured ? error.in_file(config_file().string()) : error;
 }
 
+// Returns the arguments with earlier names of flags replaced, up to "--".
+std::vector<std::string> Command::Parts::with_current_flags(int argc, char** argv) const {
+  std::vector<std::string> words(argv, argv + argc);
+  for (std::string& word : words) {
+    if (word == "--") break;
+    const std::size_t end = std::min(word.find('='), word.size());
+    if (const auto renamed = renamed_flags.find(word.substr(0, end));
+        renamed != renamed_flags.end())
+      word.replace(0, end, renamed->second);
+  }
+  return words;
+}
+
 // Returns an error text for the first unknown or former long flag. CLI11 alone would report missing
 // arguments first.
 std::optional<std::string> Command::Parts::unknown_flag(int argc, char** argv) const {
@@ -431,7 +450,10 @@ void Command::Parts::work(const std::function<void(Run&)>& body) {
 int Command::run(int argc, char** argv, const std::function<void(Run&)>& body) {
   const std::string& name = parts_->name;
   try {
-    if (const auto exit_code = parts_->parse(argc, argv)) return *exit_code;
+    std::vector<std::string> words = parts_->with_current_flags(argc, argv);
+    std::vector<char*> arguments;
+    for (std::string& word : words) arguments.push_back(word.data());
+    if (const auto exit_code = parts_->parse(argc, arguments.data())) return *exit_code;
     parts_->work(body);
     return 0;
   } catch (const UsageError& error) {

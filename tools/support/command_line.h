@@ -53,6 +53,8 @@ class Command {
               const std::string& description, bool required = false);
   // Declares a flag of earlier versions; its use is an error that names `now` instead.
   void former_flag(const std::string& name, const std::string& now);
+  // Declares the earlier name of a flag. It is still read, but not shown by --help.
+  void renamed_flag(const std::string& earlier, const std::string& now);
   void option(const std::string& name, const std::string& value_name,
               std::vector<std::string>& values, const std::string& description);
 
