@@ -87,7 +87,7 @@ Eigen::Vector2d moved_pixel(const DepthEdge& edge, const EdgeFrame& frame, const
   return edge.pixel + frame.focal_px.cwiseProduct(direction.hnormalized() - edge.ray);
 }
 
-// Of strong edges near 1, of weak texture and of noise near 0.
+// Near 1 for strong edges, near 0 for weak texture and noise.
 cv::Mat1f response_of(const cv::Mat1f& gray, bool along_rows) {
   cv::Mat1f gradient;
   cv::Sobel(gray, gradient, CV_32F, along_rows ? 1 : 0, along_rows ? 0 : 1, 3, 0.125);
@@ -112,8 +112,8 @@ cv::Mat1f gray_of(const ColorImage& color, cv::Size size) {
   return reduced;
 }
 
-// Whether the surface at a pixel ends there: beyond pixels without depth it is farther away by a
-// jump, and on the other side the surface goes on.
+// Returns true if the surface at a pixel ends there: beyond pixels without depth it is farther away
+// by a jump, and on the other side the surface goes on.
 bool is_edge(const DepthImage& depth, int x, int y, int dx, int dy) {
   const auto depth_at = [&](int column, int row) {
     return column < 0 || row < 0 || column >= depth.width || row >= depth.height

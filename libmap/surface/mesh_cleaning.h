@@ -94,8 +94,9 @@ MeshCleaningResult clean_mesh(const TriangleMesh& mesh, const MeshCleaningOption
 MeshDecimation decimate_mesh(TriangleMesh& mesh, double max_error_m,
                              Progress& progress = no_progress());
 
-// The same bound after one round: places that exceed it get the original triangles back, which
-// overlap those around them. A quarter of the time; the result is no manifold. For collision.
+// Simplification with this bound in one round: places that exceed it get the original triangles
+// back, which overlap those around them. A quarter of the time; the result is no manifold. For
+// collision.
 MeshDecimation decimate_triangles(TriangleMesh& mesh, double max_error_m);
 
 }  // namespace libmap

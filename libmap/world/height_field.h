@@ -42,7 +42,7 @@ struct HeightField {
 // The lowest surface that faces up. Throws Error: no triangle faces up, or more than 2^26 nodes.
 HeightField make_height_field(const TriangleMesh& mesh, const HeightFieldOptions& options);
 
-// Whether a triangle is above or below a cell that is left out.
+// Returns true if a triangle is above or below a cell that is left out.
 bool is_above_left_out(const HeightField& field, const TriangleMesh& mesh,
                        const Triangle& triangle);
 

@@ -8,7 +8,7 @@ namespace libmap {
 
 namespace {
 
-// Of a camera without limits: simulators need both.
+// Clip distances of a camera without limits: simulators need both.
 constexpr double default_near_m = 0.01;
 constexpr double default_far_m = 100.0;
 constexpr double camera_rate_hz = 15.0;

@@ -54,7 +54,8 @@ struct WorldModelInput {
 };
 
 // Makes the collision shapes of a model, and writes its meshes to `folder`, unless that is empty.
-// The same bytes for any number of threads. Throws Error: no triangle, or none that faces up.
+// Output bytes do not depend on the number of threads. Throws Error: no triangle, or none that
+// faces up.
 WorldModel write_world_model(const std::filesystem::path& folder, const WorldModelInput& input,
                              const WorldScores& scores, const WorldOptions& options,
                              WorldReport& report);

@@ -1,4 +1,4 @@
-// What the benchmarks of scoring share: timing with repetitions, and a table of the whole run.
+// Shared code of the scoring benchmarks: timing with repetitions, and a table of the whole run.
 #pragma once
 
 #include <benchmark/benchmark.h>
@@ -57,7 +57,7 @@ Times time_iterations(benchmark::State& state, const Work& work) {
   return times;
 }
 
-// What the author's program takes of one processor, if it was measured.
+// Processor time of the author's program, if it was measured.
 inline void set_author_ms(benchmark::State& state, double author_ms) {
   if (author_ms > 0.0) state.counters["author_ms"] = author_ms;
 }

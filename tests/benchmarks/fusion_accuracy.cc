@@ -90,7 +90,7 @@ Baselines make_baselines(const libmap::ScanSource& scan, const libmap::Trajector
 // The mesh lies in the frame of the true poses turned by -90 degrees about z.
 Pose mesh_from_truth() { return libmap::make_pose_from_rpy({0, 0, 0}, {0, 0, -90}); }
 
-// Of the cleaned surface with cells as wide as the voxels, evenly spread.
+// Evenly spread samples of the cleaned surface with cells as wide as the voxels.
 Points surface_of(const libmap::PointCloud& cloud) {
   libmap::SurfaceReconstructionOptions options;
   options.cell_size_m = voxel_size_m;
@@ -107,7 +107,8 @@ struct Truth {
   Points seen;  // of its surface, by the true cameras
 };
 
-// Whether a camera sees the sample: in the image, near enough, nothing of the mesh before it.
+// Returns true if a camera sees the sample: in the image, near enough, nothing of the mesh before
+// it.
 bool sees(const libmap::Camera& camera, const Pose& mesh_from_camera,
           const libmap::RayCaster& caster, const Eigen::Vector3d& sample) {
   constexpr double sight_margin =

@@ -181,7 +181,7 @@ Seeds frame_list_seeds() {
       "1.0 0 0 0 0 0 0 1\n2.0 0.5 0 0 0 0 0 1\n"};
 }
 
-// The same in one list, of which neither column is known to be the depth.
+// Both columns in one list, where neither is known to be the depth.
 bool run_frame_pairs(std::string_view bytes) {
   static const ScratchFile file("pairs/associations.txt");
   file.write(bytes);
@@ -272,7 +272,7 @@ bool run_poses(std::string_view bytes) {
   });
 }
 
-// Of formats that are only read.
+// Formats that are only read.
 std::string foreign_poses(libmap::TrajectoryFormat format) {
   switch (format) {
     case libmap::TrajectoryFormat::open3d:

@@ -18,7 +18,7 @@ std::vector<std::string> texts(SQLite::Database& database, const std::string& qu
   return list;
 }
 
-// What RTAB-Map keeps of its last map.
+// Last map as stored by RTAB-Map.
 void store_map(const std::filesystem::path& path) {
   using libmap::MatrixElement;
   const auto matrix = [](int rows, int columns, int channels, MatrixElement element,

@@ -1,4 +1,4 @@
-// What the fuzz targets share.
+// Shared code of the fuzz targets.
 #pragma once
 
 #include <cstddef>
@@ -24,10 +24,10 @@ std::vector<FuzzTarget> map_targets();
 std::vector<FuzzTarget> feature_targets();
 std::vector<FuzzTarget> bag_targets();
 
-// What errors name as the file.
+// File name in errors.
 inline constexpr const char* file_name = "bytes";
 
-// Whether `read` came to its end.
+// Returns true if `read` completed.
 template <typename Read>
 bool accepts(const Read& read) {
   try {
@@ -53,7 +53,7 @@ std::string with_choice(std::size_t choice, const std::string& bytes);
 // Several files in one input, form feeds between: the bytes up to the next one.
 std::string_view take_file(std::string_view& bytes);
 
-// What `write` leaves in a file of that name.
+// Returns the content that `write` leaves in a file of that name.
 std::string written(const std::string& name,
                     const std::function<void(const std::filesystem::path&)>& write);
 

@@ -129,7 +129,7 @@ class Docstrings(unittest.TestCase):
                     self.assertIn("Error", entries(found["Raises"]))
 
     def test_parameters(self):
-        """Those of the signature, in its order, with their types."""
+        """Parameters of the signature, in its order, with their types."""
         for name, value in documented():
             if not inspect.isfunction(value) or name == "Result.as_dict":
                 continue
@@ -146,7 +146,7 @@ class Docstrings(unittest.TestCase):
                 self.assertEqual("Returns" in found, returns != "None")
 
     def test_parameters_of_classes(self):
-        """Those of the stub's constructors and methods."""
+        """Parameters of the stub's constructors and methods."""
         tree = ast.parse((PYTHON / "graspmap/_core.pyi").read_text(encoding="utf-8"))
         count = 0
         for kind in (node for node in tree.body if isinstance(node, ast.ClassDef)):

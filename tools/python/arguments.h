@@ -60,7 +60,7 @@ struct ObjectArgument {
   static Kept<Object> from(const py::object& given, const std::string& name) {
     if (py::isinstance<Object>(given)) return {given.cast<std::shared_ptr<Object>>()};
     const auto type_name = py::type::of<Object>().attr("__name__").template cast<std::string>();
-    throw wrong_value(given, name, "of class " + type_name);
+    throw wrong_value(given, name, "an object of class " + type_name);
   }
 };
 

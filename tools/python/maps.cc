@@ -65,7 +65,7 @@ py::dict score(const PointCloud& terrain, const std::optional<std::string>& scen
   return made;
 }
 
-// Of each field; NaN where nothing was found.
+// Values of each field; NaN where nothing was found.
 py::dict values_of(const PointCloud& map, const std::vector<libgtd::LookupAnswer>& answers) {
   py::dict dict;
   for (std::size_t field = 0; field < map.fields.size(); ++field)

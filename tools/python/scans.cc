@@ -34,7 +34,7 @@ namespace {
 constexpr PoseSource sources[] = {PoseSource::optimized, PoseSource::odometry,
                                   PoseSource::ground_truth};
 
-// Of a field of each pose.
+// Column of a field of each pose.
 template <typename Number, typename FieldOf>
 py::array pose_view(const py::object& self, Shape row, Shape strides, const FieldOf& field_of) {
   const libmap::Trajectory& poses = self.cast<Poses&>().poses;

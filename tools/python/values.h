@@ -1,4 +1,4 @@
-// What passes between Python and the libraries: arrays, options, errors, progress.
+// Conversions between Python and the libraries: arrays, options, errors, progress.
 #pragma once
 
 #include <pybind11/numpy.h>

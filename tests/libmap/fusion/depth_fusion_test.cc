@@ -367,7 +367,7 @@ TEST(DepthFusion, RealScanLiesOnItsTrueGround) {
   EXPECT_LT(rms(heights), 0.012);
 }
 
-// What no option sets is the sensor's.
+// Properties that no option sets are the sensor's.
 TEST(DepthSensorModel, FillsDefaultsAlone) {
   const SensorModel model{.noise_m = 0.001, .noise_of_square = 0.002, .near_m = 0.5, .far_m = 3.0};
   DepthSensor sensor;

@@ -156,7 +156,7 @@ TEST(EdgeAgreement, TheSameForAnyNumberOfThreads) {
   EXPECT_EQ(one.color_from_depth.matrix(), three.color_from_depth.matrix());
 }
 
-// What cannot be compared is not displaced.
+// Images that cannot be compared are not displaced.
 TEST(EdgeAgreement, TooLittleIsNoDisplacement) {
   const Pose wrong = displace_vertices({0.05, 0, 0}, {0, 3, 0});
   EXPECT_FALSE(check_edge_agreement(MemoryScan()).is_displaced());

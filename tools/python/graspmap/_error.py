@@ -10,7 +10,7 @@ class Error(Exception):
     Attributes
     ----------
     reason : str
-        What is wrong.
+        Description of the fault.
     file : str
         Path of the file.
     field : str

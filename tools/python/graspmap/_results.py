@@ -59,7 +59,7 @@ class RefineResult(_fields.RefineFields, Result):
     skipped : list of (int, str)
         Nodes whose images could not be used, and why.
     stages : list of dict
-        Of each stage: name, rejected, seconds, figures; held_out_matches and held_out_surfaces
+        Entry of each stage: name, rejected, seconds, figures; held_out_matches and held_out_surfaces
         (before, after); trajectory_rmse_m and trajectory_rotation_error_deg of a scan with truth.
     findings : list of str
         Findings about the sensor.

@@ -34,7 +34,7 @@ def options(stage: str) -> list[dict[str, Any]]:
     Returns
     -------
     list of dict
-        Of each option: key, type, default, choices, description.
+        Entry of each option: key, type, default, choices, description.
 
     Raises
     ------
