@@ -18,6 +18,8 @@ namespace {
 constexpr double min_height_m = 1e-5;
 constexpr double max_depth_of_radius = 1.5;
 constexpr double thickness_share = 0.5;
+// MuJoCo rejects flatter pieces.
+constexpr double min_depth_m = 2e-4;
 constexpr std::size_t max_outline = 8;
 // Rays begin this far behind the surface.
 constexpr double ray_start_m = 1e-6;
@@ -106,10 +108,11 @@ Facet grow_facet(const TriangleMesh& mesh, const std::vector<HalfEdge>& opposite
 }  // namespace
 
 ConvexPieces make_convex_pieces(const TriangleMesh& mesh, const std::vector<bool>& marks,
+                                const TriangleMesh& body, double body_error_m,
                                 double max_deviation_m, double max_depth_m) {
   ConvexPieces result;
   if (std::none_of(marks.begin(), marks.end(), [](bool mark) { return mark; })) return result;
-  const RayCaster rays(mesh);
+  const RayCaster rays(body);
   const std::vector<HalfEdge> opposite = opposites_of(mesh);
   std::vector<bool> free = marks;
   std::vector<double> radius_m(mesh.triangles.size());
@@ -135,8 +138,9 @@ ConvexPieces make_convex_pieces(const TriangleMesh& mesh, const std::vector<bool
     for (const std::uint32_t v : corners)
       center += mesh.vertices[v] / static_cast<double>(corners.size());
     const Eigen::Vector3d behind = -facet.normal.normalized();
-    if (const auto hit = rays.cast(center, behind, ray_start_m + facet.bulge_m))
+    if (const auto hit = rays.cast(center, behind, ray_start_m + facet.bulge_m + body_error_m))
       depth_m = std::min(depth_m, thickness_share * hit->distance);
+    depth_m = std::max(depth_m, min_depth_m);
     ConvexPiece piece;
     piece.center = (center / center_unit_m).array().round() / std::round(1 / center_unit_m);
     for (const std::uint32_t v : corners)

@@ -28,6 +28,7 @@ struct ConvexPieces {
 // degrees. Triangles lower than 10 micrometers have no piece. The mesh must be an oriented
 // manifold.
 ConvexPieces make_convex_pieces(const TriangleMesh& mesh, const std::vector<bool>& marks,
+                                const TriangleMesh& body, double body_error_m,
                                 double max_deviation_m, double max_depth_m);
 
 }  // namespace libmap

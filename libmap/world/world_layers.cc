@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <unordered_set>
 #include <utility>
 
 #include "libmap/core/parallel.h"
@@ -24,6 +25,20 @@ Color fourth(const Color& a, const Color& b, const Color& c) {
   for (std::size_t k = 0; k < 3; ++k)
     color[k] = static_cast<std::uint8_t>(std::clamp(b[k] + c[k] - a[k], 0, 255));
   return color;
+}
+
+// MuJoCo rejects meshes in which two triangles run along an edge in the same sense: the later one
+// gets vertices of its own.
+void detach_repeated_edges(TriangleMesh& mesh) {
+  std::unordered_set<std::uint64_t> edges;
+  const auto key = [](const Triangle& t, std::size_t k) {
+    return std::uint64_t{t[k]} << 32U | t[(k + 1) % 3];
+  };
+  for (Triangle& t : mesh.triangles) {
+    if (edges.contains(key(t, 0)) || edges.contains(key(t, 1)) || edges.contains(key(t, 2)))
+      for (std::uint32_t& v : t) v = append_vertex_between(mesh, v, v, 0.0);
+    for (std::size_t k = 0; k < 3; ++k) edges.insert(key(t, k));
+  }
 }
 
 }  // namespace
@@ -71,6 +86,7 @@ TexturedMesh page_of(const TexturedMesh& model, std::int32_t page) {
     if (keep[t]) result.texture_coordinates.push_back(model.texture_coordinates[t]);
   }
   result.mesh = select_triangles(model.mesh, keep);
+  detach_repeated_edges(result.mesh);
   result.page_of_triangle.assign(result.mesh.triangles.size(), page == no_page ? no_page : 0);
   if (page != no_page) result.pages.push_back(model.pages[static_cast<std::size_t>(page)]);
   return result;

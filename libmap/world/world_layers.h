@@ -14,7 +14,8 @@ namespace libmap {
 // centers bilinear interpolation is that of the colors. Without colors there are no pages.
 TexturedMesh bake_vertex_colors(TriangleMesh mesh);
 
-// The triangles of one page (no_page: without texture), with this page alone.
+// The triangles of one page (no_page: without texture), with this page alone. No two of them run
+// along an edge in the same sense.
 TexturedMesh page_of(const TexturedMesh& model, std::int32_t page);
 
 struct ColoredMesh {

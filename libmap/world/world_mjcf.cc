@@ -119,9 +119,10 @@ void add_world_mjcf(const WorldScene& scene, XmlWriter& xml) {
 std::string to_mjcf(const WorldScene& scene) {
   XmlWriter xml(scene.notes);
   xml.element("mujoco", {{"model", scene.name}}, [&] {
-    xml.element(
-        "compiler",
-        {{"angle", "degree"}, {"meshdir", world_mesh_folder}, {"texturedir", world_mesh_folder}});
+    xml.element("compiler", {{"angle", "degree"},
+                             {"balanceinertia", "true"},
+                             {"meshdir", world_mesh_folder},
+                             {"texturedir", world_mesh_folder}});
     xml.element("option", {{"gravity", gravity_text(scene.options)}});
     xml.element("default", {}, [&] {
       xml.element("mesh", {{"scale", number_text(Eigen::Vector3d::Constant(piece_unit_m))}});

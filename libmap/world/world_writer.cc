@@ -132,13 +132,13 @@ std::vector<WorldVisual> write_scores(const fs::path& folder, const std::string&
   return visuals;
 }
 
-ConvexPieces pieces_of(const TriangleMesh& collision, const HeightField& field,
-                       const WorldOptions& options) {
+ConvexPieces pieces_of(const TriangleMesh& collision, const TriangleMesh& visual,
+                       const HeightField& field, const WorldOptions& options) {
   std::vector<bool> marks(collision.triangles.size());
   for (std::size_t t = 0; t < marks.size(); ++t)
     marks[t] = is_above_left_out(field, collision, collision.triangles[t]);
-  return make_convex_pieces(collision, marks, bulge_share * options.collision_error_m,
-                            options.piece_depth_m);
+  return make_convex_pieces(collision, marks, visual, options.collision_error_m,
+                            bulge_share * options.collision_error_m, options.piece_depth_m);
 }
 
 }  // namespace
@@ -182,7 +182,7 @@ WorldModel write_world_model(const fs::path& folder, const WorldModelInput& inpu
                    .field = make_height_field(input.surface, options.field),
                    .pieces = {}};
   const CollisionMesh collision = make_collision_mesh(input.visual.mesh, options.collision_error_m);
-  ConvexPieces pieces = pieces_of(collision.mesh, model.field, options);
+  ConvexPieces pieces = pieces_of(collision.mesh, input.visual.mesh, model.field, options);
   model.pieces = std::move(pieces.pieces);
   model.visuals = write_visuals(meshes, input.name, input.visual);
   model.graspability = write_scores(meshes, input.name, input.visual.mesh, scores, report);

@@ -115,8 +115,10 @@ TEST(ConvexPieces, AreBehindTheSurface) {
     return libmap::area_normal(ball, t).norm() < 1e-12;
   });
   const std::vector<bool> marks(ball.triangles.size(), true);
-  const libmap::ConvexPieces one_by_one = libmap::make_convex_pieces(ball, marks, 0.0, 0.02);
-  const libmap::ConvexPieces pairs = libmap::make_convex_pieces(ball, marks, 0.001, 0.02);
+  const libmap::ConvexPieces one_by_one =
+      libmap::make_convex_pieces(ball, marks, ball, 0.0, 0.0, 0.02);
+  const libmap::ConvexPieces pairs =
+      libmap::make_convex_pieces(ball, marks, ball, 0.0, 0.001, 0.02);
   EXPECT_LT(pairs.pieces.size(), 0.7 * static_cast<double>(ball.triangles.size()));
   EXPECT_LE(pairs.deviation_m, 0.001);
   for (const libmap::ConvexPieces* pieces : {&one_by_one, &pairs}) {
@@ -139,7 +141,7 @@ TEST(ConvexPieces, StayInsideThinWalls) {
   for (libmap::Triangle& t : back.triangles) std::swap(t[0], t[1]);
   const TriangleMesh wall = join_meshes(square_mesh(0.004, 0.1), back);
   for (const libmap::ConvexPiece& piece :
-       libmap::make_convex_pieces(wall, {true, true, true, true}, 0.001, 0.02).pieces)
+       libmap::make_convex_pieces(wall, {true, true, true, true}, wall, 0.0, 0.001, 0.02).pieces)
     EXPECT_NEAR((piece.center + piece.corners_m.back()).z(), 0.002, 1e-5);
 }
 
