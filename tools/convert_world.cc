@@ -67,12 +67,12 @@ libmap::Pose rig_pose(const std::string& text, const libmap::TriangleMesh& mesh)
   if (text != "auto") return parse_transform(text, "--rig-pose");
   constexpr double height_m = 0.25;
   const libmap::Bounds3d bounds = libmap::bounds_of(mesh.vertices);
-  Eigen::Vector3d place = 0.5 * (bounds.min + bounds.max);
-  place.z() = bounds.max.z() + 1.0;
-  const auto hit = libmap::RayCaster(mesh).cast(place, -Eigen::Vector3d::UnitZ());
+  Eigen::Vector3d above = 0.5 * (bounds.min + bounds.max);
+  above.z() = bounds.max.z() + 1.0;
+  const auto hit = libmap::RayCaster(mesh).cast(above, -Eigen::Vector3d::UnitZ());
   if (!hit) throw libmap::Error("no ground below the middle of the site", {.field = "--rig-pose"});
-  place.z() += height_m - hit->distance;
-  return libmap::make_pose(place, Eigen::Quaterniond::Identity());
+  above.z() += height_m - hit->distance;
+  return libmap::make_pose(above, Eigen::Quaterniond::Identity());
 }
 
 libmap::WorldRig read_world_rig(const WorldCommandOptions& options,
@@ -169,7 +169,7 @@ void write_world(const WorldCommandOptions& options, Run& run) {
                            .bound = fmt::format(">= half of {}", scores.points.size())});
     run.add_results({{"models", scene.models.size()}, {"footholds", scene.footholds.size()}});
     run.add_results(libmap::described(report));
-    run.say(
+    run.info(
         "{} triangles for collision of {}, within {:.3g} mm; height field within {:.3g} mm, "
         "{} convex pieces for the rest",
         report.collision_triangles, report.visual_triangles, 1e3 * report.collision_deviation_m,

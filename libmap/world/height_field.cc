@@ -235,8 +235,8 @@ std::array<std::size_t, 4> HeightField::cells_of(
   const Eigen::Vector3d low = corners[0].cwiseMin(corners[1]).cwiseMin(corners[2]);
   const Eigen::Vector3d high = corners[0].cwiseMax(corners[1]).cwiseMax(corners[2]);
   const auto cell = [&](double x, double corner, std::size_t nodes) {
-    const double place = std::floor((x - corner) / cell_size_m);
-    return static_cast<std::size_t>(std::clamp(place, 0.0, static_cast<double>(nodes - 2)));
+    const double whole_cells = std::floor((x - corner) / cell_size_m);
+    return static_cast<std::size_t>(std::clamp(whole_cells, 0.0, static_cast<double>(nodes - 2)));
   };
   return {cell(low.x(), corner_m.x(), columns), cell(high.x(), corner_m.x(), columns),
           cell(low.y(), corner_m.y(), rows), cell(high.y(), corner_m.y(), rows)};
