@@ -160,9 +160,9 @@ std::string percent_text(const std::optional<double>& share) {
 
 void say_ground(const Analysis& analysis, const AnalyzeOptions& options, Run& run) {
   const libgtd::MapAnalysis& ground = analysis.ground;
-  run.say("{} of {} voxels evaluated: {:.3f} m2 of ground, {:.4f} m2 ({}) graspable",
-          ground.ground.voxels, ground.voxels, ground.ground.area_m2,
-          ground.ground.graspable_area_m2, percent_text(ground.ground.graspable_share()));
+  run.info("{} of {} voxels evaluated: {:.3f} m2 of ground, {:.4f} m2 ({}) graspable",
+           ground.ground.voxels, ground.voxels, ground.ground.area_m2,
+           ground.ground.graspable_area_m2, percent_text(ground.ground.graspable_share()));
   if (ground.column_coverage < 0.95)
     run.warn(
         "{}: only {:.0f} % of the columns inside the ground have a voxel, which splits regions "
@@ -170,15 +170,15 @@ void say_ground(const Analysis& analysis, const AnalyzeOptions& options, Run& ru
         options.map, 100.0 * ground.column_coverage);
   const libgtd::RegionReach& reach = analysis.reach;
   if (analysis.regions.regions.empty()) {
-    run.say("no graspable region");
+    run.info("no graspable region");
     return;
   }
-  run.say(
+  run.info(
       "{} regions, the largest {:.4f} m2; {:g} m strides: {} groups; one group from {:.3f} m on",
       analysis.regions.regions.size(), analysis.regions.regions.front().area_m2,
       options.reach.stride_m, reach.groups, *reach.joining_stride_m);
-  run.say("{} regions ({:.4f} m2) are reachable from {}", reach.reachable_regions,
-          reach.reachable_area_m2, options.start == no_start ? "region 1" : options.start);
+  run.info("{} regions ({:.4f} m2) are reachable from {}", reach.reachable_regions,
+           reach.reachable_area_m2, options.start == no_start ? "region 1" : options.start);
   if (reach.reachable_regions == 0)
     run.warn("the nearest region, {}, is {:.3f} m from the start", *reach.start_region + 1,
              reach.start_distance_m);
@@ -186,12 +186,12 @@ void say_ground(const Analysis& analysis, const AnalyzeOptions& options, Run& ru
 
 void say_change(const libgtd::MapChange& change, const AnalyzeOptions& options, Run& run) {
   const libgtd::ChangeSummary& evaluated = change.evaluated;
-  run.say("{} common voxels ({}), {} in MAP only, {} in OTHER only", change.pairs.size(),
-          change.matching == libgtd::VoxelMatching::lattice
-              ? std::string("same lattice")
-              : fmt::format("nearest within {:g} voxels", options.change.match_distance_voxels),
-          change.only_map.size(), change.only_other.size());
-  run.say(
+  run.info("{} common voxels ({}), {} in MAP only, {} in OTHER only", change.pairs.size(),
+           change.matching == libgtd::VoxelMatching::lattice
+               ? std::string("same lattice")
+               : fmt::format("nearest within {:g} voxels", options.change.match_distance_voxels),
+           change.only_map.size(), change.only_other.size());
+  run.info(
       "of {} evaluated in both: kappa {}, accuracy {}; graspable in both {}, in MAP only {}, in "
       "OTHER only {}",
       evaluated.graspable.size(),
@@ -201,9 +201,9 @@ void say_change(const libgtd::MapChange& change, const AnalyzeOptions& options, 
       percent_text(evaluated.graspable.accuracy().value()), evaluated.graspable.true_positives,
       evaluated.lost(), evaluated.gained());
   if (evaluated.difference.count > 0)
-    run.say("score, OTHER - MAP: mean {:+.3f}, mean absolute {:.3f}, rms {:.3f}",
-            evaluated.difference.mean, evaluated.difference.mean_absolute,
-            evaluated.difference.rms);
+    run.info("score, OTHER - MAP: mean {:+.3f}, mean absolute {:.3f}, rms {:.3f}",
+             evaluated.difference.mean, evaluated.difference.mean_absolute,
+             evaluated.difference.rms);
 }
 
 void note_results(const Analysis& analysis, const Comparison* comparison, Run& run) {

@@ -395,7 +395,7 @@ void calibrate(CalibrateOptions& options, Run& run) {
   note_results(photos, result, run);
   warn_of_weaknesses(result, run);
   const std::string said = summary(result, options);
-  run.say(said.substr(0, said.size() - 1));
+  run.info(said.substr(0, said.size() - 1));
   if (!options.report.empty())
     run.timed("report", [&] { write_report(photos, result, options, run); });
   run.write_text(options.output, libmap::to_yaml({options.name, result.camera}, said));

@@ -127,8 +127,8 @@ libmap::HeightFunction find_ground(const SpotCheckCommandOptions& options, EdgeD
   if (zero) return at_zero;
   check.plane = run.timed("ground", [&] { return fit_ground(shape, options.plane); });
   const libmap::Pose level_from_map = libmap::level_from_map(*check.plane);
-  run.say("ground: a plane tilted by {:.2f} deg, {} points, RMSE {:.1f} mm", check.plane->tilt_deg,
-          check.plane->inliers, 1e3 * check.plane->rmse_m);
+  run.info("ground: a plane tilted by {:.2f} deg, {} points, RMSE {:.1f} mm", check.plane->tilt_deg,
+           check.plane->inliers, 1e3 * check.plane->rmse_m);
   run.manifest().transforms.emplace_back("level_from_map", level_from_map);
   if (shape.mesh)
     shape.mesh = libmap::transform_mesh(*shape.mesh, level_from_map);

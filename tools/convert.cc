@@ -165,7 +165,7 @@ void convert_mesh(const ConvertOptions& options, Run& run) {
   const std::string format = libmap::format_of(options.output);
   tell_losses(mesh, format, run);
   const bool to_cloud = format == ".pcd" || format == ".csv";
-  if (to_cloud) run.say("the output contains only the mesh's vertices");
+  if (to_cloud) run.info("the output contains only the mesh's vertices");
   run.add_results({{"vertices", mesh.vertices.size()}, {"triangles", mesh.triangles.size()}});
   add_input(options, run);
   run.write_output(options.output, [&](const auto& temporary) {

@@ -112,8 +112,8 @@ void report(const libmap::BagRigPlan& plan, const libmap::BagRigExport& result,
                                            camera.camera.base_from_camera);
     if (plan.topics[n].empty()) run.warn(camera.name + ": there is no topic of its images");
   }
-  run.say("{} images of {} cameras, {} of {} image sets, at most {} cameras per set", result.images,
-          plan.rig.cameras.size(), result.sets.size(), plan.all_sets, fullest);
+  run.info("{} images of {} cameras, {} of {} image sets, at most {} cameras per set",
+           result.images, plan.rig.cameras.size(), result.sets.size(), plan.all_sets, fullest);
 }
 
 // Writes a rig's folder from a bag.
@@ -150,9 +150,9 @@ void read_bag_into_cloud(const BagCommandOptions& options, Run& run) {
                    {"points", result.cloud.size()},
                    {"dropped_points", result.dropped_points}});
   if (result.cloud.empty()) run.warn(options.input + ": " + result.topic + ": no finite points");
-  run.say("{} points of {} at {} s, one of {} messages; {} not finite", result.cloud.size(),
-          result.topic, libmap::to_fixed_text(result.stamp_s, 6), result.messages,
-          result.dropped_points);
+  run.info("{} points of {} at {} s, one of {} messages; {} not finite", result.cloud.size(),
+           result.topic, libmap::to_fixed_text(result.stamp_s, 6), result.messages,
+           result.dropped_points);
   run.write_output(options.output, [&](const fs::path& temporary) {
     libmap::write_cloud(temporary, result.cloud);
   });
@@ -389,8 +389,8 @@ void write_map_bag(const BagCommandOptions& options, Run& run) {
   write_claimed_bag(options, run, [&](const fs::path& path, libmap::BagFormat format) {
     libmap::write_bag(path, format, content, options.compression);
   });
-  run.say("{} clouds and {} footholds at {} s", content.clouds.size(),
-          footholds ? footholds->cloud.size() : 0, libmap::to_fixed_text(content.stamp_s, 6));
+  run.info("{} clouds and {} footholds at {} s", content.clouds.size(),
+           footholds ? footholds->cloud.size() : 0, libmap::to_fixed_text(content.stamp_s, 6));
 }
 
 void write_rig_folder_bag(const BagCommandOptions& options, Run& run) {
@@ -410,7 +410,7 @@ void write_rig_folder_bag(const BagCommandOptions& options, Run& run) {
   write_claimed_bag(options, run, [&](const fs::path& path, libmap::BagFormat format) {
     libmap::write_rig_bag(path, format, rig, images, bag);
   });
-  run.say("{} images of {} cameras", images.size(), rig.cameras.size());
+  run.info("{} images of {} cameras", images.size(), rig.cameras.size());
 }
 
 void refuse_map_options(const BagCommandOptions& options, const std::string& reason) {

@@ -133,7 +133,7 @@ libmap::BundlerView write_bundler_image(const libmap::ScanSource& scan, const Sc
 void write_bundler(const ImageOptions& options, const std::vector<ScanImage>& all,
                    const libmap::ScanSource& scan, Run& run) {
   const std::vector<ScanImage> kept = selected(all, options);
-  run.say("{} of {} images kept", kept.size(), all.size());
+  run.info("{} of {} images kept", kept.size(), all.size());
   run.add_results({{"kept_pictures", kept.size()}});
   run.write_output_tree(options.bundler, bundler_names, [&](const fs::path& folder) {
     if (!folder.empty()) fs::create_directory(folder / "images");
@@ -179,8 +179,8 @@ void write_colmap(const ImageOptions& options, const std::vector<ScanImage>& ima
     const libmap::ColmapModel& model = builder.model();
     std::size_t observations = 0;
     for (const auto& [id, image] : model.images) observations += image.observations.size();
-    run.say("{} images of {} cameras, {} points, {} observations", model.images.size(),
-            model.cameras.size(), model.points.size(), observations);
+    run.info("{} images of {} cameras, {} points, {} observations", model.images.size(),
+             model.cameras.size(), model.points.size(), observations);
     run.add_results({{"cameras", model.cameras.size()},
                      {"points", model.points.size()},
                      {"observations", observations}});
@@ -362,12 +362,12 @@ void write_folder(const ExtractOptions& options, const libmap::ScanSource& scan,
     if (!writer) return;
     const libmap::FrameFolderCounts written = writer->finish(scan.graph());
     add_results(scan.graph(), counts, written, run);
-    run.say("{} nodes: {} color, {} depth images, {} calibrations, {} links",
-            scan.graph().nodes.size(), written.color_images, written.depth_images,
-            written.calibrations, scan.graph().links.size());
-    if (written.right_images > 0) run.say("{} right images of stereo pairs", written.right_images);
+    run.info("{} nodes: {} color, {} depth images, {} calibrations, {} links",
+             scan.graph().nodes.size(), written.color_images, written.depth_images,
+             written.calibrations, scan.graph().links.size());
+    if (written.right_images > 0) run.info("{} right images of stereo pairs", written.right_images);
     if (counts.rounded_depth_images > 0)
-      run.say("{} depth images were rounded to millimeters", counts.rounded_depth_images);
+      run.info("{} depth images were rounded to millimeters", counts.rounded_depth_images);
     if (counts.lost_depth_pixels > 0)
       run.warn("{} depth pixels beyond 65.5 m are left out", counts.lost_depth_pixels);
   };

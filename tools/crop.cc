@@ -138,8 +138,8 @@ void tell_ground(const std::string& input, const libmap::CropReport& report, Run
                    {"ground_rmse_m", ground.rmse_m},
                    {"ground_share", ground.share},
                    {"up", report.up}});
-  run.say("ground: {:.2f} deg from the map's z, {:.1f} mm RMSE over {:.1f} % of it", tilt,
-          1e3 * ground.rmse_m, 1e2 * ground.share);
+  run.info("ground: {:.2f} deg from the map's z, {:.1f} mm RMSE over {:.1f} % of it", tilt,
+           1e3 * ground.rmse_m, 1e2 * ground.share);
   if (!report.up_of_normals) return;
   const libmap::UpOfNormals& by_normals = *report.up_of_normals;
   if (by_normals.share > 0.0) run.add_results({{"up_normals_share", by_normals.share}});
@@ -156,7 +156,7 @@ void tell_scale(const libmap::BorderBand& band, const libmap::BorderScale& scale
       {{"border_sides_m", std::vector<double>(band.sides_m.begin(), band.sides_m.end())},
        {"border_scale", scale.factor},
        {"border_scale_deviation", scale.deviation}});
-  run.say(
+  run.info(
       "border: sides of {:.4f} m determine the scale x {:.5f} +- {:.5f}; refine --scale {:.5f} "
       "applies it to poses and depth",
       fmt::join(band.sides_m, ", "), scale.factor, scale.deviation, scale.factor);
@@ -168,13 +168,13 @@ void tell_site(const libmap::CropReport& report, const libmap::Bounds3d& bounds,
   if (report.rectangle) {
     run.add_results({{"site_yaw_deg", report.rectangle->yaw_deg},
                      {"site_clearance_m", report.rectangle->clearance_m}});
-    run.say("site: rotated by {:.2f} deg, {:.2f} m of data around it", report.rectangle->yaw_deg,
-            report.rectangle->clearance_m);
+    run.info("site: rotated by {:.2f} deg, {:.2f} m of data around it", report.rectangle->yaw_deg,
+             report.rectangle->clearance_m);
   }
   if (report.band) {
     run.add_results({{"band_seen", report.band->seen}, {"white_level", report.band->white_level}});
-    run.say("border: white (>= {:.0f}) along {:.0f} % of the least visible side",
-            report.band->white_level, 1e2 * report.band->seen);
+    run.info("border: white (>= {:.0f}) along {:.0f} % of the least visible side",
+             report.band->white_level, 1e2 * report.band->seen);
   }
   if (report.border_scale) tell_scale(*report.band, *report.border_scale, run);
   if (!report.outline.empty()) {
@@ -184,7 +184,7 @@ void tell_site(const libmap::CropReport& report, const libmap::Bounds3d& bounds,
     run.add_results(
         {{"outline_area_m2", libmap::XyPolygon(report.outline).area_m2()}, {"outline_m", corners}});
   }
-  run.say("size: {:.3f} x {:.3f} x {:.3f} m", size.x(), size.y(), size.z());
+  run.info("size: {:.3f} x {:.3f} x {:.3f} m", size.x(), size.y(), size.z());
 }
 
 void report_crop(const CropCommandOptions& options, const libmap::CropReport& report,
@@ -215,7 +215,7 @@ void crop_cloud(const CropCommandOptions& options, Run& run) {
       run.timed("crop", [&] { return libmap::crop_cloud(read.cloud, options.crop); });
   report_crop(options, result.report, libmap::bounds_of(result.cloud.positions), run);
   run.add_results({{"points", result.cloud.size()}});
-  run.say("{} of {} points", result.cloud.size(), read.cloud.size());
+  run.info("{} of {} points", result.cloud.size(), read.cloud.size());
   write_site(options, run, [&](const fs::path& to) { libmap::write_cloud(to, result.cloud); });
 }
 
@@ -228,8 +228,8 @@ void crop_mesh(const CropCommandOptions& options, Run& run) {
   run.add_results({{"surface_area_m2", area},
                    {"vertices", result.mesh.vertices.size()},
                    {"triangles", result.mesh.triangles.size()}});
-  run.say("{} of {} triangles, {:.3f} m2 of surface", result.mesh.triangles.size(),
-          mesh.triangles.size(), area);
+  run.info("{} of {} triangles, {:.3f} m2 of surface", result.mesh.triangles.size(),
+           mesh.triangles.size(), area);
   write_site(options, run, [&](const fs::path& to) { libmap::write_mesh(to, result.mesh); });
 }
 
@@ -256,8 +256,8 @@ void crop_pieces(const CropCommandOptions& options, const std::vector<fs::path>&
       run.timed("crop", [&] { return libmap::crop_mesh_tiles(each, options.crop, write); });
   report_crop(options, report, {box.min(), box.max()}, run);
   run.add_results({{"pieces", written}, {"surface_area_m2", area_m2}, {"triangles", triangles}});
-  run.say("{} triangles in {} of {} tiles, {:.3f} m2 of surface", triangles, written, pieces.size(),
-          area_m2);
+  run.info("{} triangles in {} of {} tiles, {:.3f} m2 of surface", triangles, written,
+           pieces.size(), area_m2);
 }
 
 void crop_folder(const CropCommandOptions& options, Run& run) {

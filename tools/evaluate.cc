@@ -64,8 +64,8 @@ void note_results(const TableEvaluation& evaluation, Run& run) {
     }
     run.add_results({{column.name + ".auc_trapezoid", result.area->trapezoid},
                      {column.name + ".auc_upper_sum", result.area->upper_sum}});
-    run.say("{}: {} locations, AUC {} (trapezoid), {} (upper sum, as in the thesis)", column.name,
-            locations, rounded_text(result.area->trapezoid), rounded_text(result.area->upper_sum));
+    run.info("{}: {} locations, AUC {} (trapezoid), {} (upper sum, as in the thesis)", column.name,
+             locations, rounded_text(result.area->trapezoid), rounded_text(result.area->upper_sum));
   }
 }
 

@@ -112,9 +112,9 @@ std::vector<libgtd::LocationResult> test_footholds(const FootholdTrialsOptions& 
     return trials[a].force_n[1] > trials[b].force_n[1];
   });
   run.add_results({{"footholds_tested", trials.size()}, {"footholds_holding", order.size()}});
-  run.say("{} of {} footholds hold {} N with a probability of at least {}", order.size(),
-          trials.size(), libmap::to_text(options.grasp.load_n),
-          libmap::to_text(options.min_probability));
+  run.info("{} of {} footholds hold {} N with a probability of at least {}", order.size(),
+           trials.size(), libmap::to_text(options.grasp.load_n),
+           libmap::to_text(options.min_probability));
   if (max_count > 0 && order.size() > static_cast<std::size_t>(max_count))
     order.resize(static_cast<std::size_t>(max_count));
   std::vector<libgtd::Foothold> holding;
@@ -201,7 +201,7 @@ void find_footholds(const FootholdsCommandOptions& options, Run& run) {
     trials =
         test_footholds(options.trials, options.footholds.max_count, manifest, map, result, run);
   run.add_results({{"footholds", result.footholds.size()}});
-  run.say("{} footholds of {} candidate voxels", result.footholds.size(), result.candidates);
+  run.info("{} footholds of {} candidate voxels", result.footholds.size(), result.candidates);
   if (result.candidates == 0)
     run.warn("{}: no voxel is a candidate{}", options.map,
              result.at_border == 0

@@ -54,7 +54,7 @@ void report_contradictions(const libmap::DepthFusionResult& result, Run& run) {
   const auto dropped =
       static_cast<double>(points.seen_through + points.missed + points.contradicted);
   if (dropped < usual_share * (dropped + static_cast<double>(result.points_made))) return;
-  run.say(
+  run.info(
       "{} points dropped because frames contradict each other, for example after a motion: {} seen "
       "through, {} missed, {} connected to those",
       dropped, points.seen_through, points.missed, points.contradicted);
@@ -65,13 +65,13 @@ void tell_registration(const libmap::DepthFusionResult& result, Run& run) {
   const libmap::PairCosts& depth = result.registration_check.depth;
   const libmap::PairCosts& shown = color.count > 0 ? color : depth;
   if (result.registration_rounds > 0)
-    run.say("poses corrected by registration: {:.1f} mm and {:.2f} deg (RMS)",
-            1e3 * result.registration_shift_m, result.registration_turn_deg);
+    run.info("poses corrected by registration: {:.1f} mm and {:.2f} deg (RMS)",
+             1e3 * result.registration_shift_m, result.registration_turn_deg);
   else if (result.registration_rejected && shown.count > 0)
-    run.say("poses not corrected: registration does not improve held-out {}, {:.4f} -> {:.4f}",
-            color.count > 0 ? "color" : "depth", shown.before, shown.after);
+    run.info("poses not corrected: registration does not improve held-out {}, {:.4f} -> {:.4f}",
+             color.count > 0 ? "color" : "depth", shown.before, shown.after);
   else if (result.registration_rejected)
-    run.say(
+    run.info(
         "poses not corrected: they are refined, and there is no color to validate registration");
 }
 
@@ -89,10 +89,10 @@ void tell_results(const libmap::DepthFusionResult& result, const FuseOptions& op
   tell_registration(result, run);
   report_contradictions(result, run);
   if (result.redundant_frames > 0)
-    run.say("{} frames skipped: earlier frames measured their surface (enough_views)",
-            result.redundant_frames);
-  run.say("{} frames, {} measurements -> {} points", result.frames, pixels.used,
-          result.points_made);
+    run.info("{} frames skipped: earlier frames measured their surface (enough_views)",
+             result.redundant_frames);
+  run.info("{} frames, {} measurements -> {} points", result.frames, pixels.used,
+           result.points_made);
   if (result.points_made > 0) return;
   if (result.points.unconfirmed > 0)
     run.warn("--min-views {} leaves no points; at most {} frames measured one point",

@@ -136,8 +136,8 @@ void panorama(PanoramaCommandOptions& options, Run& run) {
   if (result.cloud.empty()) run.warn("no camera has measurements within its limits");
   add_rig_results(rig, set, result, views, run);
   carry_transforms(options.folder, run);
-  run.say("{} points from {} of {} cameras at {} s", result.cloud.size(), views.size(), cameras,
-          libmap::to_text(set.stamp_s));
+  run.info("{} points from {} of {} cameras at {} s", result.cloud.size(), views.size(), cameras,
+           libmap::to_text(set.stamp_s));
   run.write_output(options.output, [&](const fs::path& temporary) {
     libmap::write_cloud(temporary, result.cloud);
   });

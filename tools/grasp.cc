@@ -229,7 +229,7 @@ void note_results(const std::vector<libgtd::LocationResult>& results, Run& run) 
                    {"holding", holding},
                    {"mean_hold_probability", probability},
                    {"mean_unseen", unseen}});
-  run.say(
+  run.info(
       "{} of {} locations hold; mean probability {:.2f}, {:.1f} % of the ground under the "
       "gripper unseen",
       holding, results.size(), probability, 100.0 * unseen);
@@ -358,12 +358,12 @@ void say_fit(const libgtd::PullFit& fit, std::size_t tests, Run& run) {
     return fmt::format("{:.2g} N (90 %: {:.2g} to {:.2g})", force.median_n, force.low_n,
                        force.high_n);
   };
-  run.say("{} pull tests; level ground holds {}, before the fit {}", tests, text(fit.level_after),
-          text(fit.level_before));
+  run.info("{} pull tests; level ground holds {}, before the fit {}", tests, text(fit.level_after),
+           text(fit.level_before));
   for (const libgtd::FittedParameter& one : fit.parameters)
-    run.say("{}: {:.3g} ({:.3g} to {:.3g}), before {:.3g} ({:.3g} to {:.3g}); {}", one.name,
-            one.fitted[1], one.fitted[0], one.fitted[2], one.prior[1], one.prior[0], one.prior[2],
-            one.is_determined() ? "determined by the tests" : "not determined by the tests");
+    run.info("{}: {:.3g} ({:.3g} to {:.3g}), before {:.3g} ({:.3g} to {:.3g}); {}", one.name,
+             one.fitted[1], one.fitted[0], one.fitted[2], one.prior[1], one.prior[0], one.prior[2],
+             one.is_determined() ? "determined by the tests" : "not determined by the tests");
   std::string rows;
   for (const std::size_t row : fit.outliers)
     rows += (rows.empty() ? "" : ", ") + std::to_string(row);
@@ -448,7 +448,7 @@ void plan_next_pulls(const GraspCommandOptions& options, Run& run) {
     row.push_back(fmt::format("{:.3f}", plan.information_bits));
     planned.rows.push_back(std::move(row));
   }
-  run.say("{} pulls; the first: {:.2f} bits", plans.size(), plans.front().information_bits);
+  run.info("{} pulls; the first: {:.2f} bits", plans.size(), plans.front().information_bits);
   run.write_text(options.output, libmap::to_csv(planned));
 }
 

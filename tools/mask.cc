@@ -254,7 +254,7 @@ void mask(const MaskOptions& options, Run& run) {
     else
       libmap::write_cloud(temporary, to_cloud(made));
   });
-  run.say("{} x {} x {} voxels", made.side, made.side, made.layers);
+  run.info("{} x {} x {} voxels", made.side, made.side, made.layers);
 }
 
 }  // namespace

@@ -98,16 +98,16 @@ void prepare_normals(const MeshOptions& options, libmap::PointCloud& cloud, Run&
       run.timed("normals", [&] { return libmap::estimate_normals(cloud, options.estimation); });
   cloud.normals = estimated.normals;
   const std::string way(to_text(estimated.orientation));
-  run.say("normals estimated{}, oriented by {}",
-          options.normals == NormalSource::automatic ? ", because the cloud has none" : "", way);
+  run.info("normals estimated{}, oriented by {}",
+           options.normals == NormalSource::automatic ? ", because the cloud has none" : "", way);
   run.add_results({{"normals_oriented_by", way}, {"normals_undefined", estimated.undefined}});
 }
 
 // Reports the expected size, memory and time of large surfaces before the work.
 void announce(const libmap::SurfaceWork& work, Run& run) {
   if (work.triangles < 2e6) return;
-  run.say("about {:.1f} million triangles: {:.1f} GB of memory, {:.0f} s on one thread",
-          1e-6 * work.triangles, 1e-9 * work.bytes, work.seconds);
+  run.info("about {:.1f} million triangles: {:.1f} GB of memory, {:.0f} s on one thread",
+           1e-6 * work.triangles, 1e-9 * work.bytes, work.seconds);
   if (work.bytes > static_cast<double>(libmap::machine_memory()))
     run.warn("this exceeds the machine's memory: use a larger --cell-size or a folder of tiles");
 }
@@ -122,8 +122,8 @@ libmap::TriangleMesh reconstructed(const MeshOptions& options, const libmap::Poi
   run.add_results({{"points", cloud.size()}});
   run.add_results(libmap::described(made));
   run.add_timings(made.timings_s, "reconstruction");
-  run.say("{} points, cells of {:.4g} m -> {} triangles", cloud.size(), made.cell_size_m,
-          made.mesh.triangles.size());
+  run.info("{} points, cells of {:.4g} m -> {} triangles", cloud.size(), made.cell_size_m,
+           made.mesh.triangles.size());
   if (!made.mesh.triangles.empty()) return std::move(made.mesh);
   if (made.trimmed_triangles == 0)
     throw libmap::Error("no surface was found: there are too few points, or their normals cancel",
@@ -141,8 +141,8 @@ libmap::TriangleMesh cleaned(const MeshOptions& options, const libmap::TriangleM
       libmap::clean_mesh(mesh, options.surface.cleaning, run.progress());
   run.add_results(libmap::described(made));
   run.add_timings(made.timings_s, "cleaning");
-  run.say("{} islands dropped, {} holes filled -> {} triangles", made.islands, made.filling.holes,
-          made.mesh.triangles.size());
+  run.info("{} islands dropped, {} holes filled -> {} triangles", made.islands, made.filling.holes,
+           made.mesh.triangles.size());
   return std::move(made.mesh);
 }
 
@@ -298,8 +298,8 @@ void make_tiles(const MeshOptions& options, TileFolder& output, Run& run) {
   };
   const auto finish = [&](const fs::path& folder) {
     const Totals totals = assemble(options, output, tiles, folder, run);
-    run.say("{} points -> {} triangles in {} tiles", index.points(), totals.triangles,
-            totals.pieces);
+    run.info("{} points -> {} triangles in {} tiles", index.points(), totals.triangles,
+             totals.pieces);
   };
   output.make({names, ".ply", make, finish});
 }

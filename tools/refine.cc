@@ -47,8 +47,8 @@ void say_stage(const libmap::StageReport& stage, Run& run) {
   if (stage.error)
     text += fmt::format("; error {:.2f} mm, {:.3f} deg", 1e3 * stage.error->absolute.rmse_m,
                         stage.error->absolute.mean_rotation_deg);
-  run.say(text);
-  for (const std::string& warning : stage.warnings) run.say("{}: {}", stage.name, warning);
+  run.info(text);
+  for (const std::string& warning : stage.warnings) run.info("{}: {}", stage.name, warning);
   run.detail("{}: {:.2f} s", stage.name, stage.seconds);
   if (stage.rejected_error)
     run.detail("  rejected: {:.2f} mm, {:.3f} deg", 1e3 * stage.rejected_error->absolute.rmse_m,
@@ -187,7 +187,7 @@ void say_scans(const libmap::RefinementResult& result, const libmap::ScanSource&
     if (count.poses == 0)
       run.warn("{}: gets no poses, because no link joins it to the other scans", path.string());
     else
-      run.say("{}: {} of {} nodes have a pose", path.string(), count.poses, count.nodes);
+      run.info("{}: {} of {} nodes have a pose", path.string(), count.poses, count.nodes);
   }
 }
 
@@ -241,7 +241,7 @@ void say_result(const RefineOptions& options, const libmap::RefinementResult& re
     run.warn("node {} has no features: {}", node, fault.what());
   for (const std::string& warning : result.warnings) run.warn(first + ": " + warning);
   for (const libmap::StageReport& stage : result.stages) say_stage(stage, run);
-  for (const std::string& finding : result.findings) run.say(finding);
+  for (const std::string& finding : result.findings) run.info(finding);
   if (!result.noise.empty()) run.detail("{}", result.noise);
   if (!result.calibration.empty() && (with_known_camera || result.cameras.size() > 1) &&
       options.database.empty())
@@ -254,9 +254,9 @@ void say_result(const RefineOptions& options, const libmap::RefinementResult& re
   if (is_depth_scale && result.findings.empty())
     run.detail("{}", result.scale);
   else
-    run.say(result.scale);
-  run.say("{} poses, {} links, of which {} were found", result.poses.size(), result.links.size(),
-          result.closures.size());
+    run.info(result.scale);
+  run.info("{} poses, {} links, of which {} were found", result.poses.size(), result.links.size(),
+           result.closures.size());
 }
 
 void refine(RefineOptions& options, Run& run) {

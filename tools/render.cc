@@ -361,7 +361,8 @@ libmap::ColorImage draw_one(RenderOptions& options, Run& run) {
   if (shown.columns_per_point > 0)
     run.add_results({{"columns_per_point", shown.columns_per_point}});
   if (shown.columns_per_point > 1)
-    run.say("one point per {0} x {0} columns: --box shows a part in full", shown.columns_per_point);
+    run.info("one point per {0} x {0} columns: --box shows a part in full",
+             shown.columns_per_point);
   return image;
 }
 
@@ -405,7 +406,7 @@ libmap::ColorImage draw_several(RenderOptions& options, Run& run) {
   libmap::ColorImage image =
       run.timed("draw", [&] { return libmap::draw_sheet(cells, options.sheet); });
   run.add_results({{"cells", cells.size()}});
-  run.say("{} cells, {} x {} pixels", cells.size(), image.width, image.height);
+  run.info("{} cells, {} x {} pixels", cells.size(), image.width, image.height);
   return image;
 }
 

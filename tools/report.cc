@@ -218,8 +218,8 @@ void make_report(ReportCommandOptions& options, Run& run) {
   run.add_results({{"files", read.files.size()},
                    {"bytes", page.html.size()},
                    {"pictures_made_smaller", page.changed_images}});
-  run.say("{} files, {:.1f} MB{}", read.files.size(), static_cast<double>(page.html.size()) / 1e6,
-          page.changed_images == 0 ? "" : fmt::format(", {} images reduced", page.changed_images));
+  run.info("{} files, {:.1f} MB{}", read.files.size(), static_cast<double>(page.html.size()) / 1e6,
+           page.changed_images == 0 ? "" : fmt::format(", {} images reduced", page.changed_images));
   run.write_text(options.output, page.html);
 }
 

@@ -24,8 +24,8 @@ void tell_results(const libmap::PoissonDiskResult& result, std::uint64_t wanted,
   run.add_results(libmap::described(result));
   run.add_timings(result.timings_s);
   run.detail("radii tried: {}", result.tries);
-  run.say("{:.2f} m2 -> {} points, radius {:.4g} mm, relative radius {:.3f}", result.area_m2,
-          result.cloud.size(), 1e3 * result.radius_m, result.relative_radius);
+  run.info("{:.2f} m2 -> {} points, radius {:.4g} mm, relative radius {:.3f}", result.area_m2,
+           result.cloud.size(), 1e3 * result.radius_m, result.relative_radius);
   if (!result.count_reached)
     run.warn("no radius was found for {} points; the nearest number is {}", wanted,
              result.cloud.size());
@@ -75,7 +75,7 @@ void write_tiles(const std::vector<fs::path>& pieces, libmap::TileSampler& sampl
                    {"points", points},
                    {"area_m2", area_m2},
                    {"smallest_distance_m", smallest_m}});
-  run.say("{:.2f} m2 in {} tiles -> {} points", area_m2, pieces.size(), points);
+  run.info("{:.2f} m2 in {} tiles -> {} points", area_m2, pieces.size(), points);
 }
 
 void resample_pieces(const ResampleOptions& options, Run& run) {

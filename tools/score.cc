@@ -41,8 +41,8 @@ std::string_view name_of(libgtd::UpSource source) {
 void report_plane(const libgtd::RegressionPlane& plane, const std::string& terrain, Run& run) {
   if (plane.up_source == libgtd::UpSource::direction) return;
   const bool by_normals = plane.up_source == libgtd::UpSource::normals;
-  run.say("up from the {}{}", name_of(plane.up_source),
-          by_normals ? fmt::format(": {:.1f} % agree", 100.0 * *plane.normals_up) : "");
+  run.info("up from the {}{}", name_of(plane.up_source),
+           by_normals ? fmt::format(": {:.1f} % agree", 100.0 * *plane.normals_up) : "");
   if (!by_normals && plane.up_source != libgtd::UpSource::viewpoint && plane.normals_up)
     run.warn("{}: {}: up is from the {}; --up X,Y,Z sets it", terrain,
              libmap::disagreement_text(std::max(*plane.normals_up, 1.0 - *plane.normals_up),
@@ -156,7 +156,7 @@ class StoreScoring {
           store_.folder() / "progress",
           {.tile_m = point_tile_m(),
            .has_normals = stream_.has_normals() && !frame_.drops_normals()});
-      run_.timed("sort points", [&] { fill(points, wanted); });
+      run_.timed("sort points", [&] { read_points(points, wanted); });
       run_.timed("tiles", [&] {
         in_file(options_.terrain, [&] {
           libgtd::detect_streamed(frame_, points, wanted, options_.detection,
@@ -176,9 +176,8 @@ class StoreScoring {
   void check_plan() {
     const auto earlier = run_.options().force ? std::nullopt : store_.plan();
     if (!earlier && !run_.options().force) require_no_index(store_);
-    plan_.terrain =
-        survey(stream_.tiles(), earlier ? earlier->terrain : std::vector<TerrainFile>{},
-               stream_.georeference());
+    plan_.terrain = survey(stream_.tiles(), earlier ? earlier->terrain : std::vector<TerrainFile>{},
+                           stream_.georeference());
     plan_.index.manifest = make_manifest();
     plan_.key = libmap::key_of(plan_.index.manifest);
     if (earlier && earlier->key == plan_.key) {
@@ -251,7 +250,7 @@ class StoreScoring {
   }
 
   // Reads the points that the wanted tiles depend on.
-  void fill(libmap::PointTileStore& points, const std::vector<TileNumber>& wanted) const {
+  void read_points(libmap::PointTileStore& points, const std::vector<TileNumber>& wanted) const {
     const libgtd::PointsRectangle rectangle = libgtd::points_for(wanted, frame_, tiling_);
     std::vector<fs::path> files;
     for (const TerrainFile& file : plan_.terrain)
@@ -294,13 +293,14 @@ class StoreScoring {
     const libmap::FileLock lock = store_.lock();
     const libgtd::MapTileStore::Completion completion = store_.complete(plan_);
     if (!completion.index) {
-      run_.say("{} tiles scored; {} of {} are complete", scored, completion.done, completion.tiles);
+      run_.info("{} tiles scored; {} of {} are complete", scored, completion.done,
+                completion.tiles);
       return;
     }
     const libgtd::TileStoreIndex& index = *completion.index;
     store_.write_index(index, run_.manifest());
-    run_.say("{} of {} tiles scored; all are complete: {} voxels, {} graspable", scored,
-             completion.tiles, index.voxels(), index.graspable_voxels());
+    run_.info("{} of {} tiles scored; all are complete: {} voxels, {} graspable", scored,
+              completion.tiles, index.voxels(), index.graspable_voxels());
     if (index.voxels() == 0)
       run_.warn("the terrain is smaller than the gripper mask: nothing was scored");
   }
@@ -359,8 +359,8 @@ void add_results(const libgtd::DetectionResult& result, const ScoreOptions& opti
 void say_result(const libgtd::DetectionResult& result, const ScoreOptions& options, Run& run) {
   if (result.plane) report_plane(*result.plane, options.terrain, run);
   run.add_timings(result.timings_s);
-  run.say("{} points, {} occupied voxels, {} scored in {} tiles, {} graspable", result.points,
-          result.occupied_voxels, result.map.voxels.size(), result.tiles, result.graspable_voxels);
+  run.info("{} points, {} occupied voxels, {} scored in {} tiles, {} graspable", result.points,
+           result.occupied_voxels, result.map.voxels.size(), result.tiles, result.graspable_voxels);
   if (10 * result.lone_voxels > result.occupied_voxels && result.occupied_voxels >= 10)
     run.warn(
         "{}: {:.1f} % of the voxels have no neighbor: the points are too sparse for voxels of {:g} "
@@ -370,12 +370,12 @@ void say_result(const libgtd::DetectionResult& result, const ScoreOptions& optio
             static_cast<double>(result.occupied_voxels),
         options.detection.scenario.voxel_size_m);
   if (result.map.content.normals)
-    run.say("mask tilted to the surface's normal within {:g} m; {} voxels without a normal",
-            *result.normal_radius_m, result.unoriented_voxels);
+    run.info("mask tilted to the surface's normal within {:g} m; {} voxels without a normal",
+             *result.normal_radius_m, result.unoriented_voxels);
   if (result.map.content.obstacles)
-    run.say("{} voxels are obstacles", result.obstacle_voxels);
+    run.info("{} voxels are obstacles", result.obstacle_voxels);
   else if (result.map.content.slopes)
-    run.say("obstacles are determined when `graspmap convert` merges the shares");
+    run.info("obstacles are determined when `graspmap convert` merges the shares");
   if (result.map.voxels.empty() && options.detection.share.count == 1)
     run.warn("the terrain is smaller than the gripper mask: nothing was scored");
 }

@@ -105,8 +105,8 @@ void add_results(const libmap::CameraRig& rig, const std::vector<libmap::RobotCa
       run.warn("{}: has no measurements within its range", rig.cameras[i].name);
   }
   run.add_results({{"cameras", images.size()}, {"pixels", pixels}, {"measured_pixels", measured}});
-  run.say("{} cameras, {:.0f} % of the pixels measured", images.size(),
-          100.0 * static_cast<double>(measured) / static_cast<double>(pixels));
+  run.info("{} cameras, {:.0f} % of the pixels measured", images.size(),
+           100.0 * static_cast<double>(measured) / static_cast<double>(pixels));
 }
 
 void simulate(const SimulateCamerasOptions& options, Run& run) {

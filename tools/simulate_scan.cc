@@ -85,10 +85,10 @@ void add_results(const libmap::ScanSimulationResult& result, Run& run) {
                      {"odometry_rotation_error_deg", error.mean_rotation_deg}});
     drift = fmt::format(", odometry {:.1f} mm off", 1e3 * error.rmse_m);
   }
-  run.say("{} frames along {:.1f} m, {:.0f} % of the pixels measured, {} closures{}",
-          result.graph.nodes.size(), result.path_length_m,
-          100.0 * static_cast<double>(result.measured_pixels) / static_cast<double>(result.pixels),
-          closures, drift);
+  run.info("{} frames along {:.1f} m, {:.0f} % of the pixels measured, {} closures{}",
+           result.graph.nodes.size(), result.path_length_m,
+           100.0 * static_cast<double>(result.measured_pixels) / static_cast<double>(result.pixels),
+           closures, drift);
   if (result.empty_frames > 0) run.warn("{} frames have no depth in range", result.empty_frames);
 }
 

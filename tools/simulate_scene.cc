@@ -54,8 +54,8 @@ void write_samples(const libmap::PrimitiveScene& scene, const SimulateOptions& o
   const libmap::SceneSamples samples =
       run.timed("sampling", [&] { return libmap::sample_scene(scene, options.sampling); });
   run.add_results({{"points", samples.cloud.size()}, {"spacing_m", samples.spacing_m}});
-  run.say("{} points, {} m apart", samples.cloud.size(),
-          libmap::to_text(static_cast<float>(samples.spacing_m)));
+  run.info("{} points, {} m apart", samples.cloud.size(),
+           libmap::to_text(static_cast<float>(samples.spacing_m)));
   run.write_output(options.output,
                    [&](const auto& temporary) { libmap::write_cloud(temporary, samples.cloud); });
 }
@@ -64,7 +64,7 @@ void write_surface(const libmap::PrimitiveScene& scene, const SimulateOptions& o
   const libmap::TriangleMesh mesh =
       run.timed("meshing", [&] { return libmap::scene_mesh(scene, options.meshing); });
   run.add_results({{"vertices", mesh.vertices.size()}, {"triangles", mesh.triangles.size()}});
-  run.say("{} vertices, {} triangles", mesh.vertices.size(), mesh.triangles.size());
+  run.info("{} vertices, {} triangles", mesh.vertices.size(), mesh.triangles.size());
   run.write_output(options.output,
                    [&](const auto& temporary) { libmap::write_mesh(temporary, mesh); });
 }

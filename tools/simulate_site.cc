@@ -66,8 +66,8 @@ void simulate(const SimulateSiteOptions& options, Run& run) {
                    {"vertices", mesh.vertices.size()},
                    {"triangles", mesh.triangles.size()},
                    {"field_points", points.size()}});
-  run.say("{} rocks, {} triangles, {} field points", site.rocks.size(), mesh.triangles.size(),
-          points.size());
+  run.info("{} rocks, {} triangles, {} field points", site.rocks.size(), mesh.triangles.size(),
+           points.size());
   const std::string table =
       "# Locations selected by the shape of the rocks only; no field test was made at them.\n" +
       libmap::to_csv(libmap::field_point_table(site, points));

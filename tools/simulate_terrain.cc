@@ -52,7 +52,7 @@ void simulate(SimulateTerrainOptions& options, Run& run) {
     if (folder.empty()) return;  // --dry-run
     const std::size_t points = write_tiles(options, pieces, folder, run);
     run.add_results({{"pieces", pieces.size()}, {"points", points}});
-    run.say("{} points in {} tiles", points, pieces.size());
+    run.info("{} points in {} tiles", points, pieces.size());
   });
 }
 

@@ -82,7 +82,7 @@ libmap::Trajectory poses_of(TextureCommandOptions& options, const libmap::ScanSo
     mesh_from_poses = *site_from_map * mesh_from_poses;
     run.manifest().frame = "site";
     run.manifest().transforms.emplace_back(site_from_map_name, *site_from_map);
-    run.say("poses are transformed to the site's frame");
+    run.info("poses are transformed to the site's frame");
   }
   for (libmap::TrajectoryPose& pose : poses)
     pose.world_from_base = mesh_from_poses * pose.world_from_base;
@@ -103,7 +103,7 @@ void say_result(const libmap::TextureReport& result, Run& run) {
   for (const auto& [node, fault] : result.skipped)
     run.warn(std::string("skipped: ") + fault.what());
   run.add_timings(result.timings_s);
-  run.say(
+  run.info(
       "{} images, {} charts on {} page{}, texels of {:.1f} mm; {} of {} triangles ({:.3f} m2) are "
       "not visible and gray",
       result.photos, result.charts, result.pages, result.pages == 1 ? "" : "s",
@@ -112,7 +112,7 @@ void say_result(const libmap::TextureReport& result, Run& run) {
   if (5 * result.unseen_triangles > triangles)
     run.warn("20 % of the triangles or more are visible in no image: check --frame and --poses");
   if (result.split_charts > 0)
-    run.say("{} charts larger than a page were cut", result.split_charts);
+    run.info("{} charts larger than a page were cut", result.split_charts);
   if (result.shrunk_charts > 0)
     run.warn("{} triangles larger than a page have fewer texels", result.shrunk_charts);
   if (result.atlas_scale < 1.0)

@@ -77,12 +77,12 @@ TrianglePoint point_of(const Fragment& fragment, double first, double second) {
   return {fragment.triangle, at.x(), at.y()};
 }
 
-SurfacePieces::SurfacePieces(const TriangleMesh& mesh) : mesh_(mesh) {
+SurfaceFragments::SurfaceFragments(const TriangleMesh& mesh) : mesh_(mesh) {
   add_blocks(0, mesh.triangles.size());
 }
 
-SurfacePieces::SurfacePieces(const SurfacePieces& triangles, double longest_m,
-                             std::size_t max_parts)
+SurfaceFragments::SurfaceFragments(const SurfaceFragments& triangles, double longest_m,
+                                   std::size_t max_parts)
     : mesh_(triangles.mesh_) {
   for (const SurfaceBlock& block : triangles.blocks_) {
     if (block.longest_m <= longest_m) {
@@ -95,7 +95,8 @@ SurfacePieces::SurfacePieces(const SurfacePieces& triangles, double longest_m,
   add_blocks(mesh_.triangles.size(), mesh_.triangles.size() + parts_.size());
 }
 
-void SurfacePieces::cut(const PlacedFragment& fragment, double longest_m, std::size_t max_parts) {
+void SurfaceFragments::cut(const PlacedFragment& fragment, double longest_m,
+                           std::size_t max_parts) {
   if (!(fragment.area_m2() > 0.0)) return;
   // Minimum number of parts along the longest side.
   const double parts = std::sqrt(fragment.square_of_longest_side()) / longest_m;
@@ -109,19 +110,19 @@ void SurfacePieces::cut(const PlacedFragment& fragment, double longest_m, std::s
   parts_.push_back(fragment.fragment);
 }
 
-double SurfacePieces::area_m2() const {
+double SurfaceFragments::area_m2() const {
   double area = 0.0;
   for (const SurfaceBlock& block : blocks_) area += block.area_m2;
   return area;
 }
 
-PlacedFragment SurfacePieces::piece(std::size_t number) const {
+PlacedFragment SurfaceFragments::piece(std::size_t number) const {
   if (number >= mesh_.triangles.size())
     return placed(mesh_, parts_[number - mesh_.triangles.size()]);
   return placed_triangle(mesh_, number);
 }
 
-void SurfacePieces::add_blocks(std::size_t begin, std::size_t end) {
+void SurfaceFragments::add_blocks(std::size_t begin, std::size_t end) {
   const std::size_t first = blocks_.size();
   blocks_.resize(first + (end - begin + pieces_per_block - 1) / pieces_per_block);
   parallel_for(end - begin, pieces_per_block, [&](std::size_t from, std::size_t to) {
@@ -129,7 +130,7 @@ void SurfacePieces::add_blocks(std::size_t begin, std::size_t end) {
   });
 }
 
-SurfaceBlock SurfacePieces::measured(std::size_t begin, std::size_t end) const {
+SurfaceBlock SurfaceFragments::measured(std::size_t begin, std::size_t end) const {
   SurfaceBlock block;
   block.begin = begin;
   block.end = end;
@@ -437,7 +438,7 @@ class Sampler {
   double expected_;
   GrowingGrid samples_;
   std::vector<TrianglePoint> triangle_points_;
-  SurfacePieces pieces_;
+  SurfaceFragments pieces_;
 };
 
 }  // namespace

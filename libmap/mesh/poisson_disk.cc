@@ -28,7 +28,7 @@ SampledSurface surface_of(const TriangleMesh& mesh) {
   const Bounds3d bounds = bounds_of(mesh.vertices);
   const double farthest =
       std::max(bounds.min.cwiseAbs().maxCoeff(), bounds.max.cwiseAbs().maxCoeff());
-  SampledSurface surface{mesh, bounds.min, SurfacePieces(mesh), 0.0, 0.0, {}};
+  SampledSurface surface{mesh, bounds.min, SurfaceFragments(mesh), 0.0, 0.0, {}};
   if (farthest <= single_precision_m) {
     const auto single = static_cast<float>(farthest);
     const float step = std::nextafter(single, std::numeric_limits<float>::infinity()) - single;

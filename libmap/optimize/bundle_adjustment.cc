@@ -204,7 +204,7 @@ void Adjustment::init_params(const SensorCalibration& start,
     std::copy(start.depth[n].spline_m.begin(), start.depth[n].spline_m.end(), own + spline_at);
   }
   if (!options_.refine_timing) return;
-  problem_.moving = true;
+  problem_.has_motion = true;
   const double count = static_cast<double>(std::max<std::size_t>(1, frames_.size()));
   for (const FrameFeatures& frame : frames_) mean_later_s_ += frame.depth_later_s / count;
   for (const FrameFeatures& frame : frames_)
@@ -340,7 +340,7 @@ void Adjustment::add_depth_priors(std::size_t camera, Priors& priors) {
 // that least squares with both as measurements overestimates times.
 double Adjustment::motion_scale() const {
   // Varying delays of the stamps determine the scale.
-  if (!problem_.moving || problem_.fix_cameras || later_deviation_s_ > observable_delay_s)
+  if (!problem_.has_motion || problem_.fix_cameras || later_deviation_s_ > observable_delay_s)
     return 1.0;
   double mixed = 0.0;
   double squares = 0.0;
@@ -375,13 +375,13 @@ SensorCalibration Adjustment::calibration(const JointState& state, double motion
     }
   }
   for (const FrameFeatures& frame : frames_)
-    if (const auto entry = row_.find(frame.node); problem_.moving && entry != row_.end())
+    if (const auto entry = row_.find(frame.node); problem_.has_motion && entry != row_.end())
       found.motion.emplace(frame.node, state.motions[entry->second] / motion_scale);
   return found;
 }
 
 void Adjustment::find_alternatives() {
-  const Eigen::Index size = problem_.moving ? 12 : 6;
+  const Eigen::Index size = problem_.has_motion ? 12 : 6;
   const auto poses = static_cast<Eigen::Index>(state_.poses.size());
   FreeRows rows;
   for (Eigen::Index n = 0; n < poses; ++n) {

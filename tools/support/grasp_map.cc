@@ -285,12 +285,13 @@ class MapGrasping {
     std::optional<libmap::FileLock> lock = store_.lock();
     const libgtd::MapTileStore::Completion completion = store_.complete(plan_);
     if (!completion.index) {
-      run_.say("{} tiles tested; {} of {} are complete", tested, completion.done, completion.tiles);
+      run_.info("{} tiles tested; {} of {} are complete", tested, completion.done,
+                completion.tiles);
       return;
     }
     if (is_store()) {
       store_.write_index(*completion.index, run_.manifest());
-      run_.say("{} of {} tiles tested; all are complete", tested, completion.tiles);
+      run_.info("{} of {} tiles tested; all are complete", tested, completion.tiles);
       return;
     }
     const MapTiles tiles(store_.folder(), *completion.index);
@@ -322,8 +323,8 @@ class MapGrasping {
                       {"grasp_candidates", candidates},
                       {"grasp_holding", holding},
                       {"grasp_mean_trials", mean}});
-    run_.say("{} of {} voxels hold; {} were tested, with {:.1f} trials each", holding,
-             tiles.index().voxels(), candidates, mean);
+    run_.info("{} of {} voxels hold; {} were tested, with {:.1f} trials each", holding,
+              tiles.index().voxels(), candidates, mean);
   }
 
   const GraspMapInput& input_;

@@ -84,7 +84,7 @@ std::string percent(std::optional<double> value) {
   return value ? fmt::format("{:.1f} %", 100.0 * *value) : "unknown";
 }
 
-void say(const libgtd::SummarizedMap& map, Run& run) {
+void info(const libgtd::SummarizedMap& map, Run& run) {
   const libgtd::MapSummary& summary = map.summary;
   std::string text = fmt::format("{}: {} of the voxels reach {}", map.name,
                                  percent(libgtd::Rate{summary.reached, summary.evaluated}.value()),
@@ -95,7 +95,7 @@ void say(const libgtd::SummarizedMap& map, Run& run) {
                         percent(counts.true_positive_rate().value()),
                         percent(counts.true_negative_rate().value()));
   }
-  run.say(text);
+  run.info(text);
 }
 
 // Chart of column y against x; rows without one of the two numbers are ignored. Curves are in the
@@ -181,7 +181,7 @@ void tabulate_maps(const std::vector<std::string>& map_files, const std::string&
     maps.push_back(std::move(read.summarized));
     voxels.push_back(std::move(read.voxels));
     run.add_input(file);
-    say(maps.back(), run);
+    info(maps.back(), run);
   }
   const auto table = [](const libmap::Table& content) {
     return Run::text_writer(libmap::to_csv(content));

@@ -154,7 +154,7 @@ void Run::add_input(const fs::path& path) {
     manifest_.inputs.back().path = folder_path.string();
 }
 
-void Run::say(const std::string& text) {
+void Run::info(const std::string& text) {
   std::istringstream lines(text);
   for (std::string line; std::getline(lines, line);) spdlog::info("{}", sanitize_text(line));
 }

@@ -57,13 +57,13 @@ class Run {
   // toolkit's own data are relative, so that the manifest does not depend on the installation.
   void add_input(const std::filesystem::path& path);
 
-  // Print to stderr: `say` without --quiet, `warn` always, `detail` with --verbose.
-  void say(const std::string& text);
+  // Print to stderr: `info` without --quiet, `warn` always, `detail` with --verbose.
+  void info(const std::string& text);
   void warn(const std::string& text);
   void detail(const std::string& text);
   template <typename... Values>
-  void say(fmt::format_string<Values...> text, Values&&... values) {
-    say(fmt::format(text, std::forward<Values>(values)...));
+  void info(fmt::format_string<Values...> text, Values&&... values) {
+    info(fmt::format(text, std::forward<Values>(values)...));
   }
   template <typename... Values>
   void warn(fmt::format_string<Values...> text, Values&&... values) {

@@ -75,7 +75,7 @@ bool TileFolder::is_put_together() const {
 
 bool TileFolder::is_complete() const {
   if (!is_put_together()) return false;
-  run_.say("all tiles are complete");
+  run_.info("all tiles are complete");
   return true;
 }
 
@@ -158,13 +158,13 @@ void TileFolder::assemble(const Work& work) {
                     [this](const std::string& tile) { return is_done(tile); }));
   // Another share may have been the last one too and may have removed the store.
   if (done < work.tiles.size() && !is_put_together())
-    return run_.say("{} of {} tiles are complete", done, work.tiles.size());
+    return run_.info("{} of {} tiles are complete", done, work.tiles.size());
   if (share_.count > 1) {
     try {
       run_.claim_output_tree(output_, names_, inputs_);
     } catch (const libmap::Error& error) {
       if (error.kind() != libmap::ErrorKind::failed) throw;
-      return run_.say("another share completes the folder");
+      return run_.info("another share completes the folder");
     }
   }
   if (!is_put_together()) run_.write_output_tree(output_, names_, work.finish);
