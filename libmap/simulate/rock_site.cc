@@ -61,7 +61,7 @@ bool is_within(const Footprint& footprint, double half_x, double half_y) {
          std::abs(footprint.center.y()) + footprint.reach(Eigen::Vector2d::UnitY()) <= half_y;
 }
 
-std::string rock_place(std::size_t n, const SiteRock& rock) {
+std::string rock_name(std::size_t n, const SiteRock& rock) {
   return "rocks[" + std::to_string(n) + "]" + (rock.name.empty() ? "" : " (" + rock.name + ")");
 }
 
@@ -138,14 +138,14 @@ void RockSite::check() const {
     try {
       rock_parameters(copy).check();
     } catch (const Error& error) {
-      throw error.in_field(rock_place(n, copy), ".");
+      throw error.in_field(rock_name(n, copy), ".");
     }
     // Rocks must not interrupt the outline of the ground.
     constexpr double margin_m = 0.05;
     if (!is_within(footprint_of(rocks[n]), 0.5 * ground.size_x_m - margin_m,
                    0.5 * ground.size_y_m - margin_m))
       throw Error("the rock extends beyond the ground",
-                  {.field = rock_place(n, rocks[n]) + ".x_m, y_m",
+                  {.field = rock_name(n, rocks[n]) + ".x_m, y_m",
                    .value = to_text(rocks[n].x_m) + ", " + to_text(rocks[n].y_m),
                    .bound = "5 cm within " + to_text(ground.size_x_m) + " x " +
                             to_text(ground.size_y_m) + " m"});
@@ -220,7 +220,7 @@ void place_rocks(RockSite& site, std::vector<RockToPlace> rocks) {
     }
     if (!is_placed)
       throw Error("no free position for this rock: enlarge site_size_m or reduce free_square_m",
-                  {.field = rock_place(one.rock, rock),
+                  {.field = rock_name(one.rock, rock),
                    .value = to_text(rock.width_m) + " x " + to_text(rock.depth_m) + " m"});
     taken.push_back(footprint_of(rock));
   }

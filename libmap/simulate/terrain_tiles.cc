@@ -35,8 +35,8 @@ double draw_height(const RockyTerrainOptions& options, RandomStream& draw) {
   return std::pow(low - draw.uniform() * (low - high), -1.0 / power_index);
 }
 
-std::int64_t cell_below(double place_m, double cell_m) {
-  return static_cast<std::int64_t>(std::floor(place_m / cell_m));
+std::int64_t cell_below(double position_m, double cell_m) {
+  return static_cast<std::int64_t>(std::floor(position_m / cell_m));
 }
 
 }  // namespace
