@@ -165,7 +165,7 @@ TEST(Calibrate, BadInputIsOneLineAndLeavesNothing) {
   EXPECT_TRUE(bad_input(run({"shots/00.png", "shots/00.png", "shots/00.png", "shots/00.png"}),
                         {.field = "pictures", .value = "1"}));
   EXPECT_TRUE(bad_input(graspmap({"calibrate", "shots", "-o", "shots/00.png"}),
-                        {.file = "shots/00.png", .about = "is the"}));
+                        {.file = "shots/00.png", .about = "is the input"}));
   EXPECT_FALSE(fs::exists(scratch("camera.yaml")));
 }
 

@@ -215,7 +215,7 @@ TEST(Extract, RefusesWhatIsNoScanAndOutputsOfNoUse) {
   EXPECT_TRUE(bad_input(graspmap({"convert", "scan.db", "-o", "text.db"}), {.file = "text.db"}));
   ASSERT_TRUE(succeeded(graspmap({"convert", "scan.db", "-o", "out"})));
   EXPECT_TRUE(
-      bad_input(graspmap({"convert", "out", "-o", "out/"}), {.file = "out/", .about = "is the"}));
+      bad_input(graspmap({"convert", "out", "-o", "out/"}), {.file = "out/", .about = "is the input"}));
 }
 
 TEST(Extract, FoldersOfOtherCommandsAreKept) {

@@ -85,7 +85,7 @@ TEST(Report, TheRemovedOutlineNamesTheNewWay) {
 TEST(Report, WithoutThreeJs) {
   make_run();
   EXPECT_TRUE(bad_input(graspmap({"report", "run", "-o", "r.html", "--three", "none"}),
-                        {.file = "none/three.min.js", .about = "--no-"}));
+                        {.file = "none/three.min.js", .about = "--no-3d"}));
   ASSERT_TRUE(succeeded(graspmap({"report", "run", "-o", "r.html", "--three", "none", "--no-3d"})));
   EXPECT_EQ(content("r.html").find("<canvas"), std::string::npos);
   EXPECT_NE(content("r.html").find("P&lt;1&gt;"), std::string::npos);

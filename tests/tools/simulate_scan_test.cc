@@ -220,7 +220,7 @@ TEST(SimulateScanCommand, BadInputIsOneLineAndLeavesNothing) {
       graspmap(scan({"-o", "a.db", "--frames", "2", "--radius", "50", "--last-radius", "50"})),
       {.file = "site.ply", .about = "no frame"}));
   EXPECT_TRUE(
-      bad_input(graspmap(scan({"-o", "site.ply"})), {.file = "site.ply", .about = "is the"}));
+      bad_input(graspmap(scan({"-o", "site.ply"})), {.file = "site.ply", .about = "is the input"}));
   EXPECT_TRUE(bad_input(graspmap(scan({"-o", "a.bag"})), {.file = "a.bag", .about = "a database"}));
   EXPECT_TRUE(
       bad_input(graspmap(scan({"-o", "a.db", "--flying-pixels", "0.9"})),
