@@ -6,6 +6,7 @@
 #include <limits>
 #include <set>
 
+#include "libmap/core/text.h"
 #include "tests/support/test_support.h"
 
 namespace point_grid_test {
