@@ -285,8 +285,7 @@ TEST(CalibrationCodec, NumbersThatAreNoCamera) {
   zero[0] = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(error_of([&] { only_camera(record({.k = zero})); }).context().field, "fx");
   EXPECT_EQ(error_of([&] { only_camera(record({.k = k}, -3, 240)); }).context().field, "width");
-  EXPECT_TRUE(is_error(error_of([] { only_camera(record({})); }),
-                       {.field = "fx", .value = "0", .bound = "1e-06 to 1e+09"}));
+  EXPECT_TRUE(is_error(error_of([] { only_camera(record({})); }), {.about = "neither K nor P"}));
 }
 
 }  // namespace calibration_codec_test
