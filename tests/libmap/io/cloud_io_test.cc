@@ -256,7 +256,7 @@ TEST_P(CloudFormat, FieldNamesThatWouldBeReadAsSomethingElseAreRefused) {
   cloud = sample_cloud(3);
   cloud.fields.clear();
   for (const char* const name : {"r", "g", "b"}) cloud.add_field(name, ScalarType::uint8);
-  EXPECT_TRUE(is_error(error_of([&] { write_sample(GetParam(), cloud); }), {.about = "r g b"}));
+  EXPECT_TRUE(is_error(error_of([&] { write_sample(GetParam(), cloud); }), {.field = "r g b"}));
 }
 
 // A locale with a decimal comma that needs no installation.
