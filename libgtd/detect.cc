@@ -26,7 +26,7 @@ std::vector<Eigen::Vector3f> to_float(const std::vector<Eigen::Vector3d>& points
 PointCloud downsampled(const PointCloud& cloud, double leaf_m) {
   PointCloud thin;
   thin.viewpoint = cloud.viewpoint;
-  for (const Eigen::Vector3f& centroid : thin_to_centroids(to_float(cloud.positions), leaf_m))
+  for (const Eigen::Vector3f& centroid : voxel_centroids(to_float(cloud.positions), leaf_m))
     thin.positions.push_back(centroid.cast<double>());
   return thin;
 }
@@ -179,7 +179,7 @@ DetectionResult detect(const PointCloud& terrain, const DetectionOptions& option
                                  : voxelize(surface.positions, stages.voxel_size_m);
   });
   result.occupied_voxels = grid.voxels.size();
-  result.lone_voxels = count_lone(grid.voxels);
+  result.lone_voxels = count_isolated(grid.voxels);
   // The earlier methods score any cloud, as their programs do.
   const Method method = stages.tiles.graspable.method;
   if (method == Method::corrected || method == Method::calibrated)
@@ -196,7 +196,7 @@ DetectionResult detect(const PointCloud& terrain, const DetectionOptions& option
   result.tiles = tiles.size();
   TileDetectionResult detected = detect_tiles(
       {in_frame, surface, grid}, stages.mask, tiles,
-      options.share.count == 1 ? CurvatureAt::all_points : CurvatureAt::points_near_tiles,
+      options.share.count == 1 ? CurvatureExtent::all_points : CurvatureExtent::points_near_tiles,
       stages.tiles, progress);
   result.curvature_points = detected.curvature_points;
   result.convex_points = detected.convex_points;

@@ -127,7 +127,7 @@ void require_appendable(const TilePlan& earlier, const TilePlan& plan,
         "terrain");
 }
 
-std::vector<StoredTile> untouched_tiles(const std::map<TileNumber, StoredTile>& done,
+std::vector<StoredTile> unaffected_tiles(const std::map<TileNumber, StoredTile>& done,
                                         const TilePlan& earlier, const TilePlan& plan,
                                         const TerrainFrame& frame, const StoreTiling& tiling) {
   std::vector<libmap::Bounds3d> added;
@@ -162,7 +162,7 @@ PointsRectangle points_for(const std::vector<TileNumber>& tiles, const TerrainFr
   return points_for(columns, frame, tiling.halo_voxels);
 }
 
-bool touches(const TerrainFile& file, const PointsRectangle& wanted, const TerrainFrame& frame) {
+bool may_intersect(const TerrainFile& file, const PointsRectangle& wanted, const TerrainFrame& frame) {
   if (file.points == 0) return false;
   libmap::PointCloud corners;
   for (int n = 0; n < 8; ++n)

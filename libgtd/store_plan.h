@@ -41,7 +41,7 @@ void require_appendable(const TilePlan& earlier, const TilePlan& plan,
                         const DetectionOptions& detection, bool append, const std::string& store);
 
 // Returns the finished tiles that do not depend on any point of the files that are only in `plan`.
-std::vector<StoredTile> untouched_tiles(const std::map<TileNumber, StoredTile>& done,
+std::vector<StoredTile> unaffected_tiles(const std::map<TileNumber, StoredTile>& done,
                                         const TilePlan& earlier, const TilePlan& plan,
                                         const TerrainFrame& frame, const StoreTiling& tiling);
 
@@ -49,7 +49,7 @@ std::vector<StoredTile> untouched_tiles(const std::map<TileNumber, StoredTile>& 
 PointsRectangle points_for(const std::vector<TileNumber>& tiles, const TerrainFrame& frame,
                            const StoreTiling& tiling);
 // Returns true if a point of the file may be in the rectangle.
-bool touches(const TerrainFile& file, const PointsRectangle& wanted, const TerrainFrame& frame);
+bool may_intersect(const TerrainFile& file, const PointsRectangle& wanted, const TerrainFrame& frame);
 
 // Returns the box and counts of the tile, without the fields of its file.
 StoredTile stored_tile(const StreamedTile& tile);

@@ -53,12 +53,12 @@ class StreamedDetection {
     std::vector<Eigen::Vector3d> points;
     const std::size_t step = wanted.size() / max_tiles + 1;
     for (std::size_t n = 0; n < wanted.size() && points.size() < max_points; n += step) {
-      const PointsRectangle places = points_for(columns_of_tile(wanted[n]), frame_, 0);
-      const std::size_t count = points_.count_in(places.low, places.high);
+      const PointsRectangle rectangle = points_for(columns_of_tile(wanted[n]), frame_, 0);
+      const std::size_t count = points_.count_in(rectangle.low, rectangle.high);
       if (count == 0 || count > max_points_) continue;
-      const PointCloud cloud = points_.points_in(places.low, places.high);
+      const PointCloud cloud = points_.points_in(rectangle.low, rectangle.high);
       const VoxelGrid grid = voxelize(cloud.positions, scenario_.voxel_size_m);
-      lone += count_lone(grid.voxels);
+      lone += count_isolated(grid.voxels);
       voxels += grid.voxels.size();
       points.insert(points.end(), cloud.positions.begin(), cloud.positions.end());
     }
@@ -112,8 +112,8 @@ class StreamedDetection {
   }
 
   bool is_small(const TileBounds& columns) const {
-    const PointsRectangle places = points_for(columns, frame_, halo_);
-    return points_.count_in(places.low, places.high) <= max_points_;
+    const PointsRectangle rectangle = points_for(columns, frame_, halo_);
+    return points_.count_in(rectangle.low, rectangle.high) <= max_points_;
   }
 
   // Splits between tiles, across the longer side.
@@ -159,13 +159,13 @@ class StreamedDetection {
       const TileBounds part = cut(columns_of_tile(tile), columns);
       if (!is_empty(part)) parts.push_back(part);
     }
-    const PointsRectangle places = points_for(columns, frame_, halo_);
-    const PointCloud cloud = points_.points_in(places.low, places.high);
+    const PointsRectangle rectangle = points_for(columns, frame_, halo_);
+    const PointCloud cloud = points_.points_in(rectangle.low, rectangle.high);
     VoxelGrid grid = voxelize(cloud.positions, scenario_.voxel_size_m);
     grid.min = frame_.min;
     grid.max = frame_.max;
     const TileDetectionResult found =
-        detect_tiles({cloud, cloud, grid}, mask_, parts, CurvatureAt::points_near_tiles,
+        detect_tiles({cloud, cloud, grid}, mask_, parts, CurvatureExtent::points_near_tiles,
                      tile_detection_options(mask_, scenario_));
     for (const MapVoxel& voxel : found.voxels)
       results.at(tile_of(voxel.voxel, tile_voxels_)).voxels.push_back(voxel);

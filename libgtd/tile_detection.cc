@@ -30,7 +30,7 @@ double curvature_reach_m(const CurvatureOptions& curvature) {
 constexpr double mean_margin_voxels = 2.0;
 
 double margin_voxels(const ConvexityStage& stage) {
-  return stage.of_voxel_means ? mean_margin_voxels : 0.0;
+  return stage.average_per_voxel ? mean_margin_voxels : 0.0;
 }
 
 // Columns of the tiles, each extended by `margin_m` and one voxel.
@@ -79,10 +79,10 @@ class TilesWithMargin {
 
 std::vector<std::size_t> points_within(const PointCloud& cloud, const VoxelLattice& lattice,
                                        const std::vector<TileBounds>& tiles, double margin_m) {
-  const TilesWithMargin places(lattice, tiles, margin_m);
+  const TilesWithMargin rectangles(lattice, tiles, margin_m);
   std::vector<std::size_t> within;
   for (std::size_t n = 0; n < cloud.size(); ++n)
-    if (places.hold(cloud.positions[n])) within.push_back(n);
+    if (rectangles.hold(cloud.positions[n])) within.push_back(n);
   return within;
 }
 
@@ -106,15 +106,15 @@ std::vector<Eigen::Vector3d> convex_among(const PointCloud& cloud,
 
 std::vector<Eigen::Vector3d> find_convex_points(
     const PointCloud& terrain, const VoxelLattice& lattice, const std::vector<TileBounds>& tiles,
-    CurvatureAt curvature_at, const ConvexityStage& stage, TileDetectionResult& result) {
-  if (curvature_at == CurvatureAt::all_points)
-    return convex_among(stage.of_voxel_means ? voxel_means(terrain, lattice.voxel_size_m) : terrain,
+    CurvatureExtent curvature_at, const ConvexityStage& stage, TileDetectionResult& result) {
+  if (curvature_at == CurvatureExtent::all_points)
+    return convex_among(stage.average_per_voxel ? voxel_means(terrain, lattice.voxel_size_m) : terrain,
                         std::nullopt, stage, result);
   const double reach_m = stage.distance_m + curvature_reach_m(stage.curvature) +
                          margin_voxels(stage) * lattice.voxel_size_m;
   PointCloud nearby =
       libmap::select_points(terrain, points_within(terrain, lattice, tiles, reach_m));
-  if (stage.of_voxel_means) nearby = voxel_means(nearby, lattice.voxel_size_m);
+  if (stage.average_per_voxel) nearby = voxel_means(nearby, lattice.voxel_size_m);
   return convex_among(nearby, points_within(nearby, lattice, tiles, stage.distance_m), stage,
                       result);
 }
@@ -140,7 +140,7 @@ std::vector<MapVoxel> map_voxels(const std::vector<ScoredVoxel>& scored,
                    .convex = convex[n] != 0,
                    .border = scored[n].border,
                    .force = scored[n].force,
-                   .falling_share = scored[n].falling_share};
+                   .outward_fall_fraction = scored[n].outward_fall_fraction};
     if (!surface.empty()) voxel.slope_deg = surface[n].slope_deg;
     if (options.tilts_mask && surface[n].normal.allFinite()) voxel.normal = surface[n].normal;
     voxel.graspable = is_graspable(scored[n], voxel.convex, lattice.center_of(voxel.voxel).z(),
@@ -154,7 +154,7 @@ std::vector<MapVoxel> map_voxels(const std::vector<ScoredVoxel>& scored,
 std::vector<std::uint8_t> near_convex(const std::vector<ScoredVoxel>& scored,
                                       const TileSurroundings& surroundings,
                                       const std::vector<TileBounds>& tiles,
-                                      CurvatureAt curvature_at, const ConvexityStage& stage,
+                                      CurvatureExtent curvature_at, const ConvexityStage& stage,
                                       TileDetectionResult& result) {
   const VoxelLattice& lattice = surroundings.grid.lattice;
   const std::vector<Eigen::Vector3d> convex_points =
@@ -171,7 +171,7 @@ std::optional<ConvexityStage> convexity_of(const Scenario& scenario) {
       .curvature = {.method = follows_thesis(scenario.method) ? CurvatureMethod::thesis
                                                               : CurvatureMethod::corrected,
                     .radius_m = scenario.curvature_radius_m},
-      .of_voxel_means = plane_method(scenario.method) == PlaneMethod::robust,
+      .average_per_voxel = plane_method(scenario.method) == PlaneMethod::robust,
       .zero_plane_m = scenario.lowest_target_m(),
       .distance_m = scenario.intersection_distance_m};
 }
@@ -245,7 +245,7 @@ TileDetectionOptions tile_detection_options(const GripperMask& mask, const Scena
 }
 
 TileDetectionResult detect_tiles(const TileSurroundings& surroundings, const GripperMask& mask,
-                                 const std::vector<TileBounds>& tiles, CurvatureAt curvature_at,
+                                 const std::vector<TileBounds>& tiles, CurvatureExtent curvature_at,
                                  const TileDetectionOptions& options, libmap::Progress& progress) {
   TileDetectionResult result;
   const VoxelGrid& grid = surroundings.grid;

@@ -45,7 +45,7 @@ MapContent content_of(const Scenario& scenario);
 // Options for the curvature near scored voxels and the convexity test.
 struct ConvexityStage {
   CurvatureOptions curvature;
-  bool of_voxel_means = true;  // averages points per voxel, so that density has no effect
+  bool average_per_voxel = true;  // averages points per voxel, so that density has no effect
   double zero_plane_m = 0.0;   // CurvatureMethod::thesis: lower bound of convex points
   double distance_m = 0.01;    // maximum distance of a convex voxel from a convex point
 };
@@ -84,11 +84,11 @@ struct TileDetectionResult {
 };
 
 // Points at which curvature is measured. The result is the same if the tiles cover the terrain.
-enum class CurvatureAt { points_near_tiles, all_points };
+enum class CurvatureExtent { points_near_tiles, all_points };
 
 // Scores the voxels of the tiles. Throws all errors of the individual stages.
 TileDetectionResult detect_tiles(const TileSurroundings& surroundings, const GripperMask& mask,
-                                 const std::vector<TileBounds>& tiles, CurvatureAt curvature_at,
+                                 const std::vector<TileBounds>& tiles, CurvatureExtent curvature_at,
                                  const TileDetectionOptions& options,
                                  libmap::Progress& progress = libmap::no_progress());
 

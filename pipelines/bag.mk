@@ -56,7 +56,7 @@ $(OUT)/images.json: $(BAG) $(wildcard $(BAG)/*) $(OUT)/read_with
 map_bag := $(if $(filter %.bag,$(BAG)),map.bag,$(if $(filter %.mcap,$(BAG)),map.mcap,map_bag.json))
 
 # The list of sets is known once the images exist.
-stamps := $(shell test -f $(OUT)/images/moments.csv && tail -n +2 $(OUT)/images/moments.csv | cut -d, -f1)
+stamps := $(shell tail -n +2 $(firstword $(wildcard $(OUT)/images/synchronized_sets.csv $(OUT)/images/moments.csv) /dev/null) | cut -d, -f1)
 moments: $(foreach stamp,$(stamps),$(OUT)/$(stamp)/$(map_bag) $(OUT)/$(stamp)/top.png)
 
 $(OUT)/%/panorama.pcd: $(OUT)/images.json

@@ -3,7 +3,7 @@
 #include "libmap/io/cloud_io.h"
 #include "libmap/view/image_io.h"
 #include "libmap/view/offscreen.h"
-#include "tools/support/analysis_pictures.h"
+#include "tools/support/analysis_images.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
 #include "tools/support/map_table.h"
@@ -27,7 +27,7 @@ struct AnalyzeOptions {
   std::string start = no_start;
   PointFrame points_frame = PointFrame::input;
   std::string transform = "auto";
-  bool pictures = true;
+  bool images = true;
   libgtd::MapSurfaceOptions surface;
   libgtd::MapAnalysisOptions analysis;
   libgtd::MapRegionOptions regions;
@@ -56,7 +56,7 @@ void bind(libmap::ParameterTable& table, AnalyzeOptions& options) {
   table.add("points_frame", options.points_frame, point_frame_names(),
             "frame of the start or of the expected regions: of the scored cloud, the terrain, or "
             "the map before it was cropped");
-  table.add("pictures", options.pictures, "draw images and charts");
+  table.add("pictures", options.images, "draw images and charts");
   bind(table, options.table);
 }
 
@@ -76,7 +76,7 @@ ReadMap read_map(const std::string& file, Run& run) {
   map.manifest = libmap::read_manifest_of(file);
   map.voxels = in_file(file, [&] {
     return libgtd::voxel_map_of(
-        map.cloud, map.manifest ? libgtd::facts_of(*map.manifest) : libgtd::MapFacts{});
+        map.cloud, map.manifest ? libgtd::map_info(*map.manifest) : libgtd::MapInfo{});
   });
   if (!map.manifest)
     run.warn(file +
@@ -160,7 +160,7 @@ std::string percent_text(const std::optional<double>& share) {
 
 void say_ground(const Analysis& analysis, const AnalyzeOptions& options, Run& run) {
   const libgtd::MapAnalysis& ground = analysis.ground;
-  run.say("{} of {} voxels evaluated: {:.3f} m2 of ground, {:.4f} m2 ({}) graspable",
+  run.info("{} of {} voxels evaluated: {:.3f} m2 of ground, {:.4f} m2 ({}) graspable",
           ground.ground.voxels, ground.voxels, ground.ground.area_m2,
           ground.ground.graspable_area_m2, percent_text(ground.ground.graspable_share()));
   if (ground.column_coverage < 0.95)
@@ -170,14 +170,14 @@ void say_ground(const Analysis& analysis, const AnalyzeOptions& options, Run& ru
         options.map, 100.0 * ground.column_coverage);
   const libgtd::RegionReach& reach = analysis.reach;
   if (analysis.regions.regions.empty()) {
-    run.say("no graspable region");
+    run.info("no graspable region");
     return;
   }
-  run.say(
+  run.info(
       "{} regions, the largest {:.4f} m2; {:g} m strides: {} groups; one group from {:.3f} m on",
       analysis.regions.regions.size(), analysis.regions.regions.front().area_m2,
       options.reach.stride_m, reach.groups, *reach.joining_stride_m);
-  run.say("{} regions ({:.4f} m2) are reachable from {}", reach.reachable_regions,
+  run.info("{} regions ({:.4f} m2) are reachable from {}", reach.reachable_regions,
           reach.reachable_area_m2, options.start == no_start ? "region 1" : options.start);
   if (reach.reachable_regions == 0)
     run.warn("the nearest region, {}, is {:.3f} m from the start", *reach.start_region + 1,
@@ -186,12 +186,12 @@ void say_ground(const Analysis& analysis, const AnalyzeOptions& options, Run& ru
 
 void say_change(const libgtd::MapChange& change, const AnalyzeOptions& options, Run& run) {
   const libgtd::ChangeSummary& evaluated = change.evaluated;
-  run.say("{} common voxels ({}), {} in MAP only, {} in OTHER only", change.pairs.size(),
+  run.info("{} common voxels ({}), {} in MAP only, {} in OTHER only", change.pairs.size(),
           change.matching == libgtd::VoxelMatching::lattice
               ? std::string("same lattice")
               : fmt::format("nearest within {:g} voxels", options.change.match_distance_voxels),
           change.only_map.size(), change.only_other.size());
-  run.say(
+  run.info(
       "of {} evaluated in both: kappa {}, accuracy {}; graspable in both {}, in MAP only {}, in "
       "OTHER only {}",
       evaluated.graspable.size(),
@@ -201,7 +201,7 @@ void say_change(const libgtd::MapChange& change, const AnalyzeOptions& options, 
       percent_text(evaluated.graspable.accuracy().value()), evaluated.graspable.true_positives,
       evaluated.lost(), evaluated.gained());
   if (evaluated.difference.count > 0)
-    run.say("score, OTHER - MAP: mean {:+.3f}, mean absolute {:.3f}, rms {:.3f}",
+    run.info("score, OTHER - MAP: mean {:+.3f}, mean absolute {:.3f}, rms {:.3f}",
             evaluated.difference.mean, evaluated.difference.mean_absolute,
             evaluated.difference.rms);
 }
@@ -244,7 +244,7 @@ void write_chart(const fs::path& folder, const std::string& name, const libmap::
   libmap::write_text(folder / (name + ".png"), libmap::to_png(libmap::draw_chart(chart)));
 }
 
-void write_pictures(const fs::path& folder, const AnalyzeOptions& options, const ReadMap& map,
+void write_images(const fs::path& folder, const AnalyzeOptions& options, const ReadMap& map,
                     const Analysis& analysis, const Comparison* comparison) {
   const libmap::VirtualDisplay display;
   const std::string name = short_name(options.map);
@@ -254,21 +254,21 @@ void write_pictures(const fs::path& folder, const AnalyzeOptions& options, const
               ground_chart(ground.by_height, "height [m]", "Graspable ground by height, " + name));
   write_chart(folder, "by_slope",
               ground_chart(ground.by_slope, "slope [deg]", "Graspable ground by slope, " + name));
-  MapPicture picture{map.voxels, analysis.surface, ""};
-  const auto write = [&](const char* file, const libmap::ColorImage& image) {
-    libmap::write_text(folder / file, libmap::to_png(image));
+  MapImage map_image{map.voxels, analysis.surface, ""};
+  const auto write = [&](const char* file, const libmap::ColorImage& drawn) {
+    libmap::write_text(folder / file, libmap::to_png(drawn));
   };
-  picture.title = fmt::format("{}: {} regions, stride {:g} m", name,
+  map_image.title = fmt::format("{}: {} regions, stride {:g} m", name,
                               analysis.regions.regions.size(), options.reach.stride_m);
-  write("regions.png", draw_regions(picture, analysis.regions, analysis.reach));
+  write("regions.png", draw_regions(map_image, analysis.regions, analysis.reach));
   if (comparison == nullptr) return;
   const libgtd::MapChange& change = comparison->change;
-  picture.title = fmt::format(
+  map_image.title = fmt::format(
       "MAP {}, OTHER {}{}", name, short_name(options.other),
       change.evaluated.kappa ? fmt::format(": kappa {:.2f}", change.evaluated.kappa->value) : "");
-  write("change.png", draw_change(picture, change, comparison->other.voxels,
+  write("change.png", draw_change(map_image, change, comparison->other.voxels,
                                   comparison->map_terrain_from_other_terrain));
-  write("change_score.png", draw_score_change(picture, change, comparison->other.voxels));
+  write("change_score.png", draw_score_change(map_image, change, comparison->other.voxels));
 }
 
 void write_tables(const fs::path& folder, const AnalyzeOptions& options, const ReadMap& map,
@@ -300,12 +300,12 @@ void analyze(AnalyzeOptions& options, Run& run) {
   if (options.maps.size() > 1 || !options.table.expected.empty()) {
     if (!options.other.empty())
       throw UsageError("--against requires one MAP without --expected; --pairs compares several");
-    refuse_set(options, bind_one, "requires one map without --expected");
+    reject_changed(options, bind_one, "requires one map without --expected");
     options.table.points_frame = options.points_frame;
-    options.table.pictures = options.pictures;
+    options.table.images = options.images;
     return tabulate_maps(options.maps, options.folder, options.table, run);
   }
-  refuse_set<MapTableOptions>(options.table, graspmap_tools::bind,
+  reject_changed<MapTableOptions>(options.table, graspmap_tools::bind,
                               "requires several maps or --expected");
   options.map = options.maps.front();
   if (options.other.empty() && options.transform != "auto")
@@ -330,7 +330,7 @@ void analyze(AnalyzeOptions& options, Run& run) {
   run.write_output_tree(options.folder, output_names, [&](const fs::path& folder) {
     if (folder.empty()) return;
     write_tables(folder, options, map, analysis, against);
-    if (options.pictures) write_pictures(folder, options, map, analysis, against);
+    if (options.images) write_images(folder, options, map, analysis, against);
   });
 }
 

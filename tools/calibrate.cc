@@ -13,7 +13,7 @@ using namespace graspmap_tools;
 namespace {
 
 namespace fs = std::filesystem;
-using libmap::CalibratedPicture;
+using libmap::CalibratedImage;
 using libmap::CameraCalibrationResult;
 using libmap::Chart;
 using libmap::ChartCurve;
@@ -35,7 +35,7 @@ struct CalibrateOptions {
   libmap::CameraCalibrationOptions calibration;
 };
 
-struct Picture {
+struct BoardPhoto {
   std::string name{};
   int width = 0;
   int height = 0;
@@ -77,7 +77,7 @@ std::vector<std::string> image_files(const std::vector<std::string>& given) {
 // Limit of the search for a board, which needs about 30 bytes per pixel.
 constexpr std::int64_t max_pixels = std::int64_t{1} << 24;
 
-Picture read_picture(const std::string& file, const libmap::Chessboard& board) {
+BoardPhoto read_photo(const std::string& file, const libmap::Chessboard& board) {
   try {
     const std::string bytes = libmap::read_whole_file(file);
     const auto info = libmap::read_image_info(bytes);
@@ -96,51 +96,51 @@ Picture read_picture(const std::string& file, const libmap::Chessboard& board) {
 }
 
 // Returns the first readable image. Throws the Error of the first image if none is readable.
-const Picture& first_readable(const std::vector<Picture>& pictures) {
-  for (const Picture& picture : pictures)
-    if (!picture.fault) return picture;
-  throw libmap::Error(*pictures.front().fault);
+const BoardPhoto& first_readable(const std::vector<BoardPhoto>& photos) {
+  for (const BoardPhoto& photo : photos)
+    if (!photo.fault) return photo;
+  throw libmap::Error(*photos.front().fault);
 }
 
-std::vector<Picture> read_pictures(const std::vector<std::string>& files,
+std::vector<BoardPhoto> read_photos(const std::vector<std::string>& files,
                                    const libmap::Chessboard& board, Run& run) {
-  std::vector<Picture> pictures(files.size());
+  std::vector<BoardPhoto> photos(files.size());
   run.progress().begin("boards", files.size());
   libmap::parallel_each(files.size(), [&](std::size_t n) {
-    pictures[n] = read_picture(files[n], board);
+    photos[n] = read_photo(files[n], board);
     run.progress().advance(1);
   });
   run.progress().end();
-  const Picture& first = first_readable(pictures);
-  const auto size = [](const Picture& picture) {
-    return fmt::format("{} x {}", picture.width, picture.height);
+  const BoardPhoto& first = first_readable(photos);
+  const auto size = [](const BoardPhoto& photo) {
+    return fmt::format("{} x {}", photo.width, photo.height);
   };
-  for (const Picture& picture : pictures) {
-    if (picture.fault)
-      run.warn(std::string(picture.fault->what()) + "; it is left out");
-    else if (size(picture) != size(first))
+  for (const BoardPhoto& photo : photos) {
+    if (photo.fault)
+      run.warn(std::string(photo.fault->what()) + "; it is left out");
+    else if (size(photo) != size(first))
       throw libmap::Error("the images differ in size",
-                          {.file = picture.name,
+                          {.file = photo.name,
                            .field = "size",
-                           .value = size(picture),
+                           .value = size(photo),
                            .bound = size(first) + " as " + first.name});
   }
-  return pictures;
+  return photos;
 }
 
-std::vector<libmap::BoardPicture> boards_of(const std::vector<Picture>& pictures,
+std::vector<libmap::BoardImage> boards_of(const std::vector<BoardPhoto>& photos,
                                             const CalibrateOptions& options, Run& run) {
-  std::vector<libmap::BoardPicture> boards;
-  for (const Picture& picture : pictures)
-    if (picture.corners) boards.push_back({picture.name, *picture.corners});
+  std::vector<libmap::BoardImage> boards;
+  for (const BoardPhoto& photo : photos)
+    if (photo.corners) boards.push_back({photo.name, *photo.corners});
   if (boards.empty())
     throw libmap::Error("no image shows the whole board",
                         {.field = "--board",
                          .value = options.board,
                          .bound = "the number of inner corners, one less than squares"});
-  for (const Picture& picture : pictures)
-    if (!picture.corners && !picture.fault)
-      run.warn("{}: does not show a board of {} inner corners", picture.name, options.board);
+  for (const BoardPhoto& photo : photos)
+    if (!photo.corners && !photo.fault)
+      run.warn("{}: does not show a board of {} inner corners", photo.name, options.board);
   return boards;
 }
 
@@ -178,32 +178,32 @@ std::string summary(const CameraCalibrationResult& result, const CalibrateOption
   std::string text = fmt::format(
       "{} images of a board of {} inner corners, squares of {} mm\n"
       "reprojection error {:.3f} px (root mean square)\n",
-      result.pictures.size(), options.board, libmap::to_text(options.calibration.board.square_mm),
+      result.images.size(), options.board, libmap::to_text(options.calibration.board.square_mm),
       result.rms_px);
   for (const Term& term : terms_of(result)) text += term.name + " " + with_deviation(term) + "\n";
   return text + "+-: one standard deviation\n";
 }
 
-libmap::Table picture_table(const std::vector<Picture>& pictures,
+libmap::Table photo_table(const std::vector<BoardPhoto>& photos,
                             const CameraCalibrationResult& result) {
   libmap::Table table;
   table.columns = {"image", "used", "rms_px", "max_px", "distance_m", "tilt_deg"};
-  for (const Picture& picture : pictures) {
+  for (const BoardPhoto& photo : photos) {
     const auto found = std::find_if(
-        result.pictures.begin(), result.pictures.end(),
-        [&](const CalibratedPicture& calibrated) { return calibrated.name == picture.name; });
+        result.images.begin(), result.images.end(),
+        [&](const CalibratedImage& calibrated) { return calibrated.name == photo.name; });
     const bool is_repeated = std::find(result.repeated.begin(), result.repeated.end(),
-                                       picture.name) != result.repeated.end();
-    if (found == result.pictures.end()) {
-      table.rows.push_back({picture.name,
-                            picture.fault      ? "unreadable"
-                            : !picture.corners ? "no board"
+                                       photo.name) != result.repeated.end();
+    if (found == result.images.end()) {
+      table.rows.push_back({photo.name,
+                            photo.fault      ? "unreadable"
+                            : !photo.corners ? "no board"
                             : is_repeated      ? "repeated"
                                                : "rejected",
                             "", "", "", ""});
       continue;
     }
-    table.rows.push_back({picture.name, "yes", libmap::to_text(found->rms_px),
+    table.rows.push_back({photo.name, "yes", libmap::to_text(found->rms_px),
                           libmap::to_text(found->max_px),
                           libmap::to_text(found->camera_from_board.translation().norm()),
                           libmap::to_text(found->tilt_deg)});
@@ -216,28 +216,28 @@ libmap::Table residual_table(const CameraCalibrationResult& result,
   libmap::Table table;
   table.columns = {"image", "row", "column", "x_px", "y_px", "residual_x_px", "residual_y_px"};
   const auto columns = static_cast<std::size_t>(board.columns);
-  for (const CalibratedPicture& picture : result.pictures)
-    for (std::size_t n = 0; n < picture.corners.size(); ++n)
-      table.rows.push_back({picture.name, std::to_string(n / columns), std::to_string(n % columns),
-                            libmap::to_text(picture.corners[n].x()),
-                            libmap::to_text(picture.corners[n].y()),
-                            libmap::to_text(picture.residuals_px[n].x()),
-                            libmap::to_text(picture.residuals_px[n].y())});
+  for (const CalibratedImage& photo : result.images)
+    for (std::size_t n = 0; n < photo.corners.size(); ++n)
+      table.rows.push_back({photo.name, std::to_string(n / columns), std::to_string(n % columns),
+                            libmap::to_text(photo.corners[n].x()),
+                            libmap::to_text(photo.corners[n].y()),
+                            libmap::to_text(photo.residuals_px[n].x()),
+                            libmap::to_text(photo.residuals_px[n].y())});
   return table;
 }
 
-void note_results(const std::vector<Picture>& pictures, const CameraCalibrationResult& result,
+void note_results(const std::vector<BoardPhoto>& photos, const CameraCalibrationResult& result,
                   Run& run) {
   const auto count = [&](const auto& is) {
-    return std::count_if(pictures.begin(), pictures.end(), is);
+    return std::count_if(photos.begin(), photos.end(), is);
   };
   run.add_results(
-      {{"images", pictures.size()},
-       {"images_unreadable", count([](const Picture& p) { return p.fault.has_value(); })},
-       {"images_without_board", count([](const Picture& p) { return !p.corners && !p.fault; })},
+      {{"images", photos.size()},
+       {"images_unreadable", count([](const BoardPhoto& p) { return p.fault.has_value(); })},
+       {"images_without_board", count([](const BoardPhoto& p) { return !p.corners && !p.fault; })},
        {"images_repeated", result.repeated.size()},
        {"images_rejected", result.rejected.size()},
-       {"images_used", result.pictures.size()},
+       {"images_used", result.images.size()},
        {"rms_px", result.rms_px},
        {"sigma_px", result.sigma_px}});
   for (const Term& term : terms_of(result))
@@ -251,9 +251,9 @@ void warn_of_weaknesses(const CameraCalibrationResult& result, Run& run) {
     run.warn(name + ": left out: an earlier image shows the board in the same pose");
   for (const std::string& name : result.rejected)
     run.warn(name + ": left out for its reprojection error");
-  for (const CalibratedPicture& picture : result.pictures)
-    if (picture.rms_px > good_error_px)
-      run.warn("{}: reprojection error {:.2f} px, above {} px", picture.name, picture.rms_px,
+  for (const CalibratedImage& photo : result.images)
+    if (photo.rms_px > good_error_px)
+      run.warn("{}: reprojection error {:.2f} px, above {} px", photo.name, photo.rms_px,
                good_error_px);
   if (result.relative_focal_deviation() > good_focal_deviation)
     run.warn(
@@ -287,8 +287,8 @@ std::string chart_png(const Chart& chart, int height_px) {
 double magnification(const CameraCalibrationResult& result) {
   double sum = 0.0;
   std::size_t count = 0;
-  for (const CalibratedPicture& picture : result.pictures)
-    for (const Eigen::Vector2d& residual : picture.residuals_px) {
+  for (const CalibratedImage& photo : result.images)
+    for (const Eigen::Vector2d& residual : photo.residuals_px) {
       sum += residual.norm();
       ++count;
     }
@@ -316,19 +316,19 @@ std::string draw_residuals(const CameraCalibrationResult& result) {
     curve.x.push_back(pixel.x());
     curve.y.push_back(height - 1 - pixel.y());
   };
-  for (const CalibratedPicture& picture : result.pictures)
-    for (std::size_t n = 0; n < picture.corners.size(); ++n) {
+  for (const CalibratedImage& photo : result.images)
+    for (std::size_t n = 0; n < photo.corners.size(); ++n) {
       ChartCurve dot;
       dot.color = corner_color;
       dot.markers = true;
       dot.width_px = 1.2;
-      add(dot, picture.corners[n]);
+      add(dot, photo.corners[n]);
       chart.curves.push_back(std::move(dot));
       ChartCurve arrow;
       arrow.color = residual_color;
       arrow.width_px = 1.5;
-      add(arrow, picture.corners[n]);
-      add(arrow, picture.corners[n] + scale * picture.residuals_px[n]);
+      add(arrow, photo.corners[n]);
+      add(arrow, photo.corners[n] + scale * photo.residuals_px[n]);
       chart.curves.push_back(std::move(arrow));
     }
   const double inner_width = chart_width_px - 150.0;
@@ -340,15 +340,15 @@ std::string draw_residuals(const CameraCalibrationResult& result) {
 std::string draw_errors(const CameraCalibrationResult& result, double bound_px) {
   Chart chart;
   chart.title = "Reprojection error of each image";
-  const auto count = static_cast<double>(result.pictures.size());
+  const auto count = static_cast<double>(result.images.size());
   chart.x_axis = {"image", std::pair(0.5, count + 0.5)};
   libmap::ChartHistogram bars;
   bars.name = "root mean square";
   bars.first_edge = 0.5;
   double largest = bound_px;
-  for (const CalibratedPicture& picture : result.pictures) {
-    bars.heights.push_back(picture.rms_px);
-    largest = std::max(largest, picture.rms_px);
+  for (const CalibratedImage& photo : result.images) {
+    bars.heights.push_back(photo.rms_px);
+    largest = std::max(largest, photo.rms_px);
   }
   chart.y_axis = {"error [px]", std::pair(0.0, 1.2 * largest)};
   chart.histograms.push_back(std::move(bars));
@@ -362,13 +362,13 @@ std::string draw_errors(const CameraCalibrationResult& result, double bound_px) 
   return chart_png(chart, 600);
 }
 
-void write_report(const std::vector<Picture>& pictures, const CameraCalibrationResult& result,
+void write_report(const std::vector<BoardPhoto>& photos, const CameraCalibrationResult& result,
                   const CalibrateOptions& options, Run& run) {
   const auto csv = [](const libmap::Table& table) {
     return Run::text_writer(libmap::to_csv(table));
   };
   run.write_output_folder(
-      options.report, {{"images.csv", csv(picture_table(pictures, result))},
+      options.report, {{"images.csv", csv(photo_table(photos, result))},
                        {"residuals.csv", csv(residual_table(result, options.calibration.board))},
                        {"residuals.png", Run::text_writer(draw_residuals(result))},
                        {"errors.png", Run::text_writer(draw_errors(result, good_error_px))}});
@@ -385,20 +385,20 @@ void calibrate(CalibrateOptions& options, Run& run) {
     throw libmap::Error("a camera is written as YAML",
                         {.file = options.output, .bound = "a name.yaml"});
   if (!options.report.empty()) run.claim_output_folder(options.report);
-  const std::vector<Picture> pictures = run.timed(
-      "find boards", [&] { return read_pictures(files, options.calibration.board, run); });
+  const std::vector<BoardPhoto> photos = run.timed(
+      "find boards", [&] { return read_photos(files, options.calibration.board, run); });
   for (const std::string& file : files) run.add_input(file);
-  const std::vector<libmap::BoardPicture> boards = boards_of(pictures, options, run);
+  const std::vector<libmap::BoardImage> boards = boards_of(photos, options, run);
   const CameraCalibrationResult result = run.timed("calibrate", [&] {
-    const Picture& first = first_readable(pictures);
+    const BoardPhoto& first = first_readable(photos);
     return libmap::calibrate_camera(boards, first.width, first.height, options.calibration);
   });
-  note_results(pictures, result, run);
+  note_results(photos, result, run);
   warn_of_weaknesses(result, run);
   const std::string said = summary(result, options);
-  run.say(said.substr(0, said.size() - 1));
+  run.info(said.substr(0, said.size() - 1));
   if (!options.report.empty())
-    run.timed("report", [&] { write_report(pictures, result, options, run); });
+    run.timed("report", [&] { write_report(photos, result, options, run); });
   run.write_text(options.output, libmap::to_yaml({options.name, result.camera}, said));
 }
 

@@ -16,7 +16,7 @@
 #include "tools/support/map_frame.h"
 #include "tools/support/placement.h"
 #include "tools/support/results.h"
-#include "tools/support/usages.h"
+#include "tools/support/subcommands.h"
 
 using namespace graspmap_tools;
 
@@ -28,7 +28,7 @@ struct CompareOptions {
   std::string a;
   std::string b;
   std::string output;
-  std::string picture;
+  std::string image;
   std::string transform;
   std::string box;
   double within_m = 0.01;
@@ -36,7 +36,7 @@ struct CompareOptions {
   std::uint64_t seed = 1;
   bool icp = false;
   libmap::SurfaceAlignmentOptions alignment;
-  double picture_range_m = 0.0;
+  double image_range_m = 0.0;
   libmap::SceneViewOptions view;
   bool json = false;
 };
@@ -49,7 +49,7 @@ void bind(libmap::ParameterTable& table, CompareOptions& options) {
   table.add("seed", options.seed, {}, "random seed of the samples");
   table.add("icp", options.icp, "align A with B by point-to-plane ICP first");
   bind(table, options.alignment);
-  table.add("picture_range_m", options.picture_range_m, libmap::not_negative,
+  table.add("picture_range_m", options.image_range_m, libmap::not_negative,
             "distance at the end of the image's color scale, m; 0: the 98th percentile");
   table.add("picture_view", options.view.view,
             {{"top", libmap::Viewpoint::top},
@@ -372,7 +372,7 @@ void add_results(const Comparison& comparison, Run& run) {
 }
 
 // Image of A's points, colored by their signed distance in millimeters.
-libmap::ColorImage picture_of(const Comparison& comparison, const CompareOptions& options) {
+libmap::ColorImage image_of(const Comparison& comparison, const CompareOptions& options) {
   const bool has_sides = comparison.bias_m.has_value();
   const std::string name = has_sides ? "signed distance [mm]" : "distance [mm]";
   libmap::PointCloud cloud;
@@ -385,7 +385,7 @@ libmap::ColorImage picture_of(const Comparison& comparison, const CompareOptions
   layer.coloring.mode = libmap::ColorMode::field;
   layer.coloring.field = name;
   if (has_sides) layer.coloring.scale = libmap::ColorScale::diverging;
-  layer.coloring.range_max = 1e3 * options.picture_range_m;
+  layer.coloring.range_max = 1e3 * options.image_range_m;
   layer.coloring.range_min = has_sides ? -layer.coloring.range_max : 0.0;
   libmap::Scene scene;
   scene.layers.push_back(std::move(layer));
@@ -397,17 +397,17 @@ libmap::ColorImage picture_of(const Comparison& comparison, const CompareOptions
 }
 
 void write_outputs(Comparison& comparison, const CompareOptions& options, Run& run) {
-  if (options.output.empty() && options.picture.empty()) return;
+  if (options.output.empty() && options.image.empty()) return;
   run.add_input(options.a);
   run.add_input(options.b);
   if (std::filesystem::is_regular_file(options.transform)) run.add_input(options.transform);
   run.manifest().parameters.emplace_back("transform", options.transform);
   run.manifest().parameters.emplace_back("box", options.box);
   add_results(comparison, run);
-  if (!options.picture.empty()) {
+  if (!options.image.empty()) {
     const libmap::ColorImage image =
-        run.timed("picture", [&] { return picture_of(comparison, options); });
-    run.write_text(options.picture, libmap::to_png(image));
+        run.timed("picture", [&] { return image_of(comparison, options); });
+    run.write_text(options.image, libmap::to_png(image));
   }
   if (options.output.empty()) return;
   libmap::PointCloud& cloud = comparison.points;
@@ -424,10 +424,10 @@ void compare(const CompareOptions& options, Run& run) {
     libmap::require_cloud_format(options.output);
     run.claim_output(options.output, {options.a, options.b, options.transform});
   }
-  if (!options.picture.empty()) {
-    if (libmap::format_of(options.picture) != ".png")
-      throw libmap::Error("images are written as .png", {.file = options.picture});
-    run.claim_output(options.picture, {options.a, options.b, options.transform});
+  if (!options.image.empty()) {
+    if (libmap::format_of(options.image) != ".png")
+      throw libmap::Error("images are written as .png", {.file = options.image});
+    run.claim_output(options.image, {options.a, options.b, options.transform});
   }
   const Shape a = run.timed("read", [&] { return read_shape(options.a, options); });
   const Shape b = run.timed("read", [&] { return read_shape(options.b, options); });
@@ -443,7 +443,7 @@ int compare_surfaces(int argc, char** argv) {
   command.input("B", options.b, "reference surface: a mesh or a cloud");
   command.output(options.output,
                  "A's points in B's frame with the fields distance and signed_distance", false);
-  command.option("--picture", "FILE.png", options.picture,
+  command.option("--picture", "FILE.png", options.image,
                  "image of A's points, colored by their signed distance");
   command.option("--transform", "X,Y,Z,ROLL,PITCH,YAW|FILE|crop", options.transform,
                  "transform from A to B: meters and degrees about the fixed axes, roll first; a "
@@ -461,6 +461,6 @@ int compare_surfaces(int argc, char** argv) {
 int main(int argc, char** argv) {
   const bool edges =
       std::any_of(argv, argv + argc, [](const std::string& word) { return word == "--edges"; });
-  return run_usage(argc, argv, {compare_surfaces, compare_edges},
+  return run_subcommand(argc, argv, {compare_surfaces, compare_edges},
                    edges ? compare_edges : compare_surfaces);
 }

@@ -9,12 +9,12 @@
 #include "libmap/mesh/mesh_parts.h"
 #include "libmap/mesh/surface_distance.h"
 #include "libmap/site/ground_plane.h"
-#include "libmap/site/spot_check.h"
+#include "libmap/site/edge_check.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
 #include "tools/support/placement.h"
 #include "tools/support/results.h"
-#include "tools/support/usages.h"
+#include "tools/support/subcommands.h"
 
 using namespace graspmap_tools;
 
@@ -42,7 +42,7 @@ struct SpotCheckCommandOptions {
   TruthFrame truth_frame = TruthFrame::site;
   double radius_m = 0.02;
   int min_points = 3;
-  libmap::SpotCheckOptions check;
+  libmap::EdgeCheckOptions check;
   libmap::GroundPlaneOptions plane;
   bool json = false;
 };
@@ -82,7 +82,7 @@ EdgeData read_edge_data(const std::string& file) {
 
 struct Check {
   libmap::SiteCorners site;
-  libmap::SpotCheckResult result;
+  libmap::EdgeCheckResult result;
   std::string ground;  // reference of the heights
   std::optional<libmap::GroundPlane> plane{};
 };
@@ -127,7 +127,7 @@ libmap::HeightFunction find_ground(const SpotCheckCommandOptions& options, EdgeD
   if (zero) return at_zero;
   check.plane = run.timed("ground", [&] { return fit_ground(shape, options.plane); });
   const libmap::Pose level_from_map = libmap::level_from_map(*check.plane);
-  run.say("ground: a plane tilted by {:.2f} deg, {} points, RMSE {:.1f} mm", check.plane->tilt_deg,
+  run.info("ground: a plane tilted by {:.2f} deg, {} points, RMSE {:.1f} mm", check.plane->tilt_deg,
           check.plane->inliers, 1e3 * check.plane->rmse_m);
   run.manifest().transforms.emplace_back("level_from_map", level_from_map);
   if (shape.mesh)
@@ -149,8 +149,8 @@ libmap::HeightFunction heights_in(const std::optional<libmap::Bounds3d>& box, Ed
   }
   if (!box) return libmap::heights_of(*shape.mesh);
   return [heights = libmap::heights_of(*shape.mesh, box->max.z()),
-          bottom = box->min.z()](const Eigen::Vector2d& place) {
-    const std::optional<double> height = heights(place);
+          bottom = box->min.z()](const Eigen::Vector2d& position) {
+    const std::optional<double> height = heights(position);
     return height && *height >= bottom ? height : std::nullopt;
   };
 }
@@ -176,7 +176,7 @@ std::string cell_of(const std::optional<double>& value) {
   return value ? libmap::to_fixed_text(std::abs(*value), 4) : "";
 }
 
-libmap::Table table_of(const libmap::SpotCheckResult& result) {
+libmap::Table table_of(const libmap::EdgeCheckResult& result) {
   libmap::Table table;
   table.columns = {"edge"};
   for (std::size_t n = 1; n <= result.edges[0].size(); ++n)
@@ -185,14 +185,14 @@ libmap::Table table_of(const libmap::SpotCheckResult& result) {
   for (std::size_t e = 0; e < result.edges.size(); ++e) {
     std::vector<std::string>& row = table.rows.emplace_back();
     row.emplace_back(edge_names[e]);
-    for (const libmap::SpotCheckPlace& place : result.edges[e])
-      row.push_back(cell_of(place.error_m()));
+    for (const libmap::EdgeCheckPoint& edge_point : result.edges[e])
+      row.push_back(cell_of(edge_point.error_m()));
     row.push_back(cell_of(result.mean_m[e]));
   }
   return table;
 }
 
-libmap::ResultTable results_of(const libmap::SpotCheckResult& result) {
+libmap::ResultTable results_of(const libmap::EdgeCheckResult& result) {
   return {{"measured", result.measured},
           {"missing", result.missing},
           {"mean_m", result.mean_abs_error_m},
@@ -201,18 +201,18 @@ libmap::ResultTable results_of(const libmap::SpotCheckResult& result) {
 }
 
 Json check_json(const Check& check, const SpotCheckCommandOptions& options) {
-  const libmap::SpotCheckResult& result = check.result;
+  const libmap::EdgeCheckResult& result = check.result;
   Json edges = Json::array();
   for (std::size_t e = 0; e < result.edges.size(); ++e) {
-    Json places = Json::array();
-    for (const libmap::SpotCheckPlace& place : result.edges[e])
-      places.push_back(to_json({{"x_m", place.position.x()},
-                                {"y_m", place.position.y()},
-                                {"z_m", place.height_m},
-                                {"ground_m", place.ground_m},
-                                {"error_m", place.error_m()}}));
+    Json points = Json::array();
+    for (const libmap::EdgeCheckPoint& edge_point : result.edges[e])
+      points.push_back(to_json({{"x_m", edge_point.position.x()},
+                                {"y_m", edge_point.position.y()},
+                                {"z_m", edge_point.height_m},
+                                {"ground_m", edge_point.ground_m},
+                                {"error_m", edge_point.error_m()}}));
     edges.push_back(to_json({{"edge", edge_names[e]}, {"mean_m", result.mean_m[e]}}));
-    edges.back()["places"] = places;
+    edges.back()["places"] = points;
   }
   Json corners = Json::array();
   for (const Eigen::Vector2d& corner : check.site.corners)
@@ -225,7 +225,7 @@ Json check_json(const Check& check, const SpotCheckCommandOptions& options) {
 }
 
 void print_check(const Check& check, const SpotCheckCommandOptions& options) {
-  const libmap::SpotCheckResult& result = check.result;
+  const libmap::EdgeCheckResult& result = check.result;
   if (options.json) return print_json(check_json(check, options));
   std::cout << fmt::format("height error in m along the edges (ground: {})\n{:<6}", check.ground,
                            "edge");
@@ -246,7 +246,7 @@ void print_check(const Check& check, const SpotCheckCommandOptions& options) {
                            published_mean_m);
 }
 
-void spot_check(const SpotCheckCommandOptions& options, Run& run) {
+void edge_check(const SpotCheckCommandOptions& options, Run& run) {
   if (!options.output.empty()) {
     if (libmap::format_of(options.output) != ".csv")
       throw libmap::Error("tables are written as .csv", {.file = options.output});
@@ -284,5 +284,5 @@ int graspmap_tools::compare_edges(int argc, char** argv) {
                  "extent of the site, instead of the rectangle around the data");
   command.flag("--json", options.json, "print the results as JSON, with each location");
   bind(command.parameters(), options);
-  return command.run(argc, argv, [&](Run& run) { spot_check(options, run); });
+  return command.run(argc, argv, [&](Run& run) { edge_check(options, run); });
 }

@@ -14,7 +14,7 @@
 #include "tools/support/map_frame.h"
 #include "tools/support/map_tiles.h"
 #include "tools/support/raster_output.h"
-#include "tools/support/usages.h"
+#include "tools/support/subcommands.h"
 
 using namespace graspmap_tools;
 
@@ -144,7 +144,7 @@ bool convert_textured(const ConvertOptions& options, Run& run) {
     return false;
   }
   const libmap::TexturedMeshWriteOptions writing;
-  run.require_own_companions(options.output, libmap::companions_of_model(options.output, writing));
+  run.require_own_companions(options.output, libmap::additional_model_files(options.output, writing));
   run.add_results({{"pages", model.pages.size()}});
   add_input(options, run);
   Run::Files writers;
@@ -164,7 +164,7 @@ void convert_mesh(const ConvertOptions& options, Run& run) {
   const std::string format = libmap::format_of(options.output);
   tell_losses(mesh, format, run);
   const bool to_cloud = format == ".pcd" || format == ".csv";
-  if (to_cloud) run.say("the output contains only the mesh's vertices");
+  if (to_cloud) run.info("the output contains only the mesh's vertices");
   run.add_results({{"vertices", mesh.vertices.size()}, {"triangles", mesh.triangles.size()}});
   add_input(options, run);
   run.write_output(options.output, [&](const auto& temporary) {
@@ -299,7 +299,7 @@ bool has_cloud_extension(const std::string& path) {
 // Selects the subcommand. A scan is a database or a folder of frames; other folders that are
 // converted to a file are, for example, models of COLMAP. An output without an extension is
 // otherwise a bag, of a rig or of one map; several inputs are shares of a map.
-Usage* usage_of(const Words& words) {
+Subcommand* subcommand_of(const Words& words) {
   if (words.any_input([](const std::string& word) { return word.ends_with(".db"); }))
     return convert_scan;
   if (libmap::has_bag_extension(words.output) || words.any_input(libmap::is_bag_path) ||
@@ -319,6 +319,6 @@ Usage* usage_of(const Words& words) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  return run_usage(argc, argv, {convert_file, convert_scan, convert_bag},
-                   usage_of(words_of(argc, argv)));
+  return run_subcommand(argc, argv, {convert_file, convert_scan, convert_bag},
+                   subcommand_of(words_of(argc, argv)));
 }

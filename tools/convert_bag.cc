@@ -17,7 +17,7 @@
 #include "tools/support/map_frame.h"
 #include "tools/support/option_values.h"
 #include "tools/support/run.h"
-#include "tools/support/usages.h"
+#include "tools/support/subcommands.h"
 
 using namespace graspmap_tools;
 
@@ -42,7 +42,7 @@ struct BagCommandOptions {
   std::string footholds;
   std::string frame = "auto";
   double stamp_offset_s = 0.0;
-  double arrow_m = libmap::BagPlaces{}.arrow_m;
+  double arrow_m = libmap::BagTargets{}.arrow_m;
   double cell_size_m = 0.0;
   libmap::BagCompression compression = libmap::BagCompression::none;
 };
@@ -93,9 +93,9 @@ void report(const libmap::BagRigPlan& plan, const libmap::BagRigExport& result,
     if (options.strict) throw libmap::Error(warning, {.file = options.input});
     run.warn(options.input + ": " + warning);
   }
-  if (result.pixels_beyond > 0)
+  if (result.overflow_pixels > 0)
     run.warn("{}: {} pixels exceed the 16-bit depth range and are left out (--depth-scale)",
-             options.input, result.pixels_beyond);
+             options.input, result.overflow_pixels);
   std::size_t fullest = 0;
   for (const libmap::SynchronizedSet& set : result.sets) fullest = std::max(fullest, set.seen());
   run.add_results({{"cameras", plan.rig.cameras.size()},
@@ -104,7 +104,7 @@ void report(const libmap::BagRigPlan& plan, const libmap::BagRigExport& result,
                    {"moments", result.sets.size()},
                    {"moments_in_bag", plan.all_sets},
                    {"cameras_of_fullest_moment", fullest},
-                   {"pixels_beyond", result.pixels_beyond}});
+                   {"pixels_beyond", result.overflow_pixels}});
   for (std::size_t n = 0; n < plan.rig.cameras.size(); ++n) {
     const libmap::RigCamera& camera = plan.rig.cameras[n];
     run.add_results({{camera.name + ".topic", plan.topics[n]}});
@@ -112,7 +112,7 @@ void report(const libmap::BagRigPlan& plan, const libmap::BagRigExport& result,
                                            camera.camera.base_from_camera);
     if (plan.topics[n].empty()) run.warn(camera.name + ": there is no topic of its images");
   }
-  run.say("{} images of {} cameras, {} of {} image sets, at most {} cameras per set", result.images,
+  run.info("{} images of {} cameras, {} of {} image sets, at most {} cameras per set", result.images,
           plan.rig.cameras.size(), result.sets.size(), plan.all_sets, fullest);
 }
 
@@ -150,7 +150,7 @@ void read_bag_into_cloud(const BagCommandOptions& options, Run& run) {
                    {"points", result.cloud.size()},
                    {"dropped_points", result.dropped_points}});
   if (result.cloud.empty()) run.warn(options.input + ": " + result.topic + ": no finite points");
-  run.say("{} points of {} at {} s, one of {} messages; {} not finite", result.cloud.size(),
+  run.info("{} points of {} at {} s, one of {} messages; {} not finite", result.cloud.size(),
           result.topic, libmap::to_fixed_text(result.stamp_s, 6), result.messages,
           result.dropped_points);
   run.write_output(options.output, [&](const fs::path& temporary) {
@@ -214,7 +214,7 @@ PointCloud curvature_map(const CloudFile& map) {
   return cloud;
 }
 
-libmap::BagPlaces places_of(const CloudFile& footholds, double arrow_m) {
+libmap::BagTargets targets_of(const CloudFile& footholds, double arrow_m) {
   const auto field = [&](const char* name) -> const std::vector<double>& {
     const libmap::ScalarField* found = footholds.cloud.find_field(name);
     if (found) return found->values;
@@ -225,20 +225,20 @@ libmap::BagPlaces places_of(const CloudFile& footholds, double arrow_m) {
   const std::vector<double>& y = field("approach_y");
   const std::vector<double>& z = field("approach_z");
   const std::vector<double>& score = field("score");
-  libmap::BagPlaces places;
-  places.marker_topic = "/footholds";
-  places.pose_topic = "/foothold_poses";
-  places.arrow_m = arrow_m;
+  libmap::BagTargets targets;
+  targets.marker_topic = "/footholds";
+  targets.pose_topic = "/foothold_poses";
+  targets.arrow_m = arrow_m;
   for (std::size_t n = 0; n < footholds.cloud.size(); ++n) {
     const Eigen::Vector3d approach(x[n], y[n], z[n]);
     if (!approach.allFinite() || approach.norm() < 1e-9)
       throw libmap::Error(
           "is not a direction",
           {.file = footholds.path, .field = fmt::format("approach of foothold {}", n + 1)});
-    places.places.push_back({footholds.cloud.positions[n], approach, libmap::score_color(score[n]),
+    targets.targets.push_back({footholds.cloud.positions[n], approach, libmap::score_color(score[n]),
                              fmt::format("{}: {:.2f}", n + 1, score[n])});
   }
-  return places;
+  return targets;
 }
 
 // Stamp of the messages: --stamp, else the panorama's stamp in the inputs' manifests.
@@ -341,8 +341,8 @@ void write_claimed_bag(const BagCommandOptions& options, Run& run, const Write& 
 void add_results(const libmap::BagContent& content, Run& run) {
   for (const libmap::BagCloud& cloud : content.clouds)
     run.add_results({{cloud.topic + ".points", cloud.cloud.size()}});
-  for (const libmap::BagPlaces& places : content.places)
-    run.add_results({{"footholds", places.places.size()}});
+  for (const libmap::BagTargets& targets : content.targets)
+    run.add_results({{"footholds", targets.targets.size()}});
   for (const libmap::BagGrid& grid : content.grids)
     run.add_results(
         {{"cells_x", grid.columns}, {"cells_y", grid.rows}, {"cell_size_m", grid.cell_m}});
@@ -378,8 +378,8 @@ void write_map_bag(const BagCommandOptions& options, Run& run) {
                                 ? run.timed("curvature", [&] { return curvature_map(map); })
                                 : read(options.curvature, run).cloud});
   if (footholds) {
-    content.places.push_back(places_of(*footholds, options.arrow_m));
-    content.places.back().frame = frame_id(footholds->frame(), terrain_frame);
+    content.targets.push_back(targets_of(*footholds, options.arrow_m));
+    content.targets.back().frame = frame_id(footholds->frame(), terrain_frame);
   }
   if (libmap::bag_format_of(options.output) != libmap::BagFormat::ros1)
     add_grid(map, map_frame, options, content, run);
@@ -388,7 +388,7 @@ void write_map_bag(const BagCommandOptions& options, Run& run) {
   write_claimed_bag(options, run, [&](const fs::path& path, libmap::BagFormat format) {
     libmap::write_bag(path, format, content, options.compression);
   });
-  run.say("{} clouds and {} footholds at {} s", content.clouds.size(),
+  run.info("{} clouds and {} footholds at {} s", content.clouds.size(),
           footholds ? footholds->cloud.size() : 0, libmap::to_fixed_text(content.stamp_s, 6));
 }
 
@@ -409,11 +409,11 @@ void write_rig_folder_bag(const BagCommandOptions& options, Run& run) {
   write_claimed_bag(options, run, [&](const fs::path& path, libmap::BagFormat format) {
     libmap::write_rig_bag(path, format, rig, images, bag);
   });
-  run.say("{} images of {} cameras", images.size(), rig.cameras.size());
+  run.info("{} images of {} cameras", images.size(), rig.cameras.size());
 }
 
 void refuse_map_options(const BagCommandOptions& options, const std::string& reason) {
-  refuse_given({{"--terrain", !options.terrain.empty()},
+  reject_given({{"--terrain", !options.terrain.empty()},
                 {"--curvature", !options.curvature.empty()},
                 {"--footholds", !options.footholds.empty()}},
                reason);
@@ -421,17 +421,17 @@ void refuse_map_options(const BagCommandOptions& options, const std::string& rea
 
 void write_bag(const BagCommandOptions& options, Run& run) {
   const bool rig = fs::is_directory(options.input);
-  refuse_given({{"--topic", !options.topics.empty()}},
+  reject_given({{"--topic", !options.topics.empty()}},
                rig ? "cannot be used with a rig's folder" : "cannot be used with a map");
   if (rig) {
     refuse_map_options(options, "cannot be used with a rig's folder");
-    refuse_given({{"--stamp", options.stamp != "auto"}},
+    reject_given({{"--stamp", options.stamp != "auto"}},
                  "cannot be used with a rig's folder: use --stamp-offset");
     if (options.rig.empty() && !fs::exists(fs::path(options.input) / libmap::rig_file_name))
       throw libmap::Error("is neither a map's file nor a folder with rig.yaml (--rig)",
                           {.file = options.input});
   } else {
-    refuse_given({{"--rig", !options.rig.empty()}}, "cannot be used with a map");
+    reject_given({{"--rig", !options.rig.empty()}}, "cannot be used with a map");
     libmap::require_readable_file(options.input);
   }
   libmap::bag_format_of(options.output);  // throws Error
@@ -460,7 +460,7 @@ void run_bag(const BagCommandOptions& options, Run& run) {
   refuse_map_options(options, "requires a bag as output");
   if (fs::path(options.output).has_extension()) {
     libmap::require_cloud_format(options.output);
-    refuse_given({{"--rig", !options.rig.empty()}}, "cannot be used with a cloud output");
+    reject_given({{"--rig", !options.rig.empty()}}, "cannot be used with a cloud output");
     return read_bag_into_cloud(options, run);
   }
   read_bag_into_folder(options, run);

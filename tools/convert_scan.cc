@@ -9,14 +9,14 @@
 #include "libmap/poses/trajectory_io.h"
 #include "libmap/scan/colmap_builder.h"
 #include "libmap/scan/frame_folder_writer.h"
-#include "libmap/scan/picture_file.h"
+#include "libmap/scan/image_export.h"
 #include "libmap/scan/rtabmap_reader.h"
 #include "libmap/scan/scan_source.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_tiles.h"
 #include "tools/support/placement.h"
 #include "tools/support/scan_poses.h"
-#include "tools/support/usages.h"
+#include "tools/support/subcommands.h"
 
 using namespace graspmap_tools;
 
@@ -25,14 +25,14 @@ namespace {
 namespace fs = std::filesystem;
 
 // Choice among similar images.
-enum class PicturePreference { sharpest, first };
+enum class ImagePreference { sharpest, first };
 
-struct PictureOptions {
+struct ImageOptions {
   std::string bundler;  // output folders; empty: not written
   std::string colmap;
   PosesOption poses;
   std::string transform;
-  PicturePreference keep = PicturePreference::sharpest;
+  ImagePreference keep = ImagePreference::sharpest;
   libmap::ViewSelectionOptions selection;
   libmap::ColmapBuilderOptions points;
 
@@ -46,7 +46,7 @@ const std::vector<std::string> bundler_names = {"bundle.out", "images", "list.tx
 const std::vector<std::string> colmap_names = {"images", "sparse"};
 
 // One camera of one frame.
-struct Picture {
+struct ScanImage {
   int node = 0;
   std::size_t camera = 0;
   libmap::Pose world_from_camera = libmap::Pose::Identity();
@@ -54,114 +54,114 @@ struct Picture {
 };
 
 struct FrameResult {
-  std::vector<Picture> pictures{};
+  std::vector<ScanImage> images{};
   std::optional<libmap::Error> error{};
 };
 
-FrameResult find_pictures(const libmap::ScanSource& scan, const libmap::TrajectoryPose& pose,
-                          const libmap::Pose& world_from_map, const PictureOptions& options) {
+FrameResult find_images(const libmap::ScanSource& scan, const libmap::TrajectoryPose& pose,
+                          const libmap::Pose& world_from_map, const ImageOptions& options) {
   FrameResult result;
   try {
     const std::vector<libmap::CameraView> views =
-        libmap::read_pictures(scan, pose.node, {.color = true, .depth = false});
+        libmap::read_views(scan, pose.node, {.color = true, .depth = false});
     for (std::size_t c = 0; c < views.size(); ++c) {
       // Both throw for an unsupported camera.
       if (!options.bundler.empty()) libmap::centered_pinhole(views[c].color_camera);
       if (!options.colmap.empty()) libmap::to_colmap(views[c].color_camera);
-      result.pictures.push_back(
+      result.images.push_back(
           {pose.node, c,
            world_from_map * pose.world_from_base * views[c].color_camera.base_from_camera,
            libmap::image_sharpness(views[c].color)});
     }
   } catch (const libmap::Error& error) {
-    result.pictures.clear();
+    result.images.clear();
     result.error = error;
   }
   return result;
 }
 
-std::vector<Picture> find_pictures(const libmap::ScanSource& scan, const libmap::Trajectory& poses,
+std::vector<ScanImage> find_images(const libmap::ScanSource& scan, const libmap::Trajectory& poses,
                                    const libmap::Pose& world_from_map,
-                                   const PictureOptions& options, bool strict, Run& run) {
-  std::vector<Picture> pictures;
+                                   const ImageOptions& options, bool strict, Run& run) {
+  std::vector<ScanImage> images;
   run.progress().begin("pictures", poses.size());
   for (std::size_t first = 0; first < poses.size(); first += batch_size) {
     std::vector<FrameResult> batch(std::min(batch_size, poses.size() - first));
     libmap::parallel_each(batch.size(), [&](std::size_t n) {
-      batch[n] = find_pictures(scan, poses[first + n], world_from_map, options);
+      batch[n] = find_images(scan, poses[first + n], world_from_map, options);
     });
     for (const FrameResult& result : batch) {
       if (result.error && strict) throw libmap::Error(*result.error);
       if (result.error) run.warn(std::string(result.error->what()) + "; its image is left out");
-      pictures.insert(pictures.end(), result.pictures.begin(), result.pictures.end());
+      images.insert(images.end(), result.images.begin(), result.images.end());
     }
     run.progress().advance(batch.size());
   }
   run.progress().end();
-  if (pictures.empty())
+  if (images.empty())
     throw libmap::Error("no frame has a pose, a calibration and a color image",
                         {.file = scan.path().string()});
-  return pictures;
+  return images;
 }
 
-std::vector<Picture> selected(const std::vector<Picture>& pictures, const PictureOptions& options) {
+std::vector<ScanImage> selected(const std::vector<ScanImage>& images, const ImageOptions& options) {
   std::vector<libmap::Pose> poses;
   std::vector<double> qualities;
-  for (const Picture& picture : pictures) {
-    poses.push_back(picture.world_from_camera);
-    qualities.push_back(options.keep == PicturePreference::sharpest ? picture.sharpness : 0.0);
+  for (const ScanImage& image : images) {
+    poses.push_back(image.world_from_camera);
+    qualities.push_back(options.keep == ImagePreference::sharpest ? image.sharpness : 0.0);
   }
-  std::vector<Picture> kept;
+  std::vector<ScanImage> kept;
   for (const std::size_t n : libmap::select_views(poses, qualities, options.selection))
-    kept.push_back(pictures[n]);
+    kept.push_back(images[n]);
   return kept;
 }
 
 // Writes the image, unless `folder` is empty.
-libmap::BundlerView write_picture(const libmap::ScanSource& scan, const Picture& picture,
+libmap::BundlerView write_bundler_image(const libmap::ScanSource& scan, const ScanImage& image,
                                   const fs::path& folder) {
   const libmap::CameraView view =
-      libmap::read_pictures(scan, picture.node, {.color = true, .depth = false})[picture.camera];
+      libmap::read_views(scan, image.node, {.color = true, .depth = false})[image.camera];
   libmap::BundlerView written{
-      "images/" + libmap::picture_name(picture.node, picture.camera, ".jpg"),
-      libmap::centered_pinhole(view.color_camera), picture.world_from_camera};
+      "images/" + libmap::image_file_name(image.node, image.camera, ".jpg"),
+      libmap::centered_pinhole(view.color_camera), image.world_from_camera};
   if (!folder.empty())
     libmap::write_text(folder / written.image, libmap::encode_jpeg(libmap::resample_image(
                                                    view.color, view.color_camera, written.camera)));
   return written;
 }
 
-void write_bundler(const PictureOptions& options, const std::vector<Picture>& all,
+void write_bundler(const ImageOptions& options, const std::vector<ScanImage>& all,
                    const libmap::ScanSource& scan, Run& run) {
-  const std::vector<Picture> kept = selected(all, options);
-  run.say("{} of {} images kept", kept.size(), all.size());
+  const std::vector<ScanImage> kept = selected(all, options);
+  run.info("{} of {} images kept", kept.size(), all.size());
   run.add_results({{"kept_pictures", kept.size()}});
   run.write_output_tree(options.bundler, bundler_names, [&](const fs::path& folder) {
     if (!folder.empty()) fs::create_directory(folder / "images");
     std::vector<libmap::BundlerView> views(kept.size());
     libmap::parallel_each(kept.size(),
-                          [&](std::size_t n) { views[n] = write_picture(scan, kept[n], folder); });
+                          [&](std::size_t n) { views[n] = write_bundler_image(scan, kept[n], folder); });
     if (folder.empty()) return;
     libmap::write_text(folder / "bundle.out", libmap::to_bundle_text(views));
     libmap::write_text(folder / "list.txt", libmap::to_bundler_list(views));
   });
 }
 
-struct ColmapPicture {
+struct ColmapView {
   libmap::CameraView view{};
   std::string name{};
 };
 
 // Reads the image with its depth; writes the image, unless `folder` is empty.
-ColmapPicture copy_picture(const libmap::ScanSource& scan, const Picture& picture,
+ColmapView copy_image(const libmap::ScanSource& scan, const ScanImage& image,
                            const fs::path& folder) {
-  std::vector<libmap::CameraView> views = libmap::read_pictures(scan, picture.node, {});
-  const libmap::PictureFile file = libmap::picture_file(scan, picture.node, views, picture.camera);
+  std::vector<libmap::CameraView> views = libmap::read_views(scan, image.node, {});
+  const libmap::ImageFile file = libmap::image_file_of(scan, image.node, views, image.camera);
   if (!folder.empty()) libmap::write_text(folder / "images" / file.name, file.bytes);
-  return {std::move(views[picture.camera]), file.name};
+  return {std::move(views[image.camera]), file.name};
 }
 
-void write_colmap(const PictureOptions& options, const std::vector<Picture>& pictures,
+void write_colmap(const ImageOptions& options, const std::vector<ScanImage>& images,
                   const libmap::ScanSource& scan, Run& run) {
   run.write_output_tree(options.colmap, colmap_names, [&](const fs::path& folder) {
     if (!folder.empty()) {
@@ -169,18 +169,18 @@ void write_colmap(const PictureOptions& options, const std::vector<Picture>& pic
       fs::create_directory(folder / "sparse");
     }
     libmap::ColmapBuilder builder(options.points);
-    for (std::size_t first = 0; first < pictures.size(); first += batch_size) {
-      std::vector<ColmapPicture> batch(std::min(batch_size, pictures.size() - first));
+    for (std::size_t first = 0; first < images.size(); first += batch_size) {
+      std::vector<ColmapView> batch(std::min(batch_size, images.size() - first));
       libmap::parallel_each(batch.size(), [&](std::size_t n) {
-        batch[n] = copy_picture(scan, pictures[first + n], folder);
+        batch[n] = copy_image(scan, images[first + n], folder);
       });
       for (std::size_t n = 0; n < batch.size(); ++n)
-        builder.add_image(batch[n].name, batch[n].view, pictures[first + n].world_from_camera);
+        builder.add_image(batch[n].name, batch[n].view, images[first + n].world_from_camera);
     }
     const libmap::ColmapModel& model = builder.model();
     std::size_t observations = 0;
     for (const auto& [id, image] : model.images) observations += image.observations.size();
-    run.say("{} images of {} cameras, {} points, {} observations", model.images.size(),
+    run.info("{} images of {} cameras, {} points, {} observations", model.images.size(),
             model.cameras.size(), model.points.size(), observations);
     run.add_results({{"cameras", model.cameras.size()},
                      {"points", model.points.size()},
@@ -189,7 +189,7 @@ void write_colmap(const PictureOptions& options, const std::vector<Picture>& pic
   });
 }
 
-void add_options(Command& command, PictureOptions& options) {
+void add_options(Command& command, ImageOptions& options) {
   command.option("--bundler", "DIR", options.bundler,
                  "folder for cameras and images as Bundler v0.3 for MeshLab's registered rasters: "
                  "bundle.out, list.txt, images");
@@ -203,13 +203,13 @@ void add_options(Command& command, PictureOptions& options) {
   bind(command.parameters(), options.selection);
   command.parameters().add(
       "keep", options.keep,
-      {{"sharpest", PicturePreference::sharpest}, {"first", PicturePreference::first}},
+      {{"sharpest", ImagePreference::sharpest}, {"first", ImagePreference::first}},
       "with --bundler: choice among images with similar poses");
   bind(command.parameters(), options.points);
 }
 
 // Claims the folders before the work.
-void claim_picture_folders(const PictureOptions& options, const std::string& scan, Run& run) {
+void claim_image_folders(const ImageOptions& options, const std::string& scan, Run& run) {
   parse_transform(options.transform, "--transform");
   std::vector<std::string> inputs = scan_inputs(scan, options.poses);
   inputs.push_back(options.transform);
@@ -220,22 +220,22 @@ void claim_picture_folders(const PictureOptions& options, const std::string& sca
 // Writes, for Bundler, bundle.out, list.txt and resampled images of selected views; for COLMAP,
 // sparse/cameras.txt, images.txt, points3D.txt and all images as stored. Broken frames are left out
 // with a warning. Throws Error for them if `strict`.
-void write_picture_folders(PictureOptions& options, const libmap::ScanSource& scan, bool strict,
+void write_image_folders(ImageOptions& options, const libmap::ScanSource& scan, bool strict,
                            Run& run) {
   const libmap::Trajectory poses = find_poses(scan, options.poses, strict, run);
   const libmap::Pose world_from_map = parse_transform(options.transform, "--transform");
-  const std::vector<Picture> pictures =
-      find_pictures(scan, poses, world_from_map, options, strict, run);
+  const std::vector<ScanImage> images =
+      find_images(scan, poses, world_from_map, options, strict, run);
   libmap::Manifest& manifest = run.manifest();
   manifest.parameters.emplace_back("transform", options.transform);
   manifest.frame = "poses";
   manifest.transforms.emplace_back("world_from_map", world_from_map);
-  run.add_results({{"pictures", pictures.size()}});
+  run.add_results({{"pictures", images.size()}});
   const libmap::Manifest start = manifest;
   // COLMAP is first, because it also reads the depth and so finds all broken frames.
-  if (!options.colmap.empty()) write_colmap(options, pictures, scan, run);
+  if (!options.colmap.empty()) write_colmap(options, images, scan, run);
   manifest = start;
-  if (!options.bundler.empty()) write_bundler(options, pictures, scan, run);
+  if (!options.bundler.empty()) write_bundler(options, images, scan, run);
 }
 
 struct ExtractOptions {
@@ -243,7 +243,7 @@ struct ExtractOptions {
   std::string output;
   CalibrationOption calibration;
   bool strict = false;
-  PictureOptions pictures;
+  ImageOptions images;
 };
 
 struct Counts {
@@ -363,12 +363,12 @@ void write_folder(const ExtractOptions& options, const libmap::ScanSource& scan,
     if (!writer) return;
     const libmap::FrameFolderCounts written = writer->finish(scan.graph());
     add_results(scan.graph(), counts, written, run);
-    run.say("{} nodes: {} color, {} depth images, {} calibrations, {} links",
+    run.info("{} nodes: {} color, {} depth images, {} calibrations, {} links",
             scan.graph().nodes.size(), written.color_images, written.depth_images,
             written.calibrations, scan.graph().links.size());
-    if (written.right_images > 0) run.say("{} right images of stereo pairs", written.right_images);
+    if (written.right_images > 0) run.info("{} right images of stereo pairs", written.right_images);
     if (counts.rounded_depth_images > 0)
-      run.say("{} depth images were rounded to millimeters", counts.rounded_depth_images);
+      run.info("{} depth images were rounded to millimeters", counts.rounded_depth_images);
     if (counts.lost_depth_pixels > 0)
       run.warn("{} depth pixels beyond 65.5 m are left out", counts.lost_depth_pixels);
   };
@@ -379,27 +379,27 @@ void extract(ExtractOptions& options, Run& run) {
   if (libmap::has_bag_extension(options.output))
     throw libmap::Error("a bag requires a map or the folder of a camera rig as input, not a scan",
                         {.file = options.output});
-  const bool pictures = options.pictures.wanted();
-  const PictureOptions unset;
-  if (!pictures)
-    refuse_given({{"--poses", options.pictures.poses.source != unset.poses.source},
-                  {"--transform", options.pictures.transform != unset.transform},
-                  {"--keep", options.pictures.keep != unset.keep}},
+  const bool images = options.images.wanted();
+  const ImageOptions unset;
+  if (!images)
+    reject_given({{"--poses", options.images.poses.source != unset.poses.source},
+                  {"--transform", options.images.transform != unset.transform},
+                  {"--keep", options.images.keep != unset.keep}},
                  "requires --bundler or --colmap: a folder contains the scan's own poses");
-  if (options.output.empty() && !pictures)
+  if (options.output.empty() && !images)
     throw UsageError("no output: -o, --bundler or --colmap is required");
   if (!options.output.empty())
     run.claim_output_tree(options.output, libmap::frame_folder_names(),
                           {options.scan, options.calibration.source});
-  if (pictures) claim_picture_folders(options.pictures, options.scan, run);
+  if (images) claim_image_folders(options.images, options.scan, run);
   const auto scan =
       open_scan(options.scan, options.strict, run,
-                known_camera(options.calibration, options.scan, options.pictures.poses, run));
+                known_camera(options.calibration, options.scan, options.images.poses, run));
   if (fs::is_regular_file(options.scan)) run.add_input(options.scan);
   // Each folder has its own manifest.
   const libmap::Manifest start = run.manifest();
   // Images are first, because missing poses are found before anything is written.
-  if (pictures) write_picture_folders(options.pictures, *scan, options.strict, run);
+  if (images) write_image_folders(options.images, *scan, options.strict, run);
   run.manifest() = start;
   if (!options.output.empty()) write_folder(options, *scan, run);
 }
@@ -421,6 +421,6 @@ int graspmap_tools::convert_scan(int argc, char** argv) {
   command.output(options.output, "folder for the whole scan; replaced if it exists", false);
   command.flag("--strict", options.strict, "fail at a broken frame");
   add_calibration_option(command, options.calibration);
-  add_options(command, options.pictures);
+  add_options(command, options.images);
   return command.run(argc, argv, [&](Run& run) { extract(options, run); });
 }

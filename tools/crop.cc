@@ -73,7 +73,7 @@ std::vector<Eigen::Vector2d> polygon_of(const std::string& file) {
   std::vector<Eigen::Vector2d> corners;
   for (std::size_t row = 0; row < table.rows.size(); ++row)
     corners.emplace_back(table.number(row, x), table.number(row, y));
-  return in_file(file, [&] { return libmap::PlanPolygon(corners).corners(); });
+  return in_file(file, [&] { return libmap::XyPolygon(corners).corners(); });
 }
 
 void read_region(CropCommandOptions& options) {
@@ -138,7 +138,7 @@ void tell_ground(const std::string& input, const libmap::CropReport& report, Run
                    {"ground_rmse_m", ground.rmse_m},
                    {"ground_share", ground.share},
                    {"up", report.up}});
-  run.say("ground: {:.2f} deg from the map's z, {:.1f} mm RMSE over {:.1f} % of it", tilt,
+  run.info("ground: {:.2f} deg from the map's z, {:.1f} mm RMSE over {:.1f} % of it", tilt,
           1e3 * ground.rmse_m, 1e2 * ground.share);
   if (!report.up_of_normals) return;
   const libmap::UpOfNormals& by_normals = *report.up_of_normals;
@@ -156,7 +156,7 @@ void tell_scale(const libmap::BorderBand& band, const libmap::BorderScale& scale
       {{"border_sides_m", std::vector<double>(band.sides_m.begin(), band.sides_m.end())},
        {"border_scale", scale.factor},
        {"border_scale_deviation", scale.deviation}});
-  run.say(
+  run.info(
       "border: sides of {:.4f} m determine the scale x {:.5f} +- {:.5f}; refine --scale {:.5f} "
       "applies it to poses and depth",
       fmt::join(band.sides_m, ", "), scale.factor, scale.deviation, scale.factor);
@@ -168,12 +168,12 @@ void tell_site(const libmap::CropReport& report, const libmap::Bounds3d& bounds,
   if (report.rectangle) {
     run.add_results({{"site_yaw_deg", report.rectangle->yaw_deg},
                      {"site_clearance_m", report.rectangle->clearance_m}});
-    run.say("site: rotated by {:.2f} deg, {:.2f} m of data around it", report.rectangle->yaw_deg,
+    run.info("site: rotated by {:.2f} deg, {:.2f} m of data around it", report.rectangle->yaw_deg,
             report.rectangle->clearance_m);
   }
   if (report.band) {
     run.add_results({{"band_seen", report.band->seen}, {"white_level", report.band->white_level}});
-    run.say("border: white (>= {:.0f}) along {:.0f} % of the least visible side",
+    run.info("border: white (>= {:.0f}) along {:.0f} % of the least visible side",
             report.band->white_level, 1e2 * report.band->seen);
   }
   if (report.border_scale) tell_scale(*report.band, *report.border_scale, run);
@@ -181,13 +181,13 @@ void tell_site(const libmap::CropReport& report, const libmap::Bounds3d& bounds,
     std::vector<double> corners;
     for (const Eigen::Vector2d& corner : report.outline)
       corners.insert(corners.end(), {corner.x(), corner.y()});
-    run.add_results({{"outline_area_m2", libmap::PlanPolygon(report.outline).area_m2()},
+    run.add_results({{"outline_area_m2", libmap::XyPolygon(report.outline).area_m2()},
                      {"outline_m", corners}});
   }
-  run.say("size: {:.3f} x {:.3f} x {:.3f} m", size.x(), size.y(), size.z());
+  run.info("size: {:.3f} x {:.3f} x {:.3f} m", size.x(), size.y(), size.z());
 }
 
-void tell(const CropCommandOptions& options, const libmap::CropReport& report,
+void report_crop(const CropCommandOptions& options, const libmap::CropReport& report,
           const libmap::Bounds3d& bounds, Run& run) {
   run.add_input(options.input);
   if (!options.polygon.empty()) run.add_input(options.polygon);
@@ -213,9 +213,9 @@ void crop_cloud(const CropCommandOptions& options, Run& run) {
     run.warn("{} points without a position were dropped", read.dropped_points);
   const libmap::CropCloudResult result =
       run.timed("crop", [&] { return libmap::crop_cloud(read.cloud, options.crop); });
-  tell(options, result.report, libmap::bounds_of(result.cloud.positions), run);
+  report_crop(options, result.report, libmap::bounds_of(result.cloud.positions), run);
   run.add_results({{"points", result.cloud.size()}});
-  run.say("{} of {} points", result.cloud.size(), read.cloud.size());
+  run.info("{} of {} points", result.cloud.size(), read.cloud.size());
   write_site(options, run, [&](const fs::path& to) { libmap::write_cloud(to, result.cloud); });
 }
 
@@ -223,12 +223,12 @@ void crop_mesh(const CropCommandOptions& options, Run& run) {
   const libmap::TriangleMesh mesh = libmap::read_mesh(options.input).mesh;
   const libmap::CropMeshResult result =
       run.timed("crop", [&] { return libmap::crop_mesh(mesh, options.crop); });
-  tell(options, result.report, libmap::bounds_of(result.mesh.vertices), run);
+  report_crop(options, result.report, libmap::bounds_of(result.mesh.vertices), run);
   const double area = libmap::surface_area(result.mesh);
   run.add_results({{"surface_area_m2", area},
                    {"vertices", result.mesh.vertices.size()},
                    {"triangles", result.mesh.triangles.size()}});
-  run.say("{} of {} triangles, {:.3f} m2 of surface", result.mesh.triangles.size(),
+  run.info("{} of {} triangles, {:.3f} m2 of surface", result.mesh.triangles.size(),
           mesh.triangles.size(), area);
   write_site(options, run, [&](const fs::path& to) { libmap::write_mesh(to, result.mesh); });
 }
@@ -253,15 +253,15 @@ void crop_pieces(const CropCommandOptions& options, const std::vector<fs::path>&
     libmap::write_mesh(folder / (piece.stem().string() + ".ply"), mesh);
   };
   const libmap::CropReport report =
-      run.timed("crop", [&] { return libmap::crop_mesh_pieces(each, options.crop, write); });
-  tell(options, report, {box.min(), box.max()}, run);
+      run.timed("crop", [&] { return libmap::crop_mesh_tiles(each, options.crop, write); });
+  report_crop(options, report, {box.min(), box.max()}, run);
   run.add_results({{"pieces", written}, {"surface_area_m2", area_m2}, {"triangles", triangles}});
-  run.say("{} triangles in {} of {} tiles, {:.3f} m2 of surface", triangles, written, pieces.size(),
+  run.info("{} triangles in {} of {} tiles, {:.3f} m2 of surface", triangles, written, pieces.size(),
           area_m2);
 }
 
 void crop_folder(const CropCommandOptions& options, Run& run) {
-  const std::vector<fs::path> pieces = libmap::mesh_pieces(options.input);
+  const std::vector<fs::path> pieces = libmap::mesh_tiles(options.input);
   const std::vector<std::string> names = tile_folder_names(options.output, pieces, ".ply");
   run.claim_output_tree(options.output, names, {options.input, options.polygon});
   run.write_output_tree(options.output, names, [&](const fs::path& folder) {

@@ -64,14 +64,14 @@ void note_results(const TableEvaluation& evaluation, Run& run) {
     }
     run.add_results({{column.name + ".auc_trapezoid", result.area->trapezoid},
                      {column.name + ".auc_upper_sum", result.area->upper_sum}});
-    run.say("{}: {} locations, AUC {} (trapezoid), {} (upper sum, as in the thesis)", column.name,
+    run.info("{}: {} locations, AUC {} (trapezoid), {} (upper sum, as in the thesis)", column.name,
             locations, rounded_text(result.area->trapezoid), rounded_text(result.area->upper_sum));
   }
 }
 
 void write_results(const EvaluateOptions& options, const TableEvaluation& evaluation, Run& run) {
   const libmap::Chart chart = chart_of(evaluation, options.title);
-  const libmap::ColorImage picture =
+  const libmap::ColorImage image =
       run.timed("draw", [&] { return libmap::draw_chart(chart, libmap::roc_chart_size); });
   const auto text = &Run::text_writer;
   const auto csv = [](const libmap::Table& table) {
@@ -84,7 +84,7 @@ void write_results(const EvaluateOptions& options, const TableEvaluation& evalua
                            {"summary.json", text(libgtd::to_json(evaluation))},
                            {"summary.md", text(libgtd::to_markdown(evaluation, options.title))},
                            {"roc.svg", text(libmap::chart_svg(chart, libmap::roc_chart_size))},
-                           {"roc.png", text(libmap::to_png(picture))}});
+                           {"roc.png", text(libmap::to_png(image))}});
 }
 
 // Joins the rows of all tables, with the columns that all tables have.

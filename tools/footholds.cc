@@ -51,18 +51,18 @@ std::string gripper_of(const FootholdTrialsOptions& options,
 }
 
 // Drops footholds that are not on the mesh. Returns the positions of the others in its frame.
-std::vector<Eigen::Vector3d> places_on(const libgtd::Ground& ground,
+std::vector<Eigen::Vector3d> positions_on(const libgtd::Ground& ground,
                                        const libmap::Pose& mesh_from_map,
                                        const libmap::PointCloud& map, double max_distance_m,
                                        std::vector<libgtd::Foothold>& footholds) {
-  std::vector<Eigen::Vector3d> places;
+  std::vector<Eigen::Vector3d> positions;
   std::erase_if(footholds, [&](const libgtd::Foothold& foothold) {
-    const Eigen::Vector3d place = mesh_from_map * map.positions[foothold.map_point];
-    const bool is_on_mesh = ground.distance(place, max_distance_m).has_value();
-    if (is_on_mesh) places.push_back(place);
+    const Eigen::Vector3d position = mesh_from_map * map.positions[foothold.map_point];
+    const bool is_on_mesh = ground.distance(position, max_distance_m).has_value();
+    if (is_on_mesh) positions.push_back(position);
     return !is_on_mesh;
   });
-  return places;
+  return positions;
 }
 
 void bind(libmap::ParameterTable& table, FootholdTrialsOptions& options) {
@@ -91,15 +91,15 @@ std::vector<libgtd::LocationResult> test_footholds(const FootholdTrialsOptions& 
   const auto ground = in_file(options.mesh, [&] { return libgtd::Ground(mesh); });
   std::vector<libgtd::Foothold>& footholds = result.footholds;
   const std::size_t found = footholds.size();
-  const std::vector<Eigen::Vector3d> places = places_on(
+  const std::vector<Eigen::Vector3d> positions = positions_on(
       ground, map_from_input(manifest).inverse(), map, options.grasp.max_distance_m, footholds);
-  if (places.empty() && found > 0)
+  if (positions.empty() && found > 0)
     throw libmap::Error("none of the map's footholds is on the mesh", {.file = options.mesh});
-  if (places.size() < found)
+  if (positions.size() < found)
     run.warn("{}: {} of {} footholds are not on the mesh and are left out", options.mesh,
-             found - places.size(), found);
+             found - positions.size(), found);
   const std::vector<libgtd::LocationResult> trials = run.timed("grasp", [&] {
-    return libgtd::test_grasps(ground, gripper, places, options.grasp, run.progress());
+    return libgtd::test_grasps(ground, gripper, positions, options.grasp, run.progress());
   });
   std::vector<std::size_t> order(trials.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -112,7 +112,7 @@ std::vector<libgtd::LocationResult> test_footholds(const FootholdTrialsOptions& 
     return trials[a].force_n[1] > trials[b].force_n[1];
   });
   run.add_results({{"footholds_tested", trials.size()}, {"footholds_holding", order.size()}});
-  run.say("{} of {} footholds hold {} N with a probability of at least {}", order.size(),
+  run.info("{} of {} footholds hold {} N with a probability of at least {}", order.size(),
           trials.size(), libmap::to_text(options.grasp.load_n),
           libmap::to_text(options.min_probability));
   if (max_count > 0 && order.size() > static_cast<std::size_t>(max_count))
@@ -182,7 +182,7 @@ libgtd::FootholdResult search(const FootholdsCommandOptions& options, const libm
 }
 
 void find_footholds(const FootholdsCommandOptions& options, Run& run) {
-  if (options.trials.mesh.empty()) refuse_set(options.trials, &bind, "requires --mesh");
+  if (options.trials.mesh.empty()) reject_changed(options.trials, &bind, "requires --mesh");
   libmap::require_cloud_format(options.output);
   run.claim_output(options.output, {options.map, options.trials.mesh});
   const libmap::PointCloud map = libmap::read_cloud(options.map).cloud;
@@ -201,7 +201,7 @@ void find_footholds(const FootholdsCommandOptions& options, Run& run) {
     trials =
         test_footholds(options.trials, options.footholds.max_count, manifest, map, result, run);
   run.add_results({{"footholds", result.footholds.size()}});
-  run.say("{} footholds of {} candidate voxels", result.footholds.size(), result.candidates);
+  run.info("{} footholds of {} candidate voxels", result.footholds.size(), result.candidates);
   if (result.candidates == 0)
     run.warn("{}: no voxel is a candidate{}", options.map,
              result.at_border == 0

@@ -10,7 +10,7 @@
 #include "tools/support/results.h"
 #include "tools/support/scan_poses.h"
 #include "tools/support/tile_folder.h"
-#include "tools/support/usages.h"
+#include "tools/support/subcommands.h"
 
 // JSON of the survey, which shares and resumed runs read bit for bit.
 namespace libmap {
@@ -48,15 +48,15 @@ struct FuseOptions {
 };
 
 // Warns if more points are dropped than the 2 to 4 % at edges of static scans.
-void tell_contradictions(const libmap::DepthFusionResult& result, Run& run) {
+void report_contradictions(const libmap::DepthFusionResult& result, Run& run) {
   constexpr double usual_share = 0.06;
   const libmap::SurfacePointCounts& points = result.points;
-  const auto dropped = static_cast<double>(points.seen_through + points.missed + points.beside);
+  const auto dropped = static_cast<double>(points.seen_through + points.missed + points.contradicted);
   if (dropped < usual_share * (dropped + static_cast<double>(result.points_made))) return;
-  run.say(
+  run.info(
       "{} points dropped because frames contradict each other, for example after a motion: {} seen "
       "through, {} missed, {} connected to those",
-      dropped, points.seen_through, points.missed, points.beside);
+      dropped, points.seen_through, points.missed, points.contradicted);
 }
 
 void tell_registration(const libmap::DepthFusionResult& result, Run& run) {
@@ -64,13 +64,13 @@ void tell_registration(const libmap::DepthFusionResult& result, Run& run) {
   const libmap::PairCosts& depth = result.registration_check.depth;
   const libmap::PairCosts& shown = color.count > 0 ? color : depth;
   if (result.registration_rounds > 0)
-    run.say("poses corrected by registration: {:.1f} mm and {:.2f} deg (RMS)",
+    run.info("poses corrected by registration: {:.1f} mm and {:.2f} deg (RMS)",
             1e3 * result.registration_shift_m, result.registration_turn_deg);
   else if (result.registration_rejected && shown.count > 0)
-    run.say("poses not corrected: registration does not improve held-out {}, {:.4f} -> {:.4f}",
+    run.info("poses not corrected: registration does not improve held-out {}, {:.4f} -> {:.4f}",
             color.count > 0 ? "color" : "depth", shown.before, shown.after);
   else if (result.registration_rejected)
-    run.say(
+    run.info(
         "poses not corrected: they are refined, and there is no color to validate registration");
 }
 
@@ -86,11 +86,11 @@ void tell_results(const libmap::DepthFusionResult& result, const FuseOptions& op
       pixels.used, pixels.pixels, pixels.unmeasured, pixels.out_of_range, pixels.flying,
       pixels.grazing, pixels.without_ray);
   tell_registration(result, run);
-  tell_contradictions(result, run);
+  report_contradictions(result, run);
   if (result.redundant_frames > 0)
-    run.say("{} frames skipped: earlier frames measured their surface (enough_views)",
+    run.info("{} frames skipped: earlier frames measured their surface (enough_views)",
             result.redundant_frames);
-  run.say("{} frames, {} measurements -> {} points", result.frames, pixels.used,
+  run.info("{} frames, {} measurements -> {} points", result.frames, pixels.used,
           result.points_made);
   if (result.points_made > 0) return;
   if (result.points.unconfirmed > 0)
@@ -147,9 +147,9 @@ void make_tiles(const FuseOptions& options, const libmap::ScanSource& scan,
   const double tile_m = folder == nullptr ? libmap::whole_plan : options.tile_m;
   const auto survey = [&] {
     fusion.emplace(scan, poses, options.fusion, tile_m, run.progress());
-    return TileFolder::Facts(fusion->survey());
+    return TileFolder::TileData(fusion->survey());
   };
-  const TileFolder::Facts found = folder == nullptr ? TileFolder::Facts() : folder->begin(survey);
+  const TileFolder::TileData found = folder == nullptr ? TileFolder::TileData() : folder->begin(survey);
   if (!fusion && found.is_null()) survey();
   if (!fusion) {
     const auto known = found.get<libmap::FusionSurvey>();
@@ -274,6 +274,6 @@ int fuse_scan(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  return run_usage(argc, argv, {fuse_scan, fuse_rig},
+  return run_subcommand(argc, argv, {fuse_scan, fuse_rig},
                    argc > 1 && names_rig(argc, argv) ? fuse_rig : fuse_scan);
 }

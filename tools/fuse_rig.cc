@@ -6,7 +6,7 @@
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
 #include "tools/support/option_values.h"
-#include "tools/support/usages.h"
+#include "tools/support/subcommands.h"
 
 using namespace graspmap_tools;
 
@@ -136,7 +136,7 @@ void panorama(PanoramaCommandOptions& options, Run& run) {
   if (result.cloud.empty()) run.warn("no camera has measurements within its limits");
   add_rig_results(rig, set, result, views, run);
   carry_transforms(options.folder, run);
-  run.say("{} points from {} of {} cameras at {} s", result.cloud.size(), views.size(), cameras,
+  run.info("{} points from {} of {} cameras at {} s", result.cloud.size(), views.size(), cameras,
           libmap::to_text(set.stamp_s));
   run.write_output(options.output, [&](const fs::path& temporary) {
     libmap::write_cloud(temporary, result.cloud);

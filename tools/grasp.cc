@@ -34,7 +34,7 @@ namespace {
 
 struct GraspScenesOptions {
   std::string folder;               // empty: no scenes
-  std::vector<std::string> places;  // empty: all locations
+  std::vector<std::string> locations;  // empty: all locations
 };
 
 struct GraspScene {
@@ -53,8 +53,8 @@ struct GraspScenesInput {
 constexpr std::size_t max_unlisted_scenes = 100;
 
 // File name of a location: special characters become '_'.
-std::string file_of(const std::string& place) {
-  std::string name = place.substr(0, 100);
+std::string file_of(const std::string& location) {
+  std::string name = location.substr(0, 100);
   for (char& letter : name) {
     const bool is_plain = (letter >= 'a' && letter <= 'z') || (letter >= 'A' && letter <= 'Z') ||
                           (letter >= '0' && letter <= '9') || letter == '-' || letter == '.';
@@ -64,24 +64,24 @@ std::string file_of(const std::string& place) {
   return name + ".ply";
 }
 
-std::vector<std::string> places_of(const libmap::Table& locations) {
+std::vector<std::string> names_of(const libmap::Table& locations) {
   const auto column = locations.find_column("place");
-  std::vector<std::string> places;
+  std::vector<std::string> names;
   for (std::size_t row = 0; row < locations.rows.size(); ++row)
-    places.push_back(column ? locations.rows[row][*column] : std::to_string(row + 1));
-  return places;
+    names.push_back(column ? locations.rows[row][*column] : std::to_string(row + 1));
+  return names;
 }
 
 std::vector<std::size_t> rows_of(const libmap::Table& locations,
                                  const std::vector<std::string>& listed) {
-  const std::vector<std::string> places = places_of(locations);
+  const std::vector<std::string> names = names_of(locations);
   std::vector<std::size_t> rows;
-  for (const std::string& place : listed) {
-    const auto found = std::find(places.begin(), places.end(), place);
-    if (found == places.end())
-      throw libmap::Error("is not a listed location" + libmap::did_you_mean(place, places),
-                          {.file = locations.file, .field = "--scene-of", .value = place});
-    const auto row = static_cast<std::size_t>(found - places.begin());
+  for (const std::string& location : listed) {
+    const auto found = std::find(names.begin(), names.end(), location);
+    if (found == names.end())
+      throw libmap::Error("is not a listed location" + libmap::did_you_mean(location, names),
+                          {.file = locations.file, .field = "--scene-locations", .value = location});
+    const auto row = static_cast<std::size_t>(found - names.begin());
     if (std::find(rows.begin(), rows.end(), row) == rows.end()) rows.push_back(row);
   }
   return rows;
@@ -112,7 +112,7 @@ std::string description(const libgtd::LocationResult& result, const libgtd::Tria
 // Claims the folder. Throws Error if another command wrote it, or for locations without a folder.
 void claim_scenes(const GraspScenesOptions& options, Run& run) {
   if (!options.folder.empty()) return run.claim_output_folder(options.folder);
-  if (!options.places.empty()) throw libmap::Error("requires --scenes", {.field = "--scene-of"});
+  if (!options.locations.empty()) throw libmap::Error("requires --scenes", {.field = "--scene-locations"});
 }
 
 // Returns the scenes to write. Throws Error for a location that is not in the table, two with the
@@ -120,25 +120,25 @@ void claim_scenes(const GraspScenesOptions& options, Run& run) {
 std::vector<GraspScene> scenes_of(const libmap::Table& locations,
                                   const GraspScenesOptions& options) {
   if (options.folder.empty()) return {};
-  const std::vector<std::string> places = places_of(locations);
-  std::vector<std::size_t> rows = rows_of(locations, options.places);
-  if (options.places.empty()) {
-    if (places.size() > max_unlisted_scenes)
-      throw libmap::Error("too many locations for one scene each: select some with --scene-of",
+  const std::vector<std::string> names = names_of(locations);
+  std::vector<std::size_t> rows = rows_of(locations, options.locations);
+  if (options.locations.empty()) {
+    if (names.size() > max_unlisted_scenes)
+      throw libmap::Error("too many locations for one scene each: select some with --scene-locations",
                           {.file = locations.file,
                            .field = "locations",
-                           .value = std::to_string(places.size()),
+                           .value = std::to_string(names.size()),
                            .bound = "<= " + std::to_string(max_unlisted_scenes)});
-    for (std::size_t row = 0; row < places.size(); ++row) rows.push_back(row);
+    for (std::size_t row = 0; row < names.size(); ++row) rows.push_back(row);
   }
   std::vector<GraspScene> scenes;
   for (const std::size_t row : rows) {
-    const std::string file = file_of(places[row]);
+    const std::string file = file_of(names[row]);
     for (const GraspScene& other : scenes)
       if (other.file == file)
         throw libmap::Error(
             fmt::format("the scenes of rows {} and {} have the same name", other.row + 1, row + 1),
-            {.file = locations.file, .field = "place", .value = "'" + places[row] + "'"});
+            {.file = locations.file, .field = "place", .value = "'" + names[row] + "'"});
     scenes.push_back({row, file});
   }
   return scenes;
@@ -154,7 +154,7 @@ void write_scenes(const GraspScenesOptions& options, const std::vector<GraspScen
     const libgtd::LocationResult& result = input.results[scene.row];
     const libgtd::Trial trial =
         libgtd::repeat_trial(input.ground, input.gripper, result.location, input.options,
-                             result.shown_pose, result.shown_draw);
+                             result.median_pose, result.median_draw);
     run.add_results({{scene.file, description(result, trial, load_n)}});
     files.emplace_back(scene.file, [=, &input](const std::filesystem::path& temporary) {
       libmap::write_mesh(temporary, libgtd::trial_scene(input.mesh, input.gripper, trial, load_n));
@@ -226,7 +226,7 @@ void note_results(const std::vector<libgtd::LocationResult>& results, Run& run) 
                    {"holding", holding},
                    {"mean_hold_probability", probability},
                    {"mean_unseen", unseen}});
-  run.say(
+  run.info(
       "{} of {} locations hold; mean probability {:.2f}, {:.1f} % of the ground under the "
       "gripper unseen",
       holding, results.size(), probability, 100.0 * unseen);
@@ -265,8 +265,8 @@ libgtd::Ground ground_of(const libmap::TriangleMesh& mesh, const GraspCommandOpt
 }
 
 void grasp_voxels(GraspCommandOptions& options, Run& run) {
-  refuse_given({{"--scenes", !options.scenes.folder.empty()},
-                {"--scene-of", !options.scenes.places.empty()},
+  reject_given({{"--scenes", !options.scenes.folder.empty()},
+                {"--scene-locations", !options.scenes.locations.empty()},
                 {"--more-loads", !options.more_loads.empty()},
                 {"--prefix", !options.prefix.empty()}},
                "requires --points");
@@ -278,7 +278,7 @@ void grasp_voxels(GraspCommandOptions& options, Run& run) {
   require_map_output(input, run);
   const auto file = libmap::find_data_file("grippers", options.gripper);
   const libgtd::Gripper gripper = read_with_fingers(file, options);
-  GroundPieces ground(options.mesh, gripper, options.grasp.closing.start_height_m,
+  GroundTiles ground(options.mesh, gripper, options.grasp.closing.start_height_m,
                       [&](const libmap::TriangleMesh& mesh) { return ground_of(mesh, options); });
   run.add_input(options.mesh);
   run.add_input(is_tile_store(options.map) ? store_index_path(options.map).string() : options.map);
@@ -293,7 +293,7 @@ void grasp_voxels(GraspCommandOptions& options, Run& run) {
 }
 
 void grasp_places(GraspCommandOptions& options, Run& run) {
-  refuse_given({{"--tile", options.tile != GraspCommandOptions{}.tile}}, "requires --map");
+  reject_given({{"--tile", options.tile != GraspCommandOptions{}.tile}}, "requires --map");
   if (libmap::format_of(options.output) != ".csv")
     throw libmap::Error("results are written as .csv", {.file = options.output});
   run.claim_output(options.output, {options.mesh, options.points});
@@ -302,7 +302,7 @@ void grasp_places(GraspCommandOptions& options, Run& run) {
     if (!load || !(*load > 0.0))
       throw libmap::Error("is not a load",
                           {.field = "--more-loads", .value = text, .bound = "> 0"});
-    options.grasp.more_loads_n.push_back(*load);
+    options.grasp.extra_loads_n.push_back(*load);
   }
   claim_scenes(options.scenes, run);
   options.grasp.sequential = options.sequential == SequentialTest::on;
@@ -326,7 +326,7 @@ void grasp_places(GraspCommandOptions& options, Run& run) {
   } catch (const libmap::Error& error) {
     throw error.in_file(options.points);
   }
-  for (const std::string& name : libgtd::grasp_columns(options.grasp.more_loads_n)) {
+  for (const std::string& name : libgtd::grasp_columns(options.grasp.extra_loads_n)) {
     const std::string column = options.prefix + name;
     if (table.find_column(column))
       throw libmap::Error("the locations already have this column",
@@ -355,10 +355,10 @@ void say_fit(const libgtd::PullFit& fit, std::size_t tests, Run& run) {
     return fmt::format("{:.2g} N (90 %: {:.2g} to {:.2g})", force.median_n, force.low_n,
                        force.high_n);
   };
-  run.say("{} pull tests; level ground holds {}, before the fit {}", tests, text(fit.level_after),
+  run.info("{} pull tests; level ground holds {}, before the fit {}", tests, text(fit.level_after),
           text(fit.level_before));
   for (const libgtd::FittedParameter& one : fit.parameters)
-    run.say("{}: {:.3g} ({:.3g} to {:.3g}), before {:.3g} ({:.3g} to {:.3g}); {}", one.name,
+    run.info("{}: {:.3g} ({:.3g} to {:.3g}), before {:.3g} ({:.3g} to {:.3g}); {}", one.name,
             one.fitted[1], one.fitted[0], one.fitted[2], one.prior[1], one.prior[0], one.prior[2],
             one.is_determined() ? "determined by the tests" : "not determined by the tests");
   std::string rows;
@@ -435,9 +435,9 @@ void plan_next_pulls(const GraspCommandOptions& options, Run& run) {
   libmap::Table planned;
   planned.columns = {"place",    "x",           "y",      "z",
                      "tilt_deg", "azimuth_deg", "load_n", "information_bits"};
-  const std::vector<std::string> places = places_of(table);
+  const std::vector<std::string> names = names_of(table);
   for (const libgtd::PlannedPull& plan : plans) {
-    std::vector<std::string> row{places[plan.location]};
+    std::vector<std::string> row{names[plan.location]};
     for (const double value : locations[plan.location]) row.push_back(libmap::to_text(value));
     row.push_back(std::to_string(plan.direction.tilt_deg));
     row.push_back(std::to_string(plan.direction.azimuth_deg));
@@ -445,13 +445,13 @@ void plan_next_pulls(const GraspCommandOptions& options, Run& run) {
     row.push_back(fmt::format("{:.3f}", plan.information_bits));
     planned.rows.push_back(std::move(row));
   }
-  run.say("{} pulls; the first: {:.2f} bits", plans.size(), plans.front().information_bits);
+  run.info("{} pulls; the first: {:.2f} bits", plans.size(), plans.front().information_bits);
   run.write_text(options.output, libmap::to_csv(planned));
 }
 
 void grasp(GraspCommandOptions& options, Run& run) {
   if (!options.pulls.empty()) {
-    refuse_given({{"--points", !options.points.empty()},
+    reject_given({{"--points", !options.points.empty()},
                   {"--map", !options.map.empty()},
                   {"--plan", !options.plan.empty()}},
                  "cannot be combined with --fit");
@@ -462,7 +462,7 @@ void grasp(GraspCommandOptions& options, Run& run) {
                          ? "--points LOCATIONS.csv, --map MAP or --fit PULLS.csv is missing"
                          : "--points and --map cannot be combined");
   if (!options.plan.empty()) {
-    refuse_given({{"--map", !options.map.empty()}}, "cannot be combined with --plan");
+    reject_given({{"--map", !options.map.empty()}}, "cannot be combined with --plan");
     return plan_next_pulls(options, run);
   }
   options.map.empty() ? grasp_places(options, run) : grasp_voxels(options, run);
@@ -497,7 +497,7 @@ int main(int argc, char** argv) {
   command.option("--scenes", "FOLDER", options.scenes.folder,
                  "folder for scenes of one trial per location, with nearly the median force: "
                  "FOLDER/PLACE.ply, by the column 'place' or the row");
-  command.option("--scene-of", "PLACES", options.scenes.places,
+  command.option("--scene-locations", "PLACES", options.scenes.locations,
                  "locations of the scenes; default: all");
   for (const char* key : {"friction", "asperity-min", "asperity-max", "engagement-rate", "drag"}) {
     std::string name = key;

@@ -209,7 +209,7 @@ void lookup(LookupCommandOptions& options, Run& run) {
                                    [](const auto& answer) { return answer.found; });
   run.add_input(options.points);
   run.add_results({{"points", map.answers.size()}, {"found", found}});
-  run.say("{} of {} points are on the map", found, map.answers.size());
+  run.info("{} of {} points are on the map", found, map.answers.size());
   run.write_output(options.output, [&](const auto& temporary) {
     libmap::write_geometry_file(temporary,
                                 [&](std::ostream& out) { write_answers(out, table, cells, map); });

@@ -62,8 +62,8 @@ int unknown_command(const std::string& name) {
 fs::path find_program(const std::string& command) {
   std::error_code code;
   const fs::path folder = fs::read_symlink("/proc/self/exe", code).parent_path();
-  for (const char* place : {"libexec/graspmap", "../libexec/graspmap"}) {
-    fs::path program = folder / place / ("graspmap-" + command);
+  for (const char* folder_path : {"libexec/graspmap", "../libexec/graspmap"}) {
+    fs::path program = folder / folder_path / ("graspmap-" + command);
     if (fs::exists(program)) return program;
   }
   return folder / "libexec/graspmap" / ("graspmap-" + command);

@@ -6,7 +6,7 @@
 #include "libgtd/gripper/gripper_mask.h"
 #include "libmap/core/data_folder.h"
 #include "libmap/io/cloud_io.h"
-#include "libmap/view/picture_sheet.h"
+#include "libmap/view/image_grid.h"
 #include "libmap/view/scene_view.h"
 #include "tools/support/command_line.h"
 
@@ -79,20 +79,20 @@ constexpr double square_share = 0.94;  // drawn share of a voxel's side, which l
 constexpr double offset_share = 0.1;   // distance of dimension lines, as a share of the mask's side
 
 // Index of a voxel by its two coordinates in a section.
-using PlaceInMask = std::function<Eigen::Vector3i(int, int)>;
+using CellOfPixel = std::function<Eigen::Vector3i(int, int)>;
 
 Eigen::Vector3d center_of(const GripperMask& mask, const Eigen::Vector3i& voxel) {
   return mask.voxel_size_m *
          (voxel - Eigen::Vector3i(mask.pivot_xy, mask.pivot_xy, mask.pivot_z)).cast<double>();
 }
 
-libmap::Scene scene_of(const GripperMask& mask, const PlaceInMask& place, int width, int height) {
+libmap::Scene scene_of(const GripperMask& mask, const CellOfPixel& cell_of_pixel, int width, int height) {
   libmap::Scene scene;
   for (const KindLook& look : looks) {
     libmap::PointCloud cloud;
     for (int u = 0; u < width; ++u)
       for (int v = 0; v < height; ++v) {
-        const Eigen::Vector3i at = place(u, v);
+        const Eigen::Vector3i at = cell_of_pixel(u, v);
         if (kind_of(mask, at) == look.kind) cloud.positions.push_back(center_of(mask, at));
       }
     if (cloud.empty()) continue;
@@ -204,7 +204,7 @@ libmap::Legend mask_legend(const GripperMask& mask) {
 }
 
 std::string to_sections(const GripperMask& mask, const MaskOptions& options) {
-  libmap::PictureSheetOptions sheet;
+  libmap::ImageGridOptions sheet;
   sheet.columns = 3;
   sheet.cell_width_px = options.cell_width_px;
   sheet.title = fmt::format("{}: {} x {} x {} voxels", title_of(mask, options), mask.side,
@@ -214,7 +214,7 @@ std::string to_sections(const GripperMask& mask, const MaskOptions& options) {
   return libmap::to_png(libmap::draw_sheet(mask_sections(mask, options.section_layer), sheet));
 }
 
-std::string to_picture(const GripperMask& mask, const MaskOptions& options) {
+std::string to_image(const GripperMask& mask, const MaskOptions& options) {
   if (options.sections) return to_sections(mask, options);
   libmap::SceneLayer layer;
   layer.shape = to_cloud(mask);
@@ -235,7 +235,7 @@ void mask(const MaskOptions& options, Run& run) {
   if (extension != ".txt" && extension != ".png") libmap::require_cloud_format(options.output);
   if (options.sections && extension != ".png")
     throw libmap::Error("sections are drawn as .png", {.file = options.output});
-  if (!options.sections) refuse_set(options, bind_sections, "requires --sections");
+  if (!options.sections) reject_changed(options, bind_sections, "requires --sections");
   if (options.view != MaskOptions{}.view && (options.sections || extension != ".png"))
     throw libmap::Error("requires an image (.png) without --sections", {.field = "--view"});
   run.claim_output(options.output);
@@ -249,11 +249,11 @@ void mask(const MaskOptions& options, Run& run) {
     if (extension == ".txt")
       libmap::write_text(temporary, to_text(made));
     else if (extension == ".png")
-      libmap::write_text(temporary, to_picture(made, options));
+      libmap::write_text(temporary, to_image(made, options));
     else
       libmap::write_cloud(temporary, to_cloud(made));
   });
-  run.say("{} x {} x {} voxels", made.side, made.side, made.layers);
+  run.info("{} x {} x {} voxels", made.side, made.side, made.layers);
 }
 
 }  // namespace

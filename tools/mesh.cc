@@ -7,7 +7,7 @@
 #include "libmap/geometry/normal_sides.h"
 #include "libmap/io/cloud_io.h"
 #include "libmap/io/mesh_io.h"
-#include "libmap/io/piece_index.h"
+#include "libmap/io/tile_index.h"
 #include "libmap/mesh/mesh_parts.h"
 #include "libmap/mesh/surface_distance.h"
 #include "libmap/surface/mesh_cleaning.h"
@@ -98,7 +98,7 @@ void prepare_normals(const MeshOptions& options, libmap::PointCloud& cloud, Run&
       run.timed("normals", [&] { return libmap::estimate_normals(cloud, options.estimation); });
   cloud.normals = estimated.normals;
   const std::string way(to_text(estimated.orientation));
-  run.say("normals estimated{}, oriented by {}",
+  run.info("normals estimated{}, oriented by {}",
           options.normals == NormalSource::automatic ? ", because the cloud has none" : "", way);
   run.add_results({{"normals_oriented_by", way}, {"normals_undefined", estimated.undefined}});
 }
@@ -106,7 +106,7 @@ void prepare_normals(const MeshOptions& options, libmap::PointCloud& cloud, Run&
 // Reports the expected size, memory and time of large surfaces before the work.
 void announce(const libmap::SurfaceWork& work, Run& run) {
   if (work.triangles < 2e6) return;
-  run.say("about {:.1f} million triangles: {:.1f} GB of memory, {:.0f} s on one thread",
+  run.info("about {:.1f} million triangles: {:.1f} GB of memory, {:.0f} s on one thread",
           1e-6 * work.triangles, 1e-9 * work.bytes, work.seconds);
   if (work.bytes > static_cast<double>(libmap::machine_memory()))
     run.warn("this exceeds the machine's memory: use a larger --cell-size or a folder of tiles");
@@ -122,7 +122,7 @@ libmap::TriangleMesh reconstructed(const MeshOptions& options, const libmap::Poi
   run.add_results({{"points", cloud.size()}});
   run.add_results(libmap::described(made));
   run.add_timings(made.timings_s, "reconstruction");
-  run.say("{} points, cells of {:.4g} m -> {} triangles", cloud.size(), made.cell_size_m,
+  run.info("{} points, cells of {:.4g} m -> {} triangles", cloud.size(), made.cell_size_m,
           made.mesh.triangles.size());
   if (!made.mesh.triangles.empty()) return std::move(made.mesh);
   if (made.trimmed_triangles == 0)
@@ -141,7 +141,7 @@ libmap::TriangleMesh cleaned(const MeshOptions& options, const libmap::TriangleM
       libmap::clean_mesh(mesh, options.surface.cleaning, run.progress());
   run.add_results(libmap::described(made));
   run.add_timings(made.timings_s, "cleaning");
-  run.say("{} islands dropped, {} holes filled -> {} triangles", made.islands, made.filling.holes,
+  run.info("{} islands dropped, {} holes filled -> {} triangles", made.islands, made.filling.holes,
           made.mesh.triangles.size());
   return std::move(made.mesh);
 }
@@ -190,12 +190,12 @@ void mesh(const MeshOptions& options, Run& run) {
   });
   if (options.report || options.json) report(options, cloud, surface, run);
   run.add_input(options.cloud);
-  carry_frame(options.cloud, run);
+  copy_frame(options.cloud, run);
   run.write_output(options.output,
                    [&](const auto& temporary) { libmap::write_mesh(temporary, surface); });
 }
 
-TileFolder::Facts facts_of(const libmap::SurfaceTile& made) {
+TileFolder::TileData facts_of(const libmap::SurfaceTile& made) {
   return {{"vertices", made.mesh.vertices.size()},
           {"triangles", made.mesh.triangles.size()},
           {"area_m2", libmap::surface_area(made.mesh)},
@@ -215,7 +215,7 @@ struct Totals {
          {"triangles", mesh.triangles.size()},
          {"area_m2", libmap::surface_area(mesh)}});
   }
-  void add(const TileFolder::Facts& facts) {
+  void add(const TileFolder::TileData& facts) {
     const auto count = facts.at("triangles").get<std::int64_t>();
     pieces += count > 0 ? 1 : 0;
     vertices += facts.at("vertices").get<std::int64_t>();
@@ -227,11 +227,11 @@ struct Totals {
 // File name of a tile, without extension.
 std::string name_of(const libmap::XyTile& tile) { return libmap::tile_file_name(tile, ""); }
 
-Totals put_together(const MeshOptions& options, const TileFolder& output,
+Totals assemble(const MeshOptions& options, const TileFolder& output,
                     const std::vector<libmap::XyTile>& tiles, const fs::path& folder, Run& run) {
   libmap::SurfaceIslands islands;
   for (const libmap::XyTile& tile : tiles) {
-    const TileFolder::Facts facts = output.facts(name_of(tile));
+    const TileFolder::TileData facts = output.facts(name_of(tile));
     libmap::SurfaceTile made;
     facts.at("component_areas_m2").get_to(made.component_areas_m2);
     facts.at("seams").get_to(made.seams);
@@ -240,7 +240,7 @@ Totals put_together(const MeshOptions& options, const TileFolder& output,
   const libmap::SurfaceIslands::Dropped dropped = islands.dropped(options.surface.cleaning);
   Totals totals;
   for (const libmap::XyTile& tile : tiles) {
-    const TileFolder::Facts facts = output.facts(name_of(tile));
+    const TileFolder::TileData facts = output.facts(name_of(tile));
     const fs::path to = folder / libmap::tile_file_name(tile, ".ply");
     const auto components = dropped.find(tile);
     if (components != dropped.end()) {
@@ -266,10 +266,10 @@ Totals put_together(const MeshOptions& options, const TileFolder& output,
 
 // Makes and writes the tiles one by one.
 void make_tiles(const MeshOptions& options, TileFolder& output, Run& run) {
-  libmap::SurfaceSurvey survey;
+  libmap::CloudStatistics survey;
   std::map<libmap::XyTile, std::size_t> points_in_tiles;
-  libmap::PieceIndex index = run.timed("survey", [&] {
-    return libmap::PieceIndex(libmap::cloud_pieces(options.cloud),
+  libmap::TileIndex index = run.timed("survey", [&] {
+    return libmap::TileIndex(libmap::cloud_tiles(options.cloud),
                               [&](const libmap::PointCloud& piece) {
                                 survey.add(piece, options.surface.reconstruction.weigh_by_error);
                                 libmap::add_surface_tiles(piece, options.surface, points_in_tiles);
@@ -289,16 +289,16 @@ void make_tiles(const MeshOptions& options, TileFolder& output, Run& run) {
     names.push_back(name_of(tile));
   }
   const auto make = [&](std::size_t n, const fs::path& to) {
-    const libmap::PlanBox box =
-        libmap::plan_box_of(tiles[n], options.surface.tile_m, options.surface.margin_m());
+    const libmap::XyBox box =
+        libmap::xy_box_of(tiles[n], options.surface.tile_m, options.surface.margin_m());
     const libmap::SurfaceTile made = libmap::make_surface_tile(
         index.points_in(box.min(), box.max()), survey, tiles[n], options.surface);
     if (!made.mesh.triangles.empty()) libmap::write_mesh(to, made.mesh);
     return facts_of(made);
   };
   const auto finish = [&](const fs::path& folder) {
-    const Totals totals = put_together(options, output, tiles, folder, run);
-    run.say("{} points -> {} triangles in {} tiles", index.points(), totals.triangles,
+    const Totals totals = assemble(options, output, tiles, folder, run);
+    run.info("{} points -> {} triangles in {} tiles", index.points(), totals.triangles,
             totals.pieces);
   };
   output.make({names, ".ply", make, finish});
@@ -314,7 +314,7 @@ void mesh_in_tiles(const MeshOptions& options, Run& run) {
   options.surface.check();
   in_file(options.cloud, [&] {
     run.add_input(options.cloud);
-    carry_frame(options.cloud, run);
+    copy_frame(options.cloud, run);
     TileFolder output(options.output, tile_folder_names(options.output), {options.cloud},
                       libmap::parse_share(options.tile), run);
     if (!output.is_complete()) make_tiles(options, output, run);

@@ -2,7 +2,7 @@
 #include "libmap/poses/trajectory_io.h"
 #include "libmap/refine/refinement.h"
 #include "libmap/scan/colmap_builder.h"
-#include "libmap/scan/picture_file.h"
+#include "libmap/scan/image_export.h"
 #include "libmap/scan/rtabmap_writer.h"
 #include "tools/support/command_line.h"
 #include "tools/support/refine_report.h"
@@ -47,13 +47,13 @@ void say_stage(const libmap::StageReport& stage, Run& run) {
   if (stage.error)
     text += fmt::format("; error {:.2f} mm, {:.3f} deg", 1e3 * stage.error->absolute.rmse_m,
                         stage.error->absolute.mean_rotation_deg);
-  run.say(text);
-  for (const std::string& warning : stage.warnings) run.say("{}: {}", stage.name, warning);
+  run.info(text);
+  for (const std::string& warning : stage.warnings) run.info("{}: {}", stage.name, warning);
   run.detail("{}: {:.2f} s", stage.name, stage.seconds);
   if (stage.rejected_error)
     run.detail("  rejected: {:.2f} mm, {:.3f} deg", 1e3 * stage.rejected_error->absolute.rmse_m,
                stage.rejected_error->absolute.mean_rotation_deg);
-  for (const auto& [name, value] : stage.figures) run.detail("  {} {:.6g}", name, value);
+  for (const auto& [name, value] : stage.metrics) run.detail("  {} {:.6g}", name, value);
   for (const auto& [name, group] : stage.groups)
     run.detail(
         "  {}: {} links, {} rejected, deviations x {:.3g} and x {:.3g}, rms {:.2f} mm {:.3f} deg",
@@ -79,9 +79,9 @@ libmap::ColmapModel model_of(const libmap::Trajectory& poses, const libmap::Scan
   for (const libmap::TrajectoryPose& pose : poses) {
     try {
       const std::vector<libmap::CameraView> views =
-          libmap::read_pictures(scan, pose.node, {.color = true, .depth = false});
+          libmap::read_views(scan, pose.node, {.color = true, .depth = false});
       for (std::size_t c = 0; c < views.size(); ++c)
-        builder.add_image(libmap::picture_file(scan, pose.node, views, c).name, views[c],
+        builder.add_image(libmap::image_file_of(scan, pose.node, views, c).name, views[c],
                           pose.world_from_base * views[c].color_camera.base_from_camera);
     } catch (const libmap::Error& error) {
       run.warn(std::string(error.what()) + "; its pose is not in the model of COLMAP");
@@ -187,7 +187,7 @@ void say_scans(const libmap::RefinementResult& result, const libmap::ScanSource&
     if (count.poses == 0)
       run.warn("{}: gets no poses, because no link joins it to the other scans", path.string());
     else
-      run.say("{}: {} of {} nodes have a pose", path.string(), count.poses, count.nodes);
+      run.info("{}: {} of {} nodes have a pose", path.string(), count.poses, count.nodes);
   }
 }
 
@@ -225,7 +225,7 @@ std::optional<libmap::CameraFile> claim_outputs(const RefineOptions& options, Ru
   }
   auto camera = known_camera(options.calibration, options.scans.front(), {}, run);
   if (camera)
-    refuse_given({{"--write-calibration", !options.new_calibration.empty()},
+    reject_given({{"--write-calibration", !options.new_calibration.empty()},
                   {"--write-database", !options.database.empty()}},
                  "cannot be combined with --calibration: it starts from the stored camera");
   if (!options.database.empty()) claim_database(options, run);
@@ -241,7 +241,7 @@ void say_result(const RefineOptions& options, const libmap::RefinementResult& re
     run.warn("node {} has no features: {}", node, fault.what());
   for (const std::string& warning : result.warnings) run.warn(first + ": " + warning);
   for (const libmap::StageReport& stage : result.stages) say_stage(stage, run);
-  for (const std::string& finding : result.findings) run.say(finding);
+  for (const std::string& finding : result.findings) run.info(finding);
   if (!result.noise.empty()) run.detail("{}", result.noise);
   if (!result.calibration.empty() && (with_known_camera || result.cameras.size() > 1) &&
       options.database.empty())
@@ -254,8 +254,8 @@ void say_result(const RefineOptions& options, const libmap::RefinementResult& re
   if (is_depth_scale && result.findings.empty())
     run.detail("{}", result.scale);
   else
-    run.say(result.scale);
-  run.say("{} poses, {} links, of which {} were found", result.poses.size(), result.links.size(),
+    run.info(result.scale);
+  run.info("{} poses, {} links, of which {} were found", result.poses.size(), result.links.size(),
           result.closures.size());
 }
 

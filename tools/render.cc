@@ -13,7 +13,7 @@
 #include "libmap/io/mesh_io.h"
 #include "libmap/texture/textured_mesh_io.h"
 #include "libmap/tiles/xy_tile.h"
-#include "libmap/view/picture_sheet.h"
+#include "libmap/view/image_grid.h"
 #include "libmap/view/scene_view.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
@@ -181,7 +181,7 @@ MapWindow read_window(const MapTiles& tiles, const std::optional<Eigen::AlignedB
   if (window.cloud.empty()) throw libmap::Error("contains no part of the map", {.field = "--box"});
   if (window.columns_per_point > 1) {
     window.cloud = libgtd::downsample_map(window.cloud, window.columns_per_point);
-    libgtd::center_in_squares(tiles.index(), window.columns_per_point, window.cloud);
+    libgtd::snap_to_squares(tiles.index(), window.columns_per_point, window.cloud);
   }
   return window;
 }
@@ -280,7 +280,7 @@ void bind(libmap::ParameterTable& table, SceneFileOptions& options) {
 
 // Reads a cloud, mesh, graspability map or tile store. Throws Error naming the file.
 SceneFile read_scene(const std::string& file, const SceneFileOptions& options, Run& run) {
-  if (options.points.empty()) refuse_set(options, bind_points, "requires --points");
+  if (options.points.empty()) reject_changed(options, bind_points, "requires --points");
   try {
     return scene_of(file, options, run);
   } catch (const libmap::Error& error) {
@@ -304,7 +304,7 @@ struct RenderOptions {
   std::string captions;
   std::string column_titles;
   std::string row_titles;
-  libmap::PictureSheetOptions sheet;
+  libmap::ImageGridOptions sheet;
 };
 
 // Options of an image of one file.
@@ -316,7 +316,7 @@ void bind_one(libmap::ParameterTable& table, RenderOptions& options) {
 
 // Options of a page of several files.
 void bind_page(libmap::ParameterTable& table, RenderOptions& options) {
-  libmap::PictureSheetOptions& sheet = options.sheet;
+  libmap::ImageGridOptions& sheet = options.sheet;
   table.add("columns", sheet.columns, libmap::Range{0, 1000},
             "for several files: number of columns of cells; 0: for an approximately square page");
   table.add("cell_width_px", sheet.cell_width_px, libmap::Range{16, 16384},
@@ -361,15 +361,15 @@ libmap::ColorImage draw_one(RenderOptions& options, Run& run) {
   if (shown.columns_per_point > 0)
     run.add_results({{"columns_per_point", shown.columns_per_point}});
   if (shown.columns_per_point > 1)
-    run.say("one point per {0} x {0} columns: --box shows a part in full", shown.columns_per_point);
+    run.info("one point per {0} x {0} columns: --box shows a part in full", shown.columns_per_point);
   return image;
 }
 
-libmap::ColorImage read_picture(const std::string& file) {
+libmap::ColorImage read_image(const std::string& file) {
   constexpr std::uint64_t max_file_bytes = std::uint64_t{1} << 30;
   return in_file(file, [&] {
     return libmap::decode_color(libmap::read_whole_file(file, max_file_bytes),
-                                libmap::max_picture_pixels);
+                                libmap::max_decoded_pixels);
   });
 }
 
@@ -383,7 +383,7 @@ std::vector<libmap::SheetCell> read_cells(const RenderOptions& options, Run& run
                                                    : std::filesystem::path(file).stem().string();
     cell.view = options.view.view;
     if (libmap::format_of(file) == ".png")
-      cell.picture = read_picture(file);
+      cell.image = read_image(file);
     else
       cell.scene = [&options, &run, file] { return read_scene(file, options.scene, run).scene; };
   }
@@ -393,7 +393,7 @@ std::vector<libmap::SheetCell> read_cells(const RenderOptions& options, Run& run
 libmap::ColorImage draw_several(RenderOptions& options, Run& run) {
   if (options.view.view == libmap::Viewpoint::camera)
     throw libmap::Error("requires a single file", {.field = "--view", .value = "camera"});
-  refuse_set(options, bind_one, "requires a single file");
+  reject_changed(options, bind_one, "requires a single file");
   // Maps of one cloud have the same orientation in the image.
   if (options.scene.heading == MapHeading::automatic) options.scene.heading = MapHeading::input;
   options.sheet.column_titles = split_texts(options.column_titles);
@@ -405,7 +405,7 @@ libmap::ColorImage draw_several(RenderOptions& options, Run& run) {
   libmap::ColorImage image =
       run.timed("draw", [&] { return libmap::draw_sheet(cells, options.sheet); });
   run.add_results({{"cells", cells.size()}});
-  run.say("{} cells, {} x {} pixels", cells.size(), image.width, image.height);
+  run.info("{} cells, {} x {} pixels", cells.size(), image.width, image.height);
   return image;
 }
 

@@ -44,14 +44,14 @@ void bind(libmap::ParameterTable& table, ReportCommandOptions& options) {
 }
 
 // Bytes per cell in the page: at most eleven, in base64.
-constexpr double bytes_a_cell = 44.0 / 3.0;
+constexpr double bytes_per_cell = 44.0 / 3.0;
 // Maximum shares of the page for maps and for scenes.
 constexpr double maps_share = 0.4;
 constexpr double scenes_share = 0.4;
 
-std::size_t cells_a_map(const ReportCommandOptions& options, const libmap::PlannedSection& plan) {
+std::size_t cells_per_map(const ReportCommandOptions& options, const libmap::PlannedSection& plan) {
   const std::size_t maps = plan.count(libmap::ItemKind::map);
-  const double affordable = maps_share * options.max_size_mb * 1e6 / bytes_a_cell /
+  const double affordable = maps_share * options.max_size_mb * 1e6 / bytes_per_cell /
                             static_cast<double>(std::max<std::size_t>(maps, 1));
   return static_cast<std::size_t>(std::min(affordable, static_cast<double>(options.max_cells)));
 }
@@ -107,15 +107,15 @@ DownsampledMap read_cloud_map(const fs::path& path, std::size_t max_cells) {
       libmap::transform_cloud(libmap::read_cloud(path).cloud, terrain_from_map(manifest));
   DownsampledMap map;
   map.voxels = whole.size();
-  const auto lattice = manifest ? libgtd::facts_of(*manifest).lattice : std::nullopt;
+  const auto lattice = manifest ? libgtd::map_info(*manifest).lattice : std::nullopt;
   if (lattice)
     map.options.lattice = {lattice->voxel_size_m, lattice->origin_m};
   else if (!whole.empty())
     map.options.lattice = libmap::lattice_of(whole);
-  int& width = map.options.voxels_a_cell;
+  int& width = map.options.voxels_per_cell;
   width = first_width(map.voxels, max_cells);
   do {
-    map.points = width == 1 ? whole : libgtd::thin_map_in_cubes(whole, width);
+    map.points = width == 1 ? whole : libgtd::voxel_downsample_map(whole, width);
   } while (map.points.size() > max_cells && ++width > 0);
   if (manifest) set_parameters(*manifest, map.options);
   return map;
@@ -125,10 +125,10 @@ DownsampledMap read_cloud_map(const fs::path& path, std::size_t max_cells) {
 libmap::PointCloud thin_tiles(const MapTiles& tiles, int width) {
   std::vector<libmap::PointCloud> parts(tiles.index().tiles.size());
   libmap::parallel_each(parts.size(), [&](std::size_t n) {
-    parts[n] = libgtd::thin_map_in_cubes(tiles.load(n), width);
+    parts[n] = libgtd::voxel_downsample_map(tiles.load(n), width);
   });
   // Cubes shared by two tiles have one point from each tile.
-  return libgtd::thin_map_in_cubes(libgtd::merge_map_clouds(parts), width);
+  return libgtd::voxel_downsample_map(libgtd::merge_map_clouds(parts), width);
 }
 
 // Downsamples a tile store to the same cells tile by tile, because it may exceed the memory.
@@ -138,7 +138,7 @@ DownsampledMap read_store_map(const fs::path& path, std::size_t max_cells) {
   const auto& index = tiles.index();
   map.voxels = index.voxels();
   const std::optional<libmap::Manifest> manifest = index.manifest;
-  int& width = map.options.voxels_a_cell;
+  int& width = map.options.voxels_per_cell;
   width = first_width(map.voxels, max_cells);
   do {
     map.points = thin_tiles(tiles, width);
@@ -195,7 +195,7 @@ void make_report(ReportCommandOptions& options, Run& run) {
   if (extension != ".html" && extension != ".htm")
     throw libmap::Error("reports are written as .html", {.file = options.output});
   run.claim_output(options.output);
-  const std::size_t max_cells = cells_a_map(options, plan);
+  const std::size_t max_cells = cells_per_map(options, plan);
   const bool has_views = (max_cells > 0 && plan.count(libmap::ItemKind::map) > 0) ||
                          plan.count(libmap::ItemKind::scene) > 0;
   const bool with_views = !options.no_views && has_views;
@@ -203,7 +203,7 @@ void make_report(ReportCommandOptions& options, Run& run) {
   double bytes_left = scenes_share * options.max_size_mb * 1e6;
   const libmap::ReportReadResult read = run.timed("read", [&] {
     return libmap::read_report_content(
-        plan, {.folder = options.folder, .left_out = options.output},
+        plan, {.folder = options.folder, .excluded = options.output},
         [&](const fs::path& map, const auto& lookup) {
           return load_map_view(map, lookup, max_cells, run);
         },
@@ -217,10 +217,10 @@ void make_report(ReportCommandOptions& options, Run& run) {
     run.add_input(is_tile_store(file.string()) ? store_index_path(file.string()) : file);
   run.add_results({{"files", read.files.size()},
                    {"bytes", page.html.size()},
-                   {"pictures_made_smaller", page.changed_pictures}});
-  run.say(
+                   {"pictures_made_smaller", page.changed_images}});
+  run.info(
       "{} files, {:.1f} MB{}", read.files.size(), static_cast<double>(page.html.size()) / 1e6,
-      page.changed_pictures == 0 ? "" : fmt::format(", {} images reduced", page.changed_pictures));
+      page.changed_images == 0 ? "" : fmt::format(", {} images reduced", page.changed_images));
   run.write_text(options.output, page.html);
 }
 

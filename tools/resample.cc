@@ -24,7 +24,7 @@ void tell_results(const libmap::PoissonDiskResult& result, std::uint64_t wanted,
   run.add_results(libmap::described(result));
   run.add_timings(result.timings_s);
   run.detail("radii tried: {}", result.tries);
-  run.say("{:.2f} m2 -> {} points, radius {:.4g} mm, relative radius {:.3f}", result.area_m2,
+  run.info("{:.2f} m2 -> {} points, radius {:.4g} mm, relative radius {:.3f}", result.area_m2,
           result.cloud.size(), 1e3 * result.radius_m, result.relative_radius);
   if (!result.count_reached)
     run.warn("no radius was found for {} points; the nearest number is {}", wanted,
@@ -47,14 +47,14 @@ void resample(const ResampleOptions& options, Run& run) {
   run.add_input(options.mesh);
   const libmap::PoissonDiskResult result = in_file(
       options.mesh, [&] { return libmap::sample_poisson_disk(mesh, sampling, run.progress()); });
-  carry_frame(options.mesh, run);
+  copy_frame(options.mesh, run);
   tell_results(result, sampling.count, run);
   run.write_output(options.output,
                    [&](const auto& temporary) { libmap::write_cloud(temporary, result.cloud); });
 }
 
 // Samples and writes the mesh tile by tile.
-void write_pieces(const std::vector<fs::path>& pieces, libmap::PieceSampler& sampler,
+void write_tiles(const std::vector<fs::path>& pieces, libmap::TileSampler& sampler,
                   const fs::path& folder, Run& run) {
   std::size_t points = 0;
   double area_m2 = 0.0;
@@ -75,22 +75,22 @@ void write_pieces(const std::vector<fs::path>& pieces, libmap::PieceSampler& sam
                    {"points", points},
                    {"area_m2", area_m2},
                    {"smallest_distance_m", smallest_m}});
-  run.say("{:.2f} m2 in {} tiles -> {} points", area_m2, pieces.size(), points);
+  run.info("{:.2f} m2 in {} tiles -> {} points", area_m2, pieces.size(), points);
 }
 
 void resample_pieces(const ResampleOptions& options, Run& run) {
   require_one_of_radius_and_count(options.sampling);
-  const std::vector<fs::path> pieces = libmap::mesh_pieces(options.mesh);
+  const std::vector<fs::path> pieces = libmap::mesh_tiles(options.mesh);
   const std::vector<std::string> names = tile_folder_names(options.output, pieces, ".pcd");
   run.claim_output_tree(options.output, names, {options.mesh});
   std::vector<libmap::Bounds3d> boxes;
   for (const fs::path& piece : pieces)
     boxes.push_back(libmap::bounds_of(libmap::read_mesh(piece).mesh.vertices));
   run.add_input(options.mesh);
-  libmap::PieceSampler sampler(std::move(boxes), options.sampling);
-  carry_frame(options.mesh, run);
+  libmap::TileSampler sampler(std::move(boxes), options.sampling);
+  copy_frame(options.mesh, run);
   run.write_output_tree(options.output, names, [&](const fs::path& folder) {
-    if (!folder.empty()) write_pieces(pieces, sampler, folder, run);
+    if (!folder.empty()) write_tiles(pieces, sampler, folder, run);
   });
 }
 

@@ -9,7 +9,7 @@
 #include "libmap/core/parallel.h"
 #include "libmap/geometry/normal_sides.h"
 #include "libmap/io/cloud_io.h"
-#include "libmap/io/cloud_pieces.h"
+#include "libmap/io/cloud_tiles.h"
 #include "libmap/raster/dem_reader.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
@@ -41,7 +41,7 @@ std::string_view name_of(libgtd::UpSource source) {
 void report_plane(const libgtd::RegressionPlane& plane, const std::string& terrain, Run& run) {
   if (plane.up_source == libgtd::UpSource::direction) return;
   const bool by_normals = plane.up_source == libgtd::UpSource::normals;
-  run.say("up from the {}{}", name_of(plane.up_source),
+  run.info("up from the {}{}", name_of(plane.up_source),
           by_normals ? fmt::format(": {:.1f} % agree", 100.0 * *plane.normals_up) : "");
   if (!by_normals && plane.up_source != libgtd::UpSource::viewpoint && plane.normals_up)
     run.warn("{}: {}: up is from the {}; --up X,Y,Z sets it", terrain,
@@ -60,14 +60,14 @@ void report_plane(const libgtd::RegressionPlane& plane, const std::string& terra
 
 // Returns true for a DEM or a folder of DEM tiles, whose z is up.
 bool is_dem(const std::string& terrain) {
-  return fs::exists(terrain) && libmap::is_dem_path(libmap::cloud_pieces(terrain).front());
+  return fs::exists(terrain) && libmap::is_dem_path(libmap::cloud_tiles(terrain).front());
 }
 
 // Throws Error for a mesh, whose vertices do not sample its surface.
 void refuse_mesh(const std::string& terrain) {
   if (!fs::exists(terrain)) return;
   fs::path first = terrain;
-  if (fs::is_directory(terrain)) first = libmap::cloud_pieces(terrain).front();
+  if (fs::is_directory(terrain)) first = libmap::cloud_tiles(terrain).front();
   const std::string format = libmap::format_of(first);
   if (format == ".obj" || format == ".stl" || format == ".off" || format == ".glb" ||
       (format == ".ply" && libmap::read_cloud_info(first).faces > 0))
@@ -126,7 +126,7 @@ struct ScoreStoreOptions {
   std::filesystem::path gripper_file;
   libgtd::MapFrame frame = libgtd::MapFrame::terrain;
   bool append = false;
-  std::size_t points_at_once = 1'000'000;
+  std::size_t max_points_in_memory = 1'000'000;
   libgtd::DetectionOptions detection;  // includes the share
 };
 
@@ -136,7 +136,7 @@ class StoreScoring {
       : options_(options),
         run_(run),
         store_(options.store),
-        stream_(libmap::cloud_pieces(options.terrain)),
+        stream_(libmap::cloud_tiles(options.terrain)),
         tiling_(options.detection) {
     if (fs::is_directory(options.store) && fs::is_directory(options.terrain) &&
         fs::equivalent(options.store, options.terrain))
@@ -146,7 +146,7 @@ class StoreScoring {
   void score() {
     if (run_.options().dry_run) return;
     libmap::TileJournal journal = run_.timed(
-        "plan", [&] { return store_.begin(options_.detection.share, [&] { agree_on_plan(); }); });
+        "plan", [&] { return store_.begin(options_.detection.share, [&] { check_plan(); }); });
     const std::vector<TileNumber> wanted = run_.timed("check", [&] {
       return store_.missing(
           plan_, libgtd::tiles_of(frame_, tiling_.tile_voxels, options_.detection.share));
@@ -156,14 +156,14 @@ class StoreScoring {
           store_.folder() / "progress",
           {.tile_m = point_tile_m(),
            .has_normals = stream_.has_normals() && !frame_.drops_normals()});
-      run_.timed("sort points", [&] { fill(points, wanted); });
+      run_.timed("sort points", [&] { read_points(points, wanted); });
       run_.timed("tiles", [&] {
         in_file(options_.terrain, [&] {
           libgtd::detect_streamed(frame_, points, wanted, options_.detection,
                                   [&](std::vector<libgtd::StreamedTile> tiles) {
                                     libgtd::add_tiles(write(tiles), plan_.key, journal);
                                   },
-                                  run_.progress(), {.max_points = options_.points_at_once});
+                                  run_.progress(), {.max_points = options_.max_points_in_memory});
         });
       });
     }
@@ -173,11 +173,11 @@ class StoreScoring {
  private:
   // Resumes the earlier plan if its parameters and inputs are the same, else writes a new one. The
   // caller must have locked the store.
-  void agree_on_plan() {
+  void check_plan() {
     const auto earlier = run_.options().force ? std::nullopt : store_.plan();
     if (!earlier && !run_.options().force) require_no_index(store_);
     plan_.terrain =
-        survey(stream_.pieces(), earlier ? earlier->terrain : std::vector<TerrainFile>{},
+        survey(stream_.tiles(), earlier ? earlier->terrain : std::vector<TerrainFile>{},
                stream_.georeference());
     plan_.index.manifest = make_manifest();
     plan_.key = libmap::key_of(plan_.index.manifest);
@@ -197,7 +197,7 @@ class StoreScoring {
       make_frame();
       if (earlier)
         plan_.kept =
-            libgtd::untouched_tiles(store_.done(*earlier), *earlier, plan_, frame_, tiling_);
+            libgtd::unaffected_tiles(store_.done(*earlier), *earlier, plan_, frame_, tiling_);
       else
         store_.clear();
       store_.set_plan(plan_);
@@ -251,14 +251,14 @@ class StoreScoring {
   }
 
   // Reads the points that the wanted tiles depend on.
-  void fill(libmap::PointTileStore& points, const std::vector<TileNumber>& wanted) const {
+  void read_points(libmap::PointTileStore& points, const std::vector<TileNumber>& wanted) const {
     const libgtd::PointsRectangle rectangle = libgtd::points_for(wanted, frame_, tiling_);
     std::vector<fs::path> files;
     for (const TerrainFile& file : plan_.terrain)
-      if (libgtd::touches(file, rectangle, frame_)) files.emplace_back(file.input.path);
+      if (libgtd::may_intersect(file, rectangle, frame_)) files.emplace_back(file.input.path);
     const bool are_all = wanted.size() == libgtd::tiles_of(frame_, tiling_.tile_voxels).size();
     const auto all = libmap::PointStream::Need::positions_and_normals;
-    libmap::PieceStream(files).for_each_block(all, [&](const libmap::PointCloud& block) {
+    libmap::TileStream(files).for_each_block(all, [&](const libmap::PointCloud& block) {
       const libmap::PointCloud terrain = libgtd::to_terrain(block, frame_);
       libgtd::require_in_frame(terrain, frame_, store_.plan_path());
       if (are_all) return points.add(terrain);
@@ -294,12 +294,12 @@ class StoreScoring {
     const libmap::FileLock lock = store_.lock();
     const libgtd::MapTileStore::Completion completion = store_.complete(plan_);
     if (!completion.index) {
-      run_.say("{} tiles scored; {} of {} are complete", scored, completion.done, completion.tiles);
+      run_.info("{} tiles scored; {} of {} are complete", scored, completion.done, completion.tiles);
       return;
     }
     const libgtd::TileStoreIndex& index = *completion.index;
     store_.write_index(index, run_.manifest());
-    run_.say("{} of {} tiles scored; all are complete: {} voxels, {} graspable", scored,
+    run_.info("{} of {} tiles scored; all are complete: {} voxels, {} graspable", scored,
              completion.tiles, index.voxels(), index.graspable_voxels());
     if (index.voxels() == 0)
       run_.warn("the terrain is smaller than the gripper mask: nothing was scored");
@@ -308,7 +308,7 @@ class StoreScoring {
   const ScoreStoreOptions& options_;
   Run& run_;
   libgtd::MapTileStore store_;
-  libmap::PieceStream stream_;
+  libmap::TileStream stream_;
   libgtd::StoreTiling tiling_;
   libgtd::TilePlan plan_;
   libgtd::TerrainFrame frame_;
@@ -329,7 +329,7 @@ struct ScoreOptions {
   std::string tile = "1/1";
   std::string up = "auto";
   bool append = false;
-  std::string points_at_once = "1000000";
+  std::string max_points_in_memory = "1000000";
   libgtd::MapFrame frame = libgtd::MapFrame::terrain;
   libgtd::DetectionOptions detection;
 };
@@ -341,11 +341,11 @@ void bind(libmap::ParameterTable& table, ScoreOptions& options) {
   table.add("frame", options.frame, libgtd::map_frame_names(), "frame of the map's points");
 }
 
-std::size_t parse_points_at_once(const std::string& text) {
+std::size_t parse_max_points(const std::string& text) {
   const auto count = libmap::parse_integer(text);
   if (!count || *count < 1)
     throw libmap::Error("not a number of points",
-                        {.field = "--points-at-once", .value = text, .bound = ">= 1"});
+                        {.field = "--max-points-in-memory", .value = text, .bound = ">= 1"});
   return static_cast<std::size_t>(*count);
 }
 
@@ -359,7 +359,7 @@ void add_results(const libgtd::DetectionResult& result, const ScoreOptions& opti
 void say_result(const libgtd::DetectionResult& result, const ScoreOptions& options, Run& run) {
   if (result.plane) report_plane(*result.plane, options.terrain, run);
   run.add_timings(result.timings_s);
-  run.say("{} points, {} occupied voxels, {} scored in {} tiles, {} graspable", result.points,
+  run.info("{} points, {} occupied voxels, {} scored in {} tiles, {} graspable", result.points,
           result.occupied_voxels, result.map.voxels.size(), result.tiles, result.graspable_voxels);
   if (10 * result.lone_voxels > result.occupied_voxels && result.occupied_voxels >= 10)
     run.warn(
@@ -370,19 +370,19 @@ void say_result(const libgtd::DetectionResult& result, const ScoreOptions& optio
             static_cast<double>(result.occupied_voxels),
         options.detection.scenario.voxel_size_m);
   if (result.map.content.normals)
-    run.say("mask tilted to the surface's normal within {:g} m; {} voxels without a normal",
+    run.info("mask tilted to the surface's normal within {:g} m; {} voxels without a normal",
             *result.normal_radius_m, result.unoriented_voxels);
   if (result.map.content.obstacles)
-    run.say("{} voxels are obstacles", result.obstacle_voxels);
+    run.info("{} voxels are obstacles", result.obstacle_voxels);
   else if (result.map.content.slopes)
-    run.say("obstacles are determined when `graspmap convert` merges the shares");
+    run.info("obstacles are determined when `graspmap convert` merges the shares");
   if (result.map.voxels.empty() && options.detection.share.count == 1)
     run.warn("the terrain is smaller than the gripper mask: nothing was scored");
 }
 
 // Reads a cloud file, or the tiles of a folder one by one.
-libmap::PiecesReadResult read_terrain(const std::string& path) {
-  if (std::filesystem::is_directory(path)) return libmap::read_pieces(libmap::cloud_pieces(path));
+libmap::TilesReadResult read_terrain(const std::string& path) {
+  if (std::filesystem::is_directory(path)) return libmap::read_tiles(libmap::cloud_tiles(path));
   libmap::CloudReadResult read = libmap::read_cloud(path);
   return {std::move(read.cloud), read.dropped_points};
 }
@@ -415,18 +415,18 @@ void score(ScoreOptions& options, Run& run) {
                       .gripper_file = gripper_file,
                       .frame = options.frame,
                       .append = options.append,
-                      .points_at_once = parse_points_at_once(options.points_at_once),
+                      .max_points_in_memory = parse_max_points(options.max_points_in_memory),
                       .detection = options.detection},
                      run);
     return;
   }
   if (options.append)
     throw libmap::Error("requires a tile store, MAP.tiles", {.field = "--append"});
-  if (options.points_at_once != ScoreOptions{}.points_at_once)
-    throw libmap::Error("requires a tile store, MAP.tiles", {.field = "--points-at-once"});
+  if (options.max_points_in_memory != ScoreOptions{}.max_points_in_memory)
+    throw libmap::Error("requires a tile store, MAP.tiles", {.field = "--max-points-in-memory"});
   libmap::require_cloud_format(options.output);
   run.claim_output(options.output, {options.terrain});
-  const libmap::PiecesReadResult read =
+  const libmap::TilesReadResult read =
       run.timed("read", [&] { return read_terrain(options.terrain); });
   require_points(read.cloud.size(), read.dropped_points, options.terrain, run);
   if (scenario.orientation == libgtd::Orientation::surface && !read.cloud.has_normals())
@@ -438,7 +438,7 @@ void score(ScoreOptions& options, Run& run) {
     return libgtd::detect(read.cloud, options.detection, run.progress());
   });
   run.manifest().parameters.emplace_back("tile", options.tile);
-  for (const auto& piece : libmap::cloud_pieces(options.terrain)) run.add_input(piece);
+  for (const auto& piece : libmap::cloud_tiles(options.terrain)) run.add_input(piece);
   for (const auto& input : libgtd::gripper_files(gripper_file)) run.add_input(input);
   add_results(result, options, run);
   carry_transforms(options.terrain, run);
@@ -459,7 +459,7 @@ int main(int argc, char** argv) {
                  "graspability map (.pcd, .ply, .vtp, .csv), or tile store (.tiles)");
   command.option("--tile", "K/N", options.tile,
                  "score only share K of N of the tiles; `graspmap convert` merges the shares");
-  command.option("--points-at-once", "N", options.points_at_once,
+  command.option("--max-points-in-memory", "N", options.max_points_in_memory,
                  "for a tile store: maximum number of points in memory, about 250 bytes each; the "
                  "map does not depend on it");
   command.flag("--append", options.append,

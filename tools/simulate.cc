@@ -1,5 +1,5 @@
 // graspmap simulate WHAT: simulates terrains and recordings with known truth.
-#include "tools/support/usages.h"
+#include "tools/support/subcommands.h"
 
 #include <iostream>
 #include <string>

@@ -6,7 +6,7 @@
 #include "libmap/simulate/robot_cameras.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
-#include "tools/support/usages.h"
+#include "tools/support/subcommands.h"
 
 using namespace graspmap_tools;
 
@@ -105,7 +105,7 @@ void add_results(const libmap::CameraRig& rig, const std::vector<libmap::RobotCa
       run.warn("{}: has no measurements within its range", rig.cameras[i].name);
   }
   run.add_results({{"cameras", images.size()}, {"pixels", pixels}, {"measured_pixels", measured}});
-  run.say("{} cameras, {:.0f} % of the pixels measured", images.size(),
+  run.info("{} cameras, {:.0f} % of the pixels measured", images.size(),
           100.0 * static_cast<double>(measured) / static_cast<double>(pixels));
 }
 

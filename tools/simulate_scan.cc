@@ -2,7 +2,7 @@
 #include "libmap/camera/camera_io.h"
 #include "libmap/core/data_folder.h"
 #include "libmap/io/cloud_io.h"
-#include "libmap/io/cloud_pieces.h"
+#include "libmap/io/cloud_tiles.h"
 #include "libmap/io/mesh_io.h"
 #include "libmap/poses/trajectory_error.h"
 #include "libmap/poses/trajectory_io.h"
@@ -10,7 +10,7 @@
 #include "libmap/simulate/scan_simulation.h"
 #include "tools/support/command_line.h"
 #include "tools/support/option_values.h"
-#include "tools/support/usages.h"
+#include "tools/support/subcommands.h"
 
 using namespace graspmap_tools;
 
@@ -85,7 +85,7 @@ void add_results(const libmap::ScanSimulationResult& result, Run& run) {
                      {"odometry_rotation_error_deg", error.mean_rotation_deg}});
     drift = fmt::format(", odometry {:.1f} mm off", 1e3 * error.rmse_m);
   }
-  run.say("{} frames along {:.1f} m, {:.0f} % of the pixels measured, {} closures{}",
+  run.info("{} frames along {:.1f} m, {:.0f} % of the pixels measured, {} closures{}",
           result.graph.nodes.size(), result.path_length_m,
           100.0 * static_cast<double>(result.measured_pixels) / static_cast<double>(result.pixels),
           closures, drift);
@@ -98,12 +98,12 @@ libmap::Trajectory given_poses(const SimulateScanOptions& options) {
   libmap::CameraTrajectoryOptions path = options.simulation.trajectory;
   path.frame_interval_s = libmap::CameraTrajectoryOptions{}.frame_interval_s;
   const std::string reason = "cannot be combined with --trajectory, which has the camera's poses";
-  refuse_set(path, libmap::bind, reason);
-  refuse_given({{"--target", options.target != "auto"}}, reason);
+  reject_changed(path, libmap::bind, reason);
+  reject_given({{"--target", options.target != "auto"}}, reason);
   return in_file(options.trajectory, [&] {
     const libmap::TrajectoryFile file = libmap::read_trajectory(options.trajectory);
     if (file.of_cameras) throw libmap::Error("has poses of cameras, not of the camera's body");
-    return libmap::numbered(file.poses, frame_interval_s);
+    return libmap::assign_nodes_and_stamps(file.poses, frame_interval_s);
   });
 }
 
@@ -151,13 +151,13 @@ void scan_terrain(const SimulateScanOptions& options, const libmap::Trajectory& 
     throw libmap::Error("requires a mesh",
                         {.field = "--path", .value = "loops", .bound = "auto or serpentine"});
   const libmap::ScanEvents& events = options.simulation.events;
-  refuse_given({{"--walker-first-frame", events.walker_first_frame > 0},
+  reject_given({{"--walker-first-frame", events.walker_first_frame > 0},
                 {"--stone-moved-frame", events.stone_moved_frame > 0},
                 {"--ceiling-first-frame", events.ceiling_first_frame > 0},
                 {"--multipath", options.simulation.faults.depth.multipath > 0.0}},
                "requires a mesh as scene");
-  const libmap::PieceStream stream(libmap::cloud_pieces(options.scene));
-  add_inputs(stream.pieces(), options, run);
+  const libmap::TileStream stream(libmap::cloud_tiles(options.scene));
+  add_inputs(stream.tiles(), options, run);
   run.manifest().frame = "terrain";
   run.write_output(options.output, [&](const fs::path& temporary) {
     libmap::GroundHeights ground;
@@ -165,7 +165,7 @@ void scan_terrain(const SimulateScanOptions& options, const libmap::Trajectory& 
         temporary.has_parent_path() ? temporary.parent_path() : fs::path("."),
         {.tile_m = libmap::GroundHeights::cell_m, .buffer_bytes = spool_buffer_bytes});
     std::size_t count = 0;
-    for (const fs::path& piece : stream.pieces()) count += libmap::read_cloud_info(piece).points;
+    for (const fs::path& piece : stream.tiles()) count += libmap::read_cloud_info(piece).points;
     run.progress().begin("points", count);
     run.timed("read", [&] {
       stream.for_each_block(libmap::PointStream::Need::positions,

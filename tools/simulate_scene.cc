@@ -8,7 +8,7 @@
 #include "libmap/scenes/scene_mesh.h"
 #include "libmap/scenes/scene_sampling.h"
 #include "tools/support/command_line.h"
-#include "tools/support/usages.h"
+#include "tools/support/subcommands.h"
 
 using namespace graspmap_tools;
 
@@ -54,7 +54,7 @@ void write_samples(const libmap::PrimitiveScene& scene, const SimulateOptions& o
   const libmap::SceneSamples samples =
       run.timed("sampling", [&] { return libmap::sample_scene(scene, options.sampling); });
   run.add_results({{"points", samples.cloud.size()}, {"spacing_m", samples.spacing_m}});
-  run.say("{} points, {} m apart", samples.cloud.size(),
+  run.info("{} points, {} m apart", samples.cloud.size(),
           libmap::to_text(static_cast<float>(samples.spacing_m)));
   run.write_output(options.output,
                    [&](const auto& temporary) { libmap::write_cloud(temporary, samples.cloud); });
@@ -64,13 +64,13 @@ void write_surface(const libmap::PrimitiveScene& scene, const SimulateOptions& o
   const libmap::TriangleMesh mesh =
       run.timed("meshing", [&] { return libmap::scene_mesh(scene, options.meshing); });
   run.add_results({{"vertices", mesh.vertices.size()}, {"triangles", mesh.triangles.size()}});
-  run.say("{} vertices, {} triangles", mesh.vertices.size(), mesh.triangles.size());
+  run.info("{} vertices, {} triangles", mesh.vertices.size(), mesh.triangles.size());
   run.write_output(options.output,
                    [&](const auto& temporary) { libmap::write_mesh(temporary, mesh); });
 }
 
 void simulate(const SimulateOptions& options, Run& run) {
-  refuse_set(options, options.mesh ? bind_cloud : bind_mesh,
+  reject_changed(options, options.mesh ? bind_cloud : bind_mesh,
              options.mesh ? "cannot be combined with --mesh" : "requires --mesh");
   if (options.mesh)
     libmap::require_mesh_format(options.output);

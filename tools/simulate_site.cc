@@ -7,7 +7,7 @@
 #include "libmap/simulate/rock_site.h"
 #include "libmap/simulate/site_mesh.h"
 #include "tools/support/command_line.h"
-#include "tools/support/usages.h"
+#include "tools/support/subcommands.h"
 
 using namespace graspmap_tools;
 
@@ -17,7 +17,7 @@ struct SimulateSiteOptions {
   std::string output;
   std::string site = "rocks";
   std::uint64_t seed = 0;
-  std::uint64_t places = 0;
+  std::uint64_t field_points = 0;
   libmap::SiteMeshOptions meshing;
 };
 
@@ -29,7 +29,7 @@ void bind(libmap::ParameterTable& table, SimulateSiteOptions& options) {
             "approximate edge length of the mesh, m");
   table.add("closed", options.meshing.closed,
             "add the sides and base of the ground, so that the mesh is closed");
-  table.add("places", options.places, libmap::Range{0.0, 10'000.0},
+  table.add("places", options.field_points, libmap::Range{0.0, 10'000.0},
             "number of field points; 0: as in the site file");
 }
 
@@ -38,7 +38,7 @@ libmap::RockSite load(const SimulateSiteOptions& options, const std::filesystem:
   if (options.seed != 0) seed = options.seed;
   libmap::RockSite site = libmap::parse_site(libmap::read_whole_file(file, libmap::max_yaml_bytes),
                                              file.string(), seed);
-  if (options.places != 0) site.field_points.count = static_cast<int>(options.places);
+  if (options.field_points != 0) site.field_points.count = static_cast<int>(options.field_points);
   if (site.rocks.empty())
     throw libmap::Error("a site needs at least one rock",
                         {.file = file.string(), .field = "rocks"});
@@ -66,7 +66,7 @@ void simulate(const SimulateSiteOptions& options, Run& run) {
                    {"vertices", mesh.vertices.size()},
                    {"triangles", mesh.triangles.size()},
                    {"field_points", points.size()}});
-  run.say("{} rocks, {} triangles, {} field points", site.rocks.size(), mesh.triangles.size(),
+  run.info("{} rocks, {} triangles, {} field points", site.rocks.size(), mesh.triangles.size(),
           points.size());
   const std::string table =
       "# Locations selected by the shape of the rocks only; no field test was made at them.\n" +

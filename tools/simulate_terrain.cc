@@ -1,11 +1,11 @@
 // graspmap simulate terrain: makes rocky ground of any size as a folder of tiles.
 #include "libmap/core/parallel.h"
 #include "libmap/io/cloud_io.h"
-#include "libmap/simulate/terrain_pieces.h"
+#include "libmap/simulate/terrain_tiles.h"
 #include "tools/support/command_line.h"
 #include "tools/support/option_values.h"
 #include "tools/support/tile_folder.h"
-#include "tools/support/usages.h"
+#include "tools/support/subcommands.h"
 
 using namespace graspmap_tools;
 
@@ -16,17 +16,17 @@ namespace fs = std::filesystem;
 struct SimulateTerrainOptions {
   std::string output;
   std::string size = "100";
-  libmap::TerrainPiecesOptions pieces;
+  libmap::TerrainTilesOptions pieces;
 };
 
 // Makes and writes the tiles one by one. Returns the number of points.
-std::size_t write_pieces(const SimulateTerrainOptions& options,
+std::size_t write_tiles(const SimulateTerrainOptions& options,
                          const std::vector<libmap::XyTile>& pieces, const fs::path& folder,
                          Run& run) {
   run.progress().begin("pieces", pieces.size());
   std::vector<std::size_t> points(pieces.size());
   libmap::parallel_each(pieces.size(), [&](std::size_t n) {
-    const libmap::PointCloud cloud = libmap::sample_piece(options.pieces, pieces[n]);
+    const libmap::PointCloud cloud = libmap::sample_tile(options.pieces, pieces[n]);
     libmap::write_cloud(folder / libmap::tile_file_name(pieces[n], ".pcd"), cloud);
     points[n] = cloud.size();
     run.progress().advance(1);
@@ -44,15 +44,15 @@ void simulate(SimulateTerrainOptions& options, Run& run) {
         "not a size", {.field = "--size", .value = options.size, .bound = "M or XxY, meters, > 0"});
   options.pieces.size_x_m = size->x();
   options.pieces.size_y_m = size->y();
-  const std::vector<libmap::XyTile> pieces = libmap::terrain_pieces(options.pieces);
+  const std::vector<libmap::XyTile> pieces = libmap::terrain_tiles(options.pieces);
   const std::vector<std::string> names = tile_folder_names(options.output);
   run.claim_output_tree(options.output, names);
   run.manifest().frame = "terrain";
   run.write_output_tree(options.output, names, [&](const fs::path& folder) {
     if (folder.empty()) return;  // --dry-run
-    const std::size_t points = write_pieces(options, pieces, folder, run);
+    const std::size_t points = write_tiles(options, pieces, folder, run);
     run.add_results({{"pieces", pieces.size()}, {"points", points}});
-    run.say("{} points in {} tiles", points, pieces.size());
+    run.info("{} points in {} tiles", points, pieces.size());
   });
 }
 

@@ -15,8 +15,8 @@
 // JSON of the exposure, which shares and resumed runs read bit for bit.
 namespace libmap {
 
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(TextureExposure, gains, vignetting, observations, spread_before,
-                                   spread)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(TextureExposure, gains, vignetting, observations, log_color_deviation_before,
+                                   log_color_deviation)
 
 }  // namespace libmap
 
@@ -82,7 +82,7 @@ libmap::Trajectory poses_of(TextureCommandOptions& options, const libmap::ScanSo
     mesh_from_poses = *site_from_map * mesh_from_poses;
     run.manifest().frame = "site";
     run.manifest().transforms.emplace_back(site_from_map_name, *site_from_map);
-    run.say("poses are transformed to the site's frame");
+    run.info("poses are transformed to the site's frame");
   }
   for (libmap::TrajectoryPose& pose : poses)
     pose.world_from_base = mesh_from_poses * pose.world_from_base;
@@ -103,7 +103,7 @@ void say_result(const libmap::TextureReport& result, Run& run) {
   for (const auto& [node, fault] : result.skipped)
     run.warn(std::string("skipped: ") + fault.what());
   run.add_timings(result.timings_s);
-  run.say(
+  run.info(
       "{} images, {} charts on {} page{}, texels of {:.1f} mm; {} of {} triangles ({:.3f} m2) are "
       "not visible and gray",
       result.photos, result.charts, result.pages, result.pages == 1 ? "" : "s",
@@ -112,7 +112,7 @@ void say_result(const libmap::TextureReport& result, Run& run) {
   if (5 * result.unseen_triangles > triangles)
     run.warn("20 % of the triangles or more are visible in no image: check --frame and --poses");
   if (result.split_charts > 0)
-    run.say("{} charts larger than a page were cut", result.split_charts);
+    run.info("{} charts larger than a page were cut", result.split_charts);
   if (result.shrunk_charts > 0)
     run.warn("{} triangles larger than a page have fewer texels", result.shrunk_charts);
   if (result.atlas_scale < 1.0)
@@ -169,7 +169,7 @@ void texture(TextureCommandOptions options, Run& run) {
   if (!fs::is_directory(options.mesh)) libmap::require_mesh_format(options.mesh);
   run.claim_output(options.output, inputs_of(options));
   run.require_own_companions(options.output,
-                             libmap::companions_of_model(options.output, options.writing));
+                             libmap::additional_model_files(options.output, options.writing));
   const auto scan = scan_of(options, run);
   const libmap::Trajectory poses = poses_of(options, *scan, run);
   const libmap::TextureResult result = textured(options, *scan, poses, run);
@@ -202,15 +202,15 @@ void make_models(const TextureCommandOptions& options, const libmap::ScanSource&
   // Large arrays are returned to the system after each tile, because the heap would fragment.
   mallopt(M_MMAP_THRESHOLD, 1 << 20);
   const std::vector<std::string> names = stems_of(pieces);
-  libmap::MeshPieceIndex index(pieces);
-  libmap::PieceTexturing texturing(index, options.margin_m, scan, poses, options.texture,
+  libmap::MeshTileIndex index(pieces);
+  libmap::TileTexturing texturing(index, options.margin_m, scan, poses, options.texture,
                                    run.progress());
-  const TileFolder::Facts found =
-      output.begin([&] { return TileFolder::Facts(texturing.find_exposure()); });
+  const TileFolder::TileData found =
+      output.begin([&] { return TileFolder::TileData(texturing.find_exposure()); });
   if (found.is_null()) return;  // --dry-run
   const auto exposure = found.get<libmap::TextureExposure>();
   const auto make = [&](std::size_t n, const fs::path& to) {
-    const libmap::PieceTexturing::Piece tile = texturing.make(n, exposure);
+    const libmap::TileTexturing::Piece tile = texturing.make(n, exposure);
     libmap::textured_mesh_files(to, tile.model, options.writing).front().write(to);
     return facts_of(tile.counts);
   };
@@ -230,7 +230,7 @@ void make_models(const TextureCommandOptions& options, const libmap::ScanSource&
 }
 
 void texture_in_pieces(TextureCommandOptions options, Run& run) {
-  const std::vector<fs::path> pieces = libmap::mesh_pieces(options.mesh);
+  const std::vector<fs::path> pieces = libmap::mesh_tiles(options.mesh);
   const std::vector<std::string> names = tile_folder_names(options.output, pieces, model_extension);
   const auto scan = scan_of(options, run);
   const libmap::Trajectory poses = poses_of(options, *scan, run);

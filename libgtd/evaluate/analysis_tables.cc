@@ -23,12 +23,12 @@ std::string text(double value) {
 
 std::string text(std::optional<double> value) { return value ? text(*value) : std::string(); }
 
-void add_place(const Eigen::Vector3d& place, std::vector<std::string>& row) {
+void add_position(const Eigen::Vector3d& position, std::vector<std::string>& row) {
   // Rounds to micrometers. Single precision would round UTM coordinates to decimeters.
-  constexpr double steps_a_m = 1e6;
-  for (const double coordinate : place)
+  constexpr double steps_per_m = 1e6;
+  for (const double coordinate : position)
     row.push_back(std::isfinite(coordinate)
-                      ? libmap::to_text(std::round(coordinate * steps_a_m) / steps_a_m)
+                      ? libmap::to_text(std::round(coordinate * steps_per_m) / steps_per_m)
                       : std::string());
 }
 
@@ -208,11 +208,11 @@ Table regions_table(const VoxelMap& map, const MapRegionResult& regions, const R
     const Eigen::Vector3d size = (region.max - region.min).array() + map.lattice.voxel_size_m;
     std::vector<std::string> row = {text(r + 1), text(region.voxels.size()), text(region.area_m2),
                                     text(region.plan_area_m2)};
-    add_place(map_from_terrain * region.centroid, row);
+    add_position(map_from_terrain * region.centroid, row);
     row.insert(row.end(), {text(region.centroid.z()), text(region.min.z()), text(region.max.z())});
-    add_place(size, row);
+    add_position(size, row);
     row.insert(row.end(), {text(region.mean_score), text(region.best_score)});
-    add_place(map_from_terrain * map.center_in_terrain(region.best_voxel), row);
+    add_position(map_from_terrain * map.center_in_terrain(region.best_voxel), row);
     row.insert(row.end(),
                {text(std::size_t{access.group} + 1), access.reachable ? "1" : "0",
                 access.steps ? text(*access.steps) : std::string(), text(access.stride_needed_m)});
@@ -247,8 +247,8 @@ Table region_links_table(const VoxelMap& map, const RegionReach& reach) {
     std::vector<std::string> cells = {text(std::size_t{link.a} + 1), text(std::size_t{link.b} + 1),
                                       text(link.distance_m), row.within_stride ? "1" : "0",
                                       row.in_tree ? "1" : "0"};
-    add_place(map_from_terrain * map.center_in_terrain(link.voxel_a), cells);
-    add_place(map_from_terrain * map.center_in_terrain(link.voxel_b), cells);
+    add_position(map_from_terrain * map.center_in_terrain(link.voxel_a), cells);
+    add_position(map_from_terrain * map.center_in_terrain(link.voxel_b), cells);
     table.rows.push_back(std::move(cells));
   }
   return table;

@@ -232,7 +232,7 @@ ExpectedMapResult evaluate_expected_map(const libmap::PointCloud& map, const Exp
     set_scores(std::move(region_scores[r]), result.regions[r]);
     const std::optional<bool> predicted = result.regions[r].predicted();
     if (predicted && expected.regions[r].graspable)
-      result.places.add(*expected.regions[r].graspable, *predicted);
+      result.region_confusion.add(*expected.regions[r].graspable, *predicted);
   }
   RocOptions roc;
   roc.bootstrap_replicates = 0;

@@ -67,7 +67,7 @@ struct ExpectedMapResult {
   // are too narrow; those of places are valid.
   Confusion voxels_by_score;
   std::optional<Confusion> voxels_by_flag;  // nullopt if the map has no field "graspable"
-  Confusion places;                         // one place per region with voxels
+  Confusion region_confusion;                // one place per region with voxels
   std::optional<AreaUnderCurve> area;       // by voxel scores; nullopt unless both classes exist
 };
 

@@ -55,7 +55,7 @@ std::vector<Voxel> voxels_of_tile(const libmap::PointCloud& tile) {
   return voxels;
 }
 
-struct Place {
+struct Query {
   Eigen::Vector3d in_map;
   Eigen::Vector3d in_terrain;
 };
@@ -212,40 +212,40 @@ class TileLookup {
   }
 
   // First the tiles of the nearest points, then tiles that may contain nearer points.
-  std::vector<Finding> find(const std::vector<Place>& places) const {
-    std::vector<Finding> findings(places.size());
+  std::vector<Finding> find(const std::vector<Query>& queries) const {
+    std::vector<Finding> findings(queries.size());
     std::vector<Visit> visits;
-    for (std::size_t p = 0; p < places.size(); ++p)
-      for (const std::size_t tile : first_tiles(places[p])) visits.push_back({tile, p});
-    make(std::move(visits), places, findings);
+    for (std::size_t p = 0; p < queries.size(); ++p)
+      for (const std::size_t tile : first_tiles(queries[p])) visits.push_back({tile, p});
+    make(std::move(visits), queries, findings);
     std::vector<Visit> more;
-    for (std::size_t p = 0; p < places.size(); ++p) {
+    for (std::size_t p = 0; p < queries.size(); ++p) {
       const double reach = std::sqrt(findings[p].nearest.first);
       if (reach <= reach_m_) continue;
-      const std::vector<std::size_t> asked = first_tiles(places[p]);
-      for (const std::size_t tile : finder_.within(places[p].in_terrain, reach))
+      const std::vector<std::size_t> asked = first_tiles(queries[p]);
+      for (const std::size_t tile : finder_.within(queries[p].in_terrain, reach))
         if (!std::binary_search(asked.begin(), asked.end(), tile)) more.push_back({tile, p});
     }
-    make(std::move(more), places, findings);
+    make(std::move(more), queries, findings);
     return findings;
   }
 
-  TileNumber number_of(const Place& place) const { return finder_.number_of(place.in_terrain); }
+  TileNumber number_of(const Query& query) const { return finder_.number_of(query.in_terrain); }
 
  private:
   struct Visit {
     std::size_t tile = 0;
-    std::size_t place = 0;
+    std::size_t query = 0;
     auto operator<=>(const Visit&) const = default;
   };
 
-  std::vector<std::size_t> first_tiles(const Place& place) const {
-    std::vector<std::size_t> tiles = finder_.within(place.in_terrain, reach_m_);
-    if (tiles.empty()) tiles.push_back(finder_.guess(place.in_terrain));
+  std::vector<std::size_t> first_tiles(const Query& query) const {
+    std::vector<std::size_t> tiles = finder_.within(query.in_terrain, reach_m_);
+    if (tiles.empty()) tiles.push_back(finder_.guess(query.in_terrain));
     return tiles;
   }
 
-  void make(std::vector<Visit> visits, const std::vector<Place>& places,
+  void make(std::vector<Visit> visits, const std::vector<Query>& queries,
             std::vector<Finding>& findings) const {
     std::sort(visits.begin(), visits.end());
     std::vector<std::size_t> starts;  // first visit of each tile
@@ -257,10 +257,10 @@ class TileLookup {
       const libmap::PointCloud cloud = load_(visits[starts[s]].tile);
       const MapPart tile(cloud, voxels_of_tile(cloud));
       for (std::size_t v = starts[s]; v < starts[s + 1]; ++v)
-        found[v] = ask(tile, places[visits[v].place].in_map, options_);
+        found[v] = ask(tile, queries[visits[v].query].in_map, options_);
     });
     for (std::size_t v = 0; v < visits.size(); ++v)
-      join(findings[visits[v].place], std::move(found[v]), options_.mode);
+      join(findings[visits[v].query], std::move(found[v]), options_.mode);
   }
 
   const TileLoader& load_;
@@ -313,20 +313,20 @@ std::vector<LookupAnswer> look_up_tiles(const TileStoreIndex& index, const TileL
   std::vector<std::pair<TileNumber, std::size_t>> order;  // points, by tile
   for (std::size_t n = 0; n < points.size(); ++n) {
     answers[n].distance_m = HUGE_VAL;
-    const Place place{points[n], terrain_from_map * points[n]};
-    if (place.in_map.allFinite() && place.in_terrain.allFinite())
-      order.emplace_back(lookup.number_of(place), n);
+    const Query query{points[n], terrain_from_map * points[n]};
+    if (query.in_map.allFinite() && query.in_terrain.allFinite())
+      order.emplace_back(lookup.number_of(query), n);
   }
   std::sort(order.begin(), order.end());
   progress.begin("look-up", order.size());
   for (std::size_t first = 0; first < order.size(); first += points_at_once) {
     const std::size_t last = std::min(order.size(), first + points_at_once);
-    std::vector<Place> places;
+    std::vector<Query> queries;
     for (std::size_t n = first; n < last; ++n) {
       const Eigen::Vector3d& point = points[order[n].second];
-      places.push_back({point, terrain_from_map * point});
+      queries.push_back({point, terrain_from_map * point});
     }
-    std::vector<Finding> findings = lookup.find(places);
+    std::vector<Finding> findings = lookup.find(queries);
     for (std::size_t n = first; n < last; ++n)
       answers[order[n].second] = answer_of(std::move(findings[n - first]), options);
     progress.advance(last - first);

@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
 constexpr double lattice_tolerance_voxels = 0.01;
-constexpr std::size_t places_per_chunk = 1 << 14;
+constexpr std::size_t points_per_chunk = 1 << 14;
 
 // Offset from the voxel indices of OTHER to those of MAP, if the lattices coincide.
 std::optional<Voxel> lattice_offset(const VoxelMap& map, const VoxelMap& other,
@@ -61,12 +61,12 @@ std::vector<VoxelPair> pairs_by_index(const VoxelMap& map, const VoxelMap& other
 
 // Nearest of `points` at most `reach_m` from each of `places`, the first of equally near ones.
 std::vector<std::uint32_t> nearest_points(const std::vector<Eigen::Vector3d>& points,
-                                          const std::vector<Eigen::Vector3d>& places,
+                                          const std::vector<Eigen::Vector3d>& centers,
                                           double reach_m) {
   const libmap::PointTree tree(points);
-  std::vector<std::uint32_t> nearest(places.size(), none);
-  libmap::parallel_each(places.size(), places_per_chunk, [&](std::size_t n) {
-    const libmap::NeighborPoint near = tree.first_of_nearest(places[n]);
+  std::vector<std::uint32_t> nearest(centers.size(), none);
+  libmap::parallel_each(centers.size(), points_per_chunk, [&](std::size_t n) {
+    const libmap::NeighborPoint near = tree.first_of_nearest(centers[n]);
     if (near.square_m2 <= reach_m * reach_m) nearest[n] = static_cast<std::uint32_t>(near.index);
   });
   return nearest;
@@ -74,13 +74,13 @@ std::vector<std::uint32_t> nearest_points(const std::vector<Eigen::Vector3d>& po
 
 std::vector<VoxelPair> pairs_by_distance(const VoxelMap& map, const VoxelMap& other,
                                          const libmap::Pose& map_from_other, double reach_m) {
-  std::vector<Eigen::Vector3d> places;
-  std::vector<Eigen::Vector3d> other_places;
-  for (std::size_t n = 0; n < map.size(); ++n) places.push_back(map.center_in_terrain(n));
+  std::vector<Eigen::Vector3d> centers;
+  std::vector<Eigen::Vector3d> other_centers;
+  for (std::size_t n = 0; n < map.size(); ++n) centers.push_back(map.center_in_terrain(n));
   for (std::size_t n = 0; n < other.size(); ++n)
-    other_places.push_back(map_from_other * other.center_in_terrain(n));
-  const std::vector<std::uint32_t> there = nearest_points(other_places, places, reach_m);
-  const std::vector<std::uint32_t> here = nearest_points(places, other_places, reach_m);
+    other_centers.push_back(map_from_other * other.center_in_terrain(n));
+  const std::vector<std::uint32_t> there = nearest_points(other_centers, centers, reach_m);
+  const std::vector<std::uint32_t> here = nearest_points(centers, other_centers, reach_m);
   std::vector<VoxelPair> pairs;
   for (std::uint32_t a = 0; a < map.size(); ++a)
     if (there[a] != none && here[there[a]] == a) pairs.push_back({a, there[a]});

@@ -302,12 +302,12 @@ double distance_of(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
 }
 
 // Distance from a position to the nearest voxel of each region.
-std::vector<double> distances_from(const Eigen::Vector3d& place,
+std::vector<double> distances_from(const Eigen::Vector3d& position,
                                    const std::vector<PointSet>& sets) {
   std::vector<double> distances(sets.size(), std::numeric_limits<double>::infinity());
   for (std::size_t s = 0; s < sets.size(); ++s)
     for (const Eigen::Vector3d& point : sets[s].points.positions)
-      distances[s] = std::min(distances[s], distance_of(point, place));
+      distances[s] = std::min(distances[s], distance_of(point, position));
   return distances;
 }
 

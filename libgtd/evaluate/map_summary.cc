@@ -82,7 +82,7 @@ void add_expected(const ExpectedMapResult& expected, Row& row) {
   row.add("voxel_auc", expected.area ? std::optional(expected.area->trapezoid) : std::nullopt);
   // No rates without the flag of the map.
   add_confusion("flag", expected.voxels_by_flag.value_or(Confusion{}), row);
-  add_confusion("place", expected.places, row);
+  add_confusion("place", expected.region_confusion, row);
 }
 
 std::optional<double> share(std::size_t part, std::size_t whole) {

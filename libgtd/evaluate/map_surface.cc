@@ -54,9 +54,9 @@ class MassOfOffset {
     }
   }
   double operator()(double offset) const {
-    const double place = std::min(offset / offset_at(1), static_cast<double>(masses_.size() - 1));
-    const std::size_t below = std::min(static_cast<std::size_t>(place), masses_.size() - 2);
-    return std::lerp(masses_[below], masses_[below + 1], place - static_cast<double>(below));
+    const double index = std::min(offset / offset_at(1), static_cast<double>(masses_.size() - 1));
+    const std::size_t below = std::min(static_cast<std::size_t>(index), masses_.size() - 2);
+    return std::lerp(masses_[below], masses_[below + 1], index - static_cast<double>(below));
   }
 
  private:

@@ -145,8 +145,8 @@ void fill_values(const PointCloud& map, VoxelMap& result) {
 
 }  // namespace
 
-MapFacts facts_of(const libmap::Manifest& manifest) {
-  MapFacts facts;
+MapInfo map_info(const libmap::Manifest& manifest) {
+  MapInfo facts;
   facts.zero_plane_m =
       libmap::number_of(manifest.find_parameter("zero_plane_m")).value_or(facts.zero_plane_m);
   const std::optional<double> size_m = libmap::number_of(manifest.find_parameter("voxel_size_m"));
@@ -164,7 +164,7 @@ MapFacts facts_of(const libmap::Manifest& manifest) {
   return facts;
 }
 
-VoxelMap voxel_map_of(const PointCloud& map, const MapFacts& facts) {
+VoxelMap voxel_map_of(const PointCloud& map, const MapInfo& facts) {
   map.check();
   if (map.size() > std::numeric_limits<std::uint32_t>::max())
     throw libmap::Error("the map has too many points",

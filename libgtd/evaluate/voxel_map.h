@@ -16,7 +16,7 @@
 namespace libgtd {
 
 // Properties of a map in addition to its points.
-struct MapFacts {
+struct MapInfo {
   std::optional<VoxelLattice> lattice{};  // in the terrain frame; nullopt: unknown
   libmap::Pose terrain_from_map = libmap::Pose::Identity();        // from the frame of the points
   double zero_plane_m = -std::numeric_limits<double>::infinity();  // in the terrain frame
@@ -24,7 +24,7 @@ struct MapFacts {
 
 // Reads these properties from a manifest of `graspmap score`: parameters, frame, transforms and the
 // origin of the lattice.
-MapFacts facts_of(const libmap::Manifest& manifest);
+MapInfo map_info(const libmap::Manifest& manifest);
 
 // Arrays with one entry per voxel, ascending by voxel, for any order of the map's points.
 struct VoxelMap {
@@ -54,6 +54,6 @@ struct VoxelMap {
 // or a known lattice. With the fields only, the lattice is fitted to the points in the terrain
 // frame. Points without a position are left out. Throws Error for a map without points, a missing
 // or invalid field, points that are not at their voxels, and two points of one voxel.
-VoxelMap voxel_map_of(const libmap::PointCloud& map, const MapFacts& facts = {});
+VoxelMap voxel_map_of(const libmap::PointCloud& map, const MapInfo& facts = {});
 
 }  // namespace libgtd

@@ -7,7 +7,7 @@
 #include <functional>
 #include <numbers>
 
-#include "libgtd/gripper/cloned_loops.h"
+#include "libgtd/gripper/target_clones.h"
 #include "libmap/core/angle.h"
 
 namespace libgtd {

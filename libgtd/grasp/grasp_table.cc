@@ -47,16 +47,16 @@ constexpr Column columns[] = {
     {"fails_engagement", share_of<TrialEnd::engagement>},
     {"fails_load", share_of<TrialEnd::load>},
     {"fails_unseen", share_of<TrialEnd::unseen>},
-    {"shown_pose", [](const LocationResult& r) { return std::to_string(r.shown_pose); }},
-    {"shown_draw", [](const LocationResult& r) { return std::to_string(r.shown_draw); }},
+    {"shown_pose", [](const LocationResult& r) { return std::to_string(r.median_pose); }},
+    {"shown_draw", [](const LocationResult& r) { return std::to_string(r.median_draw); }},
 };
 
 }  // namespace
 
-std::vector<std::string> grasp_columns(const std::vector<double>& more_loads_n) {
+std::vector<std::string> grasp_columns(const std::vector<double>& extra_loads_n) {
   std::vector<std::string> names;
   for (const Column& column : columns) names.emplace_back(column.name);
-  for (const double load : more_loads_n)
+  for (const double load : extra_loads_n)
     for (const char* name : {"graspable_", "hold_probability_"})
       names.push_back(name + libmap::to_text(load));
   return names;

@@ -10,7 +10,7 @@ namespace libgtd {
 
 // Returns the names of the columns: graspable (1 or 0, the verdict for `evaluate`), probability,
 // forces, contacts and failures, then graspable_L and hold_probability_L for each further load L.
-std::vector<std::string> grasp_columns(const std::vector<double>& more_loads_n = {});
+std::vector<std::string> grasp_columns(const std::vector<double>& extra_loads_n = {});
 
 // Returns the cells of one location, one per column.
 std::vector<std::string> grasp_cells(const LocationResult& result);

@@ -68,7 +68,7 @@ struct TrialParameters {
   std::size_t set_of(std::uint64_t key, int pose, int draw) const {
     const double at =
         libmap::unit_noise(key, 5) + 0.7548776662466927 * pose + 0.5698402909980532 * draw;
-    return set_at(sets, at - std::floor(at));
+    return parameter_set_at(sets, at - std::floor(at));
   }
 };
 
@@ -109,7 +109,7 @@ class Site {
       return close_gripper(patch_, gripper_, poses_[pose], options_.closing);
     constexpr std::uint64_t of_surface = 0x73757266616365;
     const std::uint64_t key = libmap::mix_bits(libmap::mix_bits(key_, of_surface), pose);
-    return close_gripper(displaced(patch_, options_.surface.correlation_m, options_.seed, key),
+    return close_gripper(displace_vertices(patch_, options_.surface.correlation_m, options_.seed, key),
                          gripper_, poses_[pose], options_.closing);
   }
 
@@ -326,7 +326,7 @@ LocationResult LocationTrials::result() && {
       static_cast<double>(result.ends[0]) / static_cast<double>(result.trials);
   std::tie(result.hold_low, result.hold_high) =
       wilson_interval(result.hold_probability, static_cast<double>(poses_.size()));
-  for (const double load : options.more_loads_n)
+  for (const double load : options.extra_loads_n)
     result.more_probabilities.push_back(
         static_cast<double>(
             std::count_if(forces.begin(), forces.end(),
@@ -349,8 +349,8 @@ LocationResult LocationTrials::result() && {
   });
   const auto shown = static_cast<int>(nearest - forces.begin());
   const auto draws = static_cast<int>(poses_.front().forces.size());
-  result.shown_pose = shown / draws;
-  result.shown_draw = shown % draws;
+  result.median_pose = shown / draws;
+  result.median_draw = shown % draws;
   return std::move(result_);
 }
 
@@ -381,7 +381,7 @@ void require_ground(const Ground& ground, const std::vector<Eigen::Vector3d>& lo
 
 void GraspOptions::check() const {
   libmap::check_parameters(*this);
-  for (const double load : more_loads_n)
+  for (const double load : extra_loads_n)
     if (!(load > 0.0))
       throw libmap::Error(
           "out of range",

@@ -25,7 +25,7 @@ enum class ApproachDirection { up, normal };
 struct GraspOptions {
   double load_n = 5.0;  // a trial holds if its force is >= load_n * safety in all directions
   double safety = 1.0;
-  std::vector<double> more_loads_n;  // further loads with computed probabilities
+  std::vector<double> extra_loads_n;  // further loads with computed probabilities
   ApproachDirection approach = ApproachDirection::up;
   int poses = 32;  // poses per location
   int draws = 32;  // draws of asperities per pose
@@ -95,8 +95,8 @@ struct LocationResult {
   double unseen = 0.0;       // mean of ClosedFinger::unseen
   double clearance_m = 0.0;  // mean height of the palm above the location
   // Trial with the force nearest to the median.
-  int shown_pose = 0;
-  int shown_draw = 0;
+  int median_pose = 0;
+  int median_draw = 0;
 
   bool holds() const { return hold_probability >= 0.5; }
 };

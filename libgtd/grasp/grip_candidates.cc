@@ -19,9 +19,9 @@ GripCandidates::GripCandidates(const libmap::TriangleMesh& mesh, const Gripper& 
                                const CandidateOptions& options)
     : start_height_m_(options.start_height_m) {
   const FingerGeometry finger = finger_geometry(gripper);
-  lay_out(mesh, options.cell_m);
+  init_grid(mesh, options.cell_m);
   for (const libmap::Triangle& triangle : mesh.triangles)
-    raise({mesh.vertices[triangle[0]], mesh.vertices[triangle[1]], mesh.vertices[triangle[2]]});
+    add_triangle({mesh.vertices[triangle[0]], mesh.vertices[triangle[1]], mesh.vertices[triangle[2]]});
   const double radius = finger.tip(finger.opening_rad, finger.curl_rad).x();
   const auto reach = static_cast<std::int64_t>(radius / cell_m_);
   for (std::int64_t i = -reach; i <= reach; ++i)
@@ -31,7 +31,7 @@ GripCandidates::GripCandidates(const libmap::TriangleMesh& mesh, const Gripper& 
       static_cast<std::size_t>(options.max_blocked * static_cast<double>(reach_.size()));
 }
 
-void GripCandidates::lay_out(const libmap::TriangleMesh& mesh, double cell_m) {
+void GripCandidates::init_grid(const libmap::TriangleMesh& mesh, double cell_m) {
   Eigen::Vector2d low = Eigen::Vector2d::Constant(std::numeric_limits<double>::infinity());
   Eigen::Vector2d high = -low;
   for (const Eigen::Vector3d& vertex : mesh.vertices) {
@@ -58,7 +58,7 @@ std::int64_t GripCandidates::cell(double coordinate, std::size_t side) const {
 }
 
 // Raises the columns of the corners and those whose center is on the triangle.
-void GripCandidates::raise(const std::array<Eigen::Vector3d, 3>& corners) {
+void GripCandidates::add_triangle(const std::array<Eigen::Vector3d, 3>& corners) {
   const auto raise_to = [&](std::int64_t i, std::int64_t j, double z) {
     float& top = tops_[static_cast<std::size_t>(i * cells_[1] + j)];
     top = std::max(top, static_cast<float>(z));

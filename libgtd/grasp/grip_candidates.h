@@ -34,9 +34,9 @@ class GripCandidates {
   bool may_hold(const Eigen::Vector3d& location) const;
 
  private:
-  void lay_out(const libmap::TriangleMesh& mesh, double cell_m);
+  void init_grid(const libmap::TriangleMesh& mesh, double cell_m);
   std::int64_t cell(double coordinate, std::size_t side) const;
-  void raise(const std::array<Eigen::Vector3d, 3>& corners);
+  void add_triangle(const std::array<Eigen::Vector3d, 3>& corners);
   float top_at(std::int64_t i, std::int64_t j) const;
 
   Eigen::Vector2d low_ = Eigen::Vector2d::Zero();

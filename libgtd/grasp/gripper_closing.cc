@@ -8,7 +8,7 @@
 #include <numbers>
 #include <utility>
 
-#include "libgtd/gripper/cloned_loops.h"
+#include "libgtd/gripper/target_clones.h"
 
 namespace libgtd {
 

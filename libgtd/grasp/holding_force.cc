@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <utility>
 
-#include "libgtd/gripper/cloned_loops.h"
+#include "libgtd/gripper/target_clones.h"
 #include "libmap/core/angle.h"
 #include "libmap/core/random_stream.h"
 

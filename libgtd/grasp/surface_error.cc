@@ -99,8 +99,8 @@ double RandomField::node(const Eigen::Array3i& number) {
   return known;
 }
 
-double RandomField::at(const Eigen::Vector3d& place) {
-  const Eigen::Array3d cell = place.array() / length_m_ + shift_;
+double RandomField::at(const Eigen::Vector3d& position) {
+  const Eigen::Array3d cell = position.array() / length_m_ + shift_;
   const Eigen::Array3d low = cell.floor();
   const Eigen::Array3d share = cell - low;
   const Eigen::Array3i first = low.max(-1e9).min(1e9).cast<int>();
@@ -116,7 +116,7 @@ double RandomField::at(const Eigen::Vector3d& place) {
   return std::clamp(sum / std::sqrt(squares), -most_deviations, most_deviations);
 }
 
-GroundPatch displaced(const GroundPatch& patch, double correlation_m, std::uint64_t seed,
+GroundPatch displace_vertices(const GroundPatch& patch, double correlation_m, std::uint64_t seed,
                       std::uint64_t key) {
   GroundPatch drawn = patch;
   if (patch.vertex_errors_m.empty()) return drawn;

@@ -38,7 +38,7 @@ class RandomField {
   // Nodes in `box` are cached, so that positions inside it are fast.
   RandomField(double length_m, std::uint64_t seed, std::uint64_t key,
               const Eigen::AlignedBox3d& box);
-  double at(const Eigen::Vector3d& place);
+  double at(const Eigen::Vector3d& position);
 
  private:
   double node(const Eigen::Array3i& number);
@@ -53,7 +53,7 @@ class RandomField {
 
 // Returns the patch with its vertices displaced along their normals by their errors times a random
 // field. A patch without errors is returned unchanged.
-GroundPatch displaced(const GroundPatch& patch, double correlation_m, std::uint64_t seed,
+GroundPatch displace_vertices(const GroundPatch& patch, double correlation_m, std::uint64_t seed,
                       std::uint64_t key);
 
 }  // namespace libgtd

@@ -188,9 +188,9 @@ void add_gripper(const SceneMeasures& measures, const Trial& trial, SceneBuilder
   for (const BearingContact& contact : trial.bearing) bears[contact.finger()] = true;
   for (std::size_t n = 0; n < trial.gripper.fingers.size(); ++n) {
     const ClosedFinger& finger = trial.gripper.fingers[n];
-    const auto at = [&](const Eigen::Vector2d& place) {
-      return pose * Eigen::Vector3d(place.x() * std::cos(finger.azimuth_rad),
-                                    place.x() * std::sin(finger.azimuth_rad), place.y());
+    const auto at = [&](const Eigen::Vector2d& in_plane) {
+      return pose * Eigen::Vector3d(in_plane.x() * std::cos(finger.azimuth_rad),
+                                    in_plane.x() * std::sin(finger.azimuth_rad), in_plane.y());
     };
     const double angle = finger.closing.proximal_rad;
     const Eigen::Vector3d joint = at(measures.finger.joint());

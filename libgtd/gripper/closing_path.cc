@@ -133,8 +133,8 @@ FingerPulls finger_pulls(const Gripper& gripper, const std::vector<ParameterSet>
 
 double ClosingPath::reach_m() const {
   double reach = palm_radius_m;
-  for (const auto* places : {&closing, &open})
-    for (const Place& place : *places) reach = std::max(reach, place.radius_m);
+  for (const auto* points : {&closing, &open})
+    for (const PathPoint& point : *points) reach = std::max(reach, point.radius_m);
   return reach;
 }
 
@@ -151,8 +151,8 @@ ClosingPath make_closing_path(const Gripper& gripper, double voxel_size_m, doubl
   const double distal = 0.001 * gripper.spine_length_mm;
   const double curl = gripper.fingers->curl_deg * libmap::radians_per_degree;
   path.finger_length_m = proximal + distal;
-  const auto place = [&](double angle, double along_proximal, double along_distal) {
-    return ClosingPath::Place{
+  const auto point_at = [&](double angle, double along_proximal, double along_distal) {
+    return ClosingPath::PathPoint{
         joint + along_proximal * std::sin(angle) + along_distal * std::sin(angle - curl),
         along_proximal * std::cos(angle) + along_distal * std::cos(angle - curl),
         along_distal > 0.0};
@@ -165,13 +165,13 @@ ClosingPath make_closing_path(const Gripper& gripper, double voxel_size_m, doubl
   for (int n = 0; n <= steps; ++n) {
     const double angle = opening + (closing - opening) * n / steps;
     for (const double share : {1.0, 0.5, 0.0})
-      path.closing.push_back(place(angle, proximal, share * distal));
+      path.closing.push_back(point_at(angle, proximal, share * distal));
   }
   const int parts =
       std::max(1, static_cast<int>(std::ceil(path.finger_length_m / (0.5 * voxel_size_m))));
   for (int n = 0; n <= parts; ++n) {
     const double along = path.finger_length_m * n / parts;
-    path.open.push_back(place(opening, std::min(along, proximal), std::max(0.0, along - proximal)));
+    path.open.push_back(point_at(opening, std::min(along, proximal), std::max(0.0, along - proximal)));
   }
   return path;
 }

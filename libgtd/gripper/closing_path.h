@@ -37,13 +37,13 @@ FingerPulls finger_pulls(const Gripper& gripper, const std::vector<ParameterSet>
 // relative to the palm. The finger turns from open to closed in steps that move its tip by at most
 // half a voxel. Each step has three positions: tip, middle of the distal link, knuckle.
 struct ClosingPath {
-  struct Place {
+  struct PathPoint {
     double radius_m = 0.0;  // from the palm's axis
     double depth_m = 0.0;   // below the palm
     bool has_spines = false;
   };
-  std::vector<Place> closing;
-  std::vector<Place> open;  // the open finger, from joint to tip
+  std::vector<PathPoint> closing;
+  std::vector<PathPoint> open;  // the open finger, from joint to tip
   double palm_radius_m = 0.0;
   double finger_length_m = 0.0;    // both links
   double load_n = 0.0;             // load of the hold probability

@@ -91,7 +91,7 @@ std::vector<ParameterValues> low_discrepancy_quantiles(std::size_t count, std::u
   return quantiles;
 }
 
-std::size_t set_at(const std::vector<ParameterSet>& ensemble, double share) {
+std::size_t parameter_set_at(const std::vector<ParameterSet>& ensemble, double share) {
   double sum = 0.0;
   for (std::size_t n = 0; n < ensemble.size(); ++n) {
     sum += ensemble[n].weight;

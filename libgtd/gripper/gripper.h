@@ -84,7 +84,7 @@ std::vector<ParameterValues> low_discrepancy_quantiles(std::size_t count, std::u
 
 // Returns the index of the set at `share` (0 .. 1) of the cumulative weights. With evenly spaced
 // shares, sets are drawn in proportion to their weights.
-std::size_t set_at(const std::vector<ParameterSet>& ensemble, double share);
+std::size_t parameter_set_at(const std::vector<ParameterSet>& ensemble, double share);
 
 // Dimensions of a gripper in millimeters and degrees, and its force parameters.
 struct Gripper {

@@ -109,7 +109,7 @@ void add_measures_of_urdf(const libmap::ParameterTable& table, const UrdfMapping
   const std::string xml = libmap::read_whole_file(path, std::uint64_t{1} << 24);
   const bool has_fingers = has_section(given, "fingers");
   try {
-    for (const auto& [key, value] : measures_of_urdf(xml, mapping)) {
+    for (const auto& [key, value] : read_urdf_dimensions(xml, mapping)) {
       if (std::find(given.begin(), given.end(), key) != given.end()) continue;
       if (key.starts_with("fingers.") && !has_fingers) continue;
       table.set(key, value);

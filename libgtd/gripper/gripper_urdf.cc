@@ -13,7 +13,7 @@
 
 #include "libmap/core/angle.h"
 #include "libmap/core/error.h"
-#include "libmap/core/guarded_process.h"
+#include "libmap/core/sandboxed_process.h"
 #include "libmap/core/pose.h"
 
 namespace libgtd {
@@ -423,8 +423,8 @@ void bind(libmap::ParameterTable& table, UrdfMapping& mapping) {
   table.add("urdf.tip_link", mapping.tip_link, "link with its origin at the spine tip");
 }
 
-Measures measures_of_urdf(const std::string& xml, const UrdfMapping& mapping) {
-  return libmap::run_guarded<Measures>(
+Measures read_urdf_dimensions(const std::string& xml, const UrdfMapping& mapping) {
+  return libmap::run_sandboxed<Measures>(
       max_data_bytes, "is damaged: urdfdom crashed on it",
       [&] { return derive(Robot(xml), mapping); },
       [](auto& pipe, Measures& measures) {

@@ -36,7 +36,7 @@ void bind(libmap::ParameterTable& table, UrdfMapping& mapping);
 // movable inside the chain or is part of a cycle, a finger joint that is not revolute or whose axis
 // is not tangential to the circle of joints, fingers that are not evenly spaced or differ by more
 // than 0.1 mm or 0.1 degrees, lengths above 1 m, and angles above 2 pi.
-std::vector<std::pair<std::string, std::string>> measures_of_urdf(const std::string& xml,
+std::vector<std::pair<std::string, std::string>> read_urdf_dimensions(const std::string& xml,
                                                                   const UrdfMapping& mapping);
 
 }  // namespace libgtd

@@ -13,7 +13,7 @@
 #include <optional>
 #include <utility>
 
-#include "libgtd/gripper/cloned_loops.h"
+#include "libgtd/gripper/target_clones.h"
 #include "libgtd/score/scanned_area.h"
 #include "libmap/core/angle.h"
 #include "libmap/core/parallel.h"
@@ -117,14 +117,14 @@ Rays make_rays(const ClosingPath& path, double voxel_size_m) {
   for (int a = 0; a < azimuths; ++a) {
     const double angle = 2.0 * std::numbers::pi * a / azimuths;
     rays.outward[static_cast<std::size_t>(a)] = {std::cos(angle), std::sin(angle)};
-    const auto cell = [&](const ClosingPath::Place& place) {
-      return RayCell{static_cast<int>(std::lround(place.radius_m * std::cos(angle) / voxel_size_m)),
-                     static_cast<int>(std::lround(place.radius_m * std::sin(angle) / voxel_size_m)),
-                     place.depth_m, place.has_spines};
+    const auto cell = [&](const ClosingPath::PathPoint& point) {
+      return RayCell{static_cast<int>(std::lround(point.radius_m * std::cos(angle) / voxel_size_m)),
+                     static_cast<int>(std::lround(point.radius_m * std::sin(angle) / voxel_size_m)),
+                     point.depth_m, point.has_spines};
     };
-    for (const ClosingPath::Place& place : path.open) rays.open.push_back(cell(place));
-    for (const ClosingPath::Place& place : path.closing)
-      if (const RayCell next = cell(place); is_new(rays.closing[static_cast<std::size_t>(a)], next))
+    for (const ClosingPath::PathPoint& point : path.open) rays.open.push_back(cell(point));
+    for (const ClosingPath::PathPoint& point : path.closing)
+      if (const RayCell next = cell(point); is_new(rays.closing[static_cast<std::size_t>(a)], next))
         rays.closing[static_cast<std::size_t>(a)].push_back(next);
   }
   double sum = 0.0;  // of a half plane
@@ -612,10 +612,10 @@ void for_each_block(const VoxelGrid& grid, const std::vector<std::size_t>& pivot
                                                                                      blocks.end());
   libmap::parallel_for(listed.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t b = begin; b < end; ++b) {
-      const auto& [place, members] = listed[b];
-      const int i = place.first * closing_block_columns;
-      const int j = place.second * closing_block_columns;
-      use(members, Heights(grid, grown({i, i + closing_block_columns, j, j + closing_block_columns},
+      const auto& [block, members] = listed[b];
+      const int i = block.first * closing_block_columns;
+      const int j = block.second * closing_block_columns;
+      use(members, Heights(grid, expanded({i, i + closing_block_columns, j, j + closing_block_columns},
                                        reach, reach)));
     }
   });

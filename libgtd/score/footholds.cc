@@ -31,13 +31,13 @@ void check(const FootholdOptions& options, const FootholdFrame& frame) {
 // cell.
 template <typename Use>
 void for_each_near(const PointGrid& grid, const std::vector<Eigen::Vector3d>& positions,
-                   const Eigen::Vector3d& place, double radius_m,
+                   const Eigen::Vector3d& center, double radius_m,
                    std::vector<PointGrid::Range>& runs, const Use& use) {
-  grid.find_near(grid.cell_of(place), 1, runs);
+  grid.find_near(grid.cell_of(center), 1, runs);
   for (const PointGrid::Range& run : runs)
     for (std::uint32_t n = run.first; n < run.last; ++n) {
       const std::uint32_t point = grid.order()[n];
-      if ((positions[point] - place).squaredNorm() <= radius_m * radius_m) use(point);
+      if ((positions[point] - center).squaredNorm() <= radius_m * radius_m) use(point);
     }
 }
 
@@ -118,7 +118,7 @@ class FootholdSearch {
     std::vector<std::size_t> order(candidates.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
     const auto is_before = [&](std::size_t a, std::size_t b) {
-      return is_place_before(place_of(candidates[a]), place_of(candidates[b]));
+      return is_position_less(position_of(candidates[a]), position_of(candidates[b]));
     };
     std::sort(order.begin(), order.end(), is_before);
     libmap::parallel_for(candidates.size(), 256, [&](std::size_t begin, std::size_t end) {
@@ -126,7 +126,7 @@ class FootholdSearch {
       for (std::size_t n = begin; n < end; ++n) {
         Foothold& candidate = candidates[order[n]];
         const Foothold* last = n == begin ? nullptr : &candidates[order[n - 1]];
-        if (last != nullptr && is_same_place(place_of(candidate), place_of(*last))) {
+        if (last != nullptr && is_same_position(position_of(candidate), position_of(*last))) {
           candidate.mean_score = last->mean_score;
           candidate.graspable_points = last->graspable_points;
         } else {
@@ -137,7 +137,7 @@ class FootholdSearch {
     return candidates;
   }
 
-  const Eigen::Vector3d& place_of(const Foothold& foothold) const {
+  const Eigen::Vector3d& position_of(const Foothold& foothold) const {
     return map_.positions[foothold.map_point];
   }
 
@@ -152,12 +152,12 @@ class FootholdSearch {
   void look_around(Foothold& foothold, const std::vector<double>& graspable,
                    std::vector<PointGrid::Range>& runs) const {
     const double radius_m = 0.5 * options_.separation_m;
-    const Eigen::Vector3d& place = map_.positions[foothold.map_point];
+    const Eigen::Vector3d& center = map_.positions[foothold.map_point];
     double sum = 0.0;
     double weights = 0.0;
-    for_each_near(grid_, map_.positions, place, radius_m, runs, [&](std::uint32_t point) {
+    for_each_near(grid_, map_.positions, center, radius_m, runs, [&](std::uint32_t point) {
       if (!std::isfinite(scores_[point])) return;
-      const double share = (map_.positions[point] - place).squaredNorm() / (radius_m * radius_m);
+      const double share = (map_.positions[point] - center).squaredNorm() / (radius_m * radius_m);
       sum += (1.0 - share) * scores_[point];
       weights += 1.0 - share;
       if (!graspable.empty() && graspable[point] != 0.0) ++foothold.graspable_points;
@@ -167,16 +167,16 @@ class FootholdSearch {
   }
 
   void describe_surface(std::vector<Foothold>& footholds) const {
-    std::vector<std::size_t> places;
-    places.reserve(footholds.size());
-    for (const Foothold& foothold : footholds) places.push_back(foothold.map_point);
+    std::vector<std::size_t> map_points;
+    map_points.reserve(footholds.size());
+    for (const Foothold& foothold : footholds) map_points.push_back(foothold.map_point);
     PointCloud surface;  // positions and normals only
     surface.positions = map_.positions;
     surface.normals = map_.normals;
     const CurvatureResult shape = estimate_curvature(
         surface,
         {.method = CurvatureMethod::corrected, .radius_m = options_.surface_radius_m, .up = up_},
-        places);
+        map_points);
     for (std::size_t n = 0; n < footholds.size(); ++n) {
       const Curvature& here = shape.points[n];
       footholds[n].normal = here.normal;

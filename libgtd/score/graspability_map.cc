@@ -77,7 +77,7 @@ PointCloud to_cloud(const GraspabilityMap& map, MapFrame frame) {
   add("j", ScalarType::int32, [](const MapVoxel& one) { return one.voxel.j; });
   add("k", ScalarType::int32, [](const MapVoxel& one) { return one.voxel.k; });
   if (map.content.falling_shares)
-    add("falling_share", ScalarType::float32, [](const auto& one) { return one.falling_share; });
+    add("falling_share", ScalarType::float32, [](const auto& one) { return one.outward_fall_fraction; });
   if (map.content.forces) {
     const auto add_force = [&](const char* name, float ForceEstimate::*value) {
       add(name, ScalarType::float32, [value](const MapVoxel& one) { return one.force.*value; });

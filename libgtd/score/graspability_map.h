@@ -19,7 +19,7 @@ struct MapVoxel {
   bool border = false;     // the window of the mask leaves the scanned area
   Obstacle obstacle = Obstacle::none;
   ForceEstimate force{};                              // calibrated only
-  double falling_share = 1.0;                         // corrected only, upright masks
+  double outward_fall_fraction = 1.0;                         // corrected only, upright masks
   float slope_deg = 0.0F;                             // see SurfaceNormal
   Eigen::Vector3f normal = Eigen::Vector3f::UnitZ();  // axis of the mask, in the terrain frame
 };

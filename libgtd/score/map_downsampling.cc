@@ -53,11 +53,11 @@ libmap::PointCloud downsample_map(const libmap::PointCloud& map, int width) {
   return thin(map, width, false);
 }
 
-libmap::PointCloud thin_map_in_cubes(const libmap::PointCloud& map, int width) {
+libmap::PointCloud voxel_downsample_map(const libmap::PointCloud& map, int width) {
   return thin(map, width, true);
 }
 
-void center_in_squares(const TileStoreIndex& index, int width, libmap::PointCloud& map) {
+void snap_to_squares(const TileStoreIndex& index, int width, libmap::PointCloud& map) {
   const VoxelFields voxels(map);
   const libmap::Pose terrain_from_map = index.frame == MapFrame::input
                                             ? index.terrain_from_input()

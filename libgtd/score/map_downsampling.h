@@ -16,9 +16,9 @@ libmap::PointCloud downsample_map(const libmap::PointCloud& map, int width);
 // Keeps one point for each cube of `width`^3 voxels that contains any: the voxel nearest to the
 // middle of the cube, and the uppermost of equally near ones. Steep faces keep their points.
 // Ascending by cube.
-libmap::PointCloud thin_map_in_cubes(const libmap::PointCloud& map, int width);
+libmap::PointCloud voxel_downsample_map(const libmap::PointCloud& map, int width);
 
 // Moves each point horizontally to the middle of its square, so that the points form a lattice.
-void center_in_squares(const TileStoreIndex& index, int width, libmap::PointCloud& map);
+void snap_to_squares(const TileStoreIndex& index, int width, libmap::PointCloud& map);
 
 }  // namespace libgtd

@@ -49,7 +49,7 @@ struct MatchingLoops {
                 std::size_t count);
   // For each index in `places`, computes the sum of `length` values of `sums` from there. Reads up
   // to 64 bytes beyond.
-  void (*add_runs)(const std::uint16_t* sums, const std::uint32_t* places, std::size_t place_count,
+  void (*add_runs)(const std::uint16_t* sums, const std::uint32_t* bit_offsets, std::size_t bit_offset_count,
                    std::size_t length, std::uint32_t* totals);
 
   // Writes the voxel number of each point inside the box, in the order of the points, and returns

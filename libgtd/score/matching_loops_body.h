@@ -111,15 +111,15 @@ void slide(std::uint16_t* sums, const std::uint16_t* entering, const std::uint16
 // Sums of pairs of neighbors.
 inline Numbers pairs_of(const Numbers& sums) { return (sums & 0xffff) + (sums >> 16); }
 
-void add_runs(const std::uint16_t* sums, const std::uint32_t* places, std::size_t place_count,
+void add_runs(const std::uint16_t* sums, const std::uint32_t* bit_offsets, std::size_t bit_offset_count,
               std::size_t length, std::uint32_t* totals) {
   constexpr std::size_t step = sizeof(Numbers) / sizeof(std::uint16_t);
   std::uint16_t kept[step] = {};  // values of the last register
   for (std::size_t y = 0; y < length % step; ++y) kept[y] = 0xffff;
   Numbers last, loaded;
   __builtin_memcpy(&last, kept, sizeof(Numbers));
-  for (std::size_t n = 0; n < place_count; ++n) {
-    const std::uint16_t* run = sums + places[n];
+  for (std::size_t n = 0; n < bit_offset_count; ++n) {
+    const std::uint16_t* run = sums + bit_offsets[n];
     Numbers total = {};
     for (std::size_t k = 0; k < length / step; ++k, run += step) {
       __builtin_memcpy(&loaded, run, sizeof(Numbers));
@@ -170,11 +170,11 @@ std::size_t find_cells(const double* const points[3], std::size_t count,
 #pragma GCC unroll 3
     for (int a = 0; a < 3; ++a) {
       const double* axis = lattice.axes[a];
-      const Lanes place = axis[0] * offset[0] + axis[1] * offset[1] + axis[2] * offset[2] + 0.5;
+      const Lanes cell_position = axis[0] * offset[0] + axis[1] * offset[1] + axis[2] * offset[2] + 0.5;
       const double begin = box.low[a];
       const double end = begin + box.size[a];
-      is_inside &= (place >= begin) & (place < end);  // false for NaN
-      cell += (floor_of(is_inside ? place : Lanes{}) - begin) * box.stride[a];
+      is_inside &= (cell_position >= begin) & (cell_position < end);  // false for NaN
+      cell += (floor_of(is_inside ? cell_position : Lanes{}) - begin) * box.stride[a];
     }
 #if GRASPMAP_REGISTER == 64
     const __mmask8 inside = _mm512_test_epi64_mask(__m512i(is_inside), __m512i(is_inside));

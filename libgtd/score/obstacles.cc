@@ -127,12 +127,12 @@ std::vector<Obstacle> find_obstacles(const std::vector<Voxel>& voxels,
   });
   const std::size_t ground = find_ground(obstacles, regions);
   std::vector<std::uint8_t> is_on_top(voxels.size(), 0);
-  const auto meet = [&](std::size_t place, std::size_t face) {
-    if (obstacles[place] != Obstacle::none || obstacles[face] != Obstacle::face) return;
+  const auto meet = [&](std::size_t free_voxel, std::size_t face) {
+    if (obstacles[free_voxel] != Obstacle::none || obstacles[face] != Obstacle::face) return;
     const Rise& rise = rises[faces.find(face)];
-    const double above_foot = static_cast<double>(voxels[place].k) - rise.foot;
-    const double below_top = static_cast<double>(rise.top) - voxels[place].k;
-    if (above_foot > limit || above_foot > below_top) is_on_top[regions.find(place)] = 1;
+    const double above_foot = static_cast<double>(voxels[free_voxel].k) - rise.foot;
+    const double below_top = static_cast<double>(rise.top) - voxels[free_voxel].k;
+    if (above_foot > limit || above_foot > below_top) is_on_top[regions.find(free_voxel)] = 1;
   };
   visit_pairs(voxels, obstacle_link_voxels, [&](std::size_t n, std::size_t m) {
     meet(n, m);

@@ -35,7 +35,7 @@ std::uint32_t ColumnSums::count(TileBounds part) const {
          sums_[at(part.i_end, part.j_begin)] + sums_[at(part.i_begin, part.j_begin)];
 }
 
-TileBounds grown(const TileBounds& bounds, int below, int above) {
+TileBounds expanded(const TileBounds& bounds, int below, int above) {
   return {bounds.i_begin - below, bounds.i_end + above, bounds.j_begin - below,
           bounds.j_end + above};
 }
@@ -46,7 +46,7 @@ TileBounds columns_around(int i, int j, int below, int above) {
 
 ColumnSums unscanned_columns(const ColumnSums& occupied, const TileBounds& bounds) {
   const int gap = scan_gap_voxels;
-  ColumnSums far(grown(bounds, gap, gap));
+  ColumnSums far(expanded(bounds, gap, gap));
   for_each_column(far.bounds(), [&](int i, int j) {
     if (occupied.count(columns_around(i, j, gap, gap)) == 0) far.set(i, j);
   });
@@ -60,7 +60,7 @@ ColumnSums unscanned_columns(const ColumnSums& occupied, const TileBounds& bound
 }
 
 ColumnSums unscanned_columns(const VoxelGrid& grid, const TileBounds& bounds) {
-  ColumnSums occupied(grown(bounds, 2 * scan_gap_voxels, 2 * scan_gap_voxels));
+  ColumnSums occupied(expanded(bounds, 2 * scan_gap_voxels, 2 * scan_gap_voxels));
   visit_columns(grid, occupied.bounds(),
                 [&](std::size_t at) { occupied.set(grid.voxels[at].i, grid.voxels[at].j); });
   occupied.accumulate();

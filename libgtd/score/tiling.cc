@@ -52,7 +52,7 @@ std::vector<std::vector<std::size_t>> blocks_of(const VoxelGrid& grid, const Til
   }
   std::vector<std::vector<std::size_t>> listed;
   listed.reserve(blocks.size());
-  for (auto& [place, members] : blocks) listed.push_back(std::move(members));
+  for (auto& [corner, members] : blocks) listed.push_back(std::move(members));
   return listed;
 }
 
@@ -94,7 +94,7 @@ std::vector<std::uint8_t> find_edges(const VoxelGrid& grid, const GripperMask& m
       columns = {std::min(columns.i_begin, voxel.i), std::max(columns.i_end, voxel.i + 1),
                  std::min(columns.j_begin, voxel.j), std::max(columns.j_end, voxel.j + 1)};
     }
-    const ColumnSums unscanned = unscanned_columns(grid, grown(columns, below, above));
+    const ColumnSums unscanned = unscanned_columns(grid, expanded(columns, below, above));
     for (const std::size_t n : block) {
       const Voxel& voxel = grid.voxels[pivots[n]];
       edges[n] = unscanned.count(columns_around(voxel.i, voxel.j, below, above)) != 0 ? 1 : 0;
@@ -129,9 +129,9 @@ std::vector<ScoredVoxel> score_tiles(const VoxelGrid& grid, const GripperMask& m
         one.force = forces[n];
         one.score = forces[n].hold_probability;
       } else {
-        if (!shares.empty()) one.falling_share = shares[n];
+        if (!shares.empty()) one.outward_fall_fraction = shares[n];
         one.score = score_percent(counts[n], mask.method, options.solid_voxel_threshold) / 100.0 *
-                    one.falling_share;
+                    one.outward_fall_fraction;
       }
       one.border = (flags[pivots[n]] & is_border) != 0;
     }

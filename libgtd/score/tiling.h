@@ -33,7 +33,7 @@ struct ScoredVoxel {
   double score = 0.0;          // score_percent / 100
   bool border = false;         // the window of the mask leaves the scanned area
   ForceEstimate force{};       // calibrated only
-  double falling_share = 1.0;  // corrected only, see outward_shares
+  double outward_fall_fraction = 1.0;  // corrected only, see outward_shares
 };
 
 struct ScoringOptions {

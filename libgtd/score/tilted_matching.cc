@@ -57,30 +57,30 @@ struct VoxelPoints {
 // Index of the voxel of each point in the list, or voxels.size().
 std::vector<std::size_t> find_voxels(const libmap::PointCloud& terrain, const VoxelLattice& lattice,
                                      const std::vector<Voxel>& voxels) {
-  std::vector<std::size_t> places(terrain.size(), voxels.size());
+  std::vector<std::size_t> voxel_of_point(terrain.size(), voxels.size());
   libmap::parallel_for(terrain.size(), 4096, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
       if (!terrain.positions[n].allFinite()) continue;
       const Voxel voxel = lattice.voxel_of(terrain.positions[n]);
       const auto found = std::lower_bound(voxels.begin(), voxels.end(), voxel);
       if (found != voxels.end() && *found == voxel)
-        places[n] = static_cast<std::size_t>(found - voxels.begin());
+        voxel_of_point[n] = static_cast<std::size_t>(found - voxels.begin());
     }
   });
-  return places;
+  return voxel_of_point;
 }
 
 // Computes the data of `voxels`, which ascend. They depend only on the points in a voxel and their
 // order.
 VoxelPoints points_of_voxels(const libmap::PointCloud& terrain, const VoxelLattice& lattice,
                              const std::vector<Voxel>& voxels) {
-  const std::vector<std::size_t> places = find_voxels(terrain, lattice, voxels);
+  const std::vector<std::size_t> voxel_of_point = find_voxels(terrain, lattice, voxels);
   VoxelPoints result;
   result.outsides.assign(voxels.size(), Eigen::Vector3f::Zero());
   std::vector<Eigen::Vector3d> offsets(voxels.size(), Eigen::Vector3d::Zero());
   std::vector<double> counts(voxels.size(), 0.0);
   for (std::size_t n = 0; n < terrain.size(); ++n) {
-    const std::size_t at = places[n];
+    const std::size_t at = voxel_of_point[n];
     if (at == voxels.size()) continue;
     // Relative to the voxel, so that precision does not depend on the distance from the origin.
     offsets[at] += terrain.positions[n] - lattice.center_of(voxels[at]);
@@ -120,19 +120,19 @@ std::vector<std::uint8_t> find_tilted_edges(const std::vector<Voxel>& voxels,
                                             const std::vector<TileBounds>& tiles) {
   std::vector<std::uint8_t> edges(voxels.size(), 0);
   const int reach = tilted_reach_voxels(mask);
-  VoxelGrid places;  // the pivots, to be split by tiles
-  places.voxels = voxels;
+  VoxelGrid pivot_grid;  // the pivots, to be split by tiles
+  pivot_grid.voxels = voxels;
   libmap::parallel_for(tiles.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t) {
       std::vector<std::size_t> here;
       std::vector<TiltedPivot> pivots_here;
-      visit_columns(places, tiles[t], [&](std::size_t n) {
+      visit_columns(pivot_grid, tiles[t], [&](std::size_t n) {
         here.push_back(n);
         pivots_here.push_back(pivots[n]);
       });
       if (here.empty()) continue;
       const std::vector<std::uint8_t> found =
-          terrain.find_edges(pivots_here, unscanned_columns(grid, grown(tiles[t], reach, reach)));
+          terrain.find_edges(pivots_here, unscanned_columns(grid, expanded(tiles[t], reach, reach)));
       for (std::size_t n = 0; n < here.size(); ++n) edges[here[n]] = found[n];
     }
   });
@@ -182,12 +182,12 @@ class TiltedTerrain::Window {
   void enter(const PointGrid::Cell& cell) {
     points_.enter(cell, reach_);
     cells_.resize(points_.count() + MatchingLoops::lanes);
-    const NeighborLoops::Places places = points_.places();
+    const NeighborLoops::Coordinates coordinates = points_.coordinates();
     runs_.clear();
     std::size_t first = 0;
     for (const std::size_t last : points_.run_ends()) {
       Run run{first, last, {}, {}};
-      const double* const axes[3] = {places.x, places.y, places.z};
+      const double* const axes[3] = {coordinates.x, coordinates.y, coordinates.z};
       for (int a = 0; a < 3; ++a) {
         const auto [low, high] = std::minmax_element(axes[a] + first, axes[a] + last);
         run.center[a] = (*low + *high) / 2;
@@ -202,11 +202,11 @@ class TiltedTerrain::Window {
   template <typename Visit>
   void visit_cells(const TiltedPivot& pivot, const Visit& visit) {
     const TiltedLattice lattice = lattice_of(pivot, lattice_);
-    const NeighborLoops::Places places = points_.places();
+    const NeighborLoops::Coordinates coordinates = points_.coordinates();
     for (const Run& run : runs_) {
       if (!may_touch(run, lattice)) continue;
-      const double* const axes[3] = {places.x + run.first, places.y + run.first,
-                                     places.z + run.first};
+      const double* const axes[3] = {coordinates.x + run.first, coordinates.y + run.first,
+                                     coordinates.z + run.first};
       const std::size_t count =
           loops_.find_cells(axes, run.last - run.first, lattice, box_, cells_.data());
       for (std::size_t n = 0; n < count; ++n) visit(static_cast<std::size_t>(cells_[n]));
@@ -225,13 +225,13 @@ class TiltedTerrain::Window {
   // Returns false if the box of the run is outside a face of the tilted box, as is most frequent.
   bool may_touch(const Run& run, const TiltedLattice& lattice) const {
     for (int a = 0; a < 3; ++a) {
-      double place = 0.5;
+      double cell_position = 0.5;
       double half = 1e-6;  // against rounding
       for (int b = 0; b < 3; ++b) {
-        place += lattice.axes[a][b] * (run.center[b] - lattice.origin[b]);
+        cell_position += lattice.axes[a][b] * (run.center[b] - lattice.origin[b]);
         half += std::abs(lattice.axes[a][b]) * run.half[b];
       }
-      if (place + half < box_.low[a] || place - half > box_.low[a] + box_.size[a]) return false;
+      if (cell_position + half < box_.low[a] || cell_position - half > box_.low[a] + box_.size[a]) return false;
     }
     return true;
   }
@@ -364,9 +364,9 @@ class EdgeSearch {
     for (int i = square_.i_begin; i < square_.i_end; ++i)
       for (int j = square_.j_begin; j < square_.j_end; ++j) {
         if (empty.count(columns_around(i, j, 0, 0)) == 0) continue;
-        const Vector3d place = origin + axes * Vector3d(i, j, 0);
+        const Vector3d foot = origin + axes * Vector3d(i, j, 0);
         if (unscanned_.count(
-                columns_around(floor_to<int>(place.x()), floor_to<int>(place.y()), 0, 0)) != 0)
+                columns_around(floor_to<int>(foot.x()), floor_to<int>(foot.y()), 0, 0)) != 0)
           return true;
       }
     return false;

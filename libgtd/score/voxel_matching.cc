@@ -13,13 +13,13 @@ namespace {
 // Counted bits of a window in chunks of 32 columns by 16 layers. Chunks without bits are left out,
 // and rows are clipped to columns with bits.
 struct ChunkedMask {
-  struct Place {
+  struct FirstBit {
     std::size_t plane = 0;  // layers 16 * plane ...
     std::size_t x = 0;
     std::size_t y = 0;
   };
   std::vector<MaskChunk> chunks;
-  std::vector<Place> places;  // position of the first bit of each chunk
+  std::vector<FirstBit> first_bits;  // position of the first bit of each chunk
 };
 
 // Data of a gripper mask that are common to all blocks.
@@ -71,7 +71,7 @@ class BlockMatcher {
   struct Pivot {
     int k = 0;
     std::uint32_t column = 0;  // first column of the window of this pivot
-    std::size_t place = 0;
+    std::size_t index = 0;
   };
   void gather(const std::vector<std::size_t>& pivots, const Run* runs, std::size_t run_count);
   void make_offsets(const ChunkedMask& mask, std::vector<std::uint32_t>& offsets) const;
@@ -115,7 +115,7 @@ ChunkedMask cut_into_chunks(const GripperMask& mask, const Wanted& wanted) {
       for (int y = 0; y < mask.side; ++y) {
         if (column(plane, x, y) == 0) continue;
         MaskChunk& chunk = cut.chunks.emplace_back();
-        cut.places.push_back({static_cast<std::size_t>(plane), static_cast<std::size_t>(x),
+        cut.first_bits.push_back({static_cast<std::size_t>(plane), static_cast<std::size_t>(x),
                               static_cast<std::size_t>(y)});
         const int count = static_cast<int>(MaskChunk::columns);
         for (int c = 0; c < count; ++c)
@@ -225,8 +225,8 @@ void BlockMatcher::gather(const std::vector<std::size_t>& pivots, const Run* run
 void BlockMatcher::make_offsets(const ChunkedMask& mask,
                                 std::vector<std::uint32_t>& offsets) const {
   offsets.clear();
-  for (const ChunkedMask::Place& place : mask.places)
-    offsets.push_back(static_cast<std::uint32_t>(place.plane * size_ + place.x * width_ + place.y));
+  for (const ChunkedMask::FirstBit& first : mask.first_bits)
+    offsets.push_back(static_cast<std::uint32_t>(first.plane * size_ + first.x * width_ + first.y));
 }
 
 // Moves the window up to the layer `low`: removes voxels below and adds voxels above.
@@ -278,7 +278,7 @@ void BlockMatcher::sum_boxes(std::size_t begin, std::size_t end, VoxelCounts* co
     for (; n < end && pivots_[n].column < (row + 1) * width_; ++n)
       origins_.push_back(static_cast<std::uint32_t>(pivots_[n].column - row * width_));
     loops_.add_runs(row_sums_.data(), origins_.data(), origins_.size(), plan_.side, totals_.data());
-    for (std::size_t m = first; m < n; ++m) counts[pivots_[m].place].ssv = totals_[m - first];
+    for (std::size_t m = first; m < n; ++m) counts[pivots_[m].index].ssv = totals_[m - first];
   }
 }
 
@@ -293,10 +293,10 @@ void BlockMatcher::count_level(std::size_t begin, std::size_t end, VoxelCounts* 
                  offsets.size(), totals_.data());
   };
   count(plan_.solid, solid_offsets_);
-  for (std::size_t n = begin; n < end; ++n) counts[pivots_[n].place].gsv = totals_[n - begin];
+  for (std::size_t n = begin; n < end; ++n) counts[pivots_[n].index].gsv = totals_[n - begin];
   if (plan_.counts_all) return;
   count(plan_.counted, counted_offsets_);
-  for (std::size_t n = begin; n < end; ++n) counts[pivots_[n].place].ssv = totals_[n - begin];
+  for (std::size_t n = begin; n < end; ++n) counts[pivots_[n].index].ssv = totals_[n - begin];
 }
 
 void BlockMatcher::match(const std::vector<std::size_t>& pivots, const Run* runs,

@@ -36,16 +36,16 @@ class NearSearch {
   NearSearch(const std::vector<Eigen::Vector3d>& points, const PointGrid& grid, double distance)
       : points_(points), grid_(grid), square_(distance * distance) {}
 
-  bool is_near(const Eigen::Vector3d& place) {
-    if (!grid_.reaches(place)) return false;
-    const PointGrid::Cell cell = grid_.cell_of(place);
+  bool is_near(const Eigen::Vector3d& position) {
+    if (!grid_.reaches(position)) return false;
+    const PointGrid::Cell cell = grid_.cell_of(position);
     if (!cell_ || *cell_ != cell) {
       grid_.find_near(cell, 1, runs_);
       cell_ = cell;
     }
     for (const PointGrid::Range& run : runs_)
       for (std::uint32_t k = run.first; k < run.last; ++k)
-        if ((points_[grid_.order()[k]] - place).squaredNorm() < square_) return true;
+        if ((points_[grid_.order()[k]] - position).squaredNorm() < square_) return true;
     return false;
   }
 

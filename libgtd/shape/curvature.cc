@@ -43,7 +43,7 @@ bool tangent_frame(const Matrix3d& covariance, Matrix3d& frame) {
 }
 
 // Normal equations of w = f + d u + e v + a u^2 + b u v + c v^2.
-void normal_equations(const NeighborLoops& loops, const NeighborLoops::Places& neighbors,
+void normal_equations(const NeighborLoops& loops, const NeighborLoops::Coordinates& neighbors,
                       std::size_t count, const Matrix3d& frame, Matrix6d& matrix, Vector6d& right) {
   std::array<double, NeighborLoops::quadric_sums> m;
   loops.sum_quadric(neighbors, count, frame.data(), m.data());
@@ -96,10 +96,10 @@ std::array<double, 2> bending(const Vector6d& quadric) {
 
 class QuadricFitter {
  public:
-  // `in_order` are the cloud's points in the order of the grid.
+  // `cell_sorted` are the cloud's points in the order of the grid.
   QuadricFitter(const libmap::PointCloud& cloud, const PointGrid& grid,
-                const std::vector<Vector3d>& in_order, double radius, const Vector3d& up)
-      : cloud_(cloud), candidates_(grid, in_order), radius_(radius), up_(up.normalized()) {}
+                const std::vector<Vector3d>& cell_sorted, double radius, const Vector3d& up)
+      : cloud_(cloud), candidates_(grid, cell_sorted), radius_(radius), up_(up.normalized()) {}
 
   // Gathers the surroundings of a cell for fit().
   void enter(const PointGrid::Cell& cell) {
@@ -110,10 +110,10 @@ class QuadricFitter {
 
   // Fits at a point of the cell entered last.
   Curvature fit(std::size_t point) {
-    const Vector3d& place = cloud_.positions[point];
-    if (!is_fitted_ || !is_same_place(place, place_)) {
-      surface_ = fit_at(place);
-      place_ = place;
+    const Vector3d& position = cloud_.positions[point];
+    if (!is_fitted_ || !is_same_position(position, position_)) {
+      surface_ = fit_at(position);
+      position_ = position;
       is_fitted_ = true;
     }
     if (!surface_) return {};
@@ -139,10 +139,10 @@ class QuadricFitter {
     std::array<double, 2> bending;
   };
 
-  std::optional<Surface> fit_at(const Vector3d& place) {
-    const NeighborLoops::Places neighbors = neighbors_.places();
+  std::optional<Surface> fit_at(const Vector3d& position) {
+    const NeighborLoops::Coordinates neighbors = neighbors_.coordinates();
     const std::size_t count =
-        loops_.select(candidates_.places(), candidates_.count(), place.data(), radius_, neighbors);
+        loops_.select(candidates_.coordinates(), candidates_.count(), position.data(), radius_, neighbors);
     Matrix3d frame;
     Matrix6d matrix;
     Vector6d right, quadric;
@@ -162,7 +162,7 @@ class QuadricFitter {
   CoordinateRows neighbors_;
   // Last fit, shared by coincident points.
   bool is_fitted_ = false;
-  Vector3d place_ = Vector3d::Zero();
+  Vector3d position_ = Vector3d::Zero();
   std::optional<Surface> surface_;
 };
 
@@ -193,7 +193,7 @@ QueriesByCell queries_by_cell(const PointGrid& grid, const std::vector<Vector3d>
   };
   for (std::size_t c = 0; c < nowhere; ++c)
     std::sort(begin_of(c), begin_of(c + 1), [&](std::size_t a, std::size_t b) {
-      return is_place_before(positions[queries[a]], positions[queries[b]]);
+      return is_position_less(positions[queries[a]], positions[queries[b]]);
     });
   return sorted;
 }
@@ -203,11 +203,11 @@ std::vector<Curvature> fit_quadrics(const libmap::PointCloud& cloud,
                                     const std::vector<std::size_t>& queries) {
   // Half the radius, slightly enlarged for rounding at the cell borders.
   const PointGrid grid(cloud.positions, options.radius_m * (0.5 + 1e-6));
-  const std::vector<Vector3d> in_order = in_order_of(grid, cloud.positions);
+  const std::vector<Vector3d> cell_sorted = sorted_by_cell(grid, cloud.positions);
   const QueriesByCell groups = queries_by_cell(grid, cloud.positions, queries);
   std::vector<Curvature> results(queries.size());
   libmap::parallel_for(grid.cells().size(), 16, [&](std::size_t begin, std::size_t end) {
-    QuadricFitter fitter(cloud, grid, in_order, options.radius_m, options.up);
+    QuadricFitter fitter(cloud, grid, cell_sorted, options.radius_m, options.up);
     for (std::size_t c = begin; c < end; ++c) {
       if (groups.begins[c] == groups.begins[c + 1]) continue;
       fitter.enter(grid.cells()[c]);

@@ -16,7 +16,7 @@ struct NeighborLoops {
 
   // Coordinates of points, one array per axis. Candidates are read, and neighbors written, up to a
   // full set of lanes beyond their number.
-  struct Places {
+  struct Coordinates {
     double* x = nullptr;
     double* y = nullptr;
     double* z = nullptr;
@@ -25,13 +25,13 @@ struct NeighborLoops {
   // Writes the candidates within `radius` of `center` to `neighbors`, relative to `center` and in
   // units of the radius; zeros follow up to a full set of lanes. Returns their number. Candidates
   // beyond `count` must be infinite.
-  std::size_t (*select)(const Places& candidates, std::size_t count, const double* center,
-                        double radius, const Places& neighbors);
+  std::size_t (*select)(const Coordinates& candidates, std::size_t count, const double* center,
+                        double radius, const Coordinates& neighbors);
   // Moments for the quadric fit: sums of x, y, z, xx, xy, xz, yy, yz, zz.
-  void (*sum_moments)(const Places& neighbors, std::size_t count, double* sums);
+  void (*sum_moments)(const Coordinates& neighbors, std::size_t count, double* sums);
   // Sums for the quadric fit, with u, v, w along the columns of `frame` (column-major): u, v, uu,
   // uv, vv, uuu, uuv, uvv, vvv, uuuu, uuuv, uuvv, uvvv, vvvv, w, uw, vw, uuw, uvw, vvw.
-  void (*sum_quadric)(const Places& neighbors, std::size_t count, const double* frame,
+  void (*sum_quadric)(const Coordinates& neighbors, std::size_t count, const double* frame,
                       double* sums);
   static constexpr std::size_t moments = 9;
   static constexpr std::size_t quadric_sums = 20;

@@ -6,22 +6,22 @@ using Register [[gnu::vector_size(GRASPMAP_REGISTER)]] = double;
 using Lanes [[gnu::vector_size(NeighborLoops::lanes * sizeof(double))]] = double;
 
 template <typename Vector>
-inline void load_places(const NeighborLoops::Places& places, std::size_t at, Vector& x, Vector& y,
+inline void load_coordinates(const NeighborLoops::Coordinates& coordinates, std::size_t at, Vector& x, Vector& y,
                         Vector& z) {
-  __builtin_memcpy(&x, places.x + at, sizeof(Vector));
-  __builtin_memcpy(&y, places.y + at, sizeof(Vector));
-  __builtin_memcpy(&z, places.z + at, sizeof(Vector));
+  __builtin_memcpy(&x, coordinates.x + at, sizeof(Vector));
+  __builtin_memcpy(&y, coordinates.y + at, sizeof(Vector));
+  __builtin_memcpy(&z, coordinates.z + at, sizeof(Vector));
 }
 
-std::size_t select(const NeighborLoops::Places& candidates, std::size_t count, const double* center,
-                   double radius, const NeighborLoops::Places& neighbors) {
+std::size_t select(const NeighborLoops::Coordinates& candidates, std::size_t count, const double* center,
+                   double radius, const NeighborLoops::Coordinates& neighbors) {
   constexpr std::size_t width = GRASPMAP_REGISTER / sizeof(double);
   const double inverse = 1 / radius;
   const double limit = radius * radius;
   std::size_t selected = 0;
   for (std::size_t k = 0; k < count; k += width) {
     Register x, y, z;
-    load_places(candidates, k, x, y, z);
+    load_coordinates(candidates, k, x, y, z);
     x -= center[0];
     y -= center[1];
     z -= center[2];
@@ -58,11 +58,11 @@ inline void join_lanes(const Lanes (&sums)[count], double* joined) {
   }
 }
 
-void sum_moments(const NeighborLoops::Places& neighbors, std::size_t count, double* sums) {
+void sum_moments(const NeighborLoops::Coordinates& neighbors, std::size_t count, double* sums) {
   Lanes s[NeighborLoops::moments] = {};
   for (std::size_t k = 0; k < count; k += NeighborLoops::lanes) {
     Lanes x, y, z;
-    load_places(neighbors, k, x, y, z);
+    load_coordinates(neighbors, k, x, y, z);
     s[0] += x;
     s[1] += y;
     s[2] += z;
@@ -76,12 +76,12 @@ void sum_moments(const NeighborLoops::Places& neighbors, std::size_t count, doub
   join_lanes(s, sums);
 }
 
-void sum_quadric(const NeighborLoops::Places& neighbors, std::size_t count, const double* frame,
+void sum_quadric(const NeighborLoops::Coordinates& neighbors, std::size_t count, const double* frame,
                  double* sums) {
   Lanes s[NeighborLoops::quadric_sums] = {};
   for (std::size_t k = 0; k < count; k += NeighborLoops::lanes) {
     Lanes x, y, z;
-    load_places(neighbors, k, x, y, z);
+    load_coordinates(neighbors, k, x, y, z);
     const Lanes u = x * frame[0] + y * frame[1] + z * frame[2];
     const Lanes v = x * frame[3] + y * frame[4] + z * frame[5];
     const Lanes w = x * frame[6] + y * frame[7] + z * frame[8];

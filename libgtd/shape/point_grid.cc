@@ -73,15 +73,15 @@ void PointGrid::sort_by_cell(const std::vector<Eigen::Vector3d>& points) {
   columns_.push_back({0, cells_.size()});
 }
 
-bool PointGrid::reaches(const Eigen::Vector3d& place) const {
-  return (place.array() >= low_.array() - cell_size_m_).all() &&
-         (place.array() <= high_.array() + cell_size_m_).all();
+bool PointGrid::reaches(const Eigen::Vector3d& position) const {
+  return (position.array() >= low_.array() - cell_size_m_).all() &&
+         (position.array() <= high_.array() + cell_size_m_).all();
 }
 
-PointGrid::Cell PointGrid::cell_of(const Eigen::Vector3d& place) const {
+PointGrid::Cell PointGrid::cell_of(const Eigen::Vector3d& position) const {
   Cell cell;
   for (int a = 0; a < 3; ++a)
-    cell[static_cast<std::size_t>(a)] = floor_to<std::int64_t>(place[a] / cell_size_m_);
+    cell[static_cast<std::size_t>(a)] = floor_to<std::int64_t>(position[a] / cell_size_m_);
   return cell;
 }
 
@@ -122,12 +122,12 @@ void CoordinateRows::make_room(std::size_t count) {
   values_.resize(3 * stride_);
 }
 
-std::vector<Eigen::Vector3d> in_order_of(const PointGrid& grid,
+std::vector<Eigen::Vector3d> sorted_by_cell(const PointGrid& grid,
                                          const std::vector<Eigen::Vector3d>& points) {
-  std::vector<Eigen::Vector3d> in_order;
-  in_order.reserve(grid.order().size());
-  for (const std::uint32_t i : grid.order()) in_order.push_back(points[i]);
-  return in_order;
+  std::vector<Eigen::Vector3d> cell_sorted;
+  cell_sorted.reserve(grid.order().size());
+  for (const std::uint32_t i : grid.order()) cell_sorted.push_back(points[i]);
+  return cell_sorted;
 }
 
 void CellSurroundings::enter(const PointGrid::Cell& cell, std::int64_t reach) {
@@ -136,7 +136,7 @@ void CellSurroundings::enter(const PointGrid::Cell& cell, std::int64_t reach) {
   count_ = 0;
   for (const PointGrid::Range& run : runs_) run_ends_.push_back(count_ += run.last - run.first);
   rows_.make_room(count_);
-  const NeighborLoops::Places to = rows_.places();
+  const NeighborLoops::Coordinates to = rows_.coordinates();
   std::size_t n = 0;
   const auto put = [&](const Eigen::Vector3d& p) {
     to.x[n] = p.x();
@@ -144,12 +144,12 @@ void CellSurroundings::enter(const PointGrid::Cell& cell, std::int64_t reach) {
     to.z[n++] = p.z();
   };
   for (const PointGrid::Range& run : runs_)
-    for (std::uint32_t k = run.first; k < run.last; ++k) put(in_order_[k]);
+    for (std::uint32_t k = run.first; k < run.last; ++k) put(cell_sorted_[k]);
   for (std::size_t k = 0; k < NeighborLoops::lanes; ++k)
     put(Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity()));
 }
 
-Eigen::Matrix3d covariance_of(const NeighborLoops& loops, const NeighborLoops::Places& neighbors,
+Eigen::Matrix3d covariance_of(const NeighborLoops& loops, const NeighborLoops::Coordinates& neighbors,
                               std::size_t count) {
   std::array<double, NeighborLoops::moments> m;
   loops.sum_moments(neighbors, count, m.data());

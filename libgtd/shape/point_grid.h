@@ -27,9 +27,9 @@ class PointGrid {
 
   // Returns true if a position is finite and at most one cell away from the bounding box of the
   // points.
-  bool reaches(const Eigen::Vector3d& place) const;
+  bool reaches(const Eigen::Vector3d& position) const;
   // Returns the cell of a position for which reaches() is true.
-  Cell cell_of(const Eigen::Vector3d& place) const;
+  Cell cell_of(const Eigen::Vector3d& position) const;
 
   // Indices of the points, sorted by cell, then by index. The points of a cell are first..last - 1.
   const std::vector<std::uint32_t>& order() const { return order_; }
@@ -68,18 +68,18 @@ class PointGrid {
 
 // Bits of a position. Points with the same bits have the same neighborhood results. Zeros of
 // different sign differ, because sums of differences may depend on the sign.
-inline std::array<std::uint64_t, 3> place_bits(const Eigen::Vector3d& place) {
-  return {std::bit_cast<std::uint64_t>(place.x()), std::bit_cast<std::uint64_t>(place.y()),
-          std::bit_cast<std::uint64_t>(place.z())};
+inline std::array<std::uint64_t, 3> position_bits(const Eigen::Vector3d& position) {
+  return {std::bit_cast<std::uint64_t>(position.x()), std::bit_cast<std::uint64_t>(position.y()),
+          std::bit_cast<std::uint64_t>(position.z())};
 }
 
-inline bool is_same_place(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  return place_bits(a) == place_bits(b);
+inline bool is_same_position(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return position_bits(a) == position_bits(b);
 }
 
 // Total order in which points of the same bits are adjacent.
-inline bool is_place_before(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  return place_bits(a) < place_bits(b);
+inline bool is_position_less(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return position_bits(a) < position_bits(b);
 }
 
 // Coordinates, one array per axis, with room for a full set of lanes at the end of each.
@@ -87,7 +87,7 @@ class CoordinateRows {
  public:
   // Resizes for `count` points; discards the values.
   void make_room(std::size_t count);
-  NeighborLoops::Places places() {
+  NeighborLoops::Coordinates coordinates() {
     return {values_.data(), values_.data() + stride_, values_.data() + 2 * stride_};
   }
 
@@ -97,32 +97,32 @@ class CoordinateRows {
 };
 
 // Returns the points in the order of the grid, for access by cells.
-std::vector<Eigen::Vector3d> in_order_of(const PointGrid& grid,
+std::vector<Eigen::Vector3d> sorted_by_cell(const PointGrid& grid,
                                          const std::vector<Eigen::Vector3d>& points);
 
 // Returns the covariance of `count` neighbors, in the squared unit of their coordinates.
-Eigen::Matrix3d covariance_of(const NeighborLoops& loops, const NeighborLoops::Places& neighbors,
+Eigen::Matrix3d covariance_of(const NeighborLoops& loops, const NeighborLoops::Coordinates& neighbors,
                               std::size_t count);
 
 // Points around a cell of a grid, gathered once for all queries in this cell.
 class CellSurroundings {
  public:
-  // `in_order` are the points in the order of the grid, in any frame and unit. Both arguments must
+  // `cell_sorted` are the points in the order of the grid, in any frame and unit. Both arguments must
   // outlive this object.
-  CellSurroundings(const PointGrid& grid, const std::vector<Eigen::Vector3d>& in_order)
-      : grid_(grid), in_order_(in_order) {}
+  CellSurroundings(const PointGrid& grid, const std::vector<Eigen::Vector3d>& cell_sorted)
+      : grid_(grid), cell_sorted_(cell_sorted) {}
 
   // Gathers the points of all cells at most `reach` cells away along each axis, in the order of the
   // grid; infinite points follow up to a full set of lanes.
   void enter(const PointGrid::Cell& cell, std::int64_t reach);
-  NeighborLoops::Places places() { return rows_.places(); }
+  NeighborLoops::Coordinates coordinates() { return rows_.coordinates(); }
   std::size_t count() const { return count_; }
   // Index after the last gathered point of each run (one column of cells).
   const std::vector<std::size_t>& run_ends() const { return run_ends_; }
 
  private:
   const PointGrid& grid_;
-  const std::vector<Eigen::Vector3d>& in_order_;
+  const std::vector<Eigen::Vector3d>& cell_sorted_;
   std::vector<PointGrid::Range> runs_;
   std::vector<std::size_t> run_ends_;
   CoordinateRows rows_;

@@ -30,9 +30,9 @@ SurfaceNormal facing(const Vector3d& fitted, const Vector3d& outside, const Vect
 
 class PlaneFitter {
  public:
-  PlaneFitter(const PointGrid& grid, const std::vector<Vector3d>& in_order, double radius,
+  PlaneFitter(const PointGrid& grid, const std::vector<Vector3d>& cell_sorted, double radius,
               const Vector3d& up)
-      : candidates_(grid, in_order), radius_(radius), up_(up.normalized()) {}
+      : candidates_(grid, cell_sorted), radius_(radius), up_(up.normalized()) {}
 
   void enter(const PointGrid::Cell& cell) {
     candidates_.enter(cell, 2);
@@ -40,10 +40,10 @@ class PlaneFitter {
   }
 
   // Fits at a position in the cell entered last.
-  SurfaceNormal fit(const Vector3d& place, const Vector3d& outside) {
-    const NeighborLoops::Places neighbors = neighbors_.places();
+  SurfaceNormal fit(const Vector3d& position, const Vector3d& outside) {
+    const NeighborLoops::Coordinates neighbors = neighbors_.coordinates();
     const std::size_t count =
-        loops_.select(candidates_.places(), candidates_.count(), place.data(), radius_, neighbors);
+        loops_.select(candidates_.coordinates(), candidates_.count(), position.data(), radius_, neighbors);
     if (count < 3) return {};
     Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
     solver.computeDirect(covariance_of(loops_, neighbors, count));
@@ -70,7 +70,7 @@ double side_of(const Vector3d& normal, const Vector3d& outside) {
 }
 
 std::vector<SurfaceNormal> fit_surface_normals(const libmap::PointCloud& cloud,
-                                               const std::vector<Vector3d>& places,
+                                               const std::vector<Vector3d>& positions,
                                                const std::vector<Eigen::Vector3f>& outsides,
                                                const SurfaceNormalOptions& options) {
   if (!(options.radius_m > 0) || std::isinf(options.radius_m))
@@ -79,25 +79,25 @@ std::vector<SurfaceNormal> fit_surface_normals(const libmap::PointCloud& cloud,
                                          .bound = "> 0 and finite"});
   if (!options.up.allFinite() || !(options.up.norm() > 0))
     throw libmap::Error("has length zero or is not finite", {.field = "up"});
-  if (!outsides.empty() && outsides.size() != places.size())
+  if (!outsides.empty() && outsides.size() != positions.size())
     throw libmap::Error("number of outsides differs from number of places",
                         {.field = "outsides",
                          .value = std::to_string(outsides.size()),
-                         .bound = std::to_string(places.size())});
+                         .bound = std::to_string(positions.size())});
   // Half the radius, slightly enlarged for rounding at the cell borders.
   const double cell_m = options.radius_m * (0.5 + 1e-6);
   const PointGrid grid(cloud.positions, cell_m);
-  const PointGrid groups(places, cell_m);
-  const std::vector<Vector3d> in_order = in_order_of(grid, cloud.positions);
-  std::vector<SurfaceNormal> normals(places.size());
+  const PointGrid groups(positions, cell_m);
+  const std::vector<Vector3d> cell_sorted = sorted_by_cell(grid, cloud.positions);
+  std::vector<SurfaceNormal> normals(positions.size());
   libmap::parallel_for(groups.cells().size(), 16, [&](std::size_t begin, std::size_t end) {
-    PlaneFitter fitter(grid, in_order, options.radius_m, options.up);
+    PlaneFitter fitter(grid, cell_sorted, options.radius_m, options.up);
     for (std::size_t c = begin; c < end; ++c) {
       fitter.enter(groups.cells()[c]);
       for (std::uint32_t n = groups.ranges()[c].first; n < groups.ranges()[c].last; ++n) {
         const std::uint32_t at = groups.order()[n];
         normals[at] = fitter.fit(
-            places[at], outsides.empty() ? Vector3d::Zero().eval() : outsides[at].cast<double>());
+            positions[at], outsides.empty() ? Vector3d::Zero().eval() : outsides[at].cast<double>());
       }
     }
   });

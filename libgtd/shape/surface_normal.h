@@ -45,7 +45,7 @@ inline bool determines_plane(const Eigen::Vector3d& variances) {
 // on points outside the radius, on the other places or on the number of threads. Throws Error for a
 // radius that is not positive, an `up` of length zero, and arrays of different length.
 std::vector<SurfaceNormal> fit_surface_normals(const libmap::PointCloud& cloud,
-                                               const std::vector<Eigen::Vector3d>& places,
+                                               const std::vector<Eigen::Vector3d>& positions,
                                                const std::vector<Eigen::Vector3f>& outsides,
                                                const SurfaceNormalOptions& options);
 

@@ -55,8 +55,8 @@ using Numbers = std::vector<std::uint32_t>;  // numbers of candidates
 // Candidates near a cell of the grid, from which the neighbors of its points are selected.
 class NeighborSearch {
  public:
-  NeighborSearch(const std::vector<Quad>& places, const PointGrid& grid, double radius)
-      : places_(places), grid_(grid), limit_(static_cast<float>(radius * radius)) {}
+  NeighborSearch(const std::vector<Quad>& quads, const PointGrid& grid, double radius)
+      : quads_(quads), grid_(grid), limit_(static_cast<float>(radius * radius)) {}
 
   // Lists the points around a cell by number.
   void list(const PointGrid::Cell& cell) {
@@ -77,10 +77,10 @@ class NeighborSearch {
     for (std::vector<float>* values : {&x_, &y_, &z_})
       values->assign(room, std::numeric_limits<float>::infinity());
     for (std::size_t n = 0; n < count; ++n) {
-      const Quad& place = near_[n] = places_[candidates_[n]];
-      x_[n] = place[0];
-      y_[n] = place[1];
-      z_[n] = place[2];
+      const Quad& quad_at = near_[n] = quads_[candidates_[n]];
+      x_[n] = quad_at[0];
+      y_[n] = quad_at[1];
+      z_[n] = quad_at[2];
     }
     keys_.resize(room);
     sorted_.resize(room);
@@ -134,7 +134,7 @@ class NeighborSearch {
     return candidates_[candidate_of(a)] < candidates_[candidate_of(b)];
   }
 
-  const std::vector<Quad>& places_;
+  const std::vector<Quad>& quads_;
   const PointGrid& grid_;
   float limit_;
   const NeighborLoops& loops_ = neighbor_loops_of(libmap::best_instruction_set());
@@ -222,8 +222,8 @@ class CurvatureEstimation {
  public:
   CurvatureEstimation(const libmap::PointCloud& cloud, double radius)
       : radius_(radius),
-        places_(places_of(cloud)),
-        grid_(positions_of(places_), 0.5 * radius * (1 + 1e-5)) {}
+        quads_(quads_of(cloud)),
+        grid_(positions_of(quads_), 0.5 * radius * (1 + 1e-5)) {}
 
   std::vector<Curvature> run(std::size_t points, const std::vector<std::size_t>& queries) {
     std::vector<Quad> normals(points, quad(Curvature::nan, Curvature::nan, Curvature::nan));
@@ -247,21 +247,21 @@ class CurvatureEstimation {
     KeptNeighbors& kept;
   };
 
-  static std::vector<Quad> places_of(const libmap::PointCloud& cloud) {
-    std::vector<Quad> places;
-    places.reserve(cloud.size());
+  static std::vector<Quad> quads_of(const libmap::PointCloud& cloud) {
+    std::vector<Quad> quads;
+    quads.reserve(cloud.size());
     for (const Eigen::Vector3d& p : cloud.positions) {
       const Vector3f at = p.cast<float>();
-      places.push_back(quad(at.x(), at.y(), at.z()));
+      quads.push_back(quad(at.x(), at.y(), at.z()));
     }
-    return places;
+    return quads;
   }
-  static std::vector<Eigen::Vector3d> positions_of(const std::vector<Quad>& places) {
+  static std::vector<Eigen::Vector3d> positions_of(const std::vector<Quad>& quads) {
     std::vector<Eigen::Vector3d> positions;
-    positions.reserve(places.size());
-    for (const Quad& place : places)
-      positions.emplace_back(static_cast<double>(place[0]), static_cast<double>(place[1]),
-                             static_cast<double>(place[2]));
+    positions.reserve(quads.size());
+    for (const Quad& quad_at : quads)
+      positions.emplace_back(static_cast<double>(quad_at[0]), static_cast<double>(quad_at[1]),
+                             static_cast<double>(quad_at[2]));
     return positions;
   }
 
@@ -273,9 +273,9 @@ class CurvatureEstimation {
                          });
   }
 
-  using Place = std::array<std::uint32_t, 3>;
-  Place place_of(std::uint32_t point) const {
-    const Quad& at = places_[point];
+  using PositionBits = std::array<std::uint32_t, 3>;
+  PositionBits bits_of(std::uint32_t point) const {
+    const Quad& at = quads_[point];
     return {std::bit_cast<std::uint32_t>(at[0]), std::bit_cast<std::uint32_t>(at[1]),
             std::bit_cast<std::uint32_t>(at[2])};
   }
@@ -287,10 +287,10 @@ class CurvatureEstimation {
     const PointGrid::Range range = grid_.ranges()[cell];
     Numbers points(grid_.order().begin() + range.first, grid_.order().begin() + range.last);
     std::sort(points.begin(), points.end(), [&](std::uint32_t a, std::uint32_t b) {
-      return std::pair(place_of(a), a) < std::pair(place_of(b), b);
+      return std::pair(bits_of(a), a) < std::pair(bits_of(b), b);
     });
     for (std::size_t n = 0; n < points.size(); ++n)
-      visit(points[n], n > 0 && place_of(points[n]) == place_of(points[n - 1]));
+      visit(points[n], n > 0 && bits_of(points[n]) == bits_of(points[n - 1]));
   }
 
   static void numbers_of(std::span<const std::uint64_t> keys, Numbers& numbers) {
@@ -300,7 +300,7 @@ class CurvatureEstimation {
   }
 
   void find_normals(const Run& run, std::vector<Quad>& normals) {
-    NeighborSearch search(places_, grid_, radius_);
+    NeighborSearch search(quads_, grid_, radius_);
     Numbers neighbors;
     const bool keep = kept_count_ < max_kept_neighbors;
     for (std::size_t c = run.begin; c < run.end; ++c) {
@@ -311,8 +311,8 @@ class CurvatureEstimation {
           normals[point] = found;
           return;
         }
-        numbers_of(search.find(places_[point]), neighbors);
-        const Vector3f normal = normal_of(search.near(), places_[point], neighbors);
+        numbers_of(search.find(quads_[point]), neighbors);
+        const Vector3f normal = normal_of(search.near(), quads_[point], neighbors);
         normals[point] = found = quad(normal[0], normal[1], normal[2]);
         if (!keep) return;
         run.kept.lists.insert(run.kept.lists.end(), neighbors.begin(), neighbors.end());
@@ -325,13 +325,13 @@ class CurvatureEstimation {
 
   void find_curvatures(const Run& run, const std::vector<Quad>& normals,
                        const std::vector<std::uint8_t>& wanted, std::vector<Curvature>& results) {
-    NeighborSearch search(places_, grid_, radius_);
+    NeighborSearch search(quads_, grid_, radius_);
     Numbers neighbors;
     std::vector<Quad> near_normals, projected;
     std::size_t list = 0;
     std::size_t first = 0;
     const auto find = [&](std::uint32_t point) {
-      if (!run.kept.complete) return numbers_of(search.find(places_[point]), neighbors);
+      if (!run.kept.complete) return numbers_of(search.find(quads_[point]), neighbors);
       const std::size_t last = run.kept.ends[list++];
       neighbors.assign(run.kept.lists.begin() + static_cast<std::ptrdiff_t>(first),
                        run.kept.lists.begin() + static_cast<std::ptrdiff_t>(last));
@@ -361,7 +361,7 @@ class CurvatureEstimation {
   }
 
   double radius_;
-  std::vector<Quad> places_;
+  std::vector<Quad> quads_;
   PointGrid grid_;
   std::vector<KeptNeighbors> kept_;
   std::atomic<std::size_t> kept_count_ = 0;

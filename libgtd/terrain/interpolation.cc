@@ -114,7 +114,7 @@ double thesis_spacing(std::size_t count, const Box& box) {
 std::size_t max_nodes(std::size_t points, const InterpolationOptions& options) {
   constexpr double always = 1e6;
   const double most =
-      always + static_cast<double>(options.max_nodes_a_point) * static_cast<double>(points);
+      always + static_cast<double>(options.max_nodes_per_point) * static_cast<double>(points);
   return most < static_cast<double>(options.max_nodes) ? static_cast<std::size_t>(most)
                                                        : options.max_nodes;
 }

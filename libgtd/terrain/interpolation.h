@@ -31,7 +31,7 @@ struct InterpolationOptions {
   std::size_t max_nodes = 100'000'000;
   // Maximum number of nodes per finite point, beyond the first million nodes. More nodes indicate a
   // few points that are far apart.
-  std::size_t max_nodes_a_point = 100;
+  std::size_t max_nodes_per_point = 100;
 };
 
 struct InterpolationResult {

@@ -34,12 +34,12 @@ constexpr std::uint32_t hilbert_cells = 4096;  // cells per side
 constexpr unsigned hilbert_bits = 24;
 
 // Index of a cell of a 4096 x 4096 square on the Hilbert curve (Hilbert 1891).
-std::uint32_t hilbert_place(std::uint32_t x, std::uint32_t y) {
-  std::uint32_t place = 0;
+std::uint32_t hilbert_index(std::uint32_t x, std::uint32_t y) {
+  std::uint32_t curve_index = 0;
   for (std::uint32_t bit = hilbert_cells / 2; bit > 0; bit /= 2) {
     const std::uint32_t right = (x & bit) != 0 ? 1 : 0;
     const std::uint32_t up = (y & bit) != 0 ? 1 : 0;
-    place = place << 2 | ((3 * right) ^ up);
+    curve_index = curve_index << 2 | ((3 * right) ^ up);
     // The curve is transposed in the lower quadrants, and mirrored, too, in the lower right one.
     // Computed without branches, which would be unpredictable.
     const std::uint32_t transposed = up - 1;
@@ -50,7 +50,7 @@ std::uint32_t hilbert_place(std::uint32_t x, std::uint32_t y) {
     x ^= swapped;
     y ^= swapped;
   }
-  return place;
+  return curve_index;
 }
 
 // Neighbors on the Hilbert curve are close in the plane, so that each point is located within a few
@@ -58,7 +58,7 @@ std::uint32_t hilbert_place(std::uint32_t x, std::uint32_t y) {
 // spatial_sort 3.0; the triangulation takes 10.4 ms with either.
 void sort_along_hilbert(const Points& points, Indices& members) {
   struct Item {
-    std::uint32_t place;
+    std::uint32_t curve_index;
     std::uint32_t index;
   };
   if (members.empty()) return;
@@ -76,8 +76,8 @@ void sort_along_hilbert(const Points& points, Indices& members) {
   items.reserve(members.size());
   for (const std::uint32_t i : members)
     items.push_back(
-        {hilbert_place(cell(points[i].x() - low.x()), cell(points[i].y() - low.y())), i});
-  radix_sort(items, hilbert_bits, [](const Item& item) { return item.place; });
+        {hilbert_index(cell(points[i].x() - low.x()), cell(points[i].y() - low.y())), i});
+  radix_sort(items, hilbert_bits, [](const Item& item) { return item.curve_index; });
   for (std::size_t n = 0; n < items.size(); ++n) members[n] = items[n].index;
 }
 
@@ -99,16 +99,16 @@ Triangulation triangulate(const Points& points, Indices members) {
   sort_along_hilbert(points, members);
   members = in_rounds(members);
   // Fetched at once and not one by one between insertions, for the cache.
-  std::vector<Kernel::Point_2> places;
-  places.reserve(members.size());
-  for (const std::uint32_t i : members) places.emplace_back(points[i].x(), points[i].y());
+  std::vector<Kernel::Point_2> plane_points;
+  plane_points.reserve(members.size());
+  for (const std::uint32_t i : members) plane_points.emplace_back(points[i].x(), points[i].y());
   Triangulation triangulation;
   triangulation.tds().vertices().reserve(members.size() + 1);
   triangulation.tds().faces().reserve(2 * members.size() + 2);
   Face hint;
   for (std::size_t n = 0; n < members.size(); ++n) {
     const std::size_t before = triangulation.number_of_vertices();
-    const auto vertex = triangulation.insert(places[n], hint);
+    const auto vertex = triangulation.insert(plane_points[n], hint);
     const bool added = triangulation.number_of_vertices() > before;
     if (added || points[members[n]].z() > points[vertex->info()].z()) vertex->info() = members[n];
     hint = vertex->face();
@@ -183,8 +183,8 @@ void triangulate_strip(const Points& points, Strip& strip) {
   strip.open.erase(std::unique(strip.open.begin(), strip.open.end()), strip.open.end());
 }
 
-std::vector<Strip> cut_into_strips(const Points& points, std::size_t points_a_strip) {
-  std::vector<Strip> strips(std::max<std::size_t>(1, points.size() / points_a_strip));
+std::vector<Strip> cut_into_strips(const Points& points, std::size_t points_per_strip) {
+  std::vector<Strip> strips(std::max<std::size_t>(1, points.size() / points_per_strip));
   std::vector<double> lines;
   if (strips.size() > 1) {
     // A sample is sufficient to place the lines.
@@ -261,8 +261,8 @@ void triangulate_between(const Points& points, const std::vector<Strip>& strips,
 
 }  // namespace
 
-PlanarTriangulation triangulate_in_plane(const Points& points, std::size_t points_a_strip) {
-  std::vector<Strip> strips = cut_into_strips(points, std::max<std::size_t>(points_a_strip, 1));
+PlanarTriangulation triangulate_in_plane(const Points& points, std::size_t points_per_strip) {
+  std::vector<Strip> strips = cut_into_strips(points, std::max<std::size_t>(points_per_strip, 1));
   libmap::parallel_each(strips.size(),
                         [&](std::size_t s) { triangulate_strip(points, strips[s]); });
   PlanarTriangulation whole;

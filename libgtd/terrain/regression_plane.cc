@@ -204,7 +204,7 @@ constexpr std::size_t cells_per_chunk = 4096;
 constexpr double max_median_ratio = 0.5;
 constexpr double min_cosine = 0.7071067811865476;  // to the start's normal: 45 deg
 constexpr int hypotheses = 500;
-constexpr std::size_t max_looked_at = 4000;
+constexpr std::size_t max_sampled = 4000;
 constexpr int max_steps = 200;
 constexpr double converged_rad = 1e-9;
 
@@ -221,13 +221,13 @@ std::vector<Vector3d> cell_means(const libmap::PointStream& points, const Fitted
   points.for_each_block(libmap::PointStream::Need::positions, [&](const libmap::PointCloud& block) {
     for (const Vector3d& position : block.positions) {
       if (!position.allFinite()) continue;
-      const Vector3d place = start.axes.transpose() * (position - start.centroid) / start.extent_m;
-      libmap::VoxelPlace voxel;
+      const Vector3d point = start.axes.transpose() * (position - start.centroid) / start.extent_m;
+      libmap::VoxelSide voxel;
       for (int axis = 0; axis < 3; ++axis)
-        voxel.cell[axis] = static_cast<int>(std::llround(place[axis] * cells_per_extent));
+        voxel.cell[axis] = static_cast<int>(std::llround(point[axis] * cells_per_extent));
       const std::uint32_t cell = cells.find_or_add(pack(voxel));
       if (cell == sums.size()) sums.emplace_back();
-      sums[cell].sum += place;
+      sums[cell].sum += point;
       sums[cell].count += 1.0;
     }
   });
@@ -245,13 +245,13 @@ std::vector<Vector3d> cell_means(const libmap::PointStream& points, const Fitted
 struct Plane {
   Vector3d normal = Vector3d::UnitX();
   double offset = 0.0;
-  double height(const Vector3d& place) const { return normal.dot(place) - offset; }
+  double height(const Vector3d& point) const { return normal.dot(point) - offset; }
 };
 
-Plane weighted_fit(const std::vector<Vector3d>& places, const Plane& last, double limit) {
+Plane weighted_fit(const std::vector<Vector3d>& cell_points, const Plane& last, double limit) {
   const libmap::PlaneSpread spread = libmap::weighted_spread(
-      places, Vector3d::Zero(), cells_per_chunk, [&](const Vector3d& place) {
-        const double ratio = last.height(place) / limit;
+      cell_points, Vector3d::Zero(), cells_per_chunk, [&](const Vector3d& point) {
+        const double ratio = last.height(point) / limit;
         return libmap::tukey_weight(ratio);
       });
   if (!spread.is_plane(1e-4)) return last;
@@ -263,26 +263,26 @@ Plane weighted_fit(const std::vector<Vector3d>& places, const Plane& last, doubl
 }
 
 // Median of the absolute heights.
-double median_height(const std::vector<Vector3d>& places, const Plane& plane) {
+double median_height(const std::vector<Vector3d>& cell_points, const Plane& plane) {
   std::vector<double> heights;
-  heights.reserve(places.size());
-  for (const Vector3d& place : places) heights.push_back(std::abs(plane.height(place)));
+  heights.reserve(cell_points.size());
+  for (const Vector3d& point : cell_points) heights.push_back(std::abs(plane.height(point)));
   return libmap::median(std::move(heights));
 }
 
 // Least median of squares (Rousseeuw 1984): of planes through three positions, the plane with the
 // minimum median of the absolute heights, on a subsample of positions.
-Plane least_median(const std::vector<Vector3d>& places, const Plane& start) {
-  std::vector<Vector3d> looked_at;
-  const std::size_t step = places.size() / max_looked_at + 1;
-  for (std::size_t n = 0; n < places.size(); n += step) looked_at.push_back(places[n]);
+Plane least_median(const std::vector<Vector3d>& cell_points, const Plane& start) {
+  std::vector<Vector3d> sampled;
+  const std::size_t step = cell_points.size() / max_sampled + 1;
+  for (std::size_t n = 0; n < cell_points.size(); n += step) sampled.push_back(cell_points[n]);
   libmap::RandomStream random(1, 0);
   Plane best = start;
-  double least = median_height(looked_at, start);
+  double least = median_height(sampled, start);
   for (int n = 0; n < hypotheses; ++n) {
-    const Vector3d& a = looked_at[random.below(looked_at.size())];
-    const Vector3d& b = looked_at[random.below(looked_at.size())];
-    const Vector3d& c = looked_at[random.below(looked_at.size())];
+    const Vector3d& a = sampled[random.below(sampled.size())];
+    const Vector3d& b = sampled[random.below(sampled.size())];
+    const Vector3d& c = sampled[random.below(sampled.size())];
     Plane plane;
     plane.normal = (b - a).cross(c - a);
     const double length = plane.normal.norm();
@@ -290,7 +290,7 @@ Plane least_median(const std::vector<Vector3d>& places, const Plane& start) {
     plane.normal /= plane.normal.dot(start.normal) < 0.0 ? -length : length;
     if (!(plane.normal.dot(start.normal) > min_cosine)) continue;
     plane.offset = plane.normal.dot(a);
-    const double median = median_height(looked_at, plane);
+    const double median = median_height(sampled, plane);
     if (median >= least) continue;
     least = median;
     best = plane;
@@ -306,17 +306,17 @@ Plane least_median(const std::vector<Vector3d>& places, const Plane& start) {
 // of the start if its median distance is less than twice that of the plane found, because such a
 // terrain has no level ground. The result is the same to the bit for points in one or many blocks.
 Vector3d ground_normal(const libmap::PointStream& points, const FittedPlane& start) {
-  const std::vector<Vector3d> places = cell_means(points, start);
+  const std::vector<Vector3d> cell_points = cell_means(points, start);
   const Plane squares;
-  const Plane found = least_median(places, squares);
-  const double median = median_height(places, found);
-  if (!(median < max_median_ratio * median_height(places, squares))) return start.axes.col(0);
+  const Plane found = least_median(cell_points, squares);
+  const double median = median_height(cell_points, found);
+  if (!(median < max_median_ratio * median_height(cell_points, squares))) return start.axes.col(0);
   // Smaller heights are rounding errors.
   constexpr double min_limit = 1e-6;
   const double limit = std::max(libmap::tukey_width_of(median), min_limit);
   Plane plane = found;
   for (int step = 0; step < max_steps; ++step) {
-    const Plane next = weighted_fit(places, plane, limit);
+    const Plane next = weighted_fit(cell_points, plane, limit);
     const double turn = (next.normal - plane.normal).norm();
     plane = next;
     if (turn < converged_rad) break;

@@ -165,7 +165,7 @@ libmap::PointCloud voxel_means(const libmap::PointCloud& terrain, double voxel_s
   return means;
 }
 
-std::vector<Eigen::Vector3f> thin_to_centroids(const std::vector<Eigen::Vector3f>& points,
+std::vector<Eigen::Vector3f> voxel_centroids(const std::vector<Eigen::Vector3f>& points,
                                                double leaf_m) {
   require_voxel_size(leaf_m);
   if (points.empty()) return {};
@@ -194,7 +194,7 @@ std::vector<Eigen::Vector3f> thin_to_centroids(const std::vector<Eigen::Vector3f
 
 VoxelGrid voxelize_thesis(const std::vector<Eigen::Vector3f>& points_in_terrain,
                           double voxel_size_m) {
-  const std::vector<Eigen::Vector3f> centroids = thin_to_centroids(points_in_terrain, voxel_size_m);
+  const std::vector<Eigen::Vector3f> centroids = voxel_centroids(points_in_terrain, voxel_size_m);
   VoxelGrid grid;
   grid.lattice.voxel_size_m = voxel_size_m;
   if (centroids.empty()) return grid;
@@ -241,7 +241,7 @@ std::vector<Voxel> VoxelFields::all() const {
   return voxels;
 }
 
-std::size_t count_lone(const std::vector<Voxel>& voxels) {
+std::size_t count_isolated(const std::vector<Voxel>& voxels) {
   std::vector<char> has_neighbor(voxels.size(), 0);
   visit_pairs(voxels, 1,
               [&](std::size_t n, std::size_t m) { has_neighbor[n] = has_neighbor[m] = 1; });

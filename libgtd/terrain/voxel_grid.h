@@ -66,7 +66,7 @@ void visit_pairs(const std::vector<Voxel>& voxels, int reach, const Visit& visit
 }
 
 // Returns the number of voxels without an occupied one among their 26 neighbors.
-std::size_t count_lone(const std::vector<Voxel>& voxels);
+std::size_t count_isolated(const std::vector<Voxel>& voxels);
 
 // Throws Error naming the spacing of the points if more than 60 % of the voxels are lone: such
 // points do not form a surface at this voxel size.
@@ -116,7 +116,7 @@ VoxelGrid voxelize_thesis(const std::vector<Eigen::Vector3f>& points_in_terrain,
 
 // Returns the centroid of the points in each cell floor(p * (1 / leaf_m)) in single precision, in
 // ascending order of z, y, x, as the author's program does before and during voxelization.
-std::vector<Eigen::Vector3f> thin_to_centroids(const std::vector<Eigen::Vector3f>& points,
+std::vector<Eigen::Vector3f> voxel_centroids(const std::vector<Eigen::Vector3f>& points,
                                                double leaf_m);
 
 // Returns the values of a field. Throws Error naming the field if it is missing.

@@ -63,14 +63,14 @@ BagRigPlan plan_bag_rig(const std::filesystem::path& bag, const BagRigOptions& o
                         const std::optional<double>& stamp_s = std::nullopt);
 
 // Table with one line per synchronized set: stamp_s, cameras, spread_s.
-inline constexpr const char* synchronized_sets_file_name = "moments.csv";
-// Names of the entries that export_bag_rig writes: rig.yaml, moments.csv and the cameras' folders.
+inline constexpr const char* synchronized_sets_file_name = "synchronized_sets.csv";
+// Names of the entries that export_bag_rig writes: rig.yaml, synchronized_sets.csv and the cameras' folders.
 std::vector<std::string> names_in_rig_folder(const BagRigPlan& plan);
 
 struct BagRigExport {
   std::size_t images = 0;
   std::vector<SynchronizedSet> sets{};  // sets of the plan without unusable images
-  std::size_t pixels_beyond = 0;  // pixels whose depth exceeds 16 bits at the camera's depth scale
+  std::size_t overflow_pixels = 0;  // pixels whose depth exceeds 16 bits at the camera's depth scale
   // Number of unusable images, and the reason for the first one of each camera.
   std::size_t broken = 0;
   std::vector<std::string> warnings{};

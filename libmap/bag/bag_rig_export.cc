@@ -69,7 +69,7 @@ class ImageWriter {
     std::string bytes;
     std::string png;
     std::string error;
-    std::size_t beyond = 0;
+    std::size_t overflow_pixels = 0;
   };
 
   std::size_t camera_of(const std::string& topic) const {
@@ -93,7 +93,7 @@ class ImageWriter {
                     {.field = "size",
                      .value = size_text(depth.image.width, depth.image.height),
                      .bound = size_text(camera.camera.width, camera.camera.height)});
-      one.beyond = depth.beyond;
+      one.overflow_pixels = depth.overflow_pixels;
       one.png = encode_png(depth.image);
     } catch (const Error& error) {
       one.error = error.what();
@@ -116,7 +116,7 @@ class ImageWriter {
       }
       written_.push_back({one.image.camera, ros_message::seconds_of(one.image.stamp_ns)});
       ++result_.images;
-      result_.pixels_beyond += one.beyond;
+      result_.overflow_pixels += one.overflow_pixels;
     }
     batch_.clear();
   }

@@ -133,12 +133,12 @@ void write_bag(const fs::path& path, BagFormat format, const BagContent& content
     message.header = header(cloud.frame);
     bag.write(cloud.topic, message.header, message, true);
   }
-  for (const BagPlaces& places : content.places) {
-    const Header own = header(places.frame);
-    bag.write(places.marker_topic, own, encode_markers(places, own), true);
-    ros_message::PoseArray poses = encode_poses(places.places);
+  for (const BagTargets& targets : content.targets) {
+    const Header own = header(targets.frame);
+    bag.write(targets.marker_topic, own, encode_markers(targets, own), true);
+    ros_message::PoseArray poses = encode_poses(targets.targets);
     poses.header = own;
-    bag.write(places.pose_topic, own, poses, true);
+    bag.write(targets.pose_topic, own, poses, true);
   }
   for (const BagGrid& grid : content.grids) {
     const Header own = header(grid.frame);

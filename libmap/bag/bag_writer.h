@@ -21,8 +21,8 @@ struct BagCloud {
 };
 
 // Position with an approach direction.
-struct BagPlace {
-  Eigen::Vector3d place = Eigen::Vector3d::Zero();
+struct BagTarget {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
   Eigen::Vector3d direction = Eigen::Vector3d::UnitX();  // any length > 0
   Color color{};
   std::string text{};
@@ -34,12 +34,12 @@ struct BagPlace {
 // The x axis of a pose is the direction, along which RViz draws the arrows of a PoseArray. The
 // rotation about it is arbitrary: the y axis is the frame's y (its z if the direction is along y),
 // made perpendicular to the direction.
-struct BagPlaces {
+struct BagTargets {
   std::string marker_topic{};
   std::string pose_topic{};
   std::string frame{};
   double arrow_m = 0.08;  // length of an arrow; a ball's radius is an eighth of it
-  std::vector<BagPlace> places{};
+  std::vector<BagTarget> targets{};
 };
 
 // Grid of square cells in a frame's x-y plane as grid_map_msgs/GridMap and nav_msgs/OccupancyGrid.
@@ -84,7 +84,7 @@ struct BagContent {
   double stamp_s = 1.0;                    // stamp of all messages, 1e-9 to 2^32 - 1 (ROS 2: 2^31)
   std::vector<BagTransform> transforms{};  // /tf_static
   std::vector<BagCloud> clouds{};
-  std::vector<BagPlaces> places{};
+  std::vector<BagTargets> targets{};
   std::vector<BagGrid> grids{};  // ROS 2 only
 };
 

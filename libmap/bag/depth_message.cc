@@ -37,7 +37,7 @@ class UnitImage {
     if (units < saturated)
       result_.image.pixels[pixel] = static_cast<std::uint16_t>(units);
     else
-      ++result_.beyond;
+      ++result_.overflow_pixels;
   }
   void set_saturated(std::size_t pixel) { result_.image.pixels[pixel] = saturated; }
   DepthMessageImage take() { return std::move(result_); }

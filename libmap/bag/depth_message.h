@@ -36,7 +36,7 @@ struct DepthUnits {
 
 struct DepthMessageImage {
   Image<std::uint16_t> image;  // in image units; 0: no measurement; 65535: saturated
-  std::size_t beyond = 0;      // number of pixels that exceed 16 bits and are set to 0
+  std::size_t overflow_pixels = 0;      // number of pixels that exceed 16 bits and are set to 0
 };
 
 // Decodes a depth image. Throws Error for an encoding other than depth, no size or more than 2^27

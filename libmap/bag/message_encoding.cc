@@ -92,41 +92,41 @@ ros_message::TransformStamped encode_transform(const BagTransform& transform) {
   return message;
 }
 
-ros_message::PoseArray encode_poses(const std::vector<BagPlace>& places) {
+ros_message::PoseArray encode_poses(const std::vector<BagTarget>& targets) {
   ros_message::PoseArray message;
-  for (const BagPlace& place : places) {
+  for (const BagTarget& target : targets) {
     message.poses.push_back(
-        {to_ros_point(place.place), to_ros_rotation(axes_along(place.direction))});
+        {to_ros_point(target.position), to_ros_rotation(axes_along(target.direction))});
   }
   return message;
 }
 
-ros_message::MarkerArray encode_markers(const BagPlaces& places,
+ros_message::MarkerArray encode_markers(const BagTargets& targets,
                                         const ros_message::Header& header) {
   ros_message::MarkerArray message;
-  const double length = places.arrow_m;
+  const double length = targets.arrow_m;
   Marker balls = marker_of("place", 0, Marker::SPHERE_LIST, header);
   balls.scale = {{length / 4, length / 4, length / 4}};
   balls.color.a = 1.0F;
   std::int32_t id = 0;
-  for (const BagPlace& place : places.places) {
-    balls.points.push_back(to_ros_point(place.place));
-    balls.colors.push_back(to_ros_color(place.color));
+  for (const BagTarget& target : targets.targets) {
+    balls.points.push_back(to_ros_point(target.position));
+    balls.colors.push_back(to_ros_color(target.color));
     Marker arrow = marker_of("approach", id, Marker::ARROW, header);
-    const Eigen::Vector3d start = place.place - length * place.direction.normalized();
-    arrow.points = {to_ros_point(start), to_ros_point(place.place)};
+    const Eigen::Vector3d start = target.position - length * target.direction.normalized();
+    arrow.points = {to_ros_point(start), to_ros_point(target.position)};
     arrow.scale = {{length / 10, length / 5, length / 4}};  // shaft, head, head's length
-    arrow.color = to_ros_color(place.color);
+    arrow.color = to_ros_color(target.color);
     Marker text = marker_of("text", id, Marker::TEXT_VIEW_FACING, header);
     text.pose.position = to_ros_point(start);
-    text.text = place.text;
+    text.text = target.text;
     text.scale.z = length / 4;  // letter height
     text.color = to_ros_color({255, 255, 255});
     message.markers.push_back(arrow);
     message.markers.push_back(text);
     ++id;
   }
-  if (!places.places.empty()) message.markers.insert(message.markers.begin(), balls);
+  if (!targets.targets.empty()) message.markers.insert(message.markers.begin(), balls);
   return message;
 }
 

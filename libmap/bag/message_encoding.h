@@ -27,10 +27,10 @@ ros_message::CameraInfo encode_camera_info(const Camera& camera);
 ros_message::TransformStamped encode_transform(const BagTransform& transform);
 
 // Encodes poses whose x axis is the direction.
-ros_message::PoseArray encode_poses(const std::vector<BagPlace>& places);
+ros_message::PoseArray encode_poses(const std::vector<BagTarget>& targets);
 
 // Encodes, for each position, an arrow that ends there and its text, and one list of balls for all.
-ros_message::MarkerArray encode_markers(const BagPlaces& places, const ros_message::Header& header);
+ros_message::MarkerArray encode_markers(const BagTargets& targets, const ros_message::Header& header);
 
 // Encodes layers from the corner of largest x and y, x first, the reverse order of BagGrid's
 // arrays. Column-major with the labels and strides of grid_map

@@ -23,7 +23,7 @@
 #include "libmap/bag/bag_storage.h"
 #include "libmap/bag/ros_messages.h"
 #include "libmap/core/error.h"
-#include "libmap/core/guarded_process.h"
+#include "libmap/core/sandboxed_process.h"
 
 namespace libmap {
 
@@ -101,7 +101,7 @@ struct Parcel {
 // Writing end of the pipe, in librosbag's process.
 class Sender {
  public:
-  explicit Sender(const GuardedProcess::Write& write) : output_(write) {}
+  explicit Sender(const SandboxedProcess::Write& write) : output_(write) {}
 
   void send(const Parcel& parcel, std::string_view bytes) {
     output_.value(parcel);
@@ -110,7 +110,7 @@ class Sender {
   void send_error(const std::string& text) { send({.kind = Parcel::Kind::error}, text); }
 
  private:
-  GuardedOutput output_;
+  SandboxWriter output_;
 };
 
 std::int64_t nanoseconds_of(const ros::Time& time) {
@@ -119,7 +119,7 @@ std::int64_t nanoseconds_of(const ros::Time& time) {
 
 using Work = std::function<void(const rosbag::Bag&, Sender&)>;
 
-void serve(const fs::path& path, const GuardedProcess::Write& write, const Work& work) {
+void serve(const fs::path& path, const SandboxedProcess::Write& write, const Work& work) {
   Sender sender(write);
   // librosbag searches encryption plugins by rospack, which caches its results in this folder.
   setenv("ROS_HOME", "/dev/null", 1);
@@ -144,7 +144,7 @@ void serve(const fs::path& path, const GuardedProcess::Write& write, const Work&
 class GuardedBag {
  public:
   GuardedBag(const fs::path& path, const Work& work)
-      : path_(path), process_(max_data_bytes, [&](const GuardedProcess::Write& write) {
+      : path_(path), process_(max_data_bytes, [&](const SandboxedProcess::Write& write) {
           serve(path, write, work);
         }) {}
 
@@ -162,8 +162,8 @@ class GuardedBag {
 
  private:
   fs::path path_;
-  GuardedProcess process_;
-  GuardedInput input_{process_, "is broken: ROS's bag library crashed on it"};
+  SandboxedProcess process_;
+  SandboxReader input_{process_, "is broken: ROS's bag library crashed on it"};
 };
 
 // Topics of a view in the order of recording, and the topic of each connection, by its header.

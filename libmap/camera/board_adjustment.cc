@@ -43,7 +43,7 @@ Camera with_intrinsics(Camera camera, const double* values) {
 }
 
 // Residuals of all corners of an image: projected minus detected.
-struct PictureResidual {
+struct ImageResidual {
   const Camera& camera;
   const std::vector<Eigen::Vector3d>& in_board;
   const std::vector<Eigen::Vector2d>& in_image;
@@ -68,8 +68,8 @@ struct BoardProblem {
     intrinsics.insert(intrinsics.end(), fit.camera.distortion.begin(), fit.camera.distortion.end());
     for (const Pose& pose : fit.camera_from_board) poses.push_back(block_of(pose));
     for (std::size_t n = 0; n < poses.size(); ++n) {
-      auto* cost = new ceres::DynamicNumericDiffCostFunction<PictureResidual, ceres::CENTRAL>(
-          new PictureResidual{fit.camera, corners.in_board, corners.in_images[n]});
+      auto* cost = new ceres::DynamicNumericDiffCostFunction<ImageResidual, ceres::CENTRAL>(
+          new ImageResidual{fit.camera, corners.in_board, corners.in_images[n]});
       cost->AddParameterBlock(static_cast<int>(intrinsics.size()));
       cost->AddParameterBlock(static_cast<int>(poses[n].size()));
       cost->SetNumResiduals(static_cast<int>(2 * corners.in_board.size()));
@@ -88,10 +88,10 @@ Eigen::Vector2d board_pixel(const Camera& camera, const Pose& camera_from_board,
 
 double squared_error(const BoardFit& fit, const BoardCorners& corners) {
   double sum = 0.0;
-  for (std::size_t picture = 0; picture < corners.in_images.size(); ++picture)
+  for (std::size_t image = 0; image < corners.in_images.size(); ++image)
     for (std::size_t n = 0; n < corners.in_board.size(); ++n)
-      sum += (corners.in_images[picture][n] -
-              board_pixel(fit.camera, fit.camera_from_board[picture], corners.in_board[n]))
+      sum += (corners.in_images[image][n] -
+              board_pixel(fit.camera, fit.camera_from_board[image], corners.in_board[n]))
                  .squaredNorm();
   return sum;
 }

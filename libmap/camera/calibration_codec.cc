@@ -149,7 +149,7 @@ std::int32_t size_of(float number) {
 
 // Multiples of 576 bytes match both layouts (8 or 9 cameras). Image sizes distinguish them: the
 // other layout has numbers of a rotation at their positions.
-bool holds_sizes(std::string_view bytes) {
+bool contains_sizes(std::string_view bytes) {
   constexpr std::size_t step = floats_bytes(CalibrationLayout::floats_with_size, false);
   for (std::size_t at = 0; at < bytes.size(); at += step) {
     ByteReader reader(bytes.substr(at));
@@ -167,7 +167,7 @@ std::optional<std::pair<CalibrationLayout, bool>> floats_layout(std::string_view
   if (bytes.size() == floats_bytes(floats, true)) return std::pair{floats, true};
   const bool fits_with_size = bytes.size() % floats_bytes(floats_with_size, false) == 0;
   const bool fits_without = bytes.size() % floats_bytes(floats, false) == 0;
-  if (fits_with_size && (!fits_without || holds_sizes(bytes)))
+  if (fits_with_size && (!fits_without || contains_sizes(bytes)))
     return std::pair{floats_with_size, false};
   if (fits_without) return std::pair{floats, false};
   return std::nullopt;

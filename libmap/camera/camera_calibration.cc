@@ -17,10 +17,10 @@ namespace libmap {
 
 namespace {
 
-constexpr std::size_t min_pictures = 3;
+constexpr std::size_t min_images = 3;
 constexpr int min_side = 3;  // corners
 constexpr int max_side = 100;
-constexpr double same_place_px = 1.0;
+constexpr double same_point_px = 1.0;
 // Maximum relative standard deviation of the focal length for a determined camera.
 constexpr double max_relative_deviation = 0.2;
 
@@ -61,10 +61,10 @@ DistortionModel distortion_of(LensModel lens) {
                                         : DistortionModel::radial_tangential;
 }
 
-BoardCorners corners_of(const std::vector<BoardPicture>& pictures, const Chessboard& board) {
+BoardCorners corners_of(const std::vector<BoardImage>& images, const Chessboard& board) {
   BoardCorners corners;
   corners.in_board = corners_on_board(board);
-  for (const BoardPicture& picture : pictures) corners.in_images.push_back(picture.corners);
+  for (const BoardImage& image : images) corners.in_images.push_back(image.corners);
   return corners;
 }
 
@@ -140,7 +140,7 @@ std::optional<BoardFit> with_poses(const Camera& camera, const BoardCorners& cor
 }
 
 // Squared error of each image; infinite if the board is behind the camera.
-std::vector<double> picture_errors(const BoardFit& fit, const BoardCorners& corners) {
+std::vector<double> image_errors(const BoardFit& fit, const BoardCorners& corners) {
   std::vector<double> errors;
   for (std::size_t n = 0; n < corners.in_images.size(); ++n) {
     const double error = squared_error({fit.camera, {fit.camera_from_board[n]}},
@@ -152,7 +152,7 @@ std::vector<double> picture_errors(const BoardFit& fit, const BoardCorners& corn
 
 // Sum over the best three quarters of the images, to be robust against bad images.
 double robust_error(const BoardFit& fit, const BoardCorners& corners) {
-  std::vector<double> errors = picture_errors(fit, corners);
+  std::vector<double> errors = image_errors(fit, corners);
   std::sort(errors.begin(), errors.end());
   const auto used = static_cast<std::ptrdiff_t>((3 * errors.size() + 3) / 4);
   return std::accumulate(errors.begin(), errors.begin() + used, 0.0);
@@ -197,21 +197,21 @@ BoardFit fit_camera(const BoardCorners& corners, int width, int height, LensMode
   refuse_undetermined();
 }
 
-CalibratedPicture calibrated(const BoardPicture& picture, const Camera& camera, const Pose& pose,
+CalibratedImage calibrated(const BoardImage& image, const Camera& camera, const Pose& pose,
                              const Chessboard& board) {
-  CalibratedPicture result;
-  result.name = picture.name;
+  CalibratedImage result;
+  result.name = image.name;
   result.camera_from_board = pose;
-  result.corners = picture.corners;
+  result.corners = image.corners;
   const std::vector<Eigen::Vector3d> in_board = corners_on_board(board);
   double sum = 0.0;
-  for (std::size_t n = 0; n < picture.corners.size(); ++n) {
-    const Eigen::Vector2d residual = picture.corners[n] - board_pixel(camera, pose, in_board[n]);
+  for (std::size_t n = 0; n < image.corners.size(); ++n) {
+    const Eigen::Vector2d residual = image.corners[n] - board_pixel(camera, pose, in_board[n]);
     result.residuals_px.push_back(residual);
     sum += residual.squaredNorm();
     result.max_px = std::max(result.max_px, residual.norm());
   }
-  result.rms_px = std::sqrt(sum / static_cast<double>(picture.corners.size()));
+  result.rms_px = std::sqrt(sum / static_cast<double>(image.corners.size()));
   const double cosine = std::min(1.0, std::abs(pose.linear()(2, 2)));
   result.tilt_deg = std::acos(cosine) * 180.0 / M_PI;
   return result;
@@ -220,8 +220,8 @@ CalibratedPicture calibrated(const BoardPicture& picture, const Camera& camera, 
 void add_coverage(CameraCalibrationResult& result) {
   Eigen::Array2d low = Eigen::Array2d::Constant(std::numeric_limits<double>::infinity());
   Eigen::Array2d high = -low;
-  for (const CalibratedPicture& picture : result.pictures)
-    for (const Eigen::Vector2d& corner : picture.corners) {
+  for (const CalibratedImage& image : result.images)
+    for (const Eigen::Vector2d& corner : image.corners) {
       low = low.min(corner.array());
       high = high.max(corner.array());
     }
@@ -230,7 +230,7 @@ void add_coverage(CameraCalibrationResult& result) {
 }
 
 // Returns true if both images show the same corners, in either order.
-bool shows_the_same(const BoardPicture& a, const BoardPicture& b) {
+bool shows_the_same(const BoardImage& a, const BoardImage& b) {
   double forward = 0.0;
   double backward = 0.0;
   const std::size_t count = a.corners.size();
@@ -238,33 +238,33 @@ bool shows_the_same(const BoardPicture& a, const BoardPicture& b) {
     forward += (a.corners[n] - b.corners[n]).squaredNorm();
     backward += (a.corners[n] - b.corners[count - 1 - n]).squaredNorm();
   }
-  return std::min(forward, backward) < static_cast<double>(count) * same_place_px * same_place_px;
+  return std::min(forward, backward) < static_cast<double>(count) * same_point_px * same_point_px;
 }
 
-CameraCalibrationResult calibrate_once(const std::vector<BoardPicture>& pictures, int width,
+CameraCalibrationResult calibrate_once(const std::vector<BoardImage>& images, int width,
                                        int height, const CameraCalibrationOptions& options) {
-  if (pictures.size() < min_pictures)
+  if (images.size() < min_images)
     throw Error("too few distinct images of the board",
                 {.field = "pictures",
-                 .value = std::to_string(pictures.size()),
-                 .bound = ">= " + std::to_string(min_pictures) + ", better 15 and more"});
-  const BoardCorners corners = corners_of(pictures, options.board);
+                 .value = std::to_string(images.size()),
+                 .bound = ">= " + std::to_string(min_images) + ", better 15 and more"});
+  const BoardCorners corners = corners_of(images, options.board);
   const BoardFit fit = fit_camera(corners, width, height, options.lens);
   CameraCalibrationResult result;
   result.camera = fit.camera;
   double sum = 0.0;
-  for (std::size_t n = 0; n < pictures.size(); ++n) {
-    result.pictures.push_back(
-        calibrated(pictures[n], fit.camera, fit.camera_from_board[n], options.board));
-    for (const Eigen::Vector2d& residual : result.pictures.back().residuals_px)
+  for (std::size_t n = 0; n < images.size(); ++n) {
+    result.images.push_back(
+        calibrated(images[n], fit.camera, fit.camera_from_board[n], options.board));
+    for (const Eigen::Vector2d& residual : result.images.back().residuals_px)
       sum += residual.squaredNorm();
   }
-  const auto count = static_cast<double>(pictures.size() * corner_count(options.board));
+  const auto count = static_cast<double>(images.size() * corner_count(options.board));
   // OpenCV's standard deviations neglect near-singular directions.
   const Eigen::MatrixXd covariance = unit_covariance(fit, corners);
   if (covariance.size() == 0) refuse_undetermined();
   const double unknowns =
-      static_cast<double>(covariance.rows()) + 6.0 * static_cast<double>(pictures.size());
+      static_cast<double>(covariance.rows()) + 6.0 * static_cast<double>(images.size());
   result.rms_px = std::sqrt(sum / count);
   result.sigma_px = std::sqrt(sum / std::max(1.0, 2 * count - unknowns));
   for (Eigen::Index n = 0; n < covariance.rows(); ++n)
@@ -276,13 +276,13 @@ CameraCalibrationResult calibrate_once(const std::vector<BoardPicture>& pictures
 
 // Index of an image that is inconsistent with a camera that fits all others, for example because of
 // wrongly ordered corners; nullopt if there is none.
-std::optional<std::size_t> find_odd_picture(const std::vector<BoardPicture>& pictures, int width,
+std::optional<std::size_t> find_odd_image(const std::vector<BoardImage>& images, int width,
                                             int height, const CameraCalibrationOptions& options) {
   constexpr double times_the_median = 5.0;
-  if (pictures.size() <= min_pictures) return std::nullopt;
-  const BoardCorners corners = corners_of(pictures, options.board);
+  if (images.size() <= min_images) return std::nullopt;
+  const BoardCorners corners = corners_of(images, options.board);
   const std::vector<double> errors =
-      picture_errors(fit_from_many_starts(corners, width, height, options.lens), corners);
+      image_errors(fit_from_many_starts(corners, width, height, options.lens), corners);
   const auto worst = std::max_element(errors.begin(), errors.end());
   if (!(std::sqrt(*worst) > times_the_median * std::sqrt(median(errors)))) return std::nullopt;
   return static_cast<std::size_t>(worst - errors.begin());
@@ -358,7 +358,7 @@ void bind(ParameterTable& table, CameraCalibrationOptions& options) {
   table.add("lens", options.lens, lens_model_names(),
             "distortion model; plumb_bob: k1 k2 p1 p2 k3; rational: k1 k2 p1 p2 k3 k4 k5 k6; "
             "equidistant: k1 k2 k3 k4 of a fisheye lens");
-  table.add("max_picture_error_px", options.max_picture_error_px, not_negative,
+  table.add("max_picture_error_px", options.max_image_error_px, not_negative,
             "maximum RMS reprojection error; worse images are rejected, pixels; 0: no limit");
 }
 
@@ -400,10 +400,10 @@ GrayImage stretch_contrast(const Image<std::uint16_t>& image) {
   if (image.empty()) return gray;
   std::vector<std::uint16_t> sorted = image.pixels;
   const auto percentile = [&](std::size_t percent) {
-    const std::size_t place = (sorted.size() - 1) * percent / 100;
-    std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(place),
+    const std::size_t index = (sorted.size() - 1) * percent / 100;
+    std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(index),
                      sorted.end());
-    return static_cast<double>(sorted[place]);
+    return static_cast<double>(sorted[index]);
   };
   const double low = percentile(1);
   const double high = std::max(percentile(99), low + 1);
@@ -418,19 +418,19 @@ double CameraCalibrationResult::relative_focal_deviation() const {
   return std::max(deviations.at(0) / camera.fx, deviations.at(1) / camera.fy);
 }
 
-CameraCalibrationResult calibrate_camera(const std::vector<BoardPicture>& pictures, int width,
+CameraCalibrationResult calibrate_camera(const std::vector<BoardImage>& images, int width,
                                          int height, const CameraCalibrationOptions& options) {
-  std::vector<BoardPicture> kept;
+  std::vector<BoardImage> kept;
   std::vector<std::string> repeated;
   std::vector<std::string> rejected;
-  for (const BoardPicture& picture : pictures) {
-    const bool is_new = std::none_of(kept.begin(), kept.end(), [&](const BoardPicture& earlier) {
-      return shows_the_same(earlier, picture);
+  for (const BoardImage& image : images) {
+    const bool is_new = std::none_of(kept.begin(), kept.end(), [&](const BoardImage& earlier) {
+      return shows_the_same(earlier, image);
     });
     if (is_new)
-      kept.push_back(picture);
+      kept.push_back(image);
     else
-      repeated.push_back(picture.name);
+      repeated.push_back(image.name);
   }
   const auto reject = [&](std::size_t n) {
     rejected.push_back(kept[n].name);
@@ -441,22 +441,22 @@ CameraCalibrationResult calibrate_camera(const std::vector<BoardPicture>& pictur
     try {
       result = calibrate_once(kept, width, height, options);
     } catch (const Error&) {
-      if (options.max_picture_error_px == 0) throw;
-      const auto odd = find_odd_picture(kept, width, height, options);
+      if (options.max_image_error_px == 0) throw;
+      const auto odd = find_odd_image(kept, width, height, options);
       if (!odd) throw;
       reject(*odd);
       continue;
     }
     const auto worst = std::max_element(
-        result.pictures.begin(), result.pictures.end(),
-        [](const CalibratedPicture& a, const CalibratedPicture& b) { return a.rms_px < b.rms_px; });
-    if (options.max_picture_error_px == 0 || worst->rms_px <= options.max_picture_error_px) {
+        result.images.begin(), result.images.end(),
+        [](const CalibratedImage& a, const CalibratedImage& b) { return a.rms_px < b.rms_px; });
+    if (options.max_image_error_px == 0 || worst->rms_px <= options.max_image_error_px) {
       result.rejected = rejected;
       result.repeated = repeated;
       return result;
     }
     // One image at a time, because a bad image increases the errors of the others.
-    reject(static_cast<std::size_t>(worst - result.pictures.begin()));
+    reject(static_cast<std::size_t>(worst - result.images.begin()));
   }
 }
 

@@ -46,7 +46,7 @@ std::optional<Pose> locate_chessboard(const std::vector<Eigen::Vector2d>& rays,
 GrayImage stretch_contrast(const Image<std::uint16_t>& image);
 
 // The board in one image.
-struct BoardPicture {
+struct BoardImage {
   std::string name{};
   std::vector<Eigen::Vector2d> corners{};  // result of find_chessboard
 };
@@ -55,12 +55,12 @@ struct CameraCalibrationOptions {
   Chessboard board{};
   LensModel lens = LensModel::plumb_bob;
   // Images with a larger RMS error are rejected, and calibration is repeated; 0: no limit.
-  double max_picture_error_px = 0.0;
+  double max_image_error_px = 0.0;
 };
 // Binds all fields except the number of corners.
 void bind(ParameterTable& table, CameraCalibrationOptions& options);
 
-struct CalibratedPicture {
+struct CalibratedImage {
   std::string name{};
   Pose camera_from_board = Pose::Identity();  // board frame: as in corners_on_board
   double rms_px = 0.0;                        // of the distances in the image
@@ -79,8 +79,8 @@ struct CameraCalibrationResult {
   double sigma_px = 0.0;             // noise of one coordinate of a corner
   double corners_width_share = 0.0;  // share of the image's width and height spanned by the corners
   double corners_height_share = 0.0;
-  std::vector<CalibratedPicture> pictures{};
-  std::vector<std::string> rejected{};  // above max_picture_error_px
+  std::vector<CalibratedImage> images{};
+  std::vector<std::string> rejected{};  // above max_image_error_px
   std::vector<std::string> repeated{};  // duplicates of earlier images
 
   // Relative standard deviation of fx or fy, whichever is larger.
@@ -90,7 +90,7 @@ struct CameraCalibrationResult {
 // Calibrates the camera. Images whose corners are within 1 px (RMS) of an earlier image are
 // ignored, because their errors are not independent. Throws Error: fewer than 3 images remain, or
 // the images do not determine the camera (for example if all boards are seen frontally).
-CameraCalibrationResult calibrate_camera(const std::vector<BoardPicture>& pictures, int width,
+CameraCalibrationResult calibrate_camera(const std::vector<BoardImage>& images, int width,
                                          int height, const CameraCalibrationOptions& options = {});
 
 }  // namespace libmap

@@ -71,20 +71,20 @@ ColorImage resample_image(const ColorImage& image, const Camera& from, const Cam
     throw Error("image and camera differ in size", {.field = "size",
                                                     .value = size_text(image.width, image.height),
                                                     .bound = size_text(from.width, from.height)});
-  cv::Mat places(to.height, to.width, CV_32FC2);
+  cv::Mat source_pixels(to.height, to.width, CV_32FC2);
   parallel_for(static_cast<std::size_t>(to.height), 16, [&](std::size_t begin, std::size_t end) {
     for (auto row = static_cast<int>(begin); row < static_cast<int>(end); ++row)
       for (int column = 0; column < to.width; ++column) {
         const Eigen::Vector2d pixel =
             distort_to_pixel(from, {(column - to.cx) / to.fx, (row - to.cy) / to.fy});
-        places.at<cv::Vec2f>(row, column) = {static_cast<float>(pixel.x()),
+        source_pixels.at<cv::Vec2f>(row, column) = {static_cast<float>(pixel.x()),
                                              static_cast<float>(pixel.y())};
       }
   });
   ColorImage result(to.width, to.height);
   const cv::Mat source(image.height, image.width, CV_8UC3, const_cast<Color*>(image.pixels.data()));
   cv::Mat target(to.height, to.width, CV_8UC3, result.pixels.data());
-  cv::remap(source, target, places, cv::noArray(), cv::INTER_CUBIC, cv::BORDER_REPLICATE);
+  cv::remap(source, target, source_pixels, cv::noArray(), cv::INTER_CUBIC, cv::BORDER_REPLICATE);
   return result;
 }
 

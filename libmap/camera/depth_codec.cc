@@ -220,8 +220,8 @@ MillimeterImage to_millimeters(const DepthImage& image) {
   MillimeterImage out(image.width, image.height);
   std::transform(image.pixels.begin(), image.pixels.end(), out.pixels.begin(), [](float depth) {
     const double millimeters = std::round(static_cast<double>(depth) * 1000);
-    const bool is_held = millimeters > 0 && millimeters < no_depth_mm;
-    return static_cast<std::uint16_t>(is_held ? millimeters : 0);
+    const bool is_representable = millimeters > 0 && millimeters < no_depth_mm;
+    return static_cast<std::uint16_t>(is_representable ? millimeters : 0);
   });
   return out;
 }

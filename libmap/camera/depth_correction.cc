@@ -23,9 +23,9 @@ DepthCorrection::Terms DepthCorrection::terms(double depth_m, double radius2) co
   const double pieces = static_cast<double>(spline_m.size()) - 3.0;
   const double within_m = std::clamp(depth_m, first_m, last_m());
   terms.radial = {radius2, radius2 * radius2, within_m * radius2};
-  const double place = std::clamp((depth_m - first_m) / step_m, 0.0, pieces);
-  const double piece = std::min(std::floor(place), pieces - 1.0);
-  const double t = place - piece;
+  const double scaled = std::clamp((depth_m - first_m) / step_m, 0.0, pieces);
+  const double piece = std::min(std::floor(scaled), pieces - 1.0);
+  const double t = scaled - piece;
   const double s = 1.0 - t;
   terms.first = static_cast<std::size_t>(piece);
   terms.spline = {s * s * s / 6.0, (3.0 * t * t * t - 6.0 * t * t + 4.0) / 6.0,

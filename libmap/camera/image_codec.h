@@ -37,7 +37,7 @@ std::optional<ImageInfo> read_image_info(std::string_view bytes);
 // Limit for frames of a scan, which several threads decode at once, with up to ten bytes per pixel.
 inline constexpr std::int64_t max_frame_pixels = std::int64_t{1} << 25;
 // Limit for texture pages and other images, which are decoded one at a time.
-inline constexpr std::int64_t max_picture_pixels = std::int64_t{1} << 27;
+inline constexpr std::int64_t max_decoded_pixels = std::int64_t{1} << 27;
 
 // Decodes any image as 8-bit color; gray becomes red = green = blue, transparency is ignored.
 // Throws Error for more than `max_pixels`; the following functions do so above max_frame_pixels.

@@ -80,7 +80,7 @@ StoredMatrix read_matrix_header(std::string_view blob) {
           .bytes = {}};
 }
 
-void each_matrix_piece(std::string_view blob,
+void for_each_matrix_chunk(std::string_view blob,
                        const std::function<void(std::string_view bytes)>& use) {
   const StoredMatrix matrix = read_matrix_header(blob);
   const std::string_view packed = blob.substr(0, blob.size() - trailer_bytes);
@@ -115,7 +115,7 @@ StoredMatrix decode_matrix(std::string_view blob) {
                 {.value = matrix_size_text(matrix),
                  .bound = "<= " + std::to_string(max_matrix_bytes) + " bytes"});
   matrix.bytes.reserve(wanted);
-  each_matrix_piece(blob, [&](std::string_view bytes) { matrix.bytes += bytes; });
+  for_each_matrix_chunk(blob, [&](std::string_view bytes) { matrix.bytes += bytes; });
   return matrix;
 }
 

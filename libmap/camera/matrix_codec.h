@@ -56,7 +56,7 @@ inline constexpr std::uint64_t max_matrix_bytes = std::uint64_t{1} << 26;
 StoredMatrix decode_matrix(std::string_view blob);
 // Decodes a matrix of any size piecewise, in constant memory. All pieces except the last have a
 // multiple of 8 bytes. Throws Error as decode_matrix does.
-void each_matrix_piece(std::string_view blob,
+void for_each_matrix_chunk(std::string_view blob,
                        const std::function<void(std::string_view bytes)>& use);
 std::string encode_matrix(const StoredMatrix& matrix);
 

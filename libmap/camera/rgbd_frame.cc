@@ -46,10 +46,10 @@ std::vector<CameraView> camera_views(const RgbdFrame& frame) {
   for (std::size_t i = 0; i < count; ++i) {
     CameraView view;
     view.color_camera = frame.cameras[i];
-    const int place = static_cast<int>(i);
+    const int index = static_cast<int>(i);
     if (!frame.color.empty()) {
       view.color =
-          count == 1 ? frame.color : crop_columns(frame.color, place * color_width, color_width);
+          count == 1 ? frame.color : crop_columns(frame.color, index * color_width, color_width);
       if (view.color.width != view.color_camera.width ||
           view.color.height != view.color_camera.height)
         view.color_camera =
@@ -58,7 +58,7 @@ std::vector<CameraView> camera_views(const RgbdFrame& frame) {
     view.depth_camera = view.color_camera;
     if (!frame.depth.empty()) {
       view.depth =
-          count == 1 ? frame.depth : crop_columns(frame.depth, place * depth_width, depth_width);
+          count == 1 ? frame.depth : crop_columns(frame.depth, index * depth_width, depth_width);
       if (view.depth.width != view.depth_camera.width ||
           view.depth.height != view.depth_camera.height)
         view.depth_camera =

@@ -35,9 +35,9 @@ Error Error::in_file(const std::string& file) const {
   return Error(reason_, std::move(context), kind_);
 }
 
-Error Error::in_field(const std::string& place, const char* joint) const {
+Error Error::in_field(const std::string& prefix, const char* joint) const {
   ErrorContext context = context_;
-  context.field = context.field.empty() ? place : place + joint + context.field;
+  context.field = context.field.empty() ? prefix : prefix + joint + context.field;
   return Error(reason_, std::move(context), kind_);
 }
 

@@ -32,7 +32,7 @@ class Error : public std::runtime_error {
   // Returns a copy that names `file`, unless the error names a file already.
   Error in_file(const std::string& file) const;
   // Returns a copy with the field "PLACE: FIELD", or "PLACE" if the error names no field.
-  Error in_field(const std::string& place, const char* joint = ": ") const;
+  Error in_field(const std::string& prefix, const char* joint = ": ") const;
 
  private:
   std::string reason_;
@@ -52,11 +52,11 @@ auto in_file(const std::filesystem::path& file, const Step& step) {
 
 // Returns step(). Prefixes the field of its Errors with `place`, as Error::in_field does.
 template <typename Step>
-auto in_field(const std::string& place, const Step& step) {
+auto in_field(const std::string& prefix, const Step& step) {
   try {
     return step();
   } catch (const Error& error) {
-    throw error.in_field(place);
+    throw error.in_field(prefix);
   }
 }
 

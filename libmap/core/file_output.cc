@@ -337,8 +337,8 @@ std::uint64_t TempFile::append(const void* bytes, std::size_t count) {
   std::uint64_t begin = 0;
   {
     const std::lock_guard lock(mutex_);
-    begin = end_;
-    end_ += count;
+    begin = size_;
+    size_ += count;
   }
   std::size_t done = 0;
   while (done < count) {

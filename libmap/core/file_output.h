@@ -128,7 +128,7 @@ class TempFile {
   std::filesystem::path folder_;
   int file_ = -1;
   std::mutex mutex_;
-  std::uint64_t end_ = 0;
+  std::uint64_t size_ = 0;
 };
 
 }  // namespace libmap

@@ -110,8 +110,8 @@ PointCloud transform_cloud(const PointCloud& cloud, const Pose& target_from_sour
   // The identity means an unknown viewpoint, which a transform does not change.
   if (!cloud.viewpoint.matrix().isIdentity(0.0))
     moved.viewpoint = target_from_source * cloud.viewpoint;
-  change_vectors(moved, "vp", [&](const Eigen::Vector3d& place) -> Eigen::Vector3d {
-    return target_from_source * place;
+  change_vectors(moved, "vp", [&](const Eigen::Vector3d& origin) -> Eigen::Vector3d {
+    return target_from_source * origin;
   });
   change_vectors(moved, "approach", [&](const Eigen::Vector3d& direction) -> Eigen::Vector3d {
     return target_from_source.linear() * direction;

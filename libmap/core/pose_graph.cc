@@ -47,10 +47,10 @@ std::string to_text(PoseSource source) {
 }
 
 const GraphNode* PoseGraph::find_node(int id) const {
-  const auto place =
+  const auto entry =
       std::lower_bound(nodes.begin(), nodes.end(), id,
                        [](const GraphNode& node, int value) { return node.id < value; });
-  return place != nodes.end() && place->id == id ? &*place : nullptr;
+  return entry != nodes.end() && entry->id == id ? &*entry : nullptr;
 }
 
 Trajectory trajectory_of(const PoseGraph& graph, PoseSource source) {
@@ -61,8 +61,8 @@ Trajectory trajectory_of(const PoseGraph& graph, PoseSource source) {
     if (source == PoseSource::odometry) pose = node.odometry_from_base;
     if (source == PoseSource::ground_truth) pose = node.truth_from_base;
     if (source == PoseSource::optimized) {
-      const auto place = graph.optimized_map_from_base.find(node.id);
-      if (place != graph.optimized_map_from_base.end()) pose = place->second;
+      const auto entry = graph.optimized_map_from_base.find(node.id);
+      if (entry != graph.optimized_map_from_base.end()) pose = entry->second;
     }
     if (pose) trajectory.push_back({node.id, node.stamp_s, *pose});
   }

@@ -25,7 +25,7 @@ struct NamedResult {
       : key(std::move(result_key)),
         description(std::move(text)),
         type(type_of<Found>()),
-        may_lack(is_optional<Found>) {
+        may_be_absent(is_optional<Found>) {
     if constexpr (is_optional<Found>)
       value = found ? std::optional(held(*found)) : std::nullopt;
     else
@@ -35,7 +35,7 @@ struct NamedResult {
   std::string key;                     // with its unit: "radius_m"
   std::string description;             // one line
   ManifestValue type;                  // a default value of the type of `value`
-  bool may_lack;                       // true for optionals
+  bool may_be_absent;                       // true for optionals
   std::optional<ManifestValue> value;  // nullopt: null in JSON, omitted in the manifest
 
  private:

@@ -91,7 +91,7 @@ std::vector<Eigen::Vector3f> estimate_vertex_normals(const TriangleMesh& mesh) {
 
 namespace {
 
-void require_one_a_triangle(const TexturedMesh& model, const char* name, std::size_t count) {
+void require_one_per_triangle(const TexturedMesh& model, const char* name, std::size_t count) {
   if (count == model.mesh.triangles.size()) return;
   throw Error("not one per triangle", {.field = name,
                                        .value = std::to_string(count) + " values",
@@ -102,8 +102,8 @@ void require_one_a_triangle(const TexturedMesh& model, const char* name, std::si
 
 void TexturedMesh::check() const {
   mesh.check();
-  require_one_a_triangle(*this, "texture_coordinates", texture_coordinates.size());
-  require_one_a_triangle(*this, "page_of_triangle", page_of_triangle.size());
+  require_one_per_triangle(*this, "texture_coordinates", texture_coordinates.size());
+  require_one_per_triangle(*this, "page_of_triangle", page_of_triangle.size());
   for (std::size_t t = 0; t < page_of_triangle.size(); ++t) {
     const std::int32_t page = page_of_triangle[t];
     if (page != no_page && (page < 0 || static_cast<std::size_t>(page) >= pages.size()))

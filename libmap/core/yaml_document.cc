@@ -83,9 +83,9 @@ void read_yaml(const std::string& text, const std::string& file,
     if (has_second_document(text)) throw Error("contains more than one YAML document");
     read(YAML::Load(text));
   } catch (const YAML::Exception& error) {
-    const std::string place =
+    const std::string position =
         error.mark.is_null() ? "" : "line " + std::to_string(error.mark.line + 1);
-    throw Error("not valid YAML: " + error.msg, {.file = file, .field = place});
+    throw Error("not valid YAML: " + error.msg, {.file = file, .field = position});
   } catch (const Error& error) {
     throw error.in_file(file);
   }
@@ -108,8 +108,8 @@ void check_keys(const YAML::Node& map, const std::vector<std::string>& known,
   }
 }
 
-Error at_node(const Error& error, const std::string& place, const YAML::Node& node) {
-  ErrorContext context = error.in_field(place, ".").context();
+Error at_node(const Error& error, const std::string& position, const YAML::Node& node) {
+  ErrorContext context = error.in_field(position, ".").context();
   if (!node.Mark().is_null())
     context.field += " (line " + std::to_string(node.Mark().line + 1) + ")";
   return Error(error.reason(), context);

@@ -34,6 +34,6 @@ void check_keys(const YAML::Node& map, const std::vector<std::string>& known,
                 const std::string& whose = "");
 
 // Returns a copy of `error` with the field "PLACE.FIELD (line N)", where N is the line of `node`.
-Error at_node(const Error& error, const std::string& place, const YAML::Node& node);
+Error at_node(const Error& error, const std::string& position, const YAML::Node& node);
 
 }  // namespace libmap

@@ -26,11 +26,11 @@ struct CalibratedObservation {
   bool registration = false;
   bool timing = false;
   DepthCorrection::Terms terms{};
-  bool knows_depth = true;
+  bool has_depth = true;
   double added_m = 0.0;                 // change of the depth by the known registration and timing
   Vector6d by_step = Vector6d::Zero();  // derivative of the depth by a registration step
   Vector6d known_step = Vector6d::Zero();  // registration step equal to the known timing
-  double row_share = 0.0;                  // row_share_of
+  double row_share = 0.0;                  // row_fraction
   double depth_later_s = 0.0;              // FrameFeatures::depth_later_s
 };
 
@@ -66,7 +66,7 @@ class CalibratedFeature {
         focal_(camera.fx, camera.fy),
         weight_(1.0 / static_cast<double>(feature.pixel_noise_px),
                 1.0 / static_cast<double>(feature.pixel_noise_px),
-                1.0 / static_cast<double>(calibrated.knows_depth ? feature.depth_noise_m
+                1.0 / static_cast<double>(calibrated.has_depth ? feature.depth_noise_m
                                                                  : unknown_depth_m)),
         calibrated_(calibrated) {}
 

@@ -182,7 +182,7 @@ bool DepthSurface::at(int column, int row, SurfacePatch& element) const {
   return true;
 }
 
-std::optional<Eigen::Vector2d> DepthSurface::place_of(
+std::optional<Eigen::Vector2d> DepthSurface::grid_position(
     const Eigen::Vector3d& point_in_camera) const {
   if (columns_ == 0 || !(point_in_camera.z() > 0.0)) return std::nullopt;
   if (!rays_.empty()) {
@@ -195,24 +195,24 @@ std::optional<Eigen::Vector2d> DepthSurface::place_of(
       (camera_.fy * point_in_camera.y() / point_in_camera.z() + camera_.cy) / step_px_);
 }
 
-bool DepthSurface::seen_at(const Eigen::Vector3d& point_in_camera, SurfacePatch& element) const {
-  const auto place = place_of(point_in_camera);
-  if (!place) return false;
-  const double column = std::round(place->x());
-  const double row = std::round(place->y());
+bool DepthSurface::nearest_to(const Eigen::Vector3d& point_in_camera, SurfacePatch& element) const {
+  const auto in_grid = grid_position(point_in_camera);
+  if (!in_grid) return false;
+  const double column = std::round(in_grid->x());
+  const double row = std::round(in_grid->y());
   if (!(column >= 0.0 && column < columns_ && row >= 0.0 && row < rows_)) return false;
   return at(static_cast<int>(column), static_cast<int>(row), element);
 }
 
-bool DepthSurface::met_at(const Eigen::Vector3d& point_in_camera, SurfacePatch& element) const {
-  const auto place = place_of(point_in_camera);
-  if (!place) return false;
-  const double left = std::floor(place->x());
-  const double top = std::floor(place->y());
+bool DepthSurface::interpolated_at(const Eigen::Vector3d& point_in_camera, SurfacePatch& element) const {
+  const auto in_grid = grid_position(point_in_camera);
+  if (!in_grid) return false;
+  const double left = std::floor(in_grid->x());
+  const double top = std::floor(in_grid->y());
   if (!(left >= 0.0 && left < columns_ - 1 && top >= 0.0 && top < rows_ - 1))
-    return seen_at(point_in_camera, element);
-  const double u = place->x() - left;
-  const double v = place->y() - top;
+    return nearest_to(point_in_camera, element);
+  const double u = in_grid->x() - left;
+  const double v = in_grid->y() - top;
   const Eigen::Vector3d ray = point_in_camera / point_in_camera.z();
   SurfacePatch blend;
   double depth_m = 0.0;
@@ -223,7 +223,7 @@ bool DepthSurface::met_at(const Eigen::Vector3d& point_in_camera, SurfacePatch& 
     const int down = corner >> 1;
     SurfacePatch plane;
     if (!at(static_cast<int>(left) + right, static_cast<int>(top) + down, plane))
-      return seen_at(point_in_camera, element);
+      return nearest_to(point_in_camera, element);
     const double weight = (right == 1 ? u : 1.0 - u) * (down == 1 ? v : 1.0 - v);
     const double met_m = plane.normal.dot(plane.point) / plane.normal.dot(ray);
     least_m = std::min(least_m, met_m);
@@ -233,7 +233,7 @@ bool DepthSurface::met_at(const Eigen::Vector3d& point_in_camera, SurfacePatch& 
     blend.noise_m += weight * plane.noise_m;
   }
   if (!(least_m > 0.0 && most_m - least_m < most_step * most_m))
-    return seen_at(point_in_camera, element);
+    return nearest_to(point_in_camera, element);
   element = blend;
   element.point = depth_m * ray;
   element.normal.normalize();

@@ -63,10 +63,10 @@ class DepthSurface {
   // Element at a grid position, which must be inside the grid.
   bool at(int column, int row, SurfacePatch& element) const;
   // Element nearest to the projection of `point_in_camera`.
-  bool seen_at(const Eigen::Vector3d& point_in_camera, SurfacePatch& element) const;
+  bool nearest_to(const Eigen::Vector3d& point_in_camera, SurfacePatch& element) const;
   // Surface on the ray through the point: bilinear mean of the four neighboring planes if all four
   // were measured on one surface, otherwise the nearest plane.
-  bool met_at(const Eigen::Vector3d& point_in_camera, SurfacePatch& element) const;
+  bool interpolated_at(const Eigen::Vector3d& point_in_camera, SurfacePatch& element) const;
 
  private:
   Camera camera_{};
@@ -79,7 +79,7 @@ class DepthSurface {
   void find_rays();
   Eigen::Vector2d ray_at(int column, int row) const;
   // Projection of a point, in steps of the grid; nullopt if it is not in the image.
-  std::optional<Eigen::Vector2d> place_of(const Eigen::Vector3d& point_in_camera) const;
+  std::optional<Eigen::Vector2d> grid_position(const Eigen::Vector3d& point_in_camera) const;
   std::size_t index(int column, int row) const {
     return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
            static_cast<std::size_t>(column);

@@ -59,7 +59,7 @@ std::vector<T> values_of(const Json& json) {
   return values;
 }
 
-std::string packed(const FrameFeatures& frame) {
+std::string encode(const FrameFeatures& frame) {
   std::vector<float> numbers;
   std::vector<std::uint16_t> cameras;
   for (const Feature& feature : frame.features) {
@@ -110,7 +110,7 @@ class DepthCheck : public Json::json_sax_t {
   int depth_ = 0;
 };
 
-FrameFeatures unpacked(std::string_view bytes, FeatureType type,
+FrameFeatures decode(std::string_view bytes, FeatureType type,
                        const std::vector<Camera>& depth_cameras) {
   if (!DepthCheck::passes(bytes)) throw Error("not CBOR or nested too deeply");
   const Json json = Json::from_cbor(bytes);
@@ -172,7 +172,7 @@ bool FeatureCache::read(const std::string& key, const std::vector<Camera>& depth
     if (text.size() <= digest_digits || text[digest_digits] != '\n') return false;
     const std::string_view body = std::string_view(text).substr(digest_digits + 1);
     if (sha256_of(body) != std::string_view(text).substr(0, digest_digits)) return false;
-    FrameFeatures read = unpacked(body, frame.type, depth_cameras);
+    FrameFeatures read = decode(body, frame.type, depth_cameras);
     frame.features = std::move(read.features);
     frame.descriptors = std::move(read.descriptors);
     frame.surfaces = std::move(read.surfaces);
@@ -185,7 +185,7 @@ bool FeatureCache::read(const std::string& key, const std::vector<Camera>& depth
   }
 }
 
-std::shared_ptr<TempFile> FeatureCache::unnamed_file() const {
+std::shared_ptr<TempFile> FeatureCache::temp_file() const {
   if (!enabled()) return nullptr;
   try {
     std::error_code failure;
@@ -201,7 +201,7 @@ bool FeatureCache::write(const std::string& key, const FrameFeatures& frame) con
   try {
     std::error_code failure;
     std::filesystem::create_directory(folder_, failure);
-    const std::string body = packed(frame);
+    const std::string body = encode(frame);
     write_whole_file(path_of(key), sha256_of(body) + "\n" + body);
     return true;
   } catch (const Error&) {

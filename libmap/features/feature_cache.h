@@ -29,7 +29,7 @@ class FeatureCache {
   bool read(const std::string& key, const std::vector<Camera>& depth_cameras,
             FrameFeatures& frame) const;
   // Temporary file in the folder; nullptr if the cache is disabled or the file cannot be created.
-  std::shared_ptr<TempFile> unnamed_file() const;
+  std::shared_ptr<TempFile> temp_file() const;
   // Stores the frame. Returns false, without an error, if the file cannot be written.
   bool write(const std::string& key, const FrameFeatures& frame) const;
 

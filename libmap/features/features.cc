@@ -314,7 +314,7 @@ FeatureResult find_features(const ScanSource& scan, const std::vector<int>& node
   PixelRayCache rays;
   MemoryBudget memory;
   const std::shared_ptr<TempFile> file =
-      cache != nullptr && nodes.size() > options.max_frames_in_memory ? cache->unnamed_file()
+      cache != nullptr && nodes.size() > options.max_frames_in_memory ? cache->temp_file()
                                                                       : nullptr;
   progress.begin("features", nodes.size());
   parallel_for(nodes.size(), 1, [&](std::size_t begin, std::size_t end) {

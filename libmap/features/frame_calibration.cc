@@ -25,7 +25,7 @@ bool plane_at(const FrameFeatures& frame, const Feature& feature, const Pose& co
   double depth = static_cast<double>(feature.depth_m);
   // The lookup needs the intersection of ray and plane, which is found by iteration.
   for (int round = 0; round < 4; ++round) {
-    if (!surface.met_at(from_seen * (depth * ray), element)) return false;
+    if (!surface.interpolated_at(from_seen * (depth * ray), element)) return false;
     element.point = seen_from * element.point;
     element.normal = seen_from.linear() * element.normal;
     const double facing = element.normal.dot(ray);
@@ -66,8 +66,8 @@ DepthCorrection correction_for(const std::vector<FrameFeatures>& frames, std::si
 Eigen::Vector2f moved_ray(const Feature& feature, const Camera& camera,
                           const IntrinsicsStep& step) {
   const Eigen::Vector2d ray = feature.ray.cast<double>();
-  return Eigen::Vector2d((camera.fx * ray.x() - step.cx_px) / (camera.fx * (1.0 + step.fx_share)),
-                         (camera.fy * ray.y() - step.cy_px) / (camera.fy * (1.0 + step.fy_share)))
+  return Eigen::Vector2d((camera.fx * ray.x() - step.cx_px) / (camera.fx * (1.0 + step.fx_relative)),
+                         (camera.fy * ray.y() - step.cy_px) / (camera.fy * (1.0 + step.fy_relative)))
       .cast<float>();
 }
 
@@ -103,7 +103,7 @@ std::vector<Pose> row_motions(const FrameFeatures& frame, const SensorCalibratio
   for (const Feature& feature : frame.features) {
     const Camera& camera = frame.cameras[feature.camera];
     const double time_s =
-        calibration.timing[feature.camera].rolling_shutter_s * row_share_of(feature, camera);
+        calibration.timing[feature.camera].rolling_shutter_s * row_fraction(feature, camera);
     motions.push_back(moved(Pose::Identity(), time_s * motion_in_camera(camera, motion->second)));
   }
   return motions;
@@ -123,8 +123,8 @@ void move_surfaces(FrameFeatures& frame, const std::vector<IntrinsicsStep>& step
 }  // namespace
 
 Camera moved(Camera camera, const IntrinsicsStep& step) {
-  camera.fx *= 1.0 + step.fx_share;
-  camera.fy *= 1.0 + step.fy_share;
+  camera.fx *= 1.0 + step.fx_relative;
+  camera.fy *= 1.0 + step.fy_relative;
   camera.cx += step.cx_px;
   camera.cy += step.cy_px;
   return camera;
@@ -191,7 +191,7 @@ double squared_radius_of(const Feature& feature, const Camera& camera) {
   return squared_image_radius(camera.width, camera.height, pixel.x(), pixel.y());
 }
 
-double row_share_of(const Feature& feature, const Camera& camera) {
+double row_fraction(const Feature& feature, const Camera& camera) {
   const double row = distort_to_pixel(camera, feature.ray.cast<double>()).y();
   return row / std::max(1, camera.height - 1) - 0.5;
 }
@@ -217,7 +217,7 @@ Pose color_from_depth_of(const FrameFeatures& frame, const Feature& feature,
   const Camera& camera = frame.cameras[feature.camera];
   const CameraTiming& timing = calibration.timing[feature.camera];
   const double later_s = timing.depth_delay_s + frame.depth_later_s -
-                         timing.rolling_shutter_s * row_share_of(feature, camera);
+                         timing.rolling_shutter_s * row_fraction(feature, camera);
   return moved(Pose::Identity(), later_s * motion_in_camera(camera, motion->second)) * pose;
 }
 

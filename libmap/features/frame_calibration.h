@@ -15,8 +15,8 @@ namespace libmap {
 
 // Change of a camera's intrinsics.
 struct IntrinsicsStep {
-  double fx_share = 0.0;  // relative to fx
-  double fy_share = 0.0;  // relative to fy
+  double fx_relative = 0.0;  // relative to fx
+  double fy_relative = 0.0;  // relative to fy
   double cx_px = 0.0;
   double cy_px = 0.0;
 };
@@ -59,7 +59,7 @@ Camera moved(Camera camera, const IntrinsicsStep& step);
 double squared_radius_of(const Feature& feature, const Camera& camera);
 // Image row of a feature from -0.5 (first row) to 0.5 (last row). The row is exposed this share of
 // CameraTiming::rolling_shutter_s after the middle row.
-double row_share_of(const Feature& feature, const Camera& camera);
+double row_fraction(const Feature& feature, const Camera& camera);
 
 // Converts a velocity of the base (base frame) to that of the camera (optical frame).
 Vector6d motion_in_camera(const Camera& camera, const Vector6d& base_motion);

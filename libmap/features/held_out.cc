@@ -26,16 +26,16 @@ const Pose* pose_of(const FrameFeatures& frame, const std::map<int, Pose>& map_f
   return pose == map_from_base.end() ? nullptr : &pose->second;
 }
 
-void add_residuals(const std::vector<BaseElement>& samples, const FrameFeatures& onto,
+void add_residuals(const std::vector<PlacedElement>& samples, const FrameFeatures& onto,
                    const Pose* from_pose, const Pose* onto_pose,
                    std::vector<SurfaceResidual>& residuals) {
-  for (const BaseElement& sample : samples) {
+  for (const PlacedElement& sample : samples) {
     residuals.push_back({.distance_m = std::numeric_limits<double>::quiet_NaN()});
     if (from_pose == nullptr || onto_pose == nullptr) continue;
     const Pose onto_from_from = onto_pose->inverse() * *from_pose;
     const Eigen::Vector3d point = onto_from_from * sample.point;
-    BaseElement plane;
-    if (!seen_from_base(onto, point, plane) ||
+    PlacedElement plane;
+    if (!element_at(onto, point, plane) ||
         plane.normal.dot(onto_from_from.linear() * sample.normal) < min_cosine)
       continue;
     residuals.back() = {plane.normal.dot(point - plane.point),
@@ -101,7 +101,7 @@ std::vector<double> match_costs(const std::vector<FrameFeatures>& frames,
 std::vector<SurfaceResidual> surface_residuals(const std::vector<FrameFeatures>& frames,
                                                const std::vector<FeatureLink>& links,
                                                const std::map<int, Pose>& map_from_base) {
-  std::vector<std::vector<BaseElement>> samples(frames.size());
+  std::vector<std::vector<PlacedElement>> samples(frames.size());
   parallel_for(frames.size(), 8, [&](std::size_t begin, std::size_t end) {
     for (std::size_t f = begin; f < end; ++f)
       samples[f] = surface_samples(frames[f], samples_of_frame, SampleUse::checks);

@@ -18,10 +18,10 @@ std::vector<int> quantize(const Eigen::MatrixXf& vectors, const Eigen::MatrixXf&
   std::vector<int> nearest(static_cast<std::size_t>(vectors.cols()), 0);
   for (Eigen::Index begin = 0; begin < vectors.cols(); begin += block) {
     const Eigen::Index count = std::min(block, vectors.cols() - begin);
-    const Eigen::MatrixXf likeness = words.transpose() * vectors.middleCols(begin, count);
+    const Eigen::MatrixXf similarities = words.transpose() * vectors.middleCols(begin, count);
     for (Eigen::Index n = 0; n < count; ++n) {
       Eigen::Index best = 0;
-      likeness.col(n).maxCoeff(&best);
+      similarities.col(n).maxCoeff(&best);
       nearest[static_cast<std::size_t>(begin + n)] = static_cast<int>(best);
     }
   }

@@ -19,19 +19,19 @@ namespace {
 constexpr int max_steps = 20;
 
 // Index of the best row for each column, or -1 if none passes the ratio test.
-std::vector<int> best_matches(const Eigen::MatrixXf& likeness, double max_ratio) {
-  std::vector<int> best(static_cast<std::size_t>(likeness.cols()), -1);
+std::vector<int> best_matches(const Eigen::MatrixXf& similarities, double max_ratio) {
+  std::vector<int> best(static_cast<std::size_t>(similarities.cols()), -1);
   const auto limit = static_cast<float>(max_ratio * max_ratio);
-  for (Eigen::Index column = 0; column < likeness.cols(); ++column) {
+  for (Eigen::Index column = 0; column < similarities.cols(); ++column) {
     float first = -2.0F;
     float second = -2.0F;
-    int place = -1;
-    for (Eigen::Index row = 0; row < likeness.rows(); ++row) {
-      const float value = likeness(row, column);
+    int nearest = -1;
+    for (Eigen::Index row = 0; row < similarities.rows(); ++row) {
+      const float value = similarities(row, column);
       if (value > first) {
         second = first;
         first = value;
-        place = static_cast<int>(row);
+        nearest = static_cast<int>(row);
       } else if (value > second) {
         second = value;
       }
@@ -39,8 +39,8 @@ std::vector<int> best_matches(const Eigen::MatrixXf& likeness, double max_ratio)
     // |x - y|^2 = 2 - 2 x.y for unit vectors; max() covers rounding.
     const float best_square = std::max(0.0F, 1.0F - first);
     const float next_square = std::max(0.0F, 1.0F - second);
-    if (place >= 0 && (max_ratio >= 1.0 || best_square < limit * next_square))
-      best[static_cast<std::size_t>(column)] = place;
+    if (nearest >= 0 && (max_ratio >= 1.0 || best_square < limit * next_square))
+      best[static_cast<std::size_t>(column)] = nearest;
   }
   return best;
 }
@@ -218,9 +218,9 @@ std::vector<FeatureMatch> match_features(const Eigen::MatrixXf& a, const Eigen::
                                          double max_ratio) {
   std::vector<FeatureMatch> matches;
   if (a.cols() == 0 || b.cols() == 0 || a.rows() != b.rows()) return matches;
-  const Eigen::MatrixXf likeness = b.transpose() * a;  // b x a
-  const std::vector<int> of_a = best_matches(likeness, max_ratio);
-  const std::vector<int> of_b = best_matches(likeness.transpose(), 1.0);
+  const Eigen::MatrixXf similarities = b.transpose() * a;  // b x a
+  const std::vector<int> of_a = best_matches(similarities, max_ratio);
+  const std::vector<int> of_b = best_matches(similarities.transpose(), 1.0);
   for (std::size_t n = 0; n < of_a.size(); ++n)
     if (of_a[n] >= 0 && of_b[static_cast<std::size_t>(of_a[n])] == static_cast<int>(n))
       matches.push_back({static_cast<int>(n), of_a[n]});

@@ -24,14 +24,14 @@ bool is_for_checks(int node, std::size_t camera, int row, int column) {
 
 }  // namespace
 
-std::vector<BaseElement> surface_samples(const FrameFeatures& frame, int count, SampleUse use) {
+std::vector<PlacedElement> surface_samples(const FrameFeatures& frame, int count, SampleUse use) {
   std::size_t cells = 0;
   for (const DepthSurface& surface : frame.surfaces)
     cells += static_cast<std::size_t>(surface.columns()) * static_cast<std::size_t>(surface.rows());
   if (use == SampleUse::checks) cells /= every_patch;
   const int step = std::max(
       1, static_cast<int>(std::floor(std::sqrt(static_cast<double>(cells) / std::max(1, count)))));
-  std::vector<BaseElement> samples;
+  std::vector<PlacedElement> samples;
   for (std::size_t camera = 0; camera < frame.surfaces.size(); ++camera) {
     const DepthSurface& surface = frame.surfaces[camera];
     const Pose& base_from_camera = surface.camera().base_from_camera;
@@ -48,12 +48,12 @@ std::vector<BaseElement> surface_samples(const FrameFeatures& frame, int count, 
   return samples;
 }
 
-bool seen_from_base(const FrameFeatures& frame, const Eigen::Vector3d& point_in_base,
-                    BaseElement& element) {
+bool element_at(const FrameFeatures& frame, const Eigen::Vector3d& point_in_base,
+                    PlacedElement& element) {
   for (const DepthSurface& surface : frame.surfaces) {
     const Pose& base_from_camera = surface.camera().base_from_camera;
     SurfacePatch seen;
-    if (!surface.seen_at(base_from_camera.inverse() * point_in_base, seen)) continue;
+    if (!surface.nearest_to(base_from_camera.inverse() * point_in_base, seen)) continue;
     element = {base_from_camera * seen.point, base_from_camera.linear() * seen.normal, seen.noise_m,
                seen.point.z()};
     return true;

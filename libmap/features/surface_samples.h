@@ -9,7 +9,7 @@
 namespace libmap {
 
 // Plane element in the base frame (m).
-struct BaseElement {
+struct PlacedElement {
   Eigen::Vector3d point = Eigen::Vector3d::Zero();
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
   double noise_m = 0.0;  // standard deviation along the normal
@@ -20,11 +20,11 @@ struct BaseElement {
 enum class SampleUse { estimation, checks };
 
 // Returns about `count` elements, evenly distributed over the images.
-std::vector<BaseElement> surface_samples(const FrameFeatures& frame, int count, SampleUse use);
+std::vector<PlacedElement> surface_samples(const FrameFeatures& frame, int count, SampleUse use);
 
 // Finds the element at the projection of the point, in the first camera that has one. Returns false
 // if there is none.
-bool seen_from_base(const FrameFeatures& frame, const Eigen::Vector3d& point_in_base,
-                    BaseElement& element);
+bool element_at(const FrameFeatures& frame, const Eigen::Vector3d& point_in_base,
+                    PlacedElement& element);
 
 }  // namespace libmap

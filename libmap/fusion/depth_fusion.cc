@@ -210,7 +210,7 @@ class Fusion {
           known.add(part.coverage);
         }
       }
-      if (!survey_.redundant.empty()) images_.keep_only(frames());
+      if (!survey_.redundant.empty()) images_.evict_others(frames());
       progress_->advance(parts.size());
     }
   }
@@ -227,8 +227,8 @@ class Fusion {
     };
     each_frame(frames().size(), sampled_, make, [&](const CoarseFrame& coarse) {
       sample_.merge(coarse.voxels, sampled_);
-      while (sample_.size() > max_voxels && sampled_.thinning < max_thinning) {
-        ++sampled_.thinning;
+      while (sample_.size() > max_voxels && sampled_.subsampling_level < max_thinning) {
+        ++sampled_.subsampling_level;
         sample_ = sample_.in(sampled_);
       }
     });
@@ -438,7 +438,7 @@ TileFusion::Tile Fusion::fuse_tile(const TileMask& cells, int element_margin,
   TileFusion::Tile tile;
   std::vector<FusionFrame> of_tile;
   for (const std::size_t n : members.frames) of_tile.push_back(frames()[n]);
-  images_.keep_only(of_tile);
+  images_.evict_others(of_tile);
   const TileMask around = cells.grown(element_margin);
   std::vector<SurfaceElement> elements;
   timed("coarse surface", [&] {
@@ -447,11 +447,11 @@ TileFusion::Tile Fusion::fuse_tile(const TileMask& cells, int element_margin,
     elements = surface_elements(voxels, options_.extend_edges);
   });
   std::erase_if(elements, [&](const SurfaceElement& element) {
-    return !around.has_place(element.position.head<2>());
+    return !around.contains(element.position.head<2>());
   });
   const auto voxel = static_cast<float>(options_.voxel_size_m);
   for (SurfaceElement& element : elements) {
-    if (cells.has_place(element.position.head<2>())) ++tile.counts.elements;
+    if (cells.contains(element.position.head<2>())) ++tile.counts.elements;
     element.position *= voxel;
   }
   RefinedSurface surface;

@@ -13,8 +13,8 @@ void describe_surface(ResultTable& table, const FusionCounts& counts) {
   table.add("dropped_seen_through", points.seen_through, Merge::sum,
             "elements that too many views see through");
   table.add("dropped_missed", points.missed, Merge::sum, "elements where views measured nothing");
-  table.add("dropped_beside", points.beside, Merge::sum, "elements connected to contradicted ones");
-  table.add("dropped_beyond_edges", points.bent_away, Merge::sum,
+  table.add("dropped_beside", points.contradicted, Merge::sum, "elements connected to contradicted ones");
+  table.add("dropped_beyond_edges", points.beyond_edge, Merge::sum,
             "points beyond an edge where the surface ends");
   table.add("merged", points.merged, Merge::sum, "elements merged with one of the same voxel");
   table.add("points", counts.points_made, Merge::sum, "points of the cloud");

@@ -85,14 +85,14 @@ struct DepthPlaneLoops {
     float axial_of_range;
     float axial_of_square;
   };
-  struct Places {
-    float* place[3];
+  struct PlacedElements {
+    float* position[3];
     float* normal[3];
     float* weight;
   };
   // Transforms planes with support to the grid.
   void (*place)(const Planes& planes, const float* ray_x, const float* ray_y, int count,
-                const Placement& placement, const Places& places);
+                const Placement& placement, const PlacedElements& placed);
   // Transforms measured depths to x and y in the grid.
   void (*place_depths)(const float* depth, const float* ray_x, const float* ray_y, int count,
                        const Placement& placement, float* x, float* y);

@@ -234,7 +234,7 @@ inline Floats turned(const float* row, const Floats& x, const Floats& y, const F
 }
 
 void place(const DepthPlaneLoops::Planes& planes, const float* ray_x, const float* ray_y, int count,
-           const DepthPlaneLoops::Placement& placement, const DepthPlaneLoops::Places& places) {
+           const DepthPlaneLoops::Placement& placement, const DepthPlaneLoops::PlacedElements& placed) {
   for (int x = 0; x < count; x += width) {
     if (!any(planes.support + x)) continue;
     const Floats depth = load<Floats>(planes.depth_m + x);
@@ -246,15 +246,15 @@ void place(const DepthPlaneLoops::Planes& planes, const float* ray_x, const floa
     const Floats nz = load<Floats>(planes.normal[2] + x);
     for (int axis = 0; axis < 3; ++axis) {
       const float* const row = placement.rotation + 3 * axis;
-      store(turned(row, px, py, z) + placement.translation[axis], places.place[axis] + x);
-      store(turned(row, nx, ny, nz), places.normal[axis] + x);
+      store(turned(row, px, py, z) + placement.translation[axis], placed.position[axis] + x);
+      store(turned(row, nx, ny, nz), placed.normal[axis] + x);
     }
     const Floats sigma =
         placement.axial_m + (placement.axial_of_range + placement.axial_of_square * depth) * depth;
     const Floats support = __builtin_convertvector(
         __builtin_convertvector(load<Bytes>(planes.support + x), Ints), Floats);
     // Frontal views determine lateral position and normal better.
-    store(load<Floats>(planes.cosine + x) * support / (sigma * sigma), places.weight + x);
+    store(load<Floats>(planes.cosine + x) * support / (sigma * sigma), placed.weight + x);
   }
 }
 

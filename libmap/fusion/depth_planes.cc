@@ -45,7 +45,7 @@ class PlaneFit {
 
   DepthPixelCounts run(const UsePlaneRow& use) {
     fit_pairs();
-    for (int ring = 0; ring < edge_reach_px; ++ring) reach_out();
+    for (int ring = 0; ring < edge_reach_px; ++ring) extend_planes();
     finish(use);
     return counts_;
   }
@@ -81,15 +81,15 @@ class PlaneFit {
   std::vector<Loops::Offset> pair_offsets() const;
   void fit_pairs();
   // A pixel at the edge of a surface, with the adjacent plane that it takes.
-  struct Taken {
+  struct ExtendedPixel {
     std::size_t plane = 0;
     std::size_t support = 0;
     std::size_t from = 0;
     float value = 0.0F;
   };
-  std::uint64_t open_pixels(int x, int y) const;
-  void take_plane_beside(int x, int y, std::vector<Taken>& taken) const;
-  void reach_out();
+  std::uint64_t edge_pixels(int x, int y) const;
+  void take_plane_beside(int x, int y, std::vector<ExtendedPixel>& taken) const;
+  void extend_planes();
   void finish(const UsePlaneRow& use);
 
   const DepthImage& depth_;
@@ -189,7 +189,7 @@ void PlaneFit::fit_pairs() {
 
 // One byte for each of eight adjacent pixels: not 0 if a neighbor has a plane. 0 for all if all
 // eight have planes.
-std::uint64_t PlaneFit::open_pixels(int x, int y) const {
+std::uint64_t PlaneFit::edge_pixels(int x, int y) const {
   const auto eight = [&](std::size_t first) {
     std::uint64_t word = 0;
     std::memcpy(&word, &support_[first], sizeof(word));
@@ -206,10 +206,10 @@ std::uint64_t PlaneFit::open_pixels(int x, int y) const {
   return near;
 }
 
-void PlaneFit::take_plane_beside(int x, int y, std::vector<Taken>& taken) const {
+void PlaneFit::take_plane_beside(int x, int y, std::vector<ExtendedPixel>& taken) const {
   if (measured(x, y) <= 0.0F || support_[support_at(x, y)] > 0) return;
   float best = tolerance_[plane_at(x, y)] / std::sqrt(1.5F);
-  Taken found;
+  ExtendedPixel found;
   for (int dy = -1; dy <= 1; ++dy)
     for (int dx = -1; dx <= 1; ++dx) {
       if (support_[support_at(x + dx, y + dy)] == 0) continue;
@@ -224,16 +224,16 @@ void PlaneFit::take_plane_beside(int x, int y, std::vector<Taken>& taken) const 
   if (found.support > 0) taken.push_back(found);
 }
 
-void PlaneFit::reach_out() {
-  std::vector<Taken> taken;
+void PlaneFit::extend_planes() {
+  std::vector<ExtendedPixel> taken;
   constexpr int word = sizeof(std::uint64_t);
   for (int y = 0; y < height_; ++y)
     for (int first = 0; first < width_; first += word) {
-      const std::uint64_t open = open_pixels(first, y);
+      const std::uint64_t open = edge_pixels(first, y);
       if (open == 0) continue;
       for (int x = first; x < std::min(first + word, width_); ++x) take_plane_beside(x, y, taken);
     }
-  for (const Taken& one : taken) {
+  for (const ExtendedPixel& one : taken) {
     value_[one.plane] = one.value;
     by_column_[one.plane] = by_column_[one.from];
     by_row_[one.plane] = by_row_[one.from];
@@ -327,8 +327,8 @@ std::vector<std::uint8_t> pixels_in(const DepthImage& depth, const PixelRays& ra
   const auto max_depth = static_cast<float>(max_depth_m);
   std::vector<std::uint8_t> are_in(depth.pixels.size(), 0);
   const auto width = static_cast<std::size_t>(depth.width);
-  std::vector<float> places(2 * (width + Loops::lanes));
-  float* const x = places.data();
+  std::vector<float> coordinates(2 * (width + Loops::lanes));
+  float* const x = coordinates.data();
   float* const y = x + width + Loops::lanes;
   for (int row = 0; row < depth.height; ++row) {
     const std::size_t first = row_begin(depth, row);
@@ -336,7 +336,7 @@ std::vector<std::uint8_t> pixels_in(const DepthImage& depth, const PixelRays& ra
                        x, y);
     for (std::size_t n = 0; n < width; ++n) {
       const float z = depth.pixels[first + n];
-      if (z > 0.0F && z <= max_depth) are_in[first + n] = cells.has_place({x[n], y[n]}) ? 1 : 0;
+      if (z > 0.0F && z <= max_depth) are_in[first + n] = cells.contains({x[n], y[n]}) ? 1 : 0;
     }
   }
   return are_in;
@@ -389,7 +389,7 @@ DepthPixelCounts add_depth_planes(const DepthImage& depth, const PixelRays& rays
   const Loops::Placement placement = placement_of(grid_from_camera, options.noise, voxel_size_m);
   std::vector<std::uint8_t> only;
   if (fitted == FittedPixels::in_cells) {
-    only = cells.thinning > 0 ? pixels_in(depth, rays, placement, options.max_depth_m, cells)
+    only = cells.subsampling_level > 0 ? pixels_in(depth, rays, placement, options.max_depth_m, cells)
                               : pixels_around(depth, rays, placement, options, voxel_size_m, cells);
     if (only.empty()) return {};
   }
@@ -398,18 +398,18 @@ DepthPixelCounts add_depth_planes(const DepthImage& depth, const PixelRays& rays
   const std::size_t stride = width + Loops::lanes;
   std::vector<float> numbers(7 * stride);
   const auto numbers_at = [&](std::size_t n) { return numbers.data() + n * stride; };
-  const Loops::Places places{{numbers_at(0), numbers_at(1), numbers_at(2)},
+  const Loops::PlacedElements placed{{numbers_at(0), numbers_at(1), numbers_at(2)},
                              {numbers_at(3), numbers_at(4), numbers_at(5)},
                              numbers_at(6)};
   return each_plane_row(depth, rays, options, only, [&](int y, const Loops::Planes& planes) {
     const std::size_t first = row_begin(depth, y);
-    loops.place(planes, &rays.x[first], &rays.y[first], depth.width, placement, places);
+    loops.place(planes, &rays.x[first], &rays.y[first], depth.width, placement, placed);
     for (std::size_t x = 0; x < width; ++x) {
       if (planes.support[x] == 0) continue;
-      const Eigen::Vector3f place(places.place[0][x], places.place[1][x], places.place[2][x]);
-      if (!cells.has_place(place.head<2>())) continue;
-      voxels.add(place, {places.normal[0][x], places.normal[1][x], places.normal[2][x]},
-                 places.weight[x]);
+      const Eigen::Vector3f position(placed.position[0][x], placed.position[1][x], placed.position[2][x]);
+      if (!cells.contains(position.head<2>())) continue;
+      voxels.add(position, {placed.normal[0][x], placed.normal[1][x], placed.normal[2][x]},
+                 placed.weight[x]);
     }
   });
 }

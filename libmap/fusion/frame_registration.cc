@@ -42,7 +42,7 @@ class Adjustment {
         corrections_(centers.size(), Vector6d::Zero()) {
     const double turn = options.rotation_error_deg * std::numbers::pi / 180.0;
     prior_.head<3>().setConstant(1.0 / (turn * turn));
-    prior_.tail<3>().setConstant(1.0 / (options.place_error_m * options.place_error_m));
+    prior_.tail<3>().setConstant(1.0 / (options.position_error_m * options.position_error_m));
     for (std::size_t n = 0; n < observations.size(); ++n) {
       weights_[n] = information(observations[n]);
       if (n == 0 || observations[n].element != observations[n - 1].element) starts_.push_back(n);

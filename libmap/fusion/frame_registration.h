@@ -13,7 +13,7 @@ namespace libmap {
 
 struct FrameRegistrationOptions {
   // > 0: standard deviations of the given poses.
-  double place_error_m = 0.02;
+  double position_error_m = 0.02;
   double rotation_error_deg = 1.0;
   // > 0: heights that differ from the others by more than this have less weight.
   double scatter_m = 0.005;

@@ -79,7 +79,7 @@ std::shared_ptr<const RgbdFrame> FusionFrames::depth_of(int node) {
   return frame;
 }
 
-void FusionFrames::keep_only(std::span<const FusionFrame> frames) {
+void FusionFrames::evict_others(std::span<const FusionFrame> frames) {
   const std::scoped_lock lock(mutex_);
   auto kept = std::move(kept_);
   kept_.clear();

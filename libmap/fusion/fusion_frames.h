@@ -50,7 +50,7 @@ class FusionFrames {
   // depth or calibration or cannot be decoded. Can be called from several threads.
   std::shared_ptr<const RgbdFrame> depth_of(int node);
   // Removes the depth of all other frames from the cache.
-  void keep_only(std::span<const FusionFrame> frames);
+  void evict_others(std::span<const FusionFrame> frames);
 
   // Returns true if the first of these frames has a color image.
   bool has_color(std::span<const FusionFrame> frames);

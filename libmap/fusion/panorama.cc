@@ -10,7 +10,7 @@ namespace libmap {
 
 namespace {
 
-constexpr std::size_t rows_a_chunk = 8;
+constexpr std::size_t rows_per_chunk = 8;
 
 struct Part {
   std::vector<Eigen::Vector3d> positions;
@@ -136,7 +136,7 @@ PanoramaResult make_panorama(const std::vector<PanoramaView>& views,
     const int rows_in_steps = (view.depth.height - 1) / options.stride_px + 1;
     const auto rows = static_cast<std::size_t>(rows_in_steps);
     Part part = parallel_reduce(
-        rows, rows_a_chunk, Part{},
+        rows, rows_per_chunk, Part{},
         [&](std::size_t first, std::size_t last) { return projection.rows(first, last); },
         [](Part left, Part right) {
           append(left, std::move(right));

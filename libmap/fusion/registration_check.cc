@@ -96,8 +96,8 @@ PairCosts costs_of(const std::vector<PairSums>& pairs) {
 void keep_held_out(const RefinementView& from, double voxel_size_m, ViewComparison& compared) {
   const Pose grid_from_camera = from.camera_from_grid.inverse();
   for (std::size_t n = 0; n < compared.depth.size(); ++n) {
-    const Eigen::Vector3d place = grid_from_camera * compared.points[n].cast<double>();
-    if (!TileMask::is_held_out((place.head<2>() / voxel_size_m).cast<float>()))
+    const Eigen::Vector3d position = grid_from_camera * compared.points[n].cast<double>();
+    if (!TileMask::is_held_out((position.head<2>() / voxel_size_m).cast<float>()))
       compared.depth[n] = std::numeric_limits<float>::quiet_NaN();
   }
 }

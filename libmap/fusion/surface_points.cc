@@ -198,8 +198,8 @@ class PointMaker {
 };
 
 std::size_t PointMaker::wanted(const SurfaceElement& element) const {
-  const Eigen::Vector2d place = element.position.head<2>().cast<double>() / voxel_size_m_;
-  return cells_.has_cell(place.array().floor().cast<int>()) ? 1 : 0;
+  const Eigen::Vector2d position = element.position.head<2>().cast<double>() / voxel_size_m_;
+  return cells_.has_cell(position.array().floor().cast<int>()) ? 1 : 0;
 }
 
 bool PointMaker::is_contradicted(std::size_t n) {
@@ -267,7 +267,7 @@ void PointMaker::spread_contradiction() {
     if (block_of[n] == VoxelIndex::none || is_contradicted_[n] != 0 || is_moved[block_of[n]] == 0)
       continue;
     is_contradicted_[n] = 1;
-    counts_.beside += wanted(surface_.elements[n]);
+    counts_.contradicted += wanted(surface_.elements[n]);
   }
 }
 
@@ -279,7 +279,7 @@ bool PointMaker::is_confirmed(const SurfaceElement& element, const RefinedElemen
   }
   if (element.extended &&
       std::abs(static_cast<double>(refined.shift_m)) > max_extended_shift * voxel_size_m_) {
-    counts_.bent_away += wanted(element);
+    counts_.beyond_edge += wanted(element);
     return false;
   }
   return true;
@@ -329,13 +329,13 @@ void PointMaker::drop_echoes() {
   std::vector<char> is_surplus(points_.size(), 0);
   parallel_for(points_.size(), 4096, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
-      VoxelPlace place = unpack(index_.keys()[n]);
+      VoxelSide voxel = unpack(index_.keys()[n]);
       int axis = 2;
       points_[n].normal.cwiseAbs().maxCoeff(&axis);
-      place.cell[axis] -= 1;
-      for (int step = 0; step < 2; ++step, place.cell[axis] += 2)
-        for (place.side = 0; place.side < 2; ++place.side) {
-          const std::uint32_t other = index_.find(pack(place));
+      voxel.cell[axis] -= 1;
+      for (int step = 0; step < 2; ++step, voxel.cell[axis] += 2)
+        for (voxel.side = 0; voxel.side < 2; ++voxel.side) {
+          const std::uint32_t other = index_.find(pack(voxel));
           if (other != VoxelIndex::none && is_echo(n, other, axis)) is_surplus[n] = 1;
         }
     }

@@ -30,9 +30,9 @@ struct SurfacePointCounts {
   std::size_t max_views = 0;        // maximum number of frames that measured one element
   std::size_t seen_through = 0;     // dropped: views see through them
   std::size_t missed = 0;           // dropped: views measured nothing there
-  std::size_t beside = 0;           // dropped: measured by one or two frames, in a square where
+  std::size_t contradicted = 0;           // dropped: measured by one or two frames, in a square where
                                     // others contradict most measurements of such frames
-  std::size_t bent_away = 0;        // dropped: beyond an edge where the surface bends
+  std::size_t beyond_edge = 0;        // dropped: beyond an edge where the surface bends
   std::size_t merged = 0;           // merged with, or an echo of, another point
   std::size_t extended_points = 0;  // points of the cloud beyond measured edges
 };

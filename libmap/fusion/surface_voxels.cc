@@ -11,20 +11,20 @@
 
 namespace libmap {
 
-SurfaceVoxels::Sum& SurfaceVoxels::side_of(const VoxelPlace& place, const Eigen::Vector3f& normal) {
-  std::uint32_t number = index_.find_or_add(pack({place.cell, 0}));
+SurfaceVoxels::Sum& SurfaceVoxels::side_of(const VoxelSide& voxel, const Eigen::Vector3f& normal) {
+  std::uint32_t number = index_.find_or_add(pack({voxel.cell, 0}));
   if (number < sums_.size() && sums_[number].normal.dot(normal) < 0.0F)
-    number = index_.find_or_add(pack({place.cell, 1}));
+    number = index_.find_or_add(pack({voxel.cell, 1}));
   if (number == sums_.size()) sums_.emplace_back();
   return sums_[number];
 }
 
-void SurfaceVoxels::add(const Eigen::Vector3f& place, const Eigen::Vector3f& normal, float weight) {
-  const Eigen::Array3f floor = place.array().floor();
+void SurfaceVoxels::add(const Eigen::Vector3f& position, const Eigen::Vector3f& normal, float weight) {
+  const Eigen::Array3f floor = position.array().floor();
   if (!((floor.abs() < static_cast<float>(voxel_cell_limit - 2)).all())) return;
   Sum& sum = side_of({floor.cast<int>().matrix(), 0}, normal);
   sum.weight += weight;
-  sum.offset += weight * (place.array() - floor - 0.5F).matrix();
+  sum.offset += weight * (position.array() - floor - 0.5F).matrix();
   sum.normal += weight * normal;
   sum.frames = 1;
 }
@@ -42,10 +42,10 @@ SurfaceVoxels SurfaceVoxels::in(const TileMask& cells) const {
 
 void SurfaceVoxels::merge(const Frame& frame, const TileMask& cells) {
   for (std::size_t n = 0; n < frame.sums.size(); ++n) {
-    const VoxelPlace place = unpack(frame.keys[n]);
-    if (!cells.has_cell(place.cell.head<2>())) continue;
+    const VoxelSide voxel = unpack(frame.keys[n]);
+    if (!cells.has_cell(voxel.cell.head<2>())) continue;
     const Sum& more = frame.sums[n];
-    Sum& sum = side_of(place, more.normal);
+    Sum& sum = side_of(voxel, more.normal);
     sum.weight += more.weight;
     sum.offset += more.offset;
     sum.normal += more.normal;
@@ -63,7 +63,7 @@ struct Piece {
   Eigen::Vector3f normal = Eigen::Vector3f::Zero();
   int axis = 2;                   // of the column
   float height = 0.0F;            // along the axis, on the column's center line
-  bool speaks = false;            // selected for its column
+  bool is_selected = false;            // selected for its column
   std::array<bool, 4> is_edge{};  // true for neighboring columns without surface
 };
 
@@ -72,8 +72,8 @@ class ElementMaker {
   ElementMaker(const SurfaceVoxels& voxels, bool extend) : voxels_(voxels), pieces_(voxels.size()) {
     each_piece([&](std::size_t n) { pieces_[n] = piece_of(n); });
     each_piece([&](std::size_t n) {
-      pieces_[n].speaks = speaks_for_column(n);
-      for (std::size_t step = 0; extend && pieces_[n].speaks && step < 4; ++step)
+      pieces_[n].is_selected = speaks_for_column(n);
+      for (std::size_t step = 0; extend && pieces_[n].is_selected && step < 4; ++step)
         pieces_[n].is_edge[step] = is_empty(neighbor(n, step), pieces_[n]);
     });
   }
@@ -81,19 +81,19 @@ class ElementMaker {
   std::vector<SurfaceElement> run() {
     for (std::size_t n = 0; n < pieces_.size(); ++n) {
       const Piece& piece = pieces_[n];
-      if (!piece.speaks) continue;
-      const VoxelPlace place = unpack(key_of(n));
+      if (!piece.is_selected) continue;
+      const VoxelSide voxel = unpack(key_of(n));
       found_.emplace_back(z_order(key_of(n)),
-                          element(place.cell, piece.axis, piece.height, piece.normal, false));
+                          element(voxel.cell, piece.axis, piece.height, piece.normal, false));
       for (std::size_t step = 0; step < 4; ++step)
         if (piece.is_edge[step]) expect(neighbor(n, step), piece, voxels_.sums()[n].weight);
     }
     for (std::size_t n = 0; n < beside_.size(); ++n) {
       const Beside& one = beside_[n];
-      const VoxelPlace place = unpack(beside_index_.keys()[n]);
+      const VoxelSide voxel = unpack(beside_index_.keys()[n]);
       found_.emplace_back(
           z_order(beside_index_.keys()[n]),
-          element(place.cell, one.axis, one.height / one.weight, one.normal.normalized(), true));
+          element(voxel.cell, one.axis, one.height / one.weight, one.normal.normalized(), true));
     }
     return in_order();
   }
@@ -136,10 +136,10 @@ class ElementMaker {
 
   bool speaks_for_column(std::size_t n) const {
     const Piece& piece = pieces_[n];
-    const VoxelPlace place = unpack(key_of(n));
-    const int cell = place.cell[piece.axis];
+    const VoxelSide voxel = unpack(key_of(n));
+    const int cell = voxel.cell[piece.axis];
     for (const int beside : {cell - 1, cell + 1}) {
-      const auto other = piece_at(place.cell, piece.axis, beside, piece.normal);
+      const auto other = piece_at(voxel.cell, piece.axis, beside, piece.normal);
       if (!other || pieces_[*other].axis != piece.axis ||
           std::abs(pieces_[*other].height - piece.height) > one_surface)
         continue;
@@ -152,7 +152,7 @@ class ElementMaker {
 
   // Continuation of a piece in an adjacent column.
   struct Neighbor {
-    VoxelPlace place;
+    VoxelSide voxel;
     float height = 0.0F;
   };
 
@@ -169,20 +169,20 @@ class ElementMaker {
     const int direction = step % 2 == 0 ? 1 : -1;
     const float slope = -piece.normal[lateral] / piece.normal[piece.axis];
     Neighbor there{unpack(key_of(n)), piece.height + slope * static_cast<float>(direction)};
-    there.place.cell[lateral] += direction;
-    there.place.cell[piece.axis] = static_cast<int>(std::floor(there.height));
+    there.voxel.cell[lateral] += direction;
+    there.voxel.cell[piece.axis] = static_cast<int>(std::floor(there.height));
     return there;
   }
 
   bool is_empty(const Neighbor& there, const Piece& piece) const {
-    const int cell = there.place.cell[piece.axis];
+    const int cell = there.voxel.cell[piece.axis];
     for (const int height : {cell, cell - 1, cell + 1})
-      if (piece_at(there.place.cell, piece.axis, height, piece.normal)) return false;
+      if (piece_at(there.voxel.cell, piece.axis, height, piece.normal)) return false;
     return true;
   }
 
   void expect(const Neighbor& there, const Piece& piece, float weight) {
-    const std::uint32_t n = beside_index_.find_or_add(pack(there.place));
+    const std::uint32_t n = beside_index_.find_or_add(pack(there.voxel));
     Beside& beside =
         n < beside_.size() ? beside_[n] : beside_.emplace_back(Beside{.axis = piece.axis});
     // Columns along another axis have another center line.
@@ -195,13 +195,13 @@ class ElementMaker {
   std::vector<SurfaceElement> in_order() const {
     std::vector<std::pair<std::uint64_t, std::uint32_t>> order;
     order.reserve(found_.size());
-    for (const auto& [place, element] : found_)
-      order.emplace_back(place, static_cast<std::uint32_t>(order.size()));
+    for (const auto& [key, element] : found_)
+      order.emplace_back(key, static_cast<std::uint32_t>(order.size()));
     // Two elements with the same key are a measured one, followed by an extended one.
     std::sort(order.begin(), order.end());
     std::vector<SurfaceElement> elements;
     elements.reserve(order.size());
-    for (const auto& [place, number] : order) elements.push_back(found_[number].second);
+    for (const auto& [key, number] : order) elements.push_back(found_[number].second);
     return elements;
   }
 

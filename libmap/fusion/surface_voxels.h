@@ -26,7 +26,7 @@ class SurfaceVoxels {
 
   // Adds one measurement at the position `place`, in voxels; ignored beyond voxel_cell_limit. A
   // voxel has two sides: normals opposite to the mean of the first belong to the second.
-  void add(const Eigen::Vector3f& place, const Eigen::Vector3f& normal, float weight);
+  void add(const Eigen::Vector3f& position, const Eigen::Vector3f& normal, float weight);
   // Sums of one frame without the hash index, which would need most of the memory.
   struct Frame {
     std::vector<std::uint64_t> keys;
@@ -43,7 +43,7 @@ class SurfaceVoxels {
   const std::vector<Sum>& sums() const { return sums_; }
 
  private:
-  Sum& side_of(const VoxelPlace& place, const Eigen::Vector3f& normal);
+  Sum& side_of(const VoxelSide& voxel, const Eigen::Vector3f& normal);
 
   VoxelIndex index_;
   std::vector<Sum> sums_;

@@ -14,30 +14,30 @@ struct TileMask {
   Eigen::Array2i low = Eigen::Array2i::Constant(-voxel_cell_limit);
   Eigen::Array2i high = Eigen::Array2i::Constant(voxel_cell_limit);  // excluded
   // Selects one in 2^thinning squares of 4 x 4 columns at random. A larger value selects a subset.
-  unsigned thinning = 0;
+  unsigned subsampling_level = 0;
 
   bool has_cell(const Eigen::Array2i& cell) const {
     if (!((cell >= low).all() && (cell < high).all())) return false;
-    if (thinning == 0) return true;
+    if (subsampling_level == 0) return true;
     const auto square = [&](int axis) { return static_cast<std::uint64_t>(cell[axis] >> 2); };
-    return mix_bits(square(0), square(1)) >> (64U - thinning) == 0;
+    return mix_bits(square(0), square(1)) >> (64U - subsampling_level) == 0;
   }
   // Returns true in one of ten squares of 4 x 4 columns, which validate a registration and are not
   // used by it. The position is in voxels.
-  static bool is_held_out(const Eigen::Vector2f& place) {
-    const Eigen::Array2i square = (place.array() / 4.0F).floor().cast<int>();
+  static bool is_held_out(const Eigen::Vector2f& position) {
+    const Eigen::Array2i square = (position.array() / 4.0F).floor().cast<int>();
     return mix_bits(~static_cast<std::uint64_t>(square.x()),
                     static_cast<std::uint64_t>(square.y())) %
                10 ==
            0;
   }
   // Returns true if the position, in voxels, is in a selected column.
-  bool has_place(const Eigen::Vector2f& place) const {
-    return (place.array().abs() < static_cast<float>(voxel_cell_limit)).all() &&
-           has_cell(place.array().floor().cast<int>());
+  bool contains(const Eigen::Vector2f& position) const {
+    return (position.array().abs() < static_cast<float>(voxel_cell_limit)).all() &&
+           has_cell(position.array().floor().cast<int>());
   }
 
-  TileMask grown(int cells) const { return {low - cells, high + cells, thinning}; }
+  TileMask grown(int cells) const { return {low - cells, high + cells, subsampling_level}; }
 };
 
 }  // namespace libmap

@@ -12,7 +12,7 @@ namespace libmap {
 namespace {
 
 constexpr std::size_t max_indexed = 65536;
-constexpr std::size_t max_looked_at = 4000;
+constexpr std::size_t max_sampled = 4000;
 constexpr std::size_t min_pairs = 100;  // fewer pairs are not significant
 constexpr std::size_t neighbors = 4;    // the point itself is one
 constexpr float min_cosine = 0.7F;      // smaller: the neighbors are across a crease
@@ -58,7 +58,7 @@ double opposing_share(const std::vector<Eigen::Vector3d>& positions,
   if (points.empty()) return 0.0;
   const PointTree tree(points);
   std::size_t pairs = 0, opposing = 0;
-  for (std::size_t n = 0; n < points.size(); n += points.size() / max_looked_at + 1)
+  for (std::size_t n = 0; n < points.size(); n += points.size() / max_sampled + 1)
     for (const NeighborPoint& other : tree.nearest(points[n], neighbors)) {
       const float cosine = directions[n].dot(directions[other.index]);
       if (other.index == n || std::abs(cosine) < min_cosine) continue;

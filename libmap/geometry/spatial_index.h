@@ -101,11 +101,11 @@ class GrowingGrid {
   }
 
   // True if a point is closer to `place` than `radius_m`, the square root of `square_m2`.
-  bool any_nearer(const Eigen::Vector3d& place, double radius_m, double square_m2) const {
+  bool any_nearer(const Eigen::Vector3d& position, double radius_m, double square_m2) const {
     const Eigen::Vector3d reach = Eigen::Vector3d::Constant(radius_m);
-    return any_in_box(place - reach, place + reach,
+    return any_in_box(position - reach, position + reach,
                       [&](const Eigen::Vector3d& point, std::uint32_t) {
-                        return (point - place).squaredNorm() < square_m2;
+                        return (point - position).squaredNorm() < square_m2;
                       });
   }
 

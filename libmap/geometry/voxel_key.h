@@ -12,7 +12,7 @@
 namespace libmap {
 
 // Index of a voxel in its grid, and the side of a thin sheet that it represents.
-struct VoxelPlace {
+struct VoxelSide {
   Eigen::Vector3i cell = Eigen::Vector3i::Zero();
   int side = 0;  // 0 or 1
 };
@@ -42,7 +42,7 @@ inline std::uint64_t spread(std::uint64_t bits) {
   return (bits | bits << 2U) & 0x1249249249249249U;
 }
 
-inline std::size_t place_in_block(std::uint64_t key) {
+inline std::size_t index_in_block(std::uint64_t key) {
   return static_cast<std::size_t>((key >> 1U & 1U) | (key >> 22U & 3U) << 1U |
                                   (key >> 43U & 3U) << 3U);
 }
@@ -56,13 +56,13 @@ inline std::uint64_t scramble(std::uint64_t key) {
 
 }  // namespace voxel_key
 
-inline std::uint64_t pack(const VoxelPlace& place) {
+inline std::uint64_t pack(const VoxelSide& voxel) {
   using voxel_key::axis_bits;
-  return axis_bits(place.cell.x()) << 43U | axis_bits(place.cell.y()) << 22U |
-         axis_bits(place.cell.z()) << 1U | static_cast<std::uint64_t>(place.side);
+  return axis_bits(voxel.cell.x()) << 43U | axis_bits(voxel.cell.y()) << 22U |
+         axis_bits(voxel.cell.z()) << 1U | static_cast<std::uint64_t>(voxel.side);
 }
 
-inline VoxelPlace unpack(std::uint64_t key) {
+inline VoxelSide unpack(std::uint64_t key) {
   const auto cell = [](std::uint64_t bits) {
     return static_cast<int>(bits & voxel_key::axis_mask) - voxel_cell_limit;
   };
@@ -87,7 +87,7 @@ class VoxelIndex {
   // Returns the key's number, or `none`.
   std::uint32_t find(std::uint64_t key) const {
     const Slot& slot = slots_[slot_of(key & ~voxel_key::block_bits)];
-    return slot.block == none ? none : blocks_[slot.block][voxel_key::place_in_block(key)];
+    return slot.block == none ? none : blocks_[slot.block][voxel_key::index_in_block(key)];
   }
 
   // Returns the key's number; a new key gets the next number.
@@ -97,7 +97,7 @@ class VoxelIndex {
       last_block_ = block_of(block_key);
       last_key_ = block_key;
     }
-    std::uint32_t& number = blocks_[last_block_][voxel_key::place_in_block(key)];
+    std::uint32_t& number = blocks_[last_block_][voxel_key::index_in_block(key)];
     if (number != none) return number;
     keys_.push_back(key);
     return number = static_cast<std::uint32_t>(keys_.size() - 1);

@@ -25,7 +25,7 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
-#include "libmap/core/guarded_process.h"
+#include "libmap/core/sandboxed_process.h"
 #include "libmap/core/output_lock.h"
 #include "libmap/core/text.h"
 #include "libmap/io/corner_key.h"
@@ -228,8 +228,8 @@ std::unique_ptr<aiMaterial> make_material(std::int32_t page) {
     material->AddProperty(&gray, 1, AI_MATKEY_BASE_COLOR);
     return material;
   }
-  const aiString picture("*" + std::to_string(page));
-  material->AddProperty(&picture, AI_MATKEY_TEXTURE(aiTextureType_BASE_COLOR, 0));
+  const aiString image("*" + std::to_string(page));
+  material->AddProperty(&image, AI_MATKEY_TEXTURE(aiTextureType_BASE_COLOR, 0));
   const int clamp = aiTextureMapMode_Clamp;
   material->AddProperty(&clamp, 1, AI_MATKEY_MAPPINGMODE_U(aiTextureType_BASE_COLOR, 0));
   material->AddProperty(&clamp, 1, AI_MATKEY_MAPPINGMODE_V(aiTextureType_BASE_COLOR, 0));
@@ -237,12 +237,12 @@ std::unique_ptr<aiMaterial> make_material(std::int32_t page) {
 }
 
 // A compressed image has height 0; its width is its size in bytes.
-std::unique_ptr<aiTexture> make_texture(const EncodedPicture& picture) {
+std::unique_ptr<aiTexture> make_texture(const EncodedImage& image) {
   auto texture = std::make_unique<aiTexture>();
-  texture->mWidth = static_cast<unsigned>(picture.bytes.size());
-  texture->pcData = new aiTexel[picture.bytes.size() / sizeof(aiTexel) + 1];
-  std::memcpy(static_cast<void*>(texture->pcData), picture.bytes.data(), picture.bytes.size());
-  picture.format.copy(texture->achFormatHint, sizeof(texture->achFormatHint) - 1);
+  texture->mWidth = static_cast<unsigned>(image.bytes.size());
+  texture->pcData = new aiTexel[image.bytes.size() / sizeof(aiTexel) + 1];
+  std::memcpy(static_cast<void*>(texture->pcData), image.bytes.data(), image.bytes.size());
+  image.format.copy(texture->achFormatHint, sizeof(texture->achFormatHint) - 1);
   return texture;
 }
 
@@ -291,17 +291,17 @@ std::string first_line(const char* text) {
 }
 
 // Texture image of a material's base color; nullopt if it has none.
-std::optional<TexturePicture> picture_of(const aiScene& scene, const aiMaterial& material) {
+std::optional<TextureImage> image_of(const aiScene& scene, const aiMaterial& material) {
   for (const aiTextureType type : {aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE}) {
     aiString path;
     if (material.GetTexture(type, 0, &path) != aiReturn_SUCCESS) continue;
     const aiTexture* const embedded = scene.GetEmbeddedTexture(path.C_Str());
     // An image is read once, even if several materials refer to it by different names.
     if (embedded == nullptr)
-      return TexturePicture{{}, std::filesystem::path(path.C_Str()).lexically_normal().string()};
+      return TextureImage{{}, std::filesystem::path(path.C_Str()).lexically_normal().string()};
     // Compressed images have height 0; their width is their size in bytes.
     if (embedded->mHeight != 0) continue;
-    return TexturePicture{
+    return TextureImage{
         std::string(reinterpret_cast<const char*>(embedded->pcData), embedded->mWidth), {}};
   }
   return std::nullopt;
@@ -312,14 +312,14 @@ DecodedModel model_of(const aiScene& scene, MeshBuilder& builder) {
   // Pages in the order of the materials; several materials can share an image.
   std::vector<std::int32_t> page_of_material(scene.mNumMaterials, no_page);
   for (unsigned m = 0; m < scene.mNumMaterials; ++m) {
-    std::optional<TexturePicture> picture = picture_of(scene, *scene.mMaterials[m]);
-    if (!picture) continue;
+    std::optional<TextureImage> image = image_of(scene, *scene.mMaterials[m]);
+    if (!image) continue;
     const auto same = std::find_if(
-        result.pictures.begin(), result.pictures.end(), [&](const TexturePicture& other) {
-          return other.path == picture->path && other.bytes == picture->bytes;
+        result.images.begin(), result.images.end(), [&](const TextureImage& other) {
+          return other.path == image->path && other.bytes == image->bytes;
         });
-    page_of_material[m] = static_cast<std::int32_t>(same - result.pictures.begin());
-    if (same == result.pictures.end()) result.pictures.push_back(std::move(*picture));
+    page_of_material[m] = static_cast<std::int32_t>(same - result.images.begin());
+    if (same == result.images.end()) result.images.push_back(std::move(*image));
   }
   result.model.texture_coordinates = builder.coordinates();
   for (const unsigned material : builder.materials())
@@ -369,7 +369,7 @@ auto decode(const std::string& format, const Read& read, const Take& take) {
 DecodedModel decode_guarded(std::uint64_t file_bytes, const std::function<DecodedModel()>& decode) {
   // Memory for assimp's scene, the mesh and its bytes; a line of OBJ needs some hundred bytes.
   const std::uint64_t memory = (std::uint64_t{1} << 30) + 100 * file_bytes;
-  return run_guarded<DecodedModel>(memory, "is broken: the library for its format crashed on it",
+  return run_sandboxed<DecodedModel>(memory, "is broken: the library for its format crashed on it",
                                    decode, [](auto& pipe, DecodedModel& decoded) {
                                      TexturedMesh& model = decoded.model;
                                      pipe.array(model.mesh.vertices);
@@ -378,10 +378,10 @@ DecodedModel decode_guarded(std::uint64_t file_bytes, const std::function<Decode
                                      pipe.array(model.mesh.vertex_colors);
                                      pipe.array(model.texture_coordinates);
                                      pipe.array(model.page_of_triangle);
-                                     pipe.size(decoded.pictures);
-                                     for (TexturePicture& picture : decoded.pictures) {
-                                       pipe.array(picture.bytes);
-                                       pipe.array(picture.path);
+                                     pipe.size(decoded.images);
+                                     for (TextureImage& image : decoded.images) {
+                                       pipe.array(image.bytes);
+                                       pipe.array(image.path);
                                      }
                                    });
 }
@@ -431,7 +431,7 @@ std::string encode_by_assimp(const TriangleMesh& mesh, const std::string& format
 }
 
 void write_model_by_assimp(const std::filesystem::path& path, std::vector<ModelPart> parts,
-                           std::vector<EncodedPicture> pictures) {
+                           std::vector<EncodedImage> images) {
   std::vector<std::unique_ptr<aiMesh>> meshes;
   std::vector<std::unique_ptr<aiMaterial>> materials;
   std::vector<std::unique_ptr<aiTexture>> textures;
@@ -442,9 +442,9 @@ void write_model_by_assimp(const std::filesystem::path& path, std::vector<ModelP
     materials.push_back(make_material(part.page));
     part = {};
   }
-  for (EncodedPicture& picture : pictures) {
-    textures.push_back(make_texture(picture));
-    picture = {};
+  for (EncodedImage& image : images) {
+    textures.push_back(make_texture(image));
+    image = {};
   }
   const auto scene = scene_of(std::move(meshes), std::move(materials), true);
   scene->mTextures = hang(textures, scene->mNumTextures);

@@ -16,15 +16,15 @@ namespace libmap {
 TriangleMesh decode_by_assimp(const std::string& bytes, const std::string& format);
 
 // Texture image of a model: its bytes if it is embedded, else its path as stored in the file.
-struct TexturePicture {
+struct TextureImage {
   std::string bytes;
   std::string path;
 };
 
-// A mesh with undecoded texture pages: page_of_triangle contains indices of `pictures`.
+// A mesh with undecoded texture pages: page_of_triangle contains indices of `images`.
 struct DecodedModel {
   TexturedMesh model;
-  std::vector<TexturePicture> pictures;
+  std::vector<TextureImage> images;
 };
 
 // Reads the .obj (with its materials) or .glb at `path`. Throws as decode_by_assimp does.
@@ -43,7 +43,7 @@ struct ModelPart {
 };
 
 // Texture image as the bytes of a file; `format` is "png" or "jpg".
-struct EncodedPicture {
+struct EncodedImage {
   std::string bytes;
   std::string format;
 };
@@ -51,6 +51,6 @@ struct EncodedPicture {
 // Writes a .glb with embedded images and unlit materials (KHR_materials_unlit). Throws Error
 // (failed).
 void write_model_by_assimp(const std::filesystem::path& path, std::vector<ModelPart> parts,
-                           std::vector<EncodedPicture> pictures);
+                           std::vector<EncodedImage> images);
 
 }  // namespace libmap

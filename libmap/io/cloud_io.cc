@@ -188,7 +188,7 @@ void write_geometry_file(const std::filesystem::path& path,
   require_good();
 }
 
-std::vector<std::filesystem::path> cloud_pieces(const std::filesystem::path& given) {
+std::vector<std::filesystem::path> cloud_tiles(const std::filesystem::path& given) {
   if (!std::filesystem::is_directory(given)) {
     require_cloud_file(given);
     return {given};
@@ -211,7 +211,7 @@ std::vector<std::filesystem::path> cloud_pieces(const std::filesystem::path& giv
 CloudReadResult read_cloud(const std::filesystem::path& path) {
   if (std::filesystem::is_directory(path)) {
     CloudReadResult joined;
-    for (const std::filesystem::path& piece : cloud_pieces(path)) {
+    for (const std::filesystem::path& piece : cloud_tiles(path)) {
       CloudReadResult read = read_cloud(piece);
       append_cloud(read.cloud, joined.cloud);
       joined.dropped_points += read.dropped_points;

@@ -38,7 +38,7 @@ struct CloudReadResult {
 
 // Returns the file itself, or the cloud files of a folder in the order of their names, without
 // hidden files. Throws Error if the path does not exist or the folder contains no cloud file.
-std::vector<std::filesystem::path> cloud_pieces(const std::filesystem::path& file_or_folder);
+std::vector<std::filesystem::path> cloud_tiles(const std::filesystem::path& file_or_folder);
 
 // Reads a file, or all files of a folder into one cloud with the info of the last file. A file
 // without points is an empty cloud. Throws Error naming the file if it cannot be read, is invalid

@@ -138,7 +138,7 @@ void append_records(const std::vector<Column>& columns, std::size_t begin, std::
   const std::size_t record = record_size(columns);
   const std::size_t start = out.size();
   out.resize(start + record * (end - begin));
-  parallel_for(end - begin, rows_a_chunk, [&](std::size_t first, std::size_t last) {
+  parallel_for(end - begin, rows_per_chunk, [&](std::size_t first, std::size_t last) {
     char* at = out.data() + start + first * record;
     for (Column column : columns) {
       column.first += (begin + first) * column.stride;

@@ -117,7 +117,7 @@ std::string viewpoint_words(const Pose& viewpoint);
 // Inverse of viewpoint_numbers; nullopt if the quaternion is zero.
 std::optional<Pose> pose_of_viewpoint(const std::array<double, 7>& numbers);
 
-inline constexpr std::size_t rows_a_chunk = 16384;  // rows per parallel chunk
+inline constexpr std::size_t rows_per_chunk = 16384;  // rows per parallel chunk
 
 // Calls body(row, value) for each row in order; the numbers are stored as T.
 template <typename T, typename Body>
@@ -167,7 +167,7 @@ void for_each_value(const Column& column, std::size_t rows, const Body& body) {
 
 template <typename Body>
 void for_each_value_in_parallel(const Column& column, std::size_t rows, const Body& body) {
-  parallel_for(rows, rows_a_chunk, [&](std::size_t begin, std::size_t end) {
+  parallel_for(rows, rows_per_chunk, [&](std::size_t begin, std::size_t end) {
     Column part = column;
     part.first += begin * part.stride;
     for_each_value(part, end - begin,

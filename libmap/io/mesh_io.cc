@@ -282,7 +282,7 @@ void encode(const std::string& format, const TriangleMesh& mesh,
 
 }  // namespace
 
-std::vector<std::filesystem::path> mesh_pieces(const std::filesystem::path& given) {
+std::vector<std::filesystem::path> mesh_tiles(const std::filesystem::path& given) {
   if (!std::filesystem::is_directory(given)) return {given};
   std::vector<std::filesystem::path> pieces;
   for (const auto& entry : std::filesystem::directory_iterator(given))
@@ -305,7 +305,7 @@ void require_mesh_format(const std::filesystem::path& path) {
 MeshReadResult read_mesh(const std::filesystem::path& path) {
   if (std::filesystem::is_directory(path)) {
     MeshReadResult joined;
-    for (const std::filesystem::path& piece : mesh_pieces(path)) {
+    for (const std::filesystem::path& piece : mesh_tiles(path)) {
       MeshReadResult read = read_mesh(piece);
       append_mesh(read.mesh, joined.mesh);
       joined.info = std::move(read.info);

@@ -41,7 +41,7 @@ MeshReadResult read_mesh(const std::filesystem::path& path);
 
 // Returns the file itself, or the mesh files of a folder in the order of their names, without
 // hidden files. Throws Error if the folder contains no mesh file.
-std::vector<std::filesystem::path> mesh_pieces(const std::filesystem::path& file_or_folder);
+std::vector<std::filesystem::path> mesh_tiles(const std::filesystem::path& file_or_folder);
 
 // Writes directly to `path`; for atomic output, pass the temporary path of an OutputFile. Omits
 // attributes that the format does not have (the table above). Throws Error for an unknown

@@ -19,7 +19,7 @@ namespace libmap {
 
 namespace {
 
-constexpr std::size_t pieces_a_block = 128;
+constexpr std::size_t pieces_per_block = 128;
 
 const Fragment whole{0, {Eigen::Vector2d(0.0, 0.0), {1.0, 0.0}, {0.0, 1.0}}};
 
@@ -77,11 +77,11 @@ TrianglePoint point_of(const Fragment& fragment, double first, double second) {
   return {fragment.triangle, at.x(), at.y()};
 }
 
-SurfacePieces::SurfacePieces(const TriangleMesh& mesh) : mesh_(mesh) {
+SurfaceFragments::SurfaceFragments(const TriangleMesh& mesh) : mesh_(mesh) {
   add_blocks(0, mesh.triangles.size());
 }
 
-SurfacePieces::SurfacePieces(const SurfacePieces& triangles, double longest_m,
+SurfaceFragments::SurfaceFragments(const SurfaceFragments& triangles, double longest_m,
                              std::size_t max_parts)
     : mesh_(triangles.mesh_) {
   for (const SurfaceBlock& block : triangles.blocks_) {
@@ -95,7 +95,7 @@ SurfacePieces::SurfacePieces(const SurfacePieces& triangles, double longest_m,
   add_blocks(mesh_.triangles.size(), mesh_.triangles.size() + parts_.size());
 }
 
-void SurfacePieces::cut(const PlacedFragment& fragment, double longest_m, std::size_t max_parts) {
+void SurfaceFragments::cut(const PlacedFragment& fragment, double longest_m, std::size_t max_parts) {
   if (!(fragment.area_m2() > 0.0)) return;
   // Minimum number of parts along the longest side.
   const double parts = std::sqrt(fragment.square_of_longest_side()) / longest_m;
@@ -109,27 +109,27 @@ void SurfacePieces::cut(const PlacedFragment& fragment, double longest_m, std::s
   parts_.push_back(fragment.fragment);
 }
 
-double SurfacePieces::area_m2() const {
+double SurfaceFragments::area_m2() const {
   double area = 0.0;
   for (const SurfaceBlock& block : blocks_) area += block.area_m2;
   return area;
 }
 
-PlacedFragment SurfacePieces::piece(std::size_t number) const {
+PlacedFragment SurfaceFragments::piece(std::size_t number) const {
   if (number >= mesh_.triangles.size())
     return placed(mesh_, parts_[number - mesh_.triangles.size()]);
   return placed_triangle(mesh_, number);
 }
 
-void SurfacePieces::add_blocks(std::size_t begin, std::size_t end) {
+void SurfaceFragments::add_blocks(std::size_t begin, std::size_t end) {
   const std::size_t first = blocks_.size();
-  blocks_.resize(first + (end - begin + pieces_a_block - 1) / pieces_a_block);
-  parallel_for(end - begin, pieces_a_block, [&](std::size_t from, std::size_t to) {
-    blocks_[first + from / pieces_a_block] = measured(begin + from, begin + to);
+  blocks_.resize(first + (end - begin + pieces_per_block - 1) / pieces_per_block);
+  parallel_for(end - begin, pieces_per_block, [&](std::size_t from, std::size_t to) {
+    blocks_[first + from / pieces_per_block] = measured(begin + from, begin + to);
   });
 }
 
-SurfaceBlock SurfacePieces::measured(std::size_t begin, std::size_t end) const {
+SurfaceBlock SurfaceFragments::measured(std::size_t begin, std::size_t end) const {
   SurfaceBlock block;
   block.begin = begin;
   block.end = end;
@@ -157,7 +157,7 @@ constexpr double first_gap_size = 1.0 / 3.0;
 constexpr double smallest_gap = 1e-3;
 
 constexpr std::size_t gaps_per_chunk = 256;
-constexpr double samples_a_part = 131072.0;
+constexpr double samples_per_part = 131072.0;
 constexpr std::size_t max_pieces = 30'000'000;
 
 // Darts per round over the whole surface, relative to the expected number of samples.
@@ -165,7 +165,7 @@ constexpr std::array<double, 5> dart_rounds = {0.5, 0.5, 1.0, 2.0, 4.0};
 
 struct Candidate {
   double order;  // random priority; smallest first
-  TrianglePoint place;
+  TrianglePoint triangle_point;
   Eigen::Vector3d position;
 };
 
@@ -300,13 +300,13 @@ class Sampler {
       accept(darts(round, dart_rounds[round] * std::max(expected_, 1.0) / surface_.area_m2));
       progress.advance(1);
     }
-    if (goes_on(places_.size())) fill_gaps(progress);
+    if (goes_on(triangle_points_.size())) fill_gaps(progress);
     progress.end();
     DiskSamples result;
-    result.positions.reserve(places_.size());
+    result.positions.reserve(triangle_points_.size());
     for (std::size_t n = surface_.others.size(); n < samples_.size(); ++n)
       result.positions.push_back(samples_[n]);
-    result.places = std::move(places_);
+    result.triangle_points = std::move(triangle_points_);
     return result;
   }
 
@@ -314,7 +314,7 @@ class Sampler {
   // Processes the surface in parts, to limit the memory for gaps.
   void fill_gaps(Progress& progress) {
     const std::vector<SurfaceBlock>& blocks = pieces_.blocks();
-    const double max_m2 = samples_a_part * radius_m_ * radius_m_ / saturation_density;
+    const double max_m2 = samples_per_part * radius_m_ * radius_m_ / saturation_density;
     progress.begin("gaps", blocks.size());
     std::uint64_t round = dart_rounds.size();
     for (std::size_t begin = 0; begin < blocks.size();) {
@@ -332,8 +332,8 @@ class Sampler {
 
   bool place(const Fragment& fragment, RandomStream& random, Candidate& candidate) const {
     const double first = random.uniform();
-    candidate.place = point_of(fragment, first, random.uniform());
-    candidate.position = position_on(surface_.mesh, candidate.place);
+    candidate.triangle_point = point_of(fragment, first, random.uniform());
+    candidate.position = position_on(surface_.mesh, candidate.triangle_point);
     if (surface_.rounding_m > 0.0) candidate.position = rounded_to_single(candidate.position);
     return !samples_.any_nearer(candidate.position, radius_m_, min_square_m2_);
   }
@@ -396,7 +396,7 @@ class Sampler {
     for (const Candidate& candidate : candidates) {
       if (samples_.any_nearer(candidate.position, radius_m_, min_square_m2_)) continue;
       samples_.add(candidate.position);
-      places_.push_back(candidate.place);
+      triangle_points_.push_back(candidate.triangle_point);
     }
   }
 
@@ -436,8 +436,8 @@ class Sampler {
   std::uint64_t seed_;
   double expected_;
   GrowingGrid samples_;
-  std::vector<TrianglePoint> places_;
-  SurfacePieces pieces_;
+  std::vector<TrianglePoint> triangle_points_;
+  SurfaceFragments pieces_;
 };
 
 }  // namespace

@@ -46,13 +46,13 @@ struct SurfaceBlock {
 };
 
 // A surface in pieces: the triangles of a mesh, and parts of triangles that are too large.
-class SurfacePieces {
+class SurfaceFragments {
  public:
   // Takes all triangles of `mesh`, which must outlive the pieces.
-  explicit SurfacePieces(const TriangleMesh& mesh);
+  explicit SurfaceFragments(const TriangleMesh& mesh);
   // Divides `triangles` until no side is longer than `longest_m`. Throws Error if there are more
   // than `max_parts` parts.
-  SurfacePieces(const SurfacePieces& triangles, double longest_m, std::size_t max_parts);
+  SurfaceFragments(const SurfaceFragments& triangles, double longest_m, std::size_t max_parts);
 
   const std::vector<SurfaceBlock>& blocks() const { return blocks_; }
   double area_m2() const;  // of all pieces
@@ -71,7 +71,7 @@ class SurfacePieces {
 struct SampledSurface {
   const TriangleMesh& mesh;  // with finite vertices
   Eigen::Vector3d low;       // minimum of the bounding box
-  SurfacePieces triangles;
+  SurfaceFragments triangles;
   double area_m2 = 0.0;  // > 0
   // Maximum displacement by rounding positions to single precision; 0: positions are not rounded.
   double rounding_m = 0.0;
@@ -81,14 +81,14 @@ struct SampledSurface {
 
 struct DiskSamples {
   std::vector<Eigen::Vector3d> positions;
-  std::vector<TrianglePoint> places;  // positions on the mesh before rounding
+  std::vector<TrianglePoint> triangle_points;  // positions on the mesh before rounding
 };
 
 // Saturation density of random discs in the plane: samples * radius^2 / area. Discs of half the
 // radius cover 0.547 of the plane.
 inline constexpr double saturation_density = 0.6965;
 // Approximate share of the samples that darts over the whole surface find.
-inline constexpr double share_of_darts = 0.808;
+inline constexpr double dart_fraction = 0.808;
 
 // Throws darts over the whole surface. Then, if goes_on(samples so far), it fills the gaps;
 // otherwise the samples are not maximal. Throws Error if the mesh is too large for the radius.

@@ -28,15 +28,15 @@ std::vector<HalfEdge> by_lower_vertex(const std::vector<Triangle>& triangles, st
   const auto for_each = [&](const auto& body) {
     for (HalfEdge t = 0; t < triangles.size(); ++t) {
       const Triangle& corners = triangles[t];
-      if (names_a_vertex_twice(corners)) continue;
+      if (has_repeated_vertex(corners)) continue;
       for (HalfEdge k = 0; k < 3; ++k) body(std::min(corners[k], corners[(k + 1) % 3]), 3 * t + k);
     }
   };
   for_each([&](std::uint32_t low, HalfEdge) { ++bucket[low + 1]; });
   std::partial_sum(bucket.begin(), bucket.end(), bucket.begin());
-  std::vector<std::uint32_t> place(bucket.begin(), bucket.end() - 1);
+  std::vector<std::uint32_t> next(bucket.begin(), bucket.end() - 1);
   std::vector<HalfEdge> sorted(bucket.back());
-  for_each([&](std::uint32_t low, HalfEdge h) { sorted[place[low]++] = h; });
+  for_each([&](std::uint32_t low, HalfEdge h) { sorted[next[low]++] = h; });
   return sorted;
 }
 
@@ -128,10 +128,10 @@ VertexTriangles triangles_at_vertices(const std::vector<Triangle>& triangles,
   for (const Triangle& t : triangles)
     for (const std::uint32_t v : t) ++result.first[v + 1];
   std::partial_sum(result.first.begin(), result.first.end(), result.first.begin());
-  std::vector<std::uint32_t> place(result.first.begin(), result.first.end() - 1);
+  std::vector<std::uint32_t> next(result.first.begin(), result.first.end() - 1);
   result.triangles.resize(result.first.back());
   for (std::uint32_t t = 0; t < triangles.size(); ++t)
-    for (const std::uint32_t v : triangles[t]) result.triangles[place[v]++] = t;
+    for (const std::uint32_t v : triangles[t]) result.triangles[next[v]++] = t;
   return result;
 }
 
@@ -170,7 +170,7 @@ std::vector<std::vector<HalfEdge>> boundary_loops(const std::vector<Triangle>& t
   return loops;
 }
 
-void grow_marks(const TriangleMesh& mesh, int rings, std::vector<bool>& marks) {
+void dilate_mask(const TriangleMesh& mesh, int rings, std::vector<bool>& marks) {
   std::vector<bool> touched(mesh.vertices.size());
   for (int ring = 0; ring < rings; ++ring) {
     touched.assign(mesh.vertices.size(), false);

@@ -24,7 +24,7 @@ inline std::uint32_t target_of(const std::vector<Triangle>& triangles, HalfEdge 
 inline Eigen::Vector3d along(const TriangleMesh& mesh, HalfEdge h) {
   return mesh.vertices[target_of(mesh.triangles, h)] - mesh.vertices[source_of(mesh.triangles, h)];
 }
-inline bool names_a_vertex_twice(const Triangle& t) {
+inline bool has_repeated_vertex(const Triangle& t) {
   return t[0] == t[1] || t[1] == t[2] || t[2] == t[0];
 }
 
@@ -74,7 +74,7 @@ std::vector<std::vector<HalfEdge>> boundary_loops(const std::vector<Triangle>& t
                                                   const std::vector<HalfEdge>& opposite);
 
 // Dilates the marks by `rings` rings of triangles that share a vertex with a marked triangle.
-void grow_marks(const TriangleMesh& mesh, int rings, std::vector<bool>& marks);
+void dilate_mask(const TriangleMesh& mesh, int rings, std::vector<bool>& marks);
 
 // Largest distance between two points, m. For more than 2,000 points it is up to 0.2 % too small.
 double diameter_of(const std::vector<Eigen::Vector3d>& points);

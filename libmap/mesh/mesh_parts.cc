@@ -54,7 +54,7 @@ Color blended(const std::array<Color, N>& colors, const std::array<double, N>& w
 template <std::size_t N>
 double blended(const ScalarField& field, const std::array<std::uint32_t, N>& vertices,
                const std::array<double, N>& weights) {
-  if (is_whole(field.type)) {
+  if (is_integer(field.type)) {
     const auto nearest = std::max_element(weights.begin(), weights.end()) - weights.begin();
     return field.values[vertices[static_cast<std::size_t>(nearest)]];
   }
@@ -129,9 +129,9 @@ MeshComponents connected_components(const TriangleMesh& mesh) {
     const Triangle& corners = mesh.triangles[t];
     for (std::size_t k = 0; k < 3; ++k) {
       const auto [low, high] = std::minmax(corners[k], corners[(k + 1) % 3]);
-      const auto [place, is_new] =
+      const auto [entry, is_new] =
           triangle_at.try_emplace((static_cast<std::uint64_t>(low) << 32U) | high, t);
-      if (!is_new) sets.join(place->second, t);
+      if (!is_new) sets.join(entry->second, t);
     }
   }
   return numbered(mesh, sets);

@@ -28,7 +28,7 @@ MeshComponents connected_components(const TriangleMesh& mesh);
 MeshComponents connected_components(const TriangleMesh& mesh,
                                     const std::vector<HalfEdge>& opposite);
 
-inline bool is_whole(ScalarType type) {
+inline bool is_integer(ScalarType type) {
   return type != ScalarType::float32 && type != ScalarType::float64;
 }
 

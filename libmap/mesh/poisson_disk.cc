@@ -28,7 +28,7 @@ SampledSurface surface_of(const TriangleMesh& mesh) {
   const Bounds3d bounds = bounds_of(mesh.vertices);
   const double farthest =
       std::max(bounds.min.cwiseAbs().maxCoeff(), bounds.max.cwiseAbs().maxCoeff());
-  SampledSurface surface{mesh, bounds.min, SurfacePieces(mesh), 0.0, 0.0, {}};
+  SampledSurface surface{mesh, bounds.min, SurfaceFragments(mesh), 0.0, 0.0, {}};
   if (farthest <= single_precision_m) {
     const auto single = static_cast<float>(farthest);
     const float step = std::nextafter(single, std::numeric_limits<float>::infinity()) - single;
@@ -120,7 +120,7 @@ class CountSearch {
   RandomStream random_;
   double radius_ = 0.0;
   double thrown_ = 0.0;
-  double share_of_darts_ = share_of_darts;
+  double share_of_darts_ = dart_fraction;
   bool is_full_ = false;  // the last try filled the gaps
   double too_small_ = 0.0;
   double too_large_ = std::numeric_limits<double>::infinity();
@@ -152,7 +152,7 @@ PoissonDiskResult sample(const SampledSurface& surface, const PoissonDiskOptions
   result.relative_radius =
       result.smallest_distance_m / (2.0 * std::sqrt(per_sample_m2 / (2.0 * std::numbers::sqrt3)));
   result.cloud = timed(result.timings_s, "attributes",
-                       [&] { return points_on_surface(surface.mesh, samples.places); });
+                       [&] { return points_on_surface(surface.mesh, samples.triangle_points); });
   result.cloud.positions = std::move(samples.positions);
   return result;
 }
@@ -172,7 +172,7 @@ PoissonDiskResult sample_poisson_disk(const TriangleMesh& mesh, const PoissonDis
   return sample(surface_of(mesh), options, progress);
 }
 
-PieceSampler::PieceSampler(std::vector<Bounds3d> boxes, const PoissonDiskOptions& options)
+TileSampler::TileSampler(std::vector<Bounds3d> boxes, const PoissonDiskOptions& options)
     : boxes_(std::move(boxes)), options_(options), near_(boxes_.size()) {
   check_parameters(options);
   if (options.count > 0)
@@ -180,7 +180,7 @@ PieceSampler::PieceSampler(std::vector<Bounds3d> boxes, const PoissonDiskOptions
                 {.field = "count", .value = std::to_string(options.count), .bound = "0"});
 }
 
-PoissonDiskResult PieceSampler::sample(const TriangleMesh& mesh, std::size_t number,
+PoissonDiskResult TileSampler::sample(const TriangleMesh& mesh, std::size_t number,
                                        Progress& progress) {
   if (!(surface_area(mesh) > 0.0)) return {};
   SampledSurface surface = surface_of(mesh);

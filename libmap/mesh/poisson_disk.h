@@ -52,10 +52,10 @@ PoissonDiskResult sample_poisson_disk(const TriangleMesh& mesh, const PoissonDis
 // Samples a surface in consecutive pieces by radius. The minimum distance also holds between
 // pieces, and seams have no gaps. Memory depends on the size of a piece and on the samples near
 // seams.
-class PieceSampler {
+class TileSampler {
  public:
   // Takes the bounding boxes of all pieces. Throws Error if options.count is not 0.
-  PieceSampler(std::vector<Bounds3d> boxes, const PoissonDiskOptions& options);
+  TileSampler(std::vector<Bounds3d> boxes, const PoissonDiskOptions& options);
   // Samples piece `number`, once per piece. Without area, the result has no samples. Throws as
   // sample_poisson_disk.
   PoissonDiskResult sample(const TriangleMesh& mesh, std::size_t number,

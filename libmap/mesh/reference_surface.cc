@@ -21,7 +21,7 @@ struct ReferenceSurface::Shape {
   Shape(const Shape&) = delete;
   Shape& operator=(const Shape&) = delete;
   virtual ~Shape() = default;
-  virtual NearestPlace nearest(const Eigen::Vector3d& point) const = 0;
+  virtual NearestSurfacePoint nearest(const Eigen::Vector3d& point) const = 0;
 };
 
 namespace {
@@ -81,10 +81,10 @@ struct ReferenceSurface::MeshShape : Shape {
     return result;
   }
 
-  NearestPlace nearest(const Eigen::Vector3d& point) const override {
+  NearestSurfacePoint nearest(const Eigen::Vector3d& point) const override {
     constexpr double on_edge = 1e-6;  // barycentric coordinates below this are on the edge
     const SurfacePoint found = surface.nearest(point);
-    NearestPlace place{found.position, Eigen::Vector3d::Zero(), found.distance_m, false};
+    NearestSurfacePoint found_point{found.position, Eigen::Vector3d::Zero(), found.distance_m, false};
     const std::uint32_t t = found.triangle;
     const std::array<double, 3> share = shares(t, found.position);
     std::size_t zeros = 0;
@@ -98,19 +98,19 @@ struct ReferenceSurface::MeshShape : Shape {
       if (share[k] > share[largest]) largest = k;
     }
     if (zeros == 0) {
-      place.normal = normal_of(t);
+      found_point.normal = normal_of(t);
     } else if (zeros == 1) {
       // The edge from the next corner to the one after it.
       const HalfEdge other = opposite[3 * std::size_t{t} + (zero + 1) % 3];
-      place.on_border = other == open_edge;
-      place.normal = normal_of(t);
-      if (is_joined(other)) place.normal += normal_of(other / 3);
+      found_point.on_border = other == open_edge;
+      found_point.normal = normal_of(t);
+      if (is_joined(other)) found_point.normal += normal_of(other / 3);
     } else {
-      place.normal = vertex_normals[triangles[t][largest]];
-      place.on_border = is_border_vertex[triangles[t][largest]] != 0;
+      found_point.normal = vertex_normals[triangles[t][largest]];
+      found_point.on_border = is_border_vertex[triangles[t][largest]] != 0;
     }
-    place.normal.normalize();
-    return place;
+    found_point.normal.normalize();
+    return found_point;
   }
 };
 
@@ -138,20 +138,20 @@ struct ReferenceSurface::CloudShape : Shape {
     }
   }
 
-  NearestPlace nearest(const Eigen::Vector3d& point) const override {
+  NearestSurfacePoint nearest(const Eigen::Vector3d& point) const override {
     const NeighborPoint neighbor = tree->nearest(point);
     const Eigen::Vector3d& center = points[neighbor.index];
     const Eigen::Vector3d& normal = normals[neighbor.index];
-    NearestPlace place{center, normal, 0.0, false};
+    NearestSurfacePoint found_point{center, normal, 0.0, false};
     if (normal.squaredNorm() > 0.0) {
       const Eigen::Vector3d offset = point - center;
       const Eigen::Vector3d along = offset - offset.dot(normal) * normal;
       const double reach = along.norm();
-      place.on_border = reach > disc_radius_m;
-      place.position += place.on_border ? Eigen::Vector3d(disc_radius_m / reach * along) : along;
+      found_point.on_border = reach > disc_radius_m;
+      found_point.position += found_point.on_border ? Eigen::Vector3d(disc_radius_m / reach * along) : along;
     }
-    place.distance_m = (point - place.position).norm();
-    return place;
+    found_point.distance_m = (point - found_point.position).norm();
+    return found_point;
   }
 };
 
@@ -165,7 +165,7 @@ ReferenceSurface& ReferenceSurface::operator=(ReferenceSurface&&) noexcept = def
 
 bool ReferenceSurface::is_oriented() const { return shape_->is_oriented; }
 const Bounds3d& ReferenceSurface::bounds() const { return shape_->bounds; }
-NearestPlace ReferenceSurface::nearest(const Eigen::Vector3d& point) const {
+NearestSurfacePoint ReferenceSurface::nearest(const Eigen::Vector3d& point) const {
   return shape_->nearest(point);
 }
 
@@ -173,10 +173,10 @@ PointDistances distances_to(const ReferenceSurface& surface,
                             const std::vector<Eigen::Vector3d>& points) {
   PointDistances distances{std::vector<double>(points.size()), std::vector<double>(points.size())};
   parallel_each(points.size(), points_per_chunk, [&](std::size_t n) {
-    const NearestPlace place = surface.nearest(points[n]);
-    distances.distance_m[n] = place.distance_m;
+    const NearestSurfacePoint found_point = surface.nearest(points[n]);
+    distances.distance_m[n] = found_point.distance_m;
     distances.signed_distance_m[n] =
-        surface.is_oriented() ? place.signed_distance_m(points[n]) : place.distance_m;
+        surface.is_oriented() ? found_point.signed_distance_m(points[n]) : found_point.distance_m;
   });
   return distances;
 }

@@ -11,7 +11,7 @@
 namespace libmap {
 
 // Nearest point of a surface to a query point.
-struct NearestPlace {
+struct NearestSurfacePoint {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  // on the surface
   // Unit normal; zero without orientation. On an edge or a corner of a mesh it is the
   // angle-weighted pseudo-normal, which distinguishes inside from outside (Baerentzen and Aanaes
@@ -48,7 +48,7 @@ class ReferenceSurface {
   const Bounds3d& bounds() const;
 
   // Nearest point of the surface to a finite point. Thread-safe.
-  NearestPlace nearest(const Eigen::Vector3d& point) const;
+  NearestSurfacePoint nearest(const Eigen::Vector3d& point) const;
 
  private:
   struct Shape;

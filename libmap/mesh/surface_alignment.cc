@@ -46,7 +46,7 @@ std::vector<Eigen::Vector3d> downsampled(const std::vector<Eigen::Vector3d>& poi
 
 struct Pair {
   Eigen::Vector3d point;  // moved
-  NearestPlace place;
+  NearestSurfacePoint nearest;
   double weight = 0.0;
 };
 
@@ -57,10 +57,10 @@ std::vector<Pair> pairs_of(const std::vector<Eigen::Vector3d>& points, const Pos
   std::vector<Pair> pairs(points.size());
   parallel_each(points.size(), distances_per_chunk, [&](std::size_t n) {
     pairs[n].point = moved * points[n];
-    pairs[n].place = surface.nearest(pairs[n].point);
+    pairs[n].nearest = surface.nearest(pairs[n].point);
   });
   std::erase_if(pairs, [&](const Pair& pair) {
-    return pair.place.on_border || !(pair.place.distance_m <= options.max_distance_m);
+    return pair.nearest.on_border || !(pair.nearest.distance_m <= options.max_distance_m);
   });
   const double share = static_cast<double>(pairs.size()) / static_cast<double>(points.size());
   if (pairs.size() < 6 || share < options.min_overlap)
@@ -77,11 +77,11 @@ std::vector<Pair> pairs_of(const std::vector<Eigen::Vector3d>& points, const Pos
 std::size_t weigh(std::vector<Pair>& pairs, double floor_m) {
   std::vector<double> distances;
   distances.reserve(pairs.size());
-  for (const Pair& pair : pairs) distances.push_back(pair.place.distance_m);
+  for (const Pair& pair : pairs) distances.push_back(pair.nearest.distance_m);
   const double reach = std::max(floor_m, tukey_width_of(median(std::move(distances))));
   std::size_t inliers = 0;
   for (Pair& pair : pairs) {
-    pair.weight = tukey_weight(pair.place.distance_m / reach);
+    pair.weight = tukey_weight(pair.nearest.distance_m / reach);
     if (pair.weight > 0.0) ++inliers;
   }
   return inliers;
@@ -108,10 +108,10 @@ CenteredEquations equations_of(const std::vector<Pair>& pairs) {
   equations.radius_m = std::sqrt(squares / weights);
   if (!(equations.radius_m > 0.0)) equations.radius_m = 1.0;
   for (const Pair& pair : pairs) {
-    const Eigen::Vector3d& normal = pair.place.normal;
+    const Eigen::Vector3d& normal = pair.nearest.normal;
     Vector6d row;
     row << (pair.point - equations.center).cross(normal) / equations.radius_m, normal;
-    const double residual = (pair.place.position - pair.point).dot(normal);
+    const double residual = (pair.nearest.position - pair.point).dot(normal);
     equations.matrix += pair.weight / weights * row * row.transpose();
     equations.rhs += pair.weight / weights * residual * row;
   }
@@ -155,7 +155,7 @@ double rmse_of(const std::vector<Pair>& pairs) {
   std::size_t count = 0;
   for (const Pair& pair : pairs) {
     if (pair.weight <= 0.0) continue;
-    squares += pair.place.distance_m * pair.place.distance_m;
+    squares += pair.nearest.distance_m * pair.nearest.distance_m;
     ++count;
   }
   return count == 0 ? 0.0 : std::sqrt(squares / static_cast<double>(count));

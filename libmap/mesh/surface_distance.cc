@@ -175,10 +175,10 @@ std::vector<TrianglePoint> sample_triangles(const TriangleMesh& mesh, double per
 
 std::vector<SurfacePoint> sample_surface(const TriangleMesh& mesh, double per_m2,
                                          std::uint64_t seed) {
-  const std::vector<TrianglePoint> places = sample_triangles(mesh, per_m2, seed);
-  std::vector<SurfacePoint> samples(places.size());
-  for (std::size_t n = 0; n < places.size(); ++n)
-    samples[n] = {position_on(mesh, places[n]), places[n].triangle, 0.0};
+  const std::vector<TrianglePoint> triangle_points = sample_triangles(mesh, per_m2, seed);
+  std::vector<SurfacePoint> samples(triangle_points.size());
+  for (std::size_t n = 0; n < triangle_points.size(); ++n)
+    samples[n] = {position_on(mesh, triangle_points[n]), triangle_points[n].triangle, 0.0};
   return samples;
 }
 

@@ -11,11 +11,11 @@ namespace {
 
 using Sparse = Eigen::SparseMatrix<double>;
 
-Eigen::Index place(std::size_t block) { return 6 * static_cast<Eigen::Index>(block); }
+Eigen::Index row_of(std::size_t block) { return 6 * static_cast<Eigen::Index>(block); }
 
 // Order of the blocks for little fill-in: approximate minimum degree (Amestoy, Davis and Duff
 // 1996).
-std::vector<std::size_t> fill_reducing_places(const BlockSystem& system) {
+std::vector<std::size_t> fill_reducing_positions(const BlockSystem& system) {
   const auto size = static_cast<Eigen::Index>(system.size());
   std::vector<Eigen::Triplet<double>> entries;
   for (const auto& [key, block] : system.blocks())
@@ -26,10 +26,10 @@ std::vector<std::size_t> fill_reducing_places(const BlockSystem& system) {
   pattern.setFromTriplets(entries.begin(), entries.end());
   Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> order;
   if (size > 0) Eigen::AMDOrdering<int>()(pattern.selfadjointView<Eigen::Lower>(), order);
-  std::vector<std::size_t> places(system.size());
-  for (std::size_t n = 0; n < places.size(); ++n)
-    places[static_cast<std::size_t>(order.indices()(static_cast<Eigen::Index>(n)))] = n;
-  return places;
+  std::vector<std::size_t> positions(system.size());
+  for (std::size_t n = 0; n < positions.size(); ++n)
+    positions[static_cast<std::size_t>(order.indices()(static_cast<Eigen::Index>(n)))] = n;
+  return positions;
 }
 
 }  // namespace
@@ -74,18 +74,18 @@ void BlockSystem::clear_rhs() {
 
 struct BlockSolver::Parts {
   Eigen::Index size = 0;
-  std::vector<std::size_t> places;  // positions of the blocks in the factored matrix
+  std::vector<std::size_t> positions;  // positions of the blocks in the factored matrix
   // All entries of a block are stored, so that the factor consists of complete blocks as well.
   Eigen::SimplicialLDLT<Sparse, Eigen::Lower, Eigen::NaturalOrdering<int>> solver;
   bool valid = false;
 
-  Eigen::Index at(std::size_t block) const { return place(places[block]); }
+  Eigen::Index at(std::size_t block) const { return row_of(positions[block]); }
 };
 
 BlockSolver::BlockSolver(const BlockSystem& system, double damping)
     : parts_(std::make_unique<Parts>()) {
-  parts_->size = place(system.size());
-  parts_->places = fill_reducing_places(system);
+  parts_->size = row_of(system.size());
+  parts_->positions = fill_reducing_positions(system);
   std::vector<Eigen::Triplet<double>> entries;
   entries.reserve(36 * system.blocks().size() + 36 * system.size());
   const auto add = [&](Eigen::Index row, Eigen::Index column, double value) {
@@ -100,7 +100,7 @@ BlockSolver::BlockSolver(const BlockSystem& system, double damping)
       }
   for (std::size_t n = 0; n < system.size(); ++n)
     for (Eigen::Index r = 0; r < 6; ++r)
-      for (Eigen::Index c = 0; c <= r; ++c) add(place(n) + r, place(n) + c, r == c ? damping : 0.0);
+      for (Eigen::Index c = 0; c <= r; ++c) add(row_of(n) + r, row_of(n) + c, r == c ? damping : 0.0);
   Sparse matrix(parts_->size, parts_->size);
   matrix.setFromTriplets(entries.begin(), entries.end());
   parts_->solver.compute(matrix);
@@ -125,7 +125,7 @@ std::vector<Matrix6d> BlockSolver::inverse_column(std::size_t column) const {
   Eigen::MatrixXd right = Eigen::MatrixXd::Zero(parts_->size, 6);
   right.block<6, 6>(parts_->at(column), 0).setIdentity();
   const Eigen::MatrixXd left = parts_->solver.solve(right);
-  std::vector<Matrix6d> result(parts_->places.size());
+  std::vector<Matrix6d> result(parts_->positions.size());
   for (std::size_t n = 0; n < result.size(); ++n) result[n] = left.block<6, 6>(parts_->at(n), 0);
   return result;
 }
@@ -214,8 +214,8 @@ BlockSystem BlockSolver::selected_inverse(const BlockSystem& wanted) const {
   const FactorInverse inverse(factor);
   BlockSystem result(wanted.size());
   for (const auto& [key, unused] : wanted.blocks()) {
-    const std::size_t a = parts_->places[key.first];
-    const std::size_t b = parts_->places[key.second];
+    const std::size_t a = parts_->positions[key.first];
+    const std::size_t b = parts_->positions[key.second];
     if (a == b) {
       result.add(key.first, key.second, inverse.diagonal[a]);
       continue;

@@ -23,7 +23,7 @@ constexpr std::size_t dense_below = 120;  // poses; with more, no dense Schur co
 constexpr double registration_prior_m = 0.02;
 constexpr double registration_prior_rad = 0.03;
 // Scatter of the stamps' depth delays from which on the scale of the motions is observable.
-constexpr double stamps_tell_s = 0.005;
+constexpr double observable_delay_s = 0.005;
 // Keeps the system regular if a pose is not constrained.
 constexpr double pose_damping = 1e-6;
 
@@ -117,8 +117,8 @@ class Adjustment {
   const Feature& feature(const Observation& seen) const {
     return frames_[seen.frame].features[seen.feature];
   }
-  bool has_pose(const Observation& seen) const { return place_.contains(frames_[seen.frame].node); }
-  void start_numbers(const SensorCalibration& start, const std::vector<GraphComponent>& components);
+  bool has_pose(const Observation& seen) const { return row_.contains(frames_[seen.frame].node); }
+  void init_params(const SensorCalibration& start, const std::vector<GraphComponent>& components);
   void add_observations();
   CalibratedObservation calibrated(const Observation& seen) const;
   void add_camera_priors(std::size_t camera, Priors& priors);
@@ -134,7 +134,7 @@ class Adjustment {
   std::size_t cameras_ = 0;                   // number of cameras; 0 if none is refined
   std::vector<DepthCorrection> corrections_;  // zero corrections that define the knots
   SensorCalibration start_;
-  std::map<int, std::size_t> place_;  // row of a node's pose
+  std::map<int, std::size_t> row_;  // row of a node's pose
   std::vector<Eigen::Index> first_;   // first parameter of a camera
   std::vector<bool> sees_;            // true for cameras with observations
   double mean_later_s_ = 0.0;         // of FrameFeatures::depth_later_s
@@ -157,21 +157,21 @@ Adjustment::Adjustment(const std::vector<FrameFeatures>& frames,
           corrections_for(frames, options.refine_depth ? cameras_ : 0, options.depth_knot_m)),
       sees_(cameras_, false) {
   state_.poses = poses;
-  for (const auto& [node, pose] : poses) place_.emplace(node, place_.size());
+  for (const auto& [node, pose] : poses) row_.emplace(node, row_.size());
   problem_.robust_scale = options.robust_scale;
-  problem_.fix_cameras = options.hold_cameras;
-  problem_.fixed.assign(place_.size(), options.hold_poses);
+  problem_.fix_cameras = options.fixes_cameras;
+  problem_.fixed.assign(row_.size(), options.fixes_poses);
   for (const GraphComponent& component : components)
-    if (const auto place = place_.find(component.gauge_node); place != place_.end())
-      problem_.fixed[place->second] = true;
-  start_numbers(start, components);
+    if (const auto entry = row_.find(component.gauge_node); entry != row_.end())
+      problem_.fixed[entry->second] = true;
+  init_params(start, components);
   add_observations();
   Priors priors(state_.camera_params.size());
   for (std::size_t n = 0; n < cameras_; ++n) add_camera_priors(n, priors);
   priors.add_to(problem_);
 }
 
-void Adjustment::start_numbers(const SensorCalibration& start,
+void Adjustment::init_params(const SensorCalibration& start,
                                const std::vector<GraphComponent>& components) {
   if (options_.refine_registration) start_.color_from_depth = start.color_from_depth;
   if (options_.refine_timing) {
@@ -194,7 +194,7 @@ void Adjustment::start_numbers(const SensorCalibration& start,
     own[timing_at + 1] = start_.timing[n].rolling_shutter_s;
     if (options_.refine_intrinsics && n < start.intrinsics.size()) {
       const IntrinsicsStep& step = start.intrinsics[n];
-      Eigen::Map<Eigen::Vector4d>(own + intrinsics_at) << step.fx_share, step.fy_share, step.cx_px,
+      Eigen::Map<Eigen::Vector4d>(own + intrinsics_at) << step.fx_relative, step.fy_relative, step.cx_px,
           step.cy_px;
     }
     if (n >= corrections_.size() || n >= start.depth.size() ||
@@ -204,7 +204,7 @@ void Adjustment::start_numbers(const SensorCalibration& start,
     std::copy(start.depth[n].spline_m.begin(), start.depth[n].spline_m.end(), own + spline_at);
   }
   if (!options_.refine_timing) return;
-  problem_.moving = true;
+  problem_.has_motion = true;
   const double count = static_cast<double>(std::max<std::size_t>(1, frames_.size()));
   for (const FrameFeatures& frame : frames_) mean_later_s_ += frame.depth_later_s / count;
   for (const FrameFeatures& frame : frames_)
@@ -234,7 +234,7 @@ void Adjustment::add_observations() {
       const Feature& its = feature(seen);
       sum += state_.poses.at(frame.node) * frame.point_in_base(seen.feature);
       problem_.observations.push_back(
-          {place_.at(frame.node), cameras_ > 0 ? first_[its.camera] : 0,
+          {row_.at(frame.node), cameras_ > 0 ? first_[its.camera] : 0,
            CalibratedFeature(its, frame.cameras[its.camera], calibrated(seen))});
       if (cameras_ > 0) sees_[its.camera] = true;
     }
@@ -262,13 +262,13 @@ CalibratedObservation Adjustment::calibrated(const Observation& seen) const {
   if (options_.refine_registration || options_.refine_timing) {
     const RegisteredDepth depth =
         registered_depth(frame, its, color_from_depth_of(frame, its, start_));
-    calibrated.knows_depth = depth.known;
+    calibrated.has_depth = depth.known;
     calibrated.added_m = depth.added_m;
     calibrated.by_step = depth.by_step;
   }
   if (options_.refine_timing) {
     const CameraTiming& timing = start_.timing[its.camera];
-    calibrated.row_share = row_share_of(its, camera);
+    calibrated.row_share = row_fraction(its, camera);
     calibrated.depth_later_s = frame.depth_later_s;
     calibrated.known_step = (timing.depth_delay_s + frame.depth_later_s -
                              timing.rolling_shutter_s * calibrated.row_share) *
@@ -318,7 +318,7 @@ void Adjustment::add_depth_priors(std::size_t camera, Priors& priors) {
   for (Eigen::Index n = 0; n < 3 + knots; ++n) free_.push_back(radial + n);
   for (Eigen::Index n = 0; n + 2 < knots; ++n)
     priors.add().segment<3>(spline + n) =
-        Eigen::Vector3d(1.0, -2.0, 1.0) / (options_.depth_bend * deviations[4 + n]);
+        Eigen::Vector3d(1.0, -2.0, 1.0) / (options_.depth_smoothness_prior * deviations[4 + n]);
   Eigen::VectorXd& gauge = priors.add();
   double count = 0.0;
   for (const FrameFeatures& frame : frames_)
@@ -340,7 +340,7 @@ void Adjustment::add_depth_priors(std::size_t camera, Priors& priors) {
 // that least squares with both as measurements overestimates times.
 double Adjustment::motion_scale() const {
   // Varying delays of the stamps determine the scale.
-  if (!problem_.moving || problem_.fix_cameras || later_deviation_s_ > stamps_tell_s) return 1.0;
+  if (!problem_.has_motion || problem_.fix_cameras || later_deviation_s_ > observable_delay_s) return 1.0;
   double mixed = 0.0;
   double squares = 0.0;
   for (std::size_t n = 0; n < state_.motions.size(); ++n) {
@@ -374,13 +374,13 @@ SensorCalibration Adjustment::calibration(const JointState& state, double motion
     }
   }
   for (const FrameFeatures& frame : frames_)
-    if (const auto place = place_.find(frame.node); problem_.moving && place != place_.end())
-      found.motion.emplace(frame.node, state.motions[place->second] / motion_scale);
+    if (const auto entry = row_.find(frame.node); problem_.has_motion && entry != row_.end())
+      found.motion.emplace(frame.node, state.motions[entry->second] / motion_scale);
   return found;
 }
 
 void Adjustment::find_alternatives() {
-  const Eigen::Index size = problem_.moving ? 12 : 6;
+  const Eigen::Index size = problem_.has_motion ? 12 : 6;
   const auto poses = static_cast<Eigen::Index>(state_.poses.size());
   FreeRows rows;
   for (Eigen::Index n = 0; n < poses; ++n) {
@@ -464,16 +464,16 @@ void bind(ParameterTable& table, BundleAdjustmentOptions& options) {
             "prior standard deviation of the principal point");
   table.add("depth_prior", options.depth_prior, positive,
             "prior standard deviation of the depth correction, relative to the depth noise");
-  table.add("depth_bend", options.depth_bend, positive,
+  table.add("depth_bend", options.depth_smoothness_prior, positive,
             "prior standard deviation of the depth correction's second differences between knots, "
             "relative to the depth noise");
   table.add("depth_knot_m", options.depth_knot_m, {0.02},
             "distance between knots of the depth correction");
   table.add("frame_time_s", options.bounds.frame_time_s, positive,
             "maximum depth delay and rolling shutter time of a possible calibration");
-  table.add("max_bend_m", options.bounds.max_bend_m, not_negative,
+  table.add("max_bend_m", options.bounds.max_depth_correction_m, not_negative,
             "maximum depth correction at range 0");
-  table.add("bend_of_range", options.bounds.bend_of_range, not_negative,
+  table.add("bend_of_range", options.bounds.max_depth_correction_per_m, not_negative,
             "increase of max_bend_m per meter of range, m/m");
 }
 
@@ -511,7 +511,7 @@ std::optional<std::string> exceeded_bound(const SensorCalibration& calibration,
                      1e3 * std::max(rows_s, delay_s), 1e3 * bounds.frame_time_s, " ms");
   }
   for (const IntrinsicsStep& step : calibration.intrinsics) {
-    const double focal = std::max(std::abs(step.fx_share), std::abs(step.fy_share));
+    const double focal = std::max(std::abs(step.fx_relative), std::abs(step.fy_relative));
     const double center_px = std::max(std::abs(step.cx_px), std::abs(step.cy_px));
     if (focal >= bounds.deviations * options.focal_prior)
       return exceeds("focal length changed by", 100.0 * focal,
@@ -526,7 +526,7 @@ std::optional<std::string> exceeded_bound(const SensorCalibration& calibration,
                      1e3 * bounds.deviations * registration_prior_m, " mm");
   for (const DepthCorrection& depth : calibration.depth)
     for (const auto& [z, bend] : largest_bends(depth))
-      if (const double most = bounds.max_bend_m + bounds.bend_of_range * z; bend >= most)
+      if (const double most = bounds.max_depth_correction_m + bounds.max_depth_correction_per_m * z; bend >= most)
         return exceeds("depth correction", 1e3 * bend, 1e3 * most, " mm") + " at a depth of " +
                to_fixed_text(z, 1) + " m";
   return std::nullopt;

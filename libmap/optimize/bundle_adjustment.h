@@ -21,8 +21,8 @@ namespace libmap {
 // Bounds of physically possible calibrations. Larger values compensate other errors.
 struct CalibrationBounds {
   double frame_time_s = 0.033;  // > 0: maximum depth delay and rolling shutter time
-  double max_bend_m = 0.01;     // >= 0: maximum depth correction at range 0
-  double bend_of_range = 0.02;  // >= 0: increase of max_bend_m per meter of range, m/m
+  double max_depth_correction_m = 0.01;     // >= 0: maximum depth correction at range 0
+  double max_depth_correction_per_m = 0.02;  // >= 0: increase of max_bend_m per meter of range, m/m
   double deviations = 4.0;      // not bound; other parameters, in deviations of their prior
 };
 
@@ -37,15 +37,15 @@ struct BundleAdjustmentOptions {
   double focal_prior = 0.02;     // > 0: of the focal length, relative
   double center_prior_px = 8.0;  // > 0: of the principal point
   double depth_prior = 4.0;      // > 0: of the depth correction, relative to the depth noise
-  double depth_bend = 0.7;       // > 0: of its second differences, relative to the depth noise
+  double depth_smoothness_prior = 0.7;       // > 0: of its second differences, relative to the depth noise
   double depth_knot_m = 0.2;     // >= 0.02: distance of the knots of the correction's spline
   CalibrationBounds bounds{};
   // Not bound.
   DepthNoise depth_noise{};
   CameraTiming timing_mean{};    // mean of the prior; its deviation is frame_time_s
   double tolerance = 1e-6;       // converged if a step reduces the cost by less than this share
-  bool hold_cameras = false;     // cameras stay at the start's calibration; velocities are free
-  bool hold_poses = false;       // poses are fixed
+  bool fixes_cameras = false;     // cameras stay at the start's calibration; velocities are free
+  bool fixes_poses = false;       // poses are fixed
   std::size_t alternatives = 0;  // maximum number of alternative calibrations in the result
   bool with_information = true;  // the result contains the information matrix
 

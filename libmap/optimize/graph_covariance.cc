@@ -84,9 +84,9 @@ BlockSystem fix_gauges(const BlockSystem& system, const std::map<int, Pose>& map
                        const std::vector<GraphComponent>& components) {
   BlockSystem bound = system;
   for (const GraphComponent& component : components) {
-    const auto place = static_cast<std::size_t>(
+    const auto block_row = static_cast<std::size_t>(
         std::distance(map_from_base.begin(), map_from_base.find(component.gauge_node)));
-    bound.add(place, place, gauge_weight * Matrix6d::Identity());
+    bound.add(block_row, block_row, gauge_weight * Matrix6d::Identity());
   }
   return bound;
 }

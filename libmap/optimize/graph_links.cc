@@ -72,7 +72,7 @@ std::vector<GraphLink> stored_links(const PoseGraph& graph) {
   return links;
 }
 
-void drop_unusable(std::vector<GraphLink>& links, std::vector<std::string>& warnings) {
+void drop_invalid(std::vector<GraphLink>& links, std::vector<std::string>& warnings) {
   std::size_t dropped = 0;
   std::string first;
   std::erase_if(links, [&](const GraphLink& link) {

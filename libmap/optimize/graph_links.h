@@ -33,7 +33,7 @@ void require_usable(const PoseLink& link);
 std::vector<GraphLink> stored_links(const PoseGraph& graph);
 
 // Drops invalid links and appends a warning.
-void drop_unusable(std::vector<GraphLink>& links, std::vector<std::string>& warnings);
+void drop_invalid(std::vector<GraphLink>& links, std::vector<std::string>& warnings);
 
 // Links between consecutive odometry poses of each session, for scans with poses but without links,
 // such as a folder of images. Recalibration estimates their standard deviations.

@@ -27,14 +27,14 @@ struct PosedFrame {
   const Pose& map_from_base;
 };
 
-double overlap_of(const std::vector<BaseElement>& samples, const FrameFeatures& other,
+double overlap_of(const std::vector<PlacedElement>& samples, const FrameFeatures& other,
                   const Pose& other_from_base) {
   if (samples.empty()) return 0.0;
   double seen = 0.0;
-  for (const BaseElement& sample : samples) {
-    BaseElement element;
+  for (const PlacedElement& sample : samples) {
+    PlacedElement element;
     const Eigen::Vector3d point = other_from_base * sample.point;
-    if (seen_from_base(other, point, element) &&
+    if (element_at(other, point, element) &&
         std::abs(element.normal.dot(point - element.point)) < 0.05)
       seen += 1.0;
   }
@@ -92,20 +92,20 @@ std::vector<FramePair> overlapping_pairs(const std::vector<FrameFeatures>& frame
   for (std::size_t n = 0; n < components.size(); ++n)
     for (const int node : components[n].nodes) component_of[node] = n;
   std::vector<PosedFrame> posed;
-  std::vector<Eigen::Vector3d> places;
+  std::vector<Eigen::Vector3d> positions;
   for (std::size_t f = 0; f < frames.size(); ++f) {
     const auto pose = map_from_base.find(frames[f].node);
     if (pose == map_from_base.end()) continue;
     posed.push_back({f, frames[f].node, pose->second});
-    places.emplace_back(pose->second.translation());
+    positions.emplace_back(pose->second.translation());
   }
   if (posed.empty()) return {};
-  const PointTree neighbors(places);
+  const PointTree neighbors(positions);
   std::vector<std::vector<FramePair>> of_frame(posed.size());
   parallel_for(posed.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
       const PosedFrame& frame = posed[n];
-      const std::vector<BaseElement> few =
+      const std::vector<PlacedElement> few =
           surface_samples(frames[frame.index], overlap_samples, SampleUse::estimation);
       std::vector<std::pair<double, std::size_t>> ranked;
       for (const std::size_t candidate : candidates_of(neighbors, posed, component_of, n)) {

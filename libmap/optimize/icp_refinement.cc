@@ -82,13 +82,13 @@ class Alignment {
             const IcpOptions& options)
       : frames_(frames), start_(poses), prior_(prior), components_(components), options_(options) {
     result_.map_from_base = poses;
-    for (const auto& [node, pose] : poses) place_.emplace(node, place_.size());
+    for (const auto& [node, pose] : poses) row_.emplace(node, row_.size());
   }
 
   IcpResult run(const std::vector<PoseLink>& links, Progress& progress);
   BlockSystem system_of(const std::vector<FramePair>& pairs, double max_distance_m) {
     pairs_ = pairs;
-    BlockSystem system(place_.size());
+    BlockSystem system(row_.size());
     add_pairs(max_distance_m, system);
     return system;
   }
@@ -98,7 +98,7 @@ class Alignment {
     const auto pose = result_.map_from_base.find(frames_[frame].node);
     return pose == result_.map_from_base.end() ? nullptr : &pose->second;
   }
-  PairEquations half_of(const std::vector<BaseElement>& samples, std::size_t onto,
+  PairEquations half_of(const std::vector<PlacedElement>& samples, std::size_t onto,
                         const Pose& onto_from_from, bool from_is_a, double max_distance_m,
                         std::uint64_t cell_share) const;
   std::vector<PairEquations> all_equations(double max_distance_m, std::uint64_t cell_share) const;
@@ -113,22 +113,22 @@ class Alignment {
   const BlockSystem& prior_;
   const std::vector<GraphComponent>& components_;
   const IcpOptions& options_;
-  std::map<int, std::size_t> place_;
+  std::map<int, std::size_t> row_;
   std::vector<FramePair> pairs_;
   IcpResult result_;
 };
 
 // Equations of a frame's samples against the planes of `onto`, in steps (t, r) of a_from_b. If the
 // frame is b, a sample p moves to p + t + r x p before a_from_b; if it is a, by the inverse.
-PairEquations Alignment::half_of(const std::vector<BaseElement>& samples, std::size_t onto,
+PairEquations Alignment::half_of(const std::vector<PlacedElement>& samples, std::size_t onto,
                                  const Pose& onto_from_from, bool from_is_a, double max_distance_m,
                                  std::uint64_t cell_share) const {
   PairEquations equations;
   const double min_cosine = std::cos(options_.max_normal_angle_deg * std::numbers::pi / 180.0);
-  for (const BaseElement& sample : samples) {
+  for (const PlacedElement& sample : samples) {
     const Eigen::Vector3d point = onto_from_from * sample.point;
-    BaseElement plane;
-    if (!seen_from_base(frames_[onto], point, plane)) continue;
+    PlacedElement plane;
+    if (!element_at(frames_[onto], point, plane)) continue;
     const Eigen::Vector3d normal = onto_from_from.linear() * sample.normal;
     if (plane.normal.dot(normal) < min_cosine) continue;
     const double distance = plane.normal.dot(point - plane.point);
@@ -165,10 +165,10 @@ PairEquations Alignment::half_of(const std::vector<BaseElement>& samples, std::s
         (0.5 * weight) * (by_sample * by_plane.transpose() + by_plane * by_sample.transpose());
     equations.rhs -= weight * distance * by_sample;
     if (cell_share > 0) {
-      const Eigen::Vector3d place = *pose_of(onto) * point / cell_m;
-      const Cell cell = {static_cast<int>(std::floor(place.x())),
-                         static_cast<int>(std::floor(place.y())),
-                         static_cast<int>(std::floor(place.z()))};
+      const Eigen::Vector3d in_cells = *pose_of(onto) * point / cell_m;
+      const Cell cell = {static_cast<int>(std::floor(in_cells.x())),
+                         static_cast<int>(std::floor(in_cells.y())),
+                         static_cast<int>(std::floor(in_cells.z()))};
       if (is_drawn(cell, cell_share))
         equations.rhs_of_cell.try_emplace(cell, Vector6d::Zero()).first->second -=
             weight * distance * by_sample;
@@ -226,7 +226,7 @@ std::vector<PairEquations> Alignment::all_equations(double max_distance_m,
   std::vector<PairEquations> of_second(pairs_.size());
   parallel_each(frames_.size(), [&](std::size_t frame) {
     if (pairs_of_frame[frame].empty()) return;
-    const std::vector<BaseElement> samples =
+    const std::vector<PlacedElement> samples =
         surface_samples(frames_[frame], options_.samples, SampleUse::estimation);
     for (const std::size_t n : pairs_of_frame[frame]) {
       const bool is_a = pairs_[n].first == frame;
@@ -251,8 +251,8 @@ double Alignment::add_pairs(double max_distance_m, BlockSystem& system) {
   result_.samples = 0;
   result_.degenerate_directions = 0;
   for (std::size_t n = 0; n < pairs_.size(); ++n) {
-    const std::size_t a = place_.at(frames_[pairs_[n].first].node);
-    const std::size_t b = place_.at(frames_[pairs_[n].second].node);
+    const std::size_t a = row_.at(frames_[pairs_[n].first].node);
+    const std::size_t b = row_.at(frames_[pairs_[n].second].node);
     const RelativeJacobian jacobian =
         relative_jacobian(pose_of(pairs_[n].first)->inverse() * *pose_of(pairs_[n].second));
     system.add_pair(a, b, jacobian.by_a, jacobian.by_b, equations[n].information, equations[n].rhs);
@@ -266,7 +266,7 @@ double Alignment::add_pairs(double max_distance_m, BlockSystem& system) {
 
 // Gauss-Newton step. Returns the largest motion of a pose (m or rad), infinity if it failed.
 double Alignment::step(double max_distance_m, double& rms_m) {
-  BlockSystem system(place_.size());
+  BlockSystem system(row_.size());
   add_prior(system);
   rms_m = add_pairs(max_distance_m, system);
   result_.information = system;
@@ -295,15 +295,15 @@ double Alignment::step(double max_distance_m, double& rms_m) {
 // Second, the chi-square of the motion of the poses from the prior, whose noise is independent of
 // the surfaces (Birge 1932).
 double Alignment::deviation_scale(double max_distance_m) const {
-  BlockSystem system(place_.size());
+  BlockSystem system(row_.size());
   add_prior(system);
   std::map<Cell, std::map<std::size_t, Vector6d>> sides;
   // For a long scan, only a sample of the cells is in memory; about max_cells suffice.
   const std::uint64_t share = 1 + frames_.size() / frames_per_cell_share;
   const std::vector<PairEquations> equations = all_equations(max_distance_m, share);
   for (std::size_t n = 0; n < pairs_.size(); ++n) {
-    const std::size_t a = place_.at(frames_[pairs_[n].first].node);
-    const std::size_t b = place_.at(frames_[pairs_[n].second].node);
+    const std::size_t a = row_.at(frames_[pairs_[n].first].node);
+    const std::size_t b = row_.at(frames_[pairs_[n].second].node);
     const RelativeJacobian jacobian =
         relative_jacobian(pose_of(pairs_[n].first)->inverse() * *pose_of(pairs_[n].second));
     for (const auto& [cell, rhs] : equations[n].rhs_of_cell) {
@@ -328,17 +328,17 @@ double Alignment::deviation_scale(double max_distance_m) const {
   for (const auto& [cell, of_cell] : sides) {
     if (number++ % stride != 0) continue;
     ++used;
-    std::vector<Vector6d> side(place_.size(), Vector6d::Zero());
-    for (const auto& [place, part] : of_cell) side[place] = part;
+    std::vector<Vector6d> side(row_.size(), Vector6d::Zero());
+    for (const auto& [row, part] : of_cell) side[row] = part;
     squares += square(side);
   }
   squares *= static_cast<double>(share * sides.size()) / static_cast<double>(used);
-  const double unknowns = 6.0 * static_cast<double>(place_.size() - components_.size());
+  const double unknowns = 6.0 * static_cast<double>(row_.size() - components_.size());
   if (!(unknowns > 0.0)) return 1.0;
   double way = 0.0;
-  std::size_t place = 0;
+  std::size_t row = 0;
   for (const auto& [node, pose] : result_.map_from_base)
-    way -= step_between(start_.at(node), pose).dot(system.rhs()[place++]);
+    way -= step_between(start_.at(node), pose).dot(system.rhs()[row++]);
   const BlockSystem inverse = solver.selected_inverse(prior_);
   double bound = unknowns;  // degrees of freedom that the prior does not determine
   for (const auto& [key, block] : prior_.blocks())
@@ -378,7 +378,7 @@ IcpResult Alignment::run(const std::vector<PoseLink>& links, Progress& progress)
   }
   result_.converged = summary.state == StepState::converged;
   result_.deviation_scale = deviation_scale(max_distance_m);
-  BlockSystem honest(place_.size());
+  BlockSystem honest(row_.size());
   const double factor = 1.0 / (result_.deviation_scale * result_.deviation_scale);
   for (const auto& [key, block] : result_.information.blocks())
     honest.add(key.first, key.second, factor * block);
@@ -393,11 +393,11 @@ IcpResult Alignment::run(const std::vector<PoseLink>& links, Progress& progress)
 double agreement_of(const FrameFeatures& a, const FrameFeatures& b, const Pose& b_from_a) {
   double seen = 0.0;
   double agreed = 0.0;
-  for (const BaseElement& sample :
+  for (const PlacedElement& sample :
        surface_samples(a, pair_agreement_samples, SampleUse::estimation)) {
-    BaseElement element;
+    PlacedElement element;
     const Eigen::Vector3d point = b_from_a * sample.point;
-    if (!seen_from_base(b, point, element)) continue;
+    if (!element_at(b, point, element)) continue;
     const double above = element.normal.dot(point - element.point);
     const double allowed = pair_agreement_m + 3.0 * std::hypot(element.noise_m, sample.noise_m);
     if (above < -allowed) continue;
@@ -455,12 +455,12 @@ std::optional<PoseLink> align_pair(const FrameFeatures& a, const FrameFeatures& 
   options.graduated = true;
   options.max_distance_m = guess_m;
   options.degenerate = pair_degenerate;
-  const std::size_t place_of_b = a.node < b.node ? 1 : 0;
+  const std::size_t side_of_b = a.node < b.node ? 1 : 0;
   BlockSystem prior(2);
   Vector6d variances;
   variances << Eigen::Vector3d::Constant(guess_m * guess_m),
       Eigen::Vector3d::Constant(guess_rad * guess_rad);
-  prior.add(place_of_b, place_of_b, variances.cwiseInverse().asDiagonal());
+  prior.add(side_of_b, side_of_b, variances.cwiseInverse().asDiagonal());
   PoseLink link{.from = a.node, .to = b.node, .type = LinkType::neighbor};
   const std::map<int, Pose> poses = {{a.node, Pose::Identity()}, {b.node, a_from_b}};
   const IcpResult aligned =
@@ -475,7 +475,7 @@ std::optional<PoseLink> align_pair(const FrameFeatures& a, const FrameFeatures& 
   if (std::min(agreement_of(a, b, link.from_from_to.inverse()),
                agreement_of(b, a, link.from_from_to)) < min_pair_agreement)
     return std::nullopt;
-  link.information = aligned.information.block(place_of_b, place_of_b);
+  link.information = aligned.information.block(side_of_b, side_of_b);
   return link;
 }
 

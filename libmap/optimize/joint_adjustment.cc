@@ -99,7 +99,7 @@ class JointSolver {
  public:
   JointSolver(const JointProblem& problem, JointState state)
       : problem_(problem),
-        node_size_(problem.moving ? 12 : 6),
+        node_size_(problem.has_motion ? 12 : 6),
         cameras_at_(node_size_ * static_cast<Eigen::Index>(state.poses.size())),
         params_(state.camera_params.size()),
         state_(std::move(state)) {}
@@ -116,7 +116,7 @@ class JointSolver {
  private:
   BundleView view_of(const JointState& state) const {
     BundleView view(state.poses);
-    if (problem_.moving) view.motions = &state.motions;
+    if (problem_.has_motion) view.motions = &state.motions;
     view.camera_params = state.camera_params.data();
     return view;
   }
@@ -150,7 +150,7 @@ double JointSolver::cost(const JointState& state) const {
       },
       [](double a, double b) { return a + b; });
   cost += 0.5 * (problem_.prior * state.camera_params - problem_.prior_mean).squaredNorm();
-  if (problem_.moving)
+  if (problem_.has_motion)
     for (std::size_t n = 0; n < state.motions.size(); ++n)
       cost += 0.5 * (state.motions[n] - problem_.motion_mean[n])
                         .cwiseQuotient(problem_.motion_deviation[n])
@@ -172,7 +172,7 @@ void JointSolver::add_priors() {
   system_.matrix.bottomRightCorner(params_, params_) += problem_.prior.transpose() * problem_.prior;
   system_.rhs.tail(params_) -=
       problem_.prior.transpose() * (problem_.prior * state_.camera_params - problem_.prior_mean);
-  if (!problem_.moving) return;
+  if (!problem_.has_motion) return;
   for (std::size_t n = 0; n < state_.motions.size(); ++n) {
     const Vector6d weight = problem_.motion_deviation[n].array().square().inverse();
     const Eigen::Index row = node_size_ * static_cast<Eigen::Index>(n) + 6;
@@ -211,7 +211,7 @@ void JointSolver::linearize() {
   parallel_each(parts, [&](std::size_t part) {
     const std::size_t end = (part + 1) * problem_.points() / parts;
     for (std::size_t point = part * problem_.points() / parts; point < end; ++point) {
-      if (problem_.moving)
+      if (problem_.has_motion)
         add_point<12>(view, point, shares[part]);
       else
         add_point<6>(view, point, shares[part]);
@@ -238,12 +238,12 @@ void JointSolver::optimize_points(JointState& state, int point_iterations) const
 
 JointState JointSolver::stepped(const Eigen::VectorXd& step) const {
   JointState after = state_;
-  std::size_t place = 0;
+  std::size_t node_index = 0;
   for (auto& [node, pose] : after.poses) {
-    const Eigen::Index row = node_size_ * static_cast<Eigen::Index>(place);
-    if (!problem_.fixed[place]) pose = moved(pose, step.segment<6>(row));
-    if (problem_.moving) after.motions[place] += step.segment<6>(row + 6);
-    ++place;
+    const Eigen::Index row = node_size_ * static_cast<Eigen::Index>(node_index);
+    if (!problem_.fixed[node_index]) pose = moved(pose, step.segment<6>(row));
+    if (problem_.has_motion) after.motions[node_index] += step.segment<6>(row + 6);
+    ++node_index;
   }
   after.camera_params += step.tail(params_);
   optimize_points(after, 1);

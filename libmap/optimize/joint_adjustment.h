@@ -19,7 +19,7 @@ struct JointProblem {
   double robust_scale = 3.0;                    // width of Cauchy's loss, standard deviations
   std::vector<bool> fixed;                      // by pose
   bool fix_cameras = false;
-  bool moving = false;                // true: motions are unknown
+  bool has_motion = false;            // true: motions are unknown
   std::vector<Vector6d> motion_mean;  // prior of the motions
   std::vector<Vector6d> motion_deviation;
   // Prior of the camera parameters x: residuals prior x - prior_mean.

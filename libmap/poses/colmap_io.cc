@@ -143,14 +143,14 @@ std::string to_colmap_points(const ColmapModel& model) {
 }
 
 fs::path find_colmap_model(const fs::path& path) {
-  const std::array<fs::path, 3> places = {path, path / "sparse", path / "sparse" / "0"};
-  for (const fs::path& place : places)
-    if (is_model(place, ".txt")) return place;
-  for (const fs::path& place : places)
-    if (is_model(place, ".bin"))
+  const std::array<fs::path, 3> candidates = {path, path / "sparse", path / "sparse" / "0"};
+  for (const fs::path& candidate : candidates)
+    if (is_model(candidate, ".txt")) return candidate;
+  for (const fs::path& candidate : candidates)
+    if (is_model(candidate, ".bin"))
       throw Error(
           "is a binary COLMAP model; convert it with 'colmap model_converter --output_type TXT'",
-          {.file = place.string()});
+          {.file = candidate.string()});
   throw Error("contains no COLMAP model: there is no images.txt or sparse/images.txt",
               {.file = path.string()});
 }

@@ -32,8 +32,8 @@ std::vector<PosePair> pair_by_node(const Trajectory& estimate, const Trajectory&
   for (const TrajectoryPose& pose : truth) truth_of_node.emplace(pose.node, &pose.world_from_base);
   std::vector<PosePair> pairs;
   for (const TrajectoryPose& pose : estimate) {
-    const auto place = truth_of_node.find(pose.node);
-    if (place != truth_of_node.end()) pairs.push_back({pose.world_from_base, *place->second});
+    const auto entry = truth_of_node.find(pose.node);
+    if (entry != truth_of_node.end()) pairs.push_back({pose.world_from_base, *entry->second});
   }
   return pairs;
 }

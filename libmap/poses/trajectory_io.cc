@@ -264,7 +264,7 @@ NodeTrajectory assign_nodes(const Trajectory& trajectory, const PoseGraph& graph
       throw Error("two poses for one node", {.field = "node", .value = std::to_string(node->id)});
   NodeTrajectory result;
   for (const auto& [id, pose] : poses) result.poses.push_back(pose);
-  result.foreign = trajectory.size() - pairs.size();
+  result.unmatched = trajectory.size() - pairs.size();
   return result;
 }
 

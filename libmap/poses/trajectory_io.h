@@ -61,7 +61,7 @@ void write_trajectory_as(TrajectoryFormat format, const std::filesystem::path& p
 // A trajectory assigned to the nodes of a scan.
 struct NodeTrajectory {
   Trajectory poses;         // with node and stamp, by ascending node
-  std::size_t foreign = 0;  // number of dropped poses without a node
+  std::size_t unmatched = 0;  // number of dropped poses without a node
 };
 
 // Assigns poses to nodes: by node if all poses have one, else by stamp within 20 ms, else by order.

@@ -8,7 +8,7 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
-#include "libmap/core/guarded_process.h"
+#include "libmap/core/sandboxed_process.h"
 #include "libmap/core/manifest.h"
 #include "libmap/core/memory_budget.h"
 #include "libmap/core/text.h"
@@ -45,8 +45,8 @@ void pass_block(auto& pipe, auto& block) {
 
 // Work of the child process. It sends an Error, or none, before each message.
 void serve(const fs::path& path, const std::optional<Georeference>& frame,
-           const GuardedProcess::Write& write) {
-  GuardedOutput output(write);
+           const SandboxedProcess::Write& write) {
+  SandboxWriter output(write);
   const auto announce = [&](Parcel parcel) {
     output.error(nullptr);
     output.value(parcel);
@@ -75,7 +75,7 @@ class DemReader::Process {
   Process(fs::path path, const std::optional<Georeference>& frame)
       : path_(std::move(path)),
         process_(max_data_bytes,
-                 [&](const GuardedProcess::Write& write) { serve(path_, frame, write); }),
+                 [&](const SandboxedProcess::Write& write) { serve(path_, frame, write); }),
         input_(process_, "is broken: GDAL crashed on it") {
     in_file(path_, [&] {
       receive_parcel();
@@ -102,8 +102,8 @@ class DemReader::Process {
   }
 
   fs::path path_;
-  GuardedProcess process_;
-  GuardedInput input_;
+  SandboxedProcess process_;
+  SandboxReader input_;
   DemInfo info_;
 };
 
@@ -127,8 +127,8 @@ Eigen::Vector3d point_of(const DemInfo& info, const DemBlock& block, std::size_t
   const auto n = static_cast<std::int64_t>(pixel);
   const Eigen::Vector3d center(static_cast<double>(block.column + n % block.columns) + 0.5,
                                static_cast<double>(block.row + n / block.columns) + 0.5, 1.0);
-  const Eigen::Vector2d place = info.local_from_pixel * center;
-  return {place.x(), place.y(), block.heights_m[pixel]};
+  const Eigen::Vector2d position = info.local_from_pixel * center;
+  return {position.x(), position.y(), block.heights_m[pixel]};
 }
 
 PointCloud read_dem_cloud(const fs::path& path, std::size_t* undeclared) {

@@ -31,7 +31,7 @@ class Rasterizer {
   explicit Rasterizer(const RasterGrid& grid) : grid_(grid) {}
 
   // Returns column and row from the grid's corner; rows increase northward.
-  Eigen::Matrix<std::int64_t, 2, 1> place_of(const Eigen::Vector3d& in_frame) const {
+  Eigen::Matrix<std::int64_t, 2, 1> cell_of(const Eigen::Vector3d& in_frame) const {
     const Eigen::Vector2d& u = grid_.column_axis;
     const Eigen::Vector2d from_corner = in_frame.head<2>() - grid_.corner_m;
     const Eigen::Vector2d pixels =
@@ -48,13 +48,13 @@ class Rasterizer {
       for (const ScalarField& field : part.fields)
         if (!is_lattice_index(field.name))
           raster_.bands.push_back({field.name, unit_of(field.name), {}});
-      min_ = max_ = place_of(grid_.frame_from_points * part.positions.front());
+      min_ = max_ = cell_of(grid_.frame_from_points * part.positions.front());
       has_points_ = true;
     }
     for (const Eigen::Vector3d& position : part.positions) {
-      const auto place = place_of(grid_.frame_from_points * position);
-      min_ = min_.cwiseMin(place);
-      max_ = max_.cwiseMax(place);
+      const auto cell = cell_of(grid_.frame_from_points * position);
+      min_ = min_.cwiseMin(cell);
+      max_ = max_.cwiseMax(cell);
     }
   }
 
@@ -85,9 +85,9 @@ class Rasterizer {
     for (const RasterBand& band : raster_.bands) fields.push_back(part.find_field(band.name));
     for (std::size_t n = 0; n < part.size(); ++n) {
       const Eigen::Vector3d in_frame = grid_.frame_from_points * part.positions[n];
-      const auto place = place_of(in_frame);
+      const auto cell = cell_of(in_frame);
       const auto pixel =
-          static_cast<std::size_t>((max_.y() - place.y()) * raster_.columns + place.x() - min_.x());
+          static_cast<std::size_t>((max_.y() - cell.y()) * raster_.columns + cell.x() - min_.x());
       if (!(in_frame.z() > raster_.heights_m[pixel])) continue;
       raster_.heights_m[pixel] = in_frame.z();
       for (std::size_t band = 0; band < fields.size(); ++band)

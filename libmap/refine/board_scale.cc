@@ -16,7 +16,7 @@
 #include "libmap/features/bundle_residuals.h"
 #include "libmap/geometry/least_squares.h"
 #include "libmap/geometry/rigid_motion.h"
-#include "libmap/scan/picture_file.h"
+#include "libmap/scan/image_export.h"
 
 namespace libmap {
 
@@ -35,7 +35,7 @@ constexpr double freedom_of_board = 7.0;
 
 using Corners = std::vector<Eigen::Vector3d>;  // in the board's frame, m
 
-struct Sight {
+struct BoardObservation {
   Pose map_from_base = Pose::Identity();
   Pose base_from_camera = Pose::Identity();
   Pose camera_from_board = Pose::Identity();  // from this image only, m
@@ -62,7 +62,7 @@ struct PlacedBoard {
 }
 
 // Returns nullopt if the frame has no pose or a corner has no ray.
-std::optional<Sight> sight_of(const BoardView& view, const std::vector<FrameFeatures>& frames,
+std::optional<BoardObservation> sight_of(const BoardView& view, const std::vector<FrameFeatures>& frames,
                               const SensorCalibration& calibration,
                               const std::map<int, Pose>& map_from_base,
                               const std::map<int, Matrix6d>& covariance, const Chessboard& board) {
@@ -76,39 +76,39 @@ std::optional<Sight> sight_of(const BoardView& view, const std::vector<FrameFeat
   frame.node = view.node;
   frame.cameras = found->cameras;
   const Camera& camera = frame.cameras.at(view.camera);
-  Sight sight;
+  BoardObservation observation;
   for (const Eigen::Vector2d& corner : view.corners)
-    if (const auto ray = pixel_to_ray(camera, corner)) sight.rays.push_back(*ray);
-  if (sight.rays.size() != view.corners.size()) return std::nullopt;
-  const auto located = locate_chessboard(sight.rays, board);
+    if (const auto ray = pixel_to_ray(camera, corner)) observation.rays.push_back(*ray);
+  if (observation.rays.size() != view.corners.size()) return std::nullopt;
+  const auto located = locate_chessboard(observation.rays, board);
   if (!located) return std::nullopt;
-  sight.camera_from_board = *located;
+  observation.camera_from_board = *located;
   const Corners corners = corners_on_board(board);
   for (std::size_t n = 0; n < corners.size(); ++n)
-    frame.features.push_back({sight.rays[n].cast<float>(),
+    frame.features.push_back({observation.rays[n].cast<float>(),
                               static_cast<float>((*located * corners[n]).z()), 0.0F, 0.0F,
                               static_cast<std::uint16_t>(view.camera)});
   calibrate(frame, calibration);
   for (std::size_t n = 0; n < corners.size(); ++n)
-    sight.rays[n] = frame.features[n].ray.cast<double>();
-  sight.map_from_base = pose->second;
-  sight.base_from_camera = camera.base_from_camera;
-  sight.focal_px = {camera.fx, camera.fy};
+    observation.rays[n] = frame.features[n].ray.cast<double>();
+  observation.map_from_base = pose->second;
+  observation.base_from_camera = camera.base_from_camera;
+  observation.focal_px = {camera.fx, camera.fy};
   if (const auto known = covariance.find(view.node); known != covariance.end())
-    sight.covariance = known->second;
-  return sight;
+    observation.covariance = known->second;
+  return observation;
 }
 
 // Mean squared distance between found and projected corners, px^2; nullopt if one is behind the
 // camera.
-std::optional<double> squared_distance(const Sight& sight, const PlacedBoard& board,
+std::optional<double> squared_distance(const BoardObservation& observation, const PlacedBoard& board,
                                        const Corners& corners) {
   double sum = 0.0;
   for (std::size_t n = 0; n < corners.size(); ++n) {
     const Eigen::Vector3d point =
-        sight.in_camera(board.map_from_board * Eigen::Vector3d(board.size * corners[n]));
+        observation.in_camera(board.map_from_board * Eigen::Vector3d(board.size * corners[n]));
     if (!(point.z() > 0.0)) return std::nullopt;
-    sum += sight.focal_px.cwiseProduct(point.hnormalized() - sight.rays[n]).squaredNorm();
+    sum += observation.focal_px.cwiseProduct(point.hnormalized() - observation.rays[n]).squaredNorm();
   }
   return sum / static_cast<double>(corners.size());
 }
@@ -130,31 +130,31 @@ std::vector<Corners> orders_of(const Chessboard& board) {
   return orders;
 }
 
-using OrderedSight = std::pair<Sight, Corners>;  // with the board's corners in the view's order
+using OrderedObservation = std::pair<BoardObservation, Corners>;  // with the board's corners in the view's order
 struct AgreeingSights {
   PlacedBoard board{};
-  std::vector<OrderedSight> sights{};
+  std::vector<OrderedObservation> observations{};
 };
 
 // Views that agree with the board's pose from the view `first` within half of the board's size.
-AgreeingSights sights_that_agree(const std::vector<Sight>& sights, std::size_t first,
+AgreeingSights sights_that_agree(const std::vector<BoardObservation>& observations, std::size_t first,
                                  const std::vector<Corners>& orders) {
   AgreeingSights agreeing;
-  const Sight& reference = sights[first];
+  const BoardObservation& reference = observations[first];
   agreeing.board.map_from_board =
       reference.map_from_base * reference.base_from_camera * reference.camera_from_board;
-  for (const Sight& sight : sights) {
+  for (const BoardObservation& observation : observations) {
     const double extent_px =
-        sight.focal_px.cwiseProduct(sight.rays.back() - sight.rays.front()).norm();
+        observation.focal_px.cwiseProduct(observation.rays.back() - observation.rays.front()).norm();
     double least = std::pow(0.5 * extent_px, 2);
     const Corners* best = nullptr;
     for (const Corners& order : orders)
-      if (const auto distance = squared_distance(sight, agreeing.board, order);
+      if (const auto distance = squared_distance(observation, agreeing.board, order);
           distance && *distance < least) {
         least = *distance;
         best = &order;
       }
-    if (best != nullptr) agreeing.sights.emplace_back(sight, *best);
+    if (best != nullptr) agreeing.observations.emplace_back(observation, *best);
   }
   return agreeing;
 }
@@ -164,16 +164,16 @@ AgreeingSights sights_that_agree(const std::vector<Sight>& sights, std::size_t f
 using Sums = Eigen::Matrix<double, 14, 14>;  // [J r H]^T [J r H]
 using System = Eigen::Matrix<double, 8, 8>;  // [J r]^T [J r], weighted
 
-Sums sums_of(const Sight& sight, const Corners& corners, const PlacedBoard& board) {
-  const Eigen::Matrix3d camera_from_base = sight.base_from_camera.linear().transpose();
-  const Pose base_from_board = sight.map_from_base.inverse() * board.map_from_board;
+Sums sums_of(const BoardObservation& observation, const Corners& corners, const PlacedBoard& board) {
+  const Eigen::Matrix3d camera_from_base = observation.base_from_camera.linear().transpose();
+  const Pose base_from_board = observation.map_from_base.inverse() * board.map_from_board;
   const Eigen::Matrix3d turn = camera_from_base * base_from_board.linear();
   Sums sums = Sums::Zero();
   for (std::size_t n = 0; n < corners.size(); ++n) {
     const Eigen::Vector3d on_board = board.size * corners[n];
     const Eigen::Vector3d in_base = base_from_board * on_board;
-    const Eigen::Vector3d point = sight.base_from_camera.inverse() * in_base;
-    const Projection projection = project(point, sight.focal_px, sight.rays[n], 0.0);
+    const Eigen::Vector3d point = observation.base_from_camera.inverse() * in_base;
+    const Projection projection = project(point, observation.focal_px, observation.rays[n], 0.0);
     const Eigen::Matrix<double, 2, 3> by_point = projection.by_point.topRows<2>();
     Eigen::Matrix<double, 2, 14> row;
     row << by_point * turn, -by_point * turn * cross_matrix(on_board), by_point * turn * on_board,
@@ -206,16 +206,16 @@ WeighedView weigh(const Sums& sums, const Matrix6d& covariance, std::size_t corn
   return view;
 }
 
-struct Weighing {
+struct SystemSum {
   System system = System::Zero();
   std::vector<double> disagreements{};  // WeighedView::disagreement of each view
 };
 
-Weighing weigh(const std::vector<OrderedSight>& sights, const PlacedBoard& board) {
-  Weighing all;
-  for (const auto& [sight, corners] : sights) {
+SystemSum weigh(const std::vector<OrderedObservation>& observations, const PlacedBoard& board) {
+  SystemSum all;
+  for (const auto& [observation, corners] : observations) {
     const WeighedView view =
-        weigh(sums_of(sight, corners, board), sight.covariance, corners.size());
+        weigh(sums_of(observation, corners, board), observation.covariance, corners.size());
     all.system += view.system;
     all.disagreements.push_back(view.disagreement);
   }
@@ -228,11 +228,11 @@ struct BoardPosition {
 };
 
 // Gauss-Newton from `start`. Returns nullopt if the views do not determine the board.
-std::optional<BoardPosition> fit(const std::vector<OrderedSight>& sights,
+std::optional<BoardPosition> fit(const std::vector<OrderedObservation>& observations,
                                  const PlacedBoard& start) {
   BoardPosition found{start};
   const GaussNewtonSummary summary = gauss_newton(max_iterations, [&] {
-    const System system = weigh(sights, found.board).system;
+    const System system = weigh(observations, found.board).system;
     const Eigen::LLT<Eigen::Matrix<double, 7, 7>> normal(system.topLeftCorner<7, 7>());
     const Eigen::Matrix<double, 7, 1> step = normal.solve(-system.topRightCorner<7, 1>());
     if (normal.info() != Eigen::Success || !step.allFinite()) return StepState::failed;
@@ -252,7 +252,7 @@ double largest_usual(const std::vector<double>& disagreements) {
 
 // Drops views that contradict the pair of views with the least median of squares (Rousseeuw 1984).
 void leave_out_contradicting(AgreeingSights& views) {
-  const std::size_t count = views.sights.size();
+  const std::size_t count = views.observations.size();
   const std::size_t pairs = count * (count - 1) / 2;
   const std::size_t stride = pairs / max_pairs + 1;
   std::vector<double> best;
@@ -260,19 +260,19 @@ void leave_out_contradicting(AgreeingSights& views) {
   for (std::size_t a = 0; a < count; ++a)
     for (std::size_t b = a + 1; b < count; ++b) {
       if (next++ % stride != 0) continue;
-      const auto found = fit({views.sights[a], views.sights[b]}, views.board);
+      const auto found = fit({views.observations[a], views.observations[b]}, views.board);
       if (!found) continue;
-      std::vector<double> disagreements = weigh(views.sights, found->board).disagreements;
+      std::vector<double> disagreements = weigh(views.observations, found->board).disagreements;
       if (!best.empty() && median(best) <= median(disagreements)) continue;
       best = std::move(disagreements);
       views.board = found->board;
     }
   if (best.empty()) return;
   const double limit = largest_usual(best);
-  std::vector<OrderedSight> kept;
+  std::vector<OrderedObservation> kept;
   for (std::size_t n = 0; n < count; ++n)
-    if (best[n] <= limit) kept.push_back(std::move(views.sights[n]));
-  views.sights = std::move(kept);
+    if (best[n] <= limit) kept.push_back(std::move(views.observations[n]));
+  views.observations = std::move(kept);
 }
 
 }  // namespace
@@ -297,14 +297,14 @@ std::vector<BoardView> find_boards(const ScanSource& scan, const std::vector<Fra
   progress.begin("board", frames.size());
   parallel_each(frames.size(), [&](std::size_t n) {
     progress.advance(1);
-    std::vector<CameraView> pictures;
+    std::vector<CameraView> images;
     try {
-      pictures = read_pictures(scan, frames[n].node, {.color = true, .depth = false});
+      images = read_views(scan, frames[n].node, {.color = true, .depth = false});
     } catch (const Error&) {
       return;  // a frame without images
     }
-    for (std::size_t camera = 0; camera < pictures.size(); ++camera)
-      if (auto corners = find_chessboard(luminance(pictures[camera].color), board))
+    for (std::size_t camera = 0; camera < images.size(); ++camera)
+      if (auto corners = find_chessboard(luminance(images[camera].color), board))
         found[n].push_back({frames[n].node, camera, std::move(*corners)});
   });
   progress.end();
@@ -326,32 +326,32 @@ ScaleEstimate scale_by_board(const std::vector<FrameFeatures>& frames,
                              const std::map<int, Pose>& map_from_base,
                              const std::map<int, Matrix6d>& covariance,
                              const std::vector<BoardView>& views, const Chessboard& board) {
-  std::vector<Sight> sights;
+  std::vector<BoardObservation> observations;
   for (const BoardView& view : views)
-    if (auto sight = sight_of(view, frames, calibration, map_from_base, covariance, board))
-      sights.push_back(std::move(*sight));
+    if (auto observation = sight_of(view, frames, calibration, map_from_base, covariance, board))
+      observations.push_back(std::move(*observation));
   const std::vector<Corners> orders = orders_of(board);
   AgreeingSights best;
-  for (std::size_t n = 0; n < sights.size() && 2 * best.sights.size() < sights.size(); ++n) {
-    AgreeingSights agreeing = sights_that_agree(sights, n, orders);
-    if (agreeing.sights.size() > best.sights.size()) best = std::move(agreeing);
+  for (std::size_t n = 0; n < observations.size() && 2 * best.observations.size() < observations.size(); ++n) {
+    AgreeingSights agreeing = sights_that_agree(observations, n, orders);
+    if (agreeing.observations.size() > best.observations.size()) best = std::move(agreeing);
   }
   leave_out_contradicting(best);
   std::optional<BoardPosition> found;
   std::vector<double> disagreements;
-  while (best.sights.size() >= 2 && (found = fit(best.sights, best.board))) {
-    disagreements = weigh(best.sights, found->board).disagreements;
+  while (best.observations.size() >= 2 && (found = fit(best.observations, best.board))) {
+    disagreements = weigh(best.observations, found->board).disagreements;
     const auto worst = std::max_element(disagreements.begin(), disagreements.end());
     if (*worst <= largest_usual(disagreements)) break;
-    best.sights.erase(best.sights.begin() + (worst - disagreements.begin()));
+    best.observations.erase(best.observations.begin() + (worst - disagreements.begin()));
     found.reset();
   }
   if (!found) refuse_board(board, "no two images agree on its pose", "one static board");
   ScaleEstimate scale;
   scale.factor = 1.0 / found->board.size;
-  scale.lengths = best.sights.size();
+  scale.lengths = best.observations.size();
   for (const double disagreement : disagreements) scale.chi_square += disagreement;
-  scale.chi_square /= freedom_of_pose * static_cast<double>(best.sights.size()) - freedom_of_board;
+  scale.chi_square /= freedom_of_pose * static_cast<double>(best.observations.size()) - freedom_of_board;
   const double share = std::sqrt(found->size_variance * std::max(1.0, scale.chi_square));
   scale.deviation = scale.factor * share;
   if (!(share <= max_deviation))

@@ -29,8 +29,8 @@ bool is_between_nodes(const PoseLink& link) {
 // Propagates values of nodes along links, in the order of repeated passes over the list until
 // nothing changes. known(node) returns true if the node has a value. tell(link, node) passes the
 // value of the link's other end to `node` and returns true if the node accepts it.
-template <typename Known, typename Tell>
-void spread_by_links(const std::vector<PoseLink>& links, const Known& known, const Tell& tell) {
+template <typename Known, typename Propagate>
+void spread_by_links(const std::vector<PoseLink>& links, const Known& known, const Propagate& propagate) {
   std::map<int, std::vector<std::size_t>> links_of;
   // Ordered by pass, then by index in the list. A link acts once, when one end has a value.
   using Turn = std::pair<std::size_t, std::size_t>;
@@ -47,7 +47,7 @@ void spread_by_links(const std::vector<PoseLink>& links, const Known& known, con
     const PoseLink& link = links[n];
     if (known(link.from) == known(link.to)) continue;
     const int listener = known(link.from) ? link.to : link.from;
-    if (!tell(link, listener)) continue;
+    if (!propagate(link, listener)) continue;
     for (const std::size_t other : links_of.at(listener))
       if (known(links[other].from) != known(links[other].to))
         turns.emplace(other > n ? round : round + 1, other);

@@ -23,10 +23,10 @@ FramePair ordered(std::size_t a, std::size_t b) { return {std::min(a, b), std::m
 // Adds the pairs of one component: each frame with the nearest frames of similar direction.
 void add_near_pairs(const std::vector<std::size_t>& members, const std::vector<const Pose*>& poses,
                     const LoopClosureDetectionOptions& options, std::set<FramePair>& pairs) {
-  std::vector<Eigen::Vector3d> places;
-  places.reserve(members.size());
-  for (const std::size_t f : members) places.emplace_back(poses[f]->translation());
-  const PointTree neighbors(places);
+  std::vector<Eigen::Vector3d> positions;
+  positions.reserve(members.size());
+  for (const std::size_t f : members) positions.emplace_back(poses[f]->translation());
+  const PointTree neighbors(positions);
   const auto wanted = static_cast<std::size_t>(options.near_candidates);
   for (std::size_t n = 0; n < members.size(); ++n) {
     std::vector<std::pair<double, std::size_t>> ranked;

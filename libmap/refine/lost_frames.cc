@@ -84,7 +84,7 @@ class LostFrames {
     if (!tried_.insert({frame, before, after}).second) return false;
     const std::optional<Pose> inside = along(before, after, frame);
     std::vector<PoseLink> links;
-    std::vector<Pose> places;
+    std::vector<Pose> candidates;
     for (const std::size_t other : {before, after}) {
       if (other == no_frame || (!links.empty() && part(other) != part(before))) continue;
       const auto link = align(
@@ -93,11 +93,11 @@ class LostFrames {
                  : along(neighbor(other, other == before ? backward : forward), other, frame));
       if (!link) continue;
       links.push_back(*link);
-      places.push_back(pose(other) * link->from_from_to);
+      candidates.push_back(pose(other) * link->from_from_to);
     }
     if (links.empty()) return false;
-    if (!is_near(places.front(), places.back(), sides_agree_m, sides_agree_rad)) return false;
-    move_part(frame, links.front().from, places.front());
+    if (!is_near(candidates.front(), candidates.back(), sides_agree_m, sides_agree_rad)) return false;
+    move_part(frame, links.front().from, candidates.front());
     result_.depth_links.insert(result_.depth_links.end(), links.begin(), links.end());
     return true;
   }
@@ -114,8 +114,8 @@ class LostFrames {
   }
 
   // Joins the frame's part to that of the node `at`, moved so that the frame is at `place`.
-  void move_part(std::size_t frame, int at, const Pose& place) {
-    const Pose move = place * pose(frame).inverse();
+  void move_part(std::size_t frame, int at, const Pose& target) {
+    const Pose move = target * pose(frame).inverse();
     const std::vector<int> nodes = std::exchange(result_.parts[part(frame)], {});
     std::vector<int>& joined = result_.parts[part_of_.at(at)];
     joined.insert(joined.end(), nodes.begin(), nodes.end());

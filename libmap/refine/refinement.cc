@@ -164,7 +164,7 @@ void start(Run& run) {
   state.other_links = stored_links(graph);
   if (options.start == StartPoses::visual)
     std::erase_if(state.other_links, [](const GraphLink& link) { return is_motion(link.link); });
-  drop_unusable(state.other_links, state.warnings);
+  drop_invalid(state.other_links, state.warnings);
   if (state.other_links.empty() && options.start != StartPoses::visual)
     state.other_links = odometry_links(graph);
   if (options.start == StartPoses::visual || options.start == StartPoses::automatic) {
@@ -211,12 +211,12 @@ void find_frames(Run& run, const FeatureCache& cache) {
       std::make_shared<std::vector<FrameFeatures>>(std::move(found.frames));
   const std::vector<FrameFeatures>& frames = *run.state.frames;
   run.report({.name = "features",
-              .figures = {{"frames", frames.size()},
+              .metrics = {{"frames", frames.size()},
                           {"features", result.features},
                           {"without_depth", without_depth}}});
   if (!options.board) return;
   input.board_views = find_boards(input.scan, frames, *options.board, input.progress);
-  run.report({.name = "board", .figures = {{"pictures", input.board_views.size()}}});
+  run.report({.name = "board", .metrics = {{"pictures", input.board_views.size()}}});
 }
 
 // Computes poses of all nodes by visual odometry and links, from the initial poses. The suffix is
@@ -240,7 +240,7 @@ void link_frames(Run& run, const std::string& suffix = {}) {
     StageResult stage = named(link_stage(input, state, round, pairs));
     const std::size_t fresh = stage.state.feature_links.size() - before;
     if (run.propose(std::move(stage)))
-      run.result.stages.back().figures.emplace_back("rejected_by_optimization",
+      run.result.stages.back().metrics.emplace_back("rejected_by_optimization",
                                                     drop_rejected_links(state));
     if (round > 0 && static_cast<double>(fresh) <= settled_share * static_cast<double>(before))
       break;
@@ -286,8 +286,8 @@ RefinementOptions with_sensor(RefinementOptions options) {
   BundleAdjustmentOptions& bundle = options.bundle_adjustment;
   const CalibrationBounds& bounds = defaults.bundle_adjustment.bounds;
   set(bundle.bounds.frame_time_s, bounds.frame_time_s, model.frame_time_s);
-  set(bundle.bounds.max_bend_m, bounds.max_bend_m, model.max_bend_m);
-  set(bundle.bounds.bend_of_range, bounds.bend_of_range, model.bend_of_range);
+  set(bundle.bounds.max_depth_correction_m, bounds.max_depth_correction_m, model.max_depth_correction_m);
+  set(bundle.bounds.max_depth_correction_per_m, bounds.max_depth_correction_per_m, model.max_depth_correction_per_m);
   bundle.timing_mean = {model.depth_delay_s, model.rolling_shutter_s};
   return options;
 }
@@ -343,7 +343,7 @@ void calibrate_sensor(Run& run) {
     }
     if (pass == max_calibrations ||
         (pass > 1 &&
-         takes_depth_from_near(last, state.calibration, settled_m, settled_rad, settled_s)))
+         is_similar_registration(last, state.calibration, settled_m, settled_rad, settled_s)))
       break;
     const bool was_lost =
         !state.losses.empty() ||
@@ -467,7 +467,7 @@ void link_by_depth(Run& run) {
   StageResult stage = depth_link_stage(run.input, run.state);
   if (stage.report.closures.candidates == 0) return;
   if (run.propose(std::move(stage)))
-    run.result.stages.back().figures.emplace_back("rejected_by_optimization",
+    run.result.stages.back().metrics.emplace_back("rejected_by_optimization",
                                                   drop_rejected_links(run.state));
 }
 

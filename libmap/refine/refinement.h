@@ -74,7 +74,7 @@ struct StageReport {
   RejectionCounts closures{};                             // of this stage only
   HeldOutEvaluation held_out{};                           // on the links of all stages so far
   std::map<std::string, LinkGroupResult> groups{};        // of an optimized pose graph
-  std::vector<std::pair<std::string, double>> figures{};  // metrics of the stage
+  std::vector<std::pair<std::string, double>> metrics{};  // metrics of the stage
   std::vector<std::string> warnings{};
   std::optional<StageError> error{};
   std::optional<StageError> rejected_error{};  // of the poses of a rejected stage

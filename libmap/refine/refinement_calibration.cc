@@ -32,7 +32,7 @@ constexpr double axial_deviation_m = 4e-4;
 
 void add_figures(const CalibrationEstimate& estimate, StageReport& report) {
   const auto add = [&](const std::string& name, double value) {
-    report.figures.emplace_back(name, value);
+    report.metrics.emplace_back(name, value);
   };
   add("frames", static_cast<double>(estimate.frames));
   for (const auto& [name, change] : estimate.tried) {
@@ -42,8 +42,8 @@ void add_figures(const CalibrationEstimate& estimate, StageReport& report) {
   const SensorCalibration& found = estimate.calibration;
   for (std::size_t n = 0; n < found.intrinsics.size(); ++n) {
     const std::string camera = "camera_" + std::to_string(n) + "_";
-    add(camera + "fx_share", found.intrinsics[n].fx_share);
-    add(camera + "fy_share", found.intrinsics[n].fy_share);
+    add(camera + "fx_share", found.intrinsics[n].fx_relative);
+    add(camera + "fy_share", found.intrinsics[n].fy_relative);
     add(camera + "cx_px", found.intrinsics[n].cx_px);
     add(camera + "cy_px", found.intrinsics[n].cy_px);
   }
@@ -61,7 +61,7 @@ void add_figures(const CalibrationEstimate& estimate, StageReport& report) {
 CalibrationChoice choice_of(const RefinementOptions& options, const SensorCalibration& known) {
   CalibrationChoice choice;
   choice.only_if_better = options.intrinsics != IntrinsicsMode::refined;
-  choice.settle = !known.empty();  // the first calibration only initializes the next
+  choice.converge = !known.empty();  // the first calibration only initializes the next
   choice.start = known;
   if (known.empty()) {
     choice.parts = {options.intrinsics != IntrinsicsMode::fixed, options.correct_depth,
@@ -146,7 +146,7 @@ StageResult calibrate_stage(const RefinementInput& input, const RefinementState&
   next.poses = std::move(estimate.adjustment.map_from_base);
   if (result.report.rejected) return result;
   if (!is_of_all && !estimate.calibration.timing.empty())
-    find_motions(data, false, estimate.calibration);
+    estimate_motions(data, false, estimate.calibration);
   next.calibration = std::move(estimate.calibration);
   next.frames = calibrated(data.frames, next.calibration);
   if (!is_of_all) {
@@ -276,7 +276,7 @@ ScaleResult scale_stage(const RefinementInput& input, const RefinementState& sta
   if (!scale) return result;
   result.stage = StageResult{.state = state, .report = {.name = "scale"}};
   result.stage->state.warnings = std::move(warnings);
-  result.stage->report.figures = {{"factor", scale->factor},
+  result.stage->report.metrics = {{"factor", scale->factor},
                                   {"deviation", scale->deviation},
                                   {"lengths", scale->lengths},
                                   {"chi_square", scale->chi_square}};

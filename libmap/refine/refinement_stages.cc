@@ -43,7 +43,7 @@ StageResult track_stage(const RefinementInput& input, const RefinementState& sta
     next.other_links.push_back({link, depth_link_group});
   next.tried = std::move(tracked.tried);
   next.losses = std::move(tracked.losses);
-  result.report.figures = {
+  result.report.metrics = {
       {"frames", input.tracked.size()},     {"key_frames", tracked.key_frames.size()},
       {"links", next.feature_links.size()}, {"tracked_by_depth", tracked.depth_links.size()},
       {"lost_nodes", next.losses.size()},   {"relocalized", tracked.relocalized},
@@ -51,7 +51,7 @@ StageResult track_stage(const RefinementInput& input, const RefinementState& sta
   const LinkConsistency consistency = link_consistency(
       next.feature_links, trajectory_of(input.scan.graph(), PoseSource::ground_truth));
   if (consistency.links > 0)
-    result.report.figures.emplace_back("squared_error_per_freedom",
+    result.report.metrics.emplace_back("squared_error_per_freedom",
                                        consistency.squared_error_per_freedom);
   return result;
 }
@@ -163,7 +163,7 @@ StageResult bundle_stage(const RefinementInput& input, const RefinementState& st
                     state.graph.components, input.options.bundle_adjustment, {}, input.progress);
   StageResult result{.state = state, .report = {.name = "bundle adjustment"}};
   result.report.rejected = !adjusted.converged;
-  result.report.figures = {
+  result.report.metrics = {
       {"tracks", adjusted.tracks},          {"observations", adjusted.observations},
       {"conflicts", adjusted.conflicts},    {"outliers", adjusted.outliers},
       {"iterations", adjusted.iterations},  {"initial_cost", adjusted.initial_cost},
@@ -184,7 +184,7 @@ StageResult surface_stage(const RefinementInput& input, const RefinementState& s
                                      state.graph.components, links, options, input.progress);
   StageResult result{.state = state};
   result.report.name = options.mode == IcpMode::links ? "surfaces of links" : "surfaces";
-  result.report.figures = {{"pairs", aligned.pairs},
+  result.report.metrics = {{"pairs", aligned.pairs},
                            {"samples", aligned.samples},
                            {"degenerate_directions", aligned.degenerate_directions},
                            {"iterations", aligned.iterations},
@@ -200,7 +200,7 @@ StageResult surface_stage(const RefinementInput& input, const RefinementState& s
   // Motions were estimated for the former poses.
   if (!next.calibration.timing.empty()) {
     const std::vector<GraphLinkResult> others = next.results_of_other_links();
-    find_motions(calibration_input(input, next, others), true, next.calibration);
+    estimate_motions(calibration_input(input, next, others), true, next.calibration);
     next.frames = calibrated(*next.stored_frames, next.calibration);
   }
   return result;

@@ -14,7 +14,7 @@ namespace {
 constexpr double picked_px = 0.5;  // standard deviation of a picked pixel
 constexpr double guessed_depth_m = 2.0;
 
-std::optional<KnownLength::Place> parse_place(std::string_view text) {
+std::optional<KnownLength::End> parse_end(std::string_view text) {
   const std::size_t first = text.find(':');
   const std::size_t second = text.rfind(':');
   if (first == second) return std::nullopt;
@@ -22,49 +22,49 @@ std::optional<KnownLength::Place> parse_place(std::string_view text) {
   const std::optional<double> x = parse_double(text.substr(first + 1, second - first - 1));
   const std::optional<double> y = parse_double(text.substr(second + 1));
   if (!node || !x || !y || !(std::abs(*x) < 1e6) || !(std::abs(*y) < 1e6)) return std::nullopt;
-  return KnownLength::Place{*node, {*x, *y}};
+  return KnownLength::End{*node, {*x, *y}};
 }
 
-struct MeasuredPlace {
+struct MeasuredEnd {
   Eigen::Vector3d in_map = Eigen::Vector3d::Zero();
   double variance = 0.0;  // per axis, in m2
 };
 
-[[noreturn]] void refuse(const KnownLength::Place& place, const std::string& reason,
+[[noreturn]] void refuse(const KnownLength::End& length_end, const std::string& reason,
                          const std::string& bound) {
   throw Error(reason, {.field = "known length",
-                       .value = std::to_string(place.node) + ":" + to_text(place.pixel.x()) + ":" +
-                                to_text(place.pixel.y()),
+                       .value = std::to_string(length_end.node) + ":" + to_text(length_end.pixel.x()) + ":" +
+                                to_text(length_end.pixel.y()),
                        .bound = bound});
 }
 
-MeasuredPlace measured_place(const KnownLength::Place& place,
+MeasuredEnd measured_end(const KnownLength::End& length_end,
                              const std::vector<FrameFeatures>& frames,
                              const SensorCalibration& calibration,
                              const std::map<int, Pose>& map_from_base) {
   const auto found = std::find_if(frames.begin(), frames.end(), [&](const FrameFeatures& frame) {
-    return frame.node == place.node;
+    return frame.node == length_end.node;
   });
-  const auto pose = map_from_base.find(place.node);
+  const auto pose = map_from_base.find(length_end.node);
   if (found == frames.end() || found->cameras.empty() || pose == map_from_base.end())
-    refuse(place, "its node has no frame with a pose", "a node of the scan");
+    refuse(length_end, "its node has no frame with a pose", "a node of the scan");
   FrameFeatures frame;
   frame.node = found->node;
   frame.cameras = found->cameras;
   frame.surfaces = found->surfaces;
   const Camera& camera = frame.cameras.front();
-  const auto ray = pixel_to_ray(camera, place.pixel);
-  if (!ray || place.pixel.x() < 0.0 || place.pixel.y() < 0.0 ||
-      place.pixel.x() > camera.width - 1.0 || place.pixel.y() > camera.height - 1.0)
-    refuse(place, "its pixel is outside the image",
+  const auto ray = pixel_to_ray(camera, length_end.pixel);
+  if (!ray || length_end.pixel.x() < 0.0 || length_end.pixel.y() < 0.0 ||
+      length_end.pixel.x() > camera.width - 1.0 || length_end.pixel.y() > camera.height - 1.0)
+    refuse(length_end, "its pixel is outside the image",
            "0:0 to " + std::to_string(camera.width - 1) + ":" + std::to_string(camera.height - 1));
   SurfacePatch element;
   if (frame.surfaces.empty() ||
-      !frame.surfaces.front().seen_at(guessed_depth_m * ray->homogeneous(), element))
-    refuse(place, "no depth was measured there", "a pixel on a surface");
+      !frame.surfaces.front().nearest_to(guessed_depth_m * ray->homogeneous(), element))
+    refuse(length_end, "no depth was measured there", "a pixel on a surface");
   // Intersects the ray with the plane of the nearest element.
   const double depth = element.normal.dot(element.point) / element.normal.dot(ray->homogeneous());
-  if (!(depth > 0.0)) refuse(place, "no depth was measured there", "a pixel on a surface");
+  if (!(depth > 0.0)) refuse(length_end, "no depth was measured there", "a pixel on a surface");
   frame.features.push_back({ray->cast<float>(), static_cast<float>(depth), 0.0F, 0.0F, 0});
   calibrate(frame, calibration);
   const double picked_m = picked_px * depth / std::min(camera.fx, camera.fy);
@@ -78,8 +78,8 @@ KnownLength parse_known_length(const std::string& text) {
   const std::size_t equals = text.rfind('=');
   const std::size_t dash = text.find('-', text.find(':', text.find(':') + 1) + 2);
   if (equals != std::string::npos && dash != std::string::npos && dash < equals) {
-    const auto from = parse_place(std::string_view(text).substr(0, dash));
-    const auto to = parse_place(std::string_view(text).substr(dash + 1, equals - dash - 1));
+    const auto from = parse_end(std::string_view(text).substr(0, dash));
+    const auto to = parse_end(std::string_view(text).substr(dash + 1, equals - dash - 1));
     const auto length = parse_double(std::string_view(text).substr(equals + 1));
     if (from && to && length && *length > 0.0 && *length < 1e6) return {*from, *to, *length};
   }
@@ -91,8 +91,8 @@ KnownLength parse_known_length(const std::string& text) {
 void check_known_lengths(const std::vector<FrameFeatures>& frames,
                          const std::vector<KnownLength>& lengths) {
   for (const KnownLength& known : lengths)
-    for (const KnownLength::Place& place : {known.from, known.to})
-      measured_place(place, frames, {}, {{place.node, Pose::Identity()}});
+    for (const KnownLength::End& length_end : {known.from, known.to})
+      measured_end(length_end, frames, {}, {{length_end.node, Pose::Identity()}});
 }
 
 ScaleEstimate scale_by_lengths(const std::vector<FrameFeatures>& frames,
@@ -103,8 +103,8 @@ ScaleEstimate scale_by_lengths(const std::vector<FrameFeatures>& frames,
   double sum = 0.0;
   std::vector<std::array<double, 2>> ratios;
   for (const KnownLength& known : lengths) {
-    const MeasuredPlace from = measured_place(known.from, frames, calibration, map_from_base);
-    const MeasuredPlace to = measured_place(known.to, frames, calibration, map_from_base);
+    const MeasuredEnd from = measured_end(known.from, frames, calibration, map_from_base);
+    const MeasuredEnd to = measured_end(known.to, frames, calibration, map_from_base);
     const double distance = (to.in_map - from.in_map).norm();
     const double deviation = std::sqrt(from.variance + to.variance);
     if (!(distance > 3.0 * deviation))

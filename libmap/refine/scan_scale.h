@@ -16,12 +16,12 @@ namespace libmap {
 
 // Distance between two points that are given as pixels of images, measured in the field.
 struct KnownLength {
-  struct Place {
+  struct End {
     int node = 0;
     Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
   };
-  Place from;
-  Place to;
+  End from;
+  End to;
   double length_m = 0.0;  // > 0
 };
 

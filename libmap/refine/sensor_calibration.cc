@@ -28,13 +28,13 @@ struct SubScan {
 
 constexpr std::size_t max_frames = 80;
 // Consecutive frames determine motions; runs that are far apart in time show different views.
-constexpr std::size_t frames_a_run = 10;
+constexpr std::size_t frames_per_run = 10;
 constexpr std::size_t min_run_links = 10;  // to the selected runs
 
 // Selects runs of consecutive frames: first the run with most links, then runs that are linked to
 // the selected ones and farthest from them in time, last the runs with most links to them.
 std::set<std::size_t> joined_frames(std::size_t frames, const std::vector<FeatureLink>& links) {
-  const std::size_t length = frames <= max_frames ? 1 : frames_a_run;
+  const std::size_t length = frames <= max_frames ? 1 : frames_per_run;
   const std::size_t runs = (frames + length - 1) / length;
   std::vector<std::map<std::size_t, std::size_t>> joined(runs);
   std::vector<std::size_t> all(runs, 0);
@@ -73,19 +73,19 @@ std::set<std::size_t> joined_frames(std::size_t frames, const std::vector<Featur
 
 SubScan sub_scan_of(const CalibrationInput& input, const std::set<std::size_t>& chosen) {
   SubScan part;
-  std::map<std::size_t, std::size_t> place;
+  std::map<std::size_t, std::size_t> index_of;
   for (const std::size_t f : chosen) {
     const auto pose = input.map_from_base.find(input.frames[f].node);
     if (pose == input.map_from_base.end()) continue;
-    place.emplace(f, part.frames.size());
+    index_of.emplace(f, part.frames.size());
     part.frames.push_back(input.frames[f]);
     part.frames.back().descriptors = {};
     part.poses.insert(*pose);
   }
   for (const FeatureLink& link : input.links) {
-    const auto a = place.find(link.frames.first);
-    const auto b = place.find(link.frames.second);
-    if (a == place.end() || b == place.end()) continue;
+    const auto a = index_of.find(link.frames.first);
+    const auto b = index_of.find(link.frames.second);
+    if (a == index_of.end() || b == index_of.end()) continue;
     part.links.push_back(link);
     part.links.back().frames = {a->second, b->second};
   }
@@ -120,8 +120,8 @@ BundleAdjustmentOptions with_free(const CalibrationParts& parts, BundleAdjustmen
 
 constexpr int max_rounds = 4;
 // Motions are estimated in windows of consecutive frames.
-constexpr std::size_t frames_a_window = 64;
-constexpr std::size_t frames_beside = 8;    // margin on each side, whose motions are not used
+constexpr std::size_t frames_per_window = 64;
+constexpr std::size_t window_margin = 8;    // margin on each side, whose motions are not used
 constexpr double max_interpolated_s = 1.0;  // maximum gap for interpolating motions
 constexpr int motion_rounds = 2;            // other motions hit other points of the depth planes
 // Minimum relative gain in the held-out costs; faults of a sensor change them by tens of percent. A
@@ -154,7 +154,7 @@ Candidate try_model(const CalibrationParts& model, const SubScan& part,
                                          part.components, free, {}, start);
     const SensorCalibration& found = candidate.adjustment.calibration;
     if (!model.registration && !model.timing) break;
-    if (takes_depth_from_near(start, found, 1e-4, 5e-5, 3e-4)) break;
+    if (is_similar_registration(start, found, 1e-4, 5e-5, 3e-4)) break;
     poses = candidate.adjustment.map_from_base;
     start = found;
   }
@@ -336,7 +336,7 @@ CalibrationEstimate ModelSearch::run() {
     if (timed_ && (!is_good(best_) || is_needed(best_.costs, timed_->costs, min_timing_gain)))
       use_timing_alone();
   }
-  if (is_good(best_) && choice_.settle) {
+  if (is_good(best_) && choice_.converge) {
     Candidate settled = try_model(best_.model, part_, options_, best_.adjustment.calibration,
                                   best_.adjustment.map_from_base, 1);
     if (is_good(settled)) best_ = std::move(settled);
@@ -383,24 +383,24 @@ BundleAdjustmentResult vary_calibration(const CalibrationInput& input,
   return result;
 }
 
-void find_motions(const CalibrationInput& input, bool hold_poses, SensorCalibration& calibration) {
+void estimate_motions(const CalibrationInput& input, bool fixes_poses, SensorCalibration& calibration) {
   const std::vector<FrameFeatures>& frames = input.frames;
   BundleAdjustmentOptions moving = with_free(parts_of(calibration), input.options);
-  moving.hold_poses = hold_poses;
-  moving.refine_timing = moving.hold_cameras = true;
+  moving.fixes_poses = fixes_poses;
+  moving.refine_timing = moving.fixes_cameras = true;
   moving.tolerance = rough_tolerance;
   SensorCalibration start = calibration;
   std::map<int, Vector6d> motions;
-  for (std::size_t first = 0; first < frames.size(); first += frames_a_window) {
+  for (std::size_t first = 0; first < frames.size(); first += frames_per_window) {
     std::set<std::size_t> window;
-    const std::size_t end = std::min(frames.size(), first + frames_a_window);
-    for (std::size_t f = first - std::min(first, frames_beside);
-         f < std::min(frames.size(), end + frames_beside); ++f)
+    const std::size_t end = std::min(frames.size(), first + frames_per_window);
+    for (std::size_t f = first - std::min(first, window_margin);
+         f < std::min(frames.size(), end + window_margin); ++f)
       window.insert(f);
     const SubScan part = sub_scan_of(input, window);
     std::map<int, Pose> poses = part.poses;
     start.motion = calibration.motion;
-    for (int round = 0; round < (hold_poses ? 1 : motion_rounds); ++round) {
+    for (int round = 0; round < (fixes_poses ? 1 : motion_rounds); ++round) {
       BundleAdjustmentResult adjusted =
           adjust_bundle(part.frames, part.tracks.tracks, poses, part.graph_links, part.components,
                         moving, {}, start);
@@ -417,7 +417,7 @@ void find_motions(const CalibrationInput& input, bool hold_poses, SensorCalibrat
   interpolate_motions(frames, calibration.motion);
 }
 
-bool takes_depth_from_near(const SensorCalibration& a, const SensorCalibration& b, double shift_m,
+bool is_similar_registration(const SensorCalibration& a, const SensorCalibration& b, double shift_m,
                            double turn_rad, double time_s) {
   const std::size_t cameras = std::max(
       {a.color_from_depth.size(), b.color_from_depth.size(), a.timing.size(), b.timing.size()});
@@ -438,14 +438,14 @@ bool takes_depth_from_near(const SensorCalibration& a, const SensorCalibration& 
   return true;
 }
 
-CameraFile calibrated_camera(const Camera& stored, const Camera& picture,
+CameraFile calibrated_camera(const Camera& stored, const Camera& image,
                              const SensorCalibration& calibration, const PoseGraph& graph) {
   CameraFile file{.camera = stored};
   if (!calibration.intrinsics.empty()) {
     // The step is in pixels of the images, which may be smaller than the stored camera's.
     IntrinsicsStep step = calibration.intrinsics.front();
-    step.cx_px *= static_cast<double>(stored.width) / picture.width;
-    step.cy_px *= static_cast<double>(stored.height) / picture.height;
+    step.cx_px *= static_cast<double>(stored.width) / image.width;
+    step.cy_px *= static_cast<double>(stored.height) / image.height;
     file.camera = moved(stored, step);
   }
   if (!calibration.color_from_depth.empty())
@@ -473,7 +473,7 @@ std::vector<std::string> findings(const SensorCalibration& calibration,
   };
   for (std::size_t n = 0; n < std::min(calibration.intrinsics.size(), cameras.size()); ++n) {
     const IntrinsicsStep& step = calibration.intrinsics[n];
-    const double percent = 100.0 * (1.0 / (1.0 + 0.5 * (step.fx_share + step.fy_share)) - 1.0);
+    const double percent = 100.0 * (1.0 / (1.0 + 0.5 * (step.fx_relative + step.fy_relative)) - 1.0);
     sentences.push_back(of_camera(n) + "stored focal length " +
                         to_fixed_text(std::abs(percent), 2) + " % too " +
                         (percent > 0.0 ? "large" : "small") + ", principal point off by " +
@@ -482,11 +482,11 @@ std::vector<std::string> findings(const SensorCalibration& calibration,
   for (std::size_t n = 0; n < std::min(calibration.depth.size(), cameras.size()); ++n) {
     const DepthCorrection& depth = calibration.depth[n];
     if (depth.spline_m.empty()) continue;
-    constexpr int places = 100;
+    constexpr int depths = 100;
     double lowest = depth.bend(depth.first_m, 0.0);
     double highest = lowest;
-    for (int k = 0; k <= places; ++k) {
-      const double z = depth.first_m + (depth.last_m() - depth.first_m) * k / places;
+    for (int k = 0; k <= depths; ++k) {
+      const double z = depth.first_m + (depth.last_m() - depth.first_m) * k / depths;
       lowest = std::min(lowest, depth.bend(z, 0.0));
       highest = std::max(highest, depth.bend(z, 0.0));
     }

@@ -42,7 +42,7 @@ struct CalibrationChoice {
   CalibrationParts parts{true, true, true, true};  // parts that may be estimated
   bool only_if_better = true;  // require that the held-out data fit clearly better
   bool leave_out = true;       // drop parts that are not needed
-  bool settle = true;          // iterate the best model to the tolerance of the options
+  bool converge = true;          // iterate the best model to the tolerance of the options
   SensorCalibration start;     // initial values of registration and timing
 };
 
@@ -69,16 +69,16 @@ BundleAdjustmentResult vary_calibration(const CalibrationInput& input,
                                         const SensorCalibration& known, std::size_t count);
 
 // Replaces the motions in `calibration` by motions of all frames with a pose, estimated at its
-// timing. `hold_poses` fixes the poses during the estimate. The rest of `calibration` is unchanged.
-void find_motions(const CalibrationInput& input, bool hold_poses, SensorCalibration& calibration);
+// timing. `fixes_poses` fixes the poses during the estimate. The rest of `calibration` is unchanged.
+void estimate_motions(const CalibrationInput& input, bool fixes_poses, SensorCalibration& calibration);
 
 // Returns true if registrations and timings of all cameras differ by at most these bounds.
-bool takes_depth_from_near(const SensorCalibration& a, const SensorCalibration& b, double shift_m,
+bool is_similar_registration(const SensorCalibration& a, const SensorCalibration& b, double shift_m,
                            double turn_rad, double time_s);
 
-// Returns the first camera with the calibration applied, for a file. `picture` is the camera of its
+// Returns the first camera with the calibration applied, for a file. `image` is the camera of its
 // images; `graph` contains the time stamps of the nodes.
-CameraFile calibrated_camera(const Camera& stored, const Camera& picture,
+CameraFile calibrated_camera(const Camera& stored, const Camera& image,
                              const SensorCalibration& calibration, const PoseGraph& graph);
 
 // Returns one sentence per fault that was corrected; `deviations` are

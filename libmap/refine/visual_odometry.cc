@@ -50,7 +50,7 @@ void calibrate(const FrameFeatures& a, const FrameFeatures& b, FeatureLink& link
 }
 
 // A relocalization candidate: a lost frame matched with an earlier one.
-struct Sighting {
+struct RelocalizationCandidate {
   std::size_t frame = none;  // the earlier frame
   Pose map_from_base;        // pose of the lost frame in the earlier frame's part
   std::size_t inliers = 0;
@@ -83,7 +83,7 @@ class Tracker {
 
   void verify(const std::vector<FramePair>& pairs);
   const Trial& trial(std::size_t a, std::size_t b);
-  const Trial& trial_ahead(std::size_t key, std::size_t frame);
+  const Trial& prefetch_trial(std::size_t key, std::size_t frame);
   Pose pose_by(std::size_t frame, std::size_t other, const FeatureLink& link) const;
 
   void begin_part(std::size_t frame);
@@ -110,7 +110,7 @@ class Tracker {
   std::vector<bool> known_;
   std::map<int, std::size_t> known_part_;            // by node, also for nodes without a frame
   std::set<std::size_t> fixed_;                      // parts with known poses
-  std::set<std::size_t> loose_;                      // parts without a known relation to others
+  std::set<std::size_t> separate_parts_;                      // parts without a known relation to others
   std::map<std::size_t, std::size_t> loss_of_part_;  // index of the loss that began a part
   std::size_t parts_ = 0;
   std::map<FramePair, Trial> trials_;
@@ -160,7 +160,7 @@ const Trial& Tracker::trial(std::size_t a, std::size_t b) {
 
 // Also computes the pairs that are probably needed next, so that all threads have work. Runs of key
 // frames, or of frames tracked against one key frame, are assumed to double in length.
-const Trial& Tracker::trial_ahead(std::size_t key, std::size_t frame) {
+const Trial& Tracker::prefetch_trial(std::size_t key, std::size_t frame) {
   if (const auto known = trials_.find({key, frame}); known != trials_.end()) return known->second;
   const bool fresh_key = key + 1 == frame;
   const std::size_t run = std::min(longest_run, fresh_key ? 1 + key_run_ : frame - key);
@@ -194,7 +194,7 @@ void Tracker::begin_part(std::size_t frame) {
   const auto first = start_.first.find(frames_[frame].node);
   pose_[frame] = first != start_.first.end() ? first->second : Pose::Identity();
   part_[frame] = parts_++;
-  if (is_usable(frame) && last_ != none) loose_.insert(part_[frame]);
+  if (is_usable(frame) && last_ != none) separate_parts_.insert(part_[frame]);
 }
 
 // Moves a part into the frame of another; returns false if both have known poses.
@@ -247,7 +247,7 @@ bool Tracker::track(std::size_t frame) {
     if (reference == none) continue;
     // The gap counts from the last tracked frame, not from the key frame.
     if (frame - (reference == earlier_ ? earlier_ : last_) > longest_gap) continue;
-    const Trial& tried = reference == key_ ? trial_ahead(key_, frame) : trial(reference, frame);
+    const Trial& tried = reference == key_ ? prefetch_trial(key_, frame) : trial(reference, frame);
     if (!tried.link) continue;
     if (reference == earlier_) earlier_ = none;
     place(frame, reference, *tried.link);
@@ -310,22 +310,22 @@ bool Tracker::relocalize(std::size_t frame) {
   pairs.reserve(candidates.size());
   for (const std::size_t other : candidates) pairs.push_back(std::minmax(frame, other));
   verify(pairs);
-  std::vector<Sighting> sightings;
+  std::vector<RelocalizationCandidate> sightings;
   for (const std::size_t other : candidates) {
     const Trial& seen = trials_.at(std::minmax(frame, other));
     if (seen.link)
       sightings.push_back({other, pose_by(frame, other, *seen.link), seen.link->matches.size()});
   }
-  const auto agree = [&](const Sighting& a, const Sighting& b) {
+  const auto agree = [&](const RelocalizationCandidate& a, const RelocalizationCandidate& b) {
     return part_[a.frame] == part_[b.frame] &&
            is_near(a.map_from_base, b.map_from_base, motion_agreement_m, motion_agreement_rad);
   };
-  const Sighting* best = nullptr;
+  const RelocalizationCandidate* best = nullptr;
   std::pair<std::size_t, std::size_t> most{1, 0};  // agreeing sightings, inliers
-  for (const Sighting& sighting : sightings) {
+  for (const RelocalizationCandidate& sighting : sightings) {
     const auto votes = static_cast<std::size_t>(
         std::count_if(sightings.begin(), sightings.end(),
-                      [&](const Sighting& other) { return agree(sighting, other); }));
+                      [&](const RelocalizationCandidate& other) { return agree(sighting, other); }));
     if (votes < 2 || std::pair(votes, sighting.inliers) <= most) continue;
     most = {votes, sighting.inliers};
     best = &sighting;
@@ -334,7 +334,7 @@ bool Tracker::relocalize(std::size_t frame) {
   const std::size_t own = part_[frame];
   const std::size_t onto = part_[best->frame];
   std::vector<std::size_t> witnesses;
-  for (const Sighting& sighting : sightings)
+  for (const RelocalizationCandidate& sighting : sightings)
     if (agree(*best, sighting)) witnesses.push_back(sighting.frame);
   if (part_[frame] == none) {
     pose_[frame] = best->map_from_base;
@@ -404,7 +404,7 @@ VisualOdometryResult Tracker::run(Progress& progress) {
     const bool begins = key_ == none || session_of(key_) != session_of(f);
     if (!begins && track(f)) {
       // A separate part tries to relocalize at each key frame.
-      if (key_ == f && loose_.contains(part_[f])) relocalize(f);
+      if (key_ == f && separate_parts_.contains(part_[f])) relocalize(f);
       continue;
     }
     if (!begins && track_by_depth(f)) continue;

@@ -73,8 +73,8 @@ MapLattice lattice_of(const PointCloud& map) {
     const auto [low, high] = std::minmax_element(voxels[axis]->begin(), voxels[axis]->end());
     if (low == high || !(*high - *low > widest)) continue;
     widest = *high - *low;
-    const auto at = [&](auto place) {
-      return map.positions[static_cast<std::size_t>(place - voxels[axis]->begin())]
+    const auto at = [&](auto index) {
+      return map.positions[static_cast<std::size_t>(index - voxels[axis]->begin())]
                           [static_cast<Eigen::Index>(axis)];
     };
     lattice.voxel_size_m = (at(high) - at(low)) / widest;
@@ -103,13 +103,13 @@ MapLattice lattice_of(const PointCloud& map) {
 MapView make_map_view(const PointCloud& map, const MapViewOptions& options) {
   MapView view;
   view.voxels = map.size();
-  view.voxels_a_cell = options.voxels_a_cell;
+  view.voxels_per_cell = options.voxels_per_cell;
   if (map.empty()) return view;
   const MapLattice lattice = options.lattice ? *options.lattice : lattice_of(map);
-  view.cell_size_m = lattice.voxel_size_m * options.voxels_a_cell;
+  view.cell_size_m = lattice.voxel_size_m * options.voxels_per_cell;
   const std::array<Field, 3> voxels = voxel_fields(map);
   const auto cell_of = [&](std::size_t axis, std::size_t n) {
-    return std::floor((*voxels[axis])[n] / options.voxels_a_cell);
+    return std::floor((*voxels[axis])[n] / options.voxels_per_cell);
   };
   view.cells.resize(map.size());
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -118,11 +118,11 @@ MapView make_map_view(const PointCloud& map, const MapViewOptions& options) {
     view.corner_in_terrain[static_cast<Eigen::Index>(axis)] =
         lattice.origin_in_terrain[static_cast<Eigen::Index>(axis)] + view.cell_size_m * lowest;
     for (std::size_t n = 0; n < map.size(); ++n) {
-      const double place = cell_of(axis, n) - lowest;
-      if (!(place <= std::numeric_limits<std::uint16_t>::max()))
+      const double index = cell_of(axis, n) - lowest;
+      if (!(index <= std::numeric_limits<std::uint16_t>::max()))
         throw Error("too wide for a view",
-                    {.field = "cells along an axis", .value = to_text(place), .bound = "<= 65535"});
-      view.cells[n].place[axis] = static_cast<std::uint16_t>(place);
+                    {.field = "cells along an axis", .value = to_text(index), .bound = "<= 65535"});
+      view.cells[n].index[axis] = static_cast<std::uint16_t>(index);
     }
   }
   if (options.load_n) add_forces(map, *options.load_n, view);

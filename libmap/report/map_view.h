@@ -27,7 +27,7 @@ struct MapMarker {
 
 // A cell of the view.
 struct MapCell {
-  std::array<std::uint16_t, 3> place{};  // index on the cell lattice, relative to the lowest cell
+  std::array<std::uint16_t, 3> index{};  // index on the cell lattice, relative to the lowest cell
   std::uint8_t colors_and_flags = 0;     // color class in the lower four bits, flags above
 };
 
@@ -60,13 +60,13 @@ struct MapView {
   std::vector<CellForce> forces;  // one per cell; empty: the map has no holding forces
   double load_n = 0.0;            // load of the probabilities
   double max_force_n = 0.0;       // quantile 0.995 of the medians
-  int voxels_a_cell = 1;          // voxels per cell along one axis
+  int voxels_per_cell = 1;          // voxels per cell along one axis
   std::uint64_t voxels = 0;       // number of voxels of the map
   std::vector<MapMarker> markers;
 };
 
 struct MapViewOptions {
-  int voxels_a_cell = 1;
+  int voxels_per_cell = 1;
   std::optional<double> zero_plane_m{};
   std::optional<double> load_n{};       // nullopt: forces are not shown
   std::optional<MapLattice> lattice{};  // nullopt: estimated from the points

@@ -17,7 +17,7 @@
 namespace libmap {
 
 // A PNG, JPEG or SVG image for embedding.
-struct ReportPicture {
+struct ReportImage {
   std::string file{};  // path relative to the run's folder
   std::string label{};
   std::string bytes{};
@@ -39,7 +39,7 @@ struct ReportTable {
 struct ReportMap {
   MapView view{};
   std::optional<ReportTable> locations{};  // row n corresponds to marker n
-  std::optional<ReportPicture> still{};
+  std::optional<ReportImage> still{};
 };
 
 // A colored mesh and the meaning of its colors.
@@ -78,8 +78,8 @@ struct ReportGap {
   std::string reason{};
 };
 
-using ReportPictures = std::vector<ReportPicture>;
-using ReportBody = std::variant<std::monostate, ReportPictures, ReportTable, ReportMap, ReportScene,
+using ReportImages = std::vector<ReportImage>;
+using ReportBody = std::variant<std::monostate, ReportImages, ReportTable, ReportMap, ReportScene,
                                 ReportParameters, TimingTable, ReportListing>;
 
 struct ReportItem {

@@ -8,7 +8,7 @@
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
 #include "libmap/report/html.h"
-#include "libmap/report/picture_fit.h"
+#include "libmap/report/image_fit.h"
 
 namespace libmap {
 
@@ -27,12 +27,12 @@ std::string gaps_html(const std::vector<ReportGap>& gaps) {
   return html;
 }
 
-std::string image_html(const ReportPicture& picture, const std::string& alternative) {
+std::string image_html(const ReportImage& image, const std::string& alternative) {
   std::string size;
-  if (picture.width > 0)
-    size = fmt::format(" width=\"{}\" height=\"{}\"", picture.width, picture.height);
+  if (image.width > 0)
+    size = fmt::format(" width=\"{}\" height=\"{}\"", image.width, image.height);
   return "<img alt=\"" + escape_html(alternative) + "\"" + size +
-         " src=\"data:" + picture.media_type + ";base64," + to_base64(picture.bytes) + "\">";
+         " src=\"data:" + image.media_type + ";base64," + to_base64(image.bytes) + "\">";
 }
 
 class PageWriter {
@@ -95,24 +95,24 @@ class PageWriter {
     return "<p class=\"caption\">" + escape_html(item.caption) + "</p>\n";
   }
 
-  std::string body_html(const ReportPictures& pictures, const ReportItem& item) {
+  std::string body_html(const ReportImages& images, const ReportItem& item) {
     const std::string number = figure_number();
     std::string html =
-        fmt::format("<div class=\"pictures n{}\">\n", std::min<std::size_t>(pictures.size(), 4));
+        fmt::format("<div class=\"pictures n{}\">\n", std::min<std::size_t>(images.size(), 4));
     std::string changes;
-    for (const ReportPicture& picture : pictures) {
-      std::string alternative = picture.label.empty() ? item.caption : picture.label;
-      if (alternative.empty()) alternative = picture.file;
-      html += "<div class=\"picture\">" + image_html(picture, alternative);
-      if (!picture.label.empty())
-        html += "<span class=\"label\">" + escape_html(picture.label) + "</span>";
+    for (const ReportImage& image : images) {
+      std::string alternative = image.label.empty() ? item.caption : image.label;
+      if (alternative.empty()) alternative = image.file;
+      html += "<div class=\"picture\">" + image_html(image, alternative);
+      if (!image.label.empty())
+        html += "<span class=\"label\">" + escape_html(image.label) + "</span>";
       html += "</div>\n";
-      if (!picture.change.empty())
-        changes += (changes.empty() ? "" : "; ") + fs::path(picture.file).filename().string() +
-                   ": " + picture.change;
+      if (!image.change.empty())
+        changes += (changes.empty() ? "" : "; ") + fs::path(image.file).filename().string() +
+                   ": " + image.change;
     }
     html += "</div>\n";
-    std::string whole = figure("picture", number, item, html, pictures.front().file);
+    std::string whole = figure("picture", number, item, html, images.front().file);
     if (!changes.empty())
       whole.insert(whole.rfind("</figure>"), "<p class=\"changed\">Made smaller for this page. " +
                                                  escape_html(changes) + ".</p>\n");
@@ -218,11 +218,11 @@ void each_item(ReportSection& section, const Visit& visit) {
   for (ReportSection& inner : section.sections) each_item(inner, visit);
 }
 
-std::vector<ReportPicture*> pictures_of(ReportContent& content) {
-  std::vector<ReportPicture*> found;
+std::vector<ReportImage*> images_of(ReportContent& content) {
+  std::vector<ReportImage*> found;
   each_item(content, [&](ReportItem& item) {
-    if (auto* pictures = std::get_if<ReportPictures>(&item.body))
-      for (ReportPicture& picture : *pictures) found.push_back(&picture);
+    if (auto* images = std::get_if<ReportImages>(&item.body))
+      for (ReportImage& image : *images) found.push_back(&image);
     auto* map = std::get_if<ReportMap>(&item.body);
     if (map != nullptr && map->still) found.push_back(&*map->still);
   });
@@ -273,24 +273,24 @@ std::string report_page(const ReportContent& content, const PageAssets& assets) 
 }
 
 FittedPage fit_report_page(ReportContent content, const PageAssets& assets, std::size_t max_bytes) {
-  const std::vector<ReportPicture*> pictures = pictures_of(content);
-  std::vector<ReportPicture> originals;
-  originals.reserve(pictures.size());
-  for (const ReportPicture* picture : pictures) originals.push_back(*picture);
+  const std::vector<ReportImage*> images = images_of(content);
+  std::vector<ReportImage> originals;
+  originals.reserve(images.size());
+  for (const ReportImage* image : images) originals.push_back(*image);
   FittedPage page;
   do {
-    for (page.picture_level = 0; page.picture_level <= max_picture_level; ++page.picture_level) {
-      parallel_each(pictures.size(), [&](std::size_t n) {
-        *pictures[n] = fit_picture(originals[n], page.picture_level);
+    for (page.image_level = 0; page.image_level <= max_image_level; ++page.image_level) {
+      parallel_each(images.size(), [&](std::size_t n) {
+        *images[n] = fit_image(originals[n], page.image_level);
       });
       page.html = report_page(content, assets);
       if (page.html.size() <= max_bytes) {
-        page.changed_pictures = static_cast<std::size_t>(
-            std::count_if(pictures.begin(), pictures.end(),
+        page.changed_images = static_cast<std::size_t>(
+            std::count_if(images.begin(), images.end(),
                           [](const auto* one) { return !one->change.empty(); }));
         return page;
       }
-      if (pictures.empty()) break;  // higher levels change nothing
+      if (images.empty()) break;  // higher levels change nothing
     }
   } while (cut_tables(content, short_table_rows));
   throw Error("the report is too large even with reduced images and tables",

@@ -21,13 +21,13 @@ struct PageAssets {
 // that content of the run's files is never executed.
 std::string report_page(const ReportContent& content, const PageAssets& assets);
 
-// Returns the page with the lowest image reduction (fit_picture) that keeps it within `max_bytes`.
+// Returns the page with the lowest image reduction (fit_image) that keeps it within `max_bytes`.
 // If the highest level is not sufficient, tables are cut to 100 rows. Throws Error naming the bound
 // if the page is still too large.
 struct FittedPage {
   std::string html;
-  int picture_level = 0;
-  std::size_t changed_pictures = 0;
+  int image_level = 0;
+  std::size_t changed_images = 0;
 };
 FittedPage fit_report_page(ReportContent content, const PageAssets& assets, std::size_t max_bytes);
 

@@ -108,7 +108,7 @@ class Finder {
     const FolderListing listing = list_folder(folder);
     add_maps(listing, section);
     add_scenes(folder, listing, section);
-    add_pictures(listing, section);
+    add_images(listing, section);
     add_tables(listing, section);
     add_texts(listing, section);
     manifests_.clear();
@@ -128,7 +128,7 @@ class Finder {
     PlannedItem parameters{.kind = ItemKind::parameters};
     for (const fs::path& map : maps_) {
       parameters.files.push_back(map);
-      parameters.labels.push_back(place_of(map));
+      parameters.labels.push_back(label_of(map));
     }
     parameters.caption = maps_.size() == 1 ? "The map of this run." : "The maps of this run.";
     return {std::move(parameters)};
@@ -142,7 +142,7 @@ class Finder {
       const fs::path folder = map.parent_path();
       if (!known.insert(folder).second) continue;
       auto& [name, outputs] = timings.cases.emplace_back();
-      name = maps_in(folder) == 1 ? place_of(map) : name_of(folder);
+      name = maps_in(folder) == 1 ? label_of(map) : name_of(folder);
       for (const ReportSource& source : manifests_below(folder, true))
         if (source.error.empty() && folder_with_map_of(source.output) == folder)
           outputs.emplace_back(source.output);
@@ -160,14 +160,14 @@ class Finder {
 
   // Manifest of an output, cached because each map is compared with all files beside it.
   const std::optional<Manifest>& manifest_of(const fs::path& output) {
-    const auto [place, added] = manifests_.try_emplace(output);
-    if (!added) return place->second;
+    const auto [cached, added] = manifests_.try_emplace(output);
+    if (!added) return cached->second;
     try {
-      place->second = read_manifest_of(output);
+      cached->second = read_manifest_of(output);
     } catch (const Error&) {
-      place->second.reset();  // unreadable manifests are ignored
+      cached->second.reset();  // unreadable manifests are ignored
     }
-    return place->second;
+    return cached->second;
   }
 
   // Nearest parent folder of `output` with a map.
@@ -183,7 +183,7 @@ class Finder {
   }
 
   // Name of a map: its folder, or its path if it is in the run's folder or beside other maps.
-  std::string place_of(const fs::path& map) const {
+  std::string label_of(const fs::path& map) const {
     const bool alone = map.parent_path() != root_ && maps_in(map.parent_path()) == 1;
     return alone ? name_of(map.parent_path()) : map.lexically_relative(root_).string();
   }
@@ -201,7 +201,7 @@ class Finder {
       PlannedItem item{.kind = ItemKind::map, .files = {file}};
       item.lookup = lookup_of(file, listing);
       if (!item.lookup.empty()) item.columns = columns_of(item.lookup);
-      item.picture = still_of(file, listing, candidates.size() == 1);
+      item.image = still_of(file, listing, candidates.size() == 1);
       section.items.push_back(std::move(item));
     }
   }
@@ -256,8 +256,8 @@ class Finder {
   // Image of the map according to the image's manifest. An image without a manifest is assigned to
   // the only map of a folder.
   fs::path still_of(const fs::path& map, const FolderListing& listing, bool only_map) {
-    const auto shows = [&](const fs::path& picture) {
-      const auto& manifest = manifest_of(picture);
+    const auto shows = [&](const fs::path& image) {
+      const auto& manifest = manifest_of(image);
       if (!manifest || manifest->inputs.empty()) return only_map;
       return fs::path(manifest->inputs.front().path).stem() == map.stem();
     };
@@ -270,8 +270,8 @@ class Finder {
   }
 
   // Adds one figure with all images and one per chart. Images that also exist as SVG are omitted.
-  static void add_pictures(const FolderListing& listing, PlannedSection& section) {
-    PlannedItem pictures{.kind = ItemKind::picture};
+  static void add_images(const FolderListing& listing, PlannedSection& section) {
+    PlannedItem images{.kind = ItemKind::image};
     std::vector<PlannedItem> charts;
     const auto drawn = [&](const fs::path& file) {
       const fs::path drawing = fs::path(file).replace_extension(".svg");
@@ -289,18 +289,18 @@ class Finder {
         continue;
       if (file.extension() == ".svg") {
         charts.push_back(
-            {.kind = ItemKind::picture, .files = {file}, .caption = heading_of(file.stem()) + "."});
+            {.kind = ItemKind::image, .files = {file}, .caption = heading_of(file.stem()) + "."});
         continue;
       }
-      pictures.files.push_back(file);
-      pictures.labels.push_back(heading_of(file.stem()));
+      images.files.push_back(file);
+      images.labels.push_back(heading_of(file.stem()));
     }
     // Several images have labels, a single one has a caption only.
-    for (const std::string& label : pictures.labels)
-      pictures.caption += (pictures.caption.empty() ? "" : ", ") + label;
-    if (!pictures.caption.empty()) pictures.caption += '.';
-    if (pictures.files.size() == 1) pictures.labels.clear();
-    if (!pictures.files.empty()) section.items.push_back(std::move(pictures));
+    for (const std::string& label : images.labels)
+      images.caption += (images.caption.empty() ? "" : ", ") + label;
+    if (!images.caption.empty()) images.caption += '.';
+    if (images.files.size() == 1) images.labels.clear();
+    if (!images.files.empty()) section.items.push_back(std::move(images));
     for (PlannedItem& chart : charts) section.items.push_back(std::move(chart));
   }
 

@@ -11,7 +11,7 @@
 namespace libmap {
 
 // Type of an item's content.
-enum class ItemKind { picture, table, map, scene, parameters, timings, listing };
+enum class ItemKind { image, table, map, scene, parameters, timings, listing };
 
 struct PlannedItem {
   ItemKind kind = ItemKind::listing;
@@ -21,7 +21,7 @@ struct PlannedItem {
   // Maps: table of look-ups, its shown columns with headings, image of the map.
   std::filesystem::path lookup{};
   TableColumns columns{};
-  std::filesystem::path picture{};
+  std::filesystem::path image{};
   // Timings: heading and outputs of each column.
   std::vector<std::pair<std::string, std::vector<std::filesystem::path>>> cases{};
 };

@@ -9,7 +9,7 @@
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
 #include "libmap/core/text.h"
-#include "libmap/report/picture_fit.h"
+#include "libmap/report/image_fit.h"
 
 namespace libmap {
 
@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::uint64_t max_picture_bytes = std::uint64_t{64} << 20;
+constexpr std::uint64_t max_image_bytes = std::uint64_t{64} << 20;
 // Commands whose running times are shown, in this order.
 constexpr std::array timed_commands = {
     "simulate scene", "simulate site", "simulate cameras", "fuse",   "mesh",     "crop",
@@ -115,8 +115,8 @@ class Reader {
     ReportItem item{.caption = plan.caption};
     if (plan.files.size() == 1) item.source = name_of(plan.files.front());
     switch (plan.kind) {
-      case ItemKind::picture:
-        read_pictures(plan, item);
+      case ItemKind::image:
+        read_images(plan, item);
         break;
       case ItemKind::table:
         fill(item, plan.files.front(), [&] {
@@ -146,25 +146,25 @@ class Reader {
     return item;
   }
 
-  std::optional<ReportPicture> read_picture(const fs::path& path, ReportItem& item) {
-    std::optional<ReportPicture> picture;
+  std::optional<ReportImage> read_image(const fs::path& path, ReportItem& item) {
+    std::optional<ReportImage> image;
     fill(item, path, [&] {
-      picture = read_picture_bytes(read_whole_file(path, max_picture_bytes));
-      picture->file = name_of(path);
+      image = read_image_bytes(read_whole_file(path, max_image_bytes));
+      image->file = name_of(path);
       use(path);
     });
-    return picture;
+    return image;
   }
 
-  void read_pictures(const PlannedItem& plan, ReportItem& item) {
-    ReportPictures pictures;
+  void read_images(const PlannedItem& plan, ReportItem& item) {
+    ReportImages images;
     for (std::size_t n = 0; n < plan.files.size(); ++n) {
-      auto picture = read_picture(plan.files[n], item);
-      if (!picture) continue;
-      if (!plan.labels.empty()) picture->label = plan.labels[n];
-      pictures.push_back(std::move(*picture));
+      auto image = read_image(plan.files[n], item);
+      if (!image) continue;
+      if (!plan.labels.empty()) image->label = plan.labels[n];
+      images.push_back(std::move(*image));
     }
-    if (!pictures.empty()) item.body = std::move(pictures);
+    if (!images.empty()) item.body = std::move(images);
   }
 
   void read_map(const PlannedItem& plan, ReportItem& item) {
@@ -175,7 +175,7 @@ class Reader {
       map.view = load_map_(path, map.locations ? std::optional(plan.lookup) : std::nullopt);
       use(path);
       if (map.locations) name_markers(plan.lookup, map);
-      if (!plan.picture.empty()) map.still = read_picture(plan.picture, item);
+      if (!plan.image.empty()) map.still = read_image(plan.image, item);
       item.body = std::move(map);
     });
   }
@@ -259,7 +259,7 @@ class Reader {
 
   void add_sources(ReportContent& content) {
     content.sources = manifests_below(root_, false);
-    const std::string itself = options_.left_out.lexically_normal().string();
+    const std::string itself = options_.excluded.lexically_normal().string();
     std::erase_if(content.sources, [&](const ReportSource& source) {
       return fs::path(source.output).lexically_normal() == itself ||
              source.manifest.command == "report";
@@ -295,9 +295,9 @@ ReportTable read_report_table(const fs::path& path, const TableColumns& columns,
     shown.lines = head.lines;
   else if (all.rows.size() > max_rows)
     shown.lines = all.rows.size() + 1;
-  std::vector<std::size_t> places;
+  std::vector<std::size_t> column_indices;
   for (const auto& [name, heading] : columns) {
-    places.push_back(all.column(name));
+    column_indices.push_back(all.column(name));
     shown.table.columns.push_back(name);
     shown.headings.push_back(heading);
   }
@@ -310,7 +310,7 @@ ReportTable read_report_table(const fs::path& path, const TableColumns& columns,
   shown.table.file = all.file;
   for (const std::vector<std::string>& row : all.rows) {
     std::vector<std::string>& cells = shown.table.rows.emplace_back();
-    for (const std::size_t place : places) cells.push_back(row[place]);
+    for (const std::size_t entry : column_indices) cells.push_back(row[entry]);
   }
   return shown;
 }
@@ -318,7 +318,7 @@ ReportTable read_report_table(const fs::path& path, const TableColumns& columns,
 TimingTable timing_table(const std::vector<std::pair<std::string, std::vector<Manifest>>>& cases) {
   TimingTable table;
   for (const auto& one : cases) table.cases.push_back(one.first);
-  std::map<std::pair<std::string, std::string>, std::size_t> place_of;  // by command and step
+  std::map<std::pair<std::string, std::string>, std::size_t> row_of;  // by command and step
   std::map<std::string, std::size_t> rank_of;                           // by command
   for (std::size_t n = 0; n < cases.size(); ++n) {
     std::vector<unsigned>& threads = table.threads.emplace_back();
@@ -326,13 +326,13 @@ TimingTable timing_table(const std::vector<std::pair<std::string, std::vector<Ma
       if (std::find(threads.begin(), threads.end(), manifest.threads) == threads.end())
         threads.push_back(manifest.threads);
       for (const auto& [step, seconds] : manifest.timings_s) {
-        const auto [place, is_new] =
-            place_of.try_emplace({manifest.command, step}, table.rows.size());
+        const auto [entry, is_new] =
+            row_of.try_emplace({manifest.command, step}, table.rows.size());
         rank_of.try_emplace(manifest.command, rank_of.size());
         if (is_new)
           table.rows.push_back(
               {manifest.command, step, std::vector<std::optional<double>>(cases.size())});
-        std::optional<double>& cell = table.rows[place->second].seconds[n];
+        std::optional<double>& cell = table.rows[entry->second].seconds[n];
         table.sums = table.sums || cell.has_value();
         cell = cell.value_or(0.0) + seconds;
       }

@@ -12,7 +12,7 @@ namespace libmap {
 
 struct ReportReadOptions {
   std::filesystem::path folder{};    // folder of the run
-  std::filesystem::path left_out{};  // the report itself, which is not listed
+  std::filesystem::path excluded{};  // the report itself, which is not listed
   std::size_t max_rows = 1000;       // per table
   std::size_t max_lines = 200;       // per text file
   std::size_t max_sources = 400;     // in the list of all outputs

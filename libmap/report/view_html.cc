@@ -49,9 +49,9 @@ std::string cell_bytes(const MapView& view) {
   std::string bytes;
   bytes.reserve(view.cells.size() * 7);
   for (const MapCell& cell : view.cells)
-    for (const unsigned place : cell.place) {
-      bytes += static_cast<char>(place & 255U);
-      bytes += static_cast<char>(place >> 8U);
+    for (const unsigned index : cell.index) {
+      bytes += static_cast<char>(index & 255U);
+      bytes += static_cast<char>(index >> 8U);
     }
   for (const MapCell& cell : view.cells) bytes += static_cast<char>(cell.colors_and_flags);
   return bytes;
@@ -168,9 +168,9 @@ std::string tools_html(const MapView& view) {
 std::string description(const MapView& view) {
   std::string text =
       fmt::format("{} cells of {} mm", view.cells.size(), short_number(view.cell_size_m * 1e3));
-  if (view.cells.size() < view.voxels || view.voxels_a_cell > 1)
+  if (view.cells.size() < view.voxels || view.voxels_per_cell > 1)
     text += fmt::format(", one voxel shown for each cube of {0} x {0} x {0} of the map's {1}",
-                        view.voxels_a_cell, view.voxels);
+                        view.voxels_per_cell, view.voxels);
   return text + ".";
 }
 

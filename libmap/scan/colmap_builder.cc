@@ -52,8 +52,8 @@ std::optional<Eigen::Vector2d> observe(const CameraView& view, const Eigen::Vect
   auto pixel = project_point(camera, point);
   if (!pixel || !holds(camera, *pixel)) return std::nullopt;
   const Eigen::Vector2d ray = point.head<2>() / point.z();
-  const DepthPixel place = depth_pixel(view, ray);
-  const double depth = depth_at(view.depth, place.x, place.y);
+  const DepthPixel depth_pixel_at = depth_pixel(view, ray);
+  const double depth = depth_at(view.depth, depth_pixel_at.x, depth_pixel_at.y);
   if (!(depth > 0.0) || !(std::abs(depth - point.z()) <= tolerance * depth)) return std::nullopt;
   // Beyond the lens's field of view, the distortion can map a point back into the image.
   const auto back = pixel_to_ray(camera, *pixel);
@@ -77,9 +77,9 @@ ColmapBuilder::ColmapBuilder(const ColmapBuilderOptions& options) : options_(opt
 int ColmapBuilder::add_camera(const ColmapCamera& camera) {
   const std::string text = to_colmap_cameras({.cameras = {{1, camera}}});
   const int next = static_cast<int>(model_.cameras.size()) + 1;
-  const auto [place, is_new] = camera_of_text_.emplace(text, next);
+  const auto [entry, is_new] = camera_of_text_.emplace(text, next);
   if (is_new) model_.cameras.emplace(next, camera);
-  return place->second;
+  return entry->second;
 }
 
 void ColmapBuilder::add_image(const std::string& name, const CameraView& view,
@@ -131,9 +131,9 @@ void ColmapBuilder::add_points(int id, const CameraView& view, const Pose& world
       const Eigen::Vector2d pixel(x, y);
       const auto ray = pixel_to_ray(view.color_camera, pixel);
       if (!ray) continue;
-      const DepthPixel place = depth_pixel(view, *ray);
-      const double depth = depth_at(view.depth, place.x, place.y);
-      if (!(depth > 0.0) || !is_smooth(view.depth, place, options_.depth_tolerance)) continue;
+      const DepthPixel depth_pixel_at = depth_pixel(view, *ray);
+      const double depth = depth_at(view.depth, depth_pixel_at.x, depth_pixel_at.y);
+      if (!(depth > 0.0) || !is_smooth(view.depth, depth_pixel_at, options_.depth_tolerance)) continue;
       const std::int64_t point = static_cast<std::int64_t>(model_.points.size()) + 1;
       model_.points.emplace(
           point, ColmapPoint{.position = world_from_camera * (depth * ray->homogeneous()),

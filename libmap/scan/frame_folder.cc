@@ -412,8 +412,8 @@ void FrameFolder::read_poses() {
         std::optional<Pose> pose;
         if (!have_nodes)
           pose = pose_at(trajectory, node.stamp_s, options_.pairing_tolerance_s);
-        else if (const auto place = pose_of_node.find(node.id); place != pose_of_node.end())
-          pose = *place->second;
+        else if (const auto entry = pose_of_node.find(node.id); entry != pose_of_node.end())
+          pose = *entry->second;
         if (!pose) continue;
         use(node, to_base_pose(node, *pose));
         ++found;
@@ -465,11 +465,11 @@ std::string FrameFolder::image_name(int node) const {
 }
 
 RgbdFrame FrameFolder::read_frame(int node, FrameParts parts) const {
-  const auto place = files_.find(node);
-  if (place == files_.end())
+  const auto entry = files_.find(node);
+  if (entry == files_.end())
     throw Error("no such node",
                 {.file = path_.string(), .field = "node", .value = std::to_string(node)});
-  const Files& of_node = place->second;
+  const Files& of_node = entry->second;
   RgbdFrame frame;
   frame.node = node;
   frame.stamp_s = graph_.find_node(node)->stamp_s;

@@ -14,7 +14,7 @@
 #include "libmap/core/text.h"
 #include "libmap/poses/trajectory_text.h"
 #include "libmap/scan/frame_folder.h"
-#include "libmap/scan/picture_file.h"
+#include "libmap/scan/image_export.h"
 
 namespace libmap {
 
@@ -43,7 +43,7 @@ void make_folder(const fs::path& folder) {
 
 // True if stamps identify the poses of a trajectory. Nodes without a pose must be too far in time
 // from the poses of other nodes to be assigned one.
-bool do_stamps_tell_nodes(const PoseGraph& graph, const Trajectory& trajectory) {
+bool stamps_identify_nodes(const PoseGraph& graph, const Trajectory& trajectory) {
   const double pairing_tolerance_s = FrameFolderOptions().pairing_tolerance_s;
   std::set<double> stamps;
   for (const GraphNode& node : graph.nodes) stamps.insert(node.stamp_s);
@@ -76,7 +76,7 @@ FrameFolderWriter::FrameFolderWriter(fs::path folder) : folder_(std::move(folder
 
 std::string FrameFolderWriter::write_image(const char* folder, int node, const std::string& bytes) {
   const ImageFormat format = image_format(bytes).value_or(ImageFormat::png);
-  std::string name = std::string(folder) + "/" + picture_name(node, 0, file_extension(format));
+  std::string name = std::string(folder) + "/" + image_file_name(node, 0, file_extension(format));
   write_text(folder_ / name, bytes);
   return name;
 }
@@ -129,8 +129,8 @@ void FrameFolderWriter::write_nodes(const PoseGraph& graph) const {
   table.columns = {"node",  "session", "weight",      "stamp_s",    "label",    "color",
                    "depth", "right",   "calibration", "baseline_m", "velocity", "gps"};
   for (const GraphNode& node : graph.nodes) {
-    const auto place = files_.find(node.id);
-    const Files of_node = place == files_.end() ? Files() : place->second;
+    const auto entry = files_.find(node.id);
+    const Files of_node = entry == files_.end() ? Files() : entry->second;
     std::string gps;
     if (node.gps)
       gps = join({node.gps->stamp_s, node.gps->longitude_deg, node.gps->latitude_deg,
@@ -147,12 +147,12 @@ std::size_t FrameFolderWriter::write_associations(const PoseGraph& graph) const 
   std::string text = "# stamp color stamp depth\n";
   std::size_t count = 0;
   for (const GraphNode& node : graph.nodes) {
-    const auto place = files_.find(node.id);
-    if (place == files_.end() || place->second.color.empty() || place->second.depth.empty())
+    const auto entry = files_.find(node.id);
+    if (entry == files_.end() || entry->second.color.empty() || entry->second.depth.empty())
       continue;
     const std::string stamp = stamp_text(node.stamp_s);
-    for (const std::string& word : {stamp, place->second.color, stamp}) (text += word) += ' ';
-    (text += place->second.depth) += '\n';
+    for (const std::string& word : {stamp, entry->second.color, stamp}) (text += word) += ' ';
+    (text += entry->second.depth) += '\n';
     ++count;
   }
   write_text(folder_ / files::associations, text);
@@ -166,7 +166,7 @@ void FrameFolderWriter::write_poses(const PoseGraph& graph) const {
   for (const auto& [source, name] : sources) {
     const Trajectory trajectory = trajectory_of(graph, source);
     if (trajectory.empty()) continue;
-    const bool with_nodes = !do_stamps_tell_nodes(graph, trajectory);
+    const bool with_nodes = !stamps_identify_nodes(graph, trajectory);
     write_text(folder_ / name, to_tum(trajectory, with_nodes));
   }
   Trajectory vertices = trajectory_of(graph, PoseSource::optimized);

@@ -74,8 +74,8 @@ NodeCameras cameras_of_images(const std::vector<ImagePose>& images, const ScanSo
   std::vector<double> stamps;
   for (std::size_t i = 0; i < images.size(); ++i) {
     const ImageName name = split_name(images[i].image);
-    if (const auto place = node_of_file.find(name.file); place != node_of_file.end()) {
-      found.push_back({i, {place->second, 0}});
+    if (const auto entry = node_of_file.find(name.file); entry != node_of_file.end()) {
+      found.push_back({i, {entry->second, 0}});
     } else if (const auto node = node_in_name(name.stem, graph)) {
       found.push_back({i, *node});
     } else if (const auto stamp = parse_double(name.stem); stamp && std::isfinite(*stamp)) {
@@ -117,9 +117,9 @@ std::vector<CameraPose> poses_of_images(const std::vector<ImagePose>& images,
                                         std::vector<std::string>& warnings) {
   std::vector<CameraPose> poses;
   std::map<std::pair<int, std::size_t>, std::string> known;
-  for (const auto& [index, place] : cameras_of_images(images, scan)) {
-    const auto& [node, camera] = place;
-    const auto [earlier, is_new] = known.emplace(place, images[index].image);
+  for (const auto& [index, node_camera] : cameras_of_images(images, scan)) {
+    const auto& [node, camera] = node_camera;
+    const auto [earlier, is_new] = known.emplace(node_camera, images[index].image);
     if (!is_new)
       throw Error("two images belong to one camera of node " + std::to_string(node),
                   {.field = "image", .value = earlier->second + " and " + images[index].image});
@@ -168,10 +168,10 @@ double fitting_scale(const std::vector<CameraPose>& poses, const std::map<int, P
   std::vector<Eigen::Vector3d> given;
   std::vector<Eigen::Vector3d> wanted;
   for (const CameraPose& pose : poses) {
-    const auto place = own.find(pose.node);
-    if (place == own.end()) continue;
+    const auto known_pose = own.find(pose.node);
+    if (known_pose == own.end()) continue;
     given.push_back(pose.world_from_camera.translation());
-    wanted.push_back((place->second * pose.base_from_camera).translation());
+    wanted.push_back((known_pose->second * pose.base_from_camera).translation());
   }
   const auto matrix_of = [](const std::vector<Eigen::Vector3d>& points) {
     Eigen::Matrix3Xd matrix(3, static_cast<Eigen::Index>(points.size()));
@@ -217,7 +217,7 @@ void bind_to_nodes(const std::vector<CameraPose>& cameras, ImportedPoses& result
   for (const auto& [node, candidates] : poses) {
     const Pose mean = mean_of(candidates);
     for (const Pose& pose : candidates)
-      result.largest_rig_deviation_m = std::max(result.largest_rig_deviation_m,
+      result.max_rig_deviation_m = std::max(result.max_rig_deviation_m,
                                                 (pose.translation() - mean.translation()).norm());
     result.trajectory.poses.push_back({node, stamps.at(node), mean});
   }
@@ -303,7 +303,7 @@ ImportedPoses import_poses(const fs::path& path, const ScanSource& scan,
       cameras = poses_of_images(file.images, scan, result.warnings);
       result.poses_in_file = file.images.size();
     }
-    result.trajectory.foreign = result.poses_in_file - cameras.size();
+    result.trajectory.unmatched = result.poses_in_file - cameras.size();
     const std::map<int, Pose> own = own_poses(scan.graph());
     result.scale = options.scale > 0.0 ? options.scale : fitting_scale(cameras, own);
     bind_to_nodes(cameras, result);

@@ -34,7 +34,7 @@ struct ImportedPoses {
   NodeTrajectory trajectory;
   std::size_t poses_in_file = 0;
   double scale = 1.0;                    // meters per unit, as applied
-  double largest_rig_deviation_m = 0.0;  // maximum deviation of a node's cameras from their mean
+  double max_rig_deviation_m = 0.0;  // maximum deviation of a node's cameras from their mean
   // Reports poses dropped because of an unusable calibration, and motion between neighbors that
   // differs from the scan's in length (wrong scale) or axes (wrong format or frame).
   std::vector<std::string> warnings{};

@@ -106,10 +106,10 @@ RigCamera camera_of(const YAML::Node& map, const RigCamera& defaults, const fs::
 }
 
 Error at_camera(const Error& error, std::size_t index, const YAML::Node& map) {
-  std::string place = "cameras[" + std::to_string(index) + "]";
+  std::string field = "cameras[" + std::to_string(index) + "]";
   if (map.IsMap() && map["name"] && map["name"].IsScalar())
-    place += " (" + map["name"].Scalar() + ")";
-  return error.in_field(place, ".");
+    field += " (" + map["name"].Scalar() + ")";
+  return error.in_field(field, ".");
 }
 
 CameraRig rig_of(const YAML::Node& root, const fs::path& folder) {

@@ -310,7 +310,7 @@ namespace {
 std::size_t count_polygons(const std::string& blob, std::int64_t corners) {
   std::size_t count = 0;
   std::uint64_t left = 0;  // remaining indices of the material
-  each_matrix_piece(blob, [&](std::string_view bytes) {
+  for_each_matrix_chunk(blob, [&](std::string_view bytes) {
     for (; bytes.size() >= sizeof(std::int32_t); bytes.remove_prefix(sizeof(std::int32_t))) {
       if (left > 0) {
         --left;

@@ -299,11 +299,11 @@ std::optional<int> node_of_localization(const StoredPoses& stored) {
 // Landmarks (ids below 0) among the stored poses move with the first node that sees them.
 std::map<int, Pose> with_landmarks(const StoredPoses& stored, const std::vector<PoseLink>& links,
                                    std::map<int, Pose> map_from_base) {
-  std::map<int, std::size_t> places;
-  for (std::size_t n = 0; n < stored.ids.size(); ++n) places.emplace(stored.ids[n], n);
+  std::map<int, std::size_t> row_of_node;
+  for (std::size_t n = 0; n < stored.ids.size(); ++n) row_of_node.emplace(stored.ids[n], n);
   const auto earlier = [&](int id) -> std::optional<Pose> {
-    const auto place = places.find(id);
-    return place == places.end() ? std::nullopt : decode_pose(stored.pose(place->second));
+    const auto entry = row_of_node.find(id);
+    return entry == row_of_node.end() ? std::nullopt : decode_pose(stored.pose(entry->second));
   };
   for (const PoseLink& link : links) {
     if (link.to > 0 || map_from_base.contains(link.to)) continue;
@@ -351,8 +351,8 @@ void update_poses(SQLite::Database& database, const StoredPoses& stored, bool lo
   const OptimizedPoseBlobs blobs = to_blobs(map_from_base);
   std::string localization;
   const std::optional<int> node = node_of_localization(stored);
-  const auto place = node ? map_from_base.find(*node) : map_from_base.end();
-  if (place != map_from_base.end()) localization = to_blob(place->second);
+  const auto entry = node ? map_from_base.find(*node) : map_from_base.end();
+  if (entry != map_from_base.end()) localization = to_blob(entry->second);
   SQLite::Statement update(database, std::string("UPDATE Admin SET opt_ids = ?, opt_poses = ?") +
                                          (localizes ? ", opt_last_localization = ?" : ""));
   if (!map_from_base.empty()) {

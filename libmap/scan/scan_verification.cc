@@ -96,7 +96,7 @@ void check_velocity(const std::string& blob) { decode_velocity(blob); }
 void check_gps(const std::string& blob) { decode_gps(blob); }
 void check_information(const std::string& blob) { decode_information(blob); }
 void check_matrix(const std::string& blob) {
-  each_matrix_piece(blob, [](std::string_view) {});
+  for_each_matrix_chunk(blob, [](std::string_view) {});
 }
 void check_image(const std::string& blob) { decode_color(blob); }
 

@@ -150,13 +150,13 @@ TriangleSoup tessellate_box(const SceneSolid& solid, const SceneMeshOptions& opt
     counts[axis] =
         pieces(2.0 * solid.half_size[static_cast<Eigen::Index>(axis)], options.edge_length_m, 1);
   std::map<std::array<std::size_t, 3>, std::uint32_t> known;
-  const auto vertex_at = [&](const std::array<std::size_t, 3>& place) {
-    const auto [entry, is_new] = known.try_emplace(place, as_index(soup.vertices.size()));
+  const auto vertex_at = [&](const std::array<std::size_t, 3>& lattice_point) {
+    const auto [entry, is_new] = known.try_emplace(lattice_point, as_index(soup.vertices.size()));
     if (is_new) {
       Eigen::Vector3d local;
       for (const std::size_t axis : {0U, 1U, 2U})
         local[static_cast<Eigen::Index>(axis)] = lattice_coordinate(
-            solid.half_size[static_cast<Eigen::Index>(axis)], place[axis], counts[axis]);
+            solid.half_size[static_cast<Eigen::Index>(axis)], lattice_point[axis], counts[axis]);
       soup.vertices.push_back(solid.scene_from_solid * local);
     }
     return entry->second;
@@ -167,11 +167,11 @@ TriangleSoup tessellate_box(const SceneSolid& solid, const SceneMeshOptions& opt
       const std::size_t u = (axis + (upper ? 1 : 2)) % 3;
       const std::size_t v = (axis + (upper ? 2 : 1)) % 3;
       const auto at = [&](std::size_t i, std::size_t j) {
-        std::array<std::size_t, 3> place{};
-        place[axis] = upper ? counts[axis] : 0;
-        place[u] = i;
-        place[v] = j;
-        return vertex_at(place);
+        std::array<std::size_t, 3> lattice_point{};
+        lattice_point[axis] = upper ? counts[axis] : 0;
+        lattice_point[u] = i;
+        lattice_point[v] = j;
+        return vertex_at(lattice_point);
       };
       add_quads(counts[u], counts[v], at, soup.triangles);
     }

@@ -56,7 +56,7 @@ class Sampler {
 
  private:
   // Relative position of a sample in its grid cell, 0 to 1.
-  double place(RandomStream& random) const { return 0.5 + jitter_ * (random.uniform() - 0.5); }
+  double jittered(RandomStream& random) const { return 0.5 + jitter_ * (random.uniform() - 0.5); }
 
   void draw_segment(const Patch& patch, RandomStream& random,
                     std::vector<SurfaceTruth>& samples) const {
@@ -68,8 +68,8 @@ class Sampler {
       const double columns = steps_of(segment.area_between(t0, t1) / spacing_, spacing_);
       const double phase = random.uniform();
       for (double column = 0.0; column < columns; column += 1.0) {
-        const double angle = 2.0 * pi * (column + phase + place(random)) / columns;
-        const double t = segment.t_of_area_share(t0, t1, place(random));
+        const double angle = 2.0 * pi * (column + phase + jittered(random)) / columns;
+        const double t = segment.t_of_area_share(t0, t1, jittered(random));
         samples.push_back(geometry_.on_profile(*patch.solid, patch.segment, t, angle));
       }
     }
@@ -83,17 +83,17 @@ class Sampler {
     const double tiles_x = bent ? steps_of(2.0 * face.half_x, 12.0 * spacing_) : 1.0;
     const double tiles_y = bent ? steps_of(2.0 * face.half_y, 12.0 * spacing_) : 1.0;
     const Eigen::Vector2d tile(2.0 * face.half_x / tiles_x, 2.0 * face.half_y / tiles_y);
-    double owed = 0.0;  // points missing so far because of rounding to whole rows
+    double missing_points = 0.0;  // points missing so far because of rounding to whole rows
     for (double j = 0.0; j < tiles_y; j += 1.0)
       for (double i = 0.0; i < tiles_x; i += 1.0)
         draw_tile(patch, {i * tile.x() - face.half_x, j * tile.y() - face.half_y}, tile, random,
-                  samples, owed);
+                  samples, missing_points);
   }
 
   void draw_tile(const Patch& patch, const Eigen::Vector2d& corner, const Eigen::Vector2d& tile,
-                 RandomStream& random, std::vector<SurfaceTruth>& samples, double& owed) const {
+                 RandomStream& random, std::vector<SurfaceTruth>& samples, double& missing_points) const {
     const Stretch stretch = stretch_of(patch, corner, tile);
-    const double wanted = tile.prod() * stretch.area / spacing_ / spacing_ + owed;
+    const double wanted = tile.prod() * stretch.area / spacing_ / spacing_ + missing_points;
     // The longer side compensates the rounding of the shorter one.
     const bool is_wide = tile.x() > tile.y();
     const double across =
@@ -101,11 +101,11 @@ class Sampler {
     const double along = std::max(1.0, std::round(wanted / across));
     const double columns = is_wide ? along : across;
     const double rows = is_wide ? across : along;
-    owed = wanted - columns * rows;
+    missing_points = wanted - columns * rows;
     for (double row = 0.0; row < rows; row += 1.0) {
       for (double column = 0.0; column < columns; column += 1.0) {
-        const double x = corner.x() + tile.x() * (column + place(random)) / columns;
-        const double y = corner.y() + tile.y() * (row + place(random)) / rows;
+        const double x = corner.x() + tile.x() * (column + jittered(random)) / columns;
+        const double y = corner.y() + tile.y() * (row + jittered(random)) / rows;
         samples.push_back(geometry_.on_face(*patch.solid, *patch.face, x, y));
       }
     }

@@ -183,7 +183,7 @@ void drop_unused_vertices(std::vector<Eigen::Vector3d>& vertices,
   vertices = std::move(used);
 }
 
-Solid in_order(const Solid& solid) {
+Solid sort_solid(const Solid& solid) {
   const auto key = [&](std::uint32_t n) {
     const Eigen::Vector3d& vertex = solid.vertices[n];
     return std::array<double, 3>{vertex.x(), vertex.y(), vertex.z()};

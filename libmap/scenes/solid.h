@@ -46,7 +46,7 @@ void drop_unused_vertices(std::vector<Eigen::Vector3d>& vertices, std::vector<Tr
 
 // Sorts vertices by x, y, z and triangles by their vertices. The order of CGAL's results depends on
 // memory addresses; sorting them makes equal input give equal bytes.
-Solid in_order(const Solid& solid);
+Solid sort_solid(const Solid& solid);
 
 // Remeshes each flat region of one label with edges of about `edge_length_m`. The outlines of the
 // regions do not change. Throws Error if corners coincide because a region is not flat.

@@ -61,7 +61,7 @@ Solid to_solid(Mesh& mesh) {
     solid.triangles.push_back(triangle);
     solid.labels.push_back(labels[face]);
   }
-  return in_order(solid);
+  return sort_solid(solid);
 }
 
 // Copies the labels of faces to their parts and copies.
@@ -125,8 +125,8 @@ void collapse_short_edges(Mesh& mesh, double min_edge_m) {
       if (!is_short(half) || !may_collapse(mesh, half) ||
           !CGAL::Euler::does_satisfy_link_condition(edge, mesh))
         continue;
-      const auto place = mesh.point(mesh.target(half));
-      mesh.point(CGAL::Euler::collapse_edge(edge, mesh)) = place;
+      const auto position = mesh.point(mesh.target(half));
+      mesh.point(CGAL::Euler::collapse_edge(edge, mesh)) = position;
       break;
     }
   }
@@ -149,11 +149,11 @@ Solid unite(const std::vector<Solid>& solids, double min_edge_m) {
   std::vector<std::vector<Bounds3d>> boxes(1);
   for (std::size_t n = 1; n < solids.size(); ++n) {
     const Bounds3d box = bounds_of(solids[n].vertices);
-    const auto place = std::find_if(boxes.begin() + 1, boxes.end(), [&](const auto& others) {
+    const auto overlapping = std::find_if(boxes.begin() + 1, boxes.end(), [&](const auto& others) {
       return std::none_of(others.begin(), others.end(),
                           [&](const Bounds3d& other) { return overlap(other, box); });
     });
-    const auto index = static_cast<std::size_t>(place - boxes.begin());
+    const auto index = static_cast<std::size_t>(overlapping - boxes.begin());
     if (index == meshes.size()) {
       meshes.emplace_back();
       boxes.emplace_back();
@@ -229,7 +229,7 @@ class FacetRefiner {
 
   Solid refine() {
     for (const auto& [label, region] : regions_of(solid_)) refine_region(region, label);
-    return in_order(result_);
+    return sort_solid(result_);
   }
 
  private:

@@ -23,9 +23,9 @@ constexpr double pace_step = 1e-3;  // integration step of the path length, loop
 
 // Smooth random function of time with mean 0 and standard deviation 1: a sum of waves with random
 // frequencies in a band and random phases.
-class Wander {
+class SmoothNoise {
  public:
-  Wander(std::uint64_t seed, std::uint64_t key, double low_hz, double high_hz) {
+  SmoothNoise(std::uint64_t seed, std::uint64_t key, double low_hz, double high_hz) {
     RandomStream random(seed, key);
     for (Wave& wave : waves_) {
       wave.rate = 2 * pi * random.uniform(low_hz, high_hz);
@@ -46,17 +46,17 @@ class Wander {
   std::array<Wave, 6> waves_;
 };
 
-using Wander3 = std::array<Wander, 3>;
+using Wander3 = std::array<SmoothNoise, 3>;
 Wander3 wander3(std::uint64_t seed, std::uint64_t key, double low_hz, double high_hz) {
-  return {Wander(seed, key, low_hz, high_hz), Wander(seed, key + 1, low_hz, high_hz),
-          Wander(seed, key + 2, low_hz, high_hz)};
+  return {SmoothNoise(seed, key, low_hz, high_hz), SmoothNoise(seed, key + 1, low_hz, high_hz),
+          SmoothNoise(seed, key + 2, low_hz, high_hz)};
 }
 Eigen::Vector3d at(const Wander3& wander, double time_s) {
   return {wander[0].at(time_s), wander[1].at(time_s), wander[2].at(time_s)};
 }
 
 // Parameters of the loops, with defaults filled in.
-struct Way {
+struct CameraRoute {
   Eigen::Vector3d center;  // at ground height
   Eigen::Vector3d target;
   double radius = 0.0, last_radius = 0.0;
@@ -73,12 +73,12 @@ std::optional<Eigen::Vector2d> facing_of_wall(const TriangleMesh& mesh) {
   return Eigen::Vector2d(sum.head<2>().normalized());
 }
 
-Way way_of(const TriangleMesh& mesh, const CameraTrajectoryOptions& options) {
+CameraRoute way_of(const TriangleMesh& mesh, const CameraTrajectoryOptions& options) {
   const Bounds3d bounds = bounds_of(mesh.vertices);
   const Eigen::Vector3d size = bounds.max - bounds.min;
   const std::optional<Eigen::Vector2d> facing = facing_of_wall(mesh);
   const auto or_fitted = [](double given, double fitted) { return given != 0 ? given : fitted; };
-  Way way;
+  CameraRoute way;
   way.center = 0.5 * (bounds.min + bounds.max);
   const double half_side =
       0.5 * (facing ? std::max(size.x(), size.y()) : size.head<2>().minCoeff());
@@ -110,7 +110,7 @@ double loop_share(double loop, int loops) {
 }
 
 // Position on the path without sway; `loop` is the number of loops from the start.
-Eigen::Vector3d position_on(const Way& way, const CameraTrajectoryOptions& options, double loop) {
+Eigen::Vector3d position_on(const CameraRoute& way, const CameraTrajectoryOptions& options, double loop) {
   const double share = loop_share(loop, options.loops);
   const double radius = way.radius + share * (way.last_radius - way.radius);
   const double height = way.height + share * (way.last_height - way.height);
@@ -137,7 +137,7 @@ Eigen::Matrix3d look_at(const Eigen::Vector3d& position, const Eigen::Vector3d& 
 }
 
 // Loop parameters of the frames, at equal path lengths.
-std::vector<double> paced_loops(const Way& way, const CameraTrajectoryOptions& options) {
+std::vector<double> paced_loops(const CameraRoute& way, const CameraTrajectoryOptions& options) {
   const auto steps = static_cast<std::size_t>(std::lround(options.loops / pace_step));
   std::vector<double> lengths{0.0};
   Eigen::Vector3d last = position_on(way, options, 0.0);
@@ -161,10 +161,10 @@ std::vector<double> paced_loops(const Way& way, const CameraTrajectoryOptions& o
 }
 
 // Adds sway, tremor and gaze variation to a camera pose.
-class Hand {
+class HandMotion {
  public:
   // Sway and tremor have the frequencies of steps; gaze has periods of about ten seconds.
-  Hand(const CameraTrajectoryOptions& options, double gaze_m, std::uint64_t seed)
+  HandMotion(const CameraTrajectoryOptions& options, double gaze_m, std::uint64_t seed)
       : sway_m_(options.sway_m),
         tremor_deg_(options.tremor_deg),
         gaze_m_(gaze_m),
@@ -215,14 +215,14 @@ class Serpentine {
                      : 0;
     const double along = way_m - lane * period;
     const double forward = lane % 2 == 0 ? 1.0 : -1.0;
-    Eigen::Vector2d place(0.5 * straight_ + forward * (along - 0.5 * straight_),
+    Eigen::Vector2d in_plane(0.5 * straight_ + forward * (along - 0.5 * straight_),
                           2.0 * radius_ * lane);
     if (along > straight_ && lane + 1 < lanes_) {
       const double angle = (along - straight_) / radius_;
-      place.x() = 0.5 * straight_ * (1.0 + forward) + forward * radius_ * std::sin(angle);
-      place.y() += radius_ * (1.0 - std::cos(angle));
+      in_plane.x() = 0.5 * straight_ * (1.0 + forward) + forward * radius_ * std::sin(angle);
+      in_plane.y() += radius_ * (1.0 - std::cos(angle));
     }
-    return in_lanes(low_ + place);
+    return in_lanes(low_ + in_plane);
   }
 
  private:
@@ -295,8 +295,8 @@ double surrounding_ground_height(const TriangleMesh& mesh) {
 
 CameraMotion camera_motion(const TriangleMesh& mesh, const CameraTrajectoryOptions& options,
                            std::uint64_t seed) {
-  const Way way = way_of(mesh, options);
-  const Hand hand(options, way.radius * std::tan(options.gaze_deg * pi / 180.0), seed);
+  const CameraRoute way = way_of(mesh, options);
+  const HandMotion hand(options, way.radius * std::tan(options.gaze_deg * pi / 180.0), seed);
   return [=, loops = paced_loops(way, options)](std::size_t frame, double after_s) {
     const std::size_t last = std::max<std::size_t>(loops.size(), 2) - 2;
     const std::size_t step = std::min(frame, last);
@@ -314,13 +314,13 @@ CameraMotion serpentine_motion(const GroundHeights& ground, const CameraTrajecto
   const double height_m = options.height_m > 0.0 ? options.height_m : 1.4;
   const double ahead_m = options.serpentine.ahead_m;
   const double gaze_m = std::hypot(height_m, ahead_m) * std::tan(options.gaze_deg * pi / 180.0);
-  const Hand hand(options, gaze_m, seed);
+  const HandMotion hand(options, gaze_m, seed);
   return [=, heights = ground](std::size_t frame, double after_s) {
     const double time_s = static_cast<double>(frame) * options.frame_interval_s + after_s;
     const double way_m = way.length() * time_s / (options.frame_interval_s * options.frames);
     const auto on_ground = [&](double at_m) {
-      const Eigen::Vector2d place = way.at(at_m);
-      return Eigen::Vector3d(place.x(), place.y(), heights.height(place));
+      const Eigen::Vector2d in_plane = way.at(at_m);
+      return Eigen::Vector3d(in_plane.x(), in_plane.y(), heights.height(in_plane));
     };
     return hand.pose(on_ground(way_m) + height_m * Eigen::Vector3d::UnitZ(),
                      on_ground(way_m + ahead_m), time_s);
@@ -347,10 +347,10 @@ Trajectory poses_of_motion(const CameraMotion& motion, const CameraTrajectoryOpt
   Trajectory trajectory;
   for (std::size_t n = 0; n < static_cast<std::size_t>(options.frames); ++n)
     trajectory.push_back({0, 0.0, motion(n, 0.0)});
-  return numbered(std::move(trajectory), options.frame_interval_s);
+  return assign_nodes_and_stamps(std::move(trajectory), options.frame_interval_s);
 }
 
-Trajectory numbered(Trajectory poses, double frame_interval_s) {
+Trajectory assign_nodes_and_stamps(Trajectory poses, double frame_interval_s) {
   const bool stamped = std::any_of(poses.begin(), poses.end(),
                                    [](const TrajectoryPose& pose) { return pose.stamp_s != 0.0; });
   for (std::size_t n = 0; n < poses.size(); ++n) {

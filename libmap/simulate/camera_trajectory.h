@@ -73,6 +73,6 @@ CameraMotion motion_through(Trajectory poses);
 Trajectory poses_of_motion(const CameraMotion& motion, const CameraTrajectoryOptions& options);
 // Numbers the poses from 1, and stamps them as poses_of_motion does if no pose has a stamp. Throws
 // Error unless stamps are strictly ascending.
-Trajectory numbered(Trajectory poses, double frame_interval_s);
+Trajectory assign_nodes_and_stamps(Trajectory poses, double frame_interval_s);
 
 }  // namespace libmap

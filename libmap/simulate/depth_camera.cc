@@ -21,7 +21,7 @@ namespace libmap {
 
 namespace {
 
-constexpr std::size_t rows_a_task = 8;
+constexpr std::size_t rows_per_task = 8;
 constexpr double radians = std::numbers::pi / 180.0;
 // Band below max_incidence_deg over which the loss of measurements increases.
 constexpr double grazing_band_deg = 10.0;
@@ -177,7 +177,7 @@ SurfaceView VisibleSurface::view(const ViewRays& rays, const PoseOfRow& world_fr
     const auto count = static_cast<std::size_t>(width);
     return std::span<const Eigen::Vector2d>(all).subspan(row * count, count);
   };
-  parallel_each(static_cast<std::size_t>(h) + 1, rows_a_task, [&](std::size_t y) {
+  parallel_each(static_cast<std::size_t>(h) + 1, rows_per_task, [&](std::size_t y) {
     const std::size_t corner_start = y * static_cast<std::size_t>(w + 1);
     view_row(row_of(rays.corners, y, w + 1), world_from_camera(static_cast<double>(y) - 0.5),
              with_color, [&](std::size_t x, const Seen& seen) {
@@ -341,7 +341,7 @@ DepthMeasurement measure_depth(const SurfaceView& view, const ViewRays& rays,
     std::size_t measured = 0, edges = 0, flying = 0;
   };
   const Counts counts = parallel_reduce(
-      static_cast<std::size_t>(view.depth.height), rows_a_task, Counts{},
+      static_cast<std::size_t>(view.depth.height), rows_per_task, Counts{},
       [&](std::size_t begin, std::size_t end) {
         Counts part;
         for (int y = static_cast<int>(begin); y < static_cast<int>(end); ++y)
@@ -372,7 +372,7 @@ ColorImage take_photo(const SurfaceView& view, const PhotoOptions& options, std:
   ColorImage photo(w, h);
   const Eigen::Vector2d middle(0.5 * (w - 1), 0.5 * (h - 1));
   const double largest = std::max(middle.squaredNorm(), 1e-9);
-  parallel_each(static_cast<std::size_t>(h), rows_a_task, [&](std::size_t row) {
+  parallel_each(static_cast<std::size_t>(h), rows_per_task, [&](std::size_t row) {
     const int y = static_cast<int>(row);
     for (int x = 0; x < w; ++x) {
       const std::size_t index = photo.index(x, y);

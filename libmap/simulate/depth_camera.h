@@ -45,7 +45,7 @@ struct SurfaceView {
 enum class TextureSource { automatic, mesh, rock };
 
 // Source of the normals for shading: estimated from the mesh, or its vertex normals.
-enum class ShadingNormals { estimated, of_vertices };
+enum class ShadingNormals { estimated, per_vertex };
 
 // One or several meshes prepared for rendering; copies share them. Light is diffuse from above with
 // a directional part.

@@ -72,13 +72,13 @@ void look_around(const TriangleMesh& mesh, const VertexTriangles& around, std::u
   point.normal = sum.normalized();
   const Eigen::Vector3d shares = symmetric_eigen(Eigen::Matrix3d(spread / area)).values;
   if (hollow / area > hollow_share * radius_m)
-    point.kind = PlaceKind::irregular;
+    point.kind = LocationKind::irregular;
   else if (shares[0] > tip_share)
-    point.kind = PlaceKind::corner;
+    point.kind = LocationKind::corner;
   else if (shares[1] > arc_share)
-    point.kind = PlaceKind::edge;
+    point.kind = LocationKind::edge;
   else
-    point.kind = PlaceKind::flat;
+    point.kind = LocationKind::flat;
 }
 
 const ScalarField& rock_field(const TriangleMesh& mesh) {
@@ -216,7 +216,7 @@ class Chooser {
 
 }  // namespace
 
-const std::string& place_kind_name(PlaceKind kind) {
+const std::string& location_kind_name(LocationKind kind) {
   static const std::array<std::string, 4> names = {"flat", "edge", "corner", "irregular"};
   return names[static_cast<std::size_t>(kind)];
 }
@@ -244,7 +244,7 @@ Table field_point_table(const RockSite& site, const std::vector<FieldPoint>& poi
     const SiteRock& rock = site.rocks[static_cast<std::size_t>(point.rock)];
     table.rows.push_back({"P" + number, to_fixed_text(point.position.x(), 4),
                           to_fixed_text(point.position.y(), 4),
-                          to_fixed_text(point.position.z(), 4), place_kind_name(point.kind),
+                          to_fixed_text(point.position.z(), 4), location_kind_name(point.kind),
                           point.is_hard ? "hard" : "easy",
                           rock.name.empty() ? std::to_string(point.rock + 1) : rock.name,
                           to_fixed_text(point.height_m, 3), to_fixed_text(point.slope_deg, 0)});

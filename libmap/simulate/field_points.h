@@ -15,13 +15,13 @@ namespace libmap {
 // al. 2000; Page et al. 2002). flat: equal normals. edge: normals vary in one direction, around a
 // ridge. corner: normals vary in both directions, around a tip. irregular: partly concave, such as
 // clefts, steps and feet of rocks.
-enum class PlaceKind { flat, edge, corner, irregular };
-const std::string& place_kind_name(PlaceKind kind);
+enum class LocationKind { flat, edge, corner, irregular };
+const std::string& location_kind_name(LocationKind kind);
 
 struct FieldPoint {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  // a vertex, in the site's frame
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
-  PlaceKind kind = PlaceKind::flat;
+  LocationKind kind = LocationKind::flat;
   bool is_hard = false;    // difficult to reach: steeper than 60 degrees
   int rock = 0;            // index in the site
   double height_m = 0.0;   // above the ground, along its normal

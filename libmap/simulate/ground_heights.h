@@ -22,22 +22,22 @@ class GroundHeights {
   const Eigen::AlignedBox2d& box() const { return box_; }
   // Mean height of the cells around a position, weighted by a Gaussian with a standard deviation of
   // cell_m; the mean of all cells if no point is near, 0 without points.
-  double height(const Eigen::Vector2d& place) const;
+  double height(const Eigen::Vector2d& position) const;
   // Mean point spacing over the occupied cells; 0 without points.
   double spacing_m() const;
   // Bounding box of the points of all cells that intersect the rectangle; empty if there are none.
   Eigen::AlignedBox3d extent(const Eigen::AlignedBox2d& rectangle) const;
 
  private:
-  using Place = std::pair<std::int64_t, std::int64_t>;
+  using CellIndex = std::pair<std::int64_t, std::int64_t>;
   struct Cell {
     std::size_t points = 0;
     double sum = 0.0;
     Eigen::AlignedBox3d box;
   };
-  static Place place_of(const Eigen::Vector2d& place);
+  static CellIndex index_of(const Eigen::Vector2d& position);
 
-  std::map<Place, Cell> cells_;
+  std::map<CellIndex, Cell> cells_;
   Eigen::AlignedBox2d box_;
 };
 

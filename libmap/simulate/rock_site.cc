@@ -61,7 +61,7 @@ bool is_within(const Footprint& footprint, double half_x, double half_y) {
          std::abs(footprint.center.y()) + footprint.reach(Eigen::Vector2d::UnitY()) <= half_y;
 }
 
-std::string rock_place(std::size_t n, const SiteRock& rock) {
+std::string rock_name(std::size_t n, const SiteRock& rock) {
   return "rocks[" + std::to_string(n) + "]" + (rock.name.empty() ? "" : " (" + rock.name + ")");
 }
 
@@ -102,7 +102,7 @@ ParameterTable ground_parameters(SiteGround& ground) {
   ParameterTable table;
   table.add("size_x_m", ground.size_x_m, ground_size_range, "length along x, m");
   table.add("size_y_m", ground.size_y_m, ground_size_range, "length along y, m");
-  table.add("unevenness_m", ground.unevenness_m, Range{0.0, 1.0},
+  table.add("unevenness_m", ground.relief_m, Range{0.0, 1.0},
             "maximum height of random relief, m");
   table.add("tilt_deg", ground.tilt_deg, Range{0.0, 135.0},
             "tilt of the ground, degrees; 90: a wall");
@@ -139,14 +139,14 @@ void RockSite::check() const {
     try {
       rock_parameters(copy).check();
     } catch (const Error& error) {
-      throw error.in_field(rock_place(n, copy), ".");
+      throw error.in_field(rock_name(n, copy), ".");
     }
     // Rocks must not interrupt the outline of the ground.
     constexpr double margin_m = 0.05;
     if (!is_within(footprint_of(rocks[n]), 0.5 * ground.size_x_m - margin_m,
                    0.5 * ground.size_y_m - margin_m))
       throw Error("the rock extends beyond the ground",
-                  {.field = rock_place(n, rocks[n]) + ".x_m, y_m",
+                  {.field = rock_name(n, rocks[n]) + ".x_m, y_m",
                    .value = to_text(rocks[n].x_m) + ", " + to_text(rocks[n].y_m),
                    .bound = "5 cm within " + to_text(ground.size_x_m) + " x " +
                             to_text(ground.size_y_m) + " m"});
@@ -221,14 +221,14 @@ void place_rocks(RockSite& site, std::vector<RockToPlace> rocks) {
     }
     if (!is_placed)
       throw Error("no free position for this rock: enlarge site_size_m or reduce free_square_m",
-                  {.field = rock_place(one.rock, rock),
+                  {.field = rock_name(one.rock, rock),
                    .value = to_text(rock.width_m) + " x " + to_text(rock.depth_m) + " m"});
     taken.push_back(footprint_of(rock));
   }
 }
 
 GroundRelief::GroundRelief(const RockSite& site)
-    : unevenness_m_(site.ground.unevenness_m), seed_(mix_bits(site.seed, 3)) {
+    : unevenness_m_(site.ground.relief_m), seed_(mix_bits(site.seed, 3)) {
   if (site.bumps.empty()) return;
   PrimitiveScene scene;
   scene.shapes.push_back({Plane{site.ground.size_x_m, site.ground.size_y_m}, {}, "ground"});

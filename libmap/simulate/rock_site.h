@@ -50,7 +50,7 @@ enum class GroundTexture { soil, rock, panel };  // colors of the ground
 struct SiteGround {
   double size_x_m = 4.0;
   double size_y_m = 4.0;
-  double unevenness_m = 0.02;  // maximum height of the random relief
+  double relief_m = 0.02;  // maximum height of the random relief
   double tilt_deg = 0.0;
   GroundTexture texture = GroundTexture::soil;
 };

@@ -31,8 +31,8 @@ TriangleMesh ellipsoid(const Eigen::Vector3d& radii_m) {
   return mesh;
 }
 
-Pose at_place(const Eigen::Vector3d& place) {
-  return make_pose_from_rpy(place, Eigen::Vector3d::Zero());
+Pose at_position(const Eigen::Vector3d& position) {
+  return make_pose_from_rpy(position, Eigen::Vector3d::Zero());
 }
 
 // A checkered pattern: distinct colors with image features.
@@ -99,12 +99,12 @@ std::vector<ExtraBody> extra_bodies(const TriangleMesh& mesh, const ScanEvents& 
       if (!is_within(frame, events.walker_first_frame, events.walker_frames)) return std::nullopt;
       const double share =
           (static_cast<double>(frame) + 1.5 - events.walker_first_frame) / events.walker_frames;
-      return at_place({middle.x(), bounds.min.y() + share * length, ground + walker_radii.z()});
+      return at_position({middle.x(), bounds.min.y() + share * length, ground + walker_radii.z()});
     });
   }
   if (events.stone_moved_frame > 0) {
     const auto lying_at = [&](double x) {
-      return at_place({x, middle.y(), ground_height(mesh, x, middle.y()) + 0.8 * stone_radii.z()});
+      return at_position({x, middle.y(), ground_height(mesh, x, middle.y()) + 0.8 * stone_radii.z()});
     };
     const Pose before = lying_at(middle.x() - 0.5 * stone_shift_m);
     const Pose after = lying_at(middle.x() + 0.5 * stone_shift_m);
@@ -114,7 +114,7 @@ std::vector<ExtraBody> extra_bodies(const TriangleMesh& mesh, const ScanEvents& 
   }
   if (events.ceiling_first_frame > 0) {
     const Pose pose =
-        at_place({middle.x(), middle.y(), surrounding_ground_height(mesh) + ceiling_m});
+        at_position({middle.x(), middle.y(), surrounding_ground_height(mesh) + ceiling_m});
     add(ceiling(), TextureSource::mesh, [=](std::size_t) { return std::optional(pose); });
   }
   return bodies;

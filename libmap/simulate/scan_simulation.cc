@@ -124,7 +124,7 @@ class ScanCamera {
   }
   SurfaceView view(std::size_t n, const VisibleSurface& surface, const ViewRays& rays,
                    const VisibleSurface::PoseOfRow& world_from_camera, bool with_color) const;
-  SurfaceView picture_view(std::size_t n, const VisibleSurface& surface) const;
+  SurfaceView image_view(std::size_t n, const VisibleSurface& surface) const;
   ColorImage photo_of(SurfaceView& view, std::size_t n, std::uint64_t key) const;
 
   const ScanSimulationOptions& options_;
@@ -169,7 +169,7 @@ ViewRange ScanCamera::range() const {
       1.0 + 0.01 * std::abs(faults.scale_percent) +
       far_deviations * (options_.depth.noise_of_range + options_.depth.noise_of_square * far_m);
   const double seen_m = far_m * widest + far_deviations * options_.depth.noise_m +
-                        std::abs(options_.depth.depth_offset_m) + std::abs(faults.wiggle_m) +
+                        std::abs(options_.depth.depth_offset_m) + std::abs(faults.periodic_error_m) +
                         std::abs(faults.corner_m);
   ViewRange range = view_range(rays_, seen_m);
   const ViewRange of_depth = view_range(depth_rays_, seen_m);
@@ -177,7 +177,7 @@ ViewRange ScanCamera::range() const {
   return range;
 }
 
-SurfaceView ScanCamera::picture_view(std::size_t n, const VisibleSurface& surface) const {
+SurfaceView ScanCamera::image_view(std::size_t n, const VisibleSurface& surface) const {
   const double row_s = faults_.rolling_shutter_s / std::max(1, rays_.height - 1);
   const Pose middle = world_from_camera(n, 0.0);
   return view(
@@ -205,7 +205,7 @@ ColorImage ScanCamera::photo_of(SurfaceView& view, std::size_t n, std::uint64_t 
 DepthMeasurement ScanCamera::take(std::size_t n, const VisibleSurface& surface,
                                   RgbdFrame& frame) const {
   const auto key = frame_key + 4 * static_cast<std::uint64_t>(n);
-  SurfaceView view = picture_view(n, surface);
+  SurfaceView view = image_view(n, surface);
   frame.cameras = {stored_camera(options_.camera, faults_)};
   frame.color = photo_of(view, n, key);
   const Pose world_from_depth = world_from_depth_camera(n);

@@ -179,7 +179,7 @@ void bind(ParameterTable& table, DepthFaults& faults) {
   table.add("depth_scale_percent", faults.scale_percent, {-50.0, 50.0},
             "fault: scale error of depth, percent");
   table.add(
-      "depth_wiggle_m", faults.wiggle_m, any_number,
+      "depth_wiggle_m", faults.periodic_error_m, any_number,
       "fault: amplitude of a periodic depth error (time of flight: Lindner and Kolb 2006), m");
   table.add("depth_wiggle_period_m", faults.wiggle_period_m, positive,
             "period of the periodic depth error over depth, m");
@@ -247,7 +247,7 @@ void bind(ParameterTable& table, SensorFaults& faults) {
 
 double DepthFaults::measured(double depth_m, double radius2) const {
   return depth_m * (1.0 + 0.01 * scale_percent) +
-         wiggle_m * std::sin(2.0 * pi * depth_m / wiggle_period_m) + corner_m * radius2;
+         periodic_error_m * std::sin(2.0 * pi * depth_m / wiggle_period_m) + corner_m * radius2;
 }
 
 Camera stored_camera(Camera camera, const CalibrationFaults& faults) {

@@ -23,13 +23,13 @@ namespace libmap {
 // 2019).
 struct DepthFaults {
   double scale_percent = 0.0;  // scale error of depth
-  double wiggle_m = 0.0;       // amplitude of the error sin(2 pi depth / wiggle_period_m)
+  double periodic_error_m = 0.0;       // amplitude of the error sin(2 pi depth / wiggle_period_m)
   double wiggle_period_m = 1.2;
   double corner_m = 0.0;   // error in the corners, proportional to the squared radius
   double holes = 0.0;      // share of the image in discs without depth
   double multipath = 0.0;  // reflectance of surfaces for multipath interference (add_multipath)
 
-  bool changes_depth() const { return scale_percent != 0 || wiggle_m != 0 || corner_m != 0; }
+  bool changes_depth() const { return scale_percent != 0 || periodic_error_m != 0 || corner_m != 0; }
   // Depth (m) measured at the true depth `depth_m`, without noise. `radius2` is the squared
   // distance from the image center, 1 in the corners.
   double measured(double depth_m, double radius2) const;

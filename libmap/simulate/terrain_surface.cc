@@ -72,8 +72,8 @@ TriangleMesh triangulate_plan(const std::vector<Eigen::Vector3d>& points,
        ++face) {
     const Triangle triangle{face->vertex(0)->info(), face->vertex(1)->info(),
                             face->vertex(2)->info()};
-    const auto place = [&](std::size_t k) { return points[triangle[k]].head<2>(); };
-    if (circumradius(place(0), place(1), place(2)) <= max_radius_m)
+    const auto corner_at = [&](std::size_t k) { return points[triangle[k]].head<2>(); };
+    if (circumradius(corner_at(0), corner_at(1), corner_at(2)) <= max_radius_m)
       mesh.triangles.push_back(triangle);
   }
   // Normals include triangles outside of the rectangle.
@@ -99,18 +99,18 @@ TerrainSurface::TerrainSurface(const PointTileStore& points, const GroundHeights
   square_m_ = GroundHeights::cell_m * std::max(1.0, cells);
 }
 
-Eigen::AlignedBox2d TerrainSurface::rectangle_of(const Place& place) const {
-  const Eigen::Vector2d low = square_m_ * Eigen::Vector2d(static_cast<double>(place.first),
-                                                          static_cast<double>(place.second));
+Eigen::AlignedBox2d TerrainSurface::rectangle_of(const TilePosition& tile) const {
+  const Eigen::Vector2d low = square_m_ * Eigen::Vector2d(static_cast<double>(tile.first),
+                                                          static_cast<double>(tile.second));
   return {low, low + Eigen::Vector2d::Constant(square_m_)};
 }
 
-std::vector<TerrainSurface::Place> TerrainSurface::places_in_view(
+std::vector<TerrainSurface::TilePosition> TerrainSurface::tiles_in_view(
     const std::vector<Pose>& world_from_camera, const ViewRange& range) const {
   // Radius around the camera: range along the rays in the image corners.
   const Eigen::Vector2d widest = range.rays.min().cwiseAbs().cwiseMax(range.rays.max().cwiseAbs());
   const double reach = range.far_m * widest.homogeneous().norm();
-  std::vector<Place> places;
+  std::vector<TilePosition> tiles;
   for (const Pose& pose : world_from_camera) {
     const Pose camera_from_world = pose.inverse();
     const Eigen::Vector2d here = pose.translation().head<2>();
@@ -123,16 +123,16 @@ std::vector<TerrainSurface::Place> TerrainSurface::places_in_view(
         if (box.isEmpty()) continue;
         box.min().array() -= range_margin_m;
         box.max().array() += range_margin_m;
-        if (may_see(box, camera_from_world, range)) places.emplace_back(i, j);
+        if (may_see(box, camera_from_world, range)) tiles.emplace_back(i, j);
       }
   }
-  std::sort(places.begin(), places.end());
-  places.erase(std::unique(places.begin(), places.end()), places.end());
-  return places;
+  std::sort(tiles.begin(), tiles.end());
+  tiles.erase(std::unique(tiles.begin(), tiles.end()), tiles.end());
+  return tiles;
 }
 
-TerrainSurface::Square TerrainSurface::make(const Place& place) const {
-  const Eigen::AlignedBox2d rectangle = rectangle_of(place);
+TerrainSurface::Square TerrainSurface::make(const TilePosition& tile) const {
+  const Eigen::AlignedBox2d rectangle = rectangle_of(tile);
   const Eigen::Vector2d margin = Eigen::Vector2d::Constant(margin_radii * max_radius_m_);
   const TriangleMesh mesh = triangulate_plan(
       points_.points_in(rectangle.min() - margin, rectangle.max() + margin).positions, rectangle,
@@ -141,14 +141,14 @@ TerrainSurface::Square TerrainSurface::make(const Place& place) const {
   square.points = mesh.vertices.size();
   if (!mesh.triangles.empty())
     square.surface.emplace(mesh, TextureSource::rock, options_.texture_seed,
-                           ShadingNormals::of_vertices);
+                           ShadingNormals::per_vertex);
   return square;
 }
 
-void TerrainSurface::load(const std::vector<Place>& places) {
-  std::vector<Place> missing;
-  for (const Place& place : places)
-    if (!squares_.contains(place)) missing.push_back(place);
+void TerrainSurface::load(const std::vector<TilePosition>& tiles) {
+  std::vector<TilePosition> missing;
+  for (const TilePosition& tile : tiles)
+    if (!squares_.contains(tile)) missing.push_back(tile);
   std::vector<Square> made(missing.size());
   parallel_each(missing.size(), [&](std::size_t n) { made[n] = make(missing[n]); });
   for (std::size_t n = 0; n < missing.size(); ++n) squares_[missing[n]] = std::move(made[n]);
@@ -157,12 +157,12 @@ void TerrainSurface::load(const std::vector<Place>& places) {
 
 std::size_t TerrainSurface::points_in_memory() const {
   std::size_t points = 0;
-  for (const auto& [place, square] : squares_) points += square.points;
+  for (const auto& [tile, square] : squares_) points += square.points;
   return points;
 }
 
 // Drops the least recently used squares until at most kept_points are left.
-void TerrainSurface::forget() {
+void TerrainSurface::evict() {
   std::size_t points = points_in_memory();
   while (points > options_.kept_points) {
     const auto oldest = std::min_element(
@@ -177,24 +177,24 @@ void TerrainSurface::forget() {
 std::vector<VisibleSurface> TerrainSurface::seen_from(
     const std::vector<std::vector<Pose>>& world_from_camera, const ViewRange& range) {
   ++uses_;
-  std::vector<std::vector<Place>> of_camera;
-  std::vector<Place> all;
+  std::vector<std::vector<TilePosition>> of_camera;
+  std::vector<TilePosition> all;
   for (const std::vector<Pose>& poses : world_from_camera) {
-    of_camera.push_back(places_in_view(poses, range));
+    of_camera.push_back(tiles_in_view(poses, range));
     all.insert(all.end(), of_camera.back().begin(), of_camera.back().end());
   }
   std::sort(all.begin(), all.end());
   all.erase(std::unique(all.begin(), all.end()), all.end());
-  for (const Place& place : all)
-    if (const auto known = squares_.find(place); known != squares_.end())
+  for (const TilePosition& tile : all)
+    if (const auto known = squares_.find(tile); known != squares_.end())
       known->second.last_use = uses_;
-  forget();  // before loading more squares
+  evict();  // before loading more squares
   load(all);
   std::vector<VisibleSurface> surfaces;
-  for (const std::vector<Place>& places : of_camera) {
+  for (const std::vector<TilePosition>& tiles : of_camera) {
     std::vector<VisibleSurface> parts;
-    for (const Place& place : places) {
-      Square& square = squares_.at(place);
+    for (const TilePosition& tile : tiles) {
+      Square& square = squares_.at(tile);
       square.last_use = uses_;
       if (square.surface) parts.push_back(*square.surface);
     }

@@ -55,25 +55,25 @@ class TerrainSurface {
   std::size_t points_in_memory() const;
 
  private:
-  using Place = std::pair<std::int64_t, std::int64_t>;
+  using TilePosition = std::pair<std::int64_t, std::int64_t>;
   struct Square {
     std::optional<VisibleSurface> surface;  // nullopt if there is no triangle
     std::size_t points = 0;
     std::uint64_t last_use = 0;
   };
-  Eigen::AlignedBox2d rectangle_of(const Place& place) const;
-  std::vector<Place> places_in_view(const std::vector<Pose>& world_from_camera,
+  Eigen::AlignedBox2d rectangle_of(const TilePosition& tile) const;
+  std::vector<TilePosition> tiles_in_view(const std::vector<Pose>& world_from_camera,
                                     const ViewRange& range) const;
-  Square make(const Place& place) const;
-  void load(const std::vector<Place>& places);
-  void forget();
+  Square make(const TilePosition& tile) const;
+  void load(const std::vector<TilePosition>& tiles);
+  void evict();
 
   const PointTileStore& points_;
   const GroundHeights& heights_;
   TerrainSurfaceOptions options_;
   double square_m_ = 0.0;
   double max_radius_m_ = 0.0;
-  std::map<Place, Square> squares_;
+  std::map<TilePosition, Square> squares_;
   std::uint64_t uses_ = 0;
   std::size_t made_ = 0;
 };

@@ -29,14 +29,14 @@ constexpr std::size_t max_lines = 10;  // white lines in one direction
 constexpr double max_size_error = 0.05;
 
 // Image from above of the white level.
-struct Picture {
+struct TopView {
   Vector2d corner = Vector2d::Zero();
   double cell = 0.0;
   Image<double> levels;  // mean over points of min(red, green, blue); `unseen` without points
 
   // Bilinear interpolation between the seen cells around a position.
-  double at(const Vector2d& place) const {
-    const Vector2d index = (place - corner) / cell - Vector2d::Constant(0.5);
+  double at(const Vector2d& position) const {
+    const Vector2d index = (position - corner) / cell - Vector2d::Constant(0.5);
     const Vector2d low(std::floor(index.x()), std::floor(index.y()));
     if (!(low.x() >= 0.0 && low.y() >= 0.0 && low.x() < levels.width - 1 &&
           low.y() < levels.height - 1))
@@ -57,7 +57,7 @@ struct Picture {
   }
 };
 
-Picture take_picture(const PointCloud& cloud, const BorderBandOptions& options) {
+TopView make_top_view(const PointCloud& cloud, const BorderBandOptions& options) {
   if (!cloud.has_colors()) throw Error("no colors for detecting a white border");
   std::vector<std::size_t> used;
   Vector2d low = Vector2d::Constant(std::numeric_limits<double>::infinity());
@@ -73,32 +73,32 @@ Picture take_picture(const PointCloud& cloud, const BorderBandOptions& options) 
     throw Error("no points at the heights of a border band",
                 {.field = "height",
                  .bound = to_text(options.min_z_m) + " to " + to_text(options.max_z_m) + " m"});
-  Picture picture;
+  TopView view;
   const Vector2d size = high - low;
-  picture.corner = low;
-  picture.cell = std::max(
+  view.corner = low;
+  view.cell = std::max(
       {options.cell_m, std::sqrt(size.x() * size.y() / max_band_cells), size.maxCoeff() / 20000.0});
-  picture.levels = Image<double>(static_cast<int>(size.x() / picture.cell) + 1,
-                                 static_cast<int>(size.y() / picture.cell) + 1, 0.0);
-  Image<int> counts(picture.levels.width, picture.levels.height);
+  view.levels = Image<double>(static_cast<int>(size.x() / view.cell) + 1,
+                                 static_cast<int>(size.y() / view.cell) + 1, 0.0);
+  Image<int> counts(view.levels.width, view.levels.height);
   for (const std::size_t n : used) {
-    const Vector2d index = (cloud.positions[n].head<2>() - low) / picture.cell;
+    const Vector2d index = (cloud.positions[n].head<2>() - low) / view.cell;
     const std::size_t cell = counts.index(std::min(static_cast<int>(index.x()), counts.width - 1),
                                           std::min(static_cast<int>(index.y()), counts.height - 1));
-    picture.levels.pixels[cell] +=
+    view.levels.pixels[cell] +=
         *std::min_element(cloud.colors[n].begin(), cloud.colors[n].end());
     ++counts.pixels[cell];
   }
   for (std::size_t n = 0; n < counts.pixels.size(); ++n)
-    picture.levels.pixels[n] =
-        counts.pixels[n] == 0 ? unseen : picture.levels.pixels[n] / counts.pixels[n];
-  return picture;
+    view.levels.pixels[n] =
+        counts.pixels[n] == 0 ? unseen : view.levels.pixels[n] / counts.pixels[n];
+  return view;
 }
 
-double white_level_of(const Picture& picture, const BorderBandOptions& options) {
+double white_level_of(const TopView& view, const BorderBandOptions& options) {
   if (options.white_level > 0.0) return options.white_level;
   std::vector<double> seen;
-  for (const double level : picture.levels.pixels)
+  for (const double level : view.levels.pixels)
     if (level != unseen) seen.push_back(level);
   std::sort(seen.begin(), seen.end());
   const double usual = seen[seen.size() / 2];
@@ -130,15 +130,15 @@ struct Axis {
   }
 };
 
-Axis make_axis(const std::vector<Vector2d>& places, Eigen::Index axis, double bin) {
-  double low = places.front()[axis];
+Axis make_axis(const std::vector<Vector2d>& locations, Eigen::Index axis, double bin) {
+  double low = locations.front()[axis];
   double high = low;
-  for (const Vector2d& place : places) {
-    low = std::min(low, place[axis]);
-    high = std::max(high, place[axis]);
+  for (const Vector2d& position : locations) {
+    low = std::min(low, position[axis]);
+    high = std::max(high, position[axis]);
   }
   Axis result{low, bin, std::vector<double>(static_cast<std::size_t>((high - low) / bin) + 1)};
-  for (const Vector2d& place : places) result.counts[result.bin_of(place[axis])] += 1.0;
+  for (const Vector2d& position : locations) result.counts[result.bin_of(position[axis])] += 1.0;
   return result;
 }
 
@@ -155,20 +155,20 @@ std::vector<double> peaks_of(const Axis& axis) {
                    [&](std::size_t a, std::size_t b) { return counts[a] > counts[b]; });
   peaks.resize(std::min(peaks.size(), max_lines));
   std::sort(peaks.begin(), peaks.end());
-  std::vector<double> places;
-  places.reserve(peaks.size());
+  std::vector<double> locations;
+  locations.reserve(peaks.size());
   for (const std::size_t n : peaks)
-    places.push_back(axis.first + (static_cast<double>(n) + 0.5) * axis.bin);
-  return places;
+    locations.push_back(axis.first + (static_cast<double>(n) + 0.5) * axis.bin);
+  return locations;
 }
 
-std::vector<Line> lines_along(const std::vector<Vector2d>& places, const Axis& across,
+std::vector<Line> lines_along(const std::vector<Vector2d>& locations, const Axis& across,
                               const Axis& along, Eigen::Index axis) {
   std::vector<Line> lines;
   for (const double at : peaks_of(across)) {
     std::vector<int> white(along.counts.size());
-    for (const Vector2d& place : places)
-      if (std::abs(place[axis] - at) <= 1.5 * across.bin) white[along.bin_of(place[1 - axis])] = 1;
+    for (const Vector2d& position : locations)
+      if (std::abs(position[axis] - at) <= 1.5 * across.bin) white[along.bin_of(position[1 - axis])] = 1;
     Line line{at, std::vector<int>(white.size() + 1)};
     for (std::size_t n = 0; n < white.size(); ++n) line.sums[n + 1] = line.sums[n] + white[n];
     lines.push_back(std::move(line));
@@ -194,13 +194,13 @@ struct Frame {
 Frame best_frame(const std::vector<Vector2d>& white, double yaw_deg, double bin,
                  const BorderBandOptions& options) {
   const Eigen::Rotation2Dd turn(-yaw_deg * std::numbers::pi / 180.0);
-  std::vector<Vector2d> places;
-  places.reserve(white.size());
-  for (const Vector2d& place : white) places.push_back(turn * place);
-  const Axis x = make_axis(places, 0, bin);
-  const Axis y = make_axis(places, 1, bin);
-  const std::vector<Line> upright = lines_along(places, x, y, 0);
-  const std::vector<Line> level = lines_along(places, y, x, 1);
+  std::vector<Vector2d> locations;
+  locations.reserve(white.size());
+  for (const Vector2d& position : white) locations.push_back(turn * position);
+  const Axis x = make_axis(locations, 0, bin);
+  const Axis y = make_axis(locations, 1, bin);
+  const std::vector<Line> upright = lines_along(locations, x, y, 0);
+  const std::vector<Line> level = lines_along(locations, y, x, 1);
   Frame best;
   best.yaw_deg = yaw_deg;
   for (std::size_t left = 0; left < upright.size(); ++left)
@@ -223,16 +223,16 @@ Frame best_frame(const std::vector<Vector2d>& white, double yaw_deg, double bin,
   return best;
 }
 
-Frame find_frame(const Picture& picture, double white_level, const BorderBandOptions& options) {
+Frame find_frame(const TopView& view, double white_level, const BorderBandOptions& options) {
   std::vector<Vector2d> white;
-  for (int y = 0; y < picture.levels.height; ++y)
-    for (int x = 0; x < picture.levels.width; ++x)
-      if (picture.levels.at(x, y) >= white_level)
-        white.push_back(picture.corner + picture.cell * Vector2d(x + 0.5, y + 0.5));
+  for (int y = 0; y < view.levels.height; ++y)
+    for (int x = 0; x < view.levels.width; ++x)
+      if (view.levels.at(x, y) >= white_level)
+        white.push_back(view.corner + view.cell * Vector2d(x + 0.5, y + 0.5));
   if (white.empty())
     throw Error("no white cells, no border band; reduce white_level",
                 {.field = "white_level", .value = to_text(white_level)});
-  const double bin = 2.0 * picture.cell;
+  const double bin = 2.0 * view.cell;
   std::vector<Frame> frames(180);
   parallel_each(frames.size(), 4, [&](std::size_t n) {
     frames[n] = best_frame(white, 0.5 * static_cast<double>(n) - 45.0, bin, options);
@@ -257,12 +257,12 @@ struct Side {
 };
 
 // Distance of the inner end of the white from the side, inwards, at a position along the side.
-std::optional<double> inner_edge(const Picture& picture, const Side& side, double along,
+std::optional<double> inner_edge(const TopView& view, const Side& side, double along,
                                  double white_level, double max_width) {
-  const double step = picture.cell;
+  const double step = view.cell;
   const auto count = static_cast<int>(max_width / step);
   const auto level = [&](int n) {
-    return picture.at(side.from + along * side.along() + n * step * side.inward());
+    return view.at(side.from + along * side.along() + n * step * side.inward());
   };
   // Starts at the white cell nearest to the side in either direction.
   int start = 0;
@@ -313,16 +313,16 @@ Vector2d fit_line(const std::vector<Vector2d>& edges) {
   return line;
 }
 
-void move_to_inner_edge(Side& side, const Picture& picture, double white_level,
+void move_to_inner_edge(Side& side, const TopView& view, double white_level,
                         const BorderBandOptions& options) {
   const double length = (side.to - side.from).norm();
-  const double step = std::max(2.0 * picture.cell, length / 400.0);
+  const double step = std::max(2.0 * view.cell, length / 400.0);
   // The bands of the neighboring sides are excluded.
   const double rim = std::min(options.max_width_m, length / 4.0);
   std::vector<Vector2d> edges;
   int slices = 0;
   for (double along = rim; along <= length - rim; along += step, ++slices)
-    if (const auto edge = inner_edge(picture, side, along, white_level, options.max_width_m))
+    if (const auto edge = inner_edge(view, side, along, white_level, options.max_width_m))
       edges.emplace_back(along, *edge);
   side.seen = static_cast<double>(edges.size()) / std::max(slices, 1);
   if (edges.size() < 5 || side.seen < options.min_seen)
@@ -369,10 +369,10 @@ void bind(ParameterTable& table, BorderBandOptions& options) {
 
 BorderBand find_border_band(const PointCloud& level_cloud, double margin_m,
                             const BorderBandOptions& options) {
-  const Picture picture = take_picture(level_cloud, options);
+  const TopView view = make_top_view(level_cloud, options);
   BorderBand band;
-  band.white_level = white_level_of(picture, options);
-  const Frame frame = find_frame(picture, band.white_level, options);
+  band.white_level = white_level_of(view, options);
+  const Frame frame = find_frame(view, band.white_level, options);
   const Eigen::Rotation2Dd turn(frame.yaw_deg * std::numbers::pi / 180.0);
   std::array<Vector2d, 4> corners = {frame.min, Vector2d(frame.max.x(), frame.min.y()), frame.max,
                                      Vector2d(frame.min.x(), frame.max.y())};
@@ -382,7 +382,7 @@ BorderBand find_border_band(const PointCloud& level_cloud, double margin_m,
   for (int round = 0; round < 2; ++round) {
     for (std::size_t n = 0; n < 4; ++n) {
       sides[n] = {corners[n], corners[(n + 1) % 4], 0.0};
-      move_to_inner_edge(sides[n], picture, band.white_level, options);
+      move_to_inner_edge(sides[n], view, band.white_level, options);
     }
     corners = corners_of(sides);
   }

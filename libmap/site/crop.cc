@@ -27,8 +27,8 @@ constexpr double ground_samples = 100000.0;  // of a mesh
 constexpr double max_view_samples = 4e6;
 constexpr double max_side_samples = 2e6;  // of few triangles
 
-Pose turn_about(const Vector2d& place, double yaw_deg) {
-  const Vector3d pivot(place.x(), place.y(), 0.0);
+Pose turn_about(const Vector2d& pivot_m, double yaw_deg) {
+  const Vector3d pivot(pivot_m.x(), pivot_m.y(), 0.0);
   Pose turn = make_pose_from_rpy(Vector3d::Zero(), {0.0, 0.0, yaw_deg});
   turn.translation() = pivot - turn.linear() * pivot;
   return turn;
@@ -37,10 +37,10 @@ Pose turn_about(const Vector2d& place, double yaw_deg) {
 bool is_identity(const Pose& pose) { return pose.matrix().isIdentity(0.0); }
 
 std::vector<Vector2d> seen_from_above(const std::vector<Vector3d>& points) {
-  std::vector<Vector2d> places;
-  places.reserve(points.size());
-  for (const Vector3d& point : points) places.emplace_back(point.head<2>());
-  return places;
+  std::vector<Vector2d> plan_points;
+  plan_points.reserve(points.size());
+  for (const Vector3d& point : points) plan_points.emplace_back(point.head<2>());
+  return plan_points;
 }
 
 // Motion of the map and the shape of the cut.
@@ -110,9 +110,9 @@ void lay_rectangle(const Source& source, const CropOptions& options, const Pose&
   }
   const Pose turn = turn_about(source.middle, *options.yaw_deg);
   const Pose from_rectangle = turn_about(rectangle.center, rectangle.yaw_deg);
-  const PlanPolygon straight = make_rectangle(rectangle.center - half, rectangle.center + half);
+  const XyPolygon straight = make_rectangle(rectangle.center - half, rectangle.center + half);
   plan.cut_from_map = turn * level;
-  plan.prism.polygon = PlanPolygon(moved(straight.corners(), turn * from_rectangle));
+  plan.prism.polygon = XyPolygon(moved(straight.corners(), turn * from_rectangle));
 }
 
 void lay_border(const Source& source, const CropOptions& options, const Pose& level, Plan& plan) {
@@ -126,7 +126,7 @@ void lay_border(const Source& source, const CropOptions& options, const Pose& le
   const Pose turn = options.yaw_deg ? turn_about(source.middle, *options.yaw_deg)
                                     : turn_about(center, -yaw_of(corners));
   plan.cut_from_map = turn * level;
-  plan.prism.polygon = PlanPolygon(moved(corners, turn));
+  plan.prism.polygon = XyPolygon(moved(corners, turn));
 }
 
 // Plans the cut along the given box or polygon.
@@ -136,7 +136,7 @@ void lay_given(const Source& source, const CropOptions& options, const Pose& lev
     plan.site_from_cut = turned;
   else
     plan.cut_from_map = turned;
-  if (options.region == CropRegion::polygon) plan.prism.polygon = PlanPolygon(options.polygon);
+  if (options.region == CropRegion::polygon) plan.prism.polygon = XyPolygon(options.polygon);
   if (options.region != CropRegion::box) return;
   plan.prism.polygon = make_rectangle(options.box.min.head<2>(), options.box.max.head<2>());
   plan.prism.min_z = options.box.min.z();
@@ -145,7 +145,7 @@ void lay_given(const Source& source, const CropOptions& options, const Pose& lev
 
 // Moves the center of the outline's bounding box to x = y = 0.
 void center_outline(const CropOptions& options, Plan& plan) {
-  const PlanPolygon& outline = *plan.prism.polygon;
+  const XyPolygon& outline = *plan.prism.polygon;
   const Vector2d middle = (outline.min() + outline.max()) / 2.0;
   Pose shift = Pose::Identity();
   shift.translation().head<2>() = -middle;
@@ -157,7 +157,7 @@ void center_outline(const CropOptions& options, Plan& plan) {
   }
   std::vector<Vector2d> corners = outline.corners();
   for (Vector2d& corner : corners) corner -= middle;
-  plan.prism.polygon = PlanPolygon(std::move(corners));
+  plan.prism.polygon = XyPolygon(std::move(corners));
 }
 
 void require_sound(const CropOptions& options) {
@@ -364,7 +364,7 @@ CropCloudResult crop_cloud(const PointCloud& cloud, const CropOptions& options) 
   return {std::move(inside), std::move(plan.report)};
 }
 
-CropReport crop_mesh_pieces(const EachMesh& each, const CropOptions& options,
+CropReport crop_mesh_tiles(const EachMesh& each, const CropOptions& options,
                             const std::function<void(TriangleMesh)>& use) {
   double area = 0.0;
   Eigen::AlignedBox3d box;
@@ -426,7 +426,7 @@ CropReport crop_mesh_pieces(const EachMesh& each, const CropOptions& options,
 
 CropMeshResult crop_mesh(const TriangleMesh& mesh, const CropOptions& options) {
   CropMeshResult result;
-  result.report = crop_mesh_pieces([&](const UseMesh& use) { use(mesh); }, options,
+  result.report = crop_mesh_tiles([&](const UseMesh& use) { use(mesh); }, options,
                                    [&](TriangleMesh cut) { result.mesh = std::move(cut); });
   return result;
 }

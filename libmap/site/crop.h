@@ -12,7 +12,7 @@
 #include "libmap/geometry/normal_sides.h"
 #include "libmap/site/border_band.h"
 #include "libmap/site/ground_plane.h"
-#include "libmap/site/plan_polygon.h"
+#include "libmap/site/xy_polygon.h"
 #include "libmap/site/site_rectangle.h"
 
 namespace libmap {
@@ -77,7 +77,7 @@ CropMeshResult crop_mesh(const TriangleMesh& mesh, const CropOptions& options);
 // crop_mesh.
 using UseMesh = std::function<void(const TriangleMesh& mesh)>;
 using EachMesh = std::function<void(const UseMesh& use)>;
-CropReport crop_mesh_pieces(const EachMesh& each, const CropOptions& options,
+CropReport crop_mesh_tiles(const EachMesh& each, const CropOptions& options,
                             const std::function<void(TriangleMesh)>& use);
 
 }  // namespace libmap

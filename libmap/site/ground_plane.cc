@@ -145,7 +145,7 @@ double share_above(const Plane& plane, const Points& points) {
 }
 
 // True if `other` is below `ground`, the plane with more points.
-bool lies_under(const Candidate& other, const Candidate& ground, const Eigen::Vector3d& up,
+bool is_below(const Candidate& other, const Candidate& ground, const Eigen::Vector3d& up,
                 double tolerance) {
   const double above_other = share_above(other.plane, ground.points);
   const double above_ground = share_above(ground.plane, other.points);
@@ -278,7 +278,7 @@ GroundPlane find_ground_plane(const std::vector<Eigen::Vector3d>& points,
                  .bound = ">= " + percent(options.min_share)});
   const Candidate* ground = &candidates.front();
   for (const Candidate& other : candidates)
-    if (&other != ground && lies_under(other, *ground, up, options.tolerance_m)) ground = &other;
+    if (&other != ground && is_below(other, *ground, up, options.tolerance_m)) ground = &other;
   const Plane plane = fit_robustly(points, ground->plane, up, options.tolerance_m);
   GroundPlane result;
   result.normal = plane.normal;

@@ -304,21 +304,21 @@ void require_finite(const TriangleMesh& mesh) {
             {.field = "triangle " + std::to_string(n), .value = "vertex " + std::to_string(v)});
 }
 
-enum class Place : char { outside, inside, on_border };
+enum class Location : char { outside, inside, on_border };
 
-Place place_of(const TriangleMesh& mesh, const Triangle& corners, const ExtrudedPolygon& prism) {
+Location location_of(const TriangleMesh& mesh, const Triangle& corners, const ExtrudedPolygon& prism) {
   const Vector3d& a = mesh.vertices[corners[0]];
   const Vector3d& b = mesh.vertices[corners[1]];
   const Vector3d& c = mesh.vertices[corners[2]];
   const Vector3d low = (a.cwiseMin(b).cwiseMin(c).array() - reach_m).matrix();
   const Vector3d high = (a.cwiseMax(b).cwiseMax(c).array() + reach_m).matrix();
-  if (high.z() < prism.min_z || low.z() > prism.max_z) return Place::outside;
+  if (high.z() < prism.min_z || low.z() > prism.max_z) return Location::outside;
   const bool across = low.z() < prism.min_z || high.z() > prism.max_z;
   if (prism.polygon) {
-    if (!prism.polygon->edges_near(low.head<2>(), high.head<2>()).empty()) return Place::on_border;
-    if (!prism.polygon->contains(a.head<2>())) return Place::outside;
+    if (!prism.polygon->edges_near(low.head<2>(), high.head<2>()).empty()) return Location::on_border;
+    if (!prism.polygon->contains(a.head<2>())) return Location::outside;
   }
-  return across ? Place::on_border : Place::inside;
+  return across ? Location::on_border : Location::inside;
 }
 
 // Mesh of the kept pieces, with the face fields of their sources.
@@ -340,14 +340,14 @@ TriangleMesh mesh_of(TriangleMesh mesh, std::vector<Piece> kept) {
 
 TriangleMesh cut_mesh(TriangleMesh mesh, const ExtrudedPolygon& prism) {
   require_finite(mesh);
-  std::vector<Place> places(mesh.triangles.size());
-  parallel_each(places.size(), 4096,
-                [&](std::size_t n) { places[n] = place_of(mesh, mesh.triangles[n], prism); });
+  std::vector<Location> locations(mesh.triangles.size());
+  parallel_each(locations.size(), 4096,
+                [&](std::size_t n) { locations[n] = location_of(mesh, mesh.triangles[n], prism); });
   std::vector<Piece> kept;
   std::vector<Piece> on_border;
-  for (std::uint32_t n = 0; n < places.size(); ++n)
-    if (places[n] != Place::outside)
-      (places[n] == Place::inside ? kept : on_border).push_back({mesh.triangles[n], n});
+  for (std::uint32_t n = 0; n < locations.size(); ++n)
+    if (locations[n] != Location::outside)
+      (locations[n] == Location::inside ? kept : on_border).push_back({mesh.triangles[n], n});
   MeshCutter cutter(mesh, std::move(on_border));
   for (const double z : {prism.min_z, prism.max_z})
     if (std::isfinite(z)) cutter.cut(Cut::at_height(z));

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "libmap/core/triangle_mesh.h"
-#include "libmap/site/plan_polygon.h"
+#include "libmap/site/xy_polygon.h"
 
 namespace libmap {
 

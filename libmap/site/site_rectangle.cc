@@ -22,8 +22,8 @@ using Eigen::Vector2d;
 using Mask = Image<std::uint8_t>;
 
 constexpr double max_cells = 1e6;
-constexpr double max_on_a_side = 20000.0;
-constexpr double min_on_a_site = 20.0;  // cells along the shorter side of the site
+constexpr double max_per_side = 20000.0;
+constexpr double min_on_site = 20.0;  // cells along the shorter side of the site
 
 // Summed-area table: sums of a mask over rectangles in constant time (Crow 1984).
 class AreaTable {
@@ -61,8 +61,8 @@ struct Ground {
   double cell = 0.0;
   Mask mask;
 
-  bool at(const Vector2d& place) const {
-    const Vector2d index = (place - corner) / cell;
+  bool at(const Vector2d& position) const {
+    const Vector2d index = (position - corner) / cell;
     const double x = std::floor(index.x());
     const double y = std::floor(index.y());
     return x >= 0.0 && y >= 0.0 && x < mask.width && y < mask.height &&
@@ -80,7 +80,7 @@ Ground make_ground(const std::vector<Vector2d>& points, const SiteRectangleOptio
   }
   const double area = (high - low).x() * (high - low).y();
   ground.cell = std::max(
-      {options.cell_m, std::sqrt(area / max_cells), (high - low).maxCoeff() / max_on_a_side});
+      {options.cell_m, std::sqrt(area / max_cells), (high - low).maxCoeff() / max_per_side});
   // A closing by `reach` cells in each direction fills gaps of 2 * reach cells.
   const int reach = static_cast<int>(std::ceil(options.max_gap_m / ground.cell / 2.0));
   const int rim = reach + 2;
@@ -134,7 +134,7 @@ class TurnedGround {
       const int middle = least + (most - least) / 2;
       (fits(size, middle) ? least : most) = middle;
     }
-    return Fit{least, middle_place(size, least)};
+    return Fit{least, middle_position(size, least)};
   }
 
  private:
@@ -142,7 +142,7 @@ class TurnedGround {
     return middle_ + turn_ * (cell_ * (Vector2d(x, y) - half_));
   }
   template <typename Visit>
-  void visit_places(const Eigen::Vector2i& size, int growth, const Visit& visit) const {
+  void visit_positions(const Eigen::Vector2i& size, int growth, const Visit& visit) const {
     const Eigen::Vector2i grown = size.array() + 2 * growth;
     for (int y = 0; y + grown.y() <= table_.height(); ++y)
       for (int x = 0; x + grown.x() <= table_.width(); ++x)
@@ -152,21 +152,21 @@ class TurnedGround {
   }
   bool fits(const Eigen::Vector2i& size, int growth) const {
     bool found = false;
-    visit_places(size, growth, [&](const Vector2d&) { return !(found = true); });
+    visit_positions(size, growth, [&](const Vector2d&) { return !(found = true); });
     return found;
   }
   // Among all positions that fit, the one nearest to their mean.
-  Vector2d middle_place(const Eigen::Vector2i& size, int growth) const {
-    std::vector<Vector2d> places;
+  Vector2d middle_position(const Eigen::Vector2i& size, int growth) const {
+    std::vector<Vector2d> positions;
     Vector2d mean = Vector2d::Zero();
-    visit_places(size, growth, [&](const Vector2d& at) {
-      places.push_back(at);
+    visit_positions(size, growth, [&](const Vector2d& at) {
+      positions.push_back(at);
       mean += at;
       return true;
     });
-    mean /= static_cast<double>(places.size());
+    mean /= static_cast<double>(positions.size());
     const Vector2d nearest =
-        *std::min_element(places.begin(), places.end(), [&](const Vector2d& a, const Vector2d& b) {
+        *std::min_element(positions.begin(), positions.end(), [&](const Vector2d& a, const Vector2d& b) {
           return (a - mean).squaredNorm() < (b - mean).squaredNorm();
         });
     return place(nearest.x(), nearest.y());
@@ -269,7 +269,7 @@ SiteRectangle find_site_rectangle(const std::vector<Vector2d>& points, const Vec
   require_ranges(size_m, options);
   if (points.empty()) throw Error("no data to find a site in");
   const Ground ground = make_ground(points, options);
-  if (ground.cell > std::max(options.cell_m, size_m.minCoeff() / min_on_a_site))
+  if (ground.cell > std::max(options.cell_m, size_m.minCoeff() / min_on_site))
     throw Error("the data extend too far for a site of this size; remove stray points",
                 {.field = "size of the data",
                  .value = to_fixed_text(ground.cell * ground.mask.width, 0) + " x " +

@@ -145,7 +145,7 @@ struct Reach {
 // For each loop, true if it is the outer boundary of its component.
 std::vector<bool> outer_boundaries(const TriangleMesh& mesh, const MeshComponents& components,
                                    const std::vector<BoundaryLoop>& loops,
-                                   const std::optional<PlanBox>& known) {
+                                   const std::optional<XyBox>& known) {
   constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
   std::vector<std::size_t> longest(components.areas_m2.size(), none);
   std::vector<double> length(components.areas_m2.size(), -1.0);
@@ -195,7 +195,7 @@ std::vector<std::uint32_t> named_vertices(const std::vector<Triangle>& triangles
   return vertices;
 }
 
-std::uint32_t place_in(const std::vector<std::uint32_t>& sorted, std::uint32_t value) {
+std::uint32_t index_in(const std::vector<std::uint32_t>& sorted, std::uint32_t value) {
   return static_cast<std::uint32_t>(std::lower_bound(sorted.begin(), sorted.end(), value) -
                                     sorted.begin());
 }
@@ -215,11 +215,11 @@ class HolePatcher {
     std::vector<Eigen::Vector3d> positions;
     for (const std::uint32_t v : result.vertices) positions.push_back(mesh_.vertices[v]);
     for (Triangle& t : triangles)
-      for (std::uint32_t& v : t) v = place_in(result.vertices, v);
+      for (std::uint32_t& v : t) v = index_in(result.vertices, v);
     result.patch = patch_hole(
-        positions, triangles, place_in(result.vertices, source_of(mesh_.triangles, loop[0])),
-        place_in(result.vertices, target_of(mesh_.triangles, loop[0])), shape);
-    if (!stands(positions, triangles, result.patch)) result.patch = {};
+        positions, triangles, index_in(result.vertices, source_of(mesh_.triangles, loop[0])),
+        index_in(result.vertices, target_of(mesh_.triangles, loop[0])), shape);
+    if (!is_valid(positions, triangles, result.patch)) result.patch = {};
     return result;
   }
 
@@ -243,7 +243,7 @@ class HolePatcher {
   }
 
   // True if each edge of the patch has two triangles, and no triangle is degenerate.
-  bool stands(const std::vector<Eigen::Vector3d>& positions, const std::vector<Triangle>& around,
+  bool is_valid(const std::vector<Eigen::Vector3d>& positions, const std::vector<Triangle>& around,
               const HolePatch& patch) const {
     TriangleMesh joined;
     joined.vertices = positions;
@@ -294,20 +294,20 @@ void append_patch_vertex(TriangleMesh& mesh, const Eigen::Vector3d& position,
       mesh.vertex_colors[added][c] = static_cast<std::uint8_t>(std::clamp(
           std::lround(mean([&](std::uint32_t v) { return mesh.vertex_colors[v][c]; })), 0L, 255L));
   for (ScalarField& field : mesh.vertex_fields)
-    if (!is_whole(field.type))
+    if (!is_integer(field.type))
       field.values[added] = mean([&](std::uint32_t v) { return field.values[v]; });
 }
 
 // Triangle at the edge of the boundary nearest to `place`.
 std::uint32_t nearest_triangle(const TriangleMesh& mesh, const BoundaryLoop& loop,
-                               const Eigen::Vector3d& place) {
+                               const Eigen::Vector3d& near_to) {
   double nearest = std::numeric_limits<double>::infinity();
   std::uint32_t triangle = loop.front() / 3;
   for (const HalfEdge h : loop) {
     const Eigen::Vector3d middle = (mesh.vertices[source_of(mesh.triangles, h)] +
                                     mesh.vertices[target_of(mesh.triangles, h)]) /
                                    2.0;
-    const double here = (middle - place).squaredNorm();
+    const double here = (middle - near_to).squaredNorm();
     if (here >= nearest) continue;
     nearest = here;
     triangle = h / 3;
@@ -325,8 +325,8 @@ void append_patch(TriangleMesh& mesh, const BoundaryLoop& loop, const PlacedPatc
   for (Triangle triangle : placed.patch.triangles) {
     for (std::uint32_t& v : triangle)
       v = v < old_count ? placed.vertices[v] : first_new + (v - old_count);
-    const Eigen::Vector3d place = center_of(mesh, triangle);
-    const std::uint32_t source = nearest_triangle(mesh, loop, place);
+    const Eigen::Vector3d near_to = center_of(mesh, triangle);
+    const std::uint32_t source = nearest_triangle(mesh, loop, near_to);
     mesh.triangles.push_back(triangle);
     for (ScalarField& field : mesh.face_fields)
       field.values.push_back(field.name == filled_field ? 1.0 : field.values[source]);
@@ -356,7 +356,7 @@ std::vector<bool> free_patches(const TriangleMesh& base, const std::vector<Bound
 }  // namespace
 
 std::vector<bool> components_beyond(const TriangleMesh& mesh, const MeshComponents& components,
-                                    const std::optional<PlanBox>& known) {
+                                    const std::optional<XyBox>& known) {
   std::vector<bool> are_beyond(components.areas_m2.size(), false);
   if (!known) return are_beyond;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
@@ -367,7 +367,7 @@ std::vector<bool> components_beyond(const TriangleMesh& mesh, const MeshComponen
 }
 
 std::vector<BoundaryLoop> find_holes(const TriangleMesh& mesh, double max_hole_m,
-                                     const std::optional<PlanBox>& known) {
+                                     const std::optional<XyBox>& known) {
   const std::vector<HalfEdge> opposite = opposites_of(mesh);
   std::vector<BoundaryLoop> loops = boundary_loops(mesh.triangles, opposite);
   if (loops.empty()) return {};
@@ -379,7 +379,7 @@ std::vector<BoundaryLoop> find_holes(const TriangleMesh& mesh, double max_hole_m
     const std::vector<Eigen::Vector3d> positions = positions_of(mesh, loops[n]);
     Eigen::AlignedBox3d box;
     for (const Eigen::Vector3d& p : positions) box.extend(p);
-    if (known && !known->contains(PlanBox(box.min().head<2>(), box.max().head<2>()))) continue;
+    if (known && !known->contains(XyBox(box.min().head<2>(), box.max().head<2>()))) continue;
     // The longest side of the box is a lower bound of the diameter, its diagonal an upper bound.
     if (box.sizes().maxCoeff() > max_hole_m) continue;
     if (box.diagonal().norm() <= max_hole_m || diameter_of(positions) <= max_hole_m)

@@ -24,12 +24,12 @@ using BoundaryLoop = std::vector<HalfEdge>;  // as boundary_loops()
 // If the mesh is part of a larger one that is complete only within the box `known` in x and y,
 // boundaries beyond the box are not holes, and components that extend beyond it have no outer
 // boundary inside.
-using PlanBox = Eigen::AlignedBox2d;
+using XyBox = Eigen::AlignedBox2d;
 std::vector<BoundaryLoop> find_holes(const TriangleMesh& mesh, double max_hole_m,
-                                     const std::optional<PlanBox>& known = std::nullopt);
+                                     const std::optional<XyBox>& known = std::nullopt);
 // For each component, true if it extends beyond the box; all false without a box.
 std::vector<bool> components_beyond(const TriangleMesh& mesh, const MeshComponents& components,
-                                    const std::optional<PlanBox>& known);
+                                    const std::optional<XyBox>& known);
 
 // Conditions for accepting a patch.
 enum class PatchCheck {

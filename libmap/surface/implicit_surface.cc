@@ -90,7 +90,7 @@ struct BlockGrid {
 };
 
 struct Cube {
-  Vector3i place;                   // position in the block
+  Vector3i position;                // position in the block
   std::array<std::size_t, 8> at{};  // indices of the corners
   unsigned inside = 0;              // one bit per corner
 };
@@ -124,7 +124,7 @@ class ImplicitSurface {
   double reach_of(const SurfaceSample& sample) const {
     return support_cells_ * std::max(1.0, static_cast<double>(sample.spacing_m) / cell_m_);
   }
-  Vector3d place_of(const SurfaceSample& sample) const {
+  Vector3d cells_of(const SurfaceSample& sample) const {
     return sample.position.cast<double>() / cell_m_;
   }
 
@@ -153,10 +153,10 @@ class ImplicitSurface {
 void ImplicitSurface::find_blocks() {
   VoxelIndex numbers;
   for (std::size_t n = 0; n < samples_.size(); ++n) {
-    const Vector3d place = place_of(samples_[n]) / block_cells;
+    const Vector3d center = cells_of(samples_[n]) / block_cells;
     const Vector3d reach = Vector3d::Constant(reach_of(samples_[n]) / block_cells);
-    const Vector3i low = (place - reach).array().floor().cast<int>();
-    const Vector3i high = (place + reach).array().floor().cast<int>();
+    const Vector3i low = (center - reach).array().floor().cast<int>();
+    const Vector3i high = (center + reach).array().floor().cast<int>();
     for (int z = low.z(); z <= high.z(); ++z)
       for (int y = low.y(); y <= high.y(); ++y)
         for (int x = low.x(); x <= high.x(); ++x) {
@@ -169,20 +169,20 @@ void ImplicitSurface::find_blocks() {
 
 void ImplicitSurface::add_sample(const SurfaceSample& sample, const Block& block,
                                  std::vector<Corner>& corners) const {
-  const Vector3d place = place_of(sample) - block.begin.cast<double>();
+  const Vector3d center = cells_of(sample) - block.begin.cast<double>();
   const Vector3d normal = sample.normal.cast<double>();
   const double reach = reach_of(sample);
   const double factor = static_cast<double>(sample.weight) / (reach * reach);
   const auto first = [&](int axis) {
-    return std::max(0, static_cast<int>(std::ceil(place[axis] - reach)));
+    return std::max(0, static_cast<int>(std::ceil(center[axis] - reach)));
   };
   const auto last = [&](int axis) {
-    return std::min(block_cells, static_cast<int>(std::floor(place[axis] + reach)));
+    return std::min(block_cells, static_cast<int>(std::floor(center[axis] + reach)));
   };
   for (int z = first(2); z <= last(2); ++z)
     for (int y = first(1); y <= last(1); ++y)
       for (int x = first(0); x <= last(0); ++x) {
-        const Vector3d offset = Vector3d(x, y, z) - place;
+        const Vector3d offset = Vector3d(x, y, z) - center;
         const double nearness = 1.0 - offset.squaredNorm() / (reach * reach);
         if (nearness <= 0.0) continue;
         const double weight = factor * nearness * nearness * nearness;
@@ -205,7 +205,7 @@ void ImplicitSurface::march(const Block& block, Part& part) const {
   for (int z = 0; z < block_cells; ++z)
     for (int y = 0; y < block_cells; ++y)
       for (int x = 0; x < block_cells; ++x) {
-        Cube cube{.place = {x, y, z}};
+        Cube cube{.position = {x, y, z}};
         if (is_crossed(grid, cube)) add_cube(block, cube, grid, part);
       }
 }
@@ -215,7 +215,7 @@ void ImplicitSurface::march(const Block& block, Part& part) const {
 bool ImplicitSurface::is_crossed(const BlockGrid& grid, Cube& cube) {
   for (std::size_t c = 0; c < cube.at.size(); ++c) {
     const auto& offset = corner_offsets[c];
-    cube.at[c] = corner_index(cube.place + Vector3i(offset[0], offset[1], offset[2]));
+    cube.at[c] = corner_index(cube.position + Vector3i(offset[0], offset[1], offset[2]));
     if (!(grid.corners[cube.at[c]].weight > 0.0)) return false;
     if (grid.values[cube.at[c]] < 0.0) cube.inside |= 1U << c;
   }
@@ -241,7 +241,7 @@ void ImplicitSurface::add_cube(const Block& block, const Cube& cube, BlockGrid& 
       const double to = grid.values[cube.at[b]];
       const double share = std::clamp(from / (from - to), min_share, 1.0 - min_share);
       part.vertices.push_back(
-          vertex_of(block, cube.place + Vector3i(low[0], low[1], low[2]), axis, share));
+          vertex_of(block, cube.position + Vector3i(low[0], low[1], low[2]), axis, share));
     }
     numbers[e] = known;
   }

@@ -97,7 +97,7 @@ void mark_boundary(TriangleMesh& mesh) {
 }
 
 void remove_triangles(TriangleMesh& mesh, std::vector<bool> marks, int rings, double min_gap_m) {
-  grow_marks(mesh, rings, marks);
+  dilate_mask(mesh, rings, marks);
   const MeshComponents components = connected_components(mesh);
   mesh.face_fields.push_back(
       {std::string(component_field), ScalarType::float64,
@@ -134,7 +134,7 @@ void repair_intersections(double min_gap_m, MeshCleaningResult& result) {
     faces = bad_faces(mesh);
   }
   result.remaining_intersecting_triangles = count_of(faces);
-  result.open_places += new_loops(mesh).size();
+  result.unclosed_holes += new_loops(mesh).size();
   for (double& mark : filled_marks(mesh).values) {
     if (mark == 1.0) ++result.closing_triangles;
     if (mark != 0.0) mark = 1.0;
@@ -170,11 +170,11 @@ Neighbors neighbors_of(const TriangleMesh& mesh) {
       if (!stays[v]) ++result.first[v + 1];
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v) result.first[v + 1] += result.first[v];
   result.vertices.resize(result.first.back());
-  std::vector<std::uint32_t> place(result.first.begin(), result.first.end() - 1);
+  std::vector<std::uint32_t> next(result.first.begin(), result.first.end() - 1);
   for (std::size_t e = 0; e < edges.size(); ++e) {
     const auto [a, b] = ends(e);
-    if (!stays[a]) result.vertices[place[a]++] = b;
-    if (!stays[b]) result.vertices[place[b]++] = a;
+    if (!stays[a]) result.vertices[next[a]++] = b;
+    if (!stays[b]) result.vertices[next[b]++] = a;
   }
   return result;
 }
@@ -213,7 +213,7 @@ void smooth_mesh(TriangleMesh& mesh, int iterations) {
 bool is_oriented_manifold(const TriangleMesh& mesh) {
   const MeshReport report = report_mesh(mesh, {.self_intersections = false});
   return report.is_manifold() && report.is_oriented() &&
-         std::none_of(mesh.triangles.begin(), mesh.triangles.end(), names_a_vertex_twice);
+         std::none_of(mesh.triangles.begin(), mesh.triangles.end(), has_repeated_vertex);
 }
 
 class Cleaning {
@@ -281,7 +281,7 @@ class Cleaning {
       mesh = select_triangles(mesh, std::vector<bool>(mesh.triangles.size(), true));
     result_.merged_vertices = weld_vertices(mesh, merge_distance());
     std::vector<bool> drop(mesh.triangles.size());
-    for (std::size_t t = 0; t < drop.size(); ++t) drop[t] = names_a_vertex_twice(mesh.triangles[t]);
+    for (std::size_t t = 0; t < drop.size(); ++t) drop[t] = has_repeated_vertex(mesh.triangles[t]);
     result_.degenerate_triangles += count_of(drop);
     const std::vector<bool> repeated = repeated_triangles(mesh.triangles);
     for (std::size_t t = 0; t < drop.size(); ++t)

@@ -40,7 +40,7 @@ struct MeshCleaningOptions {
   // >= 0: maximum distance between the decimated and the original surface; 0: no decimation.
   double decimation_error_m = 0.0;
   // Box in x and y beyond which the mesh continues: what extends beyond it is no island or hole.
-  std::optional<PlanBox> known = std::nullopt;
+  std::optional<XyBox> known = std::nullopt;
 };
 void bind(ParameterTable& table, MeshCleaningOptions& options);
 
@@ -67,7 +67,7 @@ struct MeshCleaningResult {
   // Removed because they intersected others or were degenerate, without triangles around them.
   std::size_t intersecting_triangles = 0;
   std::size_t closing_triangles = 0;  // new triangles in the resulting holes
-  std::size_t open_places = 0;        // resulting holes that stay open
+  std::size_t unclosed_holes = 0;        // resulting holes that stay open
   std::size_t remaining_intersecting_triangles = 0;
   HoleFilling filling;  // in step 5
   MeshDecimation decimation;

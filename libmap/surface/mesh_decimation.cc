@@ -179,7 +179,7 @@ double deviation(const TriangleMesh& original, const TriangleMesh& smaller, doub
     if (one.nearest_there != none) marks[one.nearest_there] = true;
   for (std::size_t t = 0; t < back.size(); ++t)
     if (back[t].nearest_there != none) marks[t] = true;
-  grow_marks(original, rings, marks);
+  dilate_mask(original, rings, marks);
   for (std::size_t t = 0; t < marks.size(); ++t)
     if (marks[t])
       for (const std::uint32_t v : original.triangles[t]) locked[v] = true;

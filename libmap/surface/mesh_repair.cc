@@ -47,7 +47,7 @@ class CapFlipper {
 
   // Removes a cap. Returns false if the adjacent triangle is a cap that depends on another one, or
   // if the new edge exists already.
-  bool settle(std::uint32_t cap, const std::function<bool(std::uint32_t)>& is_cap) {
+  bool remove_cap(std::uint32_t cap, const std::function<bool(std::uint32_t)>& is_cap) {
     const HalfEdge h = longest_edge(mesh_, cap);
     const HalfEdge across = opposite_[h];
     if (!is_joined(across)) {
@@ -165,7 +165,7 @@ std::vector<bool> degenerate_triangles(const TriangleMesh& mesh) {
   std::vector<bool> marks(mesh.triangles.size(), false);
   for (std::size_t t = 0; t < marks.size(); ++t)
     marks[t] =
-        names_a_vertex_twice(mesh.triangles[t]) || lowest_height(mesh, mesh.triangles[t]) <= lowest;
+        has_repeated_vertex(mesh.triangles[t]) || lowest_height(mesh, mesh.triangles[t]) <= lowest;
   return marks;
 }
 
@@ -231,7 +231,7 @@ std::size_t flip_caps(TriangleMesh& mesh) {
     std::vector<std::uint32_t> left;
     for (const std::uint32_t cap : caps) {
       if (!flipper.keeps(cap) || !is_cap(cap)) continue;
-      if (flipper.settle(cap, is_cap)) has_changed = true;
+      if (flipper.remove_cap(cap, is_cap)) has_changed = true;
       if (flipper.keeps(cap)) left.push_back(cap);
       if (flipper.keeps(cap) && flipper.touched()[0] == cap) left.push_back(flipper.touched()[1]);
     }

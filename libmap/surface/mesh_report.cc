@@ -97,7 +97,7 @@ void report_boundaries(const TriangleMesh& mesh, const std::vector<HalfEdge>& op
 void report_topology(const TriangleMesh& mesh, MeshReport& report) {
   const auto with_edges =
       static_cast<long>(std::count_if(mesh.triangles.begin(), mesh.triangles.end(),
-                                      [](const Triangle& t) { return !names_a_vertex_twice(t); }));
+                                      [](const Triangle& t) { return !has_repeated_vertex(t); }));
   const auto used = static_cast<long>(report.vertices - report.unused_vertices);
   report.euler_characteristic = used - static_cast<long>(report.edges) + with_edges;
   const bool has_genus = with_edges == static_cast<long>(report.triangles) && with_edges > 0 &&

@@ -20,9 +20,9 @@ namespace libmap {
 namespace {
 
 // Redirects standard output and error, because PCL prints a line for each face that it drops.
-class Silence {
+class StdoutRedirect {
  public:
-  Silence() {
+  StdoutRedirect() {
     flush();
     const int nowhere = open("/dev/null", O_WRONLY | O_CLOEXEC);
     for (std::size_t n = 0; n < kept_.size(); ++n) {
@@ -32,7 +32,7 @@ class Silence {
     }
     if (nowhere >= 0) close(nowhere);
   }
-  ~Silence() {
+  ~StdoutRedirect() {
     flush();
     for (std::size_t n = 0; n < kept_.size(); ++n) {
       if (kept_[n] < 0) continue;
@@ -40,8 +40,8 @@ class Silence {
       close(kept_[n]);
     }
   }
-  Silence(const Silence&) = delete;
-  Silence& operator=(const Silence&) = delete;
+  StdoutRedirect(const StdoutRedirect&) = delete;
+  StdoutRedirect& operator=(const StdoutRedirect&) = delete;
 
  private:
   static void flush() {
@@ -85,7 +85,7 @@ TriangleMesh solve_poisson(const std::vector<SurfaceSample>& samples,
   pcl::PointCloud<pcl::PointNormal> points;
   std::vector<pcl::Vertices> polygons;
   try {
-    const Silence silence;
+    const StdoutRedirect silence;
     pcl::Poisson<pcl::PointNormal> poisson;
     poisson.setInputCloud(to_pcl(samples));
     poisson.setThreads(1);

@@ -60,7 +60,7 @@ double max_known_spacing(const SurfaceReconstructionOptions& options) {
 // Sets colors and fields of the vertices to the mean over the 4 nearest points, weighted by
 // 1 / (d^2 + radius^2). Integer fields take the nearest point's value. NaN is ignored. `tree`
 // contains the cloud's positions.
-void carry_values(const PointCloud& cloud, const PointTree& tree, double cell_size_m,
+void transfer_values(const PointCloud& cloud, const PointTree& tree, double cell_size_m,
                   TriangleMesh& mesh) {
   const double radius_m = 0.5 * cell_size_m;
   const double max_m = max_value_cells * cell_size_m;
@@ -92,7 +92,7 @@ void carry_values(const PointCloud& cloud, const PointTree& tree, double cell_si
       const ScalarField& field = cloud.fields[f];
       double& value = mesh.vertex_fields[f].values[v];
       value = field.values[neighbors.front().index];
-      if (is_whole(field.type)) continue;
+      if (is_integer(field.type)) continue;
       double sum = 0.0;
       double weights = 0.0;
       for (const NeighborPoint& point : neighbors) {
@@ -114,7 +114,7 @@ struct UsedPoint {
 class Reconstruction {
  public:
   // `survey` describes the whole cloud of which `cloud` is a part; nullptr: `cloud` is the whole.
-  Reconstruction(const PointCloud& cloud, const SurfaceSurvey* survey,
+  Reconstruction(const PointCloud& cloud, const CloudStatistics* survey,
                  const SurfaceReconstructionOptions& options, Progress& progress)
       : cloud_(cloud), options_(options), progress_(progress), is_part_(survey != nullptr) {
     if (is_part_) survey_ = *survey;
@@ -141,7 +141,7 @@ class Reconstruction {
     });
     timed("trimming", [&] { trim(surface); });
     timed("values", [&] {
-      carry_values(cloud_, PointTree(cloud_.positions), result_.cell_size_m, result_.mesh);
+      transfer_values(cloud_, PointTree(cloud_.positions), result_.cell_size_m, result_.mesh);
       result_.mesh.vertex_normals = estimate_vertex_normals(result_.mesh);
     });
     return std::move(result_);
@@ -171,7 +171,7 @@ class Reconstruction {
   const SurfaceReconstructionOptions& options_;
   Progress& progress_;
   bool is_part_;
-  SurfaceSurvey survey_;
+  CloudStatistics survey_;
   std::vector<std::size_t> used_;
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
   double median_error_m_ = 0.0;
@@ -179,7 +179,7 @@ class Reconstruction {
   const ScalarField* errors_ = nullptr;
   PoissonProblem problem_;
   std::vector<SurfaceSample> samples_;   // relative to the origin
-  std::vector<Eigen::Vector3d> places_;  // positions of the samples, relative to the origin
+  std::vector<Eigen::Vector3d> positions_;  // positions of the samples, relative to the origin
   std::optional<PointTree> tree_;        // of places_
   std::vector<double> spacings_m_;       // local distance between samples
   SurfaceReconstructionResult result_;
@@ -214,31 +214,31 @@ void Reconstruction::choose_cell_size() {
   origin_ = survey_.origin();
   result_.cell_size_m = options_.cell_size_m;
   if (is_part_) return;
-  std::vector<Eigen::Vector3d> places;
-  places.reserve(used_.size());
+  std::vector<Eigen::Vector3d> distinct;
+  distinct.reserve(used_.size());
   for (const std::size_t n : used_)
-    if (places.empty() || places.back() != cloud_.positions[n])
-      places.push_back(cloud_.positions[n]);
+    if (distinct.empty() || distinct.back() != cloud_.positions[n])
+      distinct.push_back(cloud_.positions[n]);
   const auto too_thin = [&](const char* reason) {
     return Error(reason,
-                 {.field = "points", .value = std::to_string(places.size()) + " positions"});
+                 {.field = "points", .value = std::to_string(distinct.size()) + " positions"});
   };
-  if (places.size() < 3) throw too_thin("too few points for a surface");
+  if (distinct.size() < 3) throw too_thin("too few points for a surface");
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  for (const Eigen::Vector3d& place : places)
-    mean += (place - places.front()) / static_cast<double>(places.size());
+  for (const Eigen::Vector3d& sample_position : distinct)
+    mean += (sample_position - distinct.front()) / static_cast<double>(distinct.size());
   Eigen::Matrix3d moments = Eigen::Matrix3d::Zero();
-  for (const Eigen::Vector3d& place : places) {
-    const Eigen::Vector3d arm = place - places.front() - mean;
+  for (const Eigen::Vector3d& sample_position : distinct) {
+    const Eigen::Vector3d arm = sample_position - distinct.front() - mean;
     moments += arm * arm.transpose();
   }
   const Eigen::Vector3d spread = symmetric_eigen(moments).values;
   if (!(spread[1] > min_width * min_width * spread[2]))
     throw too_thin("all points are on a line: no surface");
-  const CloudSpacing spacing = point_spacing(places);
+  const CloudSpacing spacing = point_spacing(distinct);
   result_.spacing_m = spacing.nearest_m;
   if (!(options_.cell_size_m > 0.0)) result_.cell_size_m = result_.spacing_m;
-  area_m2_ = static_cast<double>(places.size()) * spacing.by_area_m * spacing.by_area_m;
+  area_m2_ = static_cast<double>(distinct.size()) * spacing.by_area_m * spacing.by_area_m;
 }
 
 // Coefficients measured on rolling ground of 1 million points, with poisson on a site of 300,000.
@@ -298,12 +298,12 @@ void Reconstruction::make_samples() {
     points.push_back({n, position.array().floor().cast<int>(), position});
   }
   // By block, then by cell, so that neighbors in space are neighbors in memory.
-  const auto place = [](const UsedPoint& point) {
+  const auto key_of = [](const UsedPoint& point) {
     const Eigen::Vector3i& cell = point.cell;
     return std::tuple(cell.z() >> 3, cell.y() >> 3, cell.x() >> 3, cell.z(), cell.y(), cell.x());
   };
   std::stable_sort(points.begin(), points.end(),
-                   [&](const UsedPoint& a, const UsedPoint& b) { return place(a) < place(b); });
+                   [&](const UsedPoint& a, const UsedPoint& b) { return key_of(a) < key_of(b); });
   for (std::size_t begin = 0; begin < points.size();) {
     std::size_t end = begin + 1;
     while (end < points.size() && points[end].cell == points[begin].cell) ++end;
@@ -343,16 +343,16 @@ void Reconstruction::add_cell(const UsedPoint* begin, const UsedPoint* end) {
 }
 
 void Reconstruction::find_spacings() {
-  places_.reserve(samples_.size());
-  for (const SurfaceSample& sample : samples_) places_.push_back(sample.position.cast<double>());
+  positions_.reserve(samples_.size());
+  for (const SurfaceSample& sample : samples_) positions_.push_back(sample.position.cast<double>());
   spacings_m_.resize(samples_.size());
   const double max_m = options_.method == SurfaceMethod::poisson
                            ? std::numeric_limits<double>::infinity()
                            : max_known_spacing(options_) * result_.cell_size_m;
-  tree_.emplace(places_);
+  tree_.emplace(positions_);
   const PointTree& tree = *tree_;
   parallel_each(samples_.size(), 1024, [&](std::size_t n) {
-    const auto neighbors = tree.nearest(places_[n], spacing_neighbors + 1);
+    const auto neighbors = tree.nearest(positions_[n], spacing_neighbors + 1);
     spacings_m_[n] = max_m;
     if (is_part_ && neighbors.size() <= spacing_neighbors) return;
     // Number of samples in the disc up to the farthest neighbor.
@@ -394,7 +394,7 @@ void Reconstruction::trim(TriangleMesh& surface) {
 
 }  // namespace
 
-void SurfaceSurvey::add(const PointCloud& cloud, bool weigh_by_error) {
+void CloudStatistics::add(const PointCloud& cloud, bool weigh_by_error) {
   if (!cloud.empty() && !cloud.has_normals()) throw Error("the cloud has no normals");
   const ScalarField* errors = weigh_by_error ? cloud.find_field("expected_error") : nullptr;
   for (std::size_t n = 0; n < cloud.size(); ++n) {
@@ -402,16 +402,16 @@ void SurfaceSurvey::add(const PointCloud& cloud, bool weigh_by_error) {
       ++dropped_;
       continue;
     }
-    const Eigen::Vector3d& place = cloud.positions[n];
-    bounds_.min = points_ == 0 ? place : Eigen::Vector3d(bounds_.min.cwiseMin(place));
-    bounds_.max = points_ == 0 ? place : Eigen::Vector3d(bounds_.max.cwiseMax(place));
+    const Eigen::Vector3d& sample_position = cloud.positions[n];
+    bounds_.min = points_ == 0 ? sample_position : Eigen::Vector3d(bounds_.min.cwiseMin(sample_position));
+    bounds_.max = points_ == 0 ? sample_position : Eigen::Vector3d(bounds_.max.cwiseMax(sample_position));
     ++points_;
     if (errors != nullptr && errors->values[n] > 0.0 && std::isfinite(errors->values[n]))
       ++errors_[std::bit_cast<std::uint64_t>(errors->values[n]) >> dropped_bits];
   }
 }
 
-double SurfaceSurvey::median_error_m() const {
+double CloudStatistics::median_error_m() const {
   std::size_t count = 0;
   for (const auto& [bits, number] : errors_) count += number;
   std::size_t below = 0;
@@ -448,7 +448,7 @@ SurfaceReconstructionResult reconstruct_surface(const PointCloud& cloud,
   return Reconstruction(cloud, nullptr, options, progress).run(announce);
 }
 
-SurfaceReconstructionResult reconstruct_part(const PointCloud& part, const SurfaceSurvey& survey,
+SurfaceReconstructionResult reconstruct_part(const PointCloud& part, const CloudStatistics& survey,
                                              const SurfaceReconstructionOptions& options,
                                              Progress& progress) {
   check_parameters(options);

@@ -45,7 +45,7 @@ inline constexpr int max_octree_depth = 12;
 
 // Properties of a whole cloud, for reconstructing its surface in parts. The cloud may be added in
 // parts, in any order.
-class SurfaceSurvey {
+class CloudStatistics {
  public:
   // Throws Error if the cloud has points but no normals.
   void add(const PointCloud& cloud, bool weigh_by_error);
@@ -103,7 +103,7 @@ SurfaceReconstructionResult reconstruct_surface(const PointCloud& cloud,
 // Reconstructs the surface of a part of the cloud of `survey`. At a distance of surface_margin_m()
 // from missing points, it equals the surface of the whole cloud, except for the order. Empty for
 // too few points. Throws Error as reconstruct_surface and surface_margin_m.
-SurfaceReconstructionResult reconstruct_part(const PointCloud& part, const SurfaceSurvey& survey,
+SurfaceReconstructionResult reconstruct_part(const PointCloud& part, const CloudStatistics& survey,
                                              const SurfaceReconstructionOptions& options,
                                              Progress& progress = no_progress());
 // Distance up to which points influence the surface, m. Throws Error unless the method is implicit

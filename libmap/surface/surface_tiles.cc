@@ -102,7 +102,7 @@ double SurfaceTileOptions::margin_m() const {
          surface_margin_m(reconstruction);
 }
 
-PlanBox plan_box_of(const XyTile& tile, double tile_m, double margin_m) {
+XyBox xy_box_of(const XyTile& tile, double tile_m, double margin_m) {
   const Eigen::Vector2d low =
       Eigen::Vector2d(static_cast<double>(tile.i), static_cast<double>(tile.j)) * tile_m;
   return {low.array() - margin_m, low.array() + tile_m + margin_m};
@@ -124,15 +124,15 @@ void add_surface_tiles(const PointCloud& cloud, const SurfaceTileOptions& option
     if (!(position.head<2>().cwiseAbs().maxCoeff() < max_tiles * options.tile_m))
       throw Error("too small for the coordinates of the cloud",
                   {.field = "tile_size_m", .value = to_text(options.tile_m)});
-    const Eigen::Vector2d place = position.head<2>();
-    const XyTile low = xy_tile_at(place.array() - reach, options.tile_m);
-    const XyTile high = xy_tile_at(place.array() + reach, options.tile_m);
+    const Eigen::Vector2d in_plane = position.head<2>();
+    const XyTile low = xy_tile_at(in_plane.array() - reach, options.tile_m);
+    const XyTile high = xy_tile_at(in_plane.array() + reach, options.tile_m);
     for (std::int64_t i = low.i; i <= high.i; ++i)
       for (std::int64_t j = low.j; j <= high.j; ++j) ++points_in_tiles[{i, j}];
   }
 }
 
-SurfaceTile make_surface_tile(const PointCloud& points, const SurfaceSurvey& survey,
+SurfaceTile make_surface_tile(const PointCloud& points, const CloudStatistics& survey,
                               const XyTile& tile, const SurfaceTileOptions& options,
                               Progress& progress) {
   options.check();
@@ -140,10 +140,10 @@ SurfaceTile make_surface_tile(const PointCloud& points, const SurfaceSurvey& sur
   made.reconstruction = reconstruct_part(points, survey, options.reconstruction, progress);
   const double cell_m = options.reconstruction.cell_size_m;
   MeshCleaningOptions cleaning = options.cleaning;
-  cleaning.known = plan_box_of(tile, options.tile_m, cleaning_margin_m(options));
+  cleaning.known = xy_box_of(tile, options.tile_m, cleaning_margin_m(options));
   cleaning.min_island_share = 0.0;
-  const PlanBox cut =
-      plan_box_of(tile, options.tile_m, cleaning_margin_m(options) + triangle_cells * cell_m);
+  const XyBox cut =
+      xy_box_of(tile, options.tile_m, cleaning_margin_m(options) + triangle_cells * cell_m);
   const TriangleMesh around = select_triangles(
       made.reconstruction.mesh,
       triangles_at(made.reconstruction.mesh,

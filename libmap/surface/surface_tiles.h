@@ -30,7 +30,7 @@ struct SurfaceTileOptions {
 };
 
 // Box of a tile, enlarged by a margin on each side.
-PlanBox plan_box_of(const XyTile& tile, double tile_m, double margin_m);
+XyBox xy_box_of(const XyTile& tile, double tile_m, double margin_m);
 
 // Counts, for each tile that may contain a part of the cloud's surface, the points near it. Throws
 // Error if tile_m is too small for the coordinates.
@@ -54,7 +54,7 @@ struct SurfaceTile {
 // that may continue beyond the margin, which SurfaceIslands finds. Such components, if narrower
 // than min_island_area_m2 / margin_m(), may prevent a hole beside them from being filled. Throws
 // Error as options.check(), reconstruct_part and clean_mesh.
-SurfaceTile make_surface_tile(const PointCloud& points, const SurfaceSurvey& survey,
+SurfaceTile make_surface_tile(const PointCloud& points, const CloudStatistics& survey,
                               const XyTile& tile, const SurfaceTileOptions& options,
                               Progress& progress = no_progress());
 

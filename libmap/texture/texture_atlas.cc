@@ -230,7 +230,7 @@ void AtlasMaker::pack(TextureAtlas& atlas) const {
 
 }  // namespace
 
-Eigen::Vector2d place_on_page(const TextureChart& chart, const PhotoProjector& projector,
+Eigen::Vector2d texel_of(const TextureChart& chart, const PhotoProjector& projector,
                               const Eigen::Vector3d& point) {
   return Eigen::Vector2d(chart.column, chart.row) +
          chart.scale * (pixel_of(projector, point) - chart.origin);
@@ -259,7 +259,7 @@ TexturedMesh TextureAtlas::make_model(const TriangleMesh& mesh, const TexturePho
       model.page_of_triangle[t] = chart.page;
       for (std::size_t k = 0; k < 3; ++k)
         model.texture_coordinates[t][k] =
-            coordinate(chart.page, place_on_page(chart, photos[chart.photo].projector,
+            coordinate(chart.page, texel_of(chart, photos[chart.photo].projector,
                                                  mesh.vertices[mesh.triangles[t][k]]));
     }
   });

@@ -80,7 +80,7 @@ struct PackedRectangle {
 std::size_t pack_rectangles(std::vector<PackedRectangle>& rectangles, int page_size);
 
 // Returns the texel of a world point on its chart's page; (0, 0) is the center of the first texel.
-Eigen::Vector2d place_on_page(const TextureChart& chart, const PhotoProjector& projector,
+Eigen::Vector2d texel_of(const TextureChart& chart, const PhotoProjector& projector,
                               const Eigen::Vector3d& point);
 
 }  // namespace libmap

@@ -33,7 +33,7 @@ Eigen::Vector3d powers_of(double radius2) {
 }
 
 // The observations of one surface point: observations[first] .. [last - 1].
-struct Place {
+struct SurfacePoint {
   std::size_t first = 0;
   std::size_t last = 0;
 };
@@ -54,7 +54,7 @@ class ExposureFit {
 
   const ExposureOptions& options_;
   std::vector<Observation> observations_;
-  std::vector<Place> places_;
+  std::vector<SurfacePoint> points_;
   std::vector<double> weights_;  // one per observation
   Eigen::MatrixX3d gains_;       // logarithms
   Eigen::Vector3d vignetting_ = Eigen::Vector3d::Zero();
@@ -73,13 +73,13 @@ ExposureFit::ExposureFit(std::span<const ColorObservation> observations, std::si
   for (std::size_t first = 0, last = 0; first < sorted.size(); first = last) {
     while (last < sorted.size() && sorted[last].vertex == sorted[first].vertex) ++last;
     if (last - first < 2) continue;
-    Place place{observations_.size(), 0};
+    SurfacePoint point{observations_.size(), 0};
     const std::size_t step = (last - first - 1) / max_views + 1;
     for (std::size_t i = first; i < last; i += step)
       observations_.push_back({sorted[i].photo, sorted[i].color.cast<double>().array().log(),
                                powers_of(static_cast<double>(sorted[i].radius2))});
-    place.last = observations_.size();
-    places_.push_back(place);
+    point.last = observations_.size();
+    points_.push_back(point);
   }
   weights_.assign(observations_.size(), 1.0);
 }
@@ -87,7 +87,7 @@ ExposureFit::ExposureFit(std::span<const ColorObservation> observations, std::si
 double ExposureFit::weigh() {
   double sum = 0.0;
   double count = 0.0;
-  for (const Place& place : places_) {
+  for (const SurfacePoint& point : points_) {
     Eigen::Vector3d mean = Eigen::Vector3d::Zero();
     double total = 0.0;
     const auto residual = [&](const Observation& seen) {
@@ -95,18 +95,18 @@ double ExposureFit::weigh() {
       for (Eigen::Index c = 0; c < 3; ++c) r[c] -= predicted(seen, c);
       return r;
     };
-    for (std::size_t i = place.first; i < place.last; ++i) {
+    for (std::size_t i = point.first; i < point.last; ++i) {
       mean += weights_[i] * residual(observations_[i]);
       total += weights_[i];
     }
     mean /= total;
-    for (std::size_t i = place.first; i < place.last; ++i) {
+    for (std::size_t i = point.first; i < point.last; ++i) {
       const Eigen::Vector3d off = residual(observations_[i]) - mean;
       const double size = off.norm() / std::sqrt(3.0);
       sum += size * size;
       weights_[i] = size <= huber ? 1.0 : huber / size;
     }
-    count += static_cast<double>(place.last - place.first - 1);
+    count += static_cast<double>(point.last - point.first - 1);
   }
   return count > 0.0 ? std::sqrt(sum / count) : 0.0;
 }
@@ -116,24 +116,24 @@ void ExposureFit::fit_gains() {
   const Eigen::Index photos = gains_.rows();
   std::vector<Eigen::Triplet<double>> terms;
   Eigen::MatrixX3d right = Eigen::MatrixX3d::Zero(photos, 3);
-  for (const Place& place : places_) {
+  for (const SurfacePoint& point : points_) {
     double total = 0.0;
     Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-    for (std::size_t i = place.first; i < place.last; ++i) {
+    for (std::size_t i = point.first; i < point.last; ++i) {
       const Observation& seen = observations_[i];
       const double shade = vignetting_.dot(seen.powers);
       mean += weights_[i] * (seen.log_color.array() - shade).matrix();
       total += weights_[i];
     }
     mean /= total;
-    for (std::size_t i = place.first; i < place.last; ++i) {
+    for (std::size_t i = point.first; i < point.last; ++i) {
       const Observation& a = observations_[i];
       const auto row = static_cast<Eigen::Index>(a.photo);
       const double shade = vignetting_.dot(a.powers);
       right.row(row) +=
           weights_[i] * (a.log_color.array() - shade - mean.array()).matrix().transpose();
       terms.emplace_back(row, row, weights_[i]);
-      for (std::size_t k = place.first; k < place.last; ++k)
+      for (std::size_t k = point.first; k < point.last; ++k)
         terms.emplace_back(row, static_cast<Eigen::Index>(observations_[k].photo),
                            -weights_[i] * weights_[k] / total);
     }
@@ -151,21 +151,21 @@ void ExposureFit::fit_gains() {
 void ExposureFit::fit_vignetting() {
   Eigen::Matrix3d normal = Eigen::Matrix3d::Identity() * lens_prior_weight;
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
-  for (const Place& place : places_) {
+  for (const SurfacePoint& point : points_) {
     double total = 0.0;
     Eigen::Vector3d mean_powers = Eigen::Vector3d::Zero();
     Eigen::Vector3d mean_color = Eigen::Vector3d::Zero();
     const auto color_of = [&](const Observation& seen) -> Eigen::Vector3d {
       return seen.log_color - gains_.row(static_cast<Eigen::Index>(seen.photo)).transpose();
     };
-    for (std::size_t i = place.first; i < place.last; ++i) {
+    for (std::size_t i = point.first; i < point.last; ++i) {
       mean_powers += weights_[i] * observations_[i].powers;
       mean_color += weights_[i] * color_of(observations_[i]);
       total += weights_[i];
     }
     mean_powers /= total;
     mean_color /= total;
-    for (std::size_t i = place.first; i < place.last; ++i) {
+    for (std::size_t i = point.first; i < point.last; ++i) {
       const Eigen::Vector3d powers = observations_[i].powers - mean_powers;
       const Eigen::Vector3d color = color_of(observations_[i]) - mean_color;
       normal += 3.0 * weights_[i] * powers * powers.transpose();
@@ -178,13 +178,13 @@ void ExposureFit::fit_vignetting() {
 TextureExposure ExposureFit::solve() {
   TextureExposure result;
   result.observations = observations_.size();
-  result.spread_before = weigh();
-  result.spread = result.spread_before;
+  result.log_color_deviation_before = weigh();
+  result.log_color_deviation = result.log_color_deviation_before;
   // Gains and vignetting are nearly independent, so they are estimated alternately.
   for (int round = 0; round < rounds && !observations_.empty(); ++round) {
     if (options_.vignetting) fit_vignetting();
     if (options_.gains) fit_gains();
-    result.spread = weigh();
+    result.log_color_deviation = weigh();
   }
   for (Eigen::Index photo = 0; photo < gains_.rows(); ++photo)
     result.gains.emplace_back(gains_.row(photo).transpose().array().exp().cast<float>());
@@ -201,7 +201,7 @@ Eigen::Vector3f TextureExposure::factor(std::size_t photo, double radius2) const
   return static_cast<float>(std::exp(shade)) * gains[photo];
 }
 
-TextureExposure even_out_exposure(std::span<const ColorObservation> observations,
+TextureExposure estimate_exposure(std::span<const ColorObservation> observations,
                                   std::size_t photos, const ExposureOptions& options) {
   return ExposureFit(observations, photos, options).solve();
 }

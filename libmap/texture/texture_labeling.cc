@@ -14,7 +14,7 @@ namespace {
 // Minimum relative decrease of the energy in a cycle for another cycle to follow.
 constexpr double min_gain = 1e-2;
 constexpr int max_cycles = 12;
-constexpr int rounds_a_cycle = 2;
+constexpr int rounds_per_cycle = 2;
 constexpr int rounds_of_regions = 3;
 
 // A candidate photograph of a node and its cost.
@@ -320,7 +320,7 @@ TextureLabels label_triangles(const TriangleMesh& mesh, const std::vector<HalfEd
   result.energy = result.energy_before;
   ForestDescent descent(graph);
   for (int cycle = 0; cycle < max_cycles; ++cycle) {
-    for (int round = 0; round < rounds_a_cycle; ++round) descent.improve();
+    for (int round = 0; round < rounds_per_cycle; ++round) descent.improve();
     improve_regions(graph);
     const double improved = graph.energy();
     const bool done = result.energy - improved < min_gain * result.energy;

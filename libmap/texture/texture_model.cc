@@ -17,7 +17,7 @@ namespace libmap {
 namespace {
 
 // Maximum number of candidate views per triangle.
-constexpr std::size_t views_a_triangle = 12;
+constexpr std::size_t views_per_triangle = 12;
 // Number of vertices whose colors are compared between photographs, and its minimum per piece.
 constexpr std::size_t observed_vertices = 20000;
 constexpr std::size_t min_observed_vertices = 200;
@@ -56,9 +56,9 @@ class Texturing {
             const TextureOptions& options, Progress& progress, std::size_t max_kept_bytes);
 
   TextureResult whole(const TriangleMesh& mesh);
-  std::vector<ColorObservation> observe(MeshPieceIndex& index, double margin_m);
+  std::vector<ColorObservation> observe(MeshTileIndex& index, double margin_m);
   void even_out(std::vector<ColorObservation> observations);
-  PieceTexturing::Piece piece(MeshWithMargin part);
+  TileTexturing::Piece piece(MeshWithMargin part);
   TextureReport& report() { return report_; }
 
  private:
@@ -68,7 +68,7 @@ class Texturing {
   }
   MeshWithMargin cut_finely(MeshWithMargin part) const;
   TextureViewRequest views_of(const MeshWithMargin& part) const {
-    return {part.triangles, views_a_triangle, static_cast<std::size_t>(options_.blend_views) + 1,
+    return {part.triangles, views_per_triangle, static_cast<std::size_t>(options_.blend_views) + 1,
             0};
   }
   // The model keeps the vertices of the margin, which no triangle uses.
@@ -107,7 +107,7 @@ MeshWithMargin Texturing::cut_finely(MeshWithMargin part) const {
 void Texturing::even_out(std::vector<ColorObservation> observations) {
   timed("exposure", [&] {
     look_up_colors(*photos_, observations);
-    report_.exposure = even_out_exposure(observations, photos_->size(), options_.exposure);
+    report_.exposure = estimate_exposure(observations, photos_->size(), options_.exposure);
   });
 }
 
@@ -129,9 +129,9 @@ void Texturing::count_charts(const TextureAtlas& atlas, const TriangleMesh& mesh
     for (const std::uint32_t t : chart.triangles) {
       const PhotoProjector& projector = (*photos_)[chart.photo].projector;
       const Triangle& corners = mesh.triangles[t];
-      const Eigen::Vector2d a = place_on_page(chart, projector, mesh.vertices[corners[0]]);
-      const Eigen::Vector2d ab = place_on_page(chart, projector, mesh.vertices[corners[1]]) - a;
-      const Eigen::Vector2d ac = place_on_page(chart, projector, mesh.vertices[corners[2]]) - a;
+      const Eigen::Vector2d a = texel_of(chart, projector, mesh.vertices[corners[0]]);
+      const Eigen::Vector2d ab = texel_of(chart, projector, mesh.vertices[corners[1]]) - a;
+      const Eigen::Vector2d ac = texel_of(chart, projector, mesh.vertices[corners[2]]) - a;
       report_.texels += 0.5 * std::abs(ab.x() * ac.y() - ab.y() * ac.x());
     }
 }
@@ -154,8 +154,8 @@ TexturedMesh Texturing::paint(MeshWithMargin part, TextureViews views, Progress&
   count_charts(atlas, mesh);
   return timed("painting", [&] {
     TexturedMesh model = atlas.make_model(mesh, *photos_);
-    const BlendingShares shares =
-        share_views(views.of_vertices, options_.blend_views, options_.blend_exponent);
+    const BlendingWeights shares =
+        blending_weights(views.of_vertices, options_.blend_views, options_.blend_exponent);
     paint_texture(atlas, {*photos_, report_.exposure, shares, options_.unseen_color}, model,
                   progress);
     return model;
@@ -181,7 +181,7 @@ TextureResult Texturing::whole(const TriangleMesh& mesh) {
 }
 
 // Collects color observations from all pieces.
-std::vector<ColorObservation> Texturing::observe(MeshPieceIndex& index, double margin_m) {
+std::vector<ColorObservation> Texturing::observe(MeshTileIndex& index, double margin_m) {
   const std::size_t wanted = std::max(min_observed_vertices, observed_vertices / index.size());
   std::vector<ColorObservation> all;
   std::size_t before = 0;
@@ -201,7 +201,7 @@ std::vector<ColorObservation> Texturing::observe(MeshPieceIndex& index, double m
   return all;
 }
 
-PieceTexturing::Piece Texturing::piece(MeshWithMargin part) {
+TileTexturing::Piece Texturing::piece(MeshWithMargin part) {
   static_cast<TextureCounts&>(report_) = {};
   const std::size_t uncut = part.triangles;
   part = timed("cutting", [&] { return cut_finely(std::move(part)); });
@@ -259,33 +259,33 @@ TextureResult texture_mesh(const TriangleMesh& mesh, const ScanSource& scan,
   return Texturing(scan, world_from_base, options, progress, max_image_bytes).whole(mesh);
 }
 
-class PieceTexturing::Work {
+class TileTexturing::Work {
  public:
-  MeshPieceIndex& index;
+  MeshTileIndex& index;
   double margin_m;
   Texturing texturing;
 };
 
-PieceTexturing::PieceTexturing(MeshPieceIndex& pieces, double margin_m, const ScanSource& scan,
+TileTexturing::TileTexturing(MeshTileIndex& pieces, double margin_m, const ScanSource& scan,
                                const Trajectory& world_from_base, const TextureOptions& options,
                                Progress& progress)
     : work_(new Work{
           pieces, margin_m,
           Texturing(scan, world_from_base, options, progress, max_image_bytes_in_pieces)}) {}
 
-PieceTexturing::~PieceTexturing() = default;
+TileTexturing::~TileTexturing() = default;
 
-TextureExposure PieceTexturing::find_exposure() {
+TextureExposure TileTexturing::find_exposure() {
   work_->texturing.even_out(work_->texturing.observe(work_->index, work_->margin_m));
   return work_->texturing.report().exposure;
 }
 
-PieceTexturing::Piece PieceTexturing::make(std::size_t piece, const TextureExposure& exposure) {
+TileTexturing::Piece TileTexturing::make(std::size_t piece, const TextureExposure& exposure) {
   work_->texturing.report().exposure = exposure;
   return work_->texturing.piece(work_->index.with_margin(piece, work_->margin_m));
 }
 
-TextureReport PieceTexturing::report() const {
+TextureReport TileTexturing::report() const {
   TextureReport report = work_->texturing.report();
   static_cast<TextureCounts&>(report) = {};
   return report;
@@ -323,9 +323,9 @@ void describe(ResultTable& table, const TextureReport& report) {
   table.add("photographs", report.photos, "number of photographs");
   table.add("skipped_frames", report.skipped.size(), "frames that could not be used");
   describe(table, static_cast<const TextureCounts&>(report));
-  table.add("color_spread_before", exposure.spread_before,
+  table.add("color_spread_before", exposure.log_color_deviation_before,
             "standard deviation of the log color of a location between photographs");
-  table.add("color_spread", exposure.spread,
+  table.add("color_spread", exposure.log_color_deviation,
             "standard deviation of the log color of a location, exposure corrected");
   table.add("exposure_gains", gains, "gain of red, green and blue of each photograph");
   table.add("vignetting", exposure.vignetting, "coefficients of the vignetting");

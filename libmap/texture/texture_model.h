@@ -18,7 +18,7 @@
 #include "libmap/core/result_table.h"
 #include "libmap/core/stage_timer.h"
 #include "libmap/core/triangle_mesh.h"
-#include "libmap/mesh/mesh_piece_index.h"
+#include "libmap/mesh/mesh_tile_index.h"
 #include "libmap/scan/scan_source.h"
 #include "libmap/texture/texture_atlas.h"
 #include "libmap/texture/texture_exposure.h"
@@ -87,14 +87,14 @@ TextureResult texture_mesh(const TriangleMesh& mesh, const ScanSource& scan,
 
 // Textures the pieces of a mesh one by one; memory depends on the size of a piece. Throws Error as
 // texture_mesh does, except for a piece that no photograph sees.
-class PieceTexturing {
+class TileTexturing {
  public:
   // Only the mesh within `margin_m` of a piece is considered as an occluder. `pieces`, `scan` and
   // `progress` must outlive this object.
-  PieceTexturing(MeshPieceIndex& pieces, double margin_m, const ScanSource& scan,
+  TileTexturing(MeshTileIndex& pieces, double margin_m, const ScanSource& scan,
                  const Trajectory& world_from_base, const TextureOptions& options,
                  Progress& progress = no_progress());
-  ~PieceTexturing();
+  ~TileTexturing();
 
   // Estimates the common exposure from all pieces.
   TextureExposure find_exposure();

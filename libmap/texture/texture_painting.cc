@@ -38,9 +38,9 @@ class PlaneTriangle {
     inverse_ /= area;
   }
   bool flat() const { return flat_; }
-  Eigen::Vector3d weights(const Eigen::Vector2d& place) const {
+  Eigen::Vector3d weights(const Eigen::Vector2d& texel_position) const {
     if (flat_) return Eigen::Vector3d::Constant(1.0 / 3.0);
-    const Eigen::Vector2d uv = inverse_ * (place - corners_[0]);
+    const Eigen::Vector2d uv = inverse_ * (texel_position - corners_[0]);
     return {1.0 - uv.x() - uv.y(), uv.x(), uv.y()};
   }
   const std::array<Eigen::Vector2d, 3>& corners() const { return corners_; }
@@ -115,7 +115,7 @@ PlaneTriangle ChartPainter::on_chart(std::uint32_t triangle) const {
   std::array<Eigen::Vector2d, 3> corners;
   const Eigen::Vector2d corner_of_chart(chart_->column, chart_->row);
   for (std::size_t k = 0; k < 3; ++k)
-    corners[k] = place_on_page(*chart_, paint_.photos[chart_->photo].projector,
+    corners[k] = texel_of(*chart_, paint_.photos[chart_->photo].projector,
                                model_.mesh.vertices[model_.mesh.triangles[triangle][k]]) -
                  corner_of_chart;
   return PlaneTriangle(corners);
@@ -188,7 +188,7 @@ void ChartPainter::gather_shares(std::uint32_t triangle) {
     }
     found->at_corners[corner] += share;
   };
-  const BlendingShares& all = paint_.shares;
+  const BlendingWeights& all = paint_.shares;
   for (int k = 0; k < 3; ++k) {
     const std::uint32_t vertex = model_.mesh.triangles[triangle][static_cast<std::size_t>(k)];
     const std::uint32_t first = all.first[vertex];
@@ -236,9 +236,9 @@ void ChartPainter::paint_triangle(std::int32_t local, std::span<const std::uint3
     for (int s = 0; s < samples * samples; ++s) {
       const int sample_column = s % samples;
       const int sample_row = s / samples;
-      const Eigen::Vector2d place(column + (sample_column + 0.5) / samples - 0.5,
+      const Eigen::Vector2d texel_position(column + (sample_column + 0.5) / samples - 0.5,
                                   row + (sample_row + 0.5) / samples - 0.5);
-      Eigen::Vector3d weights = plane.weights(place).cwiseMax(0.0);
+      Eigen::Vector3d weights = plane.weights(texel_position).cwiseMax(0.0);
       weights /= weights.sum();
       color += color_at(triangle, weights);
     }
@@ -256,8 +256,8 @@ void paint_neutral(const TextureAtlas& atlas, const Color& color, TexturedMesh& 
 
 }  // namespace
 
-BlendingShares share_views(const ViewTable& of_vertices, int views, double exponent) {
-  BlendingShares result;
+BlendingWeights blending_weights(const ViewTable& of_vertices, int views, double exponent) {
+  BlendingWeights result;
   result.first.push_back(0);
   for (std::size_t v = 0; v < of_vertices.rows(); ++v) {
     const auto all = of_vertices[v];
@@ -288,9 +288,9 @@ void paint_texture(const TextureAtlas& atlas, const TexturePaint& paint, Texture
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
     return atlas.charts[a].photo < atlas.charts[b].photo;
   });
-  constexpr std::size_t charts_a_task = 8;
+  constexpr std::size_t charts_per_task = 8;
   progress.begin("texture", order.size());
-  parallel_for(order.size(), charts_a_task, [&](std::size_t begin, std::size_t end) {
+  parallel_for(order.size(), charts_per_task, [&](std::size_t begin, std::size_t end) {
     ChartPainter painter(paint, model);
     for (std::size_t i = begin; i < end; ++i) painter.paint(atlas.charts[order[i]]);
     progress.advance(end - begin);

@@ -14,27 +14,27 @@
 namespace libmap {
 
 // Blending weight of a photograph at a vertex.
-struct ViewShare {
+struct BlendingWeight {
   std::uint32_t photo = 0;
   float share = 0.0F;
 };
 
 // Blending weights of all vertices: vertex v has shares[first[v]] .. [first[v + 1] - 1], which sum
 // up to 1. A vertex without weights uses the photograph of its triangle.
-struct BlendingShares {
-  std::vector<ViewShare> shares;
+struct BlendingWeights {
+  std::vector<BlendingWeight> shares;
   std::vector<std::uint32_t> first;
 };
 
 // Weights of the best `views` photographs of each vertex: quality^exponent minus that of the next
 // best photograph, normalized, so that weights are continuous over the surface (masked photo
 // blending, Callieri et al. 2008). Returns no weights if `views` is 1.
-BlendingShares share_views(const ViewTable& of_vertices, int views, double exponent);
+BlendingWeights blending_weights(const ViewTable& of_vertices, int views, double exponent);
 
 struct TexturePaint {
   const TexturePhotos& photos;
   const TextureExposure& exposure;
-  const BlendingShares& shares;
+  const BlendingWeights& shares;
   Color neutral{};
 };
 

@@ -79,7 +79,7 @@ class ViewFinder {
     cast_to_vertices();
     test_triangles();
     if (wants_views()) {
-      devalue_occluded_edges();
+      reduce_quality_at_occluders();
       keep(static_cast<std::uint32_t>(photo));
     }
     observe(static_cast<std::uint32_t>(photo));
@@ -94,7 +94,7 @@ class ViewFinder {
     bool any_asked_in_image = false;  // in the current photograph
   };
 
-  bool wants_views() const { return request_.views_a_vertex > 0 || request_.views_a_triangle > 0; }
+  bool wants_views() const { return request_.views_per_vertex > 0 || request_.views_per_triangle > 0; }
   // Returns true if the current photograph may show a part of the ball within max_depth_m.
   bool may_show(const Eigen::Vector3d& center, double radius_m) const {
     const double z =
@@ -107,7 +107,7 @@ class ViewFinder {
   void find_blocks_in_view();
   void project();
   bool is_beside_occluder(std::size_t triangle) const;
-  void devalue_occluded_edges();
+  void reduce_quality_at_occluders();
   // Visits the blocks in view in parallel.
   template <typename Use>
   void each_block(const Use& use) const {
@@ -128,7 +128,7 @@ class ViewFinder {
   Eigen::Vector3d side_of(const Triangle& t, std::size_t k) const {
     return mesh_.vertices[t[(k + 1) % 3]] - mesh_.vertices[t[k]];
   }
-  const Eigen::Vector3d& normal_of(std::size_t rated) const { return normals_[place_of_[rated]]; }
+  const Eigen::Vector3d& normal_of(std::size_t rated) const { return normals_[index_of_rated_[rated]]; }
   float rate(std::size_t triangle, double sharpness) const;
   float quality_at(std::uint32_t vertex) const;
   float longest_side_px(const Triangle& triangle) const;
@@ -150,7 +150,7 @@ class ViewFinder {
   double radius_m_ = 0.0;
   std::vector<std::uint32_t> rated_;
   std::vector<Eigen::Vector3d> normals_;  // one per rated triangle
-  std::vector<std::uint32_t> place_of_;   // per triangle: its index in rated_
+  std::vector<std::uint32_t> index_of_rated_;   // per triangle: its index in rated_
   std::vector<std::uint32_t> order_;      // vertices, by blocks
   std::vector<Block> blocks_;
   // State of the current photograph. Blocks that are not in view are outside the image.
@@ -198,7 +198,7 @@ void ViewFinder::make_blocks() {
   VoxelIndex cubes;
   std::vector<std::uint32_t> block_of(mesh_.vertices.size());
   for (std::size_t v = 0; v < block_of.size(); ++v) {
-    VoxelPlace cube;
+    VoxelSide cube;
     for (int axis = 0; axis < 3; ++axis)
       cube.cell[axis] = static_cast<int>(std::llround(mesh_.vertices[v][axis] / block_m));
     block_of[v] = cubes.find_or_add(pack(cube));
@@ -229,10 +229,10 @@ void ViewFinder::make_blocks() {
   for (Block& block : blocks_)
     for (const std::uint32_t v : block.vertices) block.box.extend(mesh_.vertices[v]);
   std::erase_if(blocks_, [](const Block& block) { return block.vertices.empty(); });
-  place_of_.resize(mesh_.triangles.size());
+  index_of_rated_.resize(mesh_.triangles.size());
   normals_.reserve(rated_.size());
   for (const std::uint32_t t : rated_) {
-    place_of_[t] = static_cast<std::uint32_t>(normals_.size());
+    index_of_rated_[t] = static_cast<std::uint32_t>(normals_.size());
     normals_.push_back(area_normal(mesh_, mesh_.triangles[t]).normalized());
   }
 }
@@ -275,7 +275,7 @@ bool ViewFinder::is_beside_occluder(std::size_t t) const {
                               occluder_tolerances * options_.occlusion_tolerance_m);
 }
 
-void ViewFinder::devalue_occluded_edges() {
+void ViewFinder::reduce_quality_at_occluders() {
   if (options_.occlusion_margin_px == 0) return;
   cells_.begin(*projector_);
   for (const Block* block : in_view_)
@@ -393,12 +393,12 @@ float ViewFinder::quality_at(std::uint32_t v) const {
 }
 
 void ViewFinder::keep(std::uint32_t photo) {
-  if (request_.views_a_triangle > 0)
+  if (request_.views_per_triangle > 0)
     each_rated([&](std::uint32_t t) {
       if (t < request_.triangles && qualities_[t] > 0.0F)
         views_.of_triangles.insert(t, {photo, qualities_[t]});
     });
-  if (request_.views_a_vertex > 0)
+  if (request_.views_per_vertex > 0)
     each_block([&](const Block& block) {
       for (const std::uint32_t v : block.vertices) {
         const float quality = is_asked_[v] ? quality_at(v) : 0.0F;
@@ -422,15 +422,15 @@ ViewTable::ViewTable(std::size_t rows, std::size_t capacity)
 
 void ViewTable::insert(std::size_t row, ViewQuality view) {
   ViewQuality* const first = entries_.data() + row * capacity_;
-  std::size_t place = counts_[row];
+  std::size_t slot = counts_[row];
   const auto before = [](const ViewQuality& a, const ViewQuality& b) {
     return a.quality != b.quality ? a.quality > b.quality : a.photo < b.photo;
   };
-  if (place == capacity_ && !before(view, first[capacity_ - 1])) return;
-  if (place < capacity_) ++counts_[row];
-  place = std::min(place, capacity_ - 1);
-  for (; place > 0 && before(view, first[place - 1]); --place) first[place] = first[place - 1];
-  first[place] = view;
+  if (slot == capacity_ && !before(view, first[capacity_ - 1])) return;
+  if (slot < capacity_) ++counts_[row];
+  slot = std::min(slot, capacity_ - 1);
+  for (; slot > 0 && before(view, first[slot - 1]); --slot) first[slot] = first[slot - 1];
+  first[slot] = view;
 }
 
 void look_up_colors(const TexturePhotos& photos, std::vector<ColorObservation>& observations) {
@@ -455,12 +455,12 @@ TextureViews find_texture_views(const TriangleMesh& mesh, const TexturePhotos& p
                                 const TextureViewOptions& options,
                                 const TextureViewRequest& request, Progress& progress) {
   TextureViews views;
-  views.of_triangles = ViewTable(request.triangles, request.views_a_triangle);
+  views.of_triangles = ViewTable(request.triangles, request.views_per_triangle);
   std::size_t vertices = 0;
   for (std::size_t t = 0; t < request.triangles; ++t)
     for (const std::uint32_t v : mesh.triangles[t])
       vertices = std::max<std::size_t>(vertices, v + 1);
-  views.of_vertices = ViewTable(vertices, request.views_a_vertex);
+  views.of_vertices = ViewTable(vertices, request.views_per_vertex);
   ViewFinder finder(mesh, photos, options, request, views);
   progress.begin("views", photos.size());
   for (std::size_t photo = 0; photo < photos.size(); ++photo) {

@@ -70,8 +70,8 @@ struct TextureViewRequest {
   // occluders, and contribute to the quality of common vertices.
   std::size_t triangles = 0;
   // Maximum number of views; both 0: no views, which takes much less time.
-  std::size_t views_a_triangle = 0;
-  std::size_t views_a_vertex = 0;
+  std::size_t views_per_triangle = 0;
+  std::size_t views_per_vertex = 0;
   std::size_t observed_vertices = 0;  // approximate number, exceeded at most twofold
 };
 

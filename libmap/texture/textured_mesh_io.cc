@@ -100,9 +100,9 @@ void write_textured_obj(const fs::path& path, const TexturedMesh& model, std::os
   const UnitedCorners united = unite_corners(model);
   for (const TextureCorner& corner : united.corners) {
     // OBJ measures v from the bottom.
-    const Eigen::Vector2d place = corner.coordinate.cast<double>();
+    const Eigen::Vector2d uv = corner.coordinate.cast<double>();
     out << "vt" +
-               numbers(Eigen::Vector2f(corner.coordinate.x(), static_cast<float>(1.0 - place.y())));
+               numbers(Eigen::Vector2f(corner.coordinate.x(), static_cast<float>(1.0 - uv.y())));
   }
   const bool has_normals = !model.mesh.vertex_normals.empty();
   for (const Eigen::Vector3f& normal : model.mesh.vertex_normals) out << "vn" + numbers(normal);
@@ -157,12 +157,12 @@ ModelPart part_of(const TexturedMesh& model, const UnitedCorners& united, std::i
 
 // glTF stores lengths in 32 bits. Assimp does not check them.
 void require_room_in_glb(const std::vector<ModelPart>& parts,
-                         const std::vector<EncodedPicture>& pictures) {
+                         const std::vector<EncodedImage>& images) {
   std::size_t bytes = std::size_t{1} << 20;  // JSON part
   for (const ModelPart& part : parts)
     bytes += part.mesh.vertices.size() * (3 + 3 + 2) * sizeof(float) +
              part.mesh.triangles.size() * 3 * sizeof(std::uint32_t);
-  for (const EncodedPicture& picture : pictures) bytes += picture.bytes.size();
+  for (const EncodedImage& image : images) bytes += image.bytes.size();
   if (bytes > std::numeric_limits<std::uint32_t>::max())
     throw Error("too large for .glb: write an .obj instead",
                 {.field = "size", .value = std::to_string(bytes) + " bytes", .bound = "< 4 GB"});
@@ -181,18 +181,18 @@ std::vector<ModelPart> parts_of(const TexturedMesh& model) {
 void write_textured_glb(const fs::path& path, const TexturedMesh& model,
                         const TexturedMeshWriteOptions& options) {
   std::vector<ModelPart> parts = parts_of(model);
-  std::vector<EncodedPicture> pictures;
+  std::vector<EncodedImage> images;
   for (const ColorImage& page : model.pages)
-    pictures.push_back(
+    images.push_back(
         {encode_page(page, options), file_extension(options.image_format).substr(1)});
-  require_room_in_glb(parts, pictures);
-  write_model_by_assimp(path, std::move(parts), std::move(pictures));
+  require_room_in_glb(parts, images);
+  write_model_by_assimp(path, std::move(parts), std::move(images));
 }
 
-ColorImage read_picture(const TexturePicture& picture, const fs::path& model) {
-  if (!picture.bytes.empty()) return decode_color(picture.bytes, max_picture_pixels);
-  const fs::path path = model.parent_path() / picture.path;
-  return in_file(path, [&] { return decode_color(read_whole_file(path), max_picture_pixels); });
+ColorImage read_image(const TextureImage& image, const fs::path& model) {
+  if (!image.bytes.empty()) return decode_color(image.bytes, max_decoded_pixels);
+  const fs::path path = model.parent_path() / image.path;
+  return in_file(path, [&] { return decode_color(read_whole_file(path), max_decoded_pixels); });
 }
 
 }  // namespace
@@ -202,7 +202,7 @@ fs::path texture_page_path(const fs::path& model, std::size_t page, ImageFormat 
          (model.stem().string() + "_" + std::to_string(page) + file_extension(format));
 }
 
-std::vector<fs::path> companions_of_model(const fs::path& model,
+std::vector<fs::path> additional_model_files(const fs::path& model,
                                           const TexturedMeshWriteOptions& options) {
   if (format_of(model) != ".obj") return {};
   return {texture_page_path(model, 0, options.image_format), material_path(model)};
@@ -257,8 +257,8 @@ TexturedMesh read_textured_mesh(const fs::path& path) {
   return in_file(path, [&] {
     DecodedModel decoded = decode_model_by_assimp(path, format_of(path).substr(1));
     if (decoded.model.mesh.triangles.empty()) throw Error("contains no triangle");
-    for (const TexturePicture& picture : decoded.pictures)
-      decoded.model.pages.push_back(read_picture(picture, path));
+    for (const TextureImage& image : decoded.images)
+      decoded.model.pages.push_back(read_image(image, path));
     decoded.model.check();
     return std::move(decoded.model);
   });

@@ -25,7 +25,7 @@ struct TexturedMeshWriteOptions {
 };
 
 // Additional files of a model with one page (image and material); empty for .glb.
-std::vector<std::filesystem::path> companions_of_model(const std::filesystem::path& model,
+std::vector<std::filesystem::path> additional_model_files(const std::filesystem::path& model,
                                                        const TexturedMeshWriteOptions& options);
 
 // One file of a model. `write` writes it to the given path, which may be temporary.

@@ -89,13 +89,13 @@ PointCloud PointTileStore::points_in(const Eigen::Vector2d& low,
   for_tiles_in(low, high, [&](const Records& records) {
     read_tile(records, bytes);
     for (const char* at = bytes.data(); at < bytes.data() + bytes.size(); at += record_bytes_) {
-      std::uint64_t place = 0;
+      std::uint64_t sequence = 0;
       Eigen::Vector3d position;
-      const char* rest = take(take(at, place), position);
+      const char* rest = take(take(at, sequence), position);
       if (!(position.x() >= low.x() && position.x() <= high.x() && position.y() >= low.y() &&
             position.y() <= high.y()))
         continue;
-      order.emplace_back(place, found.size());
+      order.emplace_back(sequence, found.size());
       found.positions.push_back(position);
       if (options_.has_normals) take(rest, found.normals.emplace_back());
     }
@@ -103,7 +103,7 @@ PointCloud PointTileStore::points_in(const Eigen::Vector2d& low,
   std::sort(order.begin(), order.end());
   std::vector<std::size_t> indices;
   indices.reserve(order.size());
-  for (const auto& [place, index] : order) indices.push_back(index);
+  for (const auto& [sequence, index] : order) indices.push_back(index);
   return libmap::select_points(found, indices);
 }
 

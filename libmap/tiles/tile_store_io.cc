@@ -31,7 +31,7 @@ void append_whole(int file, const std::string& text, const fs::path& path) {
 }
 
 // False if a killed run left a truncated line.
-bool ends_in_a_line(const fs::path& path) {
+bool ends_with_newline(const fs::path& path) {
   std::ifstream file(path, std::ios::binary | std::ios::ate);
   if (file.tellg() <= 0) return true;
   file.seekg(-1, std::ios::end);
@@ -69,7 +69,7 @@ TileJournal::TileJournal(const fs::path& store, const TileShare& share)
       lock_(lock_journal(path_, store, share)),
       file_(open(path_.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC)) {
   if (file_ < 0) throw system_failure(path_, "cannot be written", errno);
-  if (!ends_in_a_line(path_)) append_whole(file_, "\n", path_);
+  if (!ends_with_newline(path_)) append_whole(file_, "\n", path_);
 }
 
 TileJournal::TileJournal(TileJournal&& other) noexcept
@@ -101,12 +101,12 @@ void TileStore::open() const {
 }
 
 TileJournal TileStore::begin(const TileShare& share,
-                             const std::function<void()>& agree_on_plan) const {
+                             const std::function<void()>& check_plan) const {
   const bool is_new = !fs::exists(folder_);
   open();
   try {
     const FileLock held = lock();
-    agree_on_plan();
+    check_plan();
     return {folder_, share};
   } catch (...) {
     if (is_new) remove_if_bare();

@@ -55,10 +55,10 @@ class TileStore {
   std::filesystem::path index_path() const { return folder_ / "index.json"; }  // of finished stores
   std::filesystem::path plan_path() const { return progress() / "plan.json"; }
 
-  // Begins the run of a share: creates missing folders, calls agree_on_plan() while the store is
+  // Begins the run of a share: creates missing folders, calls check_plan() while the store is
   // locked, and locks the journal. Throws Error if the folder is not a tile store, and the errors
-  // of agree_on_plan(); a new folder is then removed again.
-  TileJournal begin(const TileShare& share, const std::function<void()>& agree_on_plan) const;
+  // of check_plan(); a new folder is then removed again.
+  TileJournal begin(const TileShare& share, const std::function<void()>& check_plan) const;
   void open() const;  // creates missing folders only; throws as begin() does
 
   // Returns the plan as text, or nullopt if there is none.

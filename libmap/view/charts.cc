@@ -356,10 +356,10 @@ Chart roc_chart(std::vector<ChartCurve> curves, const std::string& title) {
   return chart;
 }
 
-std::vector<double> round_ticks(double low, double high, int most) {
+std::vector<double> round_ticks(double low, double high, int max_ticks) {
   std::vector<double> ticks;
-  if (!(low < high) || !std::isfinite(high - low) || most < 1) return ticks;
-  const double min_step = (high - low) / most;
+  if (!(low < high) || !std::isfinite(high - low) || max_ticks < 1) return ticks;
+  const double min_step = (high - low) / max_ticks;
   const double power = std::floor(std::log10(min_step));
   // Ticks are computed by one division or multiplication of an integer, so that their text is
   // short.

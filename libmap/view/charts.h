@@ -74,9 +74,9 @@ Chart roc_chart(std::vector<ChartCurve> curves, const std::string& title);
 // Size for a square ROC chart.
 inline constexpr ChartSize roc_chart_size{900, 900};
 
-// Round numbers within [low, high], at most `most` + 1, with a step of 1, 2 or 5 times a power of
+// Round numbers within [low, high], at most `max_ticks` + 1, with a step of 1, 2 or 5 times a power of
 // ten. Empty unless low < high.
-std::vector<double> round_ticks(double low, double high, int most);
+std::vector<double> round_ticks(double low, double high, int max_ticks);
 
 // Formats ticks with the same number of decimals.
 std::vector<std::string> tick_texts(const std::vector<double>& ticks);

@@ -228,17 +228,17 @@ std::uint8_t to_byte(double share) {
 }
 
 // Index of the color below t among `count` evenly spaced ones, and the fraction to the next.
-std::pair<std::size_t, double> place_in(std::size_t count, double t) {
-  const double place = std::clamp(t, 0.0, 1.0) * static_cast<double>(count - 1);
-  const std::size_t below = std::min(static_cast<std::size_t>(place), count - 2);
-  return {below, place - static_cast<double>(below)};
+std::pair<std::size_t, double> segment_of(std::size_t count, double t) {
+  const double index = std::clamp(t, 0.0, 1.0) * static_cast<double>(count - 1);
+  const std::size_t below = std::min(static_cast<std::size_t>(index), count - 2);
+  return {below, index - static_cast<double>(below)};
 }
 
 // Interpolates evenly spaced points, whose maximum channel value is `full`, at t.
 template <typename Points>
 Color interpolated(const Points& points, double full, double t) {
   if (std::isnan(t)) return no_value_color;
-  const auto [below, share] = place_in(points.size(), t);
+  const auto [below, share] = segment_of(points.size(), t);
   Color color{};
   for (std::size_t c = 0; c < 3; ++c)
     color[c] = to_byte(((1.0 - share) * points[below][c] + share * points[below + 1][c]) / full);

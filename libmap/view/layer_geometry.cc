@@ -136,16 +136,16 @@ TriangleMesh finite_part(const TriangleMesh& mesh) {
 void keep_used_vertices(const TriangleMesh& mesh, const std::vector<Color>& colors,
                         PreparedLayer& result) {
   constexpr std::uint32_t unused = std::numeric_limits<std::uint32_t>::max();
-  std::vector<std::uint32_t> place(mesh.vertices.size(), unused);
+  std::vector<std::uint32_t> new_index(mesh.vertices.size(), unused);
   for (Triangle triangle : mesh.triangles) {
     for (std::uint32_t& corner : triangle) {
-      if (place[corner] == unused) {
-        place[corner] = static_cast<std::uint32_t>(result.positions.size());
+      if (new_index[corner] == unused) {
+        new_index[corner] = static_cast<std::uint32_t>(result.positions.size());
         result.positions.push_back(mesh.vertices[corner]);
         result.normals.push_back(mesh.vertex_normals[corner]);
         result.colors.push_back(colors[corner]);
       }
-      corner = place[corner];
+      corner = new_index[corner];
     }
     result.triangles.push_back(triangle);
   }

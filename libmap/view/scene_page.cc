@@ -150,7 +150,7 @@ std::vector<SeenMarker> seen_markers(const ScenePage& page, const SceneCamera& c
 }
 
 // Keeps markers with drawn labels, and the first of all others per verdict and square.
-void thin_markers(double side_px, bool labeled, std::vector<SeenMarker>& seen) {
+void downsample_markers(double side_px, bool labeled, std::vector<SeenMarker>& seen) {
   std::set<std::tuple<Verdict, long, long>> taken;
   std::erase_if(seen, [&](const SeenMarker& one) {
     if (labeled && !one.marker->label.empty()) return false;
@@ -404,7 +404,7 @@ void draw_markers(const ScenePage& page, const SceneCamera& camera,
                         .align = TextAlign::center};
   std::vector<SeenMarker> seen = seen_markers(page, camera, markers);
   const bool labeled = have_room_for_labels(seen, page.plot, 1.3 * style.size_px);
-  if (seen.size() > many_markers) thin_markers(radius, labeled, seen);
+  if (seen.size() > many_markers) downsample_markers(radius, labeled, seen);
   std::vector<LabelRequest> requests;
   if (labeled)
     for (const SeenMarker& one : seen) {
@@ -450,12 +450,12 @@ void draw_dimension_lines(const ScenePage& page, const SceneCamera& camera,
     draw_arrow(middle, to, width, ink, canvas);
     const Eigen::Vector2d along = (to - from).normalized();
     TextStyle style{.size_px = page.font_px, .align = TextAlign::center};
-    Eigen::Vector2d place = middle - Eigen::Vector2d(0.0, 0.8 * f);
+    Eigen::Vector2d label_position = middle - Eigen::Vector2d(0.0, 0.8 * f);
     if (std::abs(along.y()) > std::abs(along.x())) {
       style.align = TextAlign::left;
-      place = middle + Eigen::Vector2d(0.6 * f, 0.0);
+      label_position = middle + Eigen::Vector2d(0.6 * f, 0.0);
     }
-    canvas.text(place, line.text, style);
+    canvas.text(label_position, line.text, style);
   }
 }
 

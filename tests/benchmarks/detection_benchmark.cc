@@ -42,7 +42,7 @@ PointCloud terrain_of(const PointCloud& input, bool thesis) {
     std::vector<Eigen::Vector3f> points;
     for (const Eigen::Vector3d& point : input.positions) points.push_back(point.cast<float>());
     cloud = PointCloud();
-    for (const Eigen::Vector3f& point : libgtd::thin_to_centroids(points, 0.01))
+    for (const Eigen::Vector3f& point : libgtd::voxel_centroids(points, 0.01))
       cloud.positions.push_back(point.cast<double>());
   }
   const auto method = thesis ? libgtd::PlaneMethod::thesis : libgtd::PlaneMethod::corrected;

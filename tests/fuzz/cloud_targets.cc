@@ -1,6 +1,6 @@
 // Files of clouds, read whole and in pieces.
 #include "libmap/io/cloud_io.h"
-#include "libmap/io/cloud_pieces.h"
+#include "libmap/io/cloud_tiles.h"
 #include "libmap/io/mesh_io.h"
 #include "tests/fuzz/scratch_file.h"
 #include "tests/fuzz/target_support.h"
@@ -21,7 +21,7 @@ bool run_cloud(std::string_view bytes) {
   file.write(bytes);
   accepts([&] { libmap::read_cloud_info(file.path()); });
   accepts([&] { libmap::survey_tile(file.path()); });
-  accepts([&] { libmap::read_pieces({file.path()}); });
+  accepts([&] { libmap::read_tiles({file.path()}); });
   return accepts([&] { libmap::read_cloud(file.path()); });
 }
 

@@ -28,7 +28,7 @@ bool run_features(std::string_view bytes) {
     for (const libmap::DepthSurface& surface : frame.surfaces) {
       libmap::SurfacePatch element;
       surface.at(0, 0, element);
-      surface.seen_at({0.1, 0.1, 1.0}, element);
+      surface.nearest_to({0.1, 0.1, 1.0}, element);
     }
     libmap::descriptor_vectors(frame);
   });

@@ -59,12 +59,12 @@ bool run_map(std::string_view bytes) {
   return accepts([&] {
     libmap::PointCloud map = libmap::read_cloud(file.path()).cloud;
     accepts([&] { libgtd::voxel_map_of(map); });
-    accepts([&] { libgtd::voxel_map_of(map, libgtd::facts_of(small_manifest())); });
+    accepts([&] { libgtd::voxel_map_of(map, libgtd::map_info(small_manifest())); });
     accepts([&] { libgtd::look_up(map, {{0.0, 0.0, 0.0}}); });
     accepts([&] { libgtd::evaluate_expected_map(map, {{{"a", {}, {}, 0.02, true, ""}}}, 0.8); });
     accepts([&] { libgtd::merge_map_clouds({map}); });
     accepts([&] { look_up_all(small_index(), map); });
-    accepts([&] { libgtd::thin_map_in_cubes(map, 1 << 20); });
+    accepts([&] { libgtd::voxel_downsample_map(map, 1 << 20); });
     accepts([&] { libmap::make_map_view(map, {}); });
     libmap::PointCloud evaluated = map;
     accepts([&] { libgtd::add_obstacles(evaluated, graspmap_test::test_voxel_m, {}); });

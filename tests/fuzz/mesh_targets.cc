@@ -1,4 +1,4 @@
-// Files that hold meshes alone, and models with pictures.
+// Files that hold meshes alone, and models with images.
 #include <map>
 
 #include "libmap/camera/image_codec.h"
@@ -65,12 +65,12 @@ Seeds glb_seeds() {
   return seeds;
 }
 
-// A model and its materials; of its pictures there is one.
+// A model and its materials; of its images there is one.
 bool run_textured_obj(std::string_view bytes) {
   static const ScratchFile model("model/model.obj");
   static const ScratchFile materials("model/model.mtl");
-  static const ScratchFile picture("model/model_0.png");
-  picture.write(libmap::encode_png(libmap::ColorImage(2, 2)));
+  static const ScratchFile image("model/model_0.png");
+  image.write(libmap::encode_png(libmap::ColorImage(2, 2)));
   model.write(take_file(bytes));
   materials.write(bytes);
   return accepts([&] { libmap::read_textured_mesh(model.path()); });

@@ -27,13 +27,13 @@ void store_map(const std::filesystem::path& path) {
   };
   // Two triangles of one material.
   const std::vector<std::int32_t> polygons = {2, 0, 1, 2, 0, 2, 3};
-  const std::string picture = libmap::encode_png(graspmap_test::sample_color(1));
+  const std::string image = libmap::encode_png(graspmap_test::sample_color(1));
   const std::vector<std::pair<std::string, std::string>> blobs = {
       {"opt_map", matrix(2, 3, 1, MatrixElement::int8, std::string(6, '\x64'))},
       {"opt_cloud", matrix(1, 4, 3, MatrixElement::float32, std::string(48, '\0'))},
       {"opt_polygons", matrix(1, 7, 1, MatrixElement::int32, graspmap_test::bytes_of(polygons))},
-      {"opt_tex_materials", picture},
-      {"preview_image", picture},
+      {"opt_tex_materials", image},
+      {"preview_image", image},
       {"opt_last_localization", graspmap_test::pose_bytes(libmap::Pose::Identity())}};
   SQLite::Database database(path.string(), SQLite::OPEN_READWRITE);
   database.exec("UPDATE Admin SET opt_polygons_size = 3, opt_map_resolution = 0.05");

@@ -149,7 +149,7 @@ Seeds points_seeds() {
 bool run_manifest(std::string_view bytes) {
   return accepts([&] {
     const libmap::Manifest manifest = libmap::parse_manifest(std::string(bytes), file_name);
-    libgtd::facts_of(manifest);
+    libgtd::map_info(manifest);
     libmap::to_json(manifest);
   });
 }

@@ -5,7 +5,7 @@
 #include "libmap/camera/camera_io.h"
 #include "libmap/camera/image_codec.h"
 #include "libmap/core/table.h"
-#include "tests/support/chessboard_picture.h"
+#include "tests/support/chessboard_image.h"
 #include "tests/tools/tool_test_support.h"
 
 namespace calibrate_test {
@@ -56,7 +56,7 @@ void write_shots(int count) {
   }
 }
 
-TEST(Calibrate, RecoversTheCameraOfItsPictures) {
+TEST(Calibrate, RecoversTheCameraOfItsImages) {
   write_shots(12);
   graspmap_test::write_text(scratch("shots") / "wall.png",
                             libmap::encode_png(libmap::GrayImage(320, 240, 90)));
@@ -101,7 +101,7 @@ TEST(Calibrate, RecoversTheCameraOfItsPictures) {
   EXPECT_EQ(content("again.yaml"), content("camera.yaml"));
 }
 
-TEST(Calibrate, GoesOnWithoutPicturesThatItCannotRead) {
+TEST(Calibrate, GoesOnWithoutImagesThatItCannotRead) {
   write_shots(6);
   graspmap_test::write_text(scratch("shots") / "00a.png", content("shots/00.png").substr(0, 3000));
   graspmap_test::write_text(scratch("shots") / "text.jpg", "no picture");

@@ -273,7 +273,7 @@ TEST(Compare, IcpSaysWhatItCannotDo) {
                         {.file = "points.ply", .about = "without normals"}));
 }
 
-TEST(Compare, PictureOfSignedDistances) {
+TEST(Compare, ImageOfSignedDistances) {
   write_square_and_points();
   // The left half lies above the square, the right one below it.
   libmap::PointCloud cloud;

@@ -105,7 +105,7 @@ TEST(Extract, SaysThatFloatsWereRounded) {
   EXPECT_TRUE(libmap::open_scan(scratch("out"))->read_frame(5).depth == exact);
 }
 
-TEST(Extract, OptionsOfPicturesNeedPictures) {
+TEST(Extract, OptionsOfImagesNeedImages) {
   write_example();
   for (const auto& [name, value] :
        {std::pair{"--poses", "odometry"}, std::pair{"--transform", "1,0,0,0,0,0"},
@@ -214,8 +214,8 @@ TEST(Extract, RefusesWhatIsNoScanAndOutputsOfNoUse) {
   EXPECT_FALSE(fs::exists(scratch("out")));
   EXPECT_TRUE(bad_input(graspmap({"convert", "scan.db", "-o", "text.db"}), {.file = "text.db"}));
   ASSERT_TRUE(succeeded(graspmap({"convert", "scan.db", "-o", "out"})));
-  EXPECT_TRUE(
-      bad_input(graspmap({"convert", "out", "-o", "out/"}), {.file = "out/", .about = "is the input"}));
+  EXPECT_TRUE(bad_input(graspmap({"convert", "out", "-o", "out/"}),
+                        {.file = "out/", .about = "is the input"}));
 }
 
 TEST(Extract, FoldersOfOtherCommandsAreKept) {
@@ -249,7 +249,7 @@ std::vector<std::vector<double>> bundle_cameras(const std::string& name) {
   return cameras;
 }
 
-TEST(ExtractBundler, CamerasAndPicturesOfEveryPose) {
+TEST(ExtractBundler, CamerasAndImagesOfEveryPose) {
   const ExampleScan scan = write_example({.color = libmap::ImageFormat::png});
   ASSERT_TRUE(succeeded(graspmap({"convert", "scan.db", "--bundler", "out", "--radius", "0",
                                   "--poses", "odometry", "--transform", "1,2,3,0,0,90"})));
@@ -263,10 +263,10 @@ TEST(ExtractBundler, CamerasAndPicturesOfEveryPose) {
     ASSERT_TRUE(std::getline(list, image));
     EXPECT_EQ(image, "images/00000" + std::to_string(poses[n].node) + ".jpg");
     const libmap::Camera& lens = scan.frames.at(poses[n].node).cameras.at(0);
-    const libmap::ColorImage picture = libmap::decode_color(content("out/" + image));
+    const libmap::ColorImage photo = libmap::decode_color(content("out/" + image));
     const std::vector<double>& c = cameras[n];
     EXPECT_EQ(c[0], std::max(lens.fx, lens.fy));
-    // A point on the optical axis falls on the middle of the picture, one to the right and below
+    // A point on the optical axis falls on the middle of the image, one to the right and below
     // it right and below.
     const libmap::Pose world_from_camera =
         site_from_map * poses[n].world_from_base * lens.base_from_camera;
@@ -281,15 +281,15 @@ TEST(ExtractBundler, CamerasAndPicturesOfEveryPose) {
       EXPECT_NEAR(-c[0] * p.x() / p.z(), c[0] * in_camera.x() / in_camera.z(), 1e-3);
       EXPECT_NEAR(-c[0] * p.y() / p.z(), -c[0] * in_camera.y() / in_camera.z(), 1e-3);
     }
-    EXPECT_LE(picture.width, lens.width);
-    EXPECT_GT(picture.width, lens.width / 2);
+    EXPECT_LE(photo.width, lens.width);
+    EXPECT_GT(photo.width, lens.width / 2);
   }
   const auto manifest = json_of("out.json");
   EXPECT_EQ(manifest["results"]["kept_pictures"], poses.size());
   EXPECT_EQ(manifest["parameters"]["poses"], "odometry");
 }
 
-TEST(ExtractBundler, KeepsOneOfPicturesThatLookTheSameWay) {
+TEST(ExtractBundler, KeepsOneOfImagesThatLookTheSameWay) {
   ExampleScan scan = graspmap_test::example_scan();
   // Three places 10 cm apart with one view, and one that looks the other way.
   const libmap::Pose there = libmap::make_pose_from_rpy({0, 0, 1}, {0, 0, 0});

@@ -125,7 +125,7 @@ TEST(MapTiles, InfoCountsWhatTheMapHolds) {
   }
 }
 
-TEST(MapTiles, PicturesAreThoseOfTheMap) {
+TEST(MapTiles, ImagesAreThoseOfTheMap) {
   score_both();
   const Words small = {"--width", "300", "--height", "200", "--quiet"};
   for (const Words& box : {Words{}, Words{"--box", "-0.11,-0.2,0.13,0.15"}}) {

@@ -16,7 +16,7 @@ namespace mesh_shares_test {
 namespace fs = std::filesystem;
 
 using graspmap_test::bad_input;
-using graspmap_test::expect_same_pieces;
+using graspmap_test::expect_same_tiles;
 using graspmap_test::graspmap;
 using graspmap_test::json_of;
 using graspmap_test::pieces_in;
@@ -62,12 +62,12 @@ TEST(MeshShares, TogetherAreTheFolderOfOneRun) {
   EXPECT_TRUE(bad_input(graspmap(mesh_words("shared", {"--tile", "4/3"})),
                         {.file = "cloud.pcd", .field = "--tile", .value = "4/3"}));
   ASSERT_TRUE(succeeded(graspmap(mesh_words("shared", {"--tile", "2/3"}))));
-  expect_same_pieces("shared", "whole");
+  expect_same_tiles("shared", "whole");
   // A share is run again, as by a queue that lost a task.
   const auto again = graspmap(mesh_words("shared", {"--tile", "1/3"}));
   ASSERT_TRUE(succeeded(again));
   EXPECT_NE(again.standard_error.find("all tiles"), std::string::npos);
-  expect_same_pieces("shared", "whole");
+  expect_same_tiles("shared", "whole");
   // A run of all tiles replaces tiles of other parameters.
   ASSERT_TRUE(succeeded(graspmap(mesh_words("other", {"--tile", "1/2"}))));
   ASSERT_TRUE(succeeded(graspmap(mesh_words("other", {"--smoothing-iterations", "1"}))));
@@ -111,7 +111,7 @@ TEST(MeshShares, AKilledRunIsResumed) {
     before[piece.filename()] = inode_of(piece);
   ASSERT_GE(before.size(), 2U);
   ASSERT_TRUE(succeeded(graspmap(mesh_words("killed"))));
-  expect_same_pieces("killed", "whole");
+  expect_same_tiles("killed", "whole");
   std::size_t kept = 0;
   for (const auto& [name, inode] : before)
     kept += inode_of(scratch("killed") / name) == inode ? 1 : 0;

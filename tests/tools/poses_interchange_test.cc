@@ -55,7 +55,7 @@ ExampleScan write_example() {
   return scan;
 }
 
-TEST(ExtractColmap, CamerasPicturesAndPoints) {
+TEST(ExtractColmap, CamerasImagesAndPoints) {
   const ExampleScan scan = write_example();
   ASSERT_TRUE(succeeded(graspmap({"convert", "scan.db", "--colmap", "out", "--transform",
                                   "1,2,3,0,0,90", "--point-spacing", "5"})));

@@ -156,7 +156,7 @@ TEST(RefineWithoutPoses, NullPosesInADatabase) {
 }
 
 // Odometry with a drift of 42 mm is not used.
-TEST(RefineWithoutPoses, PicturesAloneDriftLittle) {
+TEST(RefineWithoutPoses, ImagesAloneDriftLittle) {
   GRASPMAP_REQUIRE_DATA();
   ASSERT_TRUE(succeeded(
       graspmap({"refine", scan_file("site_drift.db"), "-o", "poses.tum", "--start", "visual",
@@ -171,7 +171,7 @@ TEST(RefineWithoutPoses, PicturesAloneDriftLittle) {
   EXPECT_LT(odometry.at("squared_error_per_freedom"), 1.6);
 }
 
-TEST(RefineWithoutPoses, BarePicturesAreBadInput) {
+TEST(RefineWithoutPoses, BareImagesAreBadInput) {
   GRASPMAP_REQUIRE_DATA();
   extract_plain_folder(scan_file("site_tiny_q.db"), "images");
   const auto bare = libmap::encode_png(libmap::ColorImage(512, 424, {90, 90, 90}));
@@ -337,7 +337,7 @@ TEST(Refine, KnownLengthsDetermineTheScale) {
                         {.field = "known length", .value = "1:2:3=1"}));
 }
 
-// Scans of the same ground, or of another, with small pictures.
+// Scans of the same ground, or of another, with small images.
 void write_scan(const std::string& name, const std::string& seed, const std::string& start_deg,
                 const std::string& rock) {
   libmap::CameraFile file;

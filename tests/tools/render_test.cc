@@ -51,11 +51,11 @@ TEST(Render, FootholdsOfTheMap) {
       {"footholds", "map.pcd", "-o", "footholds.csv", "--no-graspable-only", "--border"})));
   const std::vector<std::string> words = {
       "render", "map.pcd", "--points", "footholds.csv", "--width", "320", "--height", "240", "-o"};
-  const std::map<std::string, std::vector<std::string>> pictures = {
+  const std::map<std::string, std::vector<std::string>> images = {
       {"a.png", {}},
       {"b.png", {"--points-frame", "terrain", "--label", "none"}},
       {"c.png", {"--points-frame", "terrain", "--label", "score"}}};
-  for (const auto& [name, more] : pictures) {
+  for (const auto& [name, more] : images) {
     std::vector<std::string> call = words;
     call.push_back(name);
     call.insert(call.end(), more.begin(), more.end());

@@ -48,8 +48,8 @@ PointCloud rocks(const Eigen::Vector3d& shift = Eigen::Vector3d::Zero()) {
 }
 
 // `count` files in a folder: strips along x, or every count-th point.
-void write_pieces(const std::string& folder, const PointCloud& cloud, std::size_t count,
-                  bool strips, const std::string& extension = ".pcd") {
+void write_tiles(const std::string& folder, const PointCloud& cloud, std::size_t count, bool strips,
+                 const std::string& extension = ".pcd") {
   fs::create_directories(scratch(folder));
   for (std::size_t piece = 0; piece < count; ++piece) {
     std::vector<std::size_t> indices;
@@ -128,7 +128,7 @@ class ScoreStore : public testing::TestWithParam<Case> {};
 
 TEST_P(ScoreStore, IsTheMapInOneFile) {
   const Case& given = GetParam();
-  write_pieces("in", rocks(), given.pieces, given.strips);
+  write_tiles("in", rocks(), given.pieces, given.strips);
   ASSERT_TRUE(succeeded(score("in", "whole.pcd", given.flags)));
   for (int share = given.shares; share >= 1; --share) {
     Words words = given.flags;
@@ -172,7 +172,7 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& one) { return std::string(one.param.name); });
 
 TEST(ScoreStoreTerrain, FarFromTheOrigin) {
-  write_pieces("in", rocks({1e5, -2e5, 300}), 3, false);
+  write_tiles("in", rocks({1e5, -2e5, 300}), 3, false);
   for (const char* plane : {"fit", "none"}) {
     ASSERT_TRUE(succeeded(score("in", "whole.pcd", {"--plane", plane})));
     ASSERT_TRUE(succeeded(
@@ -187,7 +187,7 @@ TEST(ScoreStoreTerrain, TilesOfDifferentPrecision) {
   const PointCloud far = rocks({700, 0, 0});
   cloud.positions.insert(cloud.positions.end(), far.positions.begin(), far.positions.end());
   cloud.normals.insert(cloud.normals.end(), far.normals.begin(), far.normals.end());
-  write_pieces("in", cloud, 1, true);
+  write_tiles("in", cloud, 1, true);
   const Words flags = {"--plane", "none", "--tile-size", "1"};
   ASSERT_TRUE(succeeded(score("in", "whole.pcd", flags)));
   ASSERT_TRUE(succeeded(score("in", "m.tiles", flags)));
@@ -216,7 +216,7 @@ TEST(ScoreStoreTerrain, InAnyFormat) {
 }
 
 TEST(ScoreStoreTerrain, NamesWithSpacesAndASlash) {
-  write_pieces("the terrain", rocks(), 2, true);
+  write_tiles("the terrain", rocks(), 2, true);
   ASSERT_TRUE(succeeded(score("the terrain", "my map.tiles/")));
   EXPECT_EQ(index_of("my map.tiles").manifest.inputs.front().path, "the terrain/piece_0.pcd");
   EXPECT_TRUE(fs::exists(scratch("my map.tiles.json")));
@@ -224,13 +224,13 @@ TEST(ScoreStoreTerrain, NamesWithSpacesAndASlash) {
 
 TEST(ScoreStoreTerrain, WithoutPointsOrWithPointsWithoutAPosition) {
   PointCloud cloud;
-  write_pieces("in", cloud, 2, true);
+  write_tiles("in", cloud, 2, true);
   EXPECT_TRUE(bad_input(score("in", "m.tiles"), {.file = "in", .about = "no points"}));
   EXPECT_FALSE(fs::exists(scratch("m.tiles/index.json")));
   cloud = rocks();
   cloud.positions[77].y() = std::nan("");
   cloud.positions[78].x() = INFINITY;
-  write_pieces("in", cloud, 2, true);
+  write_tiles("in", cloud, 2, true);
   ASSERT_TRUE(succeeded(score("in", "whole.pcd")));
   ASSERT_TRUE(succeeded(score("in", "m.tiles")));
   EXPECT_EQ(merged("m.tiles"), content("whole.pcd"));
@@ -238,7 +238,7 @@ TEST(ScoreStoreTerrain, WithoutPointsOrWithPointsWithoutAPosition) {
 
 TEST(ScoreStoreTerrain, PiecesThatDoNotFit) {
   PointCloud cloud = rocks();
-  write_pieces("in", cloud, 1, true);
+  write_tiles("in", cloud, 1, true);
   cloud.normals.clear();
   libmap::write_cloud(scratch("in/second.pcd"), cloud);
   EXPECT_TRUE(bad_input(score("in", "m.tiles"), {.file = "in/second.pcd", .about = "no normals"}));
@@ -251,7 +251,7 @@ TEST(ScoreStoreTerrain, PiecesThatDoNotFit) {
 }
 
 TEST(ScoreStoreOptions, WhatNeedsTheCloudInMemory) {
-  write_pieces("in", rocks(), 1, true);
+  write_tiles("in", rocks(), 1, true);
   for (const char* method : {"thesis", "envelope"})
     EXPECT_TRUE(bad_input(score("in", "m.tiles", {"--method", method}),
                           {.field = "method", .value = method, .about = "MAP.pcd"}));
@@ -267,14 +267,14 @@ TEST(ScoreStoreOptions, WhatNeedsTheCloudInMemory) {
 }
 
 TEST(ScoreStoreOptions, DryRunWritesNothing) {
-  write_pieces("in", rocks(), 1, true);
+  write_tiles("in", rocks(), 1, true);
   ASSERT_TRUE(succeeded(score("in", "m.tiles", {"--dry-run"})));
   EXPECT_FALSE(fs::exists(scratch("m.tiles")));
 }
 
 class ScoreStoreAgain : public testing::Test {
  protected:
-  ScoreStoreAgain() { write_pieces("in", rocks(), 2, true); }
+  ScoreStoreAgain() { write_tiles("in", rocks(), 2, true); }
 };
 
 TEST_F(ScoreStoreAgain, SecondRunScoresNothing) {
@@ -365,7 +365,8 @@ TEST_F(ScoreStoreAgain, ForeignFoldersAreNotTouched) {
   graspmap_test::write_text(scratch("n.tiles"), "a file");
   EXPECT_TRUE(bad_input(score("in", "n.tiles"), {.file = "n.tiles", .about = "a file"}));
   fs::rename(scratch("in"), scratch("in.tiles"));
-  EXPECT_TRUE(bad_input(score("in.tiles", "in.tiles"), {.file = "in.tiles", .about = "is the input"}));
+  EXPECT_TRUE(
+      bad_input(score("in.tiles", "in.tiles"), {.file = "in.tiles", .about = "is the input"}));
 }
 
 TEST_F(ScoreStoreAgain, OneProcessAShare) {
@@ -454,7 +455,7 @@ TEST_F(ScoreStoreAgain, KilledAtAnyMoment) {
 TEST(ScoreStoreAppend, NewPiecesRedoWhatTheyTouch) {
   const Words none = {"--plane", "none"};
   const Words append = {"--plane", "none", "--append"};
-  write_pieces("in", rocks(), 3, true);
+  write_tiles("in", rocks(), 3, true);
   ASSERT_TRUE(succeeded(score("in", "all.tiles", none)));
   fs::rename(scratch("in/piece_1.pcd"), scratch("piece_1.pcd"));
   ASSERT_TRUE(succeeded(score("in", "m.tiles", none)));
@@ -476,7 +477,7 @@ TEST(ScoreStoreAppend, NewPiecesRedoWhatTheyTouch) {
 }
 
 TEST(ScoreStoreAppend, OnlyWhereOldTilesStayAsTheyAre) {
-  write_pieces("in", rocks(), 3, true);
+  write_tiles("in", rocks(), 3, true);
   fs::rename(scratch("in/piece_2.pcd"), scratch("piece_2.pcd"));
   ASSERT_TRUE(succeeded(score("in", "m.tiles")));
   ASSERT_TRUE(succeeded(score("in", "n.tiles", {"--plane", "none", "--method", "climblab"})));

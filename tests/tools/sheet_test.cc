@@ -21,7 +21,7 @@ void write_map(const char* name, const char* method) {
   ASSERT_TRUE(succeeded(graspmap({"score", "terrain.pcd", "--method", method, "-o", name})));
 }
 
-TEST(Sheet, MapsAndPicturesInOne) {
+TEST(Sheet, MapsAndImagesInOne) {
   write_map("a.pcd", "corrected");
   write_map("b.pcd", "thesis");
   ASSERT_TRUE(succeeded(graspmap({"render", "a.pcd", "-o", "c.png", "--width", "200"})));
@@ -143,7 +143,7 @@ bool near(const libmap::Color& a, const libmap::Color& b) {
   return difference <= 2;
 }
 
-// The squares of the sections, found in the picture by their colors alone, against the mask.
+// The squares of the sections, found in the image by their colors alone, against the mask.
 TEST(Mask, SectionsShowTheMask) {
   ASSERT_TRUE(succeeded(graspmap(
       {"mask", "--method", "envelope", "--sections", "--cell-width", "400", "-o", "s.png"})));

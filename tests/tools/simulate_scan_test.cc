@@ -5,7 +5,7 @@
 #include "libmap/camera/camera_io.h"
 #include "libmap/io/mesh_io.h"
 #include "libmap/scan/scan_source.h"
-#include "libmap/simulate/terrain_pieces.h"
+#include "libmap/simulate/terrain_tiles.h"
 #include "tests/libmap/mesh/mesh_samples.h"
 #include "tests/tools/tool_test_support.h"
 

@@ -89,7 +89,7 @@ TEST(Mask, AsTextEqualsTheAuthorsProgram) {
   EXPECT_EQ(mask.substr(mask.find('\n')), reference.substr(reference.find('\n')));
 }
 
-TEST(Mask, AsCloudAndPicture) {
+TEST(Mask, AsCloudAndImage) {
   ASSERT_TRUE(succeeded(
       graspmap({"mask", "--gripper", "hubrobo", "--voxel-size", "0.004", "-o", "mask.ply"})));
   ASSERT_TRUE(succeeded(graspmap({"mask", "-o", "mask.png"})));

@@ -93,7 +93,7 @@ std::map<std::string, std::string> pieces_in(const std::string& folder) {
   return files;
 }
 
-void expect_same_pieces(const std::string& folder, const std::string& whole) {
+void expect_same_tiles(const std::string& folder, const std::string& whole) {
   EXPECT_TRUE(pieces_in(folder) == pieces_in(whole));
   nlohmann::json own = json_of(folder + ".json");
   nlohmann::json other = json_of(whole + ".json");

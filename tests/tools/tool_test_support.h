@@ -45,7 +45,7 @@ nlohmann::json json_of(const std::string& name);
 // Returns the contents of the files of a folder in the scratch folder, by name.
 std::map<std::string, std::string> pieces_in(const std::string& folder);
 // Expects equal tiles and results in both folders, and no temporary files.
-void expect_same_pieces(const std::string& folder, const std::string& whole);
+void expect_same_tiles(const std::string& folder, const std::string& whole);
 
 // Returns gently bumpy ground of 0.6 x 0.6 m about (0, 0), z up, with a point spacing of 5 mm, the
 // same for every call. Coordinates are multiples of 2^-20 m, which any format stores exactly.

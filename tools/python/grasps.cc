@@ -53,8 +53,8 @@ py::array_t<double> table_of(const Results& results, std::size_t width,
   return array;
 }
 
-py::dict cells_of(const Results& results, const std::vector<double>& more_loads_n) {
-  const std::vector<std::string> names = libgtd::grasp_columns(more_loads_n);
+py::dict cells_of(const Results& results, const std::vector<double>& extra_loads_n) {
+  const std::vector<std::string> names = libgtd::grasp_columns(extra_loads_n);
   std::vector<py::list> lists(names.size());
   for (const Result& result : results) {
     const std::vector<std::string> cells = libgtd::grasp_cells(result);
@@ -88,24 +88,24 @@ py::dict results_of(const Results& results, const libgtd::GraspOptions& options)
       options.pull_limits ? py::object(table_of(results, directions.size(),
                                                 [](const Result& r) { return r.pull_limits_n; }))
                           : py::none();
-  made["columns"] = cells_of(results, options.more_loads_n);
+  made["columns"] = cells_of(results, options.extra_loads_n);
   return made;
 }
 
 py::dict grasp(const libmap::TriangleMesh& mesh, const py::object& points,
-               const py::object& surface_error, const std::vector<double>& more_loads_n,
+               const py::object& surface_error, const std::vector<double>& extra_loads_n,
                bool sequential, bool pull_limits, const py::dict& values,
                const py::object& progress, unsigned threads) {
   GraspOptions options = options_from<GraspOptions>(values);
-  options.trials.more_loads_n = more_loads_n;
+  options.trials.extra_loads_n = extra_loads_n;
   options.trials.sequential = sequential;
   options.trials.pull_limits = pull_limits;
   options.trials.check();
   const libgtd::Gripper gripper = libgtd::find_gripper(options.gripper, options.overrides);
-  const std::vector<Eigen::Vector3d> places = positions_from(points, "points");
+  const std::vector<Eigen::Vector3d> positions = positions_from(points, "points");
   const libgtd::Ground ground(mesh, errors_of(mesh, surface_error, options.trials.surface));
   const Results results = run(threads, progress, [&](libmap::Progress& bar) {
-    return libgtd::test_grasps(ground, gripper, places, options.trials, bar);
+    return libgtd::test_grasps(ground, gripper, positions, options.trials, bar);
   });
   return results_of(results, options.trials);
 }

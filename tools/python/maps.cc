@@ -79,10 +79,10 @@ py::dict values_of(const PointCloud& map, const std::vector<libgtd::LookupAnswer
 py::dict lookup(const PointCloud& map, const py::object& points, const py::dict& values,
                 unsigned threads) {
   const auto options = options_from<libgtd::LookupOptions>(values);
-  const std::vector<Eigen::Vector3d> places = positions_from(points, "points");
+  const std::vector<Eigen::Vector3d> positions = positions_from(points, "points");
   using Answer = libgtd::LookupAnswer;
   const std::vector<Answer> answers = run(threads, py::none(), [&](libmap::Progress& /*bar*/) {
-    return libgtd::look_up(map, places, options);
+    return libgtd::look_up(map, positions, options);
   });
   py::dict made;
   made["found"] = column<bool>(answers, [](const Answer& answer) { return answer.found; });

@@ -26,7 +26,7 @@ PYBIND11_MODULE(_core, module) {
   graspmap_python::add_surfaces(module);
   graspmap_python::add_maps(module);
   graspmap_python::add_grasps(module);
-  graspmap_python::add_pictures(module);
+  graspmap_python::add_images(module);
   module.def("options", [](const std::string& stage) { return stage_of(stage).options(); });
   module.def("results", [](const std::string& stage) { return stage_of(stage).results(); });
   module.def("stages", [] {

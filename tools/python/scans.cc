@@ -240,7 +240,7 @@ py::dict report_of(const libmap::StageReport& stage) {
   dict["name"] = stage.name;
   dict["rejected"] = stage.rejected;
   dict["seconds"] = stage.seconds;
-  dict["figures"] = numbers_of(stage.figures);
+  dict["figures"] = numbers_of(stage.metrics);
   const auto change = [&](const char* name, const libmap::HeldOutChange& held_out) {
     if (held_out.count > 0) dict[name] = py::make_tuple(held_out.before, held_out.after);
   };

@@ -156,7 +156,7 @@ py::list list_of(const libmap::ResultTable& table, const std::vector<std::string
     if (std::find(objects.begin(), objects.end(), result.key) != objects.end()) continue;
     py::dict one;
     one["key"] = result.key;
-    one["type"] = std::string(types.at(result.type.index())) + (result.may_lack ? " | None" : "");
+    one["type"] = std::string(types.at(result.type.index())) + (result.may_be_absent ? " | None" : "");
     one["description"] = result.description;
     list.append(one);
   }

@@ -190,6 +190,6 @@ void add_scans(py::module_& module);     // Scan, Frame, Camera, Poses, refine, 
 void add_surfaces(py::module_& module);  // estimate_normals, mesh, resample
 void add_maps(py::module_& module);      // score, lookup, footholds, evaluate
 void add_grasps(py::module_& module);    // grasp
-void add_pictures(py::module_& module);  // render, to_png
+void add_images(py::module_& module);  // render, to_png
 
 }  // namespace graspmap_python

@@ -37,8 +37,8 @@ void start_log(const std::string& command, const RunOptions& options) {
 }
 
 int report(const std::string& command, const std::string& message, int exit_code) {
-  end_if_told();
-  std::cerr << "graspmap " << command << ": error: " << message_text(message) << "\n";
+  exit_if_signaled();
+  std::cerr << "graspmap " << command << ": error: " << sanitize_text(message) << "\n";
   return exit_code;
 }
 
@@ -168,7 +168,7 @@ std::unique_ptr<libmap::Progress> make_progress(const std::string& style) {
 
 }  // namespace
 
-void refuse_given(const std::vector<std::pair<const char*, bool>>& flags,
+void reject_given(const std::vector<std::pair<const char*, bool>>& flags,
                   const std::string& reason) {
   for (const auto& [flag, is_given] : flags)
     if (is_given) throw libmap::Error(reason, {.field = flag});
@@ -399,7 +399,7 @@ void Command::Parts::work(const std::function<void(Run&)>& body) {
   body(run);
   bar->end();
   require_printed();
-  end_if_told();
+  exit_if_signaled();
 }
 
 int Command::run(int argc, char** argv, const std::function<void(Run&)>& body) {
@@ -428,12 +428,12 @@ int Command::run(int argc, char** argv, const std::function<void(Run&)>& body) {
   }
 }
 
-int run_usage(int argc, char** argv, std::initializer_list<Usage*> usages, Usage* chosen) {
+int run_subcommand(int argc, char** argv, std::initializer_list<Subcommand*> subcommands, Subcommand* chosen) {
   int exit_code = chosen(argc, argv);
   const bool asks_for_help = std::any_of(
       argv, argv + argc, [](const std::string& word) { return word == "--help" || word == "-h"; });
-  if (!asks_for_help || chosen != *usages.begin()) return exit_code;
-  for (Usage* const other : usages) {
+  if (!asks_for_help || chosen != *subcommands.begin()) return exit_code;
+  for (Subcommand* const other : subcommands) {
     if (other == chosen || exit_code != 0) continue;
     std::cout << "\n";
     exit_code = other(argc, argv);

@@ -23,14 +23,14 @@ class UsageError : public libmap::Error {
 
 // Throws Error with the flag of the first parameter of `bind` that differs from its default.
 template <typename Options>
-void refuse_set(const Options& options, void (*bind)(libmap::ParameterTable&, Options&),
+void reject_changed(const Options& options, void (*bind)(libmap::ParameterTable&, Options&),
                 const std::string& reason) {
   if (const auto key = libmap::changed_key(options, bind))
     throw libmap::Error(reason, {.field = libmap::flag_of(*key)});
 }
 // Throws Error with the first flag whose value is true, which marks it as given; for options that
 // are not parameters.
-void refuse_given(const std::vector<std::pair<const char*, bool>>& flags,
+void reject_given(const std::vector<std::pair<const char*, bool>>& flags,
                   const std::string& reason);
 
 class Command {
@@ -75,7 +75,7 @@ class Command {
 
 // Runs the chosen usage of a command with several usages, each with its own Command and options.
 // --help of the first usage shows all. Returns the exit code.
-using Usage = int(int argc, char** argv);
-int run_usage(int argc, char** argv, std::initializer_list<Usage*> usages, Usage* chosen);
+using Subcommand = int(int argc, char** argv);
+int run_subcommand(int argc, char** argv, std::initializer_list<Subcommand*> subcommands, Subcommand* chosen);
 
 }  // namespace graspmap_tools

@@ -81,7 +81,7 @@ void end_cleanly_on_signals() {
   std::signal(SIGXFSZ, SIG_IGN);
 }
 
-void end_if_told() {
+void exit_if_signaled() {
   while (is_told) pause();
 }
 

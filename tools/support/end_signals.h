@@ -12,6 +12,6 @@ namespace graspmap_tools {
 void end_cleanly_on_signals();
 
 // Does not return if such a signal was received, because later errors are caused by it.
-void end_if_told();
+void exit_if_signaled();
 
 }  // namespace graspmap_tools

@@ -90,7 +90,7 @@ class TiledMap {
     if (const auto index = index_of(known))
       index_ = *index;
     else
-      index_.lattice = libgtd::voxel_map_of(cloud_, libgtd::facts_of(known)).lattice;
+      index_.lattice = libgtd::voxel_map_of(cloud_, libgtd::map_info(known)).lattice;
     index_.manifest = known;
     constexpr double tile_m = 0.5;
     index_.tile_voxels = std::max(1, static_cast<int>(tile_m / index_.lattice.voxel_size_m));
@@ -127,7 +127,7 @@ class TiledMap {
 
 class MapGrasping {
  public:
-  MapGrasping(const GraspMapInput& input, GroundPieces& ground, const libgtd::Gripper& gripper,
+  MapGrasping(const GraspMapInput& input, GroundTiles& ground, const libgtd::Gripper& gripper,
               const libgtd::GraspOptions& options, Run& run)
       : input_(input),
         gripper_(gripper),
@@ -146,7 +146,7 @@ class MapGrasping {
   void grasp() {
     if (run_.options().dry_run) return;
     std::optional<libmap::TileJournal> journal =
-        store_.begin(input_.share, [this] { agree_on_plan(); });
+        store_.begin(input_.share, [this] { check_plan(); });
     const std::vector<TileNumber> missing = store_.missing(
         plan_, libgtd::tiles_of(
                    {.plane = {}, .lattice = {}, .min = plan_.index.min, .max = plan_.index.max},
@@ -188,7 +188,7 @@ class MapGrasping {
 
   // Resumes the store's plan if it is of the same mesh, map and parameters, else writes a new one.
   // The caller must have locked the store.
-  void agree_on_plan() {
+  void check_plan() {
     const bool is_forced = run_.options().force && is_store();
     const auto earlier = is_forced ? std::nullopt : store_.plan();
     plan_.index = map_.index();
@@ -236,22 +236,22 @@ class MapGrasping {
   std::map<std::size_t, std::vector<std::size_t>> by_piece(const libmap::PointCloud& points) const {
     std::map<std::size_t, std::vector<std::size_t>> members;
     for (std::size_t n = 0; n < points.size(); ++n)
-      members[ground_.piece_at(mesh_from_map_ * points.positions[n])].push_back(n);
+      members[ground_.tile_at(mesh_from_map_ * points.positions[n])].push_back(n);
     return members;
   }
 
   // Returns one entry per member: its position if it is a candidate, else nullopt.
   std::vector<std::optional<Eigen::Vector3d>> candidates_of(
-      const GroundPieces::Piece& piece, const libmap::PointCloud& points,
+      const GroundTiles::Piece& piece, const libmap::PointCloud& points,
       const std::vector<std::size_t>& members) const {
     std::vector<std::optional<Eigen::Vector3d>> candidates(members.size());
     constexpr std::size_t grain = 256;
     libmap::parallel_each(members.size(), grain, [&](std::size_t n) {
-      const Eigen::Vector3d place = mesh_from_map_ * points.positions[members[n]];
+      const Eigen::Vector3d position = mesh_from_map_ * points.positions[members[n]];
       // The filter is valid only for approach from above.
-      if (options_.approach == libgtd::ApproachDirection::up && !piece.from_above.may_hold(place))
+      if (options_.approach == libgtd::ApproachDirection::up && !piece.from_above.may_hold(position))
         return;
-      if (piece.ground.distance(place, options_.max_distance_m)) candidates[n] = place;
+      if (piece.ground.distance(position, options_.max_distance_m)) candidates[n] = position;
     });
     return candidates;
   }
@@ -262,13 +262,13 @@ class MapGrasping {
     for (std::size_t field = 0; field < field_count; ++field)
       fields[field] = &points.add_field(grasp_fields()[field], libmap::ScalarType::float32).values;
     for (const auto& [number, members] : by_piece(points)) {
-      const GroundPieces::Piece& piece = ground_.piece(number);
+      const GroundTiles::Piece& piece = ground_.piece(number);
       const auto candidates = candidates_of(piece, points, members);
-      std::vector<Eigen::Vector3d> places;
+      std::vector<Eigen::Vector3d> positions;
       for (const auto& candidate : candidates)
-        if (candidate) places.push_back(*candidate);
-      steps.advance(members.size() - places.size());
-      const auto results = libgtd::test_grasps(piece.ground, gripper_, places, options_, steps);
+        if (candidate) positions.push_back(*candidate);
+      steps.advance(members.size() - positions.size());
+      const auto results = libgtd::test_grasps(piece.ground, gripper_, positions, options_, steps);
       auto next = results.begin();
       for (std::size_t n = 0; n < members.size(); ++n) {
         const Values values = candidates[n] ? values_of(*next++) : no_candidate;
@@ -284,12 +284,12 @@ class MapGrasping {
     std::optional<libmap::FileLock> lock = store_.lock();
     const libgtd::MapTileStore::Completion completion = store_.complete(plan_);
     if (!completion.index) {
-      run_.say("{} tiles tested; {} of {} are complete", tested, completion.done, completion.tiles);
+      run_.info("{} tiles tested; {} of {} are complete", tested, completion.done, completion.tiles);
       return;
     }
     if (is_store()) {
       store_.write_index(*completion.index, run_.manifest());
-      run_.say("{} of {} tiles tested; all are complete", tested, completion.tiles);
+      run_.info("{} of {} tiles tested; all are complete", tested, completion.tiles);
       return;
     }
     const MapTiles tiles(store_.folder(), *completion.index);
@@ -321,7 +321,7 @@ class MapGrasping {
                       {"grasp_candidates", candidates},
                       {"grasp_holding", holding},
                       {"grasp_mean_trials", mean}});
-    run_.say("{} of {} voxels hold; {} were tested, with {:.1f} trials each", holding,
+    run_.info("{} of {} voxels hold; {} were tested, with {:.1f} trials each", holding,
              tiles.index().voxels(), candidates, mean);
   }
 
@@ -330,7 +330,7 @@ class MapGrasping {
   const libgtd::GraspOptions& options_;
   Run& run_;
   TiledMap map_;
-  GroundPieces& ground_;
+  GroundTiles& ground_;
   libmap::Pose mesh_from_map_;
   libgtd::MapTileStore store_;
   libgtd::TilePlan plan_;
@@ -338,26 +338,26 @@ class MapGrasping {
 
 }  // namespace
 
-GroundPieces::Kept::Kept(std::size_t of, libmap::TriangleMesh around, const GroundPieces& pieces)
+GroundTiles::Kept::Kept(std::size_t of, libmap::TriangleMesh around, const GroundTiles& pieces)
     : Piece{.mesh = std::move(around),
             .ground = pieces.make_ground_(mesh),
             .from_above = {mesh, pieces.gripper_, {.start_height_m = pieces.start_height_m_}}},
       number(of) {}
 
-GroundPieces::GroundPieces(const std::string& mesh, const libgtd::Gripper& gripper,
+GroundTiles::GroundTiles(const std::string& mesh, const libgtd::Gripper& gripper,
                            double start_height_m, MakeGround make_ground)
     : gripper_(gripper),
       start_height_m_(start_height_m),
       make_ground_(std::move(make_ground)),
-      files_(libmap::mesh_pieces(mesh)) {
+      files_(libmap::mesh_tiles(mesh)) {
   const libgtd::FingerGeometry finger = libgtd::finger_geometry(gripper);
   margin_m_ = 2.0 * finger.tip(finger.opening_rad, finger.curl_rad).x() + extra_margin_m;
   if (files_.size() > 1) index_.emplace(files_);
 }
 
-std::size_t GroundPieces::piece_at(const Eigen::Vector3d& place) const {
+std::size_t GroundTiles::tile_at(const Eigen::Vector3d& position) const {
   if (!index_) return 0;
-  const Eigen::Vector2d point = place.head<2>();
+  const Eigen::Vector2d point = position.head<2>();
   std::size_t best = 0;
   std::pair least(std::numeric_limits<double>::infinity(), 0.0);
   for (std::size_t n = 0; n < index_->size(); ++n) {
@@ -371,7 +371,7 @@ std::size_t GroundPieces::piece_at(const Eigen::Vector3d& place) const {
   return best;
 }
 
-const GroundPieces::Piece& GroundPieces::piece(std::size_t number) {
+const GroundTiles::Piece& GroundTiles::piece(std::size_t number) {
   const auto found = std::find_if(kept_.begin(), kept_.end(),
                                   [&](const Kept& one) { return one.number == number; });
   if (found != kept_.end()) {
@@ -411,7 +411,7 @@ void require_map_output(const GraspMapInput& input, Run& run) {
                         {.field = "--force"});
 }
 
-void grasp_map(const GraspMapInput& input, GroundPieces& ground, const libgtd::Gripper& gripper,
+void grasp_map(const GraspMapInput& input, GroundTiles& ground, const libgtd::Gripper& gripper,
                const libgtd::GraspOptions& options, Run& run) {
   MapGrasping(input, ground, gripper, options, run).grasp();
 }

@@ -13,7 +13,7 @@
 #include "libgtd/grasp/grasp_trials.h"
 #include "libgtd/grasp/grip_candidates.h"
 #include "libgtd/grasp/ground.h"
-#include "libmap/mesh/mesh_piece_index.h"
+#include "libmap/mesh/mesh_tile_index.h"
 #include "libmap/tiles/tile_share.h"
 #include "tools/support/run.h"
 
@@ -21,7 +21,7 @@ namespace graspmap_tools {
 
 // Ground of the virtual field test: a mesh in one file, or in a folder of tiles, with few of them
 // in memory.
-class GroundPieces {
+class GroundTiles {
  public:
   // A tile with the mesh around it within reach of a gripper on the tile.
   struct Piece {
@@ -32,19 +32,19 @@ class GroundPieces {
   using MakeGround = std::function<libgtd::Ground(const libmap::TriangleMesh& mesh)>;
 
   // Throws Error naming the unreadable file or the gripper's missing section.
-  GroundPieces(const std::string& mesh, const libgtd::Gripper& gripper, double start_height_m,
+  GroundTiles(const std::string& mesh, const libgtd::Gripper& gripper, double start_height_m,
                MakeGround make_ground);
 
   // Returns the index of the tile at the position, by x and y; of several, the one with the nearest
   // center. Returns the nearest tile if none is there.
-  std::size_t piece_at(const Eigen::Vector3d& place) const;
+  std::size_t tile_at(const Eigen::Vector3d& position) const;
 
   // Returns the tile with this index; the reference is valid until two other tiles are requested.
   const Piece& piece(std::size_t number);
 
  private:
   struct Kept : Piece {
-    Kept(std::size_t of, libmap::TriangleMesh around, const GroundPieces& pieces);
+    Kept(std::size_t of, libmap::TriangleMesh around, const GroundTiles& pieces);
     std::size_t number = 0;
   };
 
@@ -53,7 +53,7 @@ class GroundPieces {
   double margin_m_ = 0.0;
   MakeGround make_ground_;
   std::vector<std::filesystem::path> files_;
-  std::optional<libmap::MeshPieceIndex> index_;  // only for several files
+  std::optional<libmap::MeshTileIndex> index_;  // only for several files
   std::list<Kept> kept_;                         // last used first
 };
 
@@ -75,7 +75,7 @@ void require_map_output(const GraspMapInput& input, Run& run);
 // can be resumed: in the output or in OUTPUT.progress, which is removed once the map in one file is
 // written. The run's manifest must have the inputs. Throws Error if the map is empty or already has
 // a field, none of its voxels is on the mesh, or the store is of other inputs.
-void grasp_map(const GraspMapInput& input, GroundPieces& ground, const libgtd::Gripper& gripper,
+void grasp_map(const GraspMapInput& input, GroundTiles& ground, const libgtd::Gripper& gripper,
                const libgtd::GraspOptions& options, Run& run);
 
 }  // namespace graspmap_tools

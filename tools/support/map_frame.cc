@@ -127,7 +127,7 @@ void carry_georeference(const std::string& input, Run& run) {
     run.manifest().georeference = georeference;
 }
 
-void carry_frame(const std::string& input, Run& run) {
+void copy_frame(const std::string& input, Run& run) {
   if (const auto manifest = libmap::read_manifest_of(input)) run.manifest().frame = manifest->frame;
   carry_transforms(input, run);
 }

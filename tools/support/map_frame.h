@@ -52,7 +52,7 @@ bool is_from_true_frame(const std::string& file);
 // run's, for an output in the frame of `input`.
 void carry_transforms(const std::string& input, Run& run);
 // Also copies the frame's name.
-void carry_frame(const std::string& input, Run& run);
+void copy_frame(const std::string& input, Run& run);
 // For a map made from a map: copies frame, transforms, georeference, and the parameters and results
 // that the run's manifest does not have, such as zero plane, lattice and method.
 void carry_facts(const libmap::Manifest& source, Run& run);

@@ -45,7 +45,7 @@ ReadMap summarize_one(const std::string& file, const MapTableOptions& options,
   const libmap::PointCloud cloud = libmap::read_cloud(file).cloud;
   libgtd::MapSummaryOptions own = libgtd::summary_options(map.manifest);
   own.graspability_threshold = map.cutoff = cutoff_of(options, own);
-  read.voxels = libgtd::voxel_map_of(cloud, libgtd::facts_of(map.manifest));
+  read.voxels = libgtd::voxel_map_of(cloud, libgtd::map_info(map.manifest));
   if (map.manifest.find_parameter("zero_plane_m") == nullptr)
     run.warn(file +
              ": has no manifest with the zero plane; all its points are assumed to be above");
@@ -84,7 +84,7 @@ std::string percent(std::optional<double> value) {
   return value ? fmt::format("{:.1f} %", 100.0 * *value) : "unknown";
 }
 
-void say(const libgtd::SummarizedMap& map, Run& run) {
+void info(const libgtd::SummarizedMap& map, Run& run) {
   const libgtd::MapSummary& summary = map.summary;
   std::string text = fmt::format("{}: {} of the voxels reach {}", map.name,
                                  percent(libgtd::Rate{summary.reached, summary.evaluated}.value()),
@@ -95,7 +95,7 @@ void say(const libgtd::SummarizedMap& map, Run& run) {
                         percent(counts.true_positive_rate().value()),
                         percent(counts.true_negative_rate().value()));
   }
-  run.say(text);
+  run.info(text);
 }
 
 // Chart of column y against x; rows without one of the two numbers are ignored. Curves are in the
@@ -181,7 +181,7 @@ void tabulate_maps(const std::vector<std::string>& map_files, const std::string&
     maps.push_back(std::move(read.summarized));
     voxels.push_back(std::move(read.voxels));
     run.add_input(file);
-    say(maps.back(), run);
+    info(maps.back(), run);
   }
   const auto table = [](const libmap::Table& content) {
     return Run::text_writer(libmap::to_csv(content));
@@ -194,7 +194,7 @@ void tabulate_maps(const std::vector<std::string>& map_files, const std::string&
                          return compare_all(maps, voxels);
                        }))));
   if (expected) files.emplace_back("regions.csv", table(libgtd::region_table(maps, *expected)));
-  if (options.pictures) {
+  if (options.images) {
     try {
       add_charts(files, rows, histograms, options);
     } catch (const libmap::Error& error) {

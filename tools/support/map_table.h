@@ -14,10 +14,10 @@ struct MapTableOptions {
   bool pairs = false;
   std::string varied;  // column of maps.csv, the horizontal axis of charts; empty: no such charts
   std::string series;  // columns of maps.csv, separated by ',': one curve per combination
-  bool pictures = true;
+  bool images = true;
 };
 
-// Binds all options except `expected`, `points_frame` and `pictures`.
+// Binds all options except `expected`, `points_frame` and `images`.
 void bind(libmap::ParameterTable& table, MapTableOptions& options);
 
 // Writes maps.csv, histograms.csv with a chart and, if requested, pairs.csv, regions.csv and charts

@@ -19,7 +19,7 @@ std::filesystem::path store_index_path(const std::string& store) {
 }
 
 std::optional<libgtd::TileStoreIndex> index_of(const libmap::Manifest& manifest) {
-  const auto lattice = libgtd::facts_of(manifest).lattice;
+  const auto lattice = libgtd::map_info(manifest).lattice;
   if (!lattice) return std::nullopt;
   libgtd::TileStoreIndex index;
   index.lattice = *lattice;
@@ -161,7 +161,7 @@ void merge_store(const std::string& store, const std::string& output, const Merg
                    {"border_voxels", index.border_voxels()},
                    {"graspable_voxels", index.graspable_voxels()}});
   const auto tell = [&] {
-    run.say("{} scored voxels from {} tiles", index.voxels(), index.tiles.size());
+    run.info("{} scored voxels from {} tiles", index.voxels(), index.tiles.size());
   };
   if (libmap::is_dem_path(output)) {
     const auto visit_rows = [&](const auto& visit) {
@@ -227,14 +227,14 @@ void merge_tiles(const std::vector<std::string>& tiles, const std::string& outpu
   run.add_results({{"scored_voxels", whole.size()},
                    {"border_voxels", libgtd::count_set(whole, "border")},
                    {"graspable_voxels", libgtd::count_set(whole, "graspable")}});
-  run.say("{} scored voxels from {} files", whole.size(), parts.size());
+  run.info("{} scored voxels from {} files", whole.size(), parts.size());
   // Shares have slopes only, because obstacles depend on the whole map.
   if (whole.find_field("slope_deg") != nullptr) {
     const std::size_t obstacles = in_file(libmap::manifest_path(tiles.front()).string(), [&] {
       return libgtd::add_obstacles_of(manifests.front(), whole);
     });
     run.add_results({{"obstacle_voxels", obstacles}});
-    run.say("{} voxels are obstacles", obstacles);
+    run.info("{} voxels are obstacles", obstacles);
   }
   if (libmap::is_dem_path(output)) {
     const auto visit_whole = [&](const auto& visit) { visit(whole); };

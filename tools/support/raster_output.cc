@@ -45,7 +45,7 @@ void write_raster(const std::string& output, const libmap::MapRaster& raster, Ru
     manifest.transforms.clear();
   }
   run.add_results({{"columns", raster.columns}, {"rows", raster.rows}});
-  run.say("{} x {} pixels, {} bands", raster.columns, raster.rows, 1 + raster.bands.size());
+  run.info("{} x {} pixels, {} bands", raster.columns, raster.rows, 1 + raster.bands.size());
   run.write_output(output,
                    [&](const auto& temporary) { libmap::write_map_raster(temporary, raster); });
 }

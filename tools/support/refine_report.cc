@@ -76,7 +76,7 @@ Json stage_json(const libmap::StageReport& stage) {
   if (stage.closures.candidates > 0) json["closures"] = rejections_json(stage.closures);
   if (stage.held_out.any()) json["held_out"] = held_out_json(stage.held_out);
   if (!stage.groups.empty()) json["links"] = groups_json(stage.groups);
-  for (const auto& [name, value] : stage.figures) json[name] = value;
+  for (const auto& [name, value] : stage.metrics) json[name] = value;
   if (stage.error) {
     json["absolute_error"] = to_json(libmap::described(stage.error->absolute));
     json["relative_error"] = to_json(libmap::described(stage.error->relative));
@@ -149,7 +149,7 @@ void add_stage(const libmap::StageReport& stage, std::string& text) {
                    name, group.links, group.rejected, 1e3 * group.translation_rms_before_m,
                    group.rotation_rms_before_deg, 1e3 * group.translation_rms_m,
                    group.rotation_rms_deg, group.translation_scale, group.rotation_scale);
-  for (const auto& [name, value] : stage.figures)
+  for (const auto& [name, value] : stage.metrics)
     fmt::format_to(out, "  {}: {:.6g}\n", name, value);
   add_held_out(stage, text);
   add_errors(stage, text);

@@ -101,7 +101,7 @@ void make_folder(const fs::path& folder) {
 
 }  // namespace
 
-std::string message_text(const std::string& text) {
+std::string sanitize_text(const std::string& text) {
   if (text.size() <= max_message_bytes) return printable(text);
   std::size_t head = max_message_bytes / 2;
   std::size_t tail = text.size() - max_message_bytes / 2;
@@ -149,16 +149,16 @@ void Run::add_input(const fs::path& path) {
     return;
   }
   manifest_.add_input(path);
-  const fs::path place = path.lexically_relative(libmap::data_folder());
-  if (!place.empty() && *place.begin() != "..") manifest_.inputs.back().path = place.string();
+  const fs::path folder_path = path.lexically_relative(libmap::data_folder());
+  if (!folder_path.empty() && *folder_path.begin() != "..") manifest_.inputs.back().path = folder_path.string();
 }
 
-void Run::say(const std::string& text) {
+void Run::info(const std::string& text) {
   std::istringstream lines(text);
-  for (std::string line; std::getline(lines, line);) spdlog::info("{}", message_text(line));
+  for (std::string line; std::getline(lines, line);) spdlog::info("{}", sanitize_text(line));
 }
-void Run::warn(const std::string& text) { spdlog::warn("{}", message_text(text)); }
-void Run::detail(const std::string& text) { spdlog::debug("{}", message_text(text)); }
+void Run::warn(const std::string& text) { spdlog::warn("{}", sanitize_text(text)); }
+void Run::detail(const std::string& text) { spdlog::debug("{}", sanitize_text(text)); }
 
 void Run::add_timings(const std::vector<std::pair<std::string, double>>& timings_s,
                       const std::string& stage) {
@@ -251,9 +251,9 @@ void Run::write_outputs(const fs::path& path, const Files& files) {
 void Run::claim_output_folder(const fs::path& given) {
   require_own_folder(given, ": --force writes into it");
   const fs::path folder = without_trailing_slash(given.string());
-  const fs::path place = folder.has_parent_path() ? folder.parent_path() : ".";
-  if (options_.dry_run && !fs::exists(place)) return;
-  make_folder(place);
+  const fs::path folder_path = folder.has_parent_path() ? folder.parent_path() : ".";
+  if (options_.dry_run && !fs::exists(folder_path)) return;
+  make_folder(folder_path);
   claim_manifest(folder);
 }
 

@@ -30,7 +30,7 @@ using libmap::in_file;
 // Converts a text, possibly from a file, to one line of printable UTF-8 for a terminal. Control
 // characters and invalid bytes become \xNN, line breaks become spaces; a long text is shortened in
 // the middle.
-std::string message_text(const std::string& text);
+std::string sanitize_text(const std::string& text);
 
 // Removes a trailing slash: "maps/" and "maps" are the same folder with the same manifest.
 std::string without_trailing_slash(std::string path);
@@ -57,13 +57,13 @@ class Run {
   // toolkit's own data are relative, so that the manifest does not depend on the installation.
   void add_input(const std::filesystem::path& path);
 
-  // Print to stderr: `say` without --quiet, `warn` always, `detail` with --verbose.
-  void say(const std::string& text);
+  // Print to stderr: `info` without --quiet, `warn` always, `detail` with --verbose.
+  void info(const std::string& text);
   void warn(const std::string& text);
   void detail(const std::string& text);
   template <typename... Values>
-  void say(fmt::format_string<Values...> text, Values&&... values) {
-    say(fmt::format(text, std::forward<Values>(values)...));
+  void info(fmt::format_string<Values...> text, Values&&... values) {
+    info(fmt::format(text, std::forward<Values>(values)...));
   }
   template <typename... Values>
   void warn(fmt::format_string<Values...> text, Values&&... values) {

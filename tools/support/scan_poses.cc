@@ -54,14 +54,14 @@ libmap::Trajectory poses_in_file(const PosesOption& poses, const libmap::ScanSou
   libmap::ImportedPoses imported = libmap::import_poses(file, scan, poses.file);
   run.add_input(libmap::file_of_trajectory(file));
   for (const std::string& warning : imported.warnings) run.warn("{}: {}", file, warning);
-  run.say("{} of {} poses belong to nodes of the scan",
-          imported.poses_in_file - imported.trajectory.foreign, imported.poses_in_file);
-  if (imported.scale != 1.0) run.say("scaled by {:.9g}", imported.scale);
+  run.info("{} of {} poses belong to nodes of the scan",
+          imported.poses_in_file - imported.trajectory.unmatched, imported.poses_in_file);
+  if (imported.scale != 1.0) run.info("scaled by {:.9g}", imported.scale);
   run.add_results(
       {{"poses_in_file", imported.poses_in_file}, {"poses_scale_taken", imported.scale}});
-  if (imported.largest_rig_deviation_m > 0.0) {
-    run.say("cameras of one node agree within {:.1f} mm", 1e3 * imported.largest_rig_deviation_m);
-    run.add_results({{"largest_rig_deviation_m", imported.largest_rig_deviation_m}});
+  if (imported.max_rig_deviation_m > 0.0) {
+    run.info("cameras of one node agree within {:.1f} mm", 1e3 * imported.max_rig_deviation_m);
+    run.add_results({{"largest_rig_deviation_m", imported.max_rig_deviation_m}});
   }
   return std::move(imported.trajectory.poses);
 }
@@ -154,12 +154,12 @@ std::optional<libmap::CameraFile> known_camera(const CalibrationOption& calibrat
     const auto* text = made ? std::get_if<std::string>(made->find_result(camera_result)) : nullptr;
     if (text == nullptr) return std::nullopt;
     if (fs::is_regular_file(scan) && !is_input_of(*made, scan)) {
-      run.say("camera of {}: not applied, because it is from another scan", name);
+      run.info("camera of {}: not applied, because it is from another scan", name);
       return std::nullopt;
     }
     camera = libmap::parse_camera(*text, libmap::manifest_path(name).string());
   }
-  run.say("camera of {}: {}", name,
+  run.info("camera of {}: {}", name,
           !camera.findings.empty() ? fmt::format("{}", fmt::join(camera.findings, "; "))
           : camera.depth.empty()   ? "intrinsics"
                                    : "intrinsics and depth correction");
@@ -196,7 +196,7 @@ libmap::Trajectory find_poses(const libmap::ScanSource& scan, PosesOption& poses
   const std::string path = scan.path().string();
   if (poses.source == "auto") {
     poses.source = best_poses(scan.graph(), path);
-    run.say("poses: " + poses.source);
+    run.info("poses: " + poses.source);
   } else if (const auto source = source_named(poses.source)) {
     poses.source = to_text(*source);
   }
@@ -233,7 +233,7 @@ libmap::Pose truth_from_poses(const libmap::ScanSource& scan, const libmap::Traj
   }
   const libmap::AbsoluteTrajectoryError error =
       in_file(path, [&] { return libmap::absolute_trajectory_error(poses, truth); });
-  run.say("aligned with {} true poses: RMSE {:.1f} mm, {:.2f} deg", error.poses, 1e3 * error.rmse_m,
+  run.info("aligned with {} true poses: RMSE {:.1f} mm, {:.2f} deg", error.poses, 1e3 * error.rmse_m,
           error.mean_rotation_deg);
   run.add_results({{"trajectory_rmse_m", error.rmse_m}});
   run.manifest().transforms.emplace_back(truth_from_poses_name, error.truth_from_estimate);

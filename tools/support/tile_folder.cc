@@ -8,17 +8,17 @@ namespace fs = std::filesystem;
 
 namespace {
 
-TileFolder::Facts parse_facts(const std::string& text, const fs::path& file) {
+TileFolder::TileData parse_facts(const std::string& text, const fs::path& file) {
   try {
-    return libmap::parse_json<TileFolder::Facts>(text);
+    return libmap::parse_json<TileFolder::TileData>(text);
   } catch (const nlohmann::json::exception& error) {
     throw libmap::Error(std::string("is broken: ") + error.what(), {.file = file.string()});
   }
 }
 
 // Replaces invalid UTF-8, which names of files may contain.
-std::string json_text(const TileFolder::Facts& json) {
-  return json.dump(-1, ' ', false, TileFolder::Facts::error_handler_t::replace);
+std::string json_text(const TileFolder::TileData& json) {
+  return json.dump(-1, ' ', false, TileFolder::TileData::error_handler_t::replace);
 }
 
 }  // namespace
@@ -30,7 +30,7 @@ void add_share_option(Command& command, std::string& share) {
 
 void require_folder_of_share(const std::string& output, const std::string& share) {
   if (is_tile_folder(output)) return;
-  refuse_given({{"--tile", share != whole_share}}, "requires a folder of tiles as output");
+  reject_given({{"--tile", share != whole_share}}, "requires a folder of tiles as output");
 }
 
 TileFolder::TileFolder(const std::string& output, const std::vector<std::string>& names,
@@ -55,10 +55,10 @@ TileFolder::TileFolder(const std::string& output, const std::vector<std::string>
 }
 
 // Returns the earlier plan with the same parameters and inputs. Throws if a share's plan differs.
-std::optional<TileFolder::Facts> TileFolder::earlier_plan() const {
+std::optional<TileFolder::TileData> TileFolder::earlier_plan() const {
   const auto text = run_.options().force ? std::nullopt : store_.plan_text();
   if (!text) return std::nullopt;
-  Facts plan = parse_facts(*text, store_.plan_path());
+  TileData plan = parse_facts(*text, store_.plan_path());
   if (plan.at("key") == key_) return plan;
   if (share_.count == 1) return std::nullopt;
   throw libmap::Error(
@@ -75,7 +75,7 @@ bool TileFolder::is_put_together() const {
 
 bool TileFolder::is_complete() const {
   if (!is_put_together()) return false;
-  run_.say("all tiles are complete");
+  run_.info("all tiles are complete");
   return true;
 }
 
@@ -90,13 +90,13 @@ void TileFolder::resumable(const Step& step) {
   }
 }
 
-TileFolder::Facts TileFolder::begin(const std::function<Facts()>& find) {
+TileFolder::TileData TileFolder::begin(const std::function<TileData()>& find) {
   if (run_.options().dry_run) return {};
-  resumable([&] { journal_.emplace(store_.begin(share_, [&] { agree_on_plan(find); })); });
+  resumable([&] { journal_.emplace(store_.begin(share_, [&] { check_plan(find); })); });
   return common_;
 }
 
-void TileFolder::agree_on_plan(const std::function<Facts()>& find) {
+void TileFolder::check_plan(const std::function<TileData()>& find) {
   if (const auto earlier = earlier_plan()) {
     common_ = earlier->at("common");
     return;
@@ -104,21 +104,21 @@ void TileFolder::agree_on_plan(const std::function<Facts()>& find) {
   store_.require_idle();
   store_.clear();
   common_ = find();
-  store_.write_plan(Facts{{"key", key_}, {"common", common_}}.dump());
+  store_.write_plan(TileData{{"key", key_}, {"common", common_}}.dump());
 }
 
 void TileFolder::find_done() {
   done_.clear();
   store_.each_line([this](const std::string& text, const libmap::TileStore::Line& line) {
-    const Facts facts = Facts::parse(text, nullptr, false);
-    if (facts.is_object() && facts.value("key", Facts()) == key_ && facts.contains("tile"))
+    const TileData facts = TileData::parse(text, nullptr, false);
+    if (facts.is_object() && facts.value("key", TileData()) == key_ && facts.contains("tile"))
       done_[json_text(facts.at("tile"))] = line;
   });
 }
 
 bool TileFolder::is_done(const std::string& tile) const { return done_.contains(json_text(tile)); }
 
-TileFolder::Facts TileFolder::facts(const std::string& tile) const {
+TileFolder::TileData TileFolder::facts(const std::string& tile) const {
   const libmap::TileStore::Line& line = done_.at(json_text(tile));
   return parse_facts(libmap::TileStore::read_line(line), line.journal);
 }
@@ -128,7 +128,7 @@ void TileFolder::make(const Work& work) {
   if (!journal_) begin();
   resumable([&] {
     run_.timed("tiles", [&] { make_missing(work); });
-    put_together(work);
+    assemble(work);
   });
 }
 
@@ -141,7 +141,7 @@ void TileFolder::make_missing(const Work& work) {
   run_.progress().begin("tiles", missing.size());
   for (const std::size_t n : missing) {
     libmap::OutputFile tile(file(work.tiles[n], work.extension));
-    Facts facts = work.make(n, tile.temporary_path());
+    TileData facts = work.make(n, tile.temporary_path());
     if (fs::file_size(tile.temporary_path()) > 0) tile.commit();
     facts["key"] = key_;
     facts["tile"] = work.tiles[n];
@@ -151,20 +151,20 @@ void TileFolder::make_missing(const Work& work) {
   run_.progress().end();
 }
 
-void TileFolder::put_together(const Work& work) {
+void TileFolder::assemble(const Work& work) {
   find_done();
   const auto done = static_cast<std::size_t>(
       std::count_if(work.tiles.begin(), work.tiles.end(),
                     [this](const std::string& tile) { return is_done(tile); }));
   // Another share may have been the last one too and may have removed the store.
   if (done < work.tiles.size() && !is_put_together())
-    return run_.say("{} of {} tiles are complete", done, work.tiles.size());
+    return run_.info("{} of {} tiles are complete", done, work.tiles.size());
   if (share_.count > 1) {
     try {
       run_.claim_output_tree(output_, names_, inputs_);
     } catch (const libmap::Error& error) {
       if (error.kind() != libmap::ErrorKind::failed) throw;
-      return run_.say("another share completes the folder");
+      return run_.info("another share completes the folder");
     }
   }
   if (!is_put_together()) run_.write_output_tree(output_, names_, work.finish);

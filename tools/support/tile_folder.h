@@ -46,7 +46,7 @@ void require_folder_of_share(const std::string& output, const std::string& share
 
 class TileFolder {
  public:
-  using Facts = nlohmann::json;
+  using TileData = nlohmann::json;
 
   // Claims the folder `output` unless the run makes one of several shares. `names` and `inputs` are
   // those of Run::claim_output_tree. The manifest of `run` must have its parameters and inputs.
@@ -63,13 +63,13 @@ class TileFolder {
   // computes it by `find` while the others wait. Tiles of other parameters or inputs are deleted.
   // Throws Error for such tiles if the run is one of several shares or another process uses them,
   // and the errors of `find`.
-  Facts begin(const std::function<Facts()>& find = [] { return Facts::object(); });
+  TileData begin(const std::function<TileData()>& find = [] { return TileData::object(); });
 
   struct Work {
     std::vector<std::string> tiles;  // names of the tiles of all shares, without extension
     std::string extension;           // of their files
     // Writes the n-th tile to `to`, unless it is empty, and returns its data, a JSON object.
-    std::function<Facts(std::size_t n, const std::filesystem::path& to)> make;
+    std::function<TileData(std::size_t n, const std::filesystem::path& to)> make;
     // Fills the output with the finished tiles.
     std::function<void(const std::filesystem::path& folder)> finish;
   };
@@ -79,7 +79,7 @@ class TileFolder {
   void make(const Work& work);
 
   // Data and file of a finished tile, for Work::finish.
-  Facts facts(const std::string& tile) const;
+  TileData facts(const std::string& tile) const;
   std::filesystem::path file(const std::string& tile, const std::string& extension) const {
     return store_.tiles() / (tile + extension);
   }
@@ -89,13 +89,13 @@ class TileFolder {
  private:
   template <typename Step>
   void resumable(const Step& step);
-  std::optional<Facts> earlier_plan() const;
-  void agree_on_plan(const std::function<Facts()>& find);
+  std::optional<TileData> earlier_plan() const;
+  void check_plan(const std::function<TileData()>& find);
   void find_done();
   bool is_done(const std::string& tile) const;
   bool is_put_together() const;
   void make_missing(const Work& work);
-  void put_together(const Work& work);
+  void assemble(const Work& work);
   void remove_store() const;
 
   std::string output_;
@@ -105,7 +105,7 @@ class TileFolder {
   Run& run_;
   std::string key_;
   libmap::TileStore store_;
-  Facts common_;
+  TileData common_;
   std::optional<libmap::TileJournal> journal_;
   std::map<std::string, libmap::TileStore::Line> done_;  // by the tile's name in JSON
 };

@@ -71,9 +71,9 @@ TEST(ExpectedMap, CountsByHand) {
   EXPECT_DOUBLE_EQ(*result.regions[1].mean_score, 0.475);
   EXPECT_EQ(result.regions[2].voxels, 1U);
   // "no" is predicted graspable: one of its two voxels reaches the cutoff.
-  EXPECT_EQ(result.places.true_positives, 1U);
-  EXPECT_EQ(result.places.false_positives, 1U);
-  EXPECT_EQ(result.places.size(), 2U);
+  EXPECT_EQ(result.region_confusion.true_positives, 1U);
+  EXPECT_EQ(result.region_confusion.false_positives, 1U);
+  EXPECT_EQ(result.region_confusion.size(), 2U);
 }
 
 // As in all other counts, an obstacle is not graspable, even with the flag.
@@ -244,7 +244,7 @@ TEST(MapSummary, CountsByHand) {
   map.add_field("i", libmap::ScalarType::int32).values = {0, 1, 2, 3, 4};
   map.add_field("j", libmap::ScalarType::int32).values = {0, 0, 0, 0, 0};
   map.add_field("k", libmap::ScalarType::int32).values = {0, 0, 0, 0, -10};
-  libgtd::MapFacts facts;
+  libgtd::MapInfo facts;
   facts.zero_plane_m = 0.0;
   const auto summary =
       libgtd::summarize_map(map, libgtd::voxel_map_of(map, facts),

@@ -20,7 +20,7 @@ using graspmap_test::map_cloud;
 using graspmap_test::random_engine;
 using libgtd::GroundBin;
 using libgtd::MapAnalysis;
-using libgtd::MapFacts;
+using libgtd::MapInfo;
 using libgtd::ScoreBin;
 using libgtd::Voxel;
 using libgtd::VoxelMap;
@@ -60,14 +60,14 @@ TEST(VoxelMap, LatticeFromIndicesOrFromPlaces) {
       Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, 3).normalized()));
   const PointCloud turned = libmap::transform_cloud(graded_floor(), terrain_from_map.inverse());
   for (const bool known : {true, false}) {
-    MapFacts facts{.terrain_from_map = terrain_from_map};
+    MapInfo facts{.terrain_from_map = terrain_from_map};
     if (known) facts.lattice = lattice;
     EXPECT_EQ(libgtd::voxel_map_of(turned, facts).voxels, fitted.voxels);
   }
 }
 
 TEST(VoxelMap, HostileMapsAreSaid) {
-  const auto field_of = [](PointCloud cloud, const MapFacts& facts = {}) {
+  const auto field_of = [](PointCloud cloud, const MapInfo& facts = {}) {
     return error_of([&] { libgtd::voxel_map_of(cloud, facts); }).context().field;
   };
   PointCloud plain;
@@ -127,9 +127,9 @@ TEST(VoxelMap, LatticesThatAreNotFinite) {
     libmap::Manifest manifest;
     manifest.parameters = {{"voxel_size_m", 0.01}};
     manifest.results = {{"lattice_origin_m", origin}};
-    EXPECT_TRUE(is_error(error_of([&] { libgtd::facts_of(manifest); }),
+    EXPECT_TRUE(is_error(error_of([&] { libgtd::map_info(manifest); }),
                          {.field = "lattice_origin_m or voxel_size_m"}));
-    MapFacts facts;
+    MapInfo facts;
     facts.lattice = libgtd::VoxelLattice{{origin[0], origin[1], origin[2]}, 0.01};
     EXPECT_TRUE(
         is_error(error_of([&] { libgtd::voxel_map_of(map, facts); }), {.field = "point 1"}));

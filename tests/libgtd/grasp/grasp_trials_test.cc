@@ -267,7 +267,7 @@ TEST(GraspTrials, ATrialIsRepeated) {
   const libgtd::Ground ground(mesh);
   for (const LocationResult& result : test_on(mesh, places, options)) {
     const libgtd::Trial trial = libgtd::repeat_trial(ground, gripper(), result.location, options,
-                                                     result.shown_pose, result.shown_draw);
+                                                     result.median_pose, result.median_draw);
     EXPECT_NEAR(trial.force_n, result.force_n[1], 1e-9);
     EXPECT_EQ(trial.end == TrialEnd::holds, trial.force_n >= options.load_n);
   }
@@ -343,8 +343,8 @@ TEST(GraspTrials, SequentialVerdictsAreTheFullOnes) {
       const auto [low, high] = libgtd::wilson_interval(early[n].hold_probability, poses, 1.645);
       EXPECT_TRUE(low > 0.5 || high < 0.5);
     }
-    EXPECT_LT(early[n].shown_pose, 32);
-    EXPECT_LT(early[n].shown_draw, 8);
+    EXPECT_LT(early[n].median_pose, 32);
+    EXPECT_LT(early[n].median_draw, 8);
   }
   EXPECT_GE(agree, 59);
   EXPECT_LT(trials, 60u * 30u);

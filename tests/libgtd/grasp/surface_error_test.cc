@@ -80,7 +80,7 @@ TEST(SurfaceError, DisplacesAlongTheNormalByTheError) {
   std::array<double, 2> squares{};
   std::array<int, 2> counts{};
   for (std::uint64_t key = 0; key < 300; ++key) {
-    const GroundPatch drawn = libgtd::displaced(patch, 0.02, 1, key);
+    const GroundPatch drawn = libgtd::displace_vertices(patch, 0.02, 1, key);
     ASSERT_EQ(drawn.triangles, patch.triangles);
     for (std::size_t n = 0; n < patch.vertices.size(); ++n) {
       const Eigen::Vector3d moved = drawn.vertices[n] - patch.vertices[n];

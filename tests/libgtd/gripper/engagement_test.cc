@@ -54,7 +54,7 @@ TEST(Engagement, QuantilesFillTheCube) {
 TEST(Engagement, SetsAreDrawnByTheirWeights) {
   const std::vector<libgtd::ParameterSet> sets = {{0.1, {}}, {0.0, {}}, {0.6, {}}, {0.3, {}}};
   std::array<int, 4> counts{};
-  for (int n = 0; n < 1000; ++n) ++counts[set_at(sets, (n + 0.5) / 1000)];
+  for (int n = 0; n < 1000; ++n) ++counts[parameter_set_at(sets, (n + 0.5) / 1000)];
   EXPECT_EQ(counts, (std::array<int, 4>{100, 0, 600, 300}));
 }
 

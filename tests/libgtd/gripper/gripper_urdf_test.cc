@@ -27,7 +27,7 @@ std::string replaced(std::string text, const std::string& old, const std::string
 
 std::map<std::string, double> measures(const std::string& xml, const UrdfMapping& mapping) {
   std::map<std::string, double> values;
-  for (const auto& [key, text] : libgtd::measures_of_urdf(xml, mapping))
+  for (const auto& [key, text] : libgtd::read_urdf_dimensions(xml, mapping))
     values[key] = libmap::parse_double(text).value();
   return values;
 }

@@ -127,7 +127,7 @@ TEST(ClosingForce, LevelGround) {
   const Gripper gripper = known();
   const ClosingPath path = libgtd::make_closing_path(gripper, 0.01, 5);
   double depth = 0.0;
-  for (const ClosingPath::Place& place : path.open) depth = std::max(depth, place.depth_m);
+  for (const ClosingPath::PathPoint& point : path.open) depth = std::max(depth, point.depth_m);
   EXPECT_NEAR(depth, (40 * std::cos(85 * degree) + 41 * std::cos(65 * degree)) / 1000, 1e-12);
   double c = path.pulls.at(0)[0];
   c /= std::sqrt(1 + c * c / (0.55 * 0.55));
@@ -278,10 +278,10 @@ SlowColumn slow_column(const std::map<std::pair<int, int>, double>& heights, con
       if (0.01 * std::hypot(i, j) <= path.palm_radius_m)
         palm = std::max(palm, at(pivot.i + i, pivot.j + j));
   for (int a = 0; a < 16; ++a)
-    for (const ClosingPath::Place& place : path.open) {
+    for (const ClosingPath::PathPoint& point : path.open) {
       const double angle = a * std::numbers::pi / 8;
-      palm = std::max(palm, place.depth_m + at(pivot.i + offset(place.radius_m * std::cos(angle)),
-                                               pivot.j + offset(place.radius_m * std::sin(angle))));
+      palm = std::max(palm, point.depth_m + at(pivot.i + offset(point.radius_m * std::cos(angle)),
+                                               pivot.j + offset(point.radius_m * std::sin(angle))));
     }
   std::vector<double> contacts(16, 0);
   std::vector<double> pulls(16, 0);
@@ -290,11 +290,11 @@ SlowColumn slow_column(const std::map<std::pair<int, int>, double>& heights, con
   double touching = 0;
   for (int a = 0; a < 16; ++a) {
     const double angle = a * std::numbers::pi / 8;
-    for (const ClosingPath::Place& place : path.closing) {
-      const int i = pivot.i + offset(place.radius_m * std::cos(angle));
-      const int j = pivot.j + offset(place.radius_m * std::sin(angle));
-      if (at(i, j) <= palm - place.depth_m + 1e-5) continue;
-      if (place.has_spines) {
+    for (const ClosingPath::PathPoint& point : path.closing) {
+      const int i = pivot.i + offset(point.radius_m * std::cos(angle));
+      const int j = pivot.j + offset(point.radius_m * std::sin(angle));
+      if (at(i, j) <= palm - point.depth_m + 1e-5) continue;
+      if (point.has_spines) {
         const auto slope = [&](double low, double high) {
           return low < -1e8 || high < -1e8 ? 0.0 : (high - low) / 0.02;
         };
@@ -304,7 +304,7 @@ SlowColumn slow_column(const std::map<std::pair<int, int>, double>& heights, con
         const auto fall_deg = static_cast<int>(std::lround(std::atan(fall) / degree));
         pulls[static_cast<std::size_t>(a)] = path.pulls.at(fall_deg)[0];
         pushes[static_cast<std::size_t>(a)] = path.pulls.pushes[0] * std::cos(std::atan(fall));
-        moment += place.depth_m * Eigen::Vector2d(std::cos(angle), std::sin(angle));
+        moment += point.depth_m * Eigen::Vector2d(std::cos(angle), std::sin(angle));
         touching += 1;
       }
       break;

@@ -73,12 +73,12 @@ TEST(MapDownsampling, PointsComeToTheMiddleOfTheirSquares) {
   libgtd::TileStoreIndex index;
   index.lattice = {{1, 2, 3}, 0.1};
   PointCloud map = map_of({{-1, 5, 2}});
-  libgtd::center_in_squares(index, 4, map);
+  libgtd::snap_to_squares(index, 4, map);
   EXPECT_TRUE(map.positions[0].isApprox(Eigen::Vector3d(0.8, 2.6, 3.25), 1e-12));
   index.frame = libgtd::MapFrame::input;
   const libmap::Pose terrain_from_input = libmap::make_pose_from_rpy({1, 0, 0}, {0, 0, 90});
   index.manifest.transforms.emplace_back("terrain_from_input", terrain_from_input);
-  libgtd::center_in_squares(index, 4, map);
+  libgtd::snap_to_squares(index, 4, map);
   EXPECT_TRUE(
       (terrain_from_input * map.positions[0]).isApprox(Eigen::Vector3d(0.8, 2.6, 3.25), 1e-12));
 }
@@ -89,12 +89,12 @@ TEST(MapDownsampling, InCubesSteepFacesStay) {
   for (int k = -3; k < 6; ++k) wall.push_back({1, 1, k});
   wall.push_back({2, 1, 4});
   const PointCloud map = map_of(wall);
-  EXPECT_EQ(voxels_in(libgtd::thin_map_in_cubes(map, 3)),
+  EXPECT_EQ(voxels_in(libgtd::voxel_downsample_map(map, 3)),
             (std::vector<Voxel>{{1, 1, -2}, {1, 1, 1}, {1, 1, 4}}));
   // The upper of two equally near points.
-  EXPECT_EQ(voxels_in(libgtd::thin_map_in_cubes(map_of({{1, 1, 0}, {1, 1, 2}}), 3)),
+  EXPECT_EQ(voxels_in(libgtd::voxel_downsample_map(map_of({{1, 1, 0}, {1, 1, 2}}), 3)),
             (std::vector<Voxel>{{1, 1, 2}}));
-  EXPECT_EQ(voxels_in(libgtd::thin_map_in_cubes(map, 1)), voxels_in(map));
+  EXPECT_EQ(voxels_in(libgtd::voxel_downsample_map(map, 1)), voxels_in(map));
 }
 
 }  // namespace map_downsampling_test

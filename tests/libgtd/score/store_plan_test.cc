@@ -34,7 +34,7 @@ TEST(StorePlan, FilesThatTouchARectangle) {
   const auto touches_at = [&](double x, double y) {
     file.box.min = Eigen::Vector3d(x, y, -1);
     file.box.max = Eigen::Vector3d(x + 0.5, y + 0.5, 1);
-    return touches(file, rectangle, frame);
+    return may_intersect(file, rectangle, frame);
   };
   EXPECT_TRUE(touches_at(0.2, 0.2));
   EXPECT_TRUE(touches_at(-0.505, 2.005));
@@ -44,7 +44,7 @@ TEST(StorePlan, FilesThatTouchARectangle) {
   EXPECT_FALSE(touches_at(0.2, 2.02));
   file.box.min = Eigen::Vector3d::Constant(-1e300);
   file.box.max = Eigen::Vector3d::Constant(1e300);
-  EXPECT_TRUE(touches(file, rectangle, frame));
+  EXPECT_TRUE(may_intersect(file, rectangle, frame));
   // In the terrain frame.
   frame.plane = RegressionPlane{};
   frame.plane->centroid.x() = -5.0;

@@ -143,7 +143,7 @@ TEST(Edges, OfAWideTileWithLittleGround) {
   const auto pivots = pivots_in(grid, mask, box);
   const auto edges = find_edges(grid, mask, box, pivots);
   const ColumnSums unscanned =
-      unscanned_columns(grid, grown(box, mask.pivot_xy, mask.side - mask.pivot_xy - 1));
+      unscanned_columns(grid, expanded(box, mask.pivot_xy, mask.side - mask.pivot_xy - 1));
   ASSERT_EQ(edges.size(), pivots.size());
   std::size_t flagged = 0;
   for (std::size_t n = 0; n < pivots.size(); ++n) {

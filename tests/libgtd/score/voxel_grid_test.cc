@@ -81,7 +81,7 @@ TEST(Voxelize, BadSizesAreErrorsThatSayHowMuchMemory) {
 TEST(Downsampling, AveragesThePointsOfACell) {
   const std::vector<Eigen::Vector3f> points = {
       {0.001F, 0.001F, 0.001F}, {0.003F, 0.005F, 0.001F}, {0.015F, 0.001F, 0.001F}};
-  const auto centroids = libgtd::thin_to_centroids(points, 0.01);
+  const auto centroids = libgtd::voxel_centroids(points, 0.01);
   ASSERT_EQ(centroids.size(), 2U);
   EXPECT_FLOAT_EQ(centroids[0].x(), 0.002F);
   EXPECT_FLOAT_EQ(centroids[0].y(), 0.003F);
@@ -90,12 +90,12 @@ TEST(Downsampling, AveragesThePointsOfACell) {
 
 // Boxes with few voxels and with too many for numbers of 64 bits.
 TEST(CountLone, LooksAtAll26Neighbors) {
-  using libgtd::count_lone;
-  EXPECT_EQ(count_lone({}), 0U);
-  EXPECT_EQ(count_lone({{0, 0, 0}}), 1U);
-  EXPECT_EQ(count_lone({{0, 0, 0}, {1, 1, 1}}), 0U);
-  EXPECT_EQ(count_lone({{0, 0, 0}, {1, -1, 1}, {3, 0, 0}}), 1U);
-  EXPECT_EQ(count_lone({{0, 0, 0}, {0, 0, 2}, {0, 2, 0}, {2, 0, 0}}), 4U);
+  using libgtd::count_isolated;
+  EXPECT_EQ(count_isolated({}), 0U);
+  EXPECT_EQ(count_isolated({{0, 0, 0}}), 1U);
+  EXPECT_EQ(count_isolated({{0, 0, 0}, {1, 1, 1}}), 0U);
+  EXPECT_EQ(count_isolated({{0, 0, 0}, {1, -1, 1}, {3, 0, 0}}), 1U);
+  EXPECT_EQ(count_isolated({{0, 0, 0}, {0, 0, 2}, {0, 2, 0}, {2, 0, 0}}), 4U);
 }
 
 TEST(Voxelize, SortsVoxelsOfAnyBox) {
@@ -166,7 +166,7 @@ TEST(Downsampling, CellsOfAnyBoxInOrder) {
              static_cast<int>(std::floor(p.y() * inverse)),
              static_cast<int>(std::floor(p.x() * inverse))}]
           .push_back(p);
-    const auto centroids = libgtd::thin_to_centroids(points, 0.02);
+    const auto centroids = libgtd::voxel_centroids(points, 0.02);
     ASSERT_EQ(centroids.size(), cells.size());
     auto centroid = centroids.begin();
     for (const auto& [cell, members] : cells) {

@@ -146,10 +146,10 @@ TEST(NearConvex, CloserThanTheDistanceNotAtIt) {
 
 TEST(NearConvex, EmptyAndNotFinite) {
   EXPECT_TRUE(mark_near_convex({}, {{0, 0, 0}}, 1).empty());
-  const std::vector<Vector3d> places{{0, 0, 0}, {nan, 0, 0}, {1e300, 0, 0}};
-  EXPECT_THAT(mark_near_convex(places, {}, 1), testing::Each(0));
-  EXPECT_THAT(mark_near_convex(places, {{nan, 0, 0}}, 1), testing::Each(0));
-  EXPECT_THAT(mark_near_convex(places, {{0, 0, 0.1}, {0, nan, 0}}, 1),
+  const std::vector<Vector3d> coordinates{{0, 0, 0}, {nan, 0, 0}, {1e300, 0, 0}};
+  EXPECT_THAT(mark_near_convex(coordinates, {}, 1), testing::Each(0));
+  EXPECT_THAT(mark_near_convex(coordinates, {{nan, 0, 0}}, 1), testing::Each(0));
+  EXPECT_THAT(mark_near_convex(coordinates, {{0, 0, 0.1}, {0, nan, 0}}, 1),
               testing::ElementsAre(1, 0, 0));
 }
 

@@ -258,10 +258,10 @@ TEST(Curvature, DuplicatesOfAllPointsChangeNothing) {
 
 // Each query alone is unaware of coincident points.
 TEST(Curvature, OfManyPointsInOnePlaceEachAsByItself) {
-  PointCloud places = surface(200, 0.2, [](double x, double y) { return x * x - 2 * x * y; });
+  PointCloud coordinates = surface(200, 0.2, [](double x, double y) { return x * x - 2 * x * y; });
   PointCloud cloud;
   for (std::size_t n = 0; n < 800; ++n) {
-    cloud.positions.push_back(places.positions[n < 400 ? n / 2 : n % 200]);
+    cloud.positions.push_back(coordinates.positions[n < 400 ? n / 2 : n % 200]);
     const float side = n % 3 == 0 ? -1.0F : 1.0F;
     cloud.normals.emplace_back(0.0F, n % 7 == 0 ? side : 0.0F, n % 7 == 0 ? 0.0F : side);
   }

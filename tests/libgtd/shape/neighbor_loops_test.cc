@@ -33,7 +33,7 @@ struct Columns {
   }
 };
 
-NeighborLoops::Places places_of(Columns<double>& columns) {
+NeighborLoops::Coordinates places_of(Columns<double>& columns) {
   return {columns.axes[0].data(), columns.axes[1].data(), columns.axes[2].data()};
 }
 

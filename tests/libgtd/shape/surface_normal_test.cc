@@ -75,15 +75,15 @@ TEST(SurfaceNormal, IsTheRadiusOfABall) {
     if (way.norm() > 1 || way.norm() < 0.1) continue;
     ball.positions.push_back(0.3 * way.normalized());
   }
-  std::vector<Vector3d> places;
+  std::vector<Vector3d> coordinates;
   std::vector<Vector3f> outsides;
   for (std::size_t n = 0; n < ball.size(); n += 50) {
-    places.push_back(ball.positions[n]);
+    coordinates.push_back(ball.positions[n]);
     outsides.push_back(ball.positions[n].cast<float>());
   }
-  const auto found = fit_surface_normals(ball, places, outsides, {.radius_m = 0.07});
-  for (std::size_t n = 0; n < places.size(); ++n)
-    EXPECT_GT(found[n].normal.cast<double>().dot(places[n].normalized()), std::cos(0.03));
+  const auto found = fit_surface_normals(ball, coordinates, outsides, {.radius_m = 0.07});
+  for (std::size_t n = 0; n < coordinates.size(); ++n)
+    EXPECT_GT(found[n].normal.cast<double>().dot(coordinates[n].normalized()), std::cos(0.03));
 }
 
 TEST(SurfaceNormal, DependsOnNothingFartherOff) {

@@ -89,10 +89,10 @@ TEST(ThesisCurvature, IsPclsOwnWhereTheRadiusIsFarLargerThanTheCloud) {
 
 // A few positions with many points each, in sequence and mixed.
 TEST(ThesisCurvature, IsPclsOwnOfManyPointsInFewPlaces) {
-  libmap::PointCloud places = random_surface(60);
+  libmap::PointCloud coordinates = random_surface(60);
   libmap::PointCloud cloud;
   for (std::size_t n = 0; n < 600; ++n)
-    cloud.positions.push_back(places.positions[n < 300 ? n / 5 : n % 60]);
+    cloud.positions.push_back(coordinates.positions[n < 300 ? n / 5 : n % 60]);
   expect_pcls_own(cloud, 0.3);
 }
 

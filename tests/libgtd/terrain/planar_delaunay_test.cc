@@ -23,9 +23,9 @@ using Triangles = std::vector<std::array<Corner, 3>>;
 constexpr std::size_t one_strip = 1'000'000;
 
 // Sorted by position, so that the order of the points has no effect.
-Triangles triangles_of(const Points& points, std::size_t points_a_strip) {
+Triangles triangles_of(const Points& points, std::size_t points_per_strip) {
   Triangles triangles;
-  for (const auto& corners : triangulate_in_plane(points, points_a_strip).triangles) {
+  for (const auto& corners : triangulate_in_plane(points, points_per_strip).triangles) {
     std::array<Corner, 3> one;
     for (std::size_t a = 0; a < 3; ++a) one[a] = {points[corners[a]].x(), points[corners[a]].y()};
     EXPECT_EQ(one[0], *std::min_element(one.begin(), one.end()));
@@ -53,8 +53,8 @@ Points lattice(int columns, int rows) {
 
 void expect_same_in_strips(const Points& points) {
   const Triangles whole = triangles_of(points, one_strip);
-  for (const std::size_t points_a_strip : {1u, 2u, 3u, 10u, 57u, 200u, 1000u})
-    ASSERT_EQ(triangles_of(points, points_a_strip), whole) << points_a_strip;
+  for (const std::size_t points_per_strip : {1u, 2u, 3u, 10u, 57u, 200u, 1000u})
+    ASSERT_EQ(triangles_of(points, points_per_strip), whole) << points_per_strip;
 }
 
 // Twice the area, and a test whether `p` is inside the circle of a, b, c (counterclockwise).
@@ -74,8 +74,8 @@ double in_circle(const Vector3d& a, const Vector3d& b, const Vector3d& c, const 
 // Tests every point against every triangle.
 TEST(PlanarDelaunay, NoPointLiesInATrianglesCircumcircleAndTheHullIsFilled) {
   const Points points = scattered(300);
-  for (const std::size_t points_a_strip : {30u, 100u, 1000u}) {
-    const PlanarTriangulation made = triangulate_in_plane(points, points_a_strip);
+  for (const std::size_t points_per_strip : {30u, 100u, 1000u}) {
+    const PlanarTriangulation made = triangulate_in_plane(points, points_per_strip);
     EXPECT_EQ(made.vertices, points.size());
     std::set<std::uint32_t> used;
     double area = 0;
@@ -151,10 +151,10 @@ TEST(PlanarDelaunay, NeitherOrderNorThreadsMatter) {
 }
 
 TEST(PlanarDelaunay, OfPointsInOnePlaceTheHighestIsACorner) {
-  for (const std::size_t points_a_strip : {2u, 1000u}) {
+  for (const std::size_t points_per_strip : {2u, 1000u}) {
     Points points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}};
     for (const double z : {-1.0, 2.0, 1.0}) points.emplace_back(0.25, 0.5, z);
-    const PlanarTriangulation made = triangulate_in_plane(points, points_a_strip);
+    const PlanarTriangulation made = triangulate_in_plane(points, points_per_strip);
     EXPECT_EQ(made.vertices, 5u);
     EXPECT_EQ(made.triangles.size(), 4u);
     for (const auto& corners : made.triangles)
@@ -163,13 +163,13 @@ TEST(PlanarDelaunay, OfPointsInOnePlaceTheHighestIsACorner) {
 }
 
 TEST(PlanarDelaunay, PointsOnALineHaveNoTriangles) {
-  for (const std::size_t points_a_strip : {1u, 3u, 1000u}) {
-    EXPECT_TRUE(triangulate_in_plane({}, points_a_strip).triangles.empty());
-    EXPECT_TRUE(triangulate_in_plane({{1, 2, 3}, {4, 5, 6}}, points_a_strip).triangles.empty());
+  for (const std::size_t points_per_strip : {1u, 3u, 1000u}) {
+    EXPECT_TRUE(triangulate_in_plane({}, points_per_strip).triangles.empty());
+    EXPECT_TRUE(triangulate_in_plane({{1, 2, 3}, {4, 5, 6}}, points_per_strip).triangles.empty());
     EXPECT_TRUE(
-        triangulate_in_plane(Points(50, Vector3d(1, 2, 3)), points_a_strip).triangles.empty());
-    EXPECT_TRUE(triangulate_in_plane(lattice(1, 40), points_a_strip).triangles.empty());
-    EXPECT_TRUE(triangulate_in_plane(lattice(40, 1), points_a_strip).triangles.empty());
+        triangulate_in_plane(Points(50, Vector3d(1, 2, 3)), points_per_strip).triangles.empty());
+    EXPECT_TRUE(triangulate_in_plane(lattice(1, 40), points_per_strip).triangles.empty());
+    EXPECT_TRUE(triangulate_in_plane(lattice(40, 1), points_per_strip).triangles.empty());
   }
 }
 

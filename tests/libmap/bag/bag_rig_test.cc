@@ -114,7 +114,7 @@ TEST(BagRig, EncodingsOfDepth) {
       ElementsAre(
           ElementsAre(3000, 3000, 3000, 3000, 3010, 3010, 3010, 3010, 3020, 3020, 3020, 3020),
           ElementsAre(15000, 0, 0, 0, 0, 1, 65534, 0, 0, 1000, 2000, 3000), testing::Each(65535)));
-  EXPECT_EQ(libmap::export_bag_rig(bag_path(), fine, {}).pixels_beyond, 2U);
+  EXPECT_EQ(libmap::export_bag_rig(bag_path(), fine, {}).overflow_pixels, 2U);
   // Units of the bag's 16-bit images other than millimeters are kept.
   EXPECT_EQ(images_of(plan({.depth_unit_m = 0.00025}), "a")[0][0], 300);
 }
@@ -236,7 +236,7 @@ TEST(BagRig, SetsAreChosen) {
   EXPECT_EQ(second.images.size(), 5U);
   EXPECT_EQ(second.all_sets, 5U);
   EXPECT_EQ(images_of(second, "a").size(), 3U);
-  EXPECT_THAT(graspmap_test::read_text(scratch_folder() / "rig" / "moments.csv"),
+  EXPECT_THAT(graspmap_test::read_text(scratch_folder() / "rig" / "synchronized_sets.csv"),
               HasSubstr("stamp_s,cameras,spread_s\n5.000000,2,0.012000\n5.200000,1,0.000000\n"));
   const BagRigPlan one = plan({}, 5.28);
   ASSERT_EQ(one.sets.size(), 1U);

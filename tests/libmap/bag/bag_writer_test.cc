@@ -19,7 +19,7 @@ using graspmap_test::read_text;
 using graspmap_test::scratch_folder;
 using libmap::BagContent;
 using libmap::BagFormat;
-using libmap::BagPlaces;
+using libmap::BagTargets;
 
 fs::path bag_path() { return scratch_folder() / "a.bag"; }
 
@@ -34,16 +34,16 @@ std::map<std::string, std::string> messages_of(const fs::path& path) {
   return messages;
 }
 
-BagPlaces places() {
-  BagPlaces result{"/footholds", "/foothold_poses", "terrain", 0.08, {}};
-  result.places = {{{1, 2, 3}, {0, 0, -1}, {255, 0, 51}, "1: 0.98"},
-                   {{0, 0, 0}, {0, 2, 0}, {0, 100, 0}, "2: 0.91"},
-                   {{4, 5, 6}, {3, -1, -2}, {0, 100, 0}, "3: 0.90"}};
+BagTargets targets() {
+  BagTargets result{"/footholds", "/foothold_poses", "terrain", 0.08, {}};
+  result.targets = {{{1, 2, 3}, {0, 0, -1}, {255, 0, 51}, "1: 0.98"},
+                    {{0, 0, 0}, {0, 2, 0}, {0, 100, 0}, "2: 0.91"},
+                    {{4, 5, 6}, {3, -1, -2}, {0, 100, 0}, "3: 0.90"}};
   return result;
 }
 
 TEST(BagWriter, PosesPointAlongTheDirection) {
-  libmap::write_bag(bag_path(), BagFormat::ros1, {.stamp_s = 2.0, .places = {places()}});
+  libmap::write_bag(bag_path(), BagFormat::ros1, {.stamp_s = 2.0, .targets = {targets()}});
   const auto poses = rm::decode<rm::PoseArray>(messages_of(bag_path()).at("/foothold_poses"));
   EXPECT_EQ(rm::from_ros(poses.header.frame_id), "terrain");
   EXPECT_EQ(poses.header.stamp, ros::Time(2.0));
@@ -53,7 +53,7 @@ TEST(BagWriter, PosesPointAlongTheDirection) {
     const Eigen::Quaterniond rotation(q.w, q.x, q.y, q.z);
     EXPECT_NEAR(rotation.norm(), 1.0, 1e-12);
     EXPECT_TRUE((rotation * Eigen::Vector3d::UnitX())
-                    .isApprox(places().places[n].direction.normalized(), 1e-12));
+                    .isApprox(targets().targets[n].direction.normalized(), 1e-12));
     // The y axis is the frame's, made perpendicular to the x axis.
     if (n != 1) {
       EXPECT_GT((rotation * Eigen::Vector3d::UnitY()).y(), 0.9);
@@ -63,7 +63,7 @@ TEST(BagWriter, PosesPointAlongTheDirection) {
 }
 
 TEST(BagWriter, MarkersStandAtThePlaces) {
-  libmap::write_bag(bag_path(), BagFormat::ros1, {.places = {places()}});
+  libmap::write_bag(bag_path(), BagFormat::ros1, {.targets = {targets()}});
   const auto markers = rm::decode<rm::MarkerArray>(messages_of(bag_path()).at("/footholds"));
   ASSERT_EQ(markers.markers.size(), 7U);  // the balls; an arrow and a text each
   const rm::Marker& balls = markers.markers[0];
@@ -89,7 +89,7 @@ TEST(BagWriter, MarkersStandAtThePlaces) {
 }
 
 TEST(BagWriter, SameContentSameBytes) {
-  BagContent content{.stamp_s = 1600000000.123456, .places = {places()}};
+  BagContent content{.stamp_s = 1600000000.123456, .targets = {targets()}};
   content.transforms = {{"terrain", "base_link", libmap::Pose::Identity()}};
   content.clouds = {{"/map", "terrain", {}}};
   using libmap::BagCompression;
@@ -117,7 +117,7 @@ TEST(BagWriter, WhatRosCannotHoldIsSaid) {
         }),
         {.field = "topic", .value = topic}));
   const libmap::Error full =
-      error_of([] { libmap::write_bag("/dev/full", BagFormat::ros1, {.places = {places()}}); });
+      error_of([] { libmap::write_bag("/dev/full", BagFormat::ros1, {.targets = {targets()}}); });
   EXPECT_EQ(full.kind(), libmap::ErrorKind::failed);
 }
 

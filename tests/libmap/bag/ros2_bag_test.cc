@@ -194,11 +194,11 @@ BagContent sample_content() {
   BagContent content{.stamp_s = 1600000000.25};
   content.transforms = {{"map", "terrain", libmap::make_pose_from_rpy({1, 2, 3}, {0, 0, 1})}};
   content.clouds = {{"/map", "terrain", small_cloud()}};
-  content.places = {{"/footholds",
-                     "/foothold_poses",
-                     "terrain",
-                     0.08,
-                     {{{1, 2, 3}, {0, 0, -1}, {255, 0, 51}, "1: 0.98"}}}};
+  content.targets = {{"/footholds",
+                      "/foothold_poses",
+                      "terrain",
+                      0.08,
+                      {{{1, 2, 3}, {0, 0, -1}, {255, 0, 51}, "1: 0.98"}}}};
   libmap::BagGrid grid{"/grid", "/occupancy", "terrain", 0.5, {-1, 2}, 3, 2, {}, {}};
   grid.layers = {{"elevation", {0, 1, 2, 3, 4, std::nanf("")}}};
   grid.occupancy = {0.0F, 0.25F, 1.0F, 0.5F, 0.0F, std::nanf("")};

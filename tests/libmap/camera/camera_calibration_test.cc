@@ -8,7 +8,7 @@
 #include <opencv2/calib3d.hpp>
 #include <random>
 
-#include "tests/support/chessboard_picture.h"
+#include "tests/support/chessboard_image.h"
 #include "tests/support/test_support.h"
 
 namespace camera_calibration_test {
@@ -20,7 +20,7 @@ using graspmap_test::is_error;
 using graspmap_test::PaintedBoard;
 using graspmap_test::photographed;
 using graspmap_test::random_engine;
-using libmap::BoardPicture;
+using libmap::BoardImage;
 using libmap::Camera;
 using libmap::CameraCalibrationOptions;
 using libmap::CameraCalibrationResult;
@@ -60,25 +60,25 @@ std::vector<Lens> lenses() {
            kinect(DistortionModel::equidistant, {0.05, -0.02, 0.01, -0.003})}};
 }
 
-// Corners where they are, with Gaussian noise: no picture is painted.
-std::vector<BoardPicture> noisy_corners(const Camera& camera, const std::vector<Pose>& poses,
-                                        double sigma_px) {
+// Corners where they are, with Gaussian noise: no image is painted.
+std::vector<BoardImage> noisy_corners(const Camera& camera, const std::vector<Pose>& poses,
+                                      double sigma_px) {
   Camera one_pixel = camera;  // the painter's rays are not wanted
   one_pixel.width = one_pixel.height = 1;
   const ChessboardPainter painter(one_pixel, 1);
   std::normal_distribution<double> error(0.0, 1.0);
-  std::vector<BoardPicture> pictures;
+  std::vector<BoardImage> images;
   for (const Pose& pose : poses) {
-    BoardPicture picture;
-    picture.name = "picture " + std::to_string(pictures.size());
+    BoardImage image;
+    image.name = "picture " + std::to_string(images.size());
     for (const Eigen::Vector2d& corner : painter.corners({}, pose)) {
       const double dx = sigma_px * error(random_engine());
       const double dy = sigma_px * error(random_engine());
-      picture.corners.emplace_back(corner.x() + dx, corner.y() + dy);
+      image.corners.emplace_back(corner.x() + dx, corner.y() + dy);
     }
-    pictures.push_back(picture);
+    images.push_back(image);
   }
-  return pictures;
+  return images;
 }
 
 std::vector<double> values_of(const Camera& camera) {
@@ -101,7 +101,7 @@ TEST(CameraCalibration, ExactCornersGiveTheCamera) {
     EXPECT_NEAR(result.camera.cy, lens.camera.cy, 0.01) << lens.name;
     EXPECT_EQ(result.camera.distortion.size(), lens.camera.distortion.size());
     for (std::size_t n = 0; n < poses.size(); ++n)
-      EXPECT_LT((result.pictures[n].camera_from_board.matrix() - poses[n].matrix()).norm(), 1e-4)
+      EXPECT_LT((result.images[n].camera_from_board.matrix() - poses[n].matrix()).norm(), 1e-4)
           << lens.name;
   }
 }
@@ -133,16 +133,16 @@ TEST(CameraCalibration, DeviationsAreThoseOfRepeatedCalibrations) {
 
 TEST(CameraCalibration, DeviationsAreOpenCvsButForTheNumberOfMeasurements) {
   const Lens lens = lenses()[1];
-  const auto pictures = noisy_corners(lens.camera, board_poses(lens.camera, {}, 12, 45), 0.2);
-  const CameraCalibrationResult result = calibrate_camera(pictures, 512, 424);
-  std::vector<std::vector<cv::Point3f>> boards(pictures.size());
-  std::vector<std::vector<cv::Point2f>> corners(pictures.size());
-  for (std::size_t n = 0; n < pictures.size(); ++n)
+  const auto images = noisy_corners(lens.camera, board_poses(lens.camera, {}, 12, 45), 0.2);
+  const CameraCalibrationResult result = calibrate_camera(images, 512, 424);
+  std::vector<std::vector<cv::Point3f>> boards(images.size());
+  std::vector<std::vector<cv::Point2f>> corners(images.size());
+  for (std::size_t n = 0; n < images.size(); ++n)
     for (int k = 0; k < 48; ++k) {
       const int row = k / 8;
       boards[n].emplace_back(static_cast<float>(k % 8) * 0.03F, static_cast<float>(row) * 0.03F,
                              0.0F);
-      const Eigen::Vector2f corner = pictures[n].corners[static_cast<std::size_t>(k)].cast<float>();
+      const Eigen::Vector2f corner = images[n].corners[static_cast<std::size_t>(k)].cast<float>();
       corners[n].emplace_back(corner.x(), corner.y());
     }
   cv::Mat matrix, terms, deviations, of_poses, errors;
@@ -159,22 +159,22 @@ TEST(CameraCalibration, DeviationsAreOpenCvsButForTheNumberOfMeasurements) {
                 0.01 * ratio)
         << n;
   for (int n = 0; n < 12; ++n)
-    EXPECT_NEAR(result.pictures[static_cast<std::size_t>(n)].rms_px, errors.at<double>(n), 1e-3);
+    EXPECT_NEAR(result.images[static_cast<std::size_t>(n)].rms_px, errors.at<double>(n), 1e-3);
 }
 
 TEST(CameraCalibration, PaintedBoardsGiveTheCamera) {
   for (const Lens& lens : {lenses()[1], lenses()[3]}) {
     const ChessboardPainter painter(lens.camera, 3);
-    std::vector<BoardPicture> pictures;
+    std::vector<BoardImage> images;
     for (const Pose& pose : board_poses(lens.camera, {}, 15, 45)) {
       const auto found =
           find_chessboard(photographed(painter.paint({}, pose), 0.7, 3.0), {8, 6, 30.0});
-      if (found) pictures.push_back({"painted", *found});
+      if (found) images.push_back({"painted", *found});
     }
-    EXPECT_GE(pictures.size(), 14U) << lens.name;
+    EXPECT_GE(images.size(), 14U) << lens.name;
     CameraCalibrationOptions options;
     options.lens = lens.lens;
-    const CameraCalibrationResult result = calibrate_camera(pictures, 512, 424, options);
+    const CameraCalibrationResult result = calibrate_camera(images, 512, 424, options);
     EXPECT_LT(result.rms_px, 0.1) << lens.name;
     const std::vector<double> truth = values_of(lens.camera);
     const std::vector<double> values = values_of(result.camera);
@@ -245,7 +245,7 @@ TEST(StretchContrast, UsesTheBulkOfTheRange) {
   EXPECT_TRUE(stretch_contrast({}).empty());
 }
 
-TEST(CameraCalibration, PicturesThatTellNothingAreRefused) {
+TEST(CameraCalibration, ImagesThatTellNothingAreRefused) {
   const Camera camera = kinect(DistortionModel::none, {});
   const auto poses = board_poses(camera, {}, 8, 45);
   CameraCalibrationOptions options;
@@ -275,36 +275,36 @@ TEST(CameraCalibration, PicturesThatTellNothingAreRefused) {
                        {.about = "not determine"}));
 }
 
-TEST(CameraCalibration, RepeatedPicturesCountOnce) {
+TEST(CameraCalibration, RepeatedImagesCountOnce) {
   const Camera camera = kinect(DistortionModel::none, {});
-  auto pictures = noisy_corners(camera, board_poses(camera, {}, 8, 45), 0.1);
+  auto images = noisy_corners(camera, board_poses(camera, {}, 8, 45), 0.1);
   CameraCalibrationOptions options;
   options.lens = LensModel::none;
-  const auto once = calibrate_camera(pictures, 512, 424, options);
+  const auto once = calibrate_camera(images, 512, 424, options);
   for (std::size_t n = 0; n < 8; ++n) {
-    pictures.push_back(pictures[n]);
-    pictures.back().name = "again";
-    std::reverse(pictures.back().corners.begin(), pictures.back().corners.end());
+    images.push_back(images[n]);
+    images.back().name = "again";
+    std::reverse(images.back().corners.begin(), images.back().corners.end());
   }
-  const auto twice = calibrate_camera(pictures, 512, 424, options);
+  const auto twice = calibrate_camera(images, 512, 424, options);
   EXPECT_EQ(twice.repeated, std::vector<std::string>(8, "again"));
   EXPECT_EQ(twice.camera.fx, once.camera.fx);
   EXPECT_EQ(twice.deviations, once.deviations);
 }
 
-TEST(CameraCalibration, BadPicturesAreLeftOut) {
+TEST(CameraCalibration, BadImagesAreLeftOut) {
   const Camera camera = kinect(DistortionModel::none, {});
   CameraCalibrationOptions options;
   options.lens = LensModel::none;
-  options.max_picture_error_px = 0.5;
+  options.max_image_error_px = 0.5;
   // In one of four random sets of board poses, all images together determine no camera.
   for (int round = 0; round < 12; ++round) {
-    auto pictures = noisy_corners(camera, board_poses(camera, {}, 12, 45), 0.05);
-    std::reverse(pictures[4].corners.begin(), pictures[4].corners.begin() + 8);
-    const auto result = calibrate_camera(pictures, 512, 424, options);
-    EXPECT_THAT(result.rejected, testing::ElementsAre(pictures[4].name));
+    auto images = noisy_corners(camera, board_poses(camera, {}, 12, 45), 0.05);
+    std::reverse(images[4].corners.begin(), images[4].corners.begin() + 8);
+    const auto result = calibrate_camera(images, 512, 424, options);
+    EXPECT_THAT(result.rejected, testing::ElementsAre(images[4].name));
     EXPECT_LT(result.rms_px, 0.1);
-    EXPECT_EQ(result.pictures.size(), 11U);
+    EXPECT_EQ(result.images.size(), 11U);
     EXPECT_NEAR(result.camera.fx, camera.fx, 4 * result.deviations[0]);
   }
 }

@@ -96,7 +96,7 @@ TEST(MatrixCodec, WhatIsTooLargeToBeHeldCanBeGoneThrough) {
                        {.value = "1 x 67108865 x 1 bytes"}));
   std::size_t bytes = 0;
   std::size_t others = 0;
-  libmap::each_matrix_piece(blob, [&](std::string_view piece) {
+  libmap::for_each_matrix_chunk(blob, [&](std::string_view piece) {
     EXPECT_LE(piece.size(), 1U << 16);
     bytes += piece.size();
     if (piece.find_first_not_of('\3') != std::string_view::npos) ++others;

@@ -65,7 +65,7 @@ struct Scene {
   }
 };
 
-GrayImage picture(const Scene& scene, const libmap::Camera& camera, double eye_x) {
+GrayImage view_of(const Scene& scene, const libmap::Camera& camera, double eye_x) {
   GrayImage image(width, height);
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
@@ -108,8 +108,8 @@ TEST(StereoDepth, SlantedWall) {
       StereoDepthOptions options;
       options.disparities_px = 48;
       options.directions = directions;
-      const DepthImage depth = stereo_depth(picture(scene, cameras.left, 0),
-                                            picture(scene, cameras.right, 0.12), cameras, options);
+      const DepthImage depth = stereo_depth(view_of(scene, cameras.left, 0),
+                                            view_of(scene, cameras.right, 0.12), cameras, options);
       // Left of 30 the right camera sees less of the wall.
       const Comparison result = compare(depth, scene, cameras.left, 45, 195);
       EXPECT_GT(result.share, 0.97) << slope;
@@ -124,8 +124,8 @@ TEST(StereoDepth, StepOfKnownDepth) {
   const Scene scene{.slope = 0.0, .step_x = 0.05};
   StereoDepthOptions options;
   options.disparities_px = 48;
-  const DepthImage depth = stereo_depth(picture(scene, cameras.left, 0),
-                                        picture(scene, cameras.right, 0.12), cameras, options);
+  const DepthImage depth = stereo_depth(view_of(scene, cameras.left, 0),
+                                        view_of(scene, cameras.right, 0.12), cameras, options);
   // The step stands at column 101.5 + 250 * 0.05 = 114.
   const Comparison far = compare(depth, scene, cameras.left, 45, 98);
   const Comparison near = compare(depth, scene, cameras.left, 118, 195);
@@ -138,8 +138,8 @@ TEST(StereoDepth, StepOfKnownDepth) {
     for (int x = 45; x < 195; ++x)
       EXPECT_TRUE(depth.at(x, y) == 0 || (depth.at(x, y) > 0.95F && depth.at(x, y) < 1.6F));
   options.max_depth_m = 1.2;
-  const DepthImage cut = stereo_depth(picture(scene, cameras.left, 0),
-                                      picture(scene, cameras.right, 0.12), cameras, options);
+  const DepthImage cut = stereo_depth(view_of(scene, cameras.left, 0),
+                                      view_of(scene, cameras.right, 0.12), cameras, options);
   EXPECT_EQ(compare(cut, scene, cameras.left, 45, 98).share, 0.0);
   EXPECT_GT(compare(cut, scene, cameras.left, 118, 195).share, 0.97);
 }
@@ -165,8 +165,8 @@ TEST(StereoDepth, FramesOfSeveralPairs) {
   frame.right = GrayImage(2 * width, height);
   frame.stereo = {cameras, cameras};
   for (int n = 0; n < 2; ++n) {
-    const GrayImage left = picture(scenes[n], cameras.left, 0);
-    const GrayImage right = picture(scenes[n], cameras.right, 0.12);
+    const GrayImage left = view_of(scenes[n], cameras.left, 0);
+    const GrayImage right = view_of(scenes[n], cameras.right, 0.12);
     for (int y = 0; y < height; ++y)
       for (int x = 0; x < width; ++x) {
         const std::uint8_t value = left.at(x, y);
@@ -180,8 +180,8 @@ TEST(StereoDepth, FramesOfSeveralPairs) {
   ASSERT_EQ(depth.width, 2 * width);
   for (int n = 0; n < 2; ++n)
     EXPECT_EQ(crop_columns(depth, n * width, width),
-              stereo_depth(picture(scenes[n], cameras.left, 0),
-                           picture(scenes[n], cameras.right, 0.12), cameras, options));
+              stereo_depth(view_of(scenes[n], cameras.left, 0),
+                           view_of(scenes[n], cameras.right, 0.12), cameras, options));
   frame.stereo.clear();
   EXPECT_TRUE(is_error(error_of([&] { stereo_depth(frame); }), {.field = "node 7"}));
   frame.stereo = {cameras};

@@ -174,7 +174,7 @@ TEST(CameraTest, WhatCannotBeACameraIsNamed) {
             "number of distortion terms");
 }
 
-TEST(ImageTest, ColumnsOfPicturesSideBySide) {
+TEST(ImageTest, ColumnsOfImagesSideBySide) {
   libmap::DepthImage pair(6, 2);
   for (int y = 0; y < 2; ++y)
     for (int x = 0; x < 6; ++x) pair.at(x, y) = static_cast<float>(10 * y + x);

@@ -49,8 +49,8 @@ TEST(ResultTable, HoldsEachTypeOfValue) {
   EXPECT_EQ(*results[6].value, ManifestValue(std::string("x")));
   // The type is known without a value.
   EXPECT_TRUE(std::holds_alternative<double>(results[5].type));
-  EXPECT_TRUE(results[5].may_lack);
-  EXPECT_FALSE(results[4].may_lack);
+  EXPECT_TRUE(results[5].may_be_absent);
+  EXPECT_FALSE(results[4].may_be_absent);
 }
 
 TEST(ResultTable, MergesTilesByTheKindOfEachField) {

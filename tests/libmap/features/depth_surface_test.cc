@@ -65,15 +65,15 @@ TEST(DepthSurface, ElementsAreThoseOfThePlane) {
       ++seen;
       SurfacePatch found;
       // Farther along the same ray.
-      ASSERT_TRUE(surface.seen_at(1.2 * at.point, found));
+      ASSERT_TRUE(surface.nearest_to(1.2 * at.point, found));
       EXPECT_EQ(found.point, at.point);
       EXPECT_GT(at.noise_m, 0.0);
     }
   EXPECT_GT(seen, surface.rows() * surface.columns() / 2);
   SurfacePatch none;
-  EXPECT_FALSE(surface.seen_at({0.0, 0.0, -1.0}, none)) << "behind the camera";
-  EXPECT_FALSE(surface.seen_at({9.0, 0.0, 1.0}, none)) << "beside the image";
-  EXPECT_FALSE(surface.met_at({9.0, 0.0, 1.0}, none));
+  EXPECT_FALSE(surface.nearest_to({0.0, 0.0, -1.0}, none)) << "behind the camera";
+  EXPECT_FALSE(surface.nearest_to({9.0, 0.0, 1.0}, none)) << "beside the image";
+  EXPECT_FALSE(surface.interpolated_at({9.0, 0.0, 1.0}, none));
 }
 
 // A plane seen through another camera is a different plane; normals are recomputed.
@@ -161,8 +161,8 @@ TEST(DepthSurface, HasNoJumpsBetweenItsElements) {
     const double truth = plane_z(0.0)(eye.translation(), eye.linear() * direction);
     SurfacePatch met;
     SurfacePatch nearest;
-    ASSERT_TRUE(surface.met_at(direction, met));
-    ASSERT_TRUE(surface.seen_at(direction, nearest));
+    ASSERT_TRUE(surface.interpolated_at(direction, met));
+    ASSERT_TRUE(surface.nearest_to(direction, nearest));
     EXPECT_LT((met.point.hnormalized() - *ray).norm(), 1e-9);
     const double met_error = met.point.z() - truth;
     const double nearest_error =

@@ -107,7 +107,7 @@ TEST(FeatureCache, GivesBackTheSame) {
   EXPECT_EQ(files_in(folder()).size(), 2U);
 }
 
-TEST(FeatureCache, OtherPicturesCamerasOrOptionsAreOthers) {
+TEST(FeatureCache, OtherImagesCamerasOrOptionsAreOthers) {
   TexturedScan scan = two_frames();
   const FeatureCache cache(folder());
   found(scan, cache);

@@ -71,7 +71,7 @@ libmap::FrameFeatures features_of(const libmap::CameraView& view, const FeatureO
 }
 
 // Images above 4 megapixels are halved; positions are in pixels of the full image.
-TEST(Features, PlacesInPicturesThatAreHalved) {
+TEST(Features, PlacesInImagesThatAreHalved) {
   for (const auto& [width, height, scale] :
        {std::tuple{1281, 961, 1.0}, {2561, 1921, 2.0}, {2881, 1601, 2.0}}) {
     SCOPED_TRACE(width);

@@ -239,7 +239,7 @@ TEST(DepthFusion, WhatHangsTogetherWithWhatIsDroppedIsDropped) {
            random_engine());
   const DepthFusionResult result = fuse_depth(scan, scan.poses);
   EXPECT_EQ(points_above(result.cloud, 0.15), 0U);
-  EXPECT_GT(result.points.beside, 50U);
+  EXPECT_GT(result.points.contradicted, 50U);
 }
 
 TEST(DepthFusion, SameBytesForAnyNumberOfThreads) {

@@ -101,7 +101,7 @@ TEST(DepthFusionTiles, SamePointsAsAtOnceBitForBit) {
         const SurfacePointCounts& points = result.points;
         return std::tuple(result.points_made, result.elements, result.occupied_voxels,
                           result.pixels.used, result.pixels.flying, points.merged,
-                          points.seen_through, points.bent_away, points.extended_points,
+                          points.seen_through, points.beyond_edge, points.extended_points,
                           points.max_views);
       };
       EXPECT_EQ(counts(parts), counts(whole)) << tile_m;

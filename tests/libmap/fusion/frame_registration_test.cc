@@ -42,18 +42,18 @@ MemoryScan ring_scan(const Surface& surface, int views) {
   return scan;
 }
 
-Pose small_motion(double place_m, double angle_deg) {
+Pose small_motion(double position_m, double angle_deg) {
   const Eigen::Vector3d angles(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1));
   const Eigen::Vector3d place(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1));
-  return make_pose_from_rpy(place_m * place, angle_deg * angles);
+  return make_pose_from_rpy(position_m * place, angle_deg * angles);
 }
 
-Trajectory shaken(const Trajectory& poses, double place_m, double angle_deg) {
+Trajectory shaken(const Trajectory& poses, double position_m, double angle_deg) {
   Trajectory moved = poses;
   for (TrajectoryPose& pose : moved) {
     const Eigen::Translation3d there(pose.world_from_base.translation());
     pose.world_from_base =
-        there * small_motion(place_m, angle_deg) * there.inverse() * pose.world_from_base;
+        there * small_motion(position_m, angle_deg) * there.inverse() * pose.world_from_base;
   }
   return moved;
 }
@@ -61,7 +61,7 @@ Trajectory shaken(const Trajectory& poses, double place_m, double angle_deg) {
 // Root mean squares of position and rotation errors after alignment of the first frames, because
 // the common frame is free.
 struct PoseErrors {
-  double place_m = 0.0;
+  double position_m = 0.0;
   double angle_deg = 0.0;
 };
 PoseErrors errors_of(const Trajectory& poses, const Trajectory& truth) {
@@ -71,11 +71,11 @@ PoseErrors errors_of(const Trajectory& poses, const Trajectory& truth) {
     for (std::size_t b = 0; b < a; ++b, ++pairs) {
       const Pose off = (truth[a].world_from_base.inverse() * truth[b].world_from_base).inverse() *
                        (poses[a].world_from_base.inverse() * poses[b].world_from_base);
-      errors.place_m += off.translation().squaredNorm();
+      errors.position_m += off.translation().squaredNorm();
       errors.angle_deg +=
           std::pow(Eigen::AngleAxisd(off.linear()).angle() * 180 / std::numbers::pi, 2);
     }
-  return {std::sqrt(errors.place_m / pairs), std::sqrt(errors.angle_deg / pairs)};
+  return {std::sqrt(errors.position_m / pairs), std::sqrt(errors.angle_deg / pairs)};
 }
 
 TEST(FrameRegistration, ShakenPosesAreBroughtTogether) {
@@ -84,8 +84,8 @@ TEST(FrameRegistration, ShakenPosesAreBroughtTogether) {
   const PoseErrors before = errors_of(given, scan.poses);
   const DepthFusionResult result = fuse_depth(scan, given);
   const PoseErrors after = errors_of(result.poses, scan.poses);
-  EXPECT_GT(before.place_m, 0.008);
-  EXPECT_LT(after.place_m, 0.25 * before.place_m);
+  EXPECT_GT(before.position_m, 0.008);
+  EXPECT_LT(after.position_m, 0.25 * before.position_m);
   EXPECT_LT(after.angle_deg, 0.25 * before.angle_deg);
   EXPECT_GT(result.registration_rounds, 0);
   EXPECT_GT(result.registration_shift_m, 0.003);
@@ -180,7 +180,7 @@ TEST(FrameRegistration, SolvesTheLeastSquaresProblem) {
   const double turn = options.rotation_error_deg * std::numbers::pi / 180;
   for (int f = 0; f < frames; ++f)
     for (int k = 0; k < 6; ++k)
-      normal(6 * f + k, 6 * f + k) = 1 / std::pow(k < 3 ? turn : options.place_error_m, 2);
+      normal(6 * f + k, 6 * f + k) = 1 / std::pow(k < 3 ? turn : options.position_error_m, 2);
   for (const SurfaceObservation& one : observations) {
     const Eigen::Vector3d n = elements[one.element].normal.cast<double>();
     const Eigen::Vector3d arm = elements[one.element].position.cast<double>() - centers[one.frame];
@@ -263,8 +263,8 @@ TEST(FrameRegistration, OnlyColorCorrectsRefinedPoses) {
   const DepthFusionResult result = fuse_depth(scan, given, refined);
   EXPECT_FALSE(result.registration_rejected);
   EXPECT_TRUE(result.registration_check.color.is_clearly_better());
-  EXPECT_LT(errors_of(result.poses, scan.poses).place_m,
-            0.25 * errors_of(given, scan.poses).place_m);
+  EXPECT_LT(errors_of(result.poses, scan.poses).position_m,
+            0.25 * errors_of(given, scan.poses).position_m);
 }
 
 TEST(FrameRegistration, ACheckWeighsBothKinds) {
@@ -297,7 +297,7 @@ TEST(FrameRegistration, StoredPosesOfARealScanComeNearTheTruth) {
   const DepthFusionResult result = fuse_depth(*scan, stored, options);
   const PoseErrors before = errors_of(stored, truth);
   const PoseErrors after = errors_of(result.poses, truth);
-  EXPECT_LT(after.place_m, 0.2 * before.place_m);
+  EXPECT_LT(after.position_m, 0.2 * before.position_m);
   EXPECT_LT(after.angle_deg, 0.2 * before.angle_deg);
 }
 

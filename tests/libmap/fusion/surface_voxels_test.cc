@@ -52,8 +52,8 @@ TEST(SurfaceVoxels, PlacesBeyondTheGridAreLeftOut) {
 SurfaceVoxels thick_plane(const Eigen::Vector3f& normal, int half) {
   SurfaceVoxels voxels;
   for (int n = 0; n < 400 * half * half; ++n) {
-    Eigen::Vector3f place(static_cast<float>(uniform(-half, half)),
-                          static_cast<float>(uniform(-half, half)), 0);
+    Eigen::Vector3f position(static_cast<float>(uniform(-half, half)),
+                             static_cast<float>(uniform(-half, half)), 0);
     place.z() = -(normal.x() * place.x() + normal.y() * place.y()) / normal.z();
     voxels.add(place + static_cast<float>(uniform(-0.4, 0.4)) * normal, normal, 1.0F);
   }

@@ -13,11 +13,11 @@ using graspmap_test::uniform;
 
 TEST(VoxelKey, RoundTrip) {
   for (int n = 0; n < 1000; ++n) {
-    VoxelPlace place;
+    VoxelSide place;
     for (int axis = 0; axis < 3; ++axis)
       place.cell[axis] = static_cast<int>(uniform(-voxel_cell_limit, voxel_cell_limit));
     place.side = n % 2;
-    const VoxelPlace back = unpack(pack(place));
+    const VoxelSide back = unpack(pack(place));
     EXPECT_EQ(back.cell, place.cell);
     EXPECT_EQ(back.side, place.side);
   }
@@ -27,7 +27,7 @@ TEST(VoxelIndex, AgreesWithAMap) {
   VoxelIndex index;
   std::map<std::uint64_t, std::uint32_t> truth;
   const auto random_key = [](double reach) {
-    VoxelPlace place;
+    VoxelSide place;
     for (int axis = 0; axis < 3; ++axis)
       place.cell[axis] = static_cast<int>(uniform(-reach, reach));
     place.side = uniform(0, 1) < 0.5 ? 0 : 1;

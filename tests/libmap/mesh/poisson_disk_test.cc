@@ -123,7 +123,7 @@ bool same_bytes(const PoissonDiskResult& a, const PoissonDiskResult& b) {
          a.cloud.normals == b.cloud.normals && a.cloud.fields == b.cloud.fields;
 }
 
-TEST(PieceSampler, SeamsAreSampledAsAllElse) {
+TEST(TileSampler, SeamsAreSampledAsAllElse) {
   const TriangleMesh mesh = rough_mesh(0.02);
   // In squares of 0.25 m; triangles on seams are in either square.
   constexpr std::size_t pieces = 16;
@@ -140,7 +140,7 @@ TEST(PieceSampler, SeamsAreSampledAsAllElse) {
     boxes.push_back(bounds_of(parts.back().vertices));
   }
   const PoissonDiskOptions options = {.radius_m = 0.01};
-  PieceSampler sampler(boxes, options);
+  TileSampler sampler(boxes, options);
   PoissonDiskResult joined;
   for (std::size_t n = 0; n < pieces; ++n) {
     const PoissonDiskResult part = sampler.sample(parts[n], n);
@@ -153,8 +153,8 @@ TEST(PieceSampler, SeamsAreSampledAsAllElse) {
   EXPECT_LE(largest_hole(mesh, joined.cloud.positions, 50000), 1.001 * options.radius_m + 1e-7);
   const auto whole = static_cast<double>(by_radius(mesh, 0.01).cloud.size());
   EXPECT_NEAR(static_cast<double>(joined.cloud.size()) / whole, 1.0, 0.01);
-  EXPECT_TRUE(PieceSampler(boxes, options).sample(TriangleMesh(), 0).cloud.empty());
-  EXPECT_EQ(error_of([&] { PieceSampler(boxes, {.count = 100}); }).context().field, "count");
+  EXPECT_TRUE(TileSampler(boxes, options).sample(TriangleMesh(), 0).cloud.empty());
+  EXPECT_EQ(error_of([&] { TileSampler(boxes, {.count = 100}); }).context().field, "count");
 }
 
 TEST(PoissonDisk, MaximalOnAnyTessellation) {

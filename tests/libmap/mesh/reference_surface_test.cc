@@ -44,7 +44,7 @@ TEST(ReferenceSurface, SignedDistanceOfABoxInClosedForm) {
     EXPECT_TRUE(surface.is_oriented());
     for (int n = 0; n < 2000; ++n) {
       const Eigen::Vector3d point = random_point(1.0);
-      const NearestPlace place = surface.nearest(point);
+      const NearestSurfacePoint place = surface.nearest(point);
       ASSERT_NEAR(place.signed_distance_m(point), box_distance(point, half), 1e-12)
           << point.transpose();
       ASSERT_NEAR(place.normal.norm(), 1.0, 1e-12);
@@ -93,12 +93,12 @@ TEST(ReferenceSurface, CloudWithNormalsIsASurfaceOfDiscs) {
   EXPECT_TRUE(surface.is_oriented());
   for (int n = 0; n < 500; ++n) {
     const Eigen::Vector3d point(uniform(-0.19, 0.19), uniform(-0.19, 0.19), uniform(-0.1, 0.1));
-    const NearestPlace place = surface.nearest(point);
+    const NearestSurfacePoint place = surface.nearest(point);
     ASSERT_NEAR(place.signed_distance_m(point), point.z(), 1e-12) << "gaps do not count";
     ASSERT_FALSE(place.on_border);
   }
   // The last disc extends 2 cm beyond the last point at 0.2 m.
-  const NearestPlace beyond = surface.nearest({0.26, 0.0, -0.03});
+  const NearestSurfacePoint beyond = surface.nearest({0.26, 0.0, -0.03});
   EXPECT_TRUE(beyond.on_border);
   EXPECT_NEAR(beyond.distance_m, std::hypot(0.04, 0.03), 1e-9);
   EXPECT_LT(beyond.signed_distance_m({0.26, 0.0, -0.03}), 0.0);

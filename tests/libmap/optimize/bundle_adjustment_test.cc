@@ -149,7 +149,7 @@ TEST(BundleAdjustment, AlternativesAreAsFarAsTheTruth) {
                                               scene.components, options);
     const auto numbers = [](const libmap::SensorCalibration& calibration) {
       const libmap::IntrinsicsStep& step = calibration.intrinsics.at(0);
-      return Eigen::Vector4d(step.fx_share, step.fy_share, step.cx_px, step.cy_px);
+      return Eigen::Vector4d(step.fx_relative, step.fy_relative, step.cx_px, step.cy_px);
     };
     ASSERT_EQ(result.alternatives.size(), 4U);
     Eigen::Matrix4d deviations;
@@ -189,8 +189,8 @@ TEST(BundleAdjustment, TellsBentDepthFromAFalseFocalLength) {
   const auto found =
       libmap::adjust_bundle(frames, scene.tracks, scene.start, {}, scene.components, options);
   ASSERT_EQ(found.calibration.depth.size(), 1U);
-  EXPECT_NEAR(found.calibration.intrinsics[0].fx_share, 1.0 / 1.01 - 1.0, 1e-3);
-  EXPECT_NEAR(found.calibration.intrinsics[0].fy_share, 1.0 / 1.01 - 1.0, 1e-3);
+  EXPECT_NEAR(found.calibration.intrinsics[0].fx_relative, 1.0 / 1.01 - 1.0, 1e-3);
+  EXPECT_NEAR(found.calibration.intrinsics[0].fy_relative, 1.0 / 1.01 - 1.0, 1e-3);
   EXPECT_NEAR(found.calibration.intrinsics[0].cx_px, -4.0, 0.3);
   double sum = 0.0;
   double squares = 0.0;
@@ -214,7 +214,7 @@ TEST(BundleAdjustment, TellsBentDepthFromAFalseFocalLength) {
   EXPECT_NEAR(sum / count, 1.008, 5e-3);
 }
 
-TEST(BundleAdjustment, FindsTheTimeOfThePicturesRows) {
+TEST(BundleAdjustment, FindsTheTimeOfTheImagesRows) {
   const auto points = random_points(150);
   const Way way = way_with_rows(points, 0.06);
   libmap::BundleAdjustmentOptions options;

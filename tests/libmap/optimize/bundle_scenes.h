@@ -68,7 +68,7 @@ inline Way way_with_rows(const std::vector<Eigen::Vector3d>& points, double roll
     for (std::size_t n = 0; n < points.size(); ++n)
       for (int round = 0; round < 4; ++round) {
         const double late_s =
-            rolling_shutter_s * libmap::row_share_of(frame.features[n], frame.cameras[0]);
+            rolling_shutter_s * libmap::row_fraction(frame.features[n], frame.cameras[0]);
         frame.features[n] = see_points(node, pose_at(stamp_s + late_s), {points[n]}).features[0];
       }
     way.truth[node] = pose_at(stamp_s);

@@ -131,7 +131,7 @@ TEST(AssignNodes, TakesTheNodesOfThePoses) {
   EXPECT_EQ(nodes_of(result.poses), (std::vector<int>{2, 4}));
   EXPECT_EQ(result.poses[0].stamp_s, 102.0);
   EXPECT_TRUE(result.poses[0].world_from_base.isApprox(poses[1].world_from_base));
-  EXPECT_EQ(result.foreign, 1U);
+  EXPECT_EQ(result.unmatched, 1U);
   // Node 3 is invalid.
   const Trajectory more = {{3, 0, random_pose()}, {4, 0, random_pose()}};
   EXPECT_EQ(nodes_of(libmap::assign_nodes(more, graph_of_nodes()).poses), std::vector<int>{4});
@@ -145,7 +145,7 @@ TEST(AssignNodes, PairsStampsWithinTwentyMilliseconds) {
   const libmap::NodeTrajectory result = libmap::assign_nodes(poses, graph_of_nodes());
   EXPECT_EQ(nodes_of(result.poses), (std::vector<int>{1, 4}));
   EXPECT_EQ(result.poses[1].stamp_s, 104.0);
-  EXPECT_EQ(result.foreign, 2U);
+  EXPECT_EQ(result.unmatched, 2U);
 }
 
 TEST(AssignNodes, TakesPosesWithoutNodesAndStampsInTheirOrder) {

@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "libmap/io/cloud_io.h"
-#include "libmap/io/cloud_pieces.h"
+#include "libmap/io/cloud_tiles.h"
 #include "libmap/io/mesh_io.h"
 #include "libmap/raster/dem_reader.h"
 #include "tests/libmap/raster/gdal_programs.h"
@@ -164,9 +164,9 @@ TEST(Dem, PiecesShareTheFrameOfTheFirst) {
   const fs::path first = write_dem("pieces/a.tif", grid, utm);
   grid.west += 5000.0;  // its own offset would differ
   const fs::path second = write_dem("pieces/b.tif", grid, utm);
-  const auto pieces = libmap::cloud_pieces(scratch_folder() / "pieces");
+  const auto pieces = libmap::cloud_tiles(scratch_folder() / "pieces");
   ASSERT_EQ(pieces.size(), 2U);
-  const PointCloud cloud = libmap::read_pieces(pieces).cloud;
+  const PointCloud cloud = libmap::read_tiles(pieces).cloud;
   ASSERT_EQ(cloud.size(), 22U);
   EXPECT_EQ(cloud.positions[11] - cloud.positions[0], Eigen::Vector3d(5000, 0, 0));
   EXPECT_EQ(libmap::read_georeference(scratch_folder() / "pieces"),
@@ -174,13 +174,13 @@ TEST(Dem, PiecesShareTheFrameOfTheFirst) {
   const auto box = libmap::survey_tile(second, libmap::read_georeference(first)).box;
   EXPECT_EQ(box.min.x(), cloud.positions[11].x());
   libmap::write_cloud(scratch_folder() / "pieces/c.pcd", cloud);
-  EXPECT_EQ(error_of([] { libmap::read_pieces(libmap::cloud_pieces(scratch_folder() / "pieces")); })
+  EXPECT_EQ(error_of([] { libmap::read_tiles(libmap::cloud_tiles(scratch_folder() / "pieces")); })
                 .context()
                 .file,
             (scratch_folder() / "pieces/c.pcd").string());
   fs::remove(scratch_folder() / "pieces/c.pcd");
   write_dem("pieces/c.tif", grid, {"-a_srs", "EPSG:32632"});
-  EXPECT_EQ(error_of([] { libmap::read_pieces(libmap::cloud_pieces(scratch_folder() / "pieces")); })
+  EXPECT_EQ(error_of([] { libmap::read_tiles(libmap::cloud_tiles(scratch_folder() / "pieces")); })
                 .context()
                 .field,
             "CRS");

@@ -9,7 +9,7 @@
 #include "libmap/core/error.h"
 #include "tests/libmap/features/synthetic_features.h"
 #include "tests/libmap/refine/textured_scan.h"
-#include "tests/support/chessboard_picture.h"
+#include "tests/support/chessboard_image.h"
 #include "tests/support/test_support.h"
 
 namespace board_scale_test {
@@ -66,7 +66,7 @@ Pose board_at(double x) {
   return pose;
 }
 
-// With `stored` as the camera of the frames while pictures are those of textured_camera().
+// With `stored` as the camera of the frames while images are those of textured_camera().
 Scene scene_of(std::size_t count, double step_deg, const Camera& stored = textured_camera()) {
   Scene scene;
   Camera camera = textured_camera();
@@ -204,12 +204,12 @@ TEST(BoardScale, RefinedPosesHaveTheScaleOfTheBoard) {
   for (int n = 0; n < 12; ++n) {
     const Pose pose = around(18.0 * n, 1.1 + 0.1 * std::sin(0.8 * n));
     scan.see(ground, pose, graspmap_test::random_step(0.015, 0.012));
-    const auto picture = painter.paint(
+    const auto image = painter.paint(
         painted, (pose * textured_camera().base_from_camera).inverse() * board_at(-0.2));
     libmap::RgbdFrame& frame = scan.frames.at(n + 1);
-    for (std::size_t pixel = 0; pixel < picture.pixels.size(); ++pixel)
-      if (picture.pixels[pixel] != 120.0F)  // the background
-        frame.color.pixels[pixel].fill(static_cast<std::uint8_t>(picture.pixels[pixel]));
+    for (std::size_t pixel = 0; pixel < image.pixels.size(); ++pixel)
+      if (image.pixels[pixel] != 120.0F)  // the background
+        frame.color.pixels[pixel].fill(static_cast<std::uint8_t>(image.pixels[pixel]));
     for (float& depth : frame.depth.pixels) depth *= 1.008F;
   }
   libmap::RefinementOptions options = graspmap_test::small_options();
@@ -221,11 +221,11 @@ TEST(BoardScale, RefinedPosesHaveTheScaleOfTheBoard) {
   const libmap::RefinementResult result = libmap::refine_poses(scan, options);
   EXPECT_LT(rmse_m(result), 0.002);
   ASSERT_EQ(result.stages.back().name, "scale");
-  std::map<std::string, double> figures(result.stages.back().figures.begin(),
-                                        result.stages.back().figures.end());
-  EXPECT_GE(figures.at("lengths"), 8.0);
-  EXPECT_LT(figures.at("deviation"), 0.001);
-  EXPECT_NEAR(figures.at("factor"), 1.0 / 1.008, 3.0 * figures.at("deviation"));
+  std::map<std::string, double> metrics(result.stages.back().metrics.begin(),
+                                        result.stages.back().metrics.end());
+  EXPECT_GE(metrics.at("lengths"), 8.0);
+  EXPECT_LT(metrics.at("deviation"), 0.001);
+  EXPECT_NEAR(metrics.at("factor"), 1.0 / 1.008, 3.0 * metrics.at("deviation"));
   EXPECT_TRUE(result.scale.ends_with("images: corrected")) << result.scale;
   options.known_lengths = {{{1, {60, 100}}, {2, {90, 110}}, 1.0}};
   EXPECT_EQ(error_of([&] { libmap::refine_poses(scan, options); }).context().field, "board");

@@ -172,7 +172,7 @@ TEST(Refinement, SessionsAreJoinedWhereTheySeeTheSame) {
   EXPECT_LT(error_of_poses(result), 0.003);
 }
 
-TEST(Refinement, NullPosesComeFromLinksOrPicturesAndTheRestIsNamed) {
+TEST(Refinement, NullPosesComeFromLinksOrImagesAndTheRestIsNamed) {
   TexturedScan scan = loop_of(6);
   scan.graph_.nodes[2].odometry_from_base.reset();
   for (const int id : {7, 8}) {

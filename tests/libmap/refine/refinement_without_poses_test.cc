@@ -50,12 +50,12 @@ const libmap::StageReport& stage_of(const RefinementResult& result, const std::s
 }
 
 double figure(const libmap::StageReport& stage, const std::string& name) {
-  for (const auto& [known, value] : stage.figures)
+  for (const auto& [known, value] : stage.metrics)
     if (known == name) return value;
   throw std::runtime_error("no figure " + name);
 }
 
-TEST(RefinementWithoutPoses, PicturesAloneGiveTheWay) {
+TEST(RefinementWithoutPoses, ImagesAloneGiveTheWay) {
   TexturedScan scan = loop_of(8);
   forget_poses(scan);
   const RefinementResult result = libmap::refine_poses(scan, small_options());
@@ -124,7 +124,7 @@ TEST(RefinementWithoutPoses, TwoSessionsBecomeOneMap) {
 }
 
 // Images without features are tracked by depth, from the pose by constant motion.
-TEST(RefinementWithoutPoses, DepthLeadsOverBlurredPictures) {
+TEST(RefinementWithoutPoses, DepthLeadsOverBlurredImages) {
   TexturedScan scan = loop_of(10);
   for (const int node : {4, 5, 8}) {
     libmap::ColorImage& color = scan.frames.at(node).color;

@@ -39,9 +39,9 @@ TEST(SensorCalibration, AllFramesHaveMotions) {
   way.truth.at(alone) = Pose::Identity();  // anywhere
   libmap::SensorCalibration calibration;
   calibration.timing = {{0.0, 0.06}};
-  for (const bool hold_poses : {false, true}) {
-    libmap::find_motions({way.frames, links, way.truth, {}, way.components, {}}, hold_poses,
-                         calibration);
+  for (const bool fixes_poses : {false, true}) {
+    libmap::estimate_motions({way.frames, links, way.truth, {}, way.components, {}}, fixes_poses,
+                             calibration);
     ASSERT_EQ(calibration.motion.size(), way.frames.size());
     for (const auto& [node, motion] : calibration.motion)
       EXPECT_NEAR(motion.y(), 0.6 * std::cos(1.5 * 0.3 * node), node == alone ? 0.1 : 0.03) << node;
@@ -89,7 +89,7 @@ TEST(SensorCalibration, LateDepthIsMovedBack) {
   // Forward is z in the camera: the depth's camera was 2 cm ahead.
   EXPECT_LT((pose.translation() - Eigen::Vector3d(0.0, 0.0, 0.02)).norm(), 1e-12);
   calibration.timing[0].rolling_shutter_s = 0.05;
-  const double row = libmap::row_share_of(frame.features[0], frame.cameras[0]);
+  const double row = libmap::row_fraction(frame.features[0], frame.cameras[0]);
   EXPECT_NEAR(libmap::color_from_depth_of(frame, frame.features[0], calibration).translation().z(),
               0.4 * (0.05 - 0.05 * row), 1e-12);
   frame.depth_later_s = -0.01;

@@ -173,7 +173,7 @@ TEST(VisualOdometry, ConsistencyIsThatOfKnownErrors) {
   EXPECT_NEAR(found.squared_error_per_freedom, 100.0 * (0.01 + 0.04) / 6.0, 1e-9);
 }
 
-TEST(VisualOdometry, ABlankPictureCostsOneNode) {
+TEST(VisualOdometry, ABlankImageCostsOneNode) {
   Walk walk;
   const auto points = wall(2.0);
   for (int n = 0; n < 10; ++n) {

@@ -53,20 +53,21 @@ TEST(MapView, CellsLieOnTheLattice) {
   for (std::size_t n = 0; n < 3; ++n) {
     Eigen::Vector3d place;
     for (Eigen::Index axis = 0; axis < 3; ++axis)
-      place[axis] = view.cells[n].place[static_cast<std::size_t>(axis)] + 0.5;
+      place[axis] = view.cells[n].index[static_cast<std::size_t>(axis)] + 0.5;
     EXPECT_TRUE(
         (view.corner_in_terrain + view.cell_size_m * place).isApprox(map.positions[n], 1e-9));
   }
 }
 
 TEST(MapView, CubesOfVoxels) {
-  const MapView view = libmap::make_map_view(map_of(voxels, 0.01, {0, 0, 0}), {.voxels_a_cell = 3});
+  const MapView view =
+      libmap::make_map_view(map_of(voxels, 0.01, {0, 0, 0}), {.voxels_per_cell = 3});
   EXPECT_NEAR(view.cell_size_m, 0.03, 1e-12);
   // i: floor(-4 / 3) = -2 is the lowest; 3 / 3 = 1.
-  EXPECT_EQ(view.cells[0].place[0], 0);
-  EXPECT_EQ(view.cells[1].place[0], 3);
+  EXPECT_EQ(view.cells[0].index[0], 0);
+  EXPECT_EQ(view.cells[1].index[0], 3);
   EXPECT_NEAR(view.corner_in_terrain.x(), -0.06, 1e-9);
-  EXPECT_EQ(view.cells[2].place[1], 3);
+  EXPECT_EQ(view.cells[2].index[1], 3);
 }
 
 TEST(MapView, ColorsAreTheClassesOfTheLegend) {

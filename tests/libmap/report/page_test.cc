@@ -4,7 +4,7 @@
 
 #include "libmap/camera/image_codec.h"
 #include "libmap/report/html.h"
-#include "libmap/report/picture_fit.h"
+#include "libmap/report/image_fit.h"
 #include "libmap/report/report_reader.h"
 #include "tests/support/test_support.h"
 
@@ -16,8 +16,8 @@ using graspmap_test::random_engine;
 using libmap::ColorImage;
 using libmap::PageAssets;
 using libmap::ReportContent;
-using libmap::ReportPicture;
-using libmap::ReportPictures;
+using libmap::ReportImage;
+using libmap::ReportImages;
 
 // Noise cannot be compressed.
 ColorImage noise(int width, int height) {
@@ -27,10 +27,10 @@ ColorImage noise(int width, int height) {
   return image;
 }
 
-ReportPicture picture_of(const ColorImage& image) {
-  ReportPicture picture = libmap::read_picture_bytes(libmap::encode_png(image));
-  picture.file = "a.png";
-  return picture;
+ReportImage image_of(const ColorImage& image) {
+  ReportImage report_image = libmap::read_image_bytes(libmap::encode_png(image));
+  report_image.file = "a.png";
+  return report_image;
 }
 
 const PageAssets assets{.style = "p { color: red }",
@@ -121,18 +121,18 @@ TEST(ReportPage, AScenesMesh) {
   EXPECT_EQ(libmap::report_page(content, assets).find("<canvas"), std::string::npos);
 }
 
-TEST(ReportPage, PicturesAreMadeSmallerUntilThePageFits) {
+TEST(ReportPage, ImagesAreMadeSmallerUntilThePageFits) {
   ReportContent content;
   content.heading = "a";
-  content.items.push_back({.body = ReportPictures{picture_of(noise(1600, 700))}});
+  content.items.push_back({.body = ReportImages{image_of(noise(1600, 700))}});
   const libmap::FittedPage whole = libmap::fit_report_page(content, assets, 10'000'000);
-  EXPECT_EQ(whole.picture_level, 0);
+  EXPECT_EQ(whole.image_level, 0);
   EXPECT_NE(whole.html.find("data:image/png;base64,"), std::string::npos);
   EXPECT_EQ(whole.html.find("Made smaller"), std::string::npos);
   const libmap::FittedPage fitted = libmap::fit_report_page(content, assets, 900'000);
-  EXPECT_GE(fitted.picture_level, 2);
+  EXPECT_GE(fitted.image_level, 2);
   EXPECT_LE(fitted.html.size(), 900'000U);
-  EXPECT_EQ(fitted.changed_pictures, 1U);
+  EXPECT_EQ(fitted.changed_images, 1U);
   EXPECT_NE(fitted.html.find("Made smaller for this page. a.png: JPEG, quality 90, 1400 instead of "
                              "1600 pixels wide."),
             std::string::npos);
@@ -140,7 +140,7 @@ TEST(ReportPage, PicturesAreMadeSmallerUntilThePageFits) {
                        {.field = "size", .value = "0.0 MB", .bound = "<= 0.0 MB"}));
 }
 
-TEST(ReportPage, TablesAreCutIfSmallPicturesAreNotEnough) {
+TEST(ReportPage, TablesAreCutIfSmallImagesAreNotEnough) {
   libmap::ReportTable table;
   table.table.columns = table.headings = std::vector<std::string>(20, "score");
   for (int n = 0; n < 1000; ++n) {
@@ -151,12 +151,12 @@ TEST(ReportPage, TablesAreCutIfSmallPicturesAreNotEnough) {
   content.heading = "a";
   libmap::ReportSection section;
   section.items.push_back({.body = table});
-  section.items.push_back({.body = ReportPictures{picture_of(noise(400, 300))}});
+  section.items.push_back({.body = ReportImages{image_of(noise(400, 300))}});
   content.sections.push_back(section);
   const std::size_t whole = libmap::report_page(content, assets).size();
   const libmap::FittedPage page = libmap::fit_report_page(content, assets, whole);
   EXPECT_NE(page.html.find(">P999<"), std::string::npos);
-  // The picture alone has no room beside the whole table, and is whole beside the short one.
+  // The image alone has no room beside the whole table, and is whole beside the short one.
   content.sections[0].items.pop_back();
   const std::size_t alone = libmap::report_page(content, assets).size();
   content.sections[0] = section;
@@ -165,10 +165,10 @@ TEST(ReportPage, TablesAreCutIfSmallPicturesAreNotEnough) {
   EXPECT_EQ(cut.html.find(">P100<"), std::string::npos);
   EXPECT_NE(cut.html.find(">P99<"), std::string::npos);
   EXPECT_NE(cut.html.find("The first 100 rows of 1000."), std::string::npos);
-  EXPECT_EQ(cut.picture_level, 0);
+  EXPECT_EQ(cut.image_level, 0);
 }
 
-TEST(Picture, ShrinkingTakesMeans) {
+TEST(Image, ShrinkingTakesMeans) {
   ColorImage image(4, 2);
   for (int x = 0; x < 4; ++x)
     for (int y = 0; y < 2; ++y)
@@ -178,29 +178,29 @@ TEST(Picture, ShrinkingTakesMeans) {
   EXPECT_EQ(small.at(1, 0), (libmap::Color{200, 10, 0}));
 }
 
-TEST(Picture, TransparencyLiesOnWhite) {
+TEST(Image, TransparencyLiesOnWhite) {
   libmap::RgbaImage image(64, 64, {0, 0, 0, 0});
   for (std::size_t n = 0; n < image.pixels.size(); n += 2)
     image.pixels[n] = {static_cast<std::uint8_t>(n % 251), 0, 0, 0};
-  const ReportPicture fitted =
-      libmap::fit_picture(libmap::read_picture_bytes(libmap::encode_png(image)), 1);
+  const ReportImage fitted =
+      libmap::fit_image(libmap::read_image_bytes(libmap::encode_png(image)), 1);
   ASSERT_EQ(fitted.media_type, "image/jpeg");
   EXPECT_EQ(libmap::decode_color(fitted.bytes).at(5, 5), (libmap::Color{255, 255, 255}));
 }
 
-TEST(Picture, BrokenOnesAreErrors) {
+TEST(Image, BrokenOnesAreErrors) {
   const std::string whole = libmap::encode_png(noise(40, 30));
-  EXPECT_EQ(libmap::read_picture_bytes(whole).height, 30);
-  EXPECT_THROW(libmap::read_picture_bytes(whole.substr(0, whole.size() / 2)), libmap::Error);
-  EXPECT_THROW(libmap::read_picture_bytes("no picture"), libmap::Error);
-  EXPECT_THROW(libmap::read_picture_bytes(""), libmap::Error);
-  EXPECT_THROW(libmap::read_picture_bytes("<svg><rect>"), libmap::Error);
+  EXPECT_EQ(libmap::read_image_bytes(whole).height, 30);
+  EXPECT_THROW(libmap::read_image_bytes(whole.substr(0, whole.size() / 2)), libmap::Error);
+  EXPECT_THROW(libmap::read_image_bytes("no picture"), libmap::Error);
+  EXPECT_THROW(libmap::read_image_bytes(""), libmap::Error);
+  EXPECT_THROW(libmap::read_image_bytes("<svg><rect>"), libmap::Error);
   const std::string filled = "<svg>" + std::string(std::size_t{4} << 20, ' ') + "</svg>";
-  EXPECT_TRUE(is_error(error_of([&] { libmap::read_picture_bytes(filled); }),
+  EXPECT_TRUE(is_error(error_of([&] { libmap::read_image_bytes(filled); }),
                        {.value = "4194315 bytes", .bound = "<= 4194304"}));
-  const ReportPicture drawing = libmap::read_picture_bytes("<?xml version='1.0'?><svg></svg>");
+  const ReportImage drawing = libmap::read_image_bytes("<?xml version='1.0'?><svg></svg>");
   EXPECT_EQ(drawing.media_type, "image/svg+xml");
-  EXPECT_EQ(libmap::fit_picture(drawing, libmap::max_picture_level).bytes, drawing.bytes);
+  EXPECT_EQ(libmap::fit_image(drawing, libmap::max_image_level).bytes, drawing.bytes);
 }
 
 }  // namespace page_test

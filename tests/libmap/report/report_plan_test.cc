@@ -42,10 +42,10 @@ TEST(ReportPlan, OfAFolder) {
   EXPECT_EQ(plan.sections[2].heading, "Running times");
   const auto& section = plan.sections[0];
   const fs::path folder = scratch_folder() / "2_b";
-  ASSERT_EQ(section.items.size(), 2U);  // one map, and its pictures without roc.png
+  ASSERT_EQ(section.items.size(), 2U);  // one map, and its images without roc.png
   EXPECT_EQ(section.items[0].files[0], folder / "map.pcd");
   EXPECT_EQ(section.items[0].lookup, folder / "lookup.csv");
-  EXPECT_EQ(section.items[0].picture, folder / "oblique.png");
+  EXPECT_EQ(section.items[0].image, folder / "oblique.png");
   EXPECT_EQ(section.items[0].columns.size(), 3U);
   EXPECT_EQ(section.items[1].files, std::vector<fs::path>{folder / "oblique.png"});
   ASSERT_EQ(section.sections.size(), 1U);  // not the tiles, not the loop
@@ -74,9 +74,9 @@ TEST(ReportPlan, OfMapsTogether) {
   const PlannedSection plan = libmap::plan_report(scratch_folder());
   EXPECT_EQ(plan.items[0].labels,
             (std::vector<std::string>{"a.pcd", "b.pcd", "sub/map.pcd", "sub/second.pcd", "sub/c"}));
-  EXPECT_EQ(plan.items[1].picture, scratch_folder() / "oblique.png");
-  EXPECT_EQ(plan.items[2].picture, "");
-  EXPECT_EQ(plan.sections[0].items[0].picture, "") << "of which of the two maps?";
+  EXPECT_EQ(plan.items[1].image, scratch_folder() / "oblique.png");
+  EXPECT_EQ(plan.items[2].image, "");
+  EXPECT_EQ(plan.sections[0].items[0].image, "") << "of which of the two maps?";
   const auto& cases = plan.sections.back().items[0].cases;
   ASSERT_EQ(cases.size(), 3U);
   EXPECT_EQ(cases[0].first, scratch_folder().filename().string());

@@ -99,7 +99,7 @@ TEST(ReportReader, TimesOfManifests) {
   put_manifest("one/cloud.ply", "fuse");
   const ReportContent content = read();
   const auto& times = std::get<libmap::TimingTable>(content.sections.back().items.at(0).body);
-  ASSERT_EQ(times.rows.size(), 3U);  // pictures are not timed
+  ASSERT_EQ(times.rows.size(), 3U);  // images are not timed
   EXPECT_EQ(times.rows[0].command, "fuse");
   EXPECT_EQ(times.rows[1].command, "score");
   EXPECT_EQ(times.rows[2].command, "lookup");

@@ -6,7 +6,7 @@
 #include <sstream>
 
 #include "libmap/camera/color_image.h"
-#include "libmap/scan/picture_file.h"
+#include "libmap/scan/image_export.h"
 #include "tests/support/test_support.h"
 
 namespace libmap {
@@ -94,7 +94,7 @@ TEST(Bundler, PointsFallOnTheirPixels) {
 }
 
 // A smooth image whose color is a function of the position.
-ColorImage smooth_picture(int width, int height) {
+ColorImage smooth_image(int width, int height) {
   ColorImage image(width, height);
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x)
@@ -110,11 +110,11 @@ TEST(PinholeImage, ShowsWhatTheLensShowed) {
       lens.distortion_model = DistortionModel::equidistant;
       lens.distortion = {0.02, -0.01, 0.003, 0.0};
     }
-    const ColorImage picture = smooth_picture(lens.width, lens.height);
+    const ColorImage photo = smooth_image(lens.width, lens.height);
     const Camera pinhole = centered_pinhole(lens);
     EXPECT_FALSE(pinhole.is_distorted());
     EXPECT_EQ(pinhole.fx, pinhole.fy);
-    const ColorImage resampled = resample_image(picture, lens, pinhole);
+    const ColorImage resampled = resample_image(photo, lens, pinhole);
     ASSERT_EQ(resampled.width, pinhole.width);
     EXPECT_GT(pinhole.width, 150);
     EXPECT_GT(pinhole.height, 100);
@@ -150,8 +150,8 @@ TEST(PinholeImage, PixelsThatOnlyMoveAreKept) {
   camera.width = 64;
   camera.height = 48;
   camera.fx = camera.fy = 50;
-  ColorImage picture(64, 48);
-  for (Color& color : picture.pixels)
+  ColorImage photo(64, 48);
+  for (Color& color : photo.pixels)
     for (std::uint8_t& channel : color) channel = static_cast<std::uint8_t>(random_engine()());
   struct Case {
     double cx, cy;
@@ -164,9 +164,9 @@ TEST(PinholeImage, PixelsThatOnlyMoveAreKept) {
     const Camera centered = centered_pinhole(camera);
     ASSERT_EQ(centered.width, c.width);
     ASSERT_EQ(centered.height, c.height);
-    const ColorImage part = resample_image(picture, camera, centered);
+    const ColorImage part = resample_image(photo, camera, centered);
     for (int y = 0; y < c.height; ++y)
-      for (int x = 0; x < c.width; ++x) ASSERT_EQ(part.at(x, y), picture.at(x + c.left, y + c.top));
+      for (int x = 0; x < c.width; ++x) ASSERT_EQ(part.at(x, y), photo.at(x + c.left, y + c.top));
   }
 }
 

@@ -301,7 +301,7 @@ TEST_F(TumFolder, FollowsItsOptions) {
   EXPECT_TRUE(graspmap_test::is_error(error, {.field = "depth_unit"}));
 }
 
-// A wall at 2 m before a depth camera of half the size, 40 cm to the right: the left of the picture
+// A wall at 2 m before a depth camera of half the size, 40 cm to the right: the left of the image
 // has no depth.
 TEST_F(TumFolder, RegistersADepthCameraToColor) {
   write_color("1.png");

@@ -110,7 +110,7 @@ TEST(PoseImport, ImagesOfColmapByTheirNumbers) {
     const libmap::ImportedPoses imported = libmap::import_poses(path, scan);
     EXPECT_THAT(nodes_of(imported), ElementsAre(3, 4, 12));
     EXPECT_EQ(imported.poses_in_file, 5U);
-    EXPECT_EQ(imported.trajectory.foreign, 2U);
+    EXPECT_EQ(imported.trajectory.unmatched, 2U);
     for (const libmap::TrajectoryPose& pose : imported.trajectory.poses) {
       EXPECT_TRUE(pose.world_from_base.isApprox(truth[pose.node], 1e-12)) << pose.node;
       EXPECT_EQ(pose.stamp_s, 1700000000.0 + 0.5 * pose.node);
@@ -153,8 +153,8 @@ TEST(PoseImport, CamerasOfOneNodeGiveTheMean) {
               truth.translation().x() + 0.005, 1e-12);
   EXPECT_TRUE(
       imported.trajectory.poses[0].world_from_base.linear().isApprox(truth.linear(), 1e-12));
-  EXPECT_NEAR(imported.largest_rig_deviation_m, 0.005, 1e-12);
-  EXPECT_EQ(imported.trajectory.foreign, 0U);
+  EXPECT_NEAR(imported.max_rig_deviation_m, 0.005, 1e-12);
+  EXPECT_EQ(imported.trajectory.unmatched, 0U);
 }
 
 // The scale applies to the positions of the cameras, not to the offset from a camera to the base.
@@ -199,7 +199,7 @@ TEST(PoseImport, PosesOfTheCameraBecomeThoseOfTheBase) {
   EXPECT_TRUE(imported.trajectory.poses[1].world_from_base.isApprox(
       scaled * scan.camera(0).inverse(), 1e-12));
   // Node 130, whose calibration cannot be read.
-  EXPECT_EQ(imported.trajectory.foreign, 1U);
+  EXPECT_EQ(imported.trajectory.unmatched, 1U);
   ASSERT_EQ(imported.warnings.size(), 1U);
   EXPECT_THAT(imported.warnings[0], HasSubstr("node 130"));
   EXPECT_EQ(libmap::import_poses(scratch_folder() / "camera.tum", scan).trajectory.poses.size(),

@@ -259,14 +259,14 @@ TEST(MotionThrough, GivenPosesAndScrewsBetweenThem) {
 }
 
 TEST(Numbered, StampsOrTheirAbsenceInOrder) {
-  const Trajectory unstamped = libmap::numbered(Trajectory(3), 0.5);
+  const Trajectory unstamped = libmap::assign_nodes_and_stamps(Trajectory(3), 0.5);
   EXPECT_EQ(unstamped[2].node, 3);
   EXPECT_DOUBLE_EQ(unstamped[2].stamp_s, 1.7e9 + 1.0);
   Trajectory poses(3);
   for (std::size_t n = 0; n < 3; ++n) poses[n].stamp_s = 5.0 + static_cast<double>(n);
-  EXPECT_DOUBLE_EQ(libmap::numbered(poses, 0.5)[1].stamp_s, 6.0);
+  EXPECT_DOUBLE_EQ(libmap::assign_nodes_and_stamps(poses, 0.5)[1].stamp_s, 6.0);
   poses[2].stamp_s = 6.0;
-  const libmap::Error error = error_of([&] { libmap::numbered(poses, 0.5); });
+  const libmap::Error error = error_of([&] { libmap::assign_nodes_and_stamps(poses, 0.5); });
   EXPECT_EQ(error.context().value, "6");
   EXPECT_EQ(error.context().bound, "> 6");
 }

@@ -23,7 +23,7 @@ using graspmap_test::is_error;
 
 RockSite flat_site(int rocks, int count) {
   RockSite site;
-  site.ground.unevenness_m = 0.0;
+  site.ground.relief_m = 0.0;
   site.rocks.resize(static_cast<std::size_t>(rocks));
   site.field_points.count = count;
   return site;
@@ -56,7 +56,7 @@ TEST(FieldPoints, KnowFlatsEdgesAndCornersOfABox) {
   site.field_points.min_height_m = 0.15;
   const std::vector<FieldPoint> points = choose_field_points(site, mesh);
   ASSERT_EQ(points.size(), 60U);
-  std::map<PlaceKind, int> kinds;
+  std::map<LocationKind, int> kinds;
   for (const FieldPoint& point : points) {
     ++kinds[point.kind];
     EXPECT_GE(point.position.z(), 0.15);
@@ -67,24 +67,24 @@ TEST(FieldPoints, KnowFlatsEdgesAndCornersOfABox) {
     std::sort(distances.begin(), distances.end());
     EXPECT_NEAR(distances[0], 0.0, 1e-12);
     const double radius = site.field_points.radius_m;
-    if (point.kind == PlaceKind::flat) {
+    if (point.kind == LocationKind::flat) {
       EXPECT_GT(distances[1], 0.5 * radius);
     }
-    if (point.kind == PlaceKind::edge) {
+    if (point.kind == LocationKind::edge) {
       EXPECT_LT(distances[1], radius);
     }
-    if (point.kind == PlaceKind::edge) {
+    if (point.kind == LocationKind::edge) {
       EXPECT_GT(distances[2], 0.4 * radius);
     }
-    if (point.kind == PlaceKind::corner) {
+    if (point.kind == LocationKind::corner) {
       EXPECT_LT(distances[2], radius);
     }
-    EXPECT_NE(point.kind, PlaceKind::irregular);
+    EXPECT_NE(point.kind, LocationKind::irregular);
     EXPECT_EQ(point.is_hard, point.slope_deg > 60.0);
   }
-  EXPECT_GE(kinds[PlaceKind::flat], 10);
-  EXPECT_GE(kinds[PlaceKind::edge], 10);
-  EXPECT_GE(kinds[PlaceKind::corner], 4);
+  EXPECT_GE(kinds[LocationKind::flat], 10);
+  EXPECT_GE(kinds[LocationKind::edge], 10);
+  EXPECT_GE(kinds[LocationKind::corner], 4);
 }
 
 TEST(FieldPoints, WhereTheSurfaceBendsInwardIsIrregular) {
@@ -103,7 +103,7 @@ TEST(FieldPoints, WhereTheSurfaceBendsInwardIsIrregular) {
   site.field_points.min_height_m = 0.12;
   int irregular = 0;
   for (const FieldPoint& point : choose_field_points(site, mesh)) {
-    if (point.kind != PlaceKind::irregular) continue;
+    if (point.kind != LocationKind::irregular) continue;
     ++irregular;
     // Near the rim along which the upper box stands on the lower one.
     EXPECT_LT(std::abs(point.position.z() - 0.3), 0.04);
@@ -117,7 +117,7 @@ TEST(FieldPoints, SpreadOverRocksAndKeepApart) {
   const std::vector<FieldPoint> points = choose_field_points(site, mesh);
   ASSERT_EQ(points.size(), 30U);
   std::map<int, int> rocks;
-  std::map<PlaceKind, int> kinds;
+  std::map<LocationKind, int> kinds;
   std::map<bool, int> hard;
   for (std::size_t n = 0; n < points.size(); ++n) {
     ++rocks[points[n].rock];
@@ -132,7 +132,7 @@ TEST(FieldPoints, SpreadOverRocksAndKeepApart) {
   EXPECT_EQ(rocks.size(), 12U);
   for (const auto& [rock, count] : rocks) EXPECT_LE(count, 3);
   EXPECT_EQ(kinds.size(), 4U);
-  for (const auto& [kind, count] : kinds) EXPECT_GE(count, 5) << place_kind_name(kind);
+  for (const auto& [kind, count] : kinds) EXPECT_GE(count, 5) << location_kind_name(kind);
   EXPECT_GE(hard[true], 8);
   EXPECT_GE(hard[false], 8);
   const ThreadLimit one(1);
@@ -147,7 +147,7 @@ TEST(FieldPoints, TheTableNamesPlacesAndCarriesNoVerdict) {
   point.position = {0.12345, -1.0, 0.5};
   FieldPoint second = point;
   second.rock = 1;
-  second.kind = PlaceKind::corner;
+  second.kind = LocationKind::corner;
   second.is_hard = true;
   const Table table = field_point_table(site, {point, second});
   EXPECT_FALSE(table.find_column("graspable"));

@@ -10,7 +10,7 @@
 
 #include "libmap/core/parallel.h"
 #include "libmap/core/random_stream.h"
-#include "libmap/simulate/terrain_pieces.h"
+#include "libmap/simulate/terrain_tiles.h"
 #include "tests/support/test_support.h"
 
 namespace terrain_surface_test {
@@ -161,15 +161,15 @@ TEST(TerrainSurface, SlopeIsSeenAtItsDepth) {
 }
 
 TEST(TerrainSurface, StreamedIsWholeWhateverWasSeenBefore) {
-  libmap::TerrainPiecesOptions options;
-  options.size_x_m = options.size_y_m = options.piece_m = 6.0;
+  libmap::TerrainTilesOptions options;
+  options.size_x_m = options.size_y_m = options.tile_m = 6.0;
   options.spacing_m = 0.04;
-  const PointCloud cloud = libmap::sample_piece(options, {0, 0});
+  const PointCloud cloud = libmap::sample_tile(options, {0, 0});
   const Ground ground(cloud);
   const Eigen::AlignedBox2d all(Eigen::Vector2d(-1, -1), Eigen::Vector2d(7, 7));
   const double radius = 5.0 * ground.heights.spacing_m();
   const VisibleSurface whole(libmap::triangulate_plan(cloud.positions, all, radius),
-                             libmap::TextureSource::rock, 1, libmap::ShadingNormals::of_vertices);
+                             libmap::TextureSource::rock, 1, libmap::ShadingNormals::per_vertex);
   const libmap::ViewRays rays = small_rays();
   const double far_m = 2.5;
   TerrainSurface fleeting(ground.points, ground.heights,

@@ -128,7 +128,7 @@ TEST(Crop, PiecesAreCutAsTheWhole) {
     const CropMeshResult whole = crop_mesh(mesh, options);
     std::vector<double> areas;
     std::vector<Vector3d> vertices;
-    const CropReport report = crop_mesh_pieces(each, options, [&](const TriangleMesh& cut) {
+    const CropReport report = crop_mesh_tiles(each, options, [&](const TriangleMesh& cut) {
       areas.push_back(surface_area(cut));
       vertices.insert(vertices.end(), cut.vertices.begin(), cut.vertices.end());
     });
@@ -140,7 +140,7 @@ TEST(Crop, PiecesAreCutAsTheWhole) {
     EXPECT_NEAR((bounds_of(vertices).max - bounds_of(whole.mesh.vertices).max).norm(), 0, 1e-3);
   }
   CropOptions beside = box_options({70, 70}, {71, 71});
-  EXPECT_EQ(error_of([&] { crop_mesh_pieces(each, beside, [](const TriangleMesh&) {}); }).kind(),
+  EXPECT_EQ(error_of([&] { crop_mesh_tiles(each, beside, [](const TriangleMesh&) {}); }).kind(),
             ErrorKind::bad_input);
 }
 

@@ -85,7 +85,7 @@ double smallest_triangle(const TriangleMesh& mesh) {
   return smallest;
 }
 
-double distance_to_border(const PlanPolygon& outline, const Vector3d& vertex) {
+double distance_to_border(const XyPolygon& outline, const Vector3d& vertex) {
   const Corners& corners = outline.corners();
   double nearest = 1e9;
   for (std::size_t n = 0; n < corners.size(); ++n) {
@@ -112,7 +112,7 @@ std::vector<std::array<std::uint32_t, 2>> open_edges(const TriangleMesh& mesh) {
 }
 
 // Expects one component without holes whose boundary is the outline.
-void expect_clean_cut(const TriangleMesh& mesh, const PlanPolygon& outline) {
+void expect_clean_cut(const TriangleMesh& mesh, const XyPolygon& outline) {
   mesh.check();
   EXPECT_NEAR(area_from_above(mesh), outline.area_m2(), 1e-9 * (1 + outline.area_m2()));
   const Topology topology = topology_of(mesh.vertices.size(), mesh.triangles);
@@ -136,7 +136,7 @@ void expect_clean_cut(const TriangleMesh& mesh, const PlanPolygon& outline) {
 
 TEST(MeshCutting, RectanglesAreExactToTheLastBit) {
   const TriangleMesh mesh = field_mesh(40, 1, waves);
-  const PlanPolygon outline = make_rectangle({-0.71, -0.333}, {0.123456789, 0.9});
+  const XyPolygon outline = make_rectangle({-0.71, -0.333}, {0.123456789, 0.9});
   const TriangleMesh cut = cut_mesh(mesh, {outline});
   expect_clean_cut(cut, outline);
   std::size_t on_border = 0;
@@ -154,7 +154,7 @@ TEST(MeshCutting, OutlinesOfAnyForm) {
   const TriangleMesh coarse = square_mesh(0.5, 2);
   for (const int count : {3, 4, 5, 9, 30, 200})
     for (int round = 0; round < 5; ++round) {
-      const PlanPolygon outline(random_star(count, {uniform(-0.3, 0.3), 0.1}, 0.2, 1.5));
+      const XyPolygon outline(random_star(count, {uniform(-0.3, 0.3), 0.1}, 0.2, 1.5));
       expect_clean_cut(cut_mesh(mesh, {outline}), outline);
       expect_clean_cut(cut_mesh(coarse, {outline}), outline);
     }
@@ -164,25 +164,25 @@ TEST(MeshCutting, OutlineInsideOneTriangle) {
   TriangleMesh mesh;
   mesh.vertices = {{-9, -9, 0}, {9, -9, 18}, {0, 9, 3}};
   mesh.triangles = {{0, 1, 2}};
-  const PlanPolygon outline(random_star(12, {0, -3}, 0.3, 1.2));
+  const XyPolygon outline(random_star(12, {0, -3}, 0.3, 1.2));
   expect_clean_cut(cut_mesh(mesh, {outline}), outline);
 }
 
 TEST(MeshCutting, ThroughVerticesAndAlongEdges) {
   const TriangleMesh mesh = field_mesh(20, 1, waves);  // spacing of 0.1
-  const PlanPolygon on_grid = make_rectangle({mesh.vertices[3].x(), mesh.vertices[4 * 21].y()},
-                                             {mesh.vertices[15].x(), mesh.vertices[17 * 21].y()});
+  const XyPolygon on_grid = make_rectangle({mesh.vertices[3].x(), mesh.vertices[4 * 21].y()},
+                                           {mesh.vertices[15].x(), mesh.vertices[17 * 21].y()});
   const TriangleMesh cut = cut_mesh(mesh, {on_grid});
   EXPECT_EQ(cut.triangles.size(), 2U * 12 * 13) << "no triangle is cut";
   EXPECT_EQ(cut.vertices.size(), 13U * 14);
   // A diamond whose sides run along diagonals or through vertices.
-  const PlanPolygon diamond({{0.5, 0}, {0, 0.5}, {-0.5, 0}, {0, -0.5}});
+  const XyPolygon diamond({{0.5, 0}, {0, 0.5}, {-0.5, 0}, {0, -0.5}});
   expect_clean_cut(cut_mesh(mesh, {diamond}), diamond);
   // Corners on edges, a corner on a vertex, collinear corners.
-  const PlanPolygon mixed({{-0.5, -0.5}, {0, -0.5}, {0.45, -0.5}, {0.45, 0.3}, {0.1, 0.05}});
+  const XyPolygon mixed({{-0.5, -0.5}, {0, -0.5}, {0.45, -0.5}, {0.45, 0.3}, {0.1, 0.05}});
   expect_clean_cut(cut_mesh(mesh, {mixed}), mixed);
   // Close enough to vertices that they are moved onto the border.
-  const PlanPolygon near = make_rectangle({-0.5 + 3e-8, -0.5 - 3e-8}, {0.5, 0.5 + 2e-8});
+  const XyPolygon near = make_rectangle({-0.5 + 3e-8, -0.5 - 3e-8}, {0.5, 0.5 + 2e-8});
   const TriangleMesh moved = cut_mesh(mesh, {near});
   expect_clean_cut(moved, near);
   EXPECT_GT(smallest_triangle(moved), 1e-3);
@@ -197,14 +197,14 @@ TEST(MeshCutting, JaggedHalvesMakeTheWhole) {
   Corners high = {{0.9, 0.8}, {-0.9, 0.8}};
   high.insert(high.end(), teeth.rbegin(), teeth.rend());
   const double whole = surface_area(cut_mesh(mesh, {make_rectangle({-0.9, -0.8}, {0.9, 0.8})}));
-  EXPECT_NEAR(surface_area(cut_mesh(mesh, {PlanPolygon(low)})) +
-                  surface_area(cut_mesh(mesh, {PlanPolygon(high)})),
+  EXPECT_NEAR(surface_area(cut_mesh(mesh, {XyPolygon(low)})) +
+                  surface_area(cut_mesh(mesh, {XyPolygon(high)})),
               whole, 1e-9);
 }
 
 TEST(MeshCutting, OverhangsAndClosedBodies) {
   const TriangleMesh ball = closed_ball(40, 60, {0.1, -0.2, 0.3});
-  const PlanPolygon outline = make_rectangle({-0.4, -0.5}, {0.3, 0.45});
+  const XyPolygon outline = make_rectangle({-0.4, -0.5}, {0.3, 0.45});
   const TriangleMesh cut = cut_mesh(ball, {outline});
   for (const auto& edge : open_edges(cut))
     for (const std::uint32_t v : edge)
@@ -233,7 +233,7 @@ TEST(MeshCutting, UprightWalls) {
       << "on the border, which belongs to the inside";
   EXPECT_TRUE(cut_mesh(wall, {make_rectangle({1, 0.1}, {2.5, 1})}).triangles.empty());
   // Through a corner of the outline.
-  const TriangleMesh turned = cut_mesh(wall, {PlanPolygon({{2, -1}, {3, 0}, {2, 1}, {1, 0}})});
+  const TriangleMesh turned = cut_mesh(wall, {XyPolygon({{2, -1}, {3, 0}, {2, 1}, {1, 0}})});
   EXPECT_NEAR(surface_area(turned), 4, 1e-12);
   // Half a ball, cut along a meridian.
   const TriangleMesh ball = closed_ball(12, 12, {0, 0, 0});
@@ -272,7 +272,7 @@ TEST(MeshCutting, AllThatBelongsToItIsCarriedAlong) {
   for (std::size_t n = 0; n < mesh.triangles.size(); ++n)
     faces.values.push_back(static_cast<double>(n));
   mesh.face_fields = {faces};
-  const TriangleMesh cut = cut_mesh(mesh, {PlanPolygon(random_star(9, {0, 0}, 0.3, 0.9))});
+  const TriangleMesh cut = cut_mesh(mesh, {XyPolygon(random_star(9, {0, 0}, 0.3, 0.9))});
   cut.check();
   ASSERT_EQ(cut.vertex_fields.size(), 2U);
   ASSERT_EQ(cut.face_fields.size(), 1U);
@@ -304,7 +304,7 @@ TEST(MeshCutting, FarFromTheOrigin) {
   for (Vector3d& vertex : mesh.vertices) vertex += far;
   Corners corners = random_star(11, {0, 0}, 0.3, 0.9);
   for (Vector2d& corner : corners) corner += far.head<2>();
-  const PlanPolygon outline(corners);
+  const XyPolygon outline(corners);
   const TriangleMesh cut = cut_mesh(mesh, {outline});
   EXPECT_NEAR(area_from_above(cut), outline.area_m2(), 1e-7);
   const Topology topology = topology_of(cut.vertices.size(), cut.triangles);
@@ -334,7 +334,7 @@ TEST(MeshCutting, AllOrNothing) {
 
 TEST(MeshCutting, ThreadsMakeNoDifference) {
   const TriangleMesh mesh = field_mesh(80, 1, waves);
-  const PlanPolygon outline(random_star(40, {0, 0}, 0.2, 0.9));
+  const XyPolygon outline(random_star(40, {0, 0}, 0.2, 0.9));
   const ThreadLimit one(1);
   const TriangleMesh a = cut_mesh(mesh, {outline});
   const ThreadLimit more(5);

@@ -227,7 +227,7 @@ TEST(MeshRepair, FoldIsTakenOutAndClosed) {
   const MeshCleaningResult result = cleaned(mesh, repairs());
   EXPECT_GT(result.intersecting_triangles, 0U);
   EXPECT_GT(result.closing_triangles, 0U);
-  EXPECT_EQ(result.open_places, 0U);
+  EXPECT_EQ(result.unclosed_holes, 0U);
   EXPECT_EQ(result.remaining_intersecting_triangles, 0U);
   const MeshReport report = report_mesh(result.mesh);
   EXPECT_EQ(report.filled_triangles, result.closing_triangles);
@@ -245,7 +245,7 @@ TEST(MeshRepair, ScrapsOfIntersectionsAreDropped) {
   TriangleMesh tube = graspmap_test::cylinder_mesh(25, 12, 0.3, 0.6);
   for (Eigen::Vector3d& v : tube.vertices) v += Eigen::Vector3d(0.012, 0.017, -0.31);
   const MeshCleaningResult result = cleaned(graspmap_test::join_meshes(ground, tube), repairs());
-  EXPECT_EQ(result.open_places, 0U);
+  EXPECT_EQ(result.unclosed_holes, 0U);
   EXPECT_LT(result.intersecting_triangles, 450U);  // of one round
   const MeshReport report = report_mesh(result.mesh);
   EXPECT_EQ(report.components, 3U);

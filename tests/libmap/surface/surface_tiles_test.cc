@@ -95,7 +95,7 @@ void add_rows(const TriangleMesh& mesh, Rows& rows) {
   }
 }
 
-PointCloud points_in(const PointCloud& cloud, const PlanBox& box) {
+PointCloud points_in(const PointCloud& cloud, const XyBox& box) {
   std::vector<std::size_t> inside;
   for (std::size_t n = 0; n < cloud.size(); ++n)
     if (box.contains(cloud.positions[n].head<2>())) inside.push_back(n);
@@ -113,7 +113,7 @@ TEST(SurfaceTiles, SameTrianglesAsAtOnceBitForBit) {
   Rows expected;
   add_rows(whole.mesh, expected);
 
-  SurfaceSurvey survey;
+  CloudStatistics survey;
   survey.add(points_in(cloud, {Eigen::Vector2d(2, -1), Eigen::Vector2d(9, 9)}), true);
   survey.add(points_in(cloud, {Eigen::Vector2d(-9, -1), Eigen::Vector2d(2, 9)}), true);
   std::map<XyTile, std::size_t> tiles;
@@ -122,7 +122,7 @@ TEST(SurfaceTiles, SameTrianglesAsAtOnceBitForBit) {
   std::map<XyTile, TriangleMesh> made;
   for (const auto& [tile, points] : tiles) {
     const SurfaceTile one =
-        make_surface_tile(points_in(cloud, plan_box_of(tile, options.tile_m, options.margin_m())),
+        make_surface_tile(points_in(cloud, xy_box_of(tile, options.tile_m, options.margin_m())),
                           survey, tile, options);
     islands.add(tile, one);
     made[tile] = one.mesh;
@@ -156,7 +156,7 @@ TEST(SurfaceTiles, IslandsAreJudgedAcrossTiles) {
   strip(0.3, 0.3);
   SurfaceTileOptions options = options_of(0.4);
   options.cleaning.min_island_area_m2 = 0.03;
-  SurfaceSurvey survey;
+  CloudStatistics survey;
   survey.add(cloud, true);
   std::map<XyTile, std::size_t> tiles;
   add_surface_tiles(cloud, options, tiles);
@@ -164,7 +164,7 @@ TEST(SurfaceTiles, IslandsAreJudgedAcrossTiles) {
   double area = 0.0;
   for (const auto& [tile, points] : tiles) {
     const SurfaceTile one =
-        make_surface_tile(points_in(cloud, plan_box_of(tile, options.tile_m, options.margin_m())),
+        make_surface_tile(points_in(cloud, xy_box_of(tile, options.tile_m, options.margin_m())),
                           survey, tile, options);
     islands.add(tile, one);
     area += surface_area(one.mesh);

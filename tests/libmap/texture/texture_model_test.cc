@@ -143,7 +143,7 @@ TEST(TextureModel, EvensOutExposureAndCorners) {
   };
   const auto middle = within(evened.model.mesh, 0.37);
   EXPECT_LT(errors_of(evened.model, dimmed, middle).mean, 1.5);
-  EXPECT_LT(evened.exposure.spread, 0.3 * evened.exposure.spread_before);
+  EXPECT_LT(evened.exposure.log_color_deviation, 0.3 * evened.exposure.log_color_deviation_before);
 
   TextureOptions options;
   options.exposure = {.gains = false, .vignetting = false};

@@ -50,16 +50,16 @@ TEST(ShareViews, AddUpToOneAndEndSoftly) {
   table.insert(0, {6, 2.0F});
   table.insert(0, {7, 1.0F});
   table.insert(1, {2, 3.0F});
-  const libmap::BlendingShares two = libmap::share_views(table, 2, 1.0);
+  const libmap::BlendingWeights two = libmap::blending_weights(table, 2, 1.0);
   EXPECT_EQ(two.first, (std::vector<std::uint32_t>{0, 2, 3, 3}));
   // Less the third best: 3/4 to 1/4 of the best.
   EXPECT_FLOAT_EQ(two.shares[0].share, 0.75F);
   EXPECT_FLOAT_EQ(two.shares[1].share, 0.25F);
   EXPECT_EQ(two.shares[1].photo, 6U);
   EXPECT_FLOAT_EQ(two.shares[2].share, 1.0F);
-  const libmap::BlendingShares sharper = libmap::share_views(table, 2, 2.0);
+  const libmap::BlendingWeights sharper = libmap::blending_weights(table, 2, 2.0);
   EXPECT_FLOAT_EQ(sharper.shares[0].share, 15.0F / 18.0F);
-  EXPECT_TRUE(libmap::share_views(table, 1, 1.0).shares.empty());
+  EXPECT_TRUE(libmap::blending_weights(table, 1, 1.0).shares.empty());
 }
 
 struct LabelProblem {
@@ -282,8 +282,7 @@ TEST(TextureAtlas, TexelsAreThePhotographsPixels) {
   ASSERT_EQ(atlas.charts.size(), 1U);
   for (const Eigen::Vector3d& vertex : c.mesh.vertices) {
     const Eigen::Vector2d pixel = c.photos[1].projector.project(vertex).head<2>();
-    const Eigen::Vector2d texel =
-        libmap::place_on_page(atlas.charts[0], c.photos[1].projector, vertex);
+    const Eigen::Vector2d texel = libmap::texel_of(atlas.charts[0], c.photos[1].projector, vertex);
     const Eigen::Vector2d shift = texel - pixel;
     EXPECT_NEAR(shift.x(), std::round(shift.x()), 1e-9);
     EXPECT_NEAR(shift.y(), std::round(shift.y()), 1e-9);
@@ -307,7 +306,7 @@ TEST(Exposure, GainsOfPhotographsThatDifferAndLeftOversThatDoNotFit) {
     }
   }
   std::shuffle(observations.begin(), observations.end(), random_engine());
-  const libmap::TextureExposure exposure = libmap::even_out_exposure(observations, 4, {});
+  const libmap::TextureExposure exposure = libmap::estimate_exposure(observations, 4, {});
   ASSERT_EQ(exposure.gains.size(), 4U);
   for (std::size_t i = 0; i < 3; ++i)
     EXPECT_NEAR(static_cast<double>(exposure.gains[i][0] / exposure.gains[1][0]), gains[i], 0.01);
@@ -315,7 +314,7 @@ TEST(Exposure, GainsOfPhotographsThatDifferAndLeftOversThatDoNotFit) {
               -0.15, 0.01);
   // A photograph without overlap is not changed.
   EXPECT_NEAR(static_cast<double>(exposure.gains[3][2]), 1.0, 0.08);
-  EXPECT_EQ(libmap::even_out_exposure({}, 2, {}).gains[1], Eigen::Vector3f::Ones());
+  EXPECT_EQ(libmap::estimate_exposure({}, 2, {}).gains[1], Eigen::Vector3f::Ones());
 }
 
 // Number of edges with one triangle, and with more than two.

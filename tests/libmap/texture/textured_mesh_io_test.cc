@@ -243,7 +243,7 @@ TEST(TexturedMeshIo, FilesThatAreBroken) {
   EXPECT_THROW(graspmap_test::write_textured_mesh(folder / "w.glb", TexturedMesh{}), libmap::Error);
 }
 
-TEST(TexturedMesh, APictureOfManyNamesIsOnePage) {
+TEST(TexturedMesh, AImageOfManyNamesIsOnePage) {
   const auto folder = scratch_folder();
   graspmap_test::write_text(folder / "a.png", libmap::encode_png(libmap::ColorImage(4, 4)));
   std::string materials;

@@ -206,7 +206,7 @@ TEST(Charts, LinesLieWhereTheirNumbersSay) {
   EXPECT_NEAR(high.right - low.right, width / 2, 2);
 }
 
-TEST(Charts, EqualChartsGiveEqualPicturesAndFiles) {
+TEST(Charts, EqualChartsGiveEqualImagesAndFiles) {
   Chart chart = unit_chart();
   chart.title = "duplicate";
   chart.curves = {curve_of({0, 0.3, 1}, {0, 0.8, 1}, red)};

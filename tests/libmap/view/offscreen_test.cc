@@ -29,7 +29,7 @@ std::string variable(const char* name) {
   return value != nullptr ? value : "(unset)";
 }
 
-ColorImage small_picture() {
+ColorImage small_image() {
   Scene scene;
   PointCloud cloud;
   cloud.positions = {{0, 0, 0}, {1, 1, 0}};
@@ -65,7 +65,7 @@ TEST_F(VirtualDisplayTest, ADisplayThatAnswersIsUsed) {
     const VirtualDisplay inner;
     EXPECT_FALSE(inner.started());
     EXPECT_EQ(variable("DISPLAY"), name);
-    EXPECT_EQ(small_picture().pixels.size(), 64U * 64);
+    EXPECT_EQ(small_image().pixels.size(), 64U * 64);
   }
   EXPECT_EQ(variable("DISPLAY"), name);
   EXPECT_TRUE(runs(outer.process_id()));
@@ -82,8 +82,8 @@ TEST_F(VirtualDisplayTest, ADeadDisplayIsReplacedAndRestored) {
 }
 
 TEST_F(VirtualDisplayTest, DrawsOneAfterTheOtherWithServersOfTheirOwn) {
-  const ColorImage first = small_picture();
-  EXPECT_EQ(small_picture(), first);
+  const ColorImage first = small_image();
+  EXPECT_EQ(small_image(), first);
   EXPECT_EQ(variable("DISPLAY"), "(unset)");
   // No child is left behind, neither running nor as a zombie; the thread sanitizer has one of its
   // own.
@@ -179,7 +179,7 @@ TEST(DrawOffscreen, WhatVtkSaysIsTheReason) {
       is_error(error, {.about = "no such shader at all", .kind = libmap::ErrorKind::failed}));
 }
 
-TEST(DrawOffscreen, APictureWithoutPixelsCannotBeReadBack) {
+TEST(DrawOffscreen, AImageWithoutPixelsCannotBeReadBack) {
   const Error error = error_of([] { draw_offscreen(0, 0, [](vtkRenderWindow&) {}); });
   EXPECT_EQ(error.kind(), ErrorKind::failed);
   EXPECT_TRUE(is_error(error, {.about = "read back", .kind = libmap::ErrorKind::failed}));

@@ -274,7 +274,7 @@ TEST_F(SceneViewTest, EqualInputGivesEqualBytes) {
   EXPECT_EQ(first.substr(1, 3), "PNG");
 }
 
-TEST_F(SceneViewTest, AnySizeGivesAPictureWithTheScene) {
+TEST_F(SceneViewTest, AnySizeGivesAImageWithTheScene) {
   Scene scene;
   PointCloud cloud;
   cloud.positions = {{0, 0, 0}, {1, 1, 0}, {1, 0, 0}, {0, 1, 0}};

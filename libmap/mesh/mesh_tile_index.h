@@ -1,0 +1,55 @@
+// Access to a mesh in many files: each piece with the surface around it. Memory depends on the size
+// of a piece.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <filesystem>
+#include <list>
+#include <utility>
+#include <vector>
+
+#include "libmap/core/triangle_mesh.h"
+
+namespace libmap {
+
+// A mesh followed by the surface around it.
+struct MeshWithMargin {
+  TriangleMesh mesh;
+  std::size_t triangles = 0;  // number of triangles before those of the margin
+};
+
+// Appends the triangles of `other` with a corner in `box` (x and y, borders included). Vertices of
+// `other` at exactly the position of an existing vertex are replaced by it, which joins meshes with
+// equal seams. Normals, colors and fields are treated as in append_mesh.
+void append_part_within(const TriangleMesh& other, const Eigen::AlignedBox2d& box,
+                        TriangleMesh& mesh);
+
+class MeshTileIndex {
+ public:
+  // Reads each piece once. Throws Error naming the file that cannot be read.
+  explicit MeshTileIndex(std::vector<std::filesystem::path> tiles);
+
+  // Number of pieces; indices are those of the given paths.
+  std::size_t size() const { return tiles_.size(); }
+  const std::filesystem::path& path(std::size_t tile) const { return tiles_[tile].path; }
+  // Bounding box in x and y.
+  const Eigen::AlignedBox2d& box(std::size_t tile) const { return tiles_[tile].box; }
+
+  // Returns the piece, and the triangles of other pieces with a corner within `margin_m` of its
+  // box. Caches recently used pieces, up to 1 million triangles. Throws Error if a file cannot be
+  // read.
+  MeshWithMargin with_margin(std::size_t tile, double margin_m);
+
+ private:
+  struct Tile {
+    std::filesystem::path path;
+    Eigen::AlignedBox2d box;
+  };
+  const TriangleMesh& mesh_of(const Tile& tile);
+
+  std::vector<Tile> tiles_;
+  std::list<std::pair<const Tile*, TriangleMesh>> kept_;  // most recently used first
+};
+
+}  // namespace libmap

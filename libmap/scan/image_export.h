@@ -1,0 +1,64 @@
+// Export of a scan's color images to files, selection of representative views, and Bundler files.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "libmap/camera/rgbd_frame.h"
+#include "libmap/core/camera.h"
+#include "libmap/core/parameters.h"
+#include "libmap/core/pose.h"
+#include "libmap/scan/scan_source.h"
+
+namespace libmap {
+
+// Returns "000012.jpg" for camera 0 of node 12, "000012_1.png" for camera 1.
+std::string image_file_name(int node, std::size_t camera, const std::string& extension);
+
+struct ImageFile {
+  std::string name{};
+  std::string bytes{};  // the stored bytes if they contain this image only; else a PNG
+};
+
+// Returns the image file of one camera; `views` are the views of the node's frame, with color.
+ImageFile image_file_of(const ScanSource& scan, int node, const std::vector<CameraView>& views,
+                         std::size_t camera);
+
+// Reads the views of a node's frame. Throws Error naming the node if it has no color image or no
+// calibration.
+std::vector<CameraView> read_views(const ScanSource& scan, int node, FrameParts parts);
+
+struct ViewSelectionOptions {
+  double radius_m = 0.5;    // >= 0, distance of the camera positions; 0: all views are kept
+  double angle_deg = 30.0;  // 0..180, angle between the optical axes
+};
+void bind(ParameterTable& table, ViewSelectionOptions& options);
+
+// Selects views greedily by descending quality and returns their indices in ascending order. Two
+// views are similar if they are closer than the radius and their axes are within the angle. No two
+// selected views are similar; each other view is similar to a better selected view. `qualities` has
+// one value per view; the first of equal views is better. Poses are of optical frames.
+std::vector<std::size_t> select_views(const std::vector<Pose>& world_from_camera,
+                                      const std::vector<double>& qualities,
+                                      const ViewSelectionOptions& options = {});
+
+// Image with its camera for Bundler v0.3 (Snavely, Seitz and Szeliski 2006). MeshLab imports
+// bundle.out, list.txt and the images as "registered rasters".
+struct BundlerView {
+  std::string image{};  // name in list.txt, relative to its folder
+  Camera camera{};      // centered pinhole without distortion; base_from_camera is not used
+  Pose world_from_camera = Pose::Identity();  // optical frame: z forward, x right, y down
+};
+
+// Returns bundle.out: "# Bundle file v0.3", the numbers of cameras and points, then for each camera
+// f k1 k2, three rows of R and t. Bundler's camera looks along -z with x right and y up:
+//   P = R * X + t,  p = -P.xy / P.z,  pixel = f * (1 + k1 |p|^2 + k2 |p|^4) * p
+// from the center of the image, x right, y up. k1 = k2 = 0, because readers interpret them
+// differently. There are no points, because registered images do not need them.
+std::string to_bundle_text(const std::vector<BundlerView>& views);
+
+// Returns list.txt: one image per line.
+std::string to_bundler_list(const std::vector<BundlerView>& views);
+
+}  // namespace libmap

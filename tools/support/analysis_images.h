@@ -1,0 +1,42 @@
+// Images and charts of an analysis of maps.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "libgtd/evaluate/map_analysis.h"
+#include "libgtd/evaluate/map_change.h"
+#include "libgtd/evaluate/map_regions.h"
+#include "libmap/core/image.h"
+#include "libmap/view/charts.h"
+
+namespace graspmap_tools {
+
+// Score histogram: bars of the evaluated voxels in the legend's colors, and a line for all voxels.
+libmap::Chart histogram_chart(const libgtd::MapAnalysis& analysis, const std::string& title);
+
+// Ground by a property: bars are the graspable share of a bin, a line its share of all ground.
+libmap::Chart ground_chart(const std::vector<libgtd::GroundBin>& bins,
+                           const std::string& axis_title, const std::string& title);
+
+struct MapImage {
+  const libgtd::VoxelMap& map;
+  const libgtd::MapSurface& surface;
+  std::string title;
+};
+
+// Draws the map from above: regions colored by reachability, the largest ones numbered, other
+// ground darker with slope.
+libmap::ColorImage draw_regions(const MapImage& image, const libgtd::MapRegionResult& regions,
+                                const libgtd::RegionReach& reach);
+
+// Draws the map from above, with voxels that are graspable in both maps or in one only.
+libmap::ColorImage draw_change(const MapImage& image, const libgtd::MapChange& change,
+                               const libgtd::VoxelMap& other,
+                               const libmap::Pose& map_terrain_from_other_terrain);
+
+// Draws the map from above, colored by the difference of both scores.
+libmap::ColorImage draw_score_change(const MapImage& image, const libgtd::MapChange& change,
+                                     const libgtd::VoxelMap& other);
+
+}  // namespace graspmap_tools
