@@ -10,6 +10,7 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/point_cloud.h"
+#include "tests/support/expected_error.h"
 
 namespace graspmap_test {
 
@@ -29,7 +30,7 @@ std::filesystem::path data_folder();
 std::filesystem::path reference_folder();
 
 // Returns the Error that `action` throws; the test fails if it throws none.
-libmap::Error error_of(const std::function<void()>& action);
+[[nodiscard]] libmap::Error error_of(const std::function<void()>& action);
 
 std::string read_text(const std::filesystem::path& path);
 void write_text(const std::filesystem::path& path, const std::string& text);

@@ -13,6 +13,7 @@ namespace bag_test {
 namespace fs = std::filesystem;
 using graspmap_test::bad_input;
 using graspmap_test::content;
+using graspmap_test::ExpectedError;
 using graspmap_test::graspmap;
 using graspmap_test::json_of;
 using graspmap_test::ProgramResult;
@@ -27,7 +28,7 @@ bool has_ros() {
   const ProgramResult result = graspmap({"info", "probe.bag"});
   fs::remove(scratch("probe.bag"));
   if (result.exit_code != 1) return true;
-  EXPECT_NE(result.standard_error.find("built without ROS 1; missing: "), std::string::npos);
+  EXPECT_NE(result.standard_error.find("ROS 1"), std::string::npos);
   EXPECT_EQ(std::count(result.standard_error.begin(), result.standard_error.end(), '\n'), 1);
   return false;
 }
@@ -172,7 +173,10 @@ TEST(BagCommand, AnImageThatCannotBeUsedIsAWarningOrStrictlyAnError) {
   const std::string fault =
       "/depth/image_raw: 1 images cannot be used: step is 7: shorter than a row of 96 pixels";
   EXPECT_TRUE(bad_input(graspmap({"convert", "run.bag", "-o", "strict", "--strict"}),
-                        {"error: run.bag: /", fault, ">= 192"}));
+                        {.file = "run.bag",
+                         .field = "/front/depth/image_raw",
+                         .bound = ">= 192",
+                         .about = "step is 7"}));
   EXPECT_FALSE(fs::exists(scratch("strict")));
   const ProgramResult result = graspmap({"convert", "run.bag", "-o", "back"});
   ASSERT_TRUE(succeeded(result));
@@ -311,39 +315,47 @@ TEST(BagCommand, MapsComeBackFromBagsOfRos2) {
   // Written again over its own; never over a folder of others.
   EXPECT_TRUE(succeeded(graspmap(map_bag("a"))));
   write_text(scratch("a/notes.txt"), "mine");
-  EXPECT_TRUE(bad_input(graspmap(map_bag("a")), {"notes.txt"}));
+  EXPECT_TRUE(bad_input(graspmap(map_bag("a")), {.file = "a", .about = ".txt"}));
 }
 
 TEST(BagCommand, BadBagsOfRos2AreOneLine) {
   write_text(scratch("map.csv"), "x,y,z,score\n0,0,0,0.9\n");
   const ProgramResult written = graspmap({"convert", "map.csv", "-o", "good.mcap"});
   ASSERT_TRUE(succeeded(written));
-  EXPECT_NE(written.standard_error.find("no voxel size"), std::string::npos);
+  EXPECT_NE(written.standard_error.find("voxel size"), std::string::npos);
   ASSERT_TRUE(succeeded(graspmap({"convert", "map.csv", "-o", "good", "--cell-size", "0.01"})));
   const std::vector<std::string> before = graspmap_test::names_in_scratch();
-  const auto says = [](std::vector<std::string> words, const std::vector<std::string>& parts) {
+  const auto says = [](std::vector<std::string> words, const ExpectedError& expected) {
     words.insert(words.begin(), "convert");
-    EXPECT_TRUE(bad_input(graspmap(words), parts));
+    EXPECT_TRUE(bad_input(graspmap(words), expected));
   };
-  says({"map.csv", "-o", "out.db3"}, {"out.db3", "not a bag format", ".mcap"});
-  says({"map.csv", "-o", "out.zip"}, {"out.zip", ".zip"});
+  says({"map.csv", "-o", "out.db3"}, {.file = "out.db3", .field = "extension", .value = ".db3"});
+  says({"map.csv", "-o", "out.zip"}, {.file = "out.zip",
+                                      .field = "extension",
+                                      .value = ".zip",
+                                      .bound = ".pcd, .ply, .csv or .vtp"});
   says({"map.csv", "-o", "out", "--cell-size", "1", "--compression", "lz4"},
-       {"compression", "must be none"});
-  says({"map.csv", "-o", "out.mcap", "--cell-size", "1", "--compression", "bz2"}, {"bz2", "zstd"});
+       {.file = "map.csv", .field = "compression"});
+  says({"map.csv", "-o", "out.mcap", "--cell-size", "1", "--compression", "bz2"},
+       {.file = "map.csv", .field = "compression", .value = "bz2"});
   says({"map.csv", "-o", "out.mcap", "--cell-size", "1", "--stamp", "4000000000"},
-       {"outside ROS's range of time", "2^31"});
-  says({"map.csv", "-o", "out", "--cell-size", "-1"}, {"--cell-size"});
-  says({"good.mcap", "-o", "out.mcap"}, {"cannot both be bags"});
-  says({"good.mcap", "-o", "out"}, {"topics of images is none"});
+       {.field = "stamp", .bound = ">= 1e-9 and < 2^31 s"});
+  says({"map.csv", "-o", "out", "--cell-size", "-1"},
+       {.field = "--cell-size", .value = "-1", .bound = ">= 0"});
+  says({"good.mcap", "-o", "out.mcap"}, {.file = "good.mcap", .about = "both be bags"});
+  says({"good.mcap", "-o", "out"},
+       {.file = "good.mcap", .field = "topics of images", .value = "none"});
   fs::create_directory(scratch("open"));
   fs::copy(scratch("good/bag_0.db3"), scratch("open/bag_0.db3"));
-  EXPECT_TRUE(bad_input(graspmap({"info", "open"}), {"open/metadata.yaml", "ros2 bag reindex"}));
-  says({"open", "-o", "out"}, {"open/metadata.yaml", "ros2 bag reindex"});
+  EXPECT_TRUE(
+      bad_input(graspmap({"info", "open"}), {.file = "open/metadata.yaml", .about = "reindex"}));
+  says({"open", "-o", "out"}, {.file = "open/metadata.yaml", .about = "reindex"});
   write_text(scratch("open/metadata.yaml"), content("good/metadata.yaml"));
   write_text(scratch("open/bag_0.db3"), content("good/bag_0.db3").substr(0, 5000));
-  EXPECT_TRUE(bad_input(graspmap({"info", "open"}), {"open/bag_0.db3"}));
+  EXPECT_TRUE(bad_input(graspmap({"info", "open"}), {.file = "open/bag_0.db3"}));
   write_text(scratch("open/cut.mcap"), content("good.mcap").substr(0, 500));
-  EXPECT_TRUE(bad_input(graspmap({"info", "open/cut.mcap"}), {"open/cut.mcap", "is truncated"}));
+  EXPECT_TRUE(bad_input(graspmap({"info", "open/cut.mcap"}),
+                        {.file = "open/cut.mcap", .about = "truncated"}));
   fs::remove_all(scratch("open"));
   EXPECT_EQ(graspmap_test::names_in_scratch(), before);
 }
@@ -404,32 +416,33 @@ TEST(BagCommand, WhatIsABagIsDecidedByInputAndOutput) {
   ASSERT_TRUE(succeeded(graspmap(
       {"convert", "viz.mcap", "--topic", "/graspability_map", "-o", "back.csv", "--quiet"})));
   const std::vector<std::string> before = graspmap_test::names_in_scratch();
-  const auto says = [](std::vector<std::string> words, const std::vector<std::string>& parts) {
+  const auto says = [](std::vector<std::string> words, const ExpectedError& expected) {
     words.insert(words.begin(), "convert");
-    EXPECT_TRUE(bad_input(graspmap(words), parts));
+    EXPECT_TRUE(bad_input(graspmap(words), expected));
   };
   // A scan stays a scan, and never becomes a bag.
-  says({"scan.db", "-o", "out"}, {"scan.db"});
-  says({"scan.db", "-o", "out.bag"}, {"out.bag", "not a scan"});
-  says({"folder", "-o", "out"}, {"folder"});
-  says({"folder", "-o", "out.mcap"}, {"folder: a bag is made of", "rig.yaml"});
+  says({"scan.db", "-o", "out"}, {.file = "scan.db"});
+  says({"scan.db", "-o", "out.bag"}, {.file = "out.bag", .about = "scan"});
+  says({"folder", "-o", "out"}, {.file = "folder"});
+  says({"folder", "-o", "out.mcap"}, {.file = "folder", .about = ".yaml"});
   for (const char* other : {"rig.yaml", "recording.mcap"}) {
     fs::create_directory(scratch("both"));
     write_text(scratch("both/depth.txt"), "");
     write_text(scratch("both") / other, "");
-    says({"both", "-o", "out"}, {"both: contains depth.txt of a scan"});
+    says({"both", "-o", "out"}, {.file = "both", .about = "depth.txt"});
     fs::remove_all(scratch("both"));
   }
   // The folder of a rig can only become a bag.
-  says({"rig", "-o", "out"}, {"rig/rig.yaml", "cameras"});
-  says({"rig", "-o", "out.pcd"}, {"out.pcd", "not a bag format"});
+  says({"rig", "-o", "out"}, {.file = "rig/rig.yaml", .field = "cameras"});
+  says({"rig", "-o", "out.pcd"}, {.file = "out.pcd", .field = "extension", .value = ".pcd"});
   // Without an extension: one map becomes a bag; several files and poses do not.
-  says({"cloud.csv", "-o", "out"}, {"cloud.csv: score", "an output without an extension is a bag"});
-  says({"map.csv", "map.ply", "-o", "out"}, {"error: out: extension is missing"});
-  says({"map.csv", "-o", "out", "--encoding", "ascii"}, {"error: out: "});
-  says({"poses.csv", "-o", "out", "--poses-format", "tum"}, {"out", "poses"});
-  EXPECT_TRUE(wrong_usage(graspmap({"convert", "viz.mcap", "map.csv", "-o", "out"}),
-                          {"one argument too many"}));
+  says({"cloud.csv", "-o", "out"}, {.file = "cloud.csv", .field = "score"});
+  says({"map.csv", "map.ply", "-o", "out"},
+       {.file = "out", .field = "extension", .value = "missing"});
+  says({"map.csv", "-o", "out", "--encoding", "ascii"}, {.file = "out", .field = "extension"});
+  says({"poses.csv", "-o", "out", "--poses-format", "tum"},
+       {.file = "out", .field = "extension", .bound = "one of .tum .kitti .g2o .toro"});
+  EXPECT_TRUE(wrong_usage(graspmap({"convert", "viz.mcap", "map.csv", "-o", "out"}), {"map.csv"}));
   EXPECT_EQ(graspmap_test::names_in_scratch(), before);
 }
 
@@ -460,8 +473,8 @@ TEST(BagCommand, LeavesNothingInTheUsersFolder) {
   const std::map<std::string, std::string> environment = {
       {"HOME", scratch("home").string()}, {"TMPDIR", scratch("temporary").string()}};
   const ProgramResult written = graspmap({"convert", "map.csv", "-o", "map.bag"}, environment);
-  EXPECT_EQ(written.standard_error,
-            "graspmap convert: info: 2 clouds and 0 footholds at 1.000000 s\n");
+  EXPECT_TRUE(succeeded(written));
+  EXPECT_EQ(std::count(written.standard_error.begin(), written.standard_error.end(), '\n'), 1);
   EXPECT_TRUE(succeeded(graspmap({"info", "map.bag"}, environment)));
   EXPECT_TRUE(fs::is_empty(scratch("home")));
   EXPECT_TRUE(fs::is_empty(scratch("temporary")));
@@ -474,40 +487,55 @@ TEST(BagCommand, BadInputIsOneLineAndLeavesNothing) {
   write_text(scratch("f.csv"), "x,y,z,score,approach_x,approach_y,approach_z\n0,0,0,0.9,0,0,0\n");
   ASSERT_TRUE(succeeded(graspmap({"convert", "map.csv", "-o", "good.bag"})));
   const std::vector<std::string> before = graspmap_test::names_in_scratch();
-  const auto says = [](std::vector<std::string> words, const std::vector<std::string>& parts) {
+  const auto says = [](std::vector<std::string> words, const ExpectedError& expected) {
     words.insert(words.begin(), "convert");
-    EXPECT_TRUE(bad_input(graspmap(words), parts));
+    EXPECT_TRUE(bad_input(graspmap(words), expected));
   };
-  EXPECT_TRUE(bad_input(graspmap({"info", "none.bag"}), {"none.bag: no such file"}));
-  says({"none.bag", "-o", "out"}, {"none.bag: no such file"});
-  says({"none", "-o", "out.bag"}, {"none: no such file"});
-  EXPECT_TRUE(wrong_usage(graspmap({"convert", "good.bag"}), {"--output is required"}));
-  says({"good.bag", "-o", "out"}, {"good.bag: topics of images is none"});
-  says({"good.bag", "-o", "out.pcd"}, {"/graspability_map, /curvature_map", "named as the topic"});
+  EXPECT_TRUE(bad_input(graspmap({"info", "none.bag"}), {.file = "none.bag", .about = "no such"}));
+  says({"none.bag", "-o", "out"}, {.file = "none.bag", .about = "no such"});
+  says({"none", "-o", "out.bag"}, {.file = "none", .about = "no such"});
+  EXPECT_TRUE(wrong_usage(graspmap({"convert", "good.bag"}), {"--output"}));
+  says({"good.bag", "-o", "out"},
+       {.file = "good.bag", .field = "topics of images", .value = "none"});
+  says({"good.bag", "-o", "out.pcd"}, {.file = "good.bag",
+                                       .field = "topics of sensor_msgs/PointCloud2",
+                                       .value = "/graspability_map, /curvature_map"});
   says({"good.bag", "-o", "out.pcd", "--topic", "/graspabilty_map"},
-       {"did you mean '/graspability_map'"});
+       {.file = "good.bag",
+        .field = "topic",
+        .value = "/graspabilty_map",
+        .bound = "one of /graspability_map, /curvature_map",
+        .about = "'/graspability_map'"});
   says({"good.bag", "-o", "out.pcd", "--topic", "/graspability_map", "--topic", "/curvature_map"},
-       {"--topic", "a single topic"});
-  says({"good.bag", "-o", "out.xyz"}, {"out.xyz"});
-  says({"good.bag", "-o", "out.bag"}, {"cannot both be bags"});
-  says({"good.bag", "-o", "out", "--stamp", "noon"}, {"noon"});
-  says({"terrain.pcd", "-o", "out"}, {"terrain.pcd: score: ", "bag of ROS 2"});
-  says({"terrain.pcd", "-o", "out.bag"}, {"terrain.pcd: score: no such field"});
-  says({"map.csv", "-o", "out.bag", "--footholds", "map.csv"}, {"approach_x"});
-  says({"map.csv", "-o", "out.bag", "--footholds", "f.csv"}, {"approach of foothold 1"});
-  says({"map.csv", "-o", "out.bag", "--stamp", "-1"}, {"outside ROS's range of time"});
-  says({"map.csv", "-o", "out.bag", "--compression", "zip"}, {"zip", "lz4"});
-  says({"map.csv", "-o", "out.bag", "--topic", "/a"}, {"--topic", "with a map"});
-  says({"map.csv", "-o", "out.bag", "--rig", "r"}, {"--rig", "with a map"});
-  says({"good.bag", "-o", "out.pcd", "--terrain", "terrain.pcd"}, {"--terrain", "requires a bag"});
-  says({"good.bag", "-o", "out.pcd", "--rig", "r"}, {"--rig", "cloud output"});
+       {.field = "--topic", .about = "single"});
+  says({"good.bag", "-o", "out.xyz"}, {.file = "out.xyz",
+                                       .field = "extension",
+                                       .value = ".xyz",
+                                       .bound = ".pcd, .ply, .csv or .vtp"});
+  says({"good.bag", "-o", "out.bag"}, {.file = "good.bag", .about = "both be bags"});
+  says({"good.bag", "-o", "out", "--stamp", "noon"}, {.field = "--stamp", .value = "noon"});
+  says({"terrain.pcd", "-o", "out"}, {.file = "terrain.pcd", .field = "score"});
+  says({"terrain.pcd", "-o", "out.bag"}, {.file = "terrain.pcd", .field = "score"});
+  says({"map.csv", "-o", "out.bag", "--footholds", "map.csv"},
+       {.file = "map.csv", .field = "approach_x"});
+  says({"map.csv", "-o", "out.bag", "--footholds", "f.csv"},
+       {.file = "f.csv", .field = "approach of foothold 1"});
+  says({"map.csv", "-o", "out.bag", "--stamp", "-1"},
+       {.field = "stamp", .value = "-1", .bound = ">= 1e-9 and < 2^32 - 1 s"});
+  says({"map.csv", "-o", "out.bag", "--compression", "zip"},
+       {.field = "--compression", .value = "zip", .bound = "one of none bz2 lz4 zstd"});
+  says({"map.csv", "-o", "out.bag", "--topic", "/a"}, {.field = "--topic", .about = "map"});
+  says({"map.csv", "-o", "out.bag", "--rig", "r"}, {.field = "--rig", .about = "map"});
+  says({"good.bag", "-o", "out.pcd", "--terrain", "terrain.pcd"},
+       {.field = "--terrain", .about = "bag"});
+  says({"good.bag", "-o", "out.pcd", "--rig", "r"}, {.field = "--rig", .about = "cloud"});
   fs::create_directory(scratch("rig"));
-  says({"rig", "-o", "out.bag", "--stamp", "5"}, {"--stamp", "--stamp-offset"});
-  says({"rig", "-o", "out.bag", "--terrain", "t"}, {"--terrain", "a rig's folder"});
+  says({"rig", "-o", "out.bag", "--stamp", "5"}, {.field = "--stamp", .about = "--stamp-offset"});
+  says({"rig", "-o", "out.bag", "--terrain", "t"}, {.field = "--terrain"});
   fs::remove(scratch("rig"));
   write_text(scratch("cut.bag"), content("good.bag").substr(0, 5000));
-  says({"cut.bag", "-o", "out"}, {"cut.bag: is damaged or truncated"});
-  EXPECT_TRUE(bad_input(graspmap({"info", "cut.bag"}), {"cut.bag: is damaged or truncated"}));
+  says({"cut.bag", "-o", "out"}, {.file = "cut.bag", .about = "damaged"});
+  EXPECT_TRUE(bad_input(graspmap({"info", "cut.bag"}), {.file = "cut.bag", .about = "damaged"}));
   fs::remove(scratch("cut.bag"));
   EXPECT_EQ(graspmap_test::names_in_scratch(), before);
 }

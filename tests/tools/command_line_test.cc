@@ -8,6 +8,7 @@ namespace command_line_test {
 
 using graspmap_test::bad_input;
 using graspmap_test::content;
+using graspmap_test::ended_with;
 using graspmap_test::graspmap;
 using graspmap_test::ProgramResult;
 using graspmap_test::scratch;
@@ -47,13 +48,13 @@ TEST(CommandLine, HelpShowsUnitsAndDefaults) {
 }
 
 TEST(CommandLine, UnknownCommandsAndFlags) {
-  EXPECT_TRUE(wrong_usage(graspmap({"scor"}), {"unknown command scor", "did you mean 'score'"}));
-  EXPECT_TRUE(wrong_usage(graspmap({"rendre"}), {"did you mean 'render'"}));
-  EXPECT_TRUE(wrong_usage(graspmap({"xyzzy"}), {"unknown command xyzzy"}));
+  EXPECT_TRUE(wrong_usage(graspmap({"scor"}), {"scor", "'score'"}));
+  EXPECT_TRUE(wrong_usage(graspmap({"rendre"}), {"rendre", "'render'"}));
+  EXPECT_TRUE(wrong_usage(graspmap({"xyzzy"}), {"xyzzy"}));
   EXPECT_TRUE(wrong_usage(graspmap({"score", "t.pcd", "-o", "m.pcd", "--voxl-size", "1"}),
-                          {"unknown flag --voxl-size", "did you mean '--voxel-size'"}));
+                          {"--voxl-size", "'--voxel-size'"}));
   EXPECT_TRUE(wrong_usage(graspmap({"lookup", "m.pcd", "p.csv", "-o", "l.csv", "--max-distence=1"}),
-                          {"did you mean '--max-distance'"}));
+                          {"--max-distence", "'--max-distance'"}));
   EXPECT_TRUE(wrong_usage(graspmap({"convert", "a", "-o", "b", "--forse"}), {"'--force'"}));
   EXPECT_TRUE(wrong_usage(graspmap({"info", "a", "--jsn"}), {"'--json'"}));
   EXPECT_TRUE(wrong_usage(graspmap({"evaluate", "a", "-o", "b", "--sead", "1"}), {"'--seed'"}));
@@ -62,15 +63,14 @@ TEST(CommandLine, UnknownCommandsAndFlags) {
 }
 
 TEST(CommandLine, MissingAndSurplusArguments) {
-  EXPECT_TRUE(wrong_usage(graspmap({"score", "t.pcd"}), {"--output", "required"}));
-  EXPECT_TRUE(wrong_usage(graspmap({"score", "-o", "m.pcd"}), {"TERRAIN", "required"}));
-  EXPECT_TRUE(
-      wrong_usage(graspmap({"texture", "m.ply", "-o", "m.glb"}), {"--scan", "is required"}));
-  EXPECT_TRUE(wrong_usage(graspmap({"convert", "s.db"}), {"-o, --bundler or --colmap"}));
-  EXPECT_TRUE(wrong_usage(graspmap({"score", "a", "b", "-o", "m.pcd"}), {"too many: b"}));
+  EXPECT_TRUE(wrong_usage(graspmap({"score", "t.pcd"}), {"--output"}));
+  EXPECT_TRUE(wrong_usage(graspmap({"score", "-o", "m.pcd"}), {"TERRAIN"}));
+  EXPECT_TRUE(wrong_usage(graspmap({"texture", "m.ply", "-o", "m.glb"}), {"--scan"}));
+  EXPECT_TRUE(wrong_usage(graspmap({"convert", "s.db"}), {"-o", "--bundler", "--colmap"}));
+  EXPECT_TRUE(wrong_usage(graspmap({"score", "a", "b", "-o", "m.pcd"}), {": b"}));
   EXPECT_TRUE(wrong_usage(graspmap({"score", "a", "-o", "m.pcd", "--method"}), {"--method"}));
-  EXPECT_TRUE(wrong_usage(graspmap({"convert", "a"}), {"--output", "required"}));
-  EXPECT_TRUE(wrong_usage(graspmap({"lookup", "a", "-o", "b"}), {"POINTS", "required"}));
+  EXPECT_TRUE(wrong_usage(graspmap({"convert", "a"}), {"--output"}));
+  EXPECT_TRUE(wrong_usage(graspmap({"lookup", "a", "-o", "b"}), {"POINTS"}));
   EXPECT_TRUE(graspmap_test::names_in_scratch().empty());
 }
 
@@ -154,17 +154,19 @@ TEST(CommandLine, DryRunWritesNothing) {
   EXPECT_TRUE(succeeded(score_quickly({"--dry-run"})));
   EXPECT_TRUE(succeeded(graspmap({"convert", "terrain.pcd", "-o", "terrain.ply", "--dry-run"})));
   EXPECT_EQ(graspmap_test::names_in_scratch(), before);
-  EXPECT_TRUE(bad_input(score_quickly({"--dry-run", "--voxel-size", "10"}), {"voxel_size_m is 10"}))
+  EXPECT_TRUE(bad_input(score_quickly({"--dry-run", "--voxel-size", "10"}),
+                        {.field = "voxel_size_m", .value = "10"}))
       << "it checks all the same";
-  EXPECT_TRUE(bad_input(graspmap({"score", "none.pcd", "-o", "m.csv", "--dry-run"}), {"none.pcd"}));
+  EXPECT_TRUE(
+      bad_input(graspmap({"score", "none.pcd", "-o", "m.csv", "--dry-run"}), {.file = "none.pcd"}));
   EXPECT_EQ(graspmap_test::names_in_scratch(), before);
 }
 
 TEST(CommandLine, ForeignOutputIsOverwrittenByForceAlone) {
   graspmap_test::write_terrain();
   write_text(scratch("map.csv"), "precious");
-  EXPECT_TRUE(bad_input(score_quickly({}), {"map.csv", "--force"}));
-  EXPECT_TRUE(bad_input(score_quickly({"--dry-run"}), {"map.csv", "--force"}));
+  EXPECT_TRUE(bad_input(score_quickly({}), {.file = "map.csv", .about = "--force"}));
+  EXPECT_TRUE(bad_input(score_quickly({"--dry-run"}), {.file = "map.csv", .about = "--force"}));
   EXPECT_EQ(content("map.csv"), "precious");
   EXPECT_TRUE(succeeded(score_quickly({"--force"})));
   EXPECT_NE(content("map.csv"), "precious");
@@ -174,7 +176,7 @@ TEST(CommandLine, ForeignOutputIsOverwrittenByForceAlone) {
 TEST(CommandLine, ForeignFileInThePlaceOfTheManifestIsKept) {
   graspmap_test::write_terrain();
   write_text(scratch("map.csv.json"), "{\"mine\": 1}");
-  EXPECT_TRUE(bad_input(score_quickly({}), {"map.csv.json", "--force"}));
+  EXPECT_TRUE(bad_input(score_quickly({}), {.file = "map.csv.json", .about = "--force"}));
   EXPECT_EQ(content("map.csv.json"), "{\"mine\": 1}");
   EXPECT_TRUE(succeeded(score_quickly({"--force"})));
 }
@@ -184,7 +186,8 @@ TEST(CommandLine, FailedRunKeepsTheEarlierOutput) {
   ASSERT_TRUE(succeeded(score_quickly({})));
   const std::string map = content("map.csv");
   const std::string manifest = content("map.csv.json");
-  EXPECT_TRUE(bad_input(score_quickly({"--voxel-size", "10"}), {}));
+  EXPECT_TRUE(
+      bad_input(score_quickly({"--voxel-size", "10"}), {.field = "voxel_size_m", .value = "10"}));
   EXPECT_EQ(content("map.csv"), map);
   EXPECT_EQ(content("map.csv.json"), manifest);
 }
@@ -203,9 +206,8 @@ TEST(CommandLine, AFileThatGrowsBeyondItsLimitIsAnError) {
   const auto names = graspmap_test::names_in_scratch();
   const ProgramResult result =
       in_shell("ulimit -f 8; ", "score terrain.pcd --curvature-radius 0 -o map.csv --quiet");
-  EXPECT_EQ(result.exit_code, 1);
-  EXPECT_EQ(result.standard_error,
-            "graspmap score: error: map.csv: cannot be written: File too large\n");
+  EXPECT_TRUE(ended_with(
+      result, {.file = "map.csv", .about = "File too large", .kind = libmap::ErrorKind::failed}));
   EXPECT_EQ(content("map.csv"), map);
   EXPECT_EQ(graspmap_test::names_in_scratch(), names);
 }
@@ -214,28 +216,30 @@ TEST(CommandLine, AFileOfAFolderThatGrowsBeyondItsLimitIsNamed) {
   const ProgramResult result =
       in_shell("ulimit -f 512; ",
                "simulate terrain --size 1.5 --piece 1.5 --spacing 0.008 -o pieces --quiet");
-  EXPECT_EQ(result.exit_code, 1);
-  EXPECT_EQ(result.standard_error,
-            "graspmap simulate terrain: error: pieces/piece_0_0.pcd: cannot be written: File too "
-            "large\n");
+  EXPECT_TRUE(ended_with(result, {.file = "pieces/piece_0_0.pcd",
+                                  .about = "File too large",
+                                  .kind = libmap::ErrorKind::failed}));
   EXPECT_EQ(graspmap_test::names_in_scratch(), std::vector<std::string>{});
 }
 
 TEST(CommandLine, AFolderThatCannotBeMadeIsAnError) {
   write_text(scratch("t.csv"), "graspable,score\n1,0.9\n0,0.2\n");
   const ProgramResult result = graspmap({"evaluate", "t.csv", "-o", "t.csv/inner/out"});
-  EXPECT_EQ(result.exit_code, 1);
-  EXPECT_EQ(result.standard_error,
-            "graspmap evaluate: error: t.csv/inner: cannot be created: Not a directory\n");
+  EXPECT_TRUE(ended_with(
+      result,
+      {.file = "t.csv/inner", .about = "Not a directory", .kind = libmap::ErrorKind::failed}));
 }
 
 TEST(CommandLine, WhatStandsInAFileReachesTheTerminalAsPlainText) {
   write_text(scratch("a.csv"), "x,y,z\n\x1b[2J\xff\r\xc3\xa9\xc2\x9b,0,0\n");
   EXPECT_TRUE(bad_input(graspmap({"lookup", "a.csv", "a.csv", "-o", "b.csv"}),
-                        {"'\\x1b[2J\\xff\\x0d\xc3\xa9\\xc2\\x9b': not a number"}));
+                        {.file = "a.csv",
+                         .field = "row 1, column 'x'",
+                         .value = "'\\x1b[2J\\xff\\x0d\xc3\xa9\\xc2\\x9b'"}));
   write_text(scratch("b.csv"), "x,y,z\n" + std::string(100'000, 'n') + ",0,0\n");
   const graspmap_test::ProgramResult result = graspmap({"lookup", "b.csv", "b.csv", "-o", "c.csv"});
-  EXPECT_TRUE(bad_input(result, {"b.csv", "not a number", "nnn ... nnn"}));
+  EXPECT_TRUE(
+      bad_input(result, {.file = "b.csv", .field = "row 1, column 'x'", .about = "nnn ... nnn"}));
   EXPECT_LT(result.standard_error.size(), 1100U);
 }
 
@@ -243,18 +247,18 @@ TEST(CommandLine, FaultsOfTheConfigurationNameItsFile) {
   graspmap_test::write_terrain();
   write_text(scratch("s.yaml"), "gripper: scare\n");
   EXPECT_TRUE(bad_input(graspmap({"score", "terrain.pcd", "--config", "s.yaml", "-o", "a.pcd"}),
-                        {"error: s.yaml: gripper is scare"}));
+                        {.file = "s.yaml", .field = "gripper", .value = "scare"}));
   EXPECT_TRUE(bad_input(
       graspmap({"score", "terrain.pcd", "--config", "s.yaml", "--gripper", "scarf", "-o", "a.pcd"}),
-      {"error: gripper is scarf"}));
+      {.field = "gripper", .value = "scarf"}));
 }
 
 TEST(CommandLine, PathsThatLeadNowhere) {
   std::filesystem::create_symlink("loop.pcd", scratch("loop.pcd"));
-  EXPECT_TRUE(
-      bad_input(graspmap({"convert", "loop.pcd", "-o", "a.ply"}), {"loop.pcd", "symbolic links"}));
+  EXPECT_TRUE(bad_input(graspmap({"convert", "loop.pcd", "-o", "a.ply"}),
+                        {.file = "loop.pcd", .about = "symbolic links"}));
   EXPECT_TRUE(bad_input(graspmap({"convert", std::string(300, 'n') + ".pcd", "-o", "a.ply"}),
-                        {"nnn.pcd", "name too long"}));
+                        {.file = std::string(300, 'n') + ".pcd", .about = "too long"}));
 }
 
 TEST(CommandLine, WhatCannotBePrintedIsAnError) {
@@ -266,10 +270,10 @@ TEST(CommandLine, WhatCannotBePrintedIsAnError) {
                                        {"--help", "graspmap"},
                                        {"--version", "graspmap"}}) {
     const ProgramResult result = in_shell("", std::string(words) + " > /dev/full");
-    EXPECT_EQ(result.exit_code, 1) << words;
-    EXPECT_EQ(result.standard_error,
-              std::string(program) +
-                  ": error: standard output: cannot be written: No space left on device\n");
+    EXPECT_TRUE(ended_with(
+        result,
+        {.file = "standard output", .about = "No space left", .kind = libmap::ErrorKind::failed}));
+    EXPECT_TRUE(result.standard_error.starts_with(std::string(program) + ": error: "));
   }
 }
 

@@ -245,7 +245,7 @@ TEST(Compare, IcpTriesQuarterTurns) {
   libmap::write_cloud(scratch("turned.csv"), cloud);
   const auto result = graspmap({"compare", "turned.csv", "hills.ply", "--icp", "-o", "out.ply"});
   ASSERT_TRUE(succeeded(result));
-  EXPECT_NE(result.standard_error.find("270 degrees"), std::string::npos);
+  EXPECT_NE(result.standard_error.find("270"), std::string::npos);
   const auto found = json_of("out.ply.json").at("transforms").at("b_from_a");
   const Eigen::Matrix4d truth = motion.inverse().matrix();
   for (int n = 0; n < 12; ++n)
@@ -256,18 +256,21 @@ TEST(Compare, IcpSaysWhatItCannotDo) {
   write_square_and_points();
   const auto flat = graspmap({"compare", "points.ply", "square.ply", "--icp"});
   ASSERT_TRUE(succeeded(flat));
-  EXPECT_NE(flat.standard_error.find("3 of 6 motions are not determined"), std::string::npos);
+  EXPECT_NE(flat.standard_error.find("3 of 6"), std::string::npos);
   EXPECT_NE(flat.standard_output.find("transform: 0.0000000,0.0000000,-0.0030000,"),
             std::string::npos)
       << flat.standard_output;
   EXPECT_TRUE(bad_input(
       graspmap({"compare", "points.ply", "square.ply", "--icp", "--transform", "0,0,1,0,0,0"}),
-      {"points.ply", "too little overlap"}));
+      {.file = "points.ply",
+       .field = "points within 0.2 m of the surface",
+       .value = "0.0 %",
+       .bound = ">= 10.0 %"}));
   const auto short_run =
       graspmap({"compare", "points.ply", "square.ply", "--icp", "--icp-max-iterations", "1"});
-  EXPECT_NE(short_run.standard_error.find("has not converged in 1 iterations"), std::string::npos);
+  EXPECT_NE(short_run.standard_error.find("1 iterations"), std::string::npos);
   EXPECT_TRUE(bad_input(graspmap({"compare", "square.ply", "points.ply", "--icp"}),
-                        {"points.ply", "without normals"}));
+                        {.file = "points.ply", .about = "without normals"}));
 }
 
 TEST(Compare, ImageOfSignedDistances) {
@@ -300,19 +303,27 @@ TEST(Compare, ImageOfSignedDistances) {
   EXPECT_LT(red_column / static_cast<double>(red), blue_column / static_cast<double>(blue));
   EXPECT_NEAR(json_of("map.png.json").at("results").at("rmse_m"), 0.004, 1e-8);
   EXPECT_TRUE(bad_input(graspmap({"compare", "halves.ply", "square.ply", "--picture", "map.jpg"}),
-                        {"map.jpg", ".png"}));
+                        {.file = "map.jpg", .about = ".png"}));
 }
 
 TEST(Compare, ExtremesAreOneShortLine) {
   write_square_and_points();
-  for (const Words& words :
-       {Words{"--samples-per-m2", "1e300"}, Words{"--samples-per-m2", "1e12"},
-        Words{"--within", "nan"}, Words{"--transform", "0,0,1e308,0,0,0"},
-        Words{"--box=-1e308,0,0,1e308,0,0"}, Words{"--icp", "--icp-max-distance", "-1"}}) {
+  const std::vector<std::pair<Words, graspmap_test::ExpectedError>> extremes = {
+      {{"--samples-per-m2", "1e300"},
+       {.file = "square.ply", .field = "samples", .value = "1e+300 per m2 on 1 m2"}},
+      {{"--samples-per-m2", "1e12"},
+       {.file = "square.ply", .field = "samples", .value = "1e+12 per m2 on 1 m2"}},
+      {{"--within", "nan"}, {.field = "--within", .value = "nan", .bound = "> 0"}},
+      {{"--transform", "0,0,1e308,0,0,0"},
+       {.file = "points.ply", .field = "distance of the centers", .value = "inf m"}},
+      {{"--box=-1e308,0,0,1e308,0,0"}, {.file = "points.ply", .field = "--box"}},
+      {{"--icp", "--icp-max-distance", "-1"},
+       {.field = "--icp-max-distance", .value = "-1", .bound = "> 0"}}};
+  for (const auto& [words, expected] : extremes) {
     Words all = {"compare", "points.ply", "square.ply"};
     all.insert(all.end(), words.begin(), words.end());
     const auto result = graspmap(all);
-    EXPECT_TRUE(bad_input(result, {}));
+    EXPECT_TRUE(bad_input(result, expected));
     EXPECT_LT(result.standard_error.size(), 200U) << result.standard_error;
   }
 }
@@ -338,36 +349,45 @@ TEST(Compare, TransformFilesThatAreNone) {
     graspmap_test::write_text(scratch("t.txt"), text);
     return graspmap({"compare", "points.ply", "square.ply", "--transform", "t.txt"});
   };
-  EXPECT_TRUE(bad_input(refused("1 0 0 0\n0 1 0 0\n0 0 1 0\n"), {"t.txt", "four rows"}));
-  EXPECT_TRUE(bad_input(refused("1 0 0\n0 1 0\n0 0 1\n0 0 0\n"), {"t.txt", "line 1"}));
-  EXPECT_TRUE(bad_input(refused("1 0 0 0\n0 1 0 0\n0 0 x 0\n0 0 0 1\n"), {"t.txt", "line 3"}));
-  EXPECT_TRUE(bad_input(refused("2 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"), {"t.txt", "rotation"}));
-  EXPECT_TRUE(bad_input(refused("1 0 0 0\n0 1 0 0\n0 0 -1 0\n0 0 0 1\n"), {"t.txt", "rotation"}));
-  EXPECT_TRUE(bad_input(refused("1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 1 1\n"), {"t.txt", "rotation"}));
-  EXPECT_TRUE(bad_input(refused(""), {"t.txt"}));
+  EXPECT_TRUE(bad_input(refused("1 0 0 0\n0 1 0 0\n0 0 1 0\n"),
+                        {.file = "t.txt", .field = "rows", .value = "3"}));
+  EXPECT_TRUE(
+      bad_input(refused("1 0 0\n0 1 0\n0 0 1\n0 0 0\n"), {.file = "t.txt", .field = "line 1"}));
+  EXPECT_TRUE(bad_input(refused("1 0 0 0\n0 1 0 0\n0 0 x 0\n0 0 0 1\n"),
+                        {.file = "t.txt", .field = "line 3", .value = "x"}));
+  EXPECT_TRUE(bad_input(refused("2 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"),
+                        {.file = "t.txt", .about = "rotation"}));
+  EXPECT_TRUE(bad_input(refused("1 0 0 0\n0 1 0 0\n0 0 -1 0\n0 0 0 1\n"),
+                        {.file = "t.txt", .about = "rotation"}));
+  EXPECT_TRUE(bad_input(refused("1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 1 1\n"),
+                        {.file = "t.txt", .about = "rotation"}));
+  EXPECT_TRUE(bad_input(refused(""), {.file = "t.txt", .field = "rows", .value = "0"}));
 }
 
 TEST(Compare, BadInput) {
   write_square_and_points();
   EXPECT_TRUE(
       bad_input(graspmap({"compare", "points.ply", "square.ply", "--transform", "1e300,0,0,0,0,0"}),
-                {"points.ply", "too far apart"}));
+                {.file = "points.ply", .field = "distance of the centers", .value = "inf m"}));
   const auto run = [](const Words& more) {
     Words words = {"compare", "points.ply", "square.ply"};
     words.insert(words.end(), more.begin(), more.end());
     return graspmap(words);
   };
-  EXPECT_TRUE(bad_input(run({"--transform", "1,2,3"}), {"--transform", "1,2,3", "X,Y,Z"}));
-  EXPECT_TRUE(bad_input(run({"--transform", "1,2,3,4,5,nan"}), {"--transform"}));
-  EXPECT_TRUE(bad_input(run({"--transform", "1,2,3,4,5,6,7"}), {"--transform"}));
-  EXPECT_TRUE(bad_input(run({"--box", "1,0,0,0,1,1"}), {"--box is 1,0,0,0,1,1"}));
-  EXPECT_TRUE(bad_input(run({"--box", "5,5,5,6,6,6"}), {"points.ply", "--box", "no point"}));
-  EXPECT_TRUE(bad_input(run({"--within", "0"}), {"--within"}));
-  EXPECT_TRUE(bad_input(run({"-o", "square.ply"}), {"square.ply"}));
-  EXPECT_TRUE(bad_input(graspmap({"compare", "none.ply", "square.ply"}), {"none.ply"}));
+  EXPECT_TRUE(bad_input(run({"--transform", "1,2,3"}), {.field = "--transform", .value = "1,2,3"}));
+  EXPECT_TRUE(bad_input(run({"--transform", "1,2,3,4,5,nan"}),
+                        {.field = "--transform", .value = "1,2,3,4,5,nan"}));
+  EXPECT_TRUE(bad_input(run({"--transform", "1,2,3,4,5,6,7"}),
+                        {.field = "--transform", .value = "1,2,3,4,5,6,7"}));
+  EXPECT_TRUE(bad_input(run({"--box", "1,0,0,0,1,1"}), {.field = "--box", .value = "1,0,0,0,1,1"}));
+  EXPECT_TRUE(bad_input(run({"--box", "5,5,5,6,6,6"}), {.file = "points.ply", .field = "--box"}));
+  EXPECT_TRUE(
+      bad_input(run({"--within", "0"}), {.field = "--within", .value = "0", .bound = "> 0"}));
+  EXPECT_TRUE(bad_input(run({"-o", "square.ply"}), {.file = "square.ply"}));
+  EXPECT_TRUE(bad_input(graspmap({"compare", "none.ply", "square.ply"}), {.file = "none.ply"}));
   libmap::write_cloud(scratch("empty.ply"), {});
   EXPECT_TRUE(bad_input(graspmap({"compare", "points.ply", "empty.ply"}),
-                        {"empty.ply: the cloud has no points"}));
+                        {.file = "empty.ply", .about = "no points"}));
 }
 
 }  // namespace compare_test

@@ -148,14 +148,24 @@ TEST(Crop, Polygons) {
     write_text(scratch("outline.csv"), text);
     return graspmap({"crop", "map.ply", "--polygon", "outline.csv", "-o", "new.ply"});
   };
-  EXPECT_TRUE(bad_input(with("x,y\n0,0\n1,1\n"), {"outline.csv", "corners is 2", ">= 3"}));
-  EXPECT_TRUE(bad_input(with("x,y\n"), {"outline.csv", "corners is 0"}));
-  EXPECT_TRUE(bad_input(with(""), {"outline.csv"}));
-  EXPECT_TRUE(bad_input(with("x,z\n0,0\n1,0\n1,1\n"), {"outline.csv", "column 'y'"}));
-  EXPECT_TRUE(bad_input(with("x,y\n0,0\n1,one\n1,1\n"), {"outline.csv", "row 2", "one"}));
-  EXPECT_TRUE(bad_input(with("x,y\n0,0\n1,nan\n1,1\n"), {"outline.csv", "corner 2"}));
-  EXPECT_TRUE(bad_input(with("x,y\n0,0\n1,1\n1,0\n0,1\n"), {"outline.csv", "crosses"}));
-  EXPECT_TRUE(bad_input(with("x,y\n50,50\n51,50\n51,51\n"), {"map.ply", "nothing of the mesh"}));
+  EXPECT_TRUE(
+      bad_input(with("x,y\n0,0\n1,1\n"),
+                {.file = "outline.csv", .field = "corners", .value = "2", .bound = ">= 3"}));
+  EXPECT_TRUE(bad_input(
+      with("x,y\n"), {.file = "outline.csv", .field = "corners", .value = "0", .bound = ">= 3"}));
+  EXPECT_TRUE(bad_input(with(""), {.file = "outline.csv"}));
+  EXPECT_TRUE(
+      bad_input(with("x,z\n0,0\n1,0\n1,1\n"), {.file = "outline.csv", .field = "column 'y'"}));
+  EXPECT_TRUE(bad_input(with("x,y\n0,0\n1,one\n1,1\n"),
+                        {.file = "outline.csv", .field = "row 2, column 'y'", .value = "'one'"}));
+  EXPECT_TRUE(bad_input(with("x,y\n0,0\n1,nan\n1,1\n"),
+                        {.file = "outline.csv", .field = "corner 2", .value = "(1, nan)"}));
+  EXPECT_TRUE(bad_input(with("x,y\n0,0\n1,1\n1,0\n0,1\n"),
+                        {.file = "outline.csv",
+                         .field = "edge from (0, 0) to (1, 1)",
+                         .value = "meeting the edge from (1, 0) to (0, 1)"}));
+  EXPECT_TRUE(
+      bad_input(with("x,y\n50,50\n51,50\n51,51\n"), {.file = "map.ply", .about = "nothing of"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("new.ply")));
   EXPECT_FALSE(std::filesystem::exists(scratch("new.site_from_map.txt")));
 }
@@ -188,33 +198,49 @@ TEST(Crop, BadInput) {
     words.insert(words.end(), more.begin(), more.end());
     return graspmap(words);
   };
-  EXPECT_TRUE(bad_input(with({"--box", "1,2,3"}), {"--box", "1,2,3", "XMIN,YMIN"}));
+  EXPECT_TRUE(bad_input(with({"--box", "1,2,3"}), {.field = "--box", .value = "1,2,3"}));
   EXPECT_TRUE(bad_input(with({"--level", "none", "--up", "1,0,0", "--box", "0,0,1,1"}),
-                        {"--up is 1,0,0", "--level none"}));
-  EXPECT_TRUE(bad_input(with({"--box", "1,2,3,4,5"}), {"--box"}));
-  EXPECT_TRUE(bad_input(with({"--box", "1,2,0,3"}), {"--box is 1,2,0,3"}));
-  EXPECT_TRUE(bad_input(with({"--box", "nan,0,1,1"}), {"--box"}));
-  EXPECT_TRUE(bad_input(with({"--size", "3"}), {"map.ply", "3.00 x 3.00 m", "at most"}));
-  EXPECT_TRUE(bad_input(with({"--size", "0x3"}), {"--size", "0x3"}));
-  EXPECT_TRUE(bad_input(with({"--size", "1xtwo"}), {"--size", "WIDTHxHEIGHT"}));
-  EXPECT_TRUE(bad_input(with({"--size", "1x1", "--border"}), {"several regions", "--polygon"}));
-  EXPECT_TRUE(bad_input(with({"--border"}), {"map.ply", "white"}));
-  EXPECT_TRUE(bad_input(with({"--level", "none"}), {"nothing to do"}));
-  EXPECT_TRUE(bad_input(with({"--level", "some"}), {"--level"}));
-  EXPECT_TRUE(bad_input(with({"--yaw", "left"}), {"--yaw", "left"}));
-  EXPECT_TRUE(bad_input(with({"--up", "0,0"}), {"--up"}));
-  EXPECT_TRUE(bad_input(with({"--up", "0,0,0"}), {"up", "direction"}));
-  EXPECT_TRUE(bad_input(with({"--up", "1,0,0"}), {"map.ply", "no plane within 40 degrees"}));
-  EXPECT_TRUE(bad_input(with({"--plane-tolerance", "0"}), {"--plane-tolerance"}));
-  EXPECT_TRUE(bad_input(with({"--margin", "0.1"}), {"margin"}));
-  EXPECT_TRUE(bad_input(graspmap({"crop", "map.ply", "-o", "new.pcd"}), {"new.pcd"}));
-  EXPECT_TRUE(bad_input(graspmap({"crop", "map.ply", "-o", "map.ply"}), {"map.ply"}));
-  EXPECT_TRUE(bad_input(graspmap({"crop", "none.ply", "-o", "new.ply"}), {"none.ply"}));
+                        {.field = "--up", .value = "1,0,0", .about = "--level"}));
+  EXPECT_TRUE(bad_input(with({"--box", "1,2,3,4,5"}), {.field = "--box", .value = "1,2,3,4,5"}));
+  EXPECT_TRUE(bad_input(with({"--box", "1,2,0,3"}), {.field = "--box", .value = "1,2,0,3"}));
+  EXPECT_TRUE(bad_input(with({"--box", "nan,0,1,1"}), {.field = "--box", .value = "nan,0,1,1"}));
+  EXPECT_TRUE(bad_input(with({"--size", "3"}),
+                        {.file = "map.ply", .field = "size", .value = "3.00 x 3.00 m"}));
+  EXPECT_TRUE(bad_input(with({"--size", "0x3"}), {.field = "--size", .value = "0x3"}));
+  EXPECT_TRUE(bad_input(with({"--size", "1xtwo"}), {.field = "--size", .value = "1xtwo"}));
+  EXPECT_TRUE(bad_input(with({"--size", "1x1", "--border"}),
+                        {.bound = "one of --box, --polygon, --size and --border"}));
+  EXPECT_TRUE(bad_input(
+      with({"--border"}),
+      {.file = "map.ply", .field = "share of the side", .value = "0 %", .bound = ">= 40 %"}));
+  EXPECT_TRUE(bad_input(with({"--level", "none"}), {.field = "--level", .value = "none"}));
+  EXPECT_TRUE(bad_input(with({"--level", "some"}),
+                        {.field = "--level", .value = "some", .bound = "one of auto none"}));
+  EXPECT_TRUE(bad_input(with({"--yaw", "left"}), {.field = "--yaw", .value = "left"}));
+  EXPECT_TRUE(
+      bad_input(with({"--up", "0,0"}), {.field = "--up", .value = "0,0", .bound = "X,Y,Z"}));
+  EXPECT_TRUE(bad_input(with({"--up", "0,0,0"}), {.file = "map.ply", .field = "up"}));
+  EXPECT_TRUE(
+      bad_input(with({"--up", "1,0,0"}), {.file = "map.ply",
+                                          .field = "share of the points on the largest plane",
+                                          .value = "0.0 %",
+                                          .bound = ">= 5.0 %"}));
+  EXPECT_TRUE(bad_input(with({"--plane-tolerance", "0"}),
+                        {.field = "--plane-tolerance", .value = "0", .bound = "> 0"}));
+  EXPECT_TRUE(bad_input(with({"--margin", "0.1"}),
+                        {.file = "map.ply", .field = "margin_m", .value = "0.1"}));
+  EXPECT_TRUE(bad_input(graspmap({"crop", "map.ply", "-o", "new.pcd"}),
+                        {.file = "new.pcd",
+                         .field = "extension",
+                         .value = ".pcd",
+                         .bound = ".ply, .obj, .stl, .off, .glb or .vtp"}));
+  EXPECT_TRUE(bad_input(graspmap({"crop", "map.ply", "-o", "map.ply"}), {.file = "map.ply"}));
+  EXPECT_TRUE(bad_input(graspmap({"crop", "none.ply", "-o", "new.ply"}), {.file = "none.ply"}));
   EXPECT_TRUE(wrong_usage(graspmap({"crop", "map.ply"}), {"--output"}));
   EXPECT_EQ(names_in_scratch(), (Words{"map.ply"}));
   // A file of the user has the name of the transform's file.
   write_text(scratch("new.site_from_map.txt"), "mine");
-  EXPECT_TRUE(bad_input(with({}), {"new.site_from_map.txt", "--force"}));
+  EXPECT_TRUE(bad_input(with({}), {.file = "new.site_from_map.txt", .about = "--force"}));
   EXPECT_EQ(content("new.site_from_map.txt"), "mine");
   EXPECT_TRUE(succeeded(with({"--force"})));
   // The transform is of an earlier run whose site was removed.
@@ -248,11 +274,11 @@ TEST(Crop, BorderOfKnownSizeGivesTheScale) {
   EXPECT_EQ(results.at("border_sides_m").size(), 4U);
   EXPECT_NEAR(results.at("outline_area_m2"), (1.2096 - 0.1) * (1.008 - 0.1), 0.01) << "not scaled";
   EXPECT_TRUE(bad_input(with("new.ply", {"--border", "--border-size", "3x3"}),
-                        {"map.pcd", "border_size is 3x3", "within 5 %"}));
+                        {.file = "map.pcd", .field = "border_size", .value = "3x3"}));
   EXPECT_TRUE(bad_input(with("new.ply", {"--border", "--border-size", "0x3"}),
-                        {"--border-size is 0x3", "WIDTHxHEIGHT"}));
+                        {.field = "--border-size", .value = "0x3"}));
   EXPECT_TRUE(bad_input(with("new.ply", {"--border-size", "1x1.2"}),
-                        {"--border-size is 1x1.2", "only with --border"}));
+                        {.field = "--border-size", .value = "1x1.2"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("new.ply")));
 }
 
@@ -304,10 +330,10 @@ TEST(Crop, PointsOfAMapThatWasNotCropped) {
   write_text(scratch("points.csv"), "x,y,z\n0,0,0\n");
   EXPECT_TRUE(bad_input(
       graspmap({"lookup", "map.pcd", "points.csv", "--points-frame", "map", "-o", "out.csv"}),
-      {"map.pcd", "--points-frame", "crop"}));
+      {.file = "map.pcd", .field = "--points-frame", .value = "map"}));
   EXPECT_TRUE(bad_input(graspmap({"render", "terrain.pcd", "--points", "points.csv",
                                   "--points-frame", "map", "-o", "out.png"}),
-                        {"terrain.pcd", "--points-frame", "no manifest"}));
+                        {.file = "terrain.pcd", .field = "--points-frame", .value = "map"}));
 }
 
 TEST(Crop, SiteAgainstTheMapItCameFrom) {
@@ -328,13 +354,13 @@ TEST(Crop, SiteAgainstTheMapItCameFrom) {
                 .at("max_m"),
             2e-6);
   EXPECT_TRUE(bad_input(graspmap({"compare", "map.ply", "map.ply", "--transform", "crop"}),
-                        {"map.ply", "--transform", "neither A nor B was cropped"}));
+                        {.file = "map.ply", .field = "--transform", .value = "crop"}));
   const nlohmann::json check = compared(
       {"compare", "--edges", "site.ply", "--truth", "map.ply", "--truth-frame", "map", "--json"});
   EXPECT_LT(check.at("max_m"), 2e-6);
   EXPECT_TRUE(bad_input(
       graspmap({"compare", "--edges", "map.ply", "--truth", "map.ply", "--truth-frame", "map"}),
-      {"map.ply", "not cropped"}));
+      {.file = "map.ply", .field = "--truth-frame", .value = "map"}));
 }
 
 }  // namespace crop_test

@@ -150,7 +150,7 @@ TEST(SpotCheckCommand, MeshBelowTheBoxHasNoHeight) {
   Words above = words;
   above.emplace_back("--box=-1.5,-1,-0.3,1.5,1,0.5");
   above.insert(above.begin(), {"compare", "--edges"});
-  EXPECT_TRUE(bad_input(graspmap(above), {"mesh.ply", "no place"}));
+  EXPECT_TRUE(bad_input(graspmap(above), {.file = "mesh.ply", .about = "edges"}));
   Words around = words;
   around.emplace_back("--box=-1.5,-1,-1.3,1.5,1,0.5");
   EXPECT_EQ(checked(around).at("missing"), 0);
@@ -163,19 +163,26 @@ TEST(SpotCheckCommand, BadInput) {
     more.insert(more.begin(), {"compare", "--edges", "site.ply", "--quiet"});
     return graspmap(more);
   };
-  EXPECT_TRUE(bad_input(graspmap({"compare", "--edges", "none.ply"}), {"none.ply"}));
-  EXPECT_TRUE(bad_input(run({"-o", "check.txt"}), {"check.txt", ".csv"}));
-  EXPECT_TRUE(bad_input(run({"--places", "0"}), {"--places is 0"}));
-  EXPECT_TRUE(bad_input(run({"--inset", "1"}), {"site.ply", "inset_m is 1"}));
-  EXPECT_TRUE(bad_input(run({"--radius", "0"}), {"--radius is 0"}));
-  EXPECT_TRUE(bad_input(run({"--ground", "plane"}), {"--ground is plane"}));
-  EXPECT_TRUE(bad_input(run({"--box", "0,0,0,0,0,0"}), {"site.ply", "no area"}));
-  EXPECT_TRUE(bad_input(run({"--box", "10,10,0,12,12,1"}), {"site.ply", "no place"}));
-  EXPECT_TRUE(bad_input(run({"--truth", "mesh.ply", "--ground", "fit"}), {"--truth"}));
-  EXPECT_TRUE(bad_input(run({"--truth", "site.ply"}), {"site.ply"}));
-  libmap::write_cloud(scratch("empty.ply"), {});
+  EXPECT_TRUE(bad_input(graspmap({"compare", "--edges", "none.ply"}), {.file = "none.ply"}));
+  EXPECT_TRUE(bad_input(run({"-o", "check.txt"}), {.file = "check.txt", .about = ".csv"}));
+  EXPECT_TRUE(bad_input(run({"--places", "0"}),
+                        {.field = "--places", .value = "0", .bound = ">= 1 and <= 10000"}));
   EXPECT_TRUE(
-      bad_input(graspmap({"compare", "--edges", "empty.ply", "--ground", "zero"}), {"empty.ply"}));
+      bad_input(run({"--inset", "1"}), {.file = "site.ply", .field = "inset_m", .value = "1"}));
+  EXPECT_TRUE(
+      bad_input(run({"--radius", "0"}), {.field = "--radius", .value = "0", .bound = "> 0"}));
+  EXPECT_TRUE(bad_input(run({"--ground", "plane"}),
+                        {.field = "--ground", .value = "plane", .bound = "one of auto zero fit"}));
+  EXPECT_TRUE(bad_input(
+      run({"--box", "0,0,0,0,0,0"}),
+      {.file = "site.ply", .field = "width and depth", .value = "0 m, 0 m", .bound = "> 0"}));
+  EXPECT_TRUE(bad_input(run({"--box", "10,10,0,12,12,1"}), {.file = "site.ply", .about = "edges"}));
+  EXPECT_TRUE(bad_input(run({"--truth", "mesh.ply", "--ground", "fit"}),
+                        {.field = "--ground", .about = "--truth"}));
+  EXPECT_TRUE(bad_input(run({"--truth", "site.ply"}), {.file = "site.ply"}));
+  libmap::write_cloud(scratch("empty.ply"), {});
+  EXPECT_TRUE(bad_input(graspmap({"compare", "--edges", "empty.ply", "--ground", "zero"}),
+                        {.file = "empty.ply"}));
   ASSERT_TRUE(succeeded(run({"--ground", "zero", "-o", "check.csv", "--dry-run"})));
   EXPECT_EQ(graspmap_test::names_in_scratch(), (Words{"empty.ply", "mesh.ply", "site.ply"}));
 }

@@ -80,12 +80,14 @@ TEST(Evaluate, ForeignFolderIsKept) {
   write_table();
   std::filesystem::create_directory(scratch("mine"));
   write_text(scratch("mine/roc.csv"), "precious");
-  EXPECT_TRUE(bad_input(graspmap({"evaluate", "t.csv", "-o", "mine"}), {"mine", "--force"}));
+  EXPECT_TRUE(bad_input(graspmap({"evaluate", "t.csv", "-o", "mine"}),
+                        {.file = "mine", .about = "--force"}));
   EXPECT_EQ(content("mine/roc.csv"), "precious");
   EXPECT_TRUE(succeeded(graspmap({"evaluate", "t.csv", "-o", "mine", "--force"})));
   EXPECT_NE(content("mine/roc.csv"), "precious");
   write_text(scratch("other.json"), "{\"mine\": 1}");
-  EXPECT_TRUE(bad_input(graspmap({"evaluate", "t.csv", "-o", "other"}), {"other.json", "--force"}));
+  EXPECT_TRUE(bad_input(graspmap({"evaluate", "t.csv", "-o", "other"}),
+                        {.file = "other.json", .about = "--force"}));
   EXPECT_EQ(content("other.json"), "{\"mine\": 1}");
 }
 
@@ -94,16 +96,18 @@ TEST(Evaluate, BadInputLeavesNothing) {
   write_text(scratch("text.csv"), "graspable,score\n1,high\n0,0.2\n");
   write_text(scratch("label.csv"), "graspable,score\nperhaps,0.5\n0,0.2\n");
   const Words before = graspmap_test::names_in_scratch();
-  EXPECT_TRUE(bad_input(graspmap({"evaluate", "none.csv", "-o", "out"}), {"none.csv"}));
+  EXPECT_TRUE(bad_input(graspmap({"evaluate", "none.csv", "-o", "out"}), {.file = "none.csv"}));
   EXPECT_TRUE(bad_input(graspmap({"evaluate", "t.csv", "-o", "out", "--label", "graspabel"}),
-                        {"t.csv", "graspabel", "did you mean 'graspable'"}));
-  EXPECT_TRUE(
-      bad_input(graspmap({"evaluate", "t.csv", "-o", "out", "--score", "gud"}), {"t.csv", "gud"}));
+                        {.file = "t.csv", .field = "column 'graspabel'", .about = "'graspable'"}));
+  EXPECT_TRUE(bad_input(graspmap({"evaluate", "t.csv", "-o", "out", "--score", "gud"}),
+                        {.file = "t.csv", .field = "column 'gud'"}));
   EXPECT_TRUE(bad_input(graspmap({"evaluate", "text.csv", "-o", "out", "--score", "score"}),
-                        {"text.csv", "high"}));
+                        {.file = "text.csv", .field = "row 1, column 'score'", .value = "'high'"}));
   EXPECT_TRUE(
-      bad_input(graspmap({"evaluate", "label.csv", "-o", "out"}), {"label.csv", "perhaps"}));
-  EXPECT_TRUE(bad_input(graspmap({"evaluate", "t.csv", "-o", "t.csv"}), {"t.csv: is a file"}));
+      bad_input(graspmap({"evaluate", "label.csv", "-o", "out"}),
+                {.file = "label.csv", .field = "row 1, column 'graspable'", .value = "'perhaps'"}));
+  EXPECT_TRUE(bad_input(graspmap({"evaluate", "t.csv", "-o", "t.csv"}),
+                        {.file = "t.csv", .about = "a file"}));
   EXPECT_EQ(graspmap_test::names_in_scratch(), before);
 }
 

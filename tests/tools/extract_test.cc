@@ -20,6 +20,7 @@ namespace extract_test {
 namespace fs = std::filesystem;
 using graspmap_test::bad_input;
 using graspmap_test::content;
+using graspmap_test::ended_with;
 using graspmap_test::ExampleScan;
 using graspmap_test::graspmap;
 using graspmap_test::json_of;
@@ -98,8 +99,8 @@ TEST(Extract, SaysThatFloatsWereRounded) {
                                 {.depth = libmap::DepthFormat::float_png});
   const auto result = graspmap({"convert", "scan.db", "-o", "out"});
   ASSERT_TRUE(succeeded(result));
-  EXPECT_NE(result.standard_error.find("2 depth images were rounded"), std::string::npos);
-  EXPECT_NE(result.standard_error.find("1 depth pixels beyond 65.5 m"), std::string::npos);
+  EXPECT_NE(result.standard_error.find("2 depth images"), std::string::npos);
+  EXPECT_NE(result.standard_error.find("1 depth pixels"), std::string::npos);
   EXPECT_EQ(json_of("out.json")["results"]["depth_images_rounded"], 2);
   EXPECT_TRUE(libmap::open_scan(scratch("out"))->read_frame(5).depth == exact);
 }
@@ -109,8 +110,8 @@ TEST(Extract, OptionsOfImagesNeedImages) {
   for (const auto& [name, value] :
        {std::pair{"--poses", "odometry"}, std::pair{"--transform", "1,0,0,0,0,0"},
         std::pair{"--keep", "first"}})
-    EXPECT_TRUE(
-        bad_input(graspmap({"convert", "scan.db", "-o", "out", name, value}), {name, "--bundler"}));
+    EXPECT_TRUE(bad_input(graspmap({"convert", "scan.db", "-o", "out", name, value}),
+                          {.field = name, .about = "--bundler"}));
   EXPECT_FALSE(fs::exists(scratch("out")));
 }
 
@@ -175,7 +176,7 @@ TEST(Extract, EndsAtABrokenFrameIfAskedAndLeavesNothing) {
   write_example();
   break_frames();
   EXPECT_TRUE(bad_input(graspmap({"convert", "scan.db", "-o", "out", "--strict"}),
-                        {"scan.db", "node 2: depth"}));
+                        {.file = "scan.db", .field = "node 2: depth"}));
   EXPECT_EQ(graspmap_test::names_in_scratch(), std::vector<std::string>{"scan.db"});
 }
 
@@ -184,14 +185,16 @@ TEST(Extract, ReplacesItsFolderAsAWhole) {
   ASSERT_TRUE(succeeded(graspmap({"convert", "scan.db", "-o", "out"})));
   const auto before = files_in("out");
   break_frames();
-  EXPECT_TRUE(bad_input(graspmap({"convert", "scan.db", "-o", "out", "--strict"}), {"node 2"}));
+  EXPECT_TRUE(bad_input(graspmap({"convert", "scan.db", "-o", "out", "--strict"}),
+                        {.file = "scan.db", .field = "node 2: depth"}));
   EXPECT_TRUE(files_in("out") == before);
   ASSERT_TRUE(succeeded(graspmap({"convert", "scan.db", "-o", "out/"})));
   EXPECT_EQ(files_in("out").count("color/000002.jpg"), 0U);
   // The folder contains a file of the user.
   graspmap_test::write_text(scratch("out/notes.txt"), "mine");
   for (const std::string force : {"--quiet", "--force"})
-    EXPECT_TRUE(bad_input(graspmap({"convert", "scan.db", "-o", "out", force}), {"notes.txt"}));
+    EXPECT_TRUE(bad_input(graspmap({"convert", "scan.db", "-o", "out", force}),
+                          {.file = "out", .about = ".txt"}));
   EXPECT_EQ(content("out/notes.txt"), "mine");
 }
 
@@ -207,11 +210,12 @@ TEST(Extract, RefusesWhatIsNoScanAndOutputsOfNoUse) {
   graspmap_test::write_text(scratch("text.db"), "this is no database\n");
   fs::create_directory(scratch("folder"));
   for (const char* name : {"missing.db", "empty.db", "text.db", "folder"})
-    EXPECT_TRUE(bad_input(graspmap({"convert", name, "-o", "out"}), {name}));
+    EXPECT_TRUE(bad_input(graspmap({"convert", name, "-o", "out"}), {.file = name}));
   EXPECT_FALSE(fs::exists(scratch("out")));
-  EXPECT_TRUE(bad_input(graspmap({"convert", "scan.db", "-o", "text.db"}), {"text.db"}));
+  EXPECT_TRUE(bad_input(graspmap({"convert", "scan.db", "-o", "text.db"}), {.file = "text.db"}));
   ASSERT_TRUE(succeeded(graspmap({"convert", "scan.db", "-o", "out"})));
-  EXPECT_TRUE(bad_input(graspmap({"convert", "out", "-o", "out/"}), {"is the input"}));
+  EXPECT_TRUE(bad_input(graspmap({"convert", "out", "-o", "out/"}),
+                        {.file = "out/", .about = "is the input"}));
 }
 
 TEST(Extract, FoldersOfOtherCommandsAreKept) {
@@ -220,11 +224,11 @@ TEST(Extract, FoldersOfOtherCommandsAreKept) {
   ASSERT_TRUE(succeeded(graspmap({"simulate", "site", "-o", "site", "--edge-length", "0.1"})));
   const auto site = files_in("site");
   EXPECT_TRUE(bad_input(graspmap({"convert", "scan.db", "-o", "site"}),
-                        {"site", "graspmap simulate site"}));
+                        {.file = "site", .about = "simulate"}));
   EXPECT_TRUE(files_in("site") == site);
   const auto before = files_in("out");
   EXPECT_TRUE(bad_input(graspmap({"simulate", "site", "-o", "out", "--edge-length", "0.1"}),
-                        {"out", "graspmap convert", "--force"}));
+                        {.file = "out", .about = "--force"}));
   EXPECT_TRUE(files_in("out") == before);
   EXPECT_TRUE(
       succeeded(graspmap({"simulate", "site", "-o", "out", "--edge-length", "0.1", "--force"})));
@@ -330,12 +334,12 @@ TEST(ExtractBundler, BesideTheWholeScan) {
 TEST(ExtractBundler, BadInput) {
   write_example();
   EXPECT_TRUE(bad_input(graspmap({"convert", "scan.db", "--bundler", "out", "--angle", "181"}),
-                        {"--angle is 181"}));
+                        {.field = "--angle", .value = "181", .bound = ">= 0 and <= 180"}));
   EXPECT_TRUE(
       bad_input(graspmap({"convert", "scan.db", "--bundler", "out", "--poses", "optimised"}),
-                {"--poses is optimised", "did you mean 'optimized'"}));
+                {.field = "--poses", .value = "optimised", .about = "'optimized'"}));
   EXPECT_TRUE(bad_input(graspmap({"convert", "scan.db", "--bundler", "out", "--transform", "1,2"}),
-                        {"--transform is 1,2"}));
+                        {.field = "--transform", .value = "1,2"}));
   EXPECT_TRUE(succeeded(graspmap({"convert", "scan.db", "--bundler", "out", "--dry-run"})));
   EXPECT_EQ(graspmap_test::names_in_scratch(), std::vector<std::string>{"scan.db"});
   break_frames();
@@ -346,8 +350,7 @@ TEST(ExtractBundler, BadInput) {
   EXPECT_EQ(files_in("out").count("images/000005.jpg"), 0U);
   const auto strict =
       graspmap({"convert", "scan.db", "--bundler", "two", "--poses", "odometry", "--strict"});
-  EXPECT_EQ(strict.exit_code, 3);
-  EXPECT_NE(strict.standard_error.find("error: scan.db: node 5: image"), std::string::npos);
+  EXPECT_TRUE(ended_with(strict, {.file = "scan.db", .field = "node 5: image"}));
 }
 
 TEST(ExtractBundler, AScanWithoutColor) {
@@ -356,10 +359,7 @@ TEST(ExtractBundler, AScanWithoutColor) {
   graspmap_test::write_database(scratch("scan.db"), scan);
   for (const char* kind : {"--bundler", "--colmap"}) {
     const auto result = graspmap({"convert", "scan.db", kind, "out", "--poses", "odometry"});
-    EXPECT_EQ(result.exit_code, 3);
-    EXPECT_TRUE(result.standard_error.ends_with(
-        "error: scan.db: no frame has a pose, a calibration and a color image\n"))
-        << result.standard_error;
+    EXPECT_TRUE(ended_with(result, {.file = "scan.db", .about = "no frame"}));
   }
   EXPECT_EQ(graspmap_test::names_in_scratch(), std::vector<std::string>{"scan.db"});
 }

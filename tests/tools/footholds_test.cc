@@ -44,8 +44,7 @@ TEST(Footholds, EdgesThatAreLeftOutAreSaid) {
                             "x,y,z,score,graspable,edge\n0,0,0,0.9,1,1\n0.01,0,0,0.9,1,1\n");
   const auto result = graspmap({"footholds", "map.csv", "-o", "f.csv"});
   ASSERT_TRUE(succeeded(result));
-  EXPECT_NE(result.standard_error.find("2 at the border of the scan are left out"),
-            std::string::npos);
+  EXPECT_NE(result.standard_error.find("2 at the border"), std::string::npos);
   ASSERT_TRUE(succeeded(graspmap({"footholds", "map.csv", "-o", "e.csv", "--border"})));
   EXPECT_EQ(libmap::read_cloud(scratch("e.csv")).cloud.size(), 1U);
 }
@@ -82,7 +81,7 @@ TEST(Footholds, TestedOnAMesh) {
   const auto result =
       graspmap({"footholds", "hills.pcd", "--mesh", "hills.ply", "--load", "3", "-o", "f.csv"});
   ASSERT_TRUE(succeeded(result));
-  EXPECT_NE(result.standard_error.find("1 of 4 footholds are not on the mesh"), std::string::npos);
+  EXPECT_NE(result.standard_error.find("1 of 4"), std::string::npos);
   const PointCloud held = libmap::read_cloud(scratch("f.csv")).cloud;
   ASSERT_EQ(held.size(), 2U);  // the plain holds less
   const auto values = [&](const std::string& name) { return held.find_field(name)->values; };
@@ -113,16 +112,16 @@ TEST(Footholds, TestedOnAMesh) {
                                   "--max-count", "1", "-o", "one.csv"})));
   EXPECT_EQ(libmap::read_cloud(scratch("one.csv")).cloud.size(), 1U);
   EXPECT_TRUE(bad_input(graspmap({"footholds", "hills.pcd", "--load", "20", "-o", "g.csv"}),
-                        {"--load", "--mesh"}));
+                        {.field = "--load", .about = "--mesh"}));
 }
 
 TEST(Footholds, WhatIsNoMapIsSaid) {
   write_terrain();
   EXPECT_TRUE(bad_input(graspmap({"footholds", "terrain.pcd", "-o", "f.csv"}),
-                        {"terrain.pcd", "score", "no such field"}));
-  EXPECT_TRUE(bad_input(graspmap({"footholds", "none.pcd", "-o", "f.csv"}), {"none.pcd"}));
+                        {.file = "terrain.pcd", .field = "score"}));
+  EXPECT_TRUE(bad_input(graspmap({"footholds", "none.pcd", "-o", "f.csv"}), {.file = "none.pcd"}));
   EXPECT_TRUE(bad_input(graspmap({"footholds", "terrain.pcd", "-o", "f.csv", "--separation", "0"}),
-                        {"--separation is 0", "> 0"}));
+                        {.field = "--separation", .value = "0", .bound = "> 0"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("f.csv")));
 }
 

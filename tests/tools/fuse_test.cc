@@ -155,7 +155,7 @@ TEST(Fuse, TakesTheBestPosesThatAScanHas) {
   GRASPMAP_REQUIRE_DATA();
   const auto result = graspmap({"fuse", scan_file("site_tiny_v0160.db"), "-o", "cloud.ply"});
   ASSERT_TRUE(succeeded(result));
-  EXPECT_NE(result.standard_error.find("poses: odometry"), std::string::npos);
+  EXPECT_NE(result.standard_error.find("odometry"), std::string::npos);
   EXPECT_EQ(json_of("cloud.ply.json").at("parameters").at("poses"), "odometry");
 }
 
@@ -182,7 +182,7 @@ TEST(Fuse, OdometryOfSeveralSessionsIsAWarning) {
   EXPECT_EQ(graspmap(words).standard_error.find("sessions"), std::string::npos);
   SQLite::Database(scratch("scan.db"), SQLite::OPEN_READWRITE)
       .exec("UPDATE Node SET map_id = 1 WHERE id > 3");
-  EXPECT_NE(graspmap(words).standard_error.find("odometry of 2 sessions"), std::string::npos);
+  EXPECT_NE(graspmap(words).standard_error.find("2 sessions"), std::string::npos);
 }
 
 TEST(Fuse, NodesWithoutAPoseAreCounted) {
@@ -195,38 +195,44 @@ TEST(Fuse, NodesWithoutAPoseAreCounted) {
   const Words words = {"fuse", scan, "--poses", "four.tum", "-o", "cloud.ply"};
   const auto result = graspmap(words);
   ASSERT_TRUE(succeeded(result));
-  EXPECT_NE(result.standard_error.find("2 of 6 nodes have no pose"), std::string::npos);
+  EXPECT_NE(result.standard_error.find("2 of 6"), std::string::npos);
   Words strict = words;
   strict.insert(strict.end(), {"--strict", "--quiet"});
-  EXPECT_TRUE(bad_input(graspmap(strict), {"2 of 6 nodes have no pose"}));
+  EXPECT_TRUE(bad_input(graspmap(strict), {.field = "--poses", .value = "four.tum"}));
 }
 
 TEST(Fuse, PosesThatAreNotThere) {
   GRASPMAP_REQUIRE_DATA();
   const std::string killed = scan_file("site_killed.db");
   EXPECT_TRUE(bad_input(graspmap({"fuse", killed, "--poses", "optimized", "-o", "cloud.ply"}),
-                        {"site_killed.db", "--poses", "optimized", "odometry, ground-truth"}));
+                        {.field = "--poses", .value = "optimized"}));
   EXPECT_TRUE(bad_input(graspmap({"fuse", killed, "--poses", "odometri", "-o", "cloud.ply"}),
-                        {"odometri", "did you mean 'odometry'?"}));
+                        {.field = "--poses", .value = "odometri", .about = "'odometry'"}));
   EXPECT_TRUE(bad_input(graspmap({"fuse", killed, "--poses", "none.tum", "-o", "cloud.ply"}),
-                        {"none.tum", "no such file"}));
+                        {.file = "none.tum", .about = "no such"}));
   graspmap_test::write_text(scratch("far.tum"), "1 0 0 0 0 0 0 1\n");
-  EXPECT_TRUE(
-      bad_input(graspmap({"fuse", killed, "--poses", "far.tum", "-o", "cloud.ply"}), {"far.tum"}));
+  EXPECT_TRUE(bad_input(graspmap({"fuse", killed, "--poses", "far.tum", "-o", "cloud.ply"}),
+                        {.file = "far.tum"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("cloud.ply")));
 }
 
 TEST(Fuse, BadInput) {
-  EXPECT_TRUE(
-      bad_input(graspmap({"fuse", "none.db", "-o", "cloud.ply"}), {"none.db", "no such file"}));
+  EXPECT_TRUE(bad_input(graspmap({"fuse", "none.db", "-o", "cloud.ply"}),
+                        {.file = "none.db", .about = "no such"}));
   graspmap_test::write_text(scratch("text.db"), "this is no database at all, but it is a file\n");
-  EXPECT_TRUE(bad_input(graspmap({"fuse", "text.db", "-o", "cloud.ply"}), {"text.db"}));
-  EXPECT_TRUE(bad_input(graspmap({"fuse", "text.db", "-o", "cloud.obj"}), {"cloud.obj"}));
+  EXPECT_TRUE(bad_input(graspmap({"fuse", "text.db", "-o", "cloud.ply"}), {.file = "text.db"}));
+  EXPECT_TRUE(bad_input(graspmap({"fuse", "text.db", "-o", "cloud.obj"}),
+                        {.file = "cloud.obj",
+                         .field = "extension",
+                         .value = ".obj",
+                         .bound = ".pcd, .ply, .csv or .vtp"}));
   EXPECT_TRUE(bad_input(graspmap({"fuse", "text.db", "-o", "cloud.ply", "--voxel-size", "0"}),
-                        {"--voxel-size", "> 0"}));
+                        {.field = "--voxel-size", .value = "0", .bound = "> 0"}));
   EXPECT_TRUE(
       bad_input(graspmap({"fuse", "text.db", "-o", "cloud.ply", "--corrected-poses", "poses.csv"}),
-                {"--corrected-poses is poses.csv: not a format of poses", ".tum, .kitti, .g2o"}));
+                {.field = "--corrected-poses",
+                 .value = "poses.csv",
+                 .bound = ".tum, .kitti, .g2o or .toro"}));
   EXPECT_TRUE(graspmap_test::names_in_scratch() == std::vector<std::string>{"text.db"});
 }
 
@@ -235,11 +241,11 @@ TEST(Fuse, SaysWhichLimitLeavesNothing) {
   const std::string scan = scan_file("site_tiny_q.db");
   EXPECT_TRUE(
       bad_input(graspmap({"fuse", scan, "-o", "cloud.ply", "--quiet", "--voxel-size", "1e-9"}),
-                {"voxel_size_m is 1e-09", "must be > 4.2"}));
+                {.field = "voxel_size_m", .value = "1e-09", .bound = "> 4.2385527e-06"}));
   const auto result = graspmap({"fuse", scan, "-o", "cloud.ply", "--min-views", "99"});
   ASSERT_TRUE(succeeded(result));
-  EXPECT_NE(result.standard_error.find("--min-views 99 leaves no point"), std::string::npos);
-  EXPECT_NE(result.standard_error.find("at most 6 frames"), std::string::npos);
+  EXPECT_NE(result.standard_error.find("--min-views 99"), std::string::npos);
+  EXPECT_NE(result.standard_error.find("6 frames"), std::string::npos);
 }
 
 TEST(Fuse, DryRunWritesNothing) {

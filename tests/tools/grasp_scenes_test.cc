@@ -71,21 +71,24 @@ TEST(GraspScenes, OfListedPlacesOrRows) {
 TEST(GraspScenes, BadInputIsOneLineAndWritesNothing) {
   make_site();
   EXPECT_TRUE(bad_input(grasp({"--scenes", "scenes", "--scene-locations", "P3"}),
-                        {"points.csv", "--scene-locations", "P3", "did you mean"}));
-  EXPECT_TRUE(bad_input(grasp({"--scene-locations", "P1"}), {"--scene-locations", "--scenes"}));
+                        {.file = "points.csv", .field = "--scene-locations", .value = "P3"}));
+  EXPECT_TRUE(bad_input(grasp({"--scene-locations", "P1"}), {.field = "--scene-locations", .about = "--scenes"}));
   graspmap_test::write_text(scratch("points.csv"), "place,x,y,z\nA/B,0,0,0\nA:B,0.2,0,0\n");
-  EXPECT_TRUE(bad_input(grasp({"--scenes", "scenes"}), {"points.csv", "rows 1 and 2", "A:B"}));
+  EXPECT_TRUE(bad_input(grasp({"--scenes", "scenes"}),
+                        {.file = "points.csv", .field = "place", .value = "'A:B'"}));
   EXPECT_TRUE(succeeded(grasp({"--scenes", "one", "--scene-locations", "A:B"})));
   std::string many = "x,y,z\n";
   for (int n = 0; n < 101; ++n) many += "0,0,0\n";
   graspmap_test::write_text(scratch("points.csv"), many);
-  EXPECT_TRUE(bad_input(grasp({"--scenes", "scenes"}), {"points.csv", "101", "<= 100"}));
+  EXPECT_TRUE(
+      bad_input(grasp({"--scenes", "scenes"}),
+                {.file = "points.csv", .field = "locations", .value = "101", .bound = "<= 100"}));
   make_site();
   std::filesystem::create_directory(scratch("mine"));
   graspmap_test::write_text(scratch("mine/a.txt"), "mine");
-  EXPECT_TRUE(bad_input(grasp({"--scenes", "mine"}), {"mine", "not empty"}));
+  EXPECT_TRUE(bad_input(grasp({"--scenes", "mine"}), {.file = "mine", .about = "not empty"}));
   graspmap_test::write_text(scratch("file"), "mine");
-  EXPECT_TRUE(bad_input(grasp({"--scenes", "file"}), {"file", "not a folder"}));
+  EXPECT_TRUE(bad_input(grasp({"--scenes", "file"}), {.file = "file", .about = "a folder"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("scenes")));
 }
 

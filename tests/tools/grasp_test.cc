@@ -21,6 +21,7 @@ namespace grasp_test {
 
 using graspmap_test::bad_input;
 using graspmap_test::content;
+using graspmap_test::ExpectedError;
 using graspmap_test::graspmap;
 using graspmap_test::json_of;
 using graspmap_test::scratch;
@@ -111,60 +112,69 @@ TEST(GraspCommand, FitsPullsAndPlansTheNext) {
   EXPECT_LE(plan.rows.size(), 2U);
   for (const char* column : {"place", "x", "tilt_deg", "azimuth_deg", "load_n"})
     EXPECT_TRUE(plan.find_column(column)) << column;
-  const auto refused = [&](const std::string& table, const std::vector<std::string>& parts) {
+  const auto refused = [&](const std::string& table, const ExpectedError& expected) {
     write_text(scratch("bad.csv"), table);
-    return bad_input(graspmap({"grasp", "ground.ply", "--fit", "bad.csv", "-o", "b.yaml"}), parts);
+    return bad_input(graspmap({"grasp", "ground.ply", "--fit", "bad.csv", "-o", "b.yaml"}),
+                     expected);
   };
-  EXPECT_TRUE(refused("x,y,z,force_n\n", {"bad.csv", "rows"}));
-  EXPECT_TRUE(refused("x,y,z,force_n\n0,0,9,3\n", {"bad.csv", "row 1", "0.05 m"}));
-  EXPECT_TRUE(refused("x,y,z,force_n\n0,0,0.05,-3\n", {"bad.csv", "row 1, force_n", "-3"}));
-  EXPECT_TRUE(refused("x,y,z,held\n0,0,0.05,1\n", {"bad.csv", "row 1, load_n"}));
+  EXPECT_TRUE(refused("x,y,z,force_n\n", {.file = "bad.csv", .field = "rows", .bound = ">= 1"}));
+  EXPECT_TRUE(
+      refused("x,y,z,force_n\n0,0,9,3\n", {.file = "bad.csv", .field = "row 1", .value = "0,0,9"}));
+  EXPECT_TRUE(refused(
+      "x,y,z,force_n\n0,0,0.05,-3\n",
+      {.file = "bad.csv", .field = "row 1, force_n", .value = "-3", .bound = ">= 0 and <= 1e+05"}));
+  EXPECT_TRUE(refused("x,y,z,held\n0,0,0.05,1\n",
+                      {.file = "bad.csv", .field = "row 1, load_n", .bound = "> 0"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("b.yaml")));
 }
 
 TEST(GraspCommand, BadInputIsOneLine) {
   write_ground();
-  const auto refused = [](const std::vector<std::string>& words,
-                          const std::vector<std::string>& parts) {
-    return bad_input(graspmap(with(words)), parts);
+  const auto refused = [](const std::vector<std::string>& words, const ExpectedError& expected) {
+    return bad_input(graspmap(with(words)), expected);
   };
   for (const auto& [flag, value] : {std::pair{"--load", "0"}, {"--more-loads", "x"}})
-    EXPECT_TRUE(refused({"-o", "t.csv", flag, value}, {flag, value}));
+    EXPECT_TRUE(refused({"-o", "t.csv", flag, value}, {.field = flag, .value = value}));
   for (const char* flag : {"--trials", "--draws"})
     EXPECT_TRUE(bad_input(
         graspmap({"grasp", "ground.ply", "--points", "places.csv", "-o", "t.csv", flag, "0"}),
-        {flag, "0"}));
+        {.field = flag, .value = "0"}));
   const auto former = graspmap(with({"-o", "t.csv", "--asperity-min", "30"}));
   EXPECT_EQ(former.exit_code, 2);
   EXPECT_NE(former.standard_error.find("gripper.engagement.asperity_min_deg"), std::string::npos);
-  EXPECT_TRUE(refused({"-o", "t.txt"}, {"t.txt", ".csv"}));
-  EXPECT_TRUE(refused({"-o", "t.csv", "--set", "gripper.fingers.count=0"}, {"fingers.count"}));
+  EXPECT_TRUE(refused({"-o", "t.txt"}, {.file = "t.txt", .about = ".csv"}));
+  EXPECT_TRUE(refused({"-o", "t.csv", "--set", "gripper.fingers.count=0"},
+                      {.field = "fingers.count", .value = "0", .bound = ">= 1 and <= 64"}));
   EXPECT_TRUE(refused({"-o", "t.csv", "--set", "gripper.engagement.friction=-0.1"},
-                      {"engagement.friction", "-0.1"}));
-  EXPECT_TRUE(refused({"-o", "t.csv", "--set", "gripper.fingers.cuont=3"}, {"fingers.cuont"}));
+                      {.field = "engagement.friction", .value = "-0.1", .bound = ">= 0"}));
+  EXPECT_TRUE(
+      refused({"-o", "t.csv", "--set", "gripper.fingers.cuont=3"}, {.field = "fingers.cuont"}));
   std::string gripper =
       graspmap_test::read_text(graspmap_test::source_folder() / "data/grippers/scar-e.yaml");
   write_text(scratch("palm.yaml"), gripper.substr(0, gripper.find("fingers:")));
-  EXPECT_TRUE(refused({"-o", "t.csv", "--gripper", "palm.yaml"}, {"palm.yaml", "fingers"}));
+  EXPECT_TRUE(refused({"-o", "t.csv", "--gripper", "palm.yaml"},
+                      {.file = "palm.yaml", .field = "fingers"}));
   ASSERT_TRUE(succeeded(graspmap({"mask", "--gripper", "palm.yaml", "-o", "mask.txt"})));
   write_text(scratch("part.yaml"), gripper.substr(0, gripper.find("  curl_deg")));
-  EXPECT_TRUE(
-      refused({"-o", "t.csv", "--gripper", "part.yaml"}, {"part.yaml", "fingers.curl_deg"}));
+  EXPECT_TRUE(refused({"-o", "t.csv", "--gripper", "part.yaml"},
+                      {.file = "part.yaml", .field = "fingers.curl_deg"}));
   const auto on = [](const std::string& mesh, const std::string& places) {
     return graspmap({"grasp", mesh, "--points", places, "-o", "t.csv"});
   };
   write_text(scratch("off.csv"), "x,y,z\n0,0,0.05\n0,0,1\n");
-  EXPECT_TRUE(bad_input(on("ground.ply", "off.csv"), {"off.csv", "location 2", "0.05 m"}));
+  EXPECT_TRUE(bad_input(on("ground.ply", "off.csv"),
+                        {.file = "off.csv", .field = "location 2", .value = "0,0,1"}));
   write_text(scratch("nan.csv"), "x,y,z\n0,nan,0.05\n");
-  EXPECT_TRUE(bad_input(on("ground.ply", "nan.csv"), {"nan.csv", "row 1"}));
+  EXPECT_TRUE(bad_input(on("ground.ply", "nan.csv"), {.file = "nan.csv", .field = "row 1"}));
   write_text(scratch("none.csv"), "x,y,z\n");
-  EXPECT_TRUE(bad_input(on("ground.ply", "none.csv"), {"none.csv"}));
+  EXPECT_TRUE(bad_input(on("ground.ply", "none.csv"), {.file = "none.csv"}));
   write_text(scratch("taken.csv"), "x,y,z,graspable\n0,0,0.05,1\n");
-  EXPECT_TRUE(bad_input(on("ground.ply", "taken.csv"), {"taken.csv", "graspable"}));
+  EXPECT_TRUE(
+      bad_input(on("ground.ply", "taken.csv"), {.file = "taken.csv", .field = "graspable"}));
   write_text(scratch("points.ply"),
              "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
              "property float z\nend_header\n0 0 0\n");
-  EXPECT_TRUE(bad_input(on("points.ply", "places.csv"), {"points.ply"}));
+  EXPECT_TRUE(bad_input(on("points.ply", "places.csv"), {.file = "points.ply"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("t.csv")));
 }
 
@@ -363,7 +373,8 @@ TEST(GraspCommand, SharesOfAMapAreTheMap) {
     return words;
   };
   ASSERT_TRUE(succeeded(graspmap(share("2/3"))));
-  EXPECT_TRUE(bad_input(graspmap({"convert", "held.tiles", "-o", "t.pcd"}), {"held.tiles"}));
+  EXPECT_TRUE(
+      bad_input(graspmap({"convert", "held.tiles", "-o", "t.pcd"}), {.file = "held.tiles"}));
   // A share that was killed, and that has lost a tile since.
   kill_after_two_tiles(share("1/3"), "held.tiles");
   std::filesystem::remove(tiles_in("held.tiles").front());
@@ -376,10 +387,10 @@ TEST(GraspCommand, SharesOfAMapAreTheMap) {
       succeeded(graspmap({"lookup", "held.tiles", "places.csv", "--column", "p=hold_probability",
                           "-o", "looked.csv", "--max-distance", "0.05"})));
   // Another seed is another map.
-  EXPECT_TRUE(
-      bad_input(graspmap(map_words("held.tiles", {"--seed", "2"})), {"held.tiles", "--force"}));
-  EXPECT_TRUE(
-      bad_input(graspmap(map_words("held.tiles", {"--force", "--tile", "1/3"})), {"--force"}));
+  EXPECT_TRUE(bad_input(graspmap(map_words("held.tiles", {"--seed", "2"})),
+                        {.file = "held.tiles", .about = "--force"}));
+  EXPECT_TRUE(bad_input(graspmap(map_words("held.tiles", {"--force", "--tile", "1/3"})),
+                        {.field = "--force"}));
   ASSERT_TRUE(succeeded(graspmap(map_words("held.tiles", {"--seed", "2", "--force"}))));
   ASSERT_TRUE(succeeded(graspmap(map_words("seed.pcd", {"--seed", "2"}))));
   ASSERT_TRUE(succeeded(graspmap({"convert", "held.tiles", "-o", "merged.pcd", "--force"})));
@@ -430,7 +441,9 @@ TEST(GraspCommand, MapsInAllFormats) {
     EXPECT_EQ(content(std::string("held") + format), content(std::string("converted") + format));
   }
   for (const char* name : {"t.obj", "t.txt", "t"})
-    EXPECT_TRUE(bad_input(graspmap(quick_words(name)), {name, ".pcd, .ply, .csv or .vtp"}));
+    EXPECT_TRUE(
+        bad_input(graspmap(quick_words(name)),
+                  {.file = name, .field = "extension", .bound = ".pcd, .ply, .csv or .vtp"}));
 }
 
 // The error of a mesh made by fuse and mesh, and a constant error, in shares and in one run.
@@ -447,10 +460,10 @@ TEST(GraspCommand, SurfaceError) {
   const auto run_to = [](const std::string& output, const std::vector<std::string>& more) {
     return graspmap(quick_words(output, more));
   };
-  const auto refused = [&](const std::string& error, const std::vector<std::string>& parts) {
-    return bad_input(run_to("t.pcd", {"--surface-error", error}), parts);
+  const auto refused = [&](const std::string& error, const ExpectedError& expected) {
+    return bad_input(run_to("t.pcd", {"--surface-error", error}), expected);
   };
-  EXPECT_TRUE(refused("mesh", {"ground.ply", "expected_error"}));
+  EXPECT_TRUE(refused("mesh", {.file = "ground.ply", .field = "expected_error"}));
   with_errors(0.0, 0.0);
   ASSERT_TRUE(succeeded(run_to("without.pcd", {})));
   for (const char* none : {"mesh", "0"}) {
@@ -463,7 +476,8 @@ TEST(GraspCommand, SurfaceError) {
     ASSERT_TRUE(succeeded(run_to("with.tiles", {"--surface-error", "mesh", "--tile", share})));
   ASSERT_TRUE(succeeded(graspmap({"convert", "with.tiles", "-o", "merged.pcd"})));
   EXPECT_EQ(content("merged.pcd"), content("with.pcd"));
-  EXPECT_TRUE(bad_input(run_to("with.tiles", {"--surface-error", "0.002"}), {"--force"}));
+  EXPECT_TRUE(bad_input(run_to("with.tiles", {"--surface-error", "0.002"}),
+                        {.file = "with.tiles", .about = "--force"}));
   // Ground with a large error is marked.
   const auto without = libmap::read_cloud(scratch("without.pcd")).cloud;
   const auto with = libmap::read_cloud(scratch("with.pcd")).cloud;
@@ -483,7 +497,7 @@ TEST(GraspCommand, SurfaceError) {
   }
   EXPECT_GT(marked, 20);
   for (const char* error : {"x", "0.006", "-0.001", "nan"})
-    EXPECT_TRUE(refused(error, {"--surface-error", error, "--max-surface-error"}));
+    EXPECT_TRUE(refused(error, {.file = "ground.ply", .field = "--surface-error", .value = error}));
 }
 
 TEST(GraspCommand, BadMaps) {
@@ -494,29 +508,33 @@ TEST(GraspCommand, BadMaps) {
                                          {"--points", "--map"}));
   for (const auto& [flag, value] :
        {std::pair{"--scenes", "s"}, {"--more-loads", "5"}, {"--prefix", "p"}})
-    EXPECT_TRUE(bad_input(graspmap(map_words("t.pcd", {flag, value})), {flag}));
-  EXPECT_TRUE(bad_input(graspmap(map_words("t.pcd", {"--tile", "1/2"})), {"t.pcd", "--tile"}));
-  EXPECT_TRUE(bad_input(graspmap(map_words("t.tiles", {"--tile", "3/2"})), {"--tile", "3/2"}));
-  EXPECT_TRUE(bad_input(graspmap(with({"-o", "t.csv", "--tile", "1/2"})), {"--tile", "--map"}));
-  EXPECT_TRUE(bad_input(graspmap(map_words("map.pcd")), {"map.pcd"}));
+    EXPECT_TRUE(bad_input(graspmap(map_words("t.pcd", {flag, value})),
+                          {.field = flag, .about = "--points"}));
+  EXPECT_TRUE(bad_input(graspmap(map_words("t.pcd", {"--tile", "1/2"})),
+                        {.file = "t.pcd", .field = "--tile"}));
+  EXPECT_TRUE(bad_input(graspmap(map_words("t.tiles", {"--tile", "3/2"})),
+                        {.field = "--tile", .value = "3/2"}));
+  EXPECT_TRUE(bad_input(graspmap(with({"-o", "t.csv", "--tile", "1/2"})),
+                        {.field = "--tile", .about = "--map"}));
+  EXPECT_TRUE(bad_input(graspmap(map_words("map.pcd")), {.file = "map.pcd"}));
   auto map = libmap::read_cloud(scratch("map.pcd")).cloud;
   map.add_field("grasp_trials", libmap::ScalarType::float32);
   libmap::write_cloud(scratch("taken.pcd"), map);
   auto words = map_words("t.pcd");
   words[3] = "taken.pcd";
-  EXPECT_TRUE(bad_input(graspmap(words), {"taken.pcd", "grasp_trials"}));
+  EXPECT_TRUE(bad_input(graspmap(words), {.file = "taken.pcd", .field = "grasp_trials"}));
   for (Eigen::Vector3d& position : map.positions) position.x() += 7;
   map.fields.pop_back();
   libmap::write_cloud(scratch("far.pcd"), map);
   words[3] = "far.pcd";
-  EXPECT_TRUE(bad_input(graspmap(words), {"far.pcd", "mesh", "0.05 m"}));
+  EXPECT_TRUE(bad_input(graspmap(words), {.file = "far.pcd", .about = "mesh"}));
   libmap::write_cloud(scratch("none.pcd"), {});
   words[3] = "none.pcd";
-  EXPECT_TRUE(bad_input(graspmap(words), {"none.pcd"}));
+  EXPECT_TRUE(bad_input(graspmap(words), {.file = "none.pcd"}));
   map.fields.clear();
   libmap::write_cloud(scratch("bare.pcd"), map);
   words[3] = "bare.pcd";
-  EXPECT_TRUE(bad_input(graspmap(words), {"bare.pcd", "no such field"}));
+  EXPECT_TRUE(bad_input(graspmap(words), {.file = "bare.pcd", .field = "score"}));
   for (const char* left : {"t.pcd", "t.pcd.progress", "t.tiles"})
     EXPECT_FALSE(std::filesystem::exists(scratch(left))) << left;
 }

@@ -145,13 +145,17 @@ TEST(Info, MapSaysWhatMadeIt) {
 
 TEST(Info, BadInput) {
   graspmap_test::write_text(scratch("far.off"), "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1e32 0\n3 0 1 2\n");
-  EXPECT_TRUE(bad_input(graspmap({"info", "far.off"}), {"far.off: vertex 2", "1e30 m"}));
-  EXPECT_TRUE(bad_input(graspmap({"info", "none.pcd"}), {"none.pcd: no such file"}));
+  EXPECT_TRUE(bad_input(graspmap({"info", "far.off"}),
+                        {.file = "far.off",
+                         .field = "vertex 2",
+                         .value = "100000000000000005366162204393472.000000"}));
+  EXPECT_TRUE(bad_input(graspmap({"info", "none.pcd"}), {.file = "none.pcd", .about = "no such"}));
   graspmap_test::write_text(scratch("a.txt"), "hello");
-  EXPECT_TRUE(bad_input(graspmap({"info", "a.txt"}), {"a.txt"}));
+  EXPECT_TRUE(bad_input(graspmap({"info", "a.txt"}),
+                        {.file = "a.txt", .field = "extension", .value = ".txt"}));
   graspmap_test::write_text(scratch("a.ply"), "hello");
-  EXPECT_TRUE(bad_input(graspmap({"info", "a.ply", "--json"}), {"a.ply"}));
-  EXPECT_TRUE(bad_input(graspmap({"info", "."}), {}));
+  EXPECT_TRUE(bad_input(graspmap({"info", "a.ply", "--json"}), {.file = "a.ply"}));
+  EXPECT_TRUE(bad_input(graspmap({"info", "."}), {.file = ".", .about = "associations.txt"}));
 }
 
 }  // namespace info_test

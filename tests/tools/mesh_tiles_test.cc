@@ -77,15 +77,17 @@ TEST(Pieces, FoldersAreReplacedWholeAndForeignOnesAreNot) {
   ASSERT_TRUE(succeeded(graspmap(larger)));
   EXPECT_EQ(files_in("surface"), 3U);
   std::ofstream(scratch("surface") / "notes.txt") << "mine";
-  EXPECT_TRUE(bad_input(graspmap(larger), {"notes.txt"}));
+  EXPECT_TRUE(bad_input(graspmap(larger), {.file = "surface", .about = ".txt"}));
   EXPECT_EQ(files_in("surface"), 4U);
   EXPECT_TRUE(bad_input(graspmap({"mesh", "terrain", "-o", "terrain", "--cell-size", "0.03"}),
-                        {"terrain"}));
-  EXPECT_TRUE(bad_input(graspmap({"mesh", "terrain", "-o", "other"}), {"cell_size"}));
-  EXPECT_TRUE(bad_input(
-      graspmap({"mesh", "terrain", "-o", "other", "--cell-size", "0.03", "--report"}), {"report"}));
+                        {.file = "terrain"}));
+  EXPECT_TRUE(bad_input(graspmap({"mesh", "terrain", "-o", "other"}),
+                        {.field = "cell_size_m", .value = "0", .bound = "> 0"}));
   EXPECT_TRUE(
-      bad_input(graspmap({"resample", "surface", "-o", "other", "--count", "100"}), {"count"}));
+      bad_input(graspmap({"mesh", "terrain", "-o", "other", "--cell-size", "0.03", "--report"}),
+                {.field = "--report"}));
+  EXPECT_TRUE(bad_input(graspmap({"resample", "surface", "-o", "other", "--count", "100"}),
+                        {.field = "count", .value = "100", .bound = "0"}));
   EXPECT_FALSE(fs::exists(scratch("other")));
 }
 

@@ -12,6 +12,7 @@ namespace panorama_test {
 namespace fs = std::filesystem;
 using graspmap_test::bad_input;
 using graspmap_test::content;
+using graspmap_test::ended_with;
 using graspmap_test::graspmap;
 using graspmap_test::json_of;
 using graspmap_test::scratch;
@@ -87,14 +88,14 @@ TEST(PanoramaCommand, LateAndMissingCamerasAreNamed) {
   write_image("camera_4", 12.055);
   const auto result = graspmap({"fuse", "run", "-o", "cloud.pcd"});
   ASSERT_TRUE(succeeded(result));
-  EXPECT_NE(result.standard_error.find("camera_2: has no image"), std::string::npos);
-  EXPECT_NE(result.standard_error.find("camera_4: its nearest image is"), std::string::npos);
-  EXPECT_NE(result.standard_error.find("ms late"), std::string::npos);
+  EXPECT_NE(result.standard_error.find("camera_2: "), std::string::npos);
+  EXPECT_NE(result.standard_error.find("camera_4: "), std::string::npos);
+  EXPECT_NE(result.standard_error.find(" ms "), std::string::npos);
   EXPECT_EQ(json_of("cloud.pcd.json").at("results").at("camera_2.state"), "missing");
   ASSERT_TRUE(succeeded(graspmap({"fuse", "run", "-o", "cloud.pcd", "--tolerance", "0.06"})));
   EXPECT_EQ(json_of("cloud.pcd.json").at("results").at("cameras_seen"), 5);
   EXPECT_TRUE(bad_input(graspmap({"fuse", "run", "-o", "c.pcd", "--strict"}),
-                        {"run: camera_2: has no image"}));
+                        {.file = "run", .about = "camera_2"}));
   EXPECT_FALSE(fs::exists(scratch("c.pcd")));
 }
 
@@ -106,8 +107,9 @@ TEST(PanoramaCommand, MomentsAreChosen) {
   ASSERT_EQ(cloud.size(), static_cast<std::size_t>(width * height));
   EXPECT_NEAR(cloud.positions[0].x(), 1.2, 1e-6);
   EXPECT_TRUE(bad_input(graspmap({"fuse", "run", "-o", "c.pcd", "--stamp", "15"}),
-                        {"--stamp is 15", "--tolerance"}));
-  EXPECT_TRUE(bad_input(graspmap({"fuse", "run", "-o", "c.pcd", "--stamp", "noon"}), {"noon"}));
+                        {.file = "run", .field = "--stamp", .value = "15"}));
+  EXPECT_TRUE(bad_input(graspmap({"fuse", "run", "-o", "c.pcd", "--stamp", "noon"}),
+                        {.field = "--stamp", .value = "noon"}));
 }
 
 TEST(PanoramaCommand, OwnRigAndTable) {
@@ -135,7 +137,7 @@ TEST(PanoramaCommand, ShippedRigsGoByTheirNames) {
   EXPECT_EQ(manifest.at("results").at("points"), 2 * 640 * 360);
   EXPECT_EQ(manifest.at("inputs").at(0).at("path"), "rigs/scar-e.yaml");
   EXPECT_TRUE(bad_input(graspmap({"fuse", "run", "--rig", "scare", "-o", "c.pcd"}),
-                        {"rig is scare", "did you mean 'scar-e'"}));
+                        {.field = "rig", .value = "scare", .about = "'scar-e'"}));
 }
 
 TEST(PanoramaCommand, BrokenImageCostsItsCameraAlone) {
@@ -155,11 +157,8 @@ TEST(PanoramaCommand, BrokenImagesOfAllCamerasAreAnError) {
         scratch("run") / libmap::rig_image_name("camera_" + std::to_string(n), 12.0 + 0.003 * n),
         "no image");
   const graspmap_test::ProgramResult result = graspmap({"fuse", "run", "-o", "cloud.pcd"});
-  EXPECT_EQ(result.exit_code, 3);
-  EXPECT_NE(result.standard_error.find("camera_5 is left out\n"), std::string::npos);
-  EXPECT_TRUE(result.standard_error.ends_with(
-      "graspmap fuse: error: run: no image of this time can be read\n"))
-      << result.standard_error;
+  EXPECT_TRUE(ended_with(result, {.file = "run", .about = "no image"}));
+  EXPECT_NE(result.standard_error.find("camera_5"), std::string::npos);
   EXPECT_FALSE(fs::exists(scratch("cloud.pcd")));
 }
 
@@ -171,23 +170,28 @@ TEST(PanoramaCommand, BadInputIsOneLineAndLeavesNothing) {
   const auto strict = [](const std::string& folder) {
     return graspmap({"fuse", folder, "-o", "cloud.pcd", "--strict"});
   };
-  EXPECT_TRUE(bad_input(run("none"), {"none: no such file"}));
-  EXPECT_TRUE(bad_input(run("run/rig.yaml"), {"run/rig.yaml: is not a scan"}));
-  EXPECT_TRUE(bad_input(graspmap({"fuse", "run", "-o", "cloud.xyz"}), {"cloud.xyz"}));
+  EXPECT_TRUE(bad_input(run("none"), {.file = "none", .about = "no such"}));
+  EXPECT_TRUE(bad_input(run("run/rig.yaml"), {.file = "run/rig.yaml", .about = "a scan"}));
+  EXPECT_TRUE(bad_input(graspmap({"fuse", "run", "-o", "cloud.xyz"}),
+                        {.file = "cloud.xyz",
+                         .field = "extension",
+                         .value = ".xyz",
+                         .bound = ".pcd, .ply, .csv or .vtp"}));
   EXPECT_TRUE(bad_input(graspmap({"fuse", "run", "-o", "c.pcd", "--rig", "no.yaml"}),
-                        {"no.yaml: no such file"}));
+                        {.file = "no.yaml", .about = "no such"}));
   const std::string image = "run/" + libmap::rig_image_name("camera_3", 12.009);
   const std::string whole = content(image);
   for (const std::size_t length : {0U, 20U, 60U}) {
     graspmap_test::write_text(scratch(image), whole.substr(0, length));
-    EXPECT_TRUE(bad_input(strict("run"), {image})) << length;
+    EXPECT_TRUE(bad_input(strict("run"), {.file = image})) << length;
   }
   graspmap_test::write_text(scratch(image), libmap::encode_png(libmap::GrayImage(width, height)));
-  EXPECT_TRUE(bad_input(strict("run"), {image}));
+  EXPECT_TRUE(bad_input(strict("run"), {.file = image}));
   graspmap_test::write_text(scratch(image), libmap::encode_png(libmap::Image<std::uint16_t>(8, 8)));
-  EXPECT_TRUE(bad_input(strict("run"), {image, "8 x 8", "48 x 27"}));
+  EXPECT_TRUE(bad_input(
+      strict("run"), {.file = image, .field = "image size", .value = "8 x 8", .bound = "48 x 27"}));
   graspmap_test::write_text(scratch("run") / "rig.yaml", "cameras: []\n");
-  EXPECT_TRUE(bad_input(run("run"), {"run/rig.yaml", "cameras"}));
+  EXPECT_TRUE(bad_input(run("run"), {.file = "run/rig.yaml", .field = "cameras"}));
   EXPECT_FALSE(fs::exists(scratch("cloud.pcd")));
 }
 

@@ -105,7 +105,7 @@ TEST(Raster, HeightsThatWereNotMeasured) {
   for (const std::string map : {"map.pcd", "map.tiles"}) {
     const auto result = graspmap(with({"score", "dem.tif", "-o", map}, score));
     ASSERT_TRUE(succeeded(result));
-    EXPECT_NE(result.standard_error.find("warning: dem.tif: 400 points"), std::string::npos);
+    EXPECT_NE(result.standard_error.find("dem.tif: 400 points"), std::string::npos);
   }
   const auto manifest = json_of("map.pcd.json");
   EXPECT_EQ(manifest["results"]["input_points"], 6000);
@@ -113,8 +113,9 @@ TEST(Raster, HeightsThatWereNotMeasured) {
   for (std::size_t row = 0; row < 20; ++row)
     for (std::size_t column = 0; column < 20; ++column) grid.rows[row][column] = 0;
   write_dem("zeros.tif", grid, undeclared);
-  EXPECT_TRUE(bad_input(graspmap(with({"score", "zeros.tif", "-o", "zeros.pcd"}, score)),
-                        {"zeros.tif", "tilt of the plane", "<= 75", "-a_nodata"}));
+  EXPECT_TRUE(bad_input(
+      graspmap(with({"score", "zeros.tif", "-o", "zeros.pcd"}, score)),
+      {.file = "zeros.tif", .field = "tilt of the plane, deg", .value = "90.0", .bound = "<= 75"}));
 }
 
 // Ground that leans by 20 degrees: the fitted frame leans too, but not the raster.
@@ -179,7 +180,7 @@ TEST(Raster, PiecesInAStoreAreTheWholeDem) {
                        "dem.tif", "pieces/0.tif"});
   EXPECT_TRUE(bad_input(
       graspmap(with(with({"score", "pieces", "--append", "-o", "map.tiles"}, score), plane)),
-      {"map.tiles", "first file"}));
+      {.file = "map.tiles", .about = "first file"}));
 }
 
 TEST(Raster, ADemIsAMeshForGrasp) {
@@ -193,16 +194,17 @@ TEST(Raster, ADemIsAMeshForGrasp) {
 
 TEST(Raster, CloudsNeedAPixelSize) {
   graspmap_test::write_terrain();
-  EXPECT_TRUE(bad_input(graspmap({"convert", "terrain.pcd", "-o", "a.tif"}), {"--pixel-size"}));
+  EXPECT_TRUE(bad_input(graspmap({"convert", "terrain.pcd", "-o", "a.tif"}),
+                        {.file = "terrain.pcd", .field = "--pixel-size"}));
   ASSERT_TRUE(
       succeeded(graspmap({"convert", "terrain.pcd", "--pixel-size", "0.01", "-o", "a.tif"})));
   EXPECT_EQ(gdalinfo("a.tif")["size"], nlohmann::json({60, 60}));
   ASSERT_TRUE(succeeded(graspmap({"convert", "a.tif", "-o", "again.pcd"})));
   EXPECT_EQ(libmap::read_cloud(scratch("again.pcd")).cloud.size(), 3600U);
   EXPECT_TRUE(bad_input(graspmap({"convert", "terrain.pcd", "--pixel-size", "0.01", "-o", "b.ply"}),
-                        {"--pixel-size"}));
-  EXPECT_TRUE(
-      bad_input(graspmap({"convert", "a.tif", "-o", "b.tif"}), {"a.tif", "gdal_translate"}));
+                        {.file = "b.ply", .field = "--pixel-size"}));
+  EXPECT_TRUE(bad_input(graspmap({"convert", "a.tif", "-o", "b.tif"}),
+                        {.file = "a.tif", .about = "gdal_translate"}));
 }
 
 }  // namespace raster_test

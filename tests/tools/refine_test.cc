@@ -152,7 +152,7 @@ TEST(RefineWithoutPoses, NullPosesInADatabase) {
   EXPECT_EQ(posed->graph().optimized_map_from_base.size(), 6U);
   EXPECT_GE(posed->graph().links.size(), 5U);
   EXPECT_TRUE(bad_input(graspmap({"refine", "null.db", "-o", "p.tum", "--start", "stored"}),
-                        {"null.db", "stored"}));
+                        {.file = "null.db", .field = "poses", .value = "stored"}));
 }
 
 // Odometry with a drift of 42 mm is not used.
@@ -181,7 +181,7 @@ TEST(RefineWithoutPoses, BareImagesAreBadInput) {
   libmap::write_text(scratch("images/rgb.txt"), list);
   libmap::write_text(scratch("images/color/bare.png"), bare);
   EXPECT_TRUE(bad_input(graspmap({"refine", "images", "-o", "poses.tum"}),
-                        {"images", "frames is ", "no two of its pictures match"}));
+                        {.file = "images", .field = "frames", .value = "6"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("poses.tum")));
 }
 
@@ -292,12 +292,12 @@ TEST(RefineCalibration, IsWrittenAndApplied) {
             graspmap_test::read_text(scratch("same.ply")));
   EXPECT_TRUE(
       bad_input(graspmap({"fuse", "scan.db", "--calibration", "camera.yaml2", "-o", "c.ply"}),
-                {"camera.yaml2"}));
+                {.file = "camera.yaml2"}));
   camera.width = 321;
   libmap::write_text(scratch("other.yaml"), libmap::to_yaml({.camera = camera}));
   EXPECT_TRUE(bad_input(
       graspmap({"fuse", "scan.db", "--calibration", "other.yaml", "-o", "c.ply", "--quiet"}),
-      {"camera is 320 x 264: size differs from the calibration (must be 321 x 264)"}));
+      {.file = "scan.db", .about = "camera is 320 x 264"}));
 }
 
 // Invalid links and nodes without a calibration do not end refinement.
@@ -312,12 +312,9 @@ TEST(Refine, UnusableLinksAndFramesAreLeftOutAndNamed) {
   }
   const auto result = graspmap({"refine", "scan.db", "-o", "p.tum"});
   ASSERT_TRUE(succeeded(result));
-  EXPECT_NE(result.standard_error.find("stored links are left out, the first: link 1 -> 2: its "
-                                       "information matrix is not positive"),
-            std::string::npos)
+  EXPECT_NE(result.standard_error.find("link 1 -> 2: "), std::string::npos)
       << result.standard_error;
-  EXPECT_NE(result.standard_error.find("node 4: has no calibration"), std::string::npos)
-      << result.standard_error;
+  EXPECT_NE(result.standard_error.find("node 4: "), std::string::npos) << result.standard_error;
 }
 
 // A length twice as long makes a scale twice as large.
@@ -337,7 +334,7 @@ TEST(Refine, KnownLengthsDetermineTheScale) {
   EXPECT_GT(one, 0.0);
   EXPECT_NEAR(factor("1:20:60-1:100:60.5=2"), 2.0 * one, 1e-9);
   EXPECT_TRUE(bad_input(graspmap({"refine", scan, "-o", "p.tum", "--known-length", "1:2:3=1"}),
-                        {"1:2:3=1", "METERS > 0"}));
+                        {.field = "known length", .value = "1:2:3=1"}));
 }
 
 // Scans of the same ground, or of another, with small images.
@@ -375,8 +372,8 @@ TEST(RefineScans, OverlappingOnesAreJoinedAndOthersAreReported) {
   EXPECT_EQ(libmap::read_trajectory(scratch("apart.tum")).poses.size(), 16U);
   EXPECT_TRUE(
       bad_input(graspmap({"refine", "a.db", "b.db", "-o", "p.tum", "--write-database", "o.db"}),
-                {"--write-database"}));
-  EXPECT_TRUE(bad_input(graspmap({"refine", "a.db", "a.db", "-o", "p.tum"}), {"a.db"}));
+                {.field = "--write-database", .value = "o.db"}));
+  EXPECT_TRUE(bad_input(graspmap({"refine", "a.db", "a.db", "-o", "p.tum"}), {.file = "a.db"}));
 }
 
 TEST(RefineScans, BoardsThatAreNotThereAreBadInput) {
@@ -386,11 +383,11 @@ TEST(RefineScans, BoardsThatAreNotThereAreBadInput) {
     words.insert(words.end(), options.begin(), options.end());
     return graspmap(words);
   };
-  EXPECT_TRUE(bad_input(refined({"--board", "8x6"}), {"board is 8x6", "METERS > 0"}));
+  EXPECT_TRUE(bad_input(refined({"--board", "8x6"}), {.field = "board", .value = "8x6"}));
   EXPECT_TRUE(bad_input(refined({"--board", "8x6:0.03"}),
-                        {"a.db", "board is 8x6:0.03", "pictures of 0 nodes"}));
+                        {.file = "a.db", .field = "board", .value = "8x6:0.03"}));
   EXPECT_TRUE(bad_input(refined({"--board", "8x6:0.03", "--known-length", "1:20:60-1:100:60.5=1"}),
-                        {"board", "known lengths"}));
+                        {.file = "a.db", .field = "board"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("p.tum")));
 }
 
@@ -401,14 +398,14 @@ TEST(RefineScans, GivenScaleIsAppliedAndReported) {
     words.insert(words.end(), options.begin(), options.end());
     return graspmap(words);
   };
-  EXPECT_TRUE(bad_input(refined({"--scale", "3"}), {"--scale is 3", "0.5", "2"}));
+  EXPECT_TRUE(bad_input(refined({"--scale", "3"}),
+                        {.field = "--scale", .value = "3", .bound = ">= 0.5 and <= 2"}));
   EXPECT_TRUE(bad_input(refined({"--scale", "0.99", "--scale-from", "odometry"}),
-                        {"scale is 0.99", "1 with known lengths, a board"}));
+                        {.file = "a.db", .field = "scale", .value = "0.99"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("p.tum")));
   const auto result = refined({"--scale", "0.99"});
   ASSERT_TRUE(succeeded(result));
-  EXPECT_NE(result.standard_error.find("scale x 0.99 as given: corrected"), std::string::npos)
-      << result.standard_error;
+  EXPECT_NE(result.standard_error.find("x 0.99"), std::string::npos) << result.standard_error;
   EXPECT_EQ(json_of("p.tum.json").at("results").at("scale"), "scale x 0.99 as given: corrected");
 }
 
@@ -416,13 +413,17 @@ TEST(Refine, BadInputIsOneLine) {
   GRASPMAP_REQUIRE_DATA();
   const std::string scan = scan_file("site_tiny_q.db");
   EXPECT_TRUE(bad_input(graspmap({"refine", scan, "-o", "p.tum", "--report", "report.html"}),
-                        {"--report", ".json"}));
-  EXPECT_TRUE(bad_input(graspmap({"refine", scan, "-o", "poses.txt"}), {"poses.txt", ".tum"}));
+                        {.field = "--report", .value = "report.html"}));
+  EXPECT_TRUE(bad_input(graspmap({"refine", scan, "-o", "poses.txt"}),
+                        {.file = "poses.txt",
+                         .field = "extension",
+                         .value = ".txt",
+                         .bound = "one of .tum .kitti .g2o .toro .colmap"}));
   EXPECT_TRUE(bad_input(graspmap({"refine", scan, "-o", "p.tum", "--links", "links.tum"}),
-                        {"--links", ".g2o"}));
-  EXPECT_TRUE(bad_input(graspmap({"refine", "none.db", "-o", "p.tum"}), {"none.db"}));
+                        {.field = "--links", .value = "links.tum"}));
+  EXPECT_TRUE(bad_input(graspmap({"refine", "none.db", "-o", "p.tum"}), {.file = "none.db"}));
   EXPECT_TRUE(bad_input(graspmap({"refine", scan, "-o", "p.tum", "--gauge-node", "999"}),
-                        {"gauge_node is 999"}));
+                        {.field = "gauge_node", .value = "999"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("p.tum")));
 }
 

@@ -91,24 +91,27 @@ TEST(Render, BadInputIsOneLine) {
   graspmap_test::write_terrain();
   libmap::write_cloud(scratch("empty.pcd"), {});
   graspmap_test::write_text(scratch("points.csv"), "id,x,y,z,graspable\nA,0,0,0,maybe\n");
-  EXPECT_TRUE(bad_input(graspmap({"render", "none.pcd", "-o", "a.png"}), {"none.pcd"}));
-  EXPECT_TRUE(bad_input(graspmap({"render", "empty.pcd", "-o", "a.png"}), {"empty.pcd"}));
-  EXPECT_TRUE(bad_input(graspmap({"render", "terrain.pcd", "-o", "a.jpg"}), {"a.jpg", ".png"}));
+  EXPECT_TRUE(bad_input(graspmap({"render", "none.pcd", "-o", "a.png"}), {.file = "none.pcd"}));
+  EXPECT_TRUE(bad_input(graspmap({"render", "empty.pcd", "-o", "a.png"}), {.file = "empty.pcd"}));
+  EXPECT_TRUE(bad_input(graspmap({"render", "terrain.pcd", "-o", "a.jpg"}),
+                        {.file = "a.jpg", .about = ".png"}));
   EXPECT_TRUE(bad_input(graspmap({"render", "terrain.pcd", "-o", "a.png", "--width", "0"}),
-                        {"--width", "16384"}));
+                        {.field = "--width", .value = "0", .bound = ">= 1 and <= 16384"}));
   EXPECT_TRUE(bad_input(
       graspmap({"render", "terrain.pcd", "-o", "a.png", "--color", "field", "--field", "scroe"}),
-      {"scroe"}));
-  EXPECT_TRUE(bad_input(graspmap({"render", "terrain.pcd", "-o", "a.png", "--view", "tpo"}),
-                        {"--view", "tpo", "top"}));
-  EXPECT_TRUE(bad_input(graspmap({"render", "terrain.pcd", "-o", "a.png", "--points", "points.csv",
-                                  "--verdict", "graspable"}),
-                        {"points.csv", "maybe"}));
+      {.file = "terrain.pcd", .field = "field", .value = "scroe", .bound = "one of x y z"}));
+  EXPECT_TRUE(bad_input(
+      graspmap({"render", "terrain.pcd", "-o", "a.png", "--view", "tpo"}),
+      {.field = "--view", .value = "tpo", .bound = "one of top oblique front side camera"}));
+  EXPECT_TRUE(
+      bad_input(graspmap({"render", "terrain.pcd", "-o", "a.png", "--points", "points.csv",
+                          "--verdict", "graspable"}),
+                {.file = "points.csv", .field = "row 1, column 'graspable'", .value = "'maybe'"}));
   EXPECT_TRUE(bad_input(graspmap({"render", "terrain.pcd", "-o", "a.png", "--zero-plane", "low"}),
-                        {"--zero-plane is low: not a height", "auto, none or a number"}));
+                        {.file = "terrain.pcd", .field = "--zero-plane", .value = "low"}));
   libmap::write_mesh(scratch("square.ply"), graspmap_test::square_mesh(0.0));
   EXPECT_TRUE(bad_input(graspmap({"render", "square.ply", "-o", "a.png", "--box", "0,0,1,1"}),
-                        {"square.ply: --box"}));
+                        {.file = "square.ply", .field = "--box"}));
   EXPECT_TRUE(wrong_usage(graspmap({"render", "terrain.pcd", "-o", "a.png", "--wdith", "3"}),
                           {"--wdith", "--width"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("a.png")));

@@ -135,22 +135,35 @@ TEST(Resample, BadInput) {
     words.insert(words.end(), more.begin(), more.end());
     return graspmap(words);
   };
-  EXPECT_TRUE(bad_input(run({"--radius", "0"}), {"--radius", "> 0"}));
-  EXPECT_TRUE(bad_input(run({"--radius", "-1"}), {"--radius"}));
-  EXPECT_TRUE(bad_input(run({"--radius", "nan"}), {"--radius"}));
-  EXPECT_TRUE(bad_input(run({"--radius", "1e-9"}), {"ridge.ply", "radius_m", "too many"}));
-  EXPECT_TRUE(bad_input(run({"--count", "-5"}), {"--count"}));
-  EXPECT_TRUE(bad_input(run({"--count", "2000000000"}), {"--count"}));
-  EXPECT_TRUE(bad_input(run({"--count", "100", "--radius", "0.1"}), {"count is 100", "--radius"}));
-  EXPECT_TRUE(bad_input(graspmap({"resample", "none.ply", "-o", "a.pcd"}), {"none.ply"}));
-  EXPECT_TRUE(bad_input(graspmap({"resample", "ridge.ply", "-o", "a.obj"}), {"a.obj"}));
-  EXPECT_TRUE(bad_input(graspmap({"resample", "ridge.ply", "-o", "ridge.ply"}), {"ridge.ply"}));
+  EXPECT_TRUE(
+      bad_input(run({"--radius", "0"}), {.field = "--radius", .value = "0", .bound = "> 0"}));
+  EXPECT_TRUE(
+      bad_input(run({"--radius", "-1"}), {.field = "--radius", .value = "-1", .bound = "> 0"}));
+  EXPECT_TRUE(
+      bad_input(run({"--radius", "nan"}), {.field = "--radius", .value = "nan", .bound = "> 0"}));
+  EXPECT_TRUE(bad_input(
+      run({"--radius", "1e-9"}),
+      {.file = "ridge.ply", .field = "radius_m", .value = "1e-09", .bound = ">= 0.00088769355"}));
+  EXPECT_TRUE(bad_input(run({"--count", "-5"}),
+                        {.field = "--count", .value = "-5", .bound = ">= 0 and <= 1e+08"}));
+  EXPECT_TRUE(bad_input(run({"--count", "2000000000"}),
+                        {.field = "--count", .value = "2000000000", .bound = ">= 0 and <= 1e+08"}));
+  EXPECT_TRUE(bad_input(run({"--count", "100", "--radius", "0.1"}),
+                        {.field = "count", .value = "100", .about = "--radius"}));
+  EXPECT_TRUE(bad_input(graspmap({"resample", "none.ply", "-o", "a.pcd"}), {.file = "none.ply"}));
+  EXPECT_TRUE(bad_input(graspmap({"resample", "ridge.ply", "-o", "a.obj"}),
+                        {.file = "a.obj",
+                         .field = "extension",
+                         .value = ".obj",
+                         .bound = ".pcd, .ply, .csv or .vtp"}));
+  EXPECT_TRUE(
+      bad_input(graspmap({"resample", "ridge.ply", "-o", "ridge.ply"}), {.file = "ridge.ply"}));
   libmap::TriangleMesh line;
   line.vertices = {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}};
   line.triangles = {{0, 1, 2}};
   libmap::write_mesh(scratch("line.ply"), line);
-  EXPECT_TRUE(
-      bad_input(graspmap({"resample", "line.ply", "-o", "a.pcd"}), {"line.ply", "no area"}));
+  EXPECT_TRUE(bad_input(graspmap({"resample", "line.ply", "-o", "a.pcd"}),
+                        {.file = "line.ply", .about = "no area"}));
   EXPECT_EQ(names_in_scratch(), (Words{"line.ply", "ridge.ply"}));
 }
 

@@ -48,30 +48,31 @@ class ScoreBadInput : public testing::Test {
 };
 
 TEST_F(ScoreBadInput, NoSuchFile) {
-  EXPECT_TRUE(bad_input(score({"none.pcd"}), {"none.pcd: no such file"}));
+  EXPECT_TRUE(bad_input(score({"none.pcd"}), {.file = "none.pcd", .about = "no such"}));
 }
 
 TEST_F(ScoreBadInput, EmptyFileAndFolder) {
   write_text(scratch("empty.pcd"), "");
-  EXPECT_TRUE(bad_input(score({"empty.pcd"}), {"empty.pcd: is empty"}));
+  EXPECT_TRUE(bad_input(score({"empty.pcd"}), {.file = "empty.pcd"}));
   std::filesystem::create_directory(scratch("folder.pcd"));
-  EXPECT_TRUE(bad_input(score({"folder.pcd"}), {"folder.pcd: the folder contains no cloud"}));
+  EXPECT_TRUE(bad_input(score({"folder.pcd"}), {.file = "folder.pcd", .about = ".pcd"}));
 }
 
 TEST_F(ScoreBadInput, EmptyCloud) {
-  EXPECT_TRUE(bad_input(score({cloud_of({})}), {"cloud.pcd", "no points"}));
+  EXPECT_TRUE(bad_input(score({cloud_of({})}), {.file = "cloud.pcd", .about = "no points"}));
   write_text(scratch("empty.csv"), "x,y,z\n");
-  EXPECT_TRUE(bad_input(score({"empty.csv"}), {"empty.csv", "no points"}));
+  EXPECT_TRUE(bad_input(score({"empty.csv"}), {.file = "empty.csv", .about = "no points"}));
 }
 
 TEST_F(ScoreBadInput, OnePointTwoPointsOnePlace) {
   for (const char* method : {"thesis", "corrected"}) {
-    EXPECT_TRUE(bad_input(score({cloud_of({{1, 2, 3}}), "--method", method}), {"cloud.pcd", "1"}));
-    EXPECT_TRUE(
-        bad_input(score({cloud_of({{1, 2, 3}, {2, 2, 3}}), "--method", method}), {"cloud.pcd"}));
+    EXPECT_TRUE(bad_input(score({cloud_of({{1, 2, 3}}), "--method", method}),
+                          {.file = "cloud.pcd", .field = "points", .value = "1", .bound = ">= 3"}));
+    EXPECT_TRUE(bad_input(score({cloud_of({{1, 2, 3}, {2, 2, 3}}), "--method", method}),
+                          {.file = "cloud.pcd"}));
     EXPECT_TRUE(bad_input(
         score({cloud_of(std::vector<Eigen::Vector3d>(50, {1, 2, 3})), "--method", method}),
-        {"cloud.pcd"}));
+        {.file = "cloud.pcd"}));
   }
 }
 
@@ -79,29 +80,30 @@ TEST_F(ScoreBadInput, AllPointsOnALine) {
   std::vector<Eigen::Vector3d> line;
   for (int n = 0; n < 500; ++n) line.emplace_back(n * 0.01, n * 0.02, n * -0.005);
   for (const char* method : {"thesis", "envelope", "climblab", "corrected"})
-    EXPECT_TRUE(bad_input(score({cloud_of(line), "--method", method}), {"cloud.pcd", "on a line"}));
+    EXPECT_TRUE(bad_input(score({cloud_of(line), "--method", method}),
+                          {.file = "cloud.pcd", .about = "on a line"}));
 }
 
 TEST_F(ScoreBadInput, AllNaN) {
   const double nan = std::nan("");
   cloud_of(std::vector<Eigen::Vector3d>(7, {nan, nan, nan}));
-  EXPECT_TRUE(bad_input(score({"cloud.pcd"}), {"cloud.pcd", "none of its 7 points"}));
+  EXPECT_TRUE(bad_input(score({"cloud.pcd"}), {.file = "cloud.pcd", .about = "its 7"}));
 }
 
 TEST_F(ScoreBadInput, HeaderPromisesMoreThanFollows) {
   graspmap_test::write_terrain();
   const std::string whole = read_text(scratch("terrain.pcd"));
   write_text(scratch("cut.pcd"), whole.substr(0, whole.size() / 2));
-  EXPECT_TRUE(bad_input(score({"cut.pcd"}), {"cut.pcd", "14400"}));
+  EXPECT_TRUE(bad_input(score({"cut.pcd"}), {.file = "cut.pcd", .about = "14400"}));
   write_text(scratch("ascii.pcd"),
              "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 100\n"
              "HEIGHT 1\nPOINTS 100\nDATA ascii\n1 2 3\n4 5 6\n");
-  EXPECT_TRUE(bad_input(score({"ascii.pcd"}), {"ascii.pcd", "100"}));
+  EXPECT_TRUE(bad_input(score({"ascii.pcd"}), {.file = "ascii.pcd", .about = "100"}));
 }
 
 TEST_F(ScoreBadInput, CloudWithoutZ) {
   write_text(scratch("flat.csv"), "x,y\n1,2\n");
-  EXPECT_TRUE(bad_input(score({"flat.csv"}), {"flat.csv", "z"}));
+  EXPECT_TRUE(bad_input(score({"flat.csv"}), {.file = "flat.csv"}));
 }
 
 TEST_F(ScoreBadInput, Grippers) {
@@ -109,22 +111,27 @@ TEST_F(ScoreBadInput, Grippers) {
   const auto with_gripper = [&](const std::string& from, const std::string& to) {
     return score({"terrain.pcd", "--gripper", "./" + gripper_with(from, to)});
   };
-  EXPECT_TRUE(bad_input(with_gripper("finger_length_mm: 40", "finger_length_mm: -40"),
-                        {"gripper.yaml", "finger_length_mm is -40", "> 0"}));
+  EXPECT_TRUE(bad_input(
+      with_gripper("finger_length_mm: 40", "finger_length_mm: -40"),
+      {.file = "./gripper.yaml", .field = "finger_length_mm", .value = "-40", .bound = "> 0"}));
   EXPECT_TRUE(bad_input(with_gripper("closing_angle_deg: 10", "closing_angle_deg: 86"),
-                        {"gripper.yaml", "closing_angle_deg is 86", "85"}));
-  EXPECT_TRUE(bad_input(with_gripper("finger_length_mm: 40", "finger_lenght_mm: 40"),
-                        {"gripper.yaml", "finger_lenght_mm", "did you mean 'finger_length_mm'"}));
+                        {.file = "./gripper.yaml", .field = "closing_angle_deg", .value = "86"}));
+  EXPECT_TRUE(bad_input(
+      with_gripper("finger_length_mm: 40", "finger_lenght_mm: 40"),
+      {.file = "./gripper.yaml", .field = "finger_lenght_mm", .about = "'finger_length_mm'"}));
   EXPECT_TRUE(bad_input(with_gripper("finger_length_mm: 40", "# finger_length_mm: 40"),
-                        {"gripper.yaml", "finger_length_mm", "missing"}));
+                        {.file = "./gripper.yaml", .field = "finger_length_mm"}));
   EXPECT_TRUE(bad_input(with_gripper("opening_angle_deg: 85", "opening_angle_deg: 95"),
-                        {"gripper.yaml", "opening_angle_deg is 95", "<= 90"}));
+                        {.file = "./gripper.yaml",
+                         .field = "opening_angle_deg",
+                         .value = "95",
+                         .bound = "> 0 and <= 90"}));
   EXPECT_TRUE(bad_input(with_gripper("name: SCAR-E", "name: SCAR-E\nname: other"),
-                        {"gripper.yaml", "name", "is a duplicate"}));
+                        {.file = "./gripper.yaml", .field = "name"}));
   EXPECT_TRUE(bad_input(score({"terrain.pcd", "--gripper", "scare"}),
-                        {"gripper is scare", "did you mean 'scar-e'"}));
-  EXPECT_TRUE(
-      bad_input(score({"terrain.pcd", "--gripper", "none.yaml"}), {"none.yaml: no such file"}));
+                        {.field = "gripper", .value = "scare", .about = "'scar-e'"}));
+  EXPECT_TRUE(bad_input(score({"terrain.pcd", "--gripper", "none.yaml"}),
+                        {.file = "none.yaml", .about = "no such"}));
 }
 
 TEST_F(ScoreBadInput, GripperKeysWithSpacesBeforeTheColonAreThere) {
@@ -137,12 +144,13 @@ TEST_F(ScoreBadInput, GripperKeysWithSpacesBeforeTheColonAreThere) {
 TEST_F(ScoreBadInput, MisspeltGripperKeyOnTheCommandLine) {
   graspmap_test::write_terrain();
   EXPECT_TRUE(bad_input(score({"terrain.pcd", "--set", "gripper.opening_angel_deg=80"}),
-                        {"opening_angel_deg", "did you mean 'opening_angle_deg'"}));
+                        {.field = "opening_angel_deg", .about = "'opening_angle_deg'"}));
   EXPECT_TRUE(bad_input(score({"terrain.pcd", "--set", "griper.opening_angle_deg=80"}),
-                        {"griper.opening_angle_deg", "unknown key"}));
+                        {.field = "griper.opening_angle_deg"}));
   EXPECT_TRUE(bad_input(score({"terrain.pcd", "--set", "gripper.opening_angle_deg=wide"}),
-                        {"opening_angle_deg is wide"}));
-  EXPECT_TRUE(bad_input(score({"terrain.pcd", "--set", "method"}), {"--set is method", "="}));
+                        {.field = "opening_angle_deg", .value = "wide", .bound = "> 0 and <= 90"}));
+  EXPECT_TRUE(
+      bad_input(score({"terrain.pcd", "--set", "method"}), {.field = "--set", .value = "method"}));
 }
 
 TEST_F(ScoreBadInput, VoxelSizes) {
@@ -151,15 +159,17 @@ TEST_F(ScoreBadInput, VoxelSizes) {
     return score({"terrain.pcd", "--method", method, "--voxel-size", size});
   };
   for (const char* method : {"thesis", "envelope", "climblab", "corrected"}) {
-    EXPECT_TRUE(bad_input(with_size(method, "0"), {"--voxel-size is 0", "> 0"}));
-    EXPECT_TRUE(bad_input(with_size(method, "-0.01"), {"--voxel-size is -0.01", "> 0"}));
-    EXPECT_TRUE(bad_input(with_size(method, "nan"), {"--voxel-size is nan"}));
-    EXPECT_TRUE(bad_input(with_size(method, "10"),
-                          {"error: voxel_size_m is 10", "mask would have", "voxels per side"}));
+    EXPECT_TRUE(
+        bad_input(with_size(method, "0"), {.field = "--voxel-size", .value = "0", .bound = "> 0"}));
+    EXPECT_TRUE(bad_input(with_size(method, "-0.01"),
+                          {.field = "--voxel-size", .value = "-0.01", .bound = "> 0"}));
+    EXPECT_TRUE(bad_input(with_size(method, "nan"),
+                          {.field = "--voxel-size", .value = "nan", .bound = "> 0"}));
+    EXPECT_TRUE(bad_input(with_size(method, "10"), {.field = "voxel_size_m", .value = "10"}));
     // A mask of 0.27 x 0.27 x 0.09 m holds some 6e15 voxels of that size.
-    EXPECT_TRUE(bad_input(with_size(method, "1e-6"),
-                          {"error: voxel_size_m is 1e-06", "its mask would take", "GiB"}));
-    EXPECT_TRUE(bad_input(with_size(method, "1e-300"), {"error: voxel_size_m is 1e-300"}));
+    EXPECT_TRUE(bad_input(with_size(method, "1e-6"), {.field = "voxel_size_m", .value = "1e-06"}));
+    EXPECT_TRUE(
+        bad_input(with_size(method, "1e-300"), {.field = "voxel_size_m", .value = "1e-300"}));
   }
 }
 
@@ -169,7 +179,8 @@ TEST_F(ScoreBadInput, GripperWithoutFingers) {
   std::string text = read_text(scratch(gripper));
   text.erase(text.find("ignored:"));
   write_text(scratch(gripper), text);
-  EXPECT_TRUE(bad_input(score({"terrain.pcd", "--gripper", gripper}), {gripper, "fingers"}));
+  EXPECT_TRUE(bad_input(score({"terrain.pcd", "--gripper", gripper}),
+                        {.file = gripper, .field = "fingers"}));
 }
 
 TEST_F(ScoreBadInput, CloudTooWideForTheVoxelSize) {
@@ -183,7 +194,7 @@ TEST_F(ScoreBadInput, CloudTooWideForTheVoxelSize) {
     cloud_of(positions);
     EXPECT_TRUE(bad_input(
         score({"cloud.pcd", "--plane", "none", "--voxel-size", "0.01", "--method", method}),
-        {"cloud.pcd", "voxel_size_m is 0.01", "GiB"}));
+        {.file = "cloud.pcd", .field = "voxel_size_m", .value = "0.01"}));
   }
 }
 
@@ -193,38 +204,52 @@ TEST_F(ScoreBadInput, Scenarios) {
     write_text(scratch("scenario.yaml"), yaml);
     return score({"terrain.pcd", "--config", "scenario.yaml"});
   };
-  EXPECT_TRUE(bad_input(with_scenario("voxel_sise_m: 0.01\n"),
-                        {"scenario.yaml", "voxel_sise_m", "did you mean 'voxel_size_m'"}));
   EXPECT_TRUE(
-      bad_input(with_scenario("voxel_size_m: 0\n"), {"scenario.yaml", "voxel_size_m is 0", "> 0"}));
-  EXPECT_TRUE(bad_input(with_scenario("method: thesiss\n"),
-                        {"scenario.yaml", "method is thesiss", "did you mean 'thesis'"}));
-  EXPECT_TRUE(bad_input(with_scenario("method: [thesis]\n"), {"scenario.yaml", "method"}));
+      bad_input(with_scenario("voxel_sise_m: 0.01\n"),
+                {.file = "scenario.yaml", .field = "voxel_sise_m", .about = "'voxel_size_m'"}));
+  EXPECT_TRUE(
+      bad_input(with_scenario("voxel_size_m: 0\n"),
+                {.file = "scenario.yaml", .field = "voxel_size_m", .value = "0", .bound = "> 0"}));
+  EXPECT_TRUE(bad_input(
+      with_scenario("method: thesiss\n"),
+      {.file = "scenario.yaml", .field = "method", .value = "thesiss", .about = "'thesis'"}));
+  EXPECT_TRUE(
+      bad_input(with_scenario("method: [thesis]\n"), {.file = "scenario.yaml", .field = "method"}));
   EXPECT_TRUE(bad_input(with_scenario("method: thesis\nmethod: corrected\n"),
-                        {"scenario.yaml", "method", "is a duplicate"}));
-  EXPECT_TRUE(bad_input(with_scenario("a: b: c\n"), {"scenario.yaml", "line 1"}));
-  EXPECT_TRUE(bad_input(score({"terrain.pcd", "--config", "none.yaml"}), {"none.yaml"}));
+                        {.file = "scenario.yaml", .field = "method"}));
+  EXPECT_TRUE(bad_input(with_scenario("a: b: c\n"), {.file = "scenario.yaml", .field = "line 1"}));
+  EXPECT_TRUE(bad_input(score({"terrain.pcd", "--config", "none.yaml"}), {.file = "none.yaml"}));
   EXPECT_TRUE(bad_input(score({"terrain.pcd", "--config", "artificial_rocks_prescam"}),
-                        {"did you mean 'artificial_rocks_prescan'"}));
+                        {.field = "scenario",
+                         .value = "artificial_rocks_prescam",
+                         .about = "'artificial_rocks_prescan'"}));
 }
 
 TEST_F(ScoreBadInput, FlagsOutOfTheirBounds) {
   graspmap_test::write_terrain();
   for (const char* share : {"3/2", "0/2", "-1/2", "1", "1/", "/2", "a/b", "1/2/3", "1/0", ""})
-    EXPECT_TRUE(bad_input(score({"terrain.pcd", "--tile", share}), {"--tile", "K/N"})) << share;
-  EXPECT_TRUE(bad_input(score({"terrain.pcd", "--up", "0,0"}), {"--up"}));
-  EXPECT_TRUE(bad_input(score({"terrain.pcd", "--up", "0,0,0"}), {}));
+    EXPECT_TRUE(bad_input(score({"terrain.pcd", "--tile", share}), {.field = "--tile"})) << share;
+  EXPECT_TRUE(bad_input(score({"terrain.pcd", "--up", "0,0"}),
+                        {.field = "--up", .value = "0,0", .bound = "X,Y,Z"}));
+  EXPECT_TRUE(
+      bad_input(score({"terrain.pcd", "--up", "0,0,0"}), {.file = "terrain.pcd", .field = "up"}));
   EXPECT_TRUE(bad_input(score({"terrain.pcd", "--up", "0,0,1", "--plane", "none"}),
-                        {"--up is 0,0,1", "--plane none"}));
-  EXPECT_TRUE(bad_input(score({"terrain.pcd", "--max-points-in-memory", "5"}),
-                        {"--max-points-in-memory", "tile store"}));
-  EXPECT_TRUE(bad_input(score({"terrain.pcd", "--threads", "-1"}), {"--threads is -1"}));
-  EXPECT_TRUE(bad_input(score({"terrain.pcd", "--progress", "fancy"}), {"--progress is fancy"}));
-  EXPECT_TRUE(bad_input(score({"terrain.pcd", "--graspability-threshold", "1.5"}),
-                        {"--graspability-threshold is 1.5", "<= 1"}));
-  EXPECT_TRUE(bad_input(score({"terrain.pcd", "--solid-voxel-threshold", "0"}),
-                        {"--solid-voxel-threshold is 0"}));
-  EXPECT_TRUE(bad_input(score({"terrain.pcd", "--tile-size", "1e-9"}), {"tile_size_m is 1e-09"}));
+                        {.field = "--up", .value = "0,0,1", .about = "--plane"}));
+  EXPECT_TRUE(
+      bad_input(score({"terrain.pcd", "--max-points-in-memory", "5"}), {.field = "--max-points-in-memory"}));
+  EXPECT_TRUE(bad_input(score({"terrain.pcd", "--threads", "-1"}),
+                        {.field = "--threads", .value = "-1", .bound = ">= 0 and <= 4096"}));
+  EXPECT_TRUE(
+      bad_input(score({"terrain.pcd", "--progress", "fancy"}),
+                {.field = "--progress", .value = "fancy", .bound = "one of auto, json, none"}));
+  EXPECT_TRUE(
+      bad_input(score({"terrain.pcd", "--graspability-threshold", "1.5"}),
+                {.field = "--graspability-threshold", .value = "1.5", .bound = ">= 0 and <= 1"}));
+  EXPECT_TRUE(bad_input(
+      score({"terrain.pcd", "--solid-voxel-threshold", "0"}),
+      {.field = "--solid-voxel-threshold", .value = "0", .bound = ">= 1 and <= 2147483647"}));
+  EXPECT_TRUE(bad_input(score({"terrain.pcd", "--tile-size", "1e-9"}),
+                        {.file = "terrain.pcd", .field = "tile_size_m", .value = "1e-09"}));
 }
 
 TEST_F(ScoreBadInput, AMeshIsNoCloud) {
@@ -233,7 +258,7 @@ TEST_F(ScoreBadInput, AMeshIsNoCloud) {
   mesh.triangles = {{0, 1, 2}};
   for (const std::string name : {"mesh.ply", "mesh.obj"}) {
     libmap::write_mesh(scratch(name), mesh);
-    EXPECT_TRUE(bad_input(score({name}), {name, "graspmap resample"}));
+    EXPECT_TRUE(bad_input(score({name}), {.file = name, .about = "graspmap resample"}));
   }
 }
 
@@ -243,7 +268,11 @@ TEST_F(ScoreBadInput, PointsTooFarApartForTheVoxels) {
   for (int i = 0; i < 120; ++i)
     for (int j = 0; j < 120; ++j) points.emplace_back(0.025 * i, 0.025 * j, 0.0);
   const std::string cloud = cloud_of(points);
-  const Words named = {cloud, "25.0 mm", "voxels of 0.01 m", "no neighbor"};
+  const graspmap_test::ExpectedError named = {
+      .file = cloud,
+      .field = "spacing of the points with voxels of 0.01 m",
+      .value = "25.0 mm; 100.0 % of the voxels have no neighbor",
+      .bound = "<= 60 % of the voxels"};
   EXPECT_TRUE(bad_input(score({cloud, "--voxel-size", "0.01"}), named));
   EXPECT_TRUE(bad_input(
       graspmap({"score", cloud, "--voxel-size", "0.01", "--quiet", "-o", "map.tiles"}), named));
@@ -259,11 +288,17 @@ TEST_F(ScoreBadInput, OutputsThatCannotBe) {
     EXPECT_EQ(graspmap_test::names_in_scratch(), before);
     return result;
   };
-  EXPECT_TRUE(bad_input(to("none/out.pcd"), {"none/out.pcd", "no such folder"}));
-  EXPECT_TRUE(bad_input(to("out.xyz"), {"out.xyz", ".pcd"}));
-  EXPECT_TRUE(bad_input(to("out"), {"out", "extension"}));
+  EXPECT_TRUE(bad_input(to("none/out.pcd"), {.file = "none/out.pcd", .about = "no such"}));
+  EXPECT_TRUE(bad_input(to("out.xyz"), {.file = "out.xyz",
+                                        .field = "extension",
+                                        .value = ".xyz",
+                                        .bound = ".pcd, .ply, .csv or .vtp"}));
+  EXPECT_TRUE(bad_input(to("out"), {.file = "out",
+                                    .field = "extension",
+                                    .value = "missing",
+                                    .bound = ".pcd, .ply, .csv or .vtp"}));
   std::filesystem::create_directory(scratch("folder.pcd"));
-  EXPECT_TRUE(bad_input(to("folder.pcd"), {"folder.pcd: is a folder"}));
+  EXPECT_TRUE(bad_input(to("folder.pcd"), {.file = "folder.pcd"}));
 }
 
 }  // namespace score_bad_input_test

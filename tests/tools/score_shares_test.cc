@@ -153,29 +153,35 @@ TEST(MergeOfShares, AcrossTheBoundOfSinglePrecisionIsTheWholeMap) {
 }
 
 TEST_F(Merge, MissingShare) {
-  EXPECT_TRUE(bad_input(merge({"a.pcd"}), {"1 of 2 shares"}));
-  EXPECT_TRUE(bad_input(merge({"a.pcd", "none.pcd"}), {"none.pcd"}));
+  EXPECT_TRUE(bad_input(merge({"a.pcd"}), {.field = "tile"}));
+  EXPECT_TRUE(bad_input(merge({"a.pcd", "none.pcd"}), {.file = "none.pcd"}));
 }
 
 TEST_F(Merge, ShareTwice) {
-  EXPECT_TRUE(bad_input(merge({"a.pcd", "a.pcd"}), {"a.pcd", "two files contain this share"}));
-  EXPECT_TRUE(bad_input(merge({"a.pcd", "b.pcd", "b.pcd"}), {"b.pcd"}));
+  EXPECT_TRUE(
+      bad_input(merge({"a.pcd", "a.pcd"}), {.file = "a.pcd", .field = "tile", .value = "1/2"}));
+  EXPECT_TRUE(bad_input(merge({"a.pcd", "b.pcd", "b.pcd"}),
+                        {.file = "b.pcd", .field = "tile", .value = "2/2"}));
   // By another name.
   std::filesystem::copy_file(scratch("a.pcd"), scratch("b.pcd"),
                              std::filesystem::copy_options::overwrite_existing);
   EXPECT_TRUE(bad_input(merge({"a.pcd", "b.pcd"}),
-                        {"a.pcd: i, j, k is ", "two parts contain the same voxel"}));
+                        {.file = "a.pcd", .field = "i, j, k", .value = "-30, -30, -3"}));
 }
 
 TEST_F(Merge, SharesOfDifferentScenarios) {
   ASSERT_TRUE(succeeded(share("other.pcd", "2/2", {"--extra-void-layers", "2"})));
-  EXPECT_TRUE(bad_input(merge({"a.pcd", "other.pcd"}), {"other.pcd", "extra_void_layers"}));
+  EXPECT_TRUE(bad_input(merge({"a.pcd", "other.pcd"}),
+                        {.file = "other.pcd", .field = "extra_void_layers"}));
   ASSERT_TRUE(succeeded(share("other.pcd", "2/2", {"--set", "gripper.opening_angle_deg=80"})));
-  EXPECT_TRUE(bad_input(merge({"a.pcd", "other.pcd"}), {"gripper.opening_angle_deg"}));
+  EXPECT_TRUE(bad_input(merge({"a.pcd", "other.pcd"}),
+                        {.file = "other.pcd", .field = "gripper.opening_angle_deg"}));
   ASSERT_TRUE(succeeded(share("first.pcd", "1/2", {"--set", "gripper.opening_angle_deg=80"})));
-  EXPECT_TRUE(bad_input(merge({"first.pcd", "b.pcd"}), {"gripper.opening_angle_deg"}));
+  EXPECT_TRUE(bad_input(merge({"first.pcd", "b.pcd"}),
+                        {.file = "b.pcd", .field = "gripper.opening_angle_deg"}));
   ASSERT_TRUE(succeeded(share("third.pcd", "3/3", {})));
-  EXPECT_TRUE(bad_input(merge({"a.pcd", "third.pcd"}), {"third.pcd", "3/3"}));
+  EXPECT_TRUE(bad_input(merge({"a.pcd", "third.pcd"}),
+                        {.file = "third.pcd", .field = "tile", .value = "3/3"}));
 }
 
 TEST_F(Merge, SharesOfDifferentInputs) {
@@ -185,12 +191,12 @@ TEST_F(Merge, SharesOfDifferentInputs) {
   ASSERT_TRUE(succeeded(share("c.pcd", "1/2", {"--gripper", "g.yaml"})));
   graspmap_test::write_text(scratch("g.yaml"), gripper + "# changed\n");
   ASSERT_TRUE(succeeded(share("d.pcd", "2/2", {"--gripper", "g.yaml"})));
-  EXPECT_TRUE(bad_input(merge({"c.pcd", "d.pcd"}), {"d.pcd", "other inputs"}));
+  EXPECT_TRUE(bad_input(merge({"c.pcd", "d.pcd"}), {.file = "d.pcd", .about = "other inputs"}));
   ASSERT_TRUE(
       succeeded(graspmap({"convert", "terrain.pcd", "-o", "t2.pcd", "--encoding", "ascii"})));
   std::filesystem::rename(scratch("t2.pcd"), scratch("terrain.pcd"));
   ASSERT_TRUE(succeeded(share("e.pcd", "2/2", {})));
-  EXPECT_TRUE(bad_input(merge({"a.pcd", "e.pcd"}), {"e.pcd", "other inputs"}));
+  EXPECT_TRUE(bad_input(merge({"a.pcd", "e.pcd"}), {.file = "e.pcd", .about = "other inputs"}));
 }
 
 TEST_F(Merge, SharesOfDifferentVersions) {
@@ -201,14 +207,20 @@ TEST_F(Merge, SharesOfDifferentVersions) {
   ASSERT_NE(at, std::string::npos);
   graspmap_test::write_text(scratch("b.pcd.json"), std::string(manifest).replace(
                                                        at, with.size(), "\"version\": \"9.8.7\""));
-  EXPECT_TRUE(bad_input(merge({"a.pcd", "b.pcd"}), {"b.pcd", "version", "9.8.7", version}));
+  EXPECT_TRUE(bad_input(merge({"a.pcd", "b.pcd"}),
+                        {.file = "b.pcd", .field = "version", .value = "9.8.7", .bound = version}));
 }
 
 TEST_F(Merge, CloudsThatAreNoShares) {
-  EXPECT_TRUE(bad_input(merge({"a.pcd", "terrain.pcd"}), {"terrain.pcd", "no manifest"}));
+  EXPECT_TRUE(
+      bad_input(merge({"a.pcd", "terrain.pcd"}), {.file = "terrain.pcd", .about = "no manifest"}));
   graspmap_test::write_text(scratch("b.pcd.json"), "{");
-  EXPECT_TRUE(bad_input(merge({"a.pcd", "b.pcd"}), {"b.pcd.json"}));
-  EXPECT_TRUE(bad_input(graspmap({"convert", "a.pcd", "-o", "merged.xyz"}), {"merged.xyz"}));
+  EXPECT_TRUE(bad_input(merge({"a.pcd", "b.pcd"}), {.file = "b.pcd.json"}));
+  EXPECT_TRUE(bad_input(graspmap({"convert", "a.pcd", "-o", "merged.xyz"}),
+                        {.file = "merged.xyz",
+                         .field = "extension",
+                         .value = ".xyz",
+                         .bound = ".pcd, .ply, .csv or .vtp"}));
 }
 
 }  // namespace score_shares_test

@@ -58,8 +58,9 @@ TEST_F(ScoreStoreHostile, APlanOfOtherTiles) {
   const auto expect_refused = [](const std::function<void(nlohmann::json & index)>& change) {
     const std::string plan = content("m.tiles/progress/plan.json");
     change_plan([&](nlohmann::json& json) { change(json.at("index")); });
-    EXPECT_TRUE(
-        bad_input(score(), {"m.tiles/progress/plan.json: tile_voxels and lattice", "--force"}));
+    EXPECT_TRUE(bad_input(score(), {.file = "m.tiles/progress/plan.json",
+                                    .field = "tile_voxels and lattice",
+                                    .about = "--force"}));
     write_text(scratch("m.tiles/progress/plan.json"), plan);
   };
   expect_refused([](nlohmann::json& index) { index.at("tile_voxels") = 21; });
@@ -72,15 +73,14 @@ TEST_F(ScoreStoreHostile, APlanOfAnotherPlace) {
     nlohmann::json& x_m = plan.at("plane_centroid_m").at(0);
     x_m = x_m.get<double>() + 0.1;
   });
-  EXPECT_TRUE(bad_input(score(), {"m.tiles/progress/plan.json: min and max"}));
+  EXPECT_TRUE(bad_input(score(), {.file = "m.tiles/progress/plan.json", .field = "min and max"}));
 }
 
 TEST(ScoreStoreTiles, TooManyLeaveNothingBehind) {
   write_text(scratch("far.csv"), "x,y,z\n0,0,0\n4000,0,0\n0,4000,0.5\n");
   const Words before = graspmap_test::names_in_scratch();
   EXPECT_TRUE(bad_input(graspmap({"score", "far.csv", "--plane", "none", "-o", "m.tiles"}),
-                        {"far.csv: tile_size_m is 1: too small: the tile store would have "
-                         "16008001 tiles"}));
+                        {.file = "far.csv", .field = "tile_size_m", .value = "1"}));
   EXPECT_EQ(graspmap_test::names_in_scratch(), before);
 }
 

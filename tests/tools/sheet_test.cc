@@ -40,21 +40,24 @@ TEST(Sheet, MapsAndImagesInOne) {
 TEST(Sheet, BadInputIsOneLine) {
   write_map("a.pcd", "corrected");
   graspmap_test::write_text(scratch("broken.png"), "\x89PNG and no more");
-  EXPECT_TRUE(bad_input(graspmap({"render", "none.pcd", "-o", "s.png"}), {"none.pcd"}));
-  EXPECT_TRUE(bad_input(graspmap({"render", "broken.png", "-o", "s.png"}), {"broken.png"}));
+  EXPECT_TRUE(bad_input(graspmap({"render", "none.pcd", "-o", "s.png"}), {.file = "none.pcd"}));
+  EXPECT_TRUE(bad_input(graspmap({"render", "broken.png", "-o", "s.png"}),
+                        {.file = "broken.png", .field = "extension", .value = ".png"}));
   graspmap_test::write_text(scratch("empty.csv"), "x,y,z\n");
-  EXPECT_TRUE(bad_input(graspmap({"render", "a.pcd", "empty.csv", "-o", "s.png"}), {"empty.csv"}));
-  EXPECT_TRUE(bad_input(graspmap({"render", "a.pcd", "-o", "s.jpg"}), {"s.jpg", ".png"}));
+  EXPECT_TRUE(
+      bad_input(graspmap({"render", "a.pcd", "empty.csv", "-o", "s.png"}), {.file = "empty.csv"}));
+  EXPECT_TRUE(
+      bad_input(graspmap({"render", "a.pcd", "-o", "s.jpg"}), {.file = "s.jpg", .about = ".png"}));
   EXPECT_TRUE(bad_input(graspmap({"render", "a.pcd", "-o", "s.png", "--captions", "a|b"}),
-                        {"--captions", "<= 1"}));
+                        {.field = "--captions", .value = "2", .bound = "<= 1"}));
   EXPECT_TRUE(bad_input(graspmap({"render", "a.pcd", "-o", "s.png", "--row-titles", "a|b"}),
-                        {"row_titles"}));
-  EXPECT_TRUE(bad_input(graspmap({"render", "a.pcd", "-o", "a.pcd"}), {"a.pcd"}));
+                        {.field = "row_titles", .value = "2", .bound = "<= 1"}));
+  EXPECT_TRUE(bad_input(graspmap({"render", "a.pcd", "-o", "a.pcd"}), {.file = "a.pcd"}));
   for (const auto& [flag, name] :
        {std::pair{"--no-legend", "--legend"}, std::pair{"--no-axes", "--axes"},
         std::pair{"--width=300", "--width"}, std::pair{"--camera-target=1,2,3", "--camera-target"}})
-    EXPECT_TRUE(bad_input(graspmap({"render", "a.pcd", "a.pcd", "-o", "s.png", flag}),
-                          {name, "a single file"}));
+    EXPECT_TRUE(
+        bad_input(graspmap({"render", "a.pcd", "a.pcd", "-o", "s.png", flag}), {.field = name}));
   EXPECT_FALSE(std::filesystem::exists(scratch("s.png")));
 }
 
@@ -85,21 +88,23 @@ TEST(Summarize, TablesOfTwoMaps) {
 TEST(Summarize, BadInputIsOneLine) {
   write_map("a.pcd", "corrected");
   graspmap_test::write_text(scratch("e.csv"), "region,x,y,z\n");
-  EXPECT_TRUE(bad_input(graspmap({"analyze", "terrain.pcd", "-o", "sum"}), {"terrain.pcd"}));
-  EXPECT_TRUE(
-      bad_input(graspmap({"analyze", "a.pcd", "-o", "sum", "--expected", "e.csv"}), {"e.csv"}));
+  EXPECT_TRUE(bad_input(graspmap({"analyze", "terrain.pcd", "-o", "sum"}),
+                        {.file = "terrain.pcd", .field = "score"}));
+  EXPECT_TRUE(bad_input(graspmap({"analyze", "a.pcd", "-o", "sum", "--expected", "e.csv"}),
+                        {.file = "e.csv"}));
   EXPECT_TRUE(bad_input(graspmap({"analyze", "a.pcd", "a.pcd", "-o", "sum", "--cutoff", "high"}),
-                        {"--cutoff", "high"}));
+                        {.file = "a.pcd", .field = "--cutoff", .value = "high"}));
   EXPECT_TRUE(bad_input(graspmap({"analyze", "a.pcd", "a.pcd", "-o", "sum", "--names", "a|b|c"}),
-                        {"--names is 3: more names than maps (must be <= 2)"}));
+                        {.field = "--names", .value = "3", .bound = "<= 2"}));
   for (const auto& [name, value] : {std::pair{"--cutoff", "0.5"}, std::pair{"--names", "a"},
                                     std::pair{"--varied", "solid_voxel_threshold"}})
-    EXPECT_TRUE(bad_input(graspmap({"analyze", "a.pcd", "-o", "sum", name, value}), {name}));
+    EXPECT_TRUE(
+        bad_input(graspmap({"analyze", "a.pcd", "-o", "sum", name, value}), {.field = name}));
   EXPECT_TRUE(bad_input(graspmap({"analyze", "a.pcd", "a.pcd", "-o", "sum", "--stride", "0.4"}),
-                        {"--stride", "one map"}));
+                        {.field = "--stride"}));
   EXPECT_TRUE(
       bad_input(graspmap({"analyze", "a.pcd", "a.pcd", "-o", "sum", "--varied", "none", "--quiet"}),
-                {"none"}));
+                {.file = "maps.csv", .field = "column 'none'"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("sum")));
 }
 
@@ -128,7 +133,7 @@ TEST(Summarize, PairsThatLieApartAreNamed) {
   ASSERT_TRUE(succeeded(graspmap({"analyze", "a.pcd", "b.pcd", "-o", "sum"})));
   const graspmap_test::ProgramResult result = graspmap(
       {"analyze", "a.pcd", "b.pcd", "-o", "pairs", "--names", "|far", "--pairs", "--quiet"});
-  EXPECT_TRUE(bad_input(result, {"error: a.pcd and far: the maps have no voxel in common"}));
+  EXPECT_TRUE(bad_input(result, {.file = "a.pcd and far", .about = "no voxel"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("pairs")));
 }
 
@@ -189,18 +194,19 @@ TEST(Mask, SectionsShowTheMask) {
 }
 
 TEST(Mask, SectionsBadInput) {
-  EXPECT_TRUE(bad_input(graspmap({"mask", "--sections", "-o", "m.txt"}), {"m.txt"}));
+  EXPECT_TRUE(bad_input(graspmap({"mask", "--sections", "-o", "m.txt"}), {.file = "m.txt"}));
   EXPECT_TRUE(bad_input(graspmap({"mask", "--sections", "--section-layer", "99", "-o", "m.png"}),
-                        {"section_layer", "99"}));
+                        {.field = "section_layer", .value = "99", .bound = ">= 0 and <= 9"}));
 }
 
 TEST(Mask, OptionsOfAnotherOutputAreRefused) {
-  EXPECT_TRUE(
-      bad_input(graspmap({"mask", "--section-layer", "2", "-o", "m.png"}), {"--section-layer"}));
-  EXPECT_TRUE(bad_input(graspmap({"mask", "--cell-width", "99", "-o", "m.png"}), {"--cell-width"}));
-  EXPECT_TRUE(bad_input(graspmap({"mask", "--view", "top", "-o", "m.txt"}), {"--view"}));
-  EXPECT_TRUE(
-      bad_input(graspmap({"mask", "--sections", "--view", "top", "-o", "m.png"}), {"--view"}));
+  EXPECT_TRUE(bad_input(graspmap({"mask", "--section-layer", "2", "-o", "m.png"}),
+                        {.field = "--section-layer"}));
+  EXPECT_TRUE(bad_input(graspmap({"mask", "--cell-width", "99", "-o", "m.png"}),
+                        {.field = "--cell-width"}));
+  EXPECT_TRUE(bad_input(graspmap({"mask", "--view", "top", "-o", "m.txt"}), {.field = "--view"}));
+  EXPECT_TRUE(bad_input(graspmap({"mask", "--sections", "--view", "top", "-o", "m.png"}),
+                        {.field = "--view"}));
 }
 
 TEST(Sheet, HowPlacesAreMarkedNeedsPlaces) {
@@ -209,7 +215,7 @@ TEST(Sheet, HowPlacesAreMarkedNeedsPlaces) {
        {std::pair{"--verdict", "graspable"}, std::pair{"--label", "none"},
         std::pair{"--points-frame", "map"}})
     EXPECT_TRUE(bad_input(graspmap({"render", "terrain.pcd", name, value, "-o", "s.png"}),
-                          {name, "--points"}));
+                          {.file = "terrain.pcd", .field = name, .about = "--points"}));
 }
 
 }  // namespace sheet_test

@@ -128,11 +128,12 @@ TEST(SimulateCamerasCommand, UnitsTooFineForTheRangeAreRefused) {
     more.insert(more.begin(), {"-o", "rig", "--rig", "far.yaml"});
     return graspmap(cameras(more));
   };
-  EXPECT_TRUE(bad_input(run({}), {"error: far.yaml: depth_scale_m is 1e-05: 16-bit images cannot "
-                                  "represent the range of camera front",
-                                  "(must be >= far_m / 65534, 2.2888882e-05)"}));
-  EXPECT_TRUE(bad_input(run({"--depth-scale", "0.00002"}),
-                        {"error: depth_scale_m is 2e-05: 16-bit images"}));
+  EXPECT_TRUE(bad_input(run({}), {.file = "far.yaml",
+                                  .field = "depth_scale_m",
+                                  .value = "1e-05",
+                                  .bound = ">= far_m / 65534, 2.2888882e-05"}));
+  EXPECT_TRUE(
+      bad_input(run({"--depth-scale", "0.00002"}), {.field = "depth_scale_m", .value = "2e-05"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("rig")));
   EXPECT_TRUE(succeeded(run({"--depth-scale", "2.2888882e-05"})));
 }
@@ -140,15 +141,17 @@ TEST(SimulateCamerasCommand, UnitsTooFineForTheRangeAreRefused) {
 TEST(SimulateCamerasCommand, BadInputIsOneLine) {
   write_ground();
   EXPECT_TRUE(bad_input(graspmap(cameras({"-o", "rig", "--x", "9"})),
-                        {"ground.ply", "no surface", "9, 0"}));
-  EXPECT_TRUE(bad_input(graspmap(cameras({"-o", "rig", "--rig", "scare"})), {"scar-e"}));
+                        {.file = "ground.ply", .field = "x, y", .value = "9, 0"}));
+  EXPECT_TRUE(bad_input(graspmap(cameras({"-o", "rig", "--rig", "scare"})),
+                        {.field = "rig", .value = "scare"}));
   write_text(scratch("bad.yaml"), "cameras: []\n");
-  EXPECT_TRUE(bad_input(graspmap(cameras({"-o", "rig", "--rig", "bad.yaml"})), {"bad.yaml"}));
+  EXPECT_TRUE(bad_input(graspmap(cameras({"-o", "rig", "--rig", "bad.yaml"})),
+                        {.file = "bad.yaml", .field = "cameras"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("rig")));
   // Above all it sees: images without a measurement, and a warning.
   const auto high = graspmap(cameras({"-o", "rig", "--absolute-z", "--z", "30"}));
   ASSERT_TRUE(succeeded(high));
-  EXPECT_NE(high.standard_error.find("no measurements within its range"), std::string::npos);
+  EXPECT_NE(high.standard_error.find("no measurements"), std::string::npos);
 }
 
 }  // namespace simulate_cameras_test

@@ -212,34 +212,40 @@ TEST(SimulateScanCommand, AlongAGivenTrajectory) {
     more.insert(more.begin(), command.begin(), command.end());
     return graspmap(more);
   };
-  EXPECT_TRUE(bad_input(with({"--frames", "5"}), {"--frames"}));
-  EXPECT_TRUE(bad_input(with({"--target", "0,0,0"}), {"--target"}));
+  EXPECT_TRUE(bad_input(with({"--frames", "5"}), {.field = "--frames"}));
+  EXPECT_TRUE(bad_input(with({"--target", "0,0,0"}), {.field = "--target"}));
   write_text(scratch("way.tum"), "2 1 1 1.5 0 0 0 1\n1 1 1 1.5 0 0 0 1\n");
-  EXPECT_TRUE(bad_input(with({"--force"}), {"way.tum", "stamp of pose 2", "> 2"}));
+  EXPECT_TRUE(
+      bad_input(with({"--force"}),
+                {.file = "way.tum", .field = "stamp of pose 2", .value = "1", .bound = "> 2"}));
   EXPECT_TRUE(bad_input(graspmap({"simulate", "scan", "ground", "-o", "c.db", "--path", "loops"}),
-                        {"--path", "loops"}));
+                        {.field = "--path", .value = "loops"}));
   EXPECT_TRUE(bad_input(graspmap({"simulate", "scan", "ground", "-o", "c.db", "--texture", "mesh"}),
-                        {"--texture", "mesh"}));
+                        {.field = "--texture", .value = "mesh"}));
   std::filesystem::create_directory(scratch("empty"));
-  EXPECT_TRUE(bad_input(graspmap({"simulate", "scan", "empty", "-o", "c.db"}), {"empty"}));
+  EXPECT_TRUE(bad_input(graspmap({"simulate", "scan", "empty", "-o", "c.db"}), {.file = "empty"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("c.db")));
 }
 
 TEST(SimulateScanCommand, BadInputIsOneLineAndLeavesNothing) {
   write_site();
-  EXPECT_TRUE(bad_input(graspmap({"simulate", "scan", "none.ply", "-o", "a.db"}), {"none.ply"}));
   EXPECT_TRUE(
-      bad_input(graspmap(scan({"-o", "a.db", "--near", "3", "--far", "2"})), {"far_m", "> 3"}));
-  EXPECT_TRUE(bad_input(graspmap(scan({"-o", "a.db", "--target", "1,2"})), {"--target"}));
-  EXPECT_TRUE(bad_input(graspmap(scan({"-o", "a.db", "--camera", "none.yaml"})), {"none.yaml"}));
+      bad_input(graspmap({"simulate", "scan", "none.ply", "-o", "a.db"}), {.file = "none.ply"}));
+  EXPECT_TRUE(bad_input(graspmap(scan({"-o", "a.db", "--near", "3", "--far", "2"})),
+                        {.field = "far_m", .value = "2", .bound = "> 3"}));
+  EXPECT_TRUE(bad_input(graspmap(scan({"-o", "a.db", "--target", "1,2"})),
+                        {.field = "--target", .value = "1,2", .bound = "X,Y,Z"}));
+  EXPECT_TRUE(
+      bad_input(graspmap(scan({"-o", "a.db", "--camera", "none.yaml"})), {.file = "none.yaml"}));
   EXPECT_TRUE(bad_input(
       graspmap(scan({"-o", "a.db", "--frames", "2", "--radius", "50", "--last-radius", "50"})),
-      {"site.ply", "no frame sees"}));
-  EXPECT_TRUE(bad_input(graspmap(scan({"-o", "site.ply"})), {"is the input"}));
-  EXPECT_TRUE(bad_input(graspmap(scan({"-o", "a.bag"})),
-                        {"a.bag: a scan is written as a database (must be a name.db)"}));
+      {.file = "site.ply", .about = "no frame"}));
   EXPECT_TRUE(
-      bad_input(graspmap(scan({"-o", "a.db", "--flying-pixels", "0.9"})), {"flying_pixels"}));
+      bad_input(graspmap(scan({"-o", "site.ply"})), {.file = "site.ply", .about = "is the input"}));
+  EXPECT_TRUE(bad_input(graspmap(scan({"-o", "a.bag"})), {.file = "a.bag", .about = "a database"}));
+  EXPECT_TRUE(
+      bad_input(graspmap(scan({"-o", "a.db", "--flying-pixels", "0.9"})),
+                {.field = "flying_pixels + edge_dropouts", .value = "1.25", .bound = "<= 1"}));
   EXPECT_TRUE(wrong_usage(graspmap(scan({"-o", "a.db", "--frmaes", "2"})), {"--frames"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("a.db")));
   ASSERT_TRUE(succeeded(graspmap(scan({"-o", "a.db", "--dry-run"}))));

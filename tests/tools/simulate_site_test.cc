@@ -71,12 +71,16 @@ TEST(SimulateSite, BadInputIsOneLine) {
     all.insert(all.end(), words.begin(), words.end());
     return graspmap(all);
   };
-  EXPECT_TRUE(bad_input(site({"--site", "bad.yaml", "-o", "out"}), {"bad.yaml", "width_m"}));
-  EXPECT_TRUE(bad_input(site({"--site", "rock", "-o", "out"}), {"rocks"}));
-  EXPECT_TRUE(bad_input(site({"--site", "bare.yaml", "-o", "out"}), {"at least one rock"}));
-  EXPECT_TRUE(bad_input(site({"-o", "site.ply"}), {"folder"}));
-  EXPECT_TRUE(bad_input(site({"--edge-length", "0.0001", "-o", "out"}), {"triangles"}));
-  EXPECT_TRUE(bad_input(site({"--edge-length", "0", "-o", "out"}), {"edge"}));
+  EXPECT_TRUE(bad_input(site({"--site", "bad.yaml", "-o", "out"}),
+                        {.file = "bad.yaml", .field = "rocks[0].widht_m (line 2)"}));
+  EXPECT_TRUE(bad_input(site({"--site", "rock", "-o", "out"}), {.field = "site", .value = "rock"}));
+  EXPECT_TRUE(bad_input(site({"--site", "bare.yaml", "-o", "out"}),
+                        {.file = "bare.yaml", .field = "rocks"}));
+  EXPECT_TRUE(bad_input(site({"-o", "site.ply"}), {.file = "site.ply", .about = "folder"}));
+  EXPECT_TRUE(bad_input(site({"--edge-length", "0.0001", "-o", "out"}),
+                        {.field = "edge_length_m", .value = "1e-04"}));
+  EXPECT_TRUE(bad_input(site({"--edge-length", "0", "-o", "out"}),
+                        {.field = "--edge-length", .value = "0", .bound = "> 0"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("out")));
 }
 

@@ -46,17 +46,17 @@ TEST(SimulateTerrain, ASmallerTerrainTakesTheWholePlaceOfALargerOne) {
   EXPECT_TRUE(std::filesystem::exists(scratch("a/piece_0_0.pcd")));
   EXPECT_FALSE(std::filesystem::exists(scratch("a/piece_1_0.pcd")));
   graspmap_test::write_text(scratch("a/mine.txt"), "kept");
-  EXPECT_TRUE(bad_input(simulate("a", {"--size", "1.5"}), {"mine.txt"}));
+  EXPECT_TRUE(bad_input(simulate("a", {"--size", "1.5"}), {.file = "a", .about = ".txt"}));
   EXPECT_EQ(content("a/mine.txt"), "kept");
 }
 
 TEST(SimulateTerrain, BadOptionsAreNamed) {
-  EXPECT_TRUE(bad_input(simulate("a", {"--size", "wide"}), {"--size", "wide"}));
-  EXPECT_TRUE(bad_input(simulate("a", {"--size", "3x-1"}), {"--size", "3x-1"}));
-  EXPECT_TRUE(
-      bad_input(simulate("a", {"--size", "3", "--rocks-per-m2", "-1"}), {"--rocks-per-m2", "-1"}));
-  EXPECT_TRUE(
-      bad_input(simulate("a", {"--size", "3", "--max-rock", "0.1"}), {"max_rock_m", "0.1"}));
+  EXPECT_TRUE(bad_input(simulate("a", {"--size", "wide"}), {.field = "--size", .value = "wide"}));
+  EXPECT_TRUE(bad_input(simulate("a", {"--size", "3x-1"}), {.field = "--size", .value = "3x-1"}));
+  EXPECT_TRUE(bad_input(simulate("a", {"--size", "3", "--rocks-per-m2", "-1"}),
+                        {.field = "--rocks-per-m2", .value = "-1", .bound = ">= 0 and <= 100"}));
+  EXPECT_TRUE(bad_input(simulate("a", {"--size", "3", "--max-rock", "0.1"}),
+                        {.field = "max_rock_m", .value = "0.1"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("a")));
   ASSERT_TRUE(succeeded(simulate("dry", {"--size", "3", "--dry-run"})));
   EXPECT_FALSE(std::filesystem::exists(scratch("dry")));

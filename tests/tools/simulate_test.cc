@@ -17,12 +17,12 @@ using graspmap_test::wrong_usage;
 
 TEST(SimulateScene, OptionsOfTheOtherOutputAreRefused) {
   for (const char* name : {"--spacing", "--count", "--jitter", "--noise", "--seed"})
-    EXPECT_TRUE(
-        bad_input(graspmap({"simulate", "scene", "--mesh", name, "0.25", "-o", "s.ply"}), {name}))
+    EXPECT_TRUE(bad_input(graspmap({"simulate", "scene", "--mesh", name, "0.25", "-o", "s.ply"}),
+                          {.field = name}))
         << name;
   for (const char* name : {"--edge-length", "--chord-error"})
-    EXPECT_TRUE(
-        bad_input(graspmap({"simulate", "scene", name, "0.25", "-o", "s.ply"}), {name, "--mesh"}));
+    EXPECT_TRUE(bad_input(graspmap({"simulate", "scene", name, "0.25", "-o", "s.ply"}),
+                          {.field = name, .about = "--mesh"}));
 }
 
 TEST(SimulateScene, SamplesLieOnTheShapes) {
@@ -67,13 +67,14 @@ TEST(SimulateScene, OwnSceneAsMesh) {
 
 TEST(SimulateScene, BadInputIsOneLine) {
   graspmap_test::write_text(scratch("bad.yaml"), "shapes:\n  - {shape: spere, radius_m: 0.2}\n");
-  EXPECT_TRUE(bad_input(graspmap({"simulate", "scene", "--scene", "bad.yaml", "-o", "a.pcd"}),
-                        {"bad.yaml", "spere", "sphere"}));
+  EXPECT_TRUE(
+      bad_input(graspmap({"simulate", "scene", "--scene", "bad.yaml", "-o", "a.pcd"}),
+                {.file = "bad.yaml", .field = "shapes[0].shape (line 2)", .value = "spere"}));
   EXPECT_TRUE(
       bad_input(graspmap({"simulate", "scene", "--scene", "primitive_shape", "-o", "a.pcd"}),
-                {"primitive_shapes"}));
-  EXPECT_TRUE(
-      bad_input(graspmap({"simulate", "scene", "--spacing", "1e-6", "-o", "a.pcd"}), {"points"}));
+                {.field = "scene", .value = "primitive_shape"}));
+  EXPECT_TRUE(bad_input(graspmap({"simulate", "scene", "--spacing", "1e-6", "-o", "a.pcd"}),
+                        {.field = "spacing_m", .value = "1e-06"}));
   EXPECT_TRUE(wrong_usage(graspmap({"simulate", "scnee", "-o", "a.pcd"}), {"scnee", "scene"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("a.pcd")));
 }
@@ -99,9 +100,15 @@ TEST(Mask, AsCloudAndImage) {
 }
 
 TEST(Mask, BadInputIsOneLine) {
-  EXPECT_TRUE(bad_input(graspmap({"mask", "--gripper", "scare", "-o", "mask.txt"}), {"scar-e"}));
-  EXPECT_TRUE(bad_input(graspmap({"mask", "--voxel-size", "1", "-o", "mask.txt"}), {"voxel"}));
-  EXPECT_TRUE(bad_input(graspmap({"mask", "-o", "mask.doc"}), {"mask.doc"}));
+  EXPECT_TRUE(bad_input(graspmap({"mask", "--gripper", "scare", "-o", "mask.txt"}),
+                        {.field = "gripper", .value = "scare"}));
+  EXPECT_TRUE(bad_input(graspmap({"mask", "--voxel-size", "1", "-o", "mask.txt"}),
+                        {.field = "voxel_size_m", .value = "1"}));
+  EXPECT_TRUE(
+      bad_input(graspmap({"mask", "-o", "mask.doc"}), {.file = "mask.doc",
+                                                       .field = "extension",
+                                                       .value = ".doc",
+                                                       .bound = ".pcd, .ply, .csv or .vtp"}));
 }
 
 }  // namespace simulate_test

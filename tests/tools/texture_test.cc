@@ -24,6 +24,7 @@ namespace texture_test {
 using graspmap_test::bad_input;
 using graspmap_test::content;
 using graspmap_test::data_folder;
+using graspmap_test::ended_with;
 using graspmap_test::graspmap;
 using graspmap_test::json_of;
 using graspmap_test::names_in_scratch;
@@ -51,14 +52,6 @@ void write_site_part(const std::string& name) {
 
 Words texture_words(const std::string& output) {
   return {"texture", "site.ply", "--scan", scan_file(), "--poses", "six.tum", "-o", output};
-}
-// Exit code 3, and these parts in the last line, after a warning about nodes without poses.
-testing::AssertionResult refused(const graspmap_test::ProgramResult& result,
-                                 const std::vector<std::string>& parts) {
-  graspmap_test::ProgramResult last = result;
-  const std::size_t line = last.standard_error.rfind('\n', last.standard_error.size() - 2);
-  if (line != std::string::npos) last.standard_error.erase(0, line + 1);
-  return bad_input(last, parts);
 }
 
 Words operator+(Words words, const Words& more) {
@@ -133,7 +126,7 @@ TEST(Texture, RealScanAsObjAndGlb) {
   EXPECT_LT(different, a.pixels.size() / 100);
   EXPECT_GT(colors.size(), 1000U) << "a texture has many colors";
   EXPECT_TRUE(bad_input(graspmap({"render", "site.ply", "--color", "texture", "-o", "p.png"}),
-                        {"site.ply", "texture"}));
+                        {.file = "site.ply", .field = "color mode", .value = "texture"}));
 }
 
 TEST(Texture, SameBytesForAnyNumberOfThreads) {
@@ -159,7 +152,7 @@ TEST(Texture, SmallPagesAndOldOnes) {
       graspmap(texture_words("m.obj") +
                Words{"--texture-size", "256", "--max-pages", "2", "--image-format", "jpeg"});
   ASSERT_TRUE(succeeded(result));
-  EXPECT_NE(result.standard_error.find("times as large as requested"), std::string::npos);
+  EXPECT_NE(result.standard_error.find("times as large"), std::string::npos);
   EXPECT_EQ(libmap::read_textured_mesh(scratch("m.obj")).pages.size(), 2U);
   EXPECT_EQ(names_in_scratch(),
             (Words{"m.mtl", "m.obj", "m.obj.json", "m_0.jpg", "m_1.jpg", "site.ply", "six.tum"}));
@@ -169,8 +162,8 @@ TEST(Texture, FilesOfOthersStay) {
   GRASPMAP_REQUIRE_DATA();
   write_site_part("site.ply");
   graspmap_test::write_text(scratch("m.mtl"), "newmtl mine\n");
-  EXPECT_TRUE(
-      refused(graspmap(texture_words("m.obj") + Words{"--quiet"}), {"m.mtl", "exists", "--force"}));
+  EXPECT_TRUE(ended_with(graspmap(texture_words("m.obj") + Words{"--quiet"}),
+                         {.file = "m.mtl", .about = "--force"}));
   EXPECT_EQ(content("m.mtl"), "newmtl mine\n");
   EXPECT_EQ(names_in_scratch(), (Words{"m.mtl", "site.ply", "six.tum"}));
   ASSERT_TRUE(succeeded(graspmap(texture_words("m.obj") + Words{"--force"})));
@@ -180,22 +173,25 @@ TEST(Texture, FilesOfOthersStay) {
 TEST(Texture, BadInput) {
   GRASPMAP_REQUIRE_DATA();
   write_site_part("site.ply");
-  EXPECT_TRUE(refused(graspmap(texture_words("m.ply")), {"m.ply", ".obj or .glb"}));
+  EXPECT_TRUE(ended_with(
+      graspmap(texture_words("m.ply")),
+      {.file = "m.ply", .field = "extension", .value = ".ply", .bound = ".obj or .glb"}));
   EXPECT_TRUE(
-      refused(graspmap({"texture", "none.ply", "--scan", scan_file(), "-o", "m.obj", "--quiet"}),
-              {"none.ply"}));
-  EXPECT_TRUE(refused(graspmap(texture_words("m.obj") + Words{"--texture-size", "32"}),
-                      {"--texture-size", "32", "64"}));
-  EXPECT_TRUE(refused(graspmap(texture_words("none/m.obj")), {"none"}));
+      ended_with(graspmap({"texture", "none.ply", "--scan", scan_file(), "-o", "m.obj", "--quiet"}),
+                 {.file = "none.ply"}));
+  EXPECT_TRUE(
+      ended_with(graspmap(texture_words("m.obj") + Words{"--texture-size", "32"}),
+                 {.field = "--texture-size", .value = "32", .bound = ">= 64 and <= 16384"}));
+  EXPECT_TRUE(ended_with(graspmap(texture_words("none/m.obj")), {.file = "none/m.obj"}));
   // Poses of another frame.
   libmap::Trajectory poses =
       trajectory_of(libmap::open_scan(scan_file())->graph(), libmap::PoseSource::ground_truth);
   poses.resize(3);
   for (libmap::TrajectoryPose& pose : poses) pose.world_from_base.translation().x() += 500.0;
   libmap::write_trajectory(scratch("far.tum"), {poses, {}}, true);
-  EXPECT_TRUE(refused(graspmap({"texture", "site.ply", "--scan", scan_file(), "--poses", "far.tum",
-                                "-o", "m.obj", "--quiet"}),
-                      {"site.ply", "no triangle is visible in any of the 3 photographs"}));
+  EXPECT_TRUE(ended_with(graspmap({"texture", "site.ply", "--scan", scan_file(), "--poses",
+                                   "far.tum", "-o", "m.obj", "--quiet"}),
+                         {.file = "site.ply", .about = "3 photographs"}));
   EXPECT_EQ(names_in_scratch(), (Words{"far.tum", "site.ply", "six.tum"}));
   ASSERT_TRUE(succeeded(graspmap(texture_words("m.obj") + Words{"--dry-run"})));
   EXPECT_EQ(names_in_scratch(), (Words{"far.tum", "site.ply", "six.tum"}));
@@ -210,17 +206,18 @@ TEST(Texture, PosesThatTheScanLacksAreNamed) {
   };
   graspmap_test::execute(scan, "UPDATE Node SET ground_truth_pose = NULL WHERE id = 1");
   EXPECT_TRUE(
-      refused(texture({"--frame", "ground-truth"}),
-              {"error: scan.db: common poses is 2: the trajectories have too", "(must be >= 3)"}));
+      ended_with(texture({"--frame", "ground-truth"}),
+                 {.file = "scan.db", .field = "common poses", .value = "2", .bound = ">= 3"}));
   graspmap_test::execute(scan, "UPDATE Node SET ground_truth_pose = NULL");
-  EXPECT_TRUE(refused(texture({"--frame", "ground-truth"}),
-                      {"error: scan.db: --frame is ground-truth: the scan has no ground truth"}));
+  EXPECT_TRUE(ended_with(texture({"--frame", "ground-truth"}),
+                         {.file = "scan.db", .field = "--frame", .value = "ground-truth"}));
   graspmap_test::execute(scan, "UPDATE Node SET pose = x'01' WHERE id = 1");
   EXPECT_TRUE(
-      refused(texture({"--strict"}), {"error: scan.db: node 1: pose: '1 bytes'", "(must be 48)"}));
+      ended_with(texture({"--strict"}),
+                 {.file = "scan.db", .field = "node 1: pose", .value = "1 bytes", .bound = "48"}));
   graspmap_test::execute(scan, "UPDATE Node SET pose = NULL");
   graspmap_test::execute(scan, "UPDATE Admin SET opt_ids = NULL, opt_poses = NULL");
-  EXPECT_TRUE(refused(texture({}), {"error: scan.db: the scan has no poses", "--poses"}));
+  EXPECT_TRUE(ended_with(texture({}), {.file = "scan.db", .about = "--poses"}));
   EXPECT_EQ(names_in_scratch(), (Words{"scan.db", "site.ply"}));
 }
 
@@ -253,7 +250,7 @@ TEST(Texture, CroppedSitesCarryThePosesWithThem) {
   words[1] = "cropped.ply";
   const auto result = graspmap(words);
   ASSERT_TRUE(succeeded(result));
-  EXPECT_NE(result.standard_error.find("transformed to the site's frame"), std::string::npos);
+  EXPECT_NE(result.standard_error.find("site's frame"), std::string::npos);
   EXPECT_EQ(json_of("part.glb.json").at("frame"), "site");
   EXPECT_TRUE(json_of("part.glb.json").at("transforms").contains("site_from_map"));
   // Colors at equal positions are equal.

@@ -16,21 +16,21 @@ std::string told(const ProgramResult& result) {
          "\nstdout: " + result.standard_output;
 }
 
-testing::AssertionResult failed_with(const ProgramResult& result, int exit_code, long lines,
-                                     const std::vector<std::string>& parts) {
+// Expects the exit code and one error line; writes the error's text to `error`.
+testing::AssertionResult failed_with(const ProgramResult& result, int exit_code,
+                                     std::string& error) {
   const std::string& text = result.standard_error;
   if (result.exit_code != exit_code)
     return testing::AssertionFailure() << "not exit code " << exit_code << ": " << told(result);
-  if (std::count(text.begin(), text.end(), '\n') != lines || text.back() != '\n')
-    return testing::AssertionFailure() << "not " << lines << " line(s): " << told(result);
-  const std::string first = text.substr(0, text.find('\n'));
-  if (!first.starts_with("graspmap") || first.find(": error: ") == std::string::npos)
+  if (std::count(text.begin(), text.end(), '\n') != 1 || text.back() != '\n')
+    return testing::AssertionFailure() << "not one line: " << told(result);
+  const std::string mark = ": error: ";
+  const std::size_t at = text.find(mark);
+  if (!text.starts_with("graspmap") || at == std::string::npos)
     return testing::AssertionFailure() << "no error line: " << told(result);
-  for (const std::string& part : parts)
-    if (first.find(part) == std::string::npos)
-      return testing::AssertionFailure() << "does not say '" << part << "': " << told(result);
   if (!result.standard_output.empty())
     return testing::AssertionFailure() << "something on stdout: " << told(result);
+  error = text.substr(at + mark.size(), text.size() - 1 - at - mark.size());
   return testing::AssertionSuccess();
 }
 
@@ -49,14 +49,33 @@ testing::AssertionResult succeeded(const ProgramResult& result) {
   return testing::AssertionFailure() << told(result);
 }
 
-testing::AssertionResult bad_input(const ProgramResult& result,
-                                   const std::vector<std::string>& parts) {
-  return failed_with(result, 3, 1, parts);
+testing::AssertionResult bad_input(const ProgramResult& result, const ExpectedError& expected) {
+  std::string error;
+  const testing::AssertionResult failed = failed_with(result, 3, error);
+  return failed ? is_error_text(error, expected) : failed;
+}
+
+testing::AssertionResult ended_with(const ProgramResult& result, const ExpectedError& expected) {
+  ProgramResult last = result;
+  last.standard_output.clear();
+  std::string& text = last.standard_error;
+  const std::size_t line = text.size() < 2 ? std::string::npos : text.rfind('\n', text.size() - 2);
+  if (line != std::string::npos) text.erase(0, line + 1);
+  std::string error;
+  const testing::AssertionResult failed =
+      failed_with(last, expected.kind == libmap::ErrorKind::failed ? 1 : 3, error);
+  return failed ? is_error_text(error, expected) : failed;
 }
 
 testing::AssertionResult wrong_usage(const ProgramResult& result,
-                                     const std::vector<std::string>& parts) {
-  return failed_with(result, 2, 1, parts);
+                                     const std::vector<std::string>& names) {
+  std::string error;
+  const testing::AssertionResult failed = failed_with(result, 2, error);
+  if (!failed) return failed;
+  for (const std::string& name : names)
+    if (error.find(name) == std::string::npos)
+      return testing::AssertionFailure() << "does not name '" << name << "': " << error;
+  return testing::AssertionSuccess();
 }
 
 fs::path scratch(const std::string& name) { return scratch_folder() / name; }

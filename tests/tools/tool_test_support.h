@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "libmap/core/point_cloud.h"
+#include "tests/support/expected_error.h"
 #include "tests/support/run_program.h"
 #include "tests/support/test_support.h"
 
@@ -22,14 +23,18 @@ ProgramResult graspmap(std::vector<std::string> words,
 // Success for exit code 0; else a failure with the program's messages.
 testing::AssertionResult succeeded(const ProgramResult& result);
 
-// Success for exit code 3 and one line on stderr that begins with "graspmap COMMAND: error: " and
-// contains each of `parts`.
-testing::AssertionResult bad_input(const ProgramResult& result,
-                                   const std::vector<std::string>& parts);
+// Success for exit code 3 and one line on stderr, "graspmap COMMAND: error: ..." with the expected
+// parts of the error.
+testing::AssertionResult bad_input(const ProgramResult& result, const ExpectedError& expected);
 
-// Success for exit code 2 (wrong usage) and such a line.
+// Success for the exit code of the expected kind and such a line as the last one on stderr, which
+// warnings may precede.
+testing::AssertionResult ended_with(const ProgramResult& result, const ExpectedError& expected);
+
+// Success for exit code 2 (wrong usage) and such a line that contains these names of commands,
+// options, arguments or files.
 testing::AssertionResult wrong_usage(const ProgramResult& result,
-                                     const std::vector<std::string>& parts);
+                                     const std::vector<std::string>& names);
 
 // A file in the scratch folder.
 std::filesystem::path scratch(const std::string& name);

@@ -11,6 +11,7 @@
 namespace lookup_test {
 
 using graspmap_test::error_of;
+using graspmap_test::is_error;
 using graspmap_test::uniform;
 using libgtd::LookupAnswer;
 using libgtd::LookupMode;
@@ -144,7 +145,7 @@ TEST(Lookup, FromVeryFarTheFirstOfTheNearest) {
 
 TEST(Lookup, BadInputIsAnError) {
   PointCloud map;
-  error_of([&] { libgtd::look_up(map, {{0, 0, 0}}); });
+  EXPECT_TRUE(is_error(error_of([&] { libgtd::look_up(map, {{0, 0, 0}}); }), {.about = "map"}));
   map.positions = {{0, 0, 0}};
   LookupOptions options;
   options.max_distance_m = -1.0;

@@ -15,6 +15,7 @@ namespace region_reach_test {
 
 using graspmap_test::error_of;
 using graspmap_test::floor_voxels;
+using graspmap_test::is_error;
 using graspmap_test::level_surface;
 using graspmap_test::map_cloud;
 using graspmap_test::uniform;
@@ -270,8 +271,8 @@ TEST(RegionReach, OptionsOutOfBounds) {
       "adjacency_voxels");
   libgtd::MapSurface surface = level_surface(map);
   surface.area_m2.pop_back();
-  EXPECT_EQ(error_of([&] { libgtd::find_regions(map, surface); }).reason(),
-            "the surface does not match the map");
+  EXPECT_TRUE(
+      is_error(error_of([&] { libgtd::find_regions(map, surface); }), {.field = "area_m2"}));
 }
 
 // Squares of their distances are infinite: no reach links them.
@@ -280,7 +281,7 @@ TEST(RegionReach, TooFarApartForDistances) {
   const MapRegionResult regions = libgtd::find_regions(map, level_surface(map));
   map.lattice.voxel_size_m = 1e200;
   const libmap::Error error = error_of([&] { libgtd::find_reach(map, regions); });
-  EXPECT_EQ(error.reason(), "the regions are too far apart: their distances are not finite");
+  EXPECT_TRUE(is_error(error, {.field = "voxel_size_m", .value = "1e+200"}));
   EXPECT_EQ(error.context().field, "voxel_size_m");
   map.lattice.voxel_size_m = 0.01;
   const RegionReach reach =
@@ -297,7 +298,7 @@ TEST(RegionReach, TooManyPairsWithinAStride) {
   ASSERT_EQ(regions.regions.size(), 68U * 68U);
   const libmap::Error error =
       error_of([&] { libgtd::find_reach(map, regions, {.stride_m = 2.5}); });
-  EXPECT_EQ(error.reason(), "links more than 10 million pairs of regions");
+  EXPECT_TRUE(is_error(error, {.field = "stride_m", .value = "2.5"}));
   EXPECT_EQ(error.context().field, "stride_m");
   EXPECT_EQ(error.context().value, "2.5");
 }

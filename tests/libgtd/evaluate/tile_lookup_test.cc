@@ -15,6 +15,7 @@
 namespace tile_lookup_test {
 
 using graspmap_test::error_of;
+using graspmap_test::is_error;
 using graspmap_test::uniform;
 using libgtd::GraspabilityMap;
 using libgtd::LookupAnswer;
@@ -206,8 +207,8 @@ TEST(TileLookupErrors, MapsThatCannotBeAsked) {
   TileStoreIndex empty = map.index();
   empty.tiles.clear();
   const auto load = [&](std::size_t tile) { return map.load(tile); };
-  EXPECT_EQ(error_of([&] { libgtd::look_up_tiles(empty, load, points); }).reason(),
-            "the map has no points");
+  EXPECT_TRUE(is_error(error_of([&] { libgtd::look_up_tiles(empty, load, points); }),
+                       {.about = "no points"}));
   const auto without_columns = [&](std::size_t tile) {
     PointCloud cloud = map.load(tile);
     cloud.fields.resize(2);
@@ -223,8 +224,8 @@ TEST(TileLookupErrors, MapsThatCannotBeAsked) {
     for (std::size_t n = 0; n < order.size(); ++n) order[n] = order.size() - 1 - n;
     return libmap::select_points(cloud, order);
   };
-  EXPECT_EQ(error_of([&] { libgtd::look_up_tiles(map.index(), reversed, points); }).reason(),
-            "the points of a tile are not in order");
+  EXPECT_TRUE(is_error(error_of([&] { libgtd::look_up_tiles(map.index(), reversed, points); }),
+                       {.about = "order"}));
   const auto nowhere = [&](std::size_t tile) {
     PointCloud cloud = map.load(tile);
     for (libmap::ScalarField& field : cloud.fields)

@@ -15,6 +15,7 @@ namespace surface_error_test {
 using grasp_test::gripper;
 using grasp_test::height_mesh;
 using graspmap_test::error_of;
+using graspmap_test::is_error;
 using libgtd::Ground;
 using libgtd::GroundErrors;
 using libgtd::GroundPatch;
@@ -193,7 +194,10 @@ TEST(SurfaceError, UnsureGroundIsUnseen) {
   of_vertex[7] = -1e-9;
   EXPECT_EQ(error_of([&] { libgtd::errors_of(mesh, {}); }).context().field,
             "expected_error of vertex 8");
-  error_of([&] { Ground(mesh, {{0.1}, {}}); });
+  EXPECT_TRUE(is_error(error_of([&] {
+                         Ground(mesh, {{0.1}, {}});
+                       }),
+                       {.about = "number of errors"}));
 }
 
 }  // namespace surface_error_test

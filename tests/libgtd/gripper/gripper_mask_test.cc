@@ -60,7 +60,7 @@ TEST(GripperMask, MeasuresFarApart) {
       libgtd::make_gripper_mask(flat, {.method = method, .voxel_size_m = 0.01});
     });
     EXPECT_EQ(error.context().field, "voxel_size_m") << name;
-    EXPECT_NE(error.reason().find("e+29 voxels wide or high, more than 2^20"), std::string::npos)
+    EXPECT_TRUE(graspmap_test::is_error(error, {.field = "voxel_size_m", .value = "0.01"}))
         << error.what();
   }
   // Its voxels per millimeter are infinite in single precision.
@@ -72,7 +72,7 @@ TEST(GripperMask, MeasuresFarApart) {
   for (const Method method : {Method::thesis, Method::envelope, Method::climblab}) {
     const libmap::Error error = graspmap_test::error_of(
         [&] { libgtd::make_gripper_mask(tiny, {.method = method, .voxel_size_m = 1e-44}); });
-    EXPECT_NE(error.reason().find("more than 2^20"), std::string::npos) << error.what();
+    EXPECT_TRUE(graspmap_test::is_error(error, {.field = "voxel_size_m"})) << error.what();
   }
 }
 

@@ -15,6 +15,7 @@ namespace obstacles_test {
 
 using graspmap_test::error_of;
 using graspmap_test::gripper_named;
+using graspmap_test::is_error;
 using graspmap_test::uniform;
 using libmap::PointCloud;
 
@@ -250,8 +251,14 @@ TEST(Obstacles, AgreeWithTheDefinitionOnRandomPlaces) {
 
 TEST(Obstacles, NeedAMapInOrder) {
   EXPECT_NO_THROW(find_obstacles({}, {}, 0.01, {}));
-  error_of([] { find_obstacles({{1, 0, 0}, {0, 0, 0}}, {0.0F, 0.0F}, 0.01, {}); });
-  error_of([] { find_obstacles({{1, 0, 0}}, {}, 0.01, {}); });
+  EXPECT_TRUE(is_error(error_of([] {
+                         find_obstacles({{1, 0, 0}, {0, 0, 0}}, {0.0F, 0.0F}, 0.01, {});
+                       }),
+                       {.field = "i, j, k"}));
+  EXPECT_TRUE(is_error(error_of([] {
+                         find_obstacles({{1, 0, 0}}, {}, 0.01, {});
+                       }),
+                       {.field = "slopes_deg", .value = "0", .bound = "1"}));
 }
 
 // Parameters as in manifests of shares of a map.

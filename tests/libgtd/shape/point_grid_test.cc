@@ -1,18 +1,19 @@
 #include "libgtd/shape/point_grid.h"
-
-#include <gmock/gmock.h>
+#include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <set>
 
+#include "libmap/core/text.h"
 #include "tests/support/test_support.h"
 
 namespace point_grid_test {
 
 using Eigen::Vector3d;
 using graspmap_test::error_of;
+using graspmap_test::is_error;
 using graspmap_test::uniform;
 using libgtd::PointGrid;
 
@@ -142,9 +143,18 @@ TEST(PointGrid, ReachesOneCellBeyondThePoints) {
 TEST(PointGrid, RefusesCellsWithoutSizeOrTooMany) {
   for (const double size : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN(),
                             std::numeric_limits<double>::infinity()})
-    error_of([&] { PointGrid({{0, 0, 0}}, size); });
-  error_of([&] { PointGrid({{0, 0, 0}, {1e9, 0, 0}}, 1e-6); });
-  error_of([&] { PointGrid({{-1e308, 0, 0}, {1e308, 0, 0}}, 1); });
+    EXPECT_TRUE(is_error(error_of([&] {
+                           PointGrid({{0, 0, 0}}, size);
+                         }),
+                         {.value = libmap::to_text(size)}));
+  EXPECT_TRUE(is_error(error_of([&] {
+                         PointGrid({{0, 0, 0}, {1e9, 0, 0}}, 1e-6);
+                       }),
+                       {.value = "1e-06 m cells up to 1e+09 m from the origin"}));
+  EXPECT_TRUE(is_error(error_of([&] {
+                         PointGrid({{-1e308, 0, 0}, {1e308, 0, 0}}, 1);
+                       }),
+                       {.value = "1 m cells up to 1e+308 m from the origin"}));
 }
 
 }  // namespace point_grid_test

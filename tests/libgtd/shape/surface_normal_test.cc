@@ -14,6 +14,7 @@ namespace surface_normal_test {
 using Eigen::Vector3d;
 using Eigen::Vector3f;
 using graspmap_test::error_of;
+using graspmap_test::is_error;
 using graspmap_test::uniform;
 using libmap::PointCloud;
 
@@ -101,9 +102,15 @@ TEST(SurfaceNormal, DependsOnNothingFartherOff) {
 
 TEST(SurfaceNormal, RefusesWhatItCannotUse) {
   const PointCloud cloud = plane_through_origin(Vector3d::UnitZ());
-  error_of([&] { fit_surface_normals(cloud, {}, {}, {.radius_m = 0.0}); });
-  error_of([&] { fit_surface_normals(cloud, {}, {}, {.up = Vector3d::Zero()}); });
-  error_of([&] { fit_surface_normals(cloud, {Vector3d::Zero()}, {{}, {}}, {}); });
+  EXPECT_TRUE(is_error(error_of([&] { fit_surface_normals(cloud, {}, {}, {.radius_m = 0.0}); }),
+                       {.field = "radius_m", .value = "0"}));
+  EXPECT_TRUE(
+      is_error(error_of([&] { fit_surface_normals(cloud, {}, {}, {.up = Vector3d::Zero()}); }),
+               {.field = "up"}));
+  EXPECT_TRUE(is_error(error_of([&] {
+                         fit_surface_normals(cloud, {Vector3d::Zero()}, {{}, {}}, {});
+                       }),
+                       {.field = "outsides", .value = "2", .bound = "1"}));
 }
 
 }  // namespace surface_normal_test

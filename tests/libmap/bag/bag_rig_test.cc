@@ -14,6 +14,7 @@ namespace fs = std::filesystem;
 namespace rm = graspmap_test::rm;
 using graspmap_test::bytes_of;
 using graspmap_test::error_of;
+using graspmap_test::is_error;
 using graspmap_test::sample_depth;
 using graspmap_test::sample_header;
 using graspmap_test::sample_image;
@@ -37,8 +38,8 @@ BagRigPlan plan(const BagRigOptions& options = {},
   return libmap::plan_bag_rig(bag_path(), options, stamp_s);
 }
 
-std::string refusal(const BagRigOptions& options = {}) {
-  return error_of([&] { plan(options); }).what();
+libmap::Error refusal(const BagRigOptions& options = {}) {
+  return error_of([&] { plan(options); });
 }
 
 // Written images of one camera in the order of their stamps.
@@ -175,7 +176,8 @@ TEST(BagRig, CalibrationsOfAllKinds) {
   EXPECT_EQ(camera_of(info, true).fx, 7);
   EXPECT_EQ(camera_of(info, true).cx, 1.75);
   info.distortion_model = rm::to_ros("magic");
-  EXPECT_THAT(error_of([&] { camera_of(info, false); }).what(), HasSubstr("magic"));
+  EXPECT_TRUE(is_error(error_of([&] { camera_of(info, false); }),
+                       {.field = "distortion_model", .value = "magic"}));
   info.D = {0.1, 0.02, 0.001, 0.002};
   info.distortion_model = rm::to_ros("equidistant");
   EXPECT_EQ(camera_of(info, false).distortion_model, libmap::DistortionModel::equidistant);
@@ -197,7 +199,8 @@ TEST(BagRig, CalibrationsOfAllKinds) {
   EXPECT_EQ(part.cx, 100);
   EXPECT_EQ(part.cy, 50);
   info.K = {};
-  EXPECT_THAT(error_of([&] { camera_of(info, false); }).what(), HasSubstr("fx"));
+  EXPECT_TRUE(is_error(error_of([&] { camera_of(info, false); }),
+                       {.field = "fx", .value = "0", .bound = "1e-06 to 1e+09"}));
 }
 
 // The name of a topic decides if its images are rectified: "direct" does not count.
@@ -299,12 +302,13 @@ TEST(BagRig, ABagWithoutAnImageThatCanBeUsedIsAnError) {
   write([](rm::Image& image) { image.data.resize(23); });
   const BagRigPlan broken = plan();
   const auto said = [&] {
-    return std::string(error_of([&] { libmap::export_bag_rig(bag_path(), broken, {}); }).what());
+    return error_of([&] { libmap::export_bag_rig(bag_path(), broken, {}); });
   };
-  EXPECT_THAT(said(), HasSubstr("a.bag: /a/image_raw: 1 images cannot be used: data is 23 bytes"));
+  EXPECT_TRUE(
+      is_error(said(), {.file = bag_path(), .field = "/a/image_raw", .about = "data is 23 bytes"}));
   // The bag has changed.
   write([](rm::Image& image) { image.header.stamp = ros::Time(7.0); });
-  EXPECT_EQ(said(), bag_path().string() + ": no image can be used");
+  EXPECT_TRUE(is_error(said(), {.file = bag_path(), .about = "no image"}));
   // A compressed image with fewer bytes than the header before the PNG.
   rm::CompressedImage image;
   image.header = sample_header("a_optical", 5.0);
@@ -313,8 +317,8 @@ TEST(BagRig, ABagWithoutAnImageThatCanBeUsedIsAnError) {
   SampleBag bag(bag_path());
   add_surroundings(bag, "a");
   bag.write("/a/image_raw/compressedDepth", 5.0, image).close();
-  EXPECT_THAT(error_of([&] { libmap::export_bag_rig(bag_path(), plan(), {}); }).what(),
-              HasSubstr("data is 11 bytes: truncated (must be >= 12 bytes)"));
+  EXPECT_TRUE(is_error(error_of([&] { libmap::export_bag_rig(bag_path(), plan(), {}); }),
+                       {.field = "/a/image_raw/compressedDepth", .about = "data is 11 bytes"}));
 }
 
 TEST(BagRig, RigOfOnesOwn) {
@@ -334,19 +338,20 @@ TEST(BagRig, RigOfOnesOwn) {
     rig.cameras.push_back(camera);
   }
   BagRigOptions options{.rig = rig};
-  EXPECT_THAT(refusal(options), HasSubstr("/robot/left_cam/depth"));
-  EXPECT_THAT(refusal(options), HasSubstr("CAMERA=TOPIC"));
+  EXPECT_TRUE(is_error(refusal(options), {.field = "topic", .value = "/robot/left_cam/depth"}));
+  EXPECT_TRUE(is_error(refusal(options), {.field = "topic", .value = "/robot/left_cam/depth"}));
   options.topics = {"left=/robot/left_cam/depth", "/robot/other/depth"};
   const BagRigPlan result = plan(options);
   EXPECT_THAT(result.topics, ElementsAre("/robot/other/depth", "/robot/left_cam/depth", ""));
   EXPECT_EQ(result.rig.cameras[1].near_m, 0.28);
   EXPECT_EQ(images_of(result, "left")[0][0], 2000);
   options.topics = {"left=/robot/left_cam/depth", "left=/robot/other/depth"};
-  EXPECT_THAT(refusal(options), HasSubstr("same camera"));
+  EXPECT_TRUE(is_error(refusal(options), {.field = "topic", .value = "/robot/other/depth"}));
   options.topics = {"left=/robot/left_cam/depth", "other=/robot/left_cam/depth"};
-  EXPECT_THAT(refusal(options), HasSubstr("is named twice"));
+  EXPECT_TRUE(is_error(refusal(options), {.field = "topic", .value = "/robot/left_cam/depth"}));
   options.topics = {"lfet=/robot/left_cam/depth"};
-  EXPECT_THAT(refusal(options), HasSubstr("did you mean 'left'"));
+  EXPECT_TRUE(is_error(refusal(options),
+                       {.field = "topic", .value = "/robot/left_cam/depth", .about = "'left'"}));
 }
 
 TEST(BagRig, WhatIsMissingIsNamed) {
@@ -356,44 +361,51 @@ TEST(BagRig, WhatIsMissingIsNamed) {
     made.close();
   };
   bag([](SampleBag& made) { made.transform("a", "b", Pose::Identity()); });
-  EXPECT_THAT(refusal(), HasSubstr("a.bag: topics of images is none"));
+  EXPECT_TRUE(is_error(refusal(), {.file = graspmap_test::scratch_folder() / "a.bag",
+                                   .field = "topics of images",
+                                   .value = "none"}));
   bag([](SampleBag& made) {
     made.write("/a/color", 1.0, sample_image("a", 1.0, "rgb8", 1, 1, "abc"));
   });
-  EXPECT_THAT(refusal(), HasSubstr("/a/color rgb8"));
-  EXPECT_THAT(refusal({.topics = {"/a/color"}}), HasSubstr("encoding of /a/color is rgb8"));
-  EXPECT_THAT(refusal({.topics = {"/a/colr"}}), HasSubstr("did you mean '/a/color'"));
+  EXPECT_TRUE(is_error(refusal(), {.field = "topics of images", .value = "/a/color rgb8"}));
+  EXPECT_TRUE(is_error(refusal({.topics = {"/a/color"}}),
+                       {.field = "encoding of /a/color", .value = "rgb8"}));
+  EXPECT_TRUE(is_error(
+      refusal({.topics = {"/a/colr"}}),
+      {.field = "topic", .value = "/a/colr", .bound = "one of /a/color", .about = "'/a/color'"}));
   bag([](SampleBag& made) { made.write("/a/image_raw", 1.0, sample_depth("a", 1.0)); });
-  EXPECT_THAT(refusal(), HasSubstr("topic is /tf_static"));
+  EXPECT_TRUE(is_error(refusal(), {.field = "topic", .value = "/tf_static"}));
   bag([](SampleBag& made) {
     made.write("/a/image_raw", 1.0, sample_depth("a", 1.0));
     made.transform("base_link", "a", Pose::Identity());
   });
-  EXPECT_THAT(refusal(), HasSubstr("topic is /a/camera_info"));
+  EXPECT_TRUE(is_error(refusal(), {.field = "/a/image_raw: topic", .value = "/a/camera_info"}));
   bag([](SampleBag& made) {
     rm::Image image = sample_depth("a_optical", 1.0);
     image.header.seq = 7;  // read as a number of transforms, it would be too large
     made.write("/a/image_raw", 1.0, image);
   });
-  EXPECT_THAT(refusal({.transform_topic = "/a/image_raw"}),
-              HasSubstr("type of /a/image_raw is sensor_msgs/Image: wrong type (must be "
-                        "tf2_msgs/TFMessage)"));
+  EXPECT_TRUE(
+      is_error(refusal({.transform_topic = "/a/image_raw"}), {.field = "type of /a/image_raw",
+                                                              .value = "sensor_msgs/Image",
+                                                              .bound = "tf2_msgs/TFMessage"}));
   bag([](SampleBag& made) {
     made.camera("/a", {1.0}).transform("base_link", "a_optcal", Pose::Identity());
   });
-  EXPECT_THAT(refusal(), HasSubstr("did you mean 'a_optcal'"));
+  EXPECT_TRUE(is_error(
+      refusal(), {.field = "/a/image_raw: frame", .value = "a_optical", .about = "'a_optcal'"}));
   bag([](SampleBag& made) {
     made.camera("/a", {1.0}).transform("a_optical", "b", Pose::Identity());
     made.transform("b", "a_optical", Pose::Identity());
   });
-  EXPECT_THAT(refusal(), HasSubstr("form a cycle"));
+  EXPECT_TRUE(is_error(refusal(), {.field = "frame", .value = "a_optical", .about = "cycle"}));
   bag([](SampleBag& made) {
     rm::CameraInfo info = sample_info("a_optical", 1.0);
     info.K = {};
     made.write("/a/image_raw", 1.0, sample_depth("a_optical", 1.0));
     made.write("/a/camera_info", 1.0, info).transform("x", "a_optical", Pose::Identity());
   });
-  EXPECT_THAT(refusal(), HasSubstr("no camera info can be used"));
+  EXPECT_TRUE(is_error(refusal(), {.field = "/a/image_raw: /a/camera_info"}));
   bag([](SampleBag& made) {
     rm::TFMessage message;
     message.transforms.resize(1);
@@ -401,7 +413,7 @@ TEST(BagRig, WhatIsMissingIsNamed) {
     message.transforms[0].child_frame_id = rm::to_ros("a_optical");
     made.camera("/a", {1.0}).write("/tf_static", 1.0, message);
   });
-  EXPECT_THAT(refusal(), HasSubstr("/tf_static: quaternion of frame a_optical: not a rotation"));
+  EXPECT_TRUE(is_error(refusal(), {.field = "/tf_static: quaternion of frame a_optical"}));
 }
 
 }  // namespace bag_rig_test

@@ -22,6 +22,7 @@ namespace ros2_bag_test {
 namespace fs = std::filesystem;
 namespace rm = libmap::ros_message;
 using graspmap_test::error_of;
+using graspmap_test::is_error;
 using graspmap_test::read_text;
 using graspmap_test::scratch_folder;
 using graspmap_test::write_text;
@@ -267,7 +268,7 @@ TEST_P(Ros2Formats, DamagedFiles) {
       EXPECT_FALSE(is_cut) << bytes.size();
     } catch (const libmap::Error& error) {
       EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos);
-      EXPECT_THAT(error.what(), HasSubstr(bag.string()));
+      EXPECT_TRUE(error.context().file.starts_with(bag.string())) << error.what();
     }
   }
 }
@@ -334,8 +335,8 @@ TEST(Ros2Bag, MetadataOfAllVersions) {
   EXPECT_THAT(said(metadata("5", "..", "\"\"")).context().field, HasSubstr("relative_file_paths"));
   EXPECT_THAT(said(metadata("5", "[a]", "\"\"")).context().field, HasSubstr("relative_file_paths"));
   fs::remove(file);
-  EXPECT_THAT(error_of([&] { libmap::list_bag(scratch_folder()); }).what(),
-              HasSubstr("ros2 bag reindex"));
+  EXPECT_TRUE(
+      is_error(error_of([&] { libmap::list_bag(scratch_folder()); }), {.about = "reindex"}));
 }
 
 TEST(Ros2Bag, SplitRecordingsAreOneBag) {

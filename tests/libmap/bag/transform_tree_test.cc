@@ -1,6 +1,5 @@
 #include "libmap/bag/transform_tree.h"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "tests/support/test_support.h"
@@ -8,10 +7,10 @@
 namespace transform_tree_test {
 
 using graspmap_test::error_of;
+using graspmap_test::is_error;
 using libmap::make_pose_from_rpy;
 using libmap::Pose;
 using libmap::TransformTree;
-using testing::HasSubstr;
 
 Pose random_pose() {
   using graspmap_test::uniform;
@@ -43,10 +42,10 @@ TEST(TransformTree, WhatLeadsNowhereIsSaid) {
   TransformTree tree;
   tree.add("base_link", "camera", Pose::Identity());
   tree.add("map", "odom", Pose::Identity());
-  EXPECT_THAT(error_of([&] { tree.target_from_source("base_lnk", "camera"); }).what(),
-              HasSubstr("did you mean 'base_link'"));
-  EXPECT_THAT(error_of([&] { tree.target_from_source("odom", "camera"); }).what(),
-              HasSubstr("no transforms connect it to odom"));
+  EXPECT_TRUE(is_error(error_of([&] { tree.target_from_source("base_lnk", "camera"); }),
+                       {.field = "frame", .value = "base_lnk", .about = "'base_link'"}));
+  EXPECT_TRUE(is_error(error_of([&] { tree.target_from_source("odom", "camera"); }),
+                       {.field = "frame", .value = "camera", .about = "odom"}));
 }
 
 TEST(TransformTree, CirclesEnd) {
@@ -55,9 +54,10 @@ TEST(TransformTree, CirclesEnd) {
   tree.add("b", "c", Pose::Identity());
   tree.add("c", "a", Pose::Identity());
   tree.add("c", "d", Pose::Identity());
-  EXPECT_THAT(error_of([&] { tree.target_from_source("a", "d"); }).what(),
-              HasSubstr("form a cycle"));
-  EXPECT_THAT(error_of([&] { tree.root_of("b"); }).what(), HasSubstr("form a cycle"));
+  EXPECT_TRUE(is_error(error_of([&] { tree.target_from_source("a", "d"); }),
+                       {.field = "frame", .value = "a", .about = "cycle"}));
+  EXPECT_TRUE(is_error(error_of([&] { tree.root_of("b"); }),
+                       {.field = "frame", .value = "b", .about = "cycle"}));
   EXPECT_THROW(tree.add("e", "e", Pose::Identity()), libmap::Error);
 }
 
@@ -67,7 +67,8 @@ TEST(TransformTree, FramesStandStill) {
   tree.add("a", "b", pose);
   tree.add("a", "b", pose);  // added twice
   pose.translation().x() = 0.001;
-  EXPECT_THAT(error_of([&] { tree.add("a", "b", pose); }).what(), HasSubstr("is not static"));
+  EXPECT_TRUE(
+      is_error(error_of([&] { tree.add("a", "b", pose); }), {.field = "frame", .value = "b"}));
   EXPECT_THROW(tree.add("c", "b", Pose::Identity()), libmap::Error);
   pose.translation().x() = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THROW(tree.add("a", "d", pose), libmap::Error);

@@ -1,6 +1,5 @@
 #include "libmap/camera/camera_io.h"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <opencv2/core.hpp>
@@ -10,6 +9,7 @@
 namespace camera_io_test {
 
 using graspmap_test::error_of;
+using graspmap_test::is_error;
 using graspmap_test::scratch_folder;
 using graspmap_test::uniform;
 using libmap::Camera;
@@ -17,7 +17,6 @@ using libmap::CameraFile;
 using libmap::DistortionModel;
 using libmap::parse_camera;
 using libmap::to_yaml;
-using testing::HasSubstr;
 
 Camera random_camera(DistortionModel model, std::size_t terms) {
   Camera camera;
@@ -66,15 +65,17 @@ TEST(CameraIo, DepthCorrectionsComeBackBitForBit) {
   expect_equal(read.camera, file.camera);
   EXPECT_TRUE(parse_camera(to_yaml({.camera = file.camera}), "a.yaml").depth.empty());
   file.depth.spline_m.resize(3);
-  EXPECT_THAT(error_of([&] { parse_camera(to_yaml(file), "a.yaml"); }).what(),
-              HasSubstr("depth_correction is 3: wrong number of coefficients"));
+  EXPECT_TRUE(is_error(
+      error_of([&] { parse_camera(to_yaml(file), "a.yaml"); }),
+      {.file = "a.yaml", .field = "depth_correction", .value = "3", .bound = "4 to 1000"}));
   file.depth.spline_m = {0, 0, 0, 2};
-  EXPECT_THAT(error_of([&] { parse_camera(to_yaml(file), "a.yaml"); }).what(),
-              HasSubstr("-1 to 1 m"));
+  EXPECT_TRUE(is_error(
+      error_of([&] { parse_camera(to_yaml(file), "a.yaml"); }),
+      {.file = "a.yaml", .field = "depth_correction", .value = "2", .bound = "-1 to 1 m"}));
   file.depth.spline_m = {0, 0, 0, 0};
   file.depth.step_m = 0.0;
-  EXPECT_THAT(error_of([&] { parse_camera(to_yaml(file), "a.yaml"); }).what(),
-              HasSubstr("depth_correction_range"));
+  EXPECT_TRUE(is_error(error_of([&] { parse_camera(to_yaml(file), "a.yaml"); }),
+                       {.file = "a.yaml", .field = "depth_correction_range", .value = "0.61, 0"}));
 }
 
 // A spline of equal coefficients is a constant; of coefficients on a line that line; depths beyond
@@ -208,43 +209,63 @@ TEST(CameraIo, RotationsNearlySoAreMadeExact) {
 
 struct Broken {
   std::string text;
-  std::vector<std::string> said;
+  graspmap_test::ExpectedError expected;
 };
 
 TEST(CameraIo, BadFilesAreNamed) {
   const std::vector<Broken> files = {
-      {"", {"bad.yaml"}},
-      {"[1, 2]", {"map"}},
-      {"a: [1", {"not valid YAML"}},
-      {"image_width: 640\n", {"image_height", "missing"}},
-      {"image_width: 640\nimage_height: 480\n", {"camera_matrix", "missing"}},
-      {"image_width: 6.5\nimage_height: 480\n", {"image_width", "6.5"}},
-      {"image_width: 1e9\nimage_height: 480\n", {"image_width", "65536"}},
-      {"image_width: -3\nimage_height: 480\n", {"image_width", "-3"}},
-      {"image_width: [3]\nimage_height: 480\n", {"image_width"}},
-      {"image_width: 3\nimage_height: 480\ncamera_matrix: [1, 2]", {"camera_matrix", "3 x 3"}},
-      {"image_width: 3\nimage_height: 480\ncamera_matrix: [1, 1, 2, 0, 1, 2, 0, 0, 1]", {"skew"}},
-      {"image_width: 3\nimage_height: 480\ncamera_matrix: [0, 0, 2, 0, 1, 2, 0, 0, 1]", {"fx"}},
+      {"", {.file = "bad.yaml", .about = "camera"}},
+      {"[1, 2]", {.file = "bad.yaml", .about = "camera"}},
+      {"a: [1", {.file = "bad.yaml", .field = "line 1"}},
+      {"image_width: 640\n", {.file = "bad.yaml", .field = "image_height"}},
+      {"image_width: 640\nimage_height: 480\n", {.file = "bad.yaml", .field = "camera_matrix"}},
+      {"image_width: 6.5\nimage_height: 480\n",
+       {.file = "bad.yaml", .field = "image_width", .value = "6.5", .bound = ">= 1 and <= 65536"}},
+      {"image_width: 1e9\nimage_height: 480\n",
+       {.file = "bad.yaml", .field = "image_width", .value = "1e9", .bound = ">= 1 and <= 65536"}},
+      {"image_width: -3\nimage_height: 480\n",
+       {.file = "bad.yaml", .field = "image_width", .value = "-3", .bound = ">= 1 and <= 65536"}},
+      {"image_width: [3]\nimage_height: 480\n", {.file = "bad.yaml", .field = "image_width"}},
+      {"image_width: 3\nimage_height: 480\ncamera_matrix: [1, 2]",
+       {.file = "bad.yaml", .field = "camera_matrix", .value = "2 numbers", .bound = "3 x 3"}},
+      {"image_width: 3\nimage_height: 480\ncamera_matrix: [1, 1, 2, 0, 1, 2, 0, 0, 1]",
+       {.file = "bad.yaml", .field = "camera_matrix", .value = "1"}},
+      {"image_width: 3\nimage_height: 480\ncamera_matrix: [0, 0, 2, 0, 1, 2, 0, 0, 1]",
+       {.file = "bad.yaml", .field = "fx", .value = "0", .bound = "1e-06 to 1e+09"}},
       {"image_width: 3\nimage_height: 480\ncamera_matrix: [1, 0, 2, 0, 1, 2, 0, 0, 2]",
-       {"camera_matrix: not a camera matrix"}},
-      {"image_width: 3\nimage_height: 4\ncamera_matrix: [1, 0, .nan, 0, 1, 2, 0, 0, 1]", {".nan"}},
-      {"image_width: 3\nimage_height: 4\ncamera_matrix: [1, 0, x, 0, 1, 2, 0, 0, 1]", {"is x"}},
+       {.file = "bad.yaml", .field = "camera_matrix"}},
+      {"image_width: 3\nimage_height: 4\ncamera_matrix: [1, 0, .nan, 0, 1, 2, 0, 0, 1]",
+       {.file = "bad.yaml", .field = "camera_matrix", .value = ".nan"}},
+      {"image_width: 3\nimage_height: 4\ncamera_matrix: [1, 0, x, 0, 1, 2, 0, 0, 1]",
+       {.file = "bad.yaml", .field = "camera_matrix", .value = "x"}},
       {"image_width: 3\nimage_height: 4\ncamera_matrix: {rows: 3, cols: 3}",
-       {"camera_matrix.data"}},
+       {.file = "bad.yaml", .field = "camera_matrix.data"}},
       {"image_width: 3\nimage_height: 4\ncamera_matrix: {rows: 3, cols: 3, data: [1]}",
-       {"9 numbers"}},
-      {plain + "distortion_model: plum_bob\n", {"plum_bob", "did you mean 'plumb_bob'"}},
-      {plain + "distortion_coefficients: [1, 2, 3]\n", {"4, 5, 8 or 12"}},
-      {plain + "distortion_model: equidistant\ndistortion_coefficients: [1, 2, 3, 4, 5]\n", {"4"}},
-      {plain + "distortion_model: none\ndistortion_coefficients: [1, 2, 3, 4, 5]\n", {"none"}},
-      {plain + "local_transform: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1, 0]\n", {"not a rotation"}},
-      {plain + "local_transform: [1, 0, 0]\n", {"3 x 4"}}};
+       {.file = "bad.yaml", .field = "camera_matrix.data", .value = "1 numbers"}},
+      {plain + "distortion_model: plum_bob\n",
+       {.file = "bad.yaml",
+        .field = "distortion_model",
+        .value = "plum_bob",
+        .about = "'plumb_bob'"}},
+      {plain + "distortion_coefficients: [1, 2, 3]\n",
+       {.file = "bad.yaml",
+        .field = "number of distortion terms",
+        .value = "3",
+        .bound = "4, 5, 8 or 12"}},
+      {plain + "distortion_model: equidistant\ndistortion_coefficients: [1, 2, 3, 4, 5]\n",
+       {.file = "bad.yaml", .field = "number of distortion terms", .value = "5", .bound = "4"}},
+      {plain + "distortion_model: none\ndistortion_coefficients: [1, 2, 3, 4, 5]\n",
+       {.file = "bad.yaml", .field = "distortion_coefficients"}},
+      {plain + "local_transform: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1, 0]\n",
+       {.file = "bad.yaml", .field = "local_transform", .value = "off by 2", .bound = "<= 0.001"}},
+      {plain + "local_transform: [1, 0, 0]\n",
+       {.file = "bad.yaml",
+        .field = "local_transform",
+        .value = "3 numbers",
+        .bound = "3 x 4 or 4 x 4"}}};
   for (const Broken& broken : files) {
     const libmap::Error error = error_of([&] { parse_camera(broken.text, "bad.yaml"); });
-    EXPECT_EQ(error.kind(), libmap::ErrorKind::bad_input);
-    EXPECT_THAT(error.what(), HasSubstr("bad.yaml")) << broken.text;
-    for (const std::string& part : broken.said)
-      EXPECT_THAT(error.what(), HasSubstr(part)) << broken.text;
+    EXPECT_TRUE(is_error(error, broken.expected)) << broken.text;
   }
 }
 
@@ -286,8 +307,8 @@ TEST(CameraIo, TimingMotionsAndScaleAreReadBackAsWritten) {
 TEST(CameraIo, HugeListsEndEarly) {
   std::string text = "image_width: 3\nimage_height: 4\ncamera_matrix: [1";
   for (int n = 0; n < 10000; ++n) text += ", 1";
-  EXPECT_THAT(error_of([&] { parse_camera(text + "]", "a"); }).what(),
-              HasSubstr("too many numbers"));
+  EXPECT_TRUE(is_error(error_of([&] { parse_camera(text + "]", "a"); }),
+                       {.file = "a", .field = "camera_matrix"}));
 }
 
 }  // namespace camera_io_test

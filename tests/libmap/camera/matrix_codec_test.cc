@@ -11,6 +11,7 @@ namespace matrix_codec_test {
 
 using graspmap_test::bytes_of;
 using graspmap_test::error_of;
+using graspmap_test::is_error;
 using libmap::MatrixElement;
 using libmap::StoredMatrix;
 
@@ -56,33 +57,43 @@ TEST(MatrixCodec, Texts) {
                               text + '\0'};
     EXPECT_EQ(libmap::decode_compressed_text(encode_matrix(matrix)), text);
   }
-  error_of([] {
-    libmap::decode_compressed_text(encode_matrix(example(MatrixElement::float32, 1, 3, 1)));
-  });
+  EXPECT_TRUE(is_error(error_of([] {
+                         libmap::decode_compressed_text(
+                             encode_matrix(example(MatrixElement::float32, 1, 3, 1)));
+                       }),
+                       {.about = "not a text"}));
 }
 
 TEST(MatrixCodec, SizesThatDoNotFit) {
   const StoredMatrix matrix = example(MatrixElement::uint8, 10, 10, 1);
-  error_of([&] { libmap::decode_matrix(with_trailer(matrix, 10, 9, 0)); });
-  error_of([&] { libmap::decode_matrix(with_trailer(matrix, 10, 11, 0)); });
-  error_of([&] { libmap::decode_matrix(with_trailer(matrix, -10, 10, 0)); });
-  error_of([&] { libmap::decode_matrix(with_trailer(matrix, 10, 10, 7)); });
-  error_of([&] { libmap::decode_matrix(with_trailer(matrix, 10, 10, -1)); });
-  error_of([&] { libmap::decode_matrix(with_trailer(matrix, 10, 10, 1 << 30)); });
+  EXPECT_TRUE(is_error(error_of([&] { libmap::decode_matrix(with_trailer(matrix, 10, 9, 0)); }),
+                       {.value = "10 x 9 x 1 bytes"}));
+  EXPECT_TRUE(is_error(error_of([&] { libmap::decode_matrix(with_trailer(matrix, 10, 11, 0)); }),
+                       {.about = "100 of 110 bytes"}));
+  EXPECT_TRUE(is_error(error_of([&] { libmap::decode_matrix(with_trailer(matrix, -10, 10, 0)); }),
+                       {.value = "-10 x 10"}));
+  EXPECT_TRUE(is_error(error_of([&] { libmap::decode_matrix(with_trailer(matrix, 10, 10, 7)); }),
+                       {.value = "7"}));
+  EXPECT_TRUE(is_error(error_of([&] { libmap::decode_matrix(with_trailer(matrix, 10, 10, -1)); }),
+                       {.value = "-1"}));
+  EXPECT_TRUE(
+      is_error(error_of([&] { libmap::decode_matrix(with_trailer(matrix, 10, 10, 1 << 30)); }),
+               {.value = "1073741824"}));
   // 100 MB out of 111 bytes: more than deflate can.
   for (const auto& [rows, columns, type] :
        {std::tuple{0x7fffffff, 1, 6}, {10000, 10000, 0}, {0x7fffffff, 0x7fffffff, 8 * 511 + 6}})
-    EXPECT_EQ(error_of([&, rows = rows, columns = columns, type = type] {
-                libmap::decode_matrix(with_trailer(matrix, rows, columns, type));
-              }).reason(),
-              "compressed matrix: size exceeds what 111 bytes can contain");
+    EXPECT_TRUE(is_error(error_of([&, rows = rows, columns = columns, type = type] {
+                           libmap::decode_matrix(with_trailer(matrix, rows, columns, type));
+                         }),
+                         {.about = "111 bytes"}));
 }
 
 TEST(MatrixCodec, WhatIsTooLargeToBeHeldCanBeGoneThrough) {
   StoredMatrix matrix{.rows = 1, .columns = (1 << 26) + 1, .channels = 1, .bytes = {}};
   matrix.bytes.assign(static_cast<std::size_t>(matrix.columns), '\3');
   const std::string blob = encode_matrix(matrix);
-  EXPECT_EQ(error_of([&] { libmap::decode_matrix(blob); }).reason(), "compressed matrix too large");
+  EXPECT_TRUE(is_error(error_of([&] { libmap::decode_matrix(blob); }),
+                       {.value = "1 x 67108865 x 1 bytes"}));
   std::size_t bytes = 0;
   std::size_t others = 0;
   libmap::for_each_matrix_chunk(blob, [&](std::string_view piece) {
@@ -97,12 +108,12 @@ TEST(MatrixCodec, WhatIsTooLargeToBeHeldCanBeGoneThrough) {
 TEST(MatrixCodec, StreamsOfAnotherLengthThanTheirSize) {
   StoredMatrix matrix = example(MatrixElement::uint8, 300, 300, 1);
   for (const int rows : {0, 1, 299}) {
-    EXPECT_EQ(
-        error_of([&, rows] { libmap::decode_matrix(with_trailer(matrix, rows, 300, 0)); }).reason(),
-        "compressed matrix is longer than its size");
+    EXPECT_TRUE(
+        is_error(error_of([&, rows] { libmap::decode_matrix(with_trailer(matrix, rows, 300, 0)); }),
+                 {.about = "longer"}));
   }
-  EXPECT_EQ(error_of([&] { libmap::decode_matrix(with_trailer(matrix, 301, 300, 0)); }).reason(),
-            "compressed matrix is broken: ends after 90000 of 90300 bytes");
+  EXPECT_TRUE(is_error(error_of([&] { libmap::decode_matrix(with_trailer(matrix, 301, 300, 0)); }),
+                       {.about = "90000"}));
 }
 
 TEST(MatrixCodec, TruncationsAndFlips) {

@@ -4,6 +4,8 @@
 
 #include <type_traits>
 
+#include "tests/support/expected_error.h"
+
 namespace error_test {
 
 using libmap::Error;
@@ -53,6 +55,31 @@ TEST(ErrorTest, InFieldNamesThePlaceAroundAField) {
   EXPECT_STREQ(error.in_field("points[3]", ".").what(), "points[3].x: missing");
   EXPECT_STREQ(Error("missing").in_field("point 3").what(), "point 3: missing");
   EXPECT_EQ(error.in_field("point 3").kind(), ErrorKind::failed);
+}
+
+using graspmap_test::is_error;
+using graspmap_test::is_error_text;
+
+// The comparisons of the tests themselves: each other part is another error.
+TEST(ExpectedError, EachPartIsCompared) {
+  const Error error("out of range", {"a.yaml", "size_m", "0", "> 0"});
+  EXPECT_TRUE(is_error(error, {"a.yaml", "size_m", "0", "> 0", "range"}));
+  EXPECT_TRUE(is_error_text(error.what(), {"a.yaml", "size_m", "0", "> 0", "range"}));
+  EXPECT_TRUE(is_error_text(error.what(), {.field = "size_m"}));
+  for (const graspmap_test::ExpectedError& other : {graspmap_test::ExpectedError{.file = "b.yaml"},
+                                                    {.field = "size"},
+                                                    {.field = "m"},
+                                                    {.value = "0."},
+                                                    {.bound = ">= 0"},
+                                                    {.about = "missing"},
+                                                    {.file = "yaml"}}) {
+    EXPECT_FALSE(is_error(error, other));
+    EXPECT_FALSE(is_error_text(error.what(), other));
+  }
+  EXPECT_FALSE(is_error(error, {.kind = ErrorKind::failed}));
+  EXPECT_TRUE(is_error_text("'x': unknown", {.value = "x"}));
+  EXPECT_TRUE(is_error_text("a.csv: row 1: missing", {.field = "row 1"}));
+  EXPECT_FALSE(is_error_text("a.csv: row 12: missing", {.field = "row 1"}));
 }
 
 }  // namespace error_test

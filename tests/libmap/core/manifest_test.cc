@@ -12,6 +12,7 @@ namespace manifest_test {
 
 namespace fs = std::filesystem;
 using graspmap_test::error_of;
+using graspmap_test::is_error;
 using graspmap_test::scratch_folder;
 using libmap::Manifest;
 using libmap::ManifestValue;
@@ -137,7 +138,8 @@ TEST(ManifestTest, InputIsHashed) {
   EXPECT_EQ(manifest.inputs.at(0).path, path.string());
   EXPECT_EQ(manifest.inputs.at(0).bytes, 3U);
   EXPECT_EQ(manifest.inputs.at(0).sha256, libmap::sha256_of("abc"));
-  error_of([&] { manifest.add_input(scratch_folder() / "none"); });
+  EXPECT_TRUE(is_error(error_of([&] { manifest.add_input(scratch_folder() / "none"); }),
+                       {.file = scratch_folder() / "none", .about = "no such file"}));
 }
 
 TEST(ManifestTest, NothingBesideIsNothing) {
@@ -192,9 +194,9 @@ TEST(ManifestTest, TransformsThatAreNone) {
               "transforms");
   }
   manifest.transforms[0].second = libmap::Pose(Eigen::Translation3d(0, 0, -2e8));
-  EXPECT_EQ(
-      error_of([&] { libmap::read_manifest_of(written(libmap::to_json(manifest))); }).reason(),
-      "not a rotation and a translation of at most 1e8 m");
+  EXPECT_TRUE(
+      is_error(error_of([&] { libmap::read_manifest_of(written(libmap::to_json(manifest))); }),
+               {.field = "transforms"}));
 }
 
 TEST(ManifestTest, ObjectsWithoutABoundAreRefused) {
@@ -203,9 +205,9 @@ TEST(ManifestTest, ObjectsWithoutABoundAreRefused) {
   EXPECT_EQ(libmap::read_manifest_of(written(libmap::to_json(manifest)))->timings_s.size(),
             10'000U);
   manifest.timings_s.emplace_back("one more", 1.0);
-  EXPECT_EQ(
-      error_of([&] { libmap::read_manifest_of(written(libmap::to_json(manifest))); }).reason(),
-      "contains an object of more than 10000 members");
+  EXPECT_TRUE(
+      is_error(error_of([&] { libmap::read_manifest_of(written(libmap::to_json(manifest))); }),
+               {.about = "members"}));
 }
 
 TEST(ManifestTest, NumbersThatAreNotFiniteStayReadable) {
@@ -246,7 +248,8 @@ TEST(ManifestTest, Sha256OfAFileIsThatOfItsBytes) {
     graspmap_test::write_text(path, bytes);
     EXPECT_EQ(libmap::sha256_of_file(path), libmap::sha256_of(bytes)) << size;
   }
-  error_of([&] { libmap::sha256_of_file(scratch_folder()); });
+  EXPECT_TRUE(is_error(error_of([&] { libmap::sha256_of_file(scratch_folder()); }),
+                       {.file = scratch_folder(), .about = "is a folder"}));
 }
 
 }  // namespace manifest_test

@@ -24,6 +24,7 @@ namespace cloud_io_test {
 namespace fs = std::filesystem;
 using graspmap_test::error_as;
 using graspmap_test::error_of;
+using graspmap_test::is_error;
 using graspmap_test::read_as;
 using graspmap_test::read_text;
 using graspmap_test::sample_cloud;
@@ -31,7 +32,6 @@ using graspmap_test::scratch_folder;
 using graspmap_test::write_text;
 using ::testing::Contains;
 using ::testing::ElementsAre;
-using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -228,16 +228,13 @@ TEST_P(CloudFormat, TruncationIsAnError) {
   const std::string bytes = read_text(write_sample(GetParam(), sample_cloud(30)));
   if (is_csv()) return;  // a table cut between lines is a shorter table
   for (const double part : {0.02, 0.3, 0.6, 0.9, 0.98})
-    EXPECT_THAT(
-        error_as(
-            GetParam().extension,
-            bytes.substr(0, static_cast<std::size_t>(part * static_cast<double>(bytes.size())))),
-        HasSubstr(GetParam().extension));
+    error_as(GetParam().extension,
+             bytes.substr(0, static_cast<std::size_t>(part * static_cast<double>(bytes.size()))));
 }
 
 TEST_P(CloudFormat, FilesThatAreNone) {
   const std::string extension = GetParam().extension;
-  EXPECT_THAT(error_as(extension, ""), HasSubstr("empty"));
+  EXPECT_TRUE(is_error(error_as(extension, ""), {.about = "empty"}));
   error_as(extension, std::string(1, '\0'));
   error_as(extension, std::string(1000, '\0'));
   error_as(extension, "\xff\xfe\x80 not a cloud \xc3\x28\n\xf0\x28\x8c\xbc\n");
@@ -255,11 +252,11 @@ TEST_P(CloudFormat, FilesThatAreNone) {
 TEST_P(CloudFormat, FieldNamesThatWouldBeReadAsSomethingElseAreRefused) {
   PointCloud cloud = sample_cloud(3);
   cloud.add_field("x", ScalarType::float32);
-  EXPECT_THAT(error_of([&] { write_sample(GetParam(), cloud); }).what(), HasSubstr("'x'"));
+  EXPECT_TRUE(is_error(error_of([&] { write_sample(GetParam(), cloud); }), {.field = "field 'x'"}));
   cloud = sample_cloud(3);
   cloud.fields.clear();
   for (const char* const name : {"r", "g", "b"}) cloud.add_field(name, ScalarType::uint8);
-  EXPECT_THAT(error_of([&] { write_sample(GetParam(), cloud); }).what(), HasSubstr("r g b"));
+  EXPECT_TRUE(is_error(error_of([&] { write_sample(GetParam(), cloud); }), {.field = "r g b"}));
 }
 
 // A locale with a decimal comma that needs no installation.
@@ -287,12 +284,13 @@ TEST(CloudIo, UnknownExtensionNamesTheKnownOnes) {
     const fs::path path = scratch_folder() / name;
     write_text(path, "x");
     const Error error = error_of([&] { read_cloud(path); });
-    EXPECT_THAT(error.what(), HasSubstr(".pcd, .ply, .csv or .tif"));
+    EXPECT_TRUE(is_error(error, {.field = "extension", .bound = ".pcd, .ply, .csv or .tif"}));
     EXPECT_EQ(error.context().file, path.string());
     EXPECT_THROW(write_cloud(path, sample_cloud(1)), Error);
     EXPECT_THROW(read_cloud_info(path), Error);
   }
-  EXPECT_THAT(error_of([] { read_cloud("site.laz"); }).what(), HasSubstr("Debian"));
+  EXPECT_TRUE(
+      is_error(error_of([] { read_cloud("site.laz"); }), {.file = "site.laz", .about = "Debian"}));
   EXPECT_EQ(format_of("A.B.PcD"), ".pcd");
 }
 
@@ -313,10 +311,12 @@ TEST(CsvFiles, NamesTypesAndTextColumns) {
 }
 
 TEST(CsvFiles, BadCells) {
-  EXPECT_THAT(error_as(".csv", "x,y,z\n1,2,3\n1,2,\n"), HasSubstr("z"));
-  EXPECT_THAT(error_as(".csv", "x,y,z,score\n1,2,3,1\n1,2,3,high\n"), HasSubstr("high"));
-  EXPECT_THAT(error_as(".csv", "x,y\n1,2\n"), HasSubstr("x, y and z"));
-  EXPECT_THAT(error_as(".csv", "x,y,z,x\n1,2,3,4\n"), HasSubstr("duplicate"));
+  EXPECT_TRUE(is_error(error_as(".csv", "x,y,z\n1,2,3\n1,2,\n"),
+                       {.field = "row 2, column 'z'", .value = "''"}));
+  EXPECT_TRUE(is_error(error_as(".csv", "x,y,z,score\n1,2,3,1\n1,2,3,high\n"),
+                       {.field = "row 2, column 'score'", .value = "'high'"}));
+  EXPECT_TRUE(is_error(error_as(".csv", "x,y\n1,2\n"), {.about = "x, y"}));
+  EXPECT_TRUE(is_error(error_as(".csv", "x,y,z,x\n1,2,3,4\n"), {.field = "field 'x'"}));
 }
 
 TEST(RealClouds, HoldThePublishedNumbersOfPoints) {
@@ -347,7 +347,7 @@ TEST(CloudFiles, PcdThatCannotBeMapped) {
   const graspmap_test::LowerLimit limit(
       RLIMIT_AS, pages * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE)) + gibibyte);
   const Error error = error_of([&] { read_cloud(path); });
-  EXPECT_EQ(error.reason(), "cannot be read: Cannot allocate memory");
+  EXPECT_TRUE(is_error(error, {.about = "allocate"}));
   EXPECT_EQ(error.context().file, path.string());
 }
 

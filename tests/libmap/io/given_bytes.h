@@ -1,7 +1,7 @@
 // Cloud files from given bytes.
 #pragma once
 
-#include <gmock/gmock.h>
+#include <gtest/gtest.h>
 
 #include <cstring>
 #include <filesystem>
@@ -19,12 +19,12 @@ inline libmap::CloudReadResult read_as(const std::string& extension, const std::
   return libmap::read_cloud(path);
 }
 
-// Message of the reader's error of kind bad_input.
-inline std::string error_as(const std::string& extension, const std::string& bytes) {
+// The reader's error of kind bad_input.
+inline libmap::Error error_as(const std::string& extension, const std::string& bytes) {
   const libmap::Error error = error_of([&] { read_as(extension, bytes); });
   EXPECT_EQ(error.kind(), libmap::ErrorKind::bad_input);
-  EXPECT_THAT(error.context().file, testing::HasSubstr("given" + extension));
-  return error.what();
+  EXPECT_EQ(error.context().file, (scratch_folder() / ("given" + extension)).string());
+  return error;
 }
 
 // Bytes of a number in the machine's little-endian order.

@@ -20,6 +20,7 @@ namespace mesh_io_test {
 namespace fs = std::filesystem;
 using graspmap_test::as_float;
 using graspmap_test::error_of;
+using graspmap_test::is_error;
 using graspmap_test::read_text;
 using graspmap_test::scratch_folder;
 using graspmap_test::uniform;
@@ -82,11 +83,11 @@ MeshReadResult read_as(const std::string& extension, const std::string& bytes) {
   return read_mesh(path);
 }
 
-std::string error_as(const std::string& extension, const std::string& bytes) {
+Error error_as(const std::string& extension, const std::string& bytes) {
   const Error error = error_of([&] { read_as(extension, bytes); });
   EXPECT_EQ(error.kind(), ErrorKind::bad_input);
-  EXPECT_THAT(error.context().file, HasSubstr("given" + extension));
-  return error.what();
+  EXPECT_EQ(error.context().file, (scratch_folder() / ("given" + extension)).string());
+  return error;
 }
 
 class MeshFormat : public ::testing::TestWithParam<Format> {};
@@ -210,7 +211,7 @@ TEST_P(MeshFormat, DamageIsAnErrorAndNeverACrash) {
 
 TEST_P(MeshFormat, FilesThatAreNone) {
   const std::string extension = GetParam().extension;
-  EXPECT_THAT(error_as(extension, ""), HasSubstr("empty"));
+  EXPECT_TRUE(is_error(error_as(extension, ""), {.about = "empty"}));
   error_as(extension, std::string(1, '\0'));
   error_as(extension, std::string(1000, '\0'));
   error_as(extension, "\xff\xfe\x80 not a mesh \xc3\x28\n\xf0\x28\x8c\xbc\n");
@@ -232,7 +233,7 @@ TEST_P(MeshFormat, VerticesThatAreNotFiniteAreNotWritten) {
   TriangleMesh mesh = sheet(3);
   mesh.vertices[4].y() = std::numeric_limits<double>::quiet_NaN();
   const Error error = error_of([&] { write_sample(GetParam(), mesh); });
-  EXPECT_THAT(error.what(), HasSubstr("vertex is 4: position is not finite"));
+  EXPECT_TRUE(is_error(error, {.field = "vertex", .value = "4"}));
 }
 
 TEST(MeshFiles, PolygonsBecomeTrianglesWithTheirFields) {
@@ -257,16 +258,22 @@ TEST(MeshFiles, BrokenPlyFaces) {
            face + "\n";
   };
   EXPECT_EQ(read_as(".ply", mesh("3 0 1 2")).mesh.triangles.size(), 1U);
-  EXPECT_THAT(error_as(".ply", mesh("3 0 1 3")), HasSubstr("face 0 is 3: no such vertex"));
-  EXPECT_THAT(error_as(".ply", mesh("3 0 1 -1")), HasSubstr("no such vertex"));
-  EXPECT_THAT(error_as(".ply", mesh("2 0 1")), HasSubstr("too few corners"));
-  EXPECT_THAT(error_as(".ply", mesh("-3 0 1 2")), HasSubstr("list longer"));
-  EXPECT_THAT(error_as(".ply", mesh("4 0 1 2")), HasSubstr("list longer"));
-  EXPECT_THAT(error_as(".ply", mesh("0")), HasSubstr("too few corners"));
+  EXPECT_TRUE(is_error(error_as(".ply", mesh("3 0 1 3")),
+                       {.field = "face 0", .value = "3", .bound = "0 to 3 - 1"}));
+  EXPECT_TRUE(is_error(error_as(".ply", mesh("3 0 1 -1")),
+                       {.field = "face 0", .value = "-1", .bound = "0 to 3 - 1"}));
+  EXPECT_TRUE(is_error(error_as(".ply", mesh("2 0 1")),
+                       {.field = "face 0", .value = "2", .bound = ">= 3"}));
+  EXPECT_TRUE(
+      is_error(error_as(".ply", mesh("-3 0 1 2")), {.field = "vertex_indices", .value = "-3"}));
+  EXPECT_TRUE(
+      is_error(error_as(".ply", mesh("4 0 1 2")), {.field = "vertex_indices", .value = "4"}));
+  EXPECT_TRUE(
+      is_error(error_as(".ply", mesh("0")), {.field = "face 0", .value = "0", .bound = ">= 3"}));
   std::string nan = mesh("3 0 1 2");
   nan.replace(nan.find("1 0 0\n"), 5, "1 nan");
-  EXPECT_THAT(error_as(".ply", nan.replace(nan.find("1 nan\n"), 6, "1 nan 0\n")),
-              HasSubstr("vertex 1: position is not finite"));
+  EXPECT_TRUE(is_error(error_as(".ply", nan.replace(nan.find("1 nan\n"), 6, "1 nan 0\n")),
+                       {.field = "vertex 1"}));
 }
 
 TEST(MeshFiles, GlbHasYUp) {
@@ -309,17 +316,17 @@ TEST(MeshFiles, WhatAssimpFallsOverIsAnError) {
   fs::copy_file(
       graspmap_test::source_folder() / "tests/fuzz/findings/glb/primitive_without_attributes",
       path);
-  EXPECT_THAT(error_of([&] { read_mesh(path); }).what(),
-              HasSubstr("mesh.glb: is broken: the library for its format crashed on it"));
+  EXPECT_TRUE(is_error(error_of([&] { read_mesh(path); }),
+                       {.file = graspmap_test::scratch_folder() / "mesh.glb", .about = "library"}));
 }
 
 // Errors reported by assimp, and numbers that it accepts.
 TEST(MeshFiles, WhatAssimpRefusesIsSaid) {
   const std::string two = "v 0 0 0\nv 0 1 0\n";
-  EXPECT_THAT(error_as(".stl", std::string(84, 'x')), HasSubstr("not a readable stl file: "));
-  EXPECT_THAT(error_as(".obj", two + "v nan 0 0\nf 1 2 3\n"),
-              HasSubstr("given.obj: vertex 2: position is not finite"));
-  EXPECT_THAT(error_as(".obj", two + "v 1e999 0 0\nf 1 2 3\n"), HasSubstr("line 3 is '1e999'"));
+  EXPECT_TRUE(is_error(error_as(".stl", std::string(84, 'x')), {.about = "stl file:"}));
+  EXPECT_TRUE(is_error(error_as(".obj", two + "v nan 0 0\nf 1 2 3\n"), {.field = "vertex 2"}));
+  EXPECT_TRUE(is_error(error_as(".obj", two + "v 1e999 0 0\nf 1 2 3\n"),
+                       {.field = "line 3", .value = "'1e999'"}));
   const fs::path path = scratch_folder() / "mesh.glb";
   TriangleMesh mesh;
   mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0.625}};
@@ -331,7 +338,7 @@ TEST(MeshFiles, WhatAssimpRefusesIsSaid) {
   ASSERT_NE(at, std::string::npos);
   const float nan = std::numeric_limits<float>::quiet_NaN();
   bytes.replace(at, sizeof nan, reinterpret_cast<const char*>(&nan), sizeof nan);
-  EXPECT_THAT(error_as(".glb", bytes), HasSubstr("vertex 2: position is not finite"));
+  EXPECT_TRUE(is_error(error_as(".glb", bytes), {.field = "vertex 2"}));
 }
 
 TEST(MeshFiles, WhatSinglePrecisionCannotHoldIsNotWritten) {
@@ -340,8 +347,7 @@ TEST(MeshFiles, WhatSinglePrecisionCannotHoldIsNotWritten) {
   for (const char* extension : {".obj", ".stl", ".glb"}) {
     const fs::path path = scratch_folder() / (std::string("far") + extension);
     const Error error = error_of([&] { write_mesh(path, mesh); });
-    EXPECT_THAT(error.what(), HasSubstr(std::string("far") + extension +
-                                        ": vertex 4 is 1e+39 m: too far away for " + extension));
+    EXPECT_TRUE(is_error(error, {.file = path, .field = "vertex 4", .value = "1e+39 m"}));
     EXPECT_FALSE(fs::exists(path));
   }
   for (const char* extension : {".ply", ".off"}) {
@@ -353,8 +359,8 @@ TEST(MeshFiles, WhatSinglePrecisionCannotHoldIsNotWritten) {
 
 TEST(MeshFiles, NoTriangleIsNotWrittenByAssimp) {
   for (const std::string format : {"stl", "glb"})
-    EXPECT_EQ(error_of([&] { write_mesh(scratch_folder() / ("mesh." + format), {}); }).reason(),
-              "a mesh without triangles cannot be written as " + format);
+    EXPECT_TRUE(is_error(error_of([&] { write_mesh(scratch_folder() / ("mesh." + format), {}); }),
+                         {.about = "without triangles"}));
 }
 
 TEST(MeshFiles, ObjKeepsMapCoordinates) {
@@ -442,17 +448,18 @@ TEST(MeshFiles, OffOfOtherPrograms) {
 }
 
 TEST(MeshFiles, NoTriangleIsAnError) {
-  EXPECT_THAT(error_as(".obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\n"), HasSubstr("given.obj"));
+  EXPECT_TRUE(is_error(error_as(".obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\n"), {.about = "no triangle"}));
   const fs::path path = scratch_folder() / "cloud.ply";
   write_cloud(path, graspmap_test::sample_cloud(4));
-  EXPECT_THAT(error_of([&] { read_mesh(path); }).what(), HasSubstr("no triangle"));
+  EXPECT_TRUE(is_error(error_of([&] { read_mesh(path); }), {.about = "no triangle"}));
 }
 
 TEST(MeshFiles, UnknownExtensionNamesTheKnownOnes) {
   const fs::path path = scratch_folder() / "mesh.objj";
   write_text(path, "x");
-  EXPECT_THAT(error_of([&] { read_mesh(path); }).what(),
-              HasSubstr(".ply, .obj, .stl, .off, .glb or .tif"));
+  EXPECT_TRUE(is_error(
+      error_of([&] { read_mesh(path); }),
+      {.field = "extension", .value = ".objj", .bound = ".ply, .obj, .stl, .off, .glb or .tif"}));
   EXPECT_THROW(write_mesh(path, sheet(2)), Error);
 }
 
@@ -471,7 +478,8 @@ TEST(FileKinds, ByExtensionAndContent) {
     EXPECT_EQ(file_kind(cloud(name)), FileKind::cloud) << name;
   for (const char* const name : {"a.ply", "a.obj", "a.stl", "a.off", "a.glb", "A.PLY"})
     EXPECT_EQ(file_kind(mesh(name)), FileKind::mesh) << name;
-  EXPECT_THAT(error_of([] { file_kind("scan.db"); }).what(), HasSubstr(".pcd"));
+  EXPECT_TRUE(is_error(error_of([] { file_kind("scan.db"); }),
+                       {.file = "scan.db", .field = "extension", .value = ".db"}));
   EXPECT_THROW(file_kind(scratch_folder() / "missing.ply"), Error);
 }
 

@@ -17,10 +17,10 @@ namespace ply_codec_test {
 
 using graspmap_test::error_as;
 using graspmap_test::error_of;
+using graspmap_test::is_error;
 using graspmap_test::raw;
 using graspmap_test::read_as;
 using ::testing::ElementsAre;
-using ::testing::HasSubstr;
 
 std::string ply_header(const std::string& encoding, const std::string& points) {
   return "ply\nformat " + encoding + " 1.0\nelement vertex " + points +
@@ -57,42 +57,45 @@ TEST(PlyFiles, ListsInBinary) {
   EXPECT_EQ(read.cloud.positions[0], Eigen::Vector3d(1, 2, 3));
   EXPECT_EQ(read.cloud.positions[1], Eigen::Vector3d(4, 5, 6));
   const std::string lying = raw(4.0F) + raw<std::uint16_t>(60000) + raw(5.0F) + raw(6.0F);
-  EXPECT_THAT(error_as(".ply", header + first + lying), HasSubstr("list longer than the data"));
+  EXPECT_TRUE(
+      is_error(error_as(".ply", header + first + lying), {.field = "extra", .value = "60000"}));
 }
 
 TEST(PlyFiles, HeadersThatLie) {
-  EXPECT_THAT(error_as(".ply", ply_header("binary_little_endian", "11") + std::string(120, '\1')),
-              HasSubstr("declares 11 rows of 'vertex' of 12 bytes, but only 120"));
-  EXPECT_THAT(error_as(".ply", ply_header("ascii", "3") + "1.5 2.5 3.5\n1.5 2.5 3.5\n"),
-              HasSubstr("declares 3 rows of 'vertex', but the data end in row 2"));
-  EXPECT_THAT(error_as(".ply", ply_header("ascii", "1") + "1 2 3 4\n"), HasSubstr("more than one"));
-  EXPECT_THAT(error_as(".ply", ply_header("ascii", "1") + "1 22 \n"), HasSubstr("z"));
+  EXPECT_TRUE(
+      is_error(error_as(".ply", ply_header("binary_little_endian", "11") + std::string(120, '\1')),
+               {.about = "11 rows"}));
+  EXPECT_TRUE(is_error(error_as(".ply", ply_header("ascii", "3") + "1.5 2.5 3.5\n1.5 2.5 3.5\n"),
+                       {.about = "row 2"}));
+  EXPECT_TRUE(
+      is_error(error_as(".ply", ply_header("ascii", "1") + "1 2 3 4\n"), {.about = "than one"}));
+  EXPECT_TRUE(is_error(error_as(".ply", ply_header("ascii", "1") + "1 22 \n"), {.field = "z"}));
   for (const char* const points : {"9223372036854775807", "1537228672809129302", "1000000000000"})
     for (const char* const encoding : {"ascii", "binary_little_endian", "binary_big_endian"})
-      EXPECT_THAT(error_as(".ply", ply_header(encoding, points) + std::string(100, '1')),
-                  HasSubstr("declares"));
+      EXPECT_TRUE(is_error(error_as(".ply", ply_header(encoding, points) + std::string(100, '1')),
+                           {.about = "declares"}));
   for (const char* const points : {"-1", "1e3", "99999999999999999999", "x", ""})
     error_as(".ply", ply_header("ascii", points) + "1 2 3\n");
   error_as(".ply", ply_header("binary_middle_endian", "1") + "1 2 3\n");
-  EXPECT_THAT(error_as(".ply",
-                       "ply\nformat ascii 1.0\nelement vertex 1\nproperty uchar x\n"
-                       "property uchar y\nproperty uchar z\nend_header\n1 2 256\n"),
-              HasSubstr("uint8"));
-  EXPECT_THAT(error_as(".ply",
-                       "ply\nformat ascii 1.0\nelement point 1\nproperty float x\n"
-                       "end_header\n1\n"),
-              HasSubstr("no element vertex"));
+  EXPECT_TRUE(is_error(error_as(".ply",
+                                "ply\nformat ascii 1.0\nelement vertex 1\nproperty uchar x\n"
+                                "property uchar y\nproperty uchar z\nend_header\n1 2 256\n"),
+                       {.field = "z", .value = "256"}));
+  EXPECT_TRUE(is_error(error_as(".ply",
+                                "ply\nformat ascii 1.0\nelement point 1\nproperty float x\n"
+                                "end_header\n1\n"),
+                       {.about = "no element"}));
 }
 
 TEST(PlyFiles, HeaderLinesThatDoNotFit) {
-  EXPECT_THAT(error_as(".ply",
-                       "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\n"
-                       "property list float int extra\nend_header\n1 1 1\n"),
-              HasSubstr("PLY header line 5 is float: the type of a list's length must be"));
-  EXPECT_THAT(error_as(".ply",
-                       "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\n"
-                       "element vertex 1\nproperty float x\nend_header\n1\n1\n"),
-              HasSubstr("PLY header line 5 is vertex: duplicate element"));
+  EXPECT_TRUE(is_error(error_as(".ply",
+                                "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\n"
+                                "property list float int extra\nend_header\n1 1 1\n"),
+                       {.field = "PLY header line 5", .value = "float"}));
+  EXPECT_TRUE(is_error(error_as(".ply",
+                                "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\n"
+                                "element vertex 1\nproperty float x\nend_header\n1\n1\n"),
+                       {.field = "PLY header line 5", .value = "vertex"}));
 }
 
 // Each name is compared with all previous names.
@@ -103,9 +106,10 @@ TEST(PlyFiles, VeryManyElementsOrProperties) {
     elements += "element e" + std::to_string(n) + " 0\n";
     properties += "property float p" + std::to_string(n) + "\n";
   }
-  EXPECT_THAT(error_as(".ply", elements + "end_header\n"), HasSubstr("more than 1000 elements"));
-  EXPECT_THAT(error_as(".ply", properties + "end_header\n"),
-              HasSubstr("more than 10000 properties"));
+  EXPECT_TRUE(
+      is_error(error_as(".ply", elements + "end_header\n"), {.field = "PLY header line 1003"}));
+  EXPECT_TRUE(
+      is_error(error_as(".ply", properties + "end_header\n"), {.field = "PLY header line 10004"}));
 }
 
 // All rows are one number in memory.
@@ -119,7 +123,7 @@ TEST(PlyFiles, MoreVerticesThanAMeshCanName) {
   std::ostringstream out;
   const Error error =
       error_of([&] { encode_ply({.vertices = &set, .triangles = &triangles}, {}, out); });
-  EXPECT_EQ(error.reason(), "too many vertices for a PLY mesh");
+  EXPECT_TRUE(is_error(error, {.field = "vertices", .value = "2147483648"}));
   EXPECT_EQ(error.context().value, "2147483648");
 }
 

@@ -217,7 +217,8 @@ TEST(G2oText, NumbersAtTheEndsOfTheirRange) {
   EXPECT_EQ(links("2147483646 2147483647", "1").front().type, LinkType::neighbor);
   EXPECT_EQ(links("2147483647 2147483647", "1").front().type, LinkType::global_closure);
   const libmap::Error error = graspmap_test::error_of([&] { links("1 2", "1e308"); });
-  EXPECT_EQ(error.reason(), "information out of range");
+  EXPECT_TRUE(graspmap_test::is_error(
+      error, {.file = "a.g2o", .field = "line 1", .value = "1e+308", .bound = "<= 1e300"}));
   EXPECT_EQ(error.context().bound, "<= 1e300");
 }
 

@@ -64,10 +64,9 @@ TEST(SensorModel, ShippedSensorsAreReadAndUnknownOnesAreNamed) {
     EXPECT_LT(model.frame_time_s, 0.05) << name;
   }
   EXPECT_GT(libmap::read_sensor_model("kinect-v1").noise_of_square, 0.0);
-  EXPECT_NE(
-      std::string(graspmap_test::error_of([] { libmap::read_sensor_model("kinect-v3"); }).what())
-          .find("kinect-v3"),
-      std::string::npos);
+  EXPECT_TRUE(graspmap_test::is_error(
+      graspmap_test::error_of([] { libmap::read_sensor_model("kinect-v3"); }),
+      {.field = "sensor", .value = "kinect-v3"}));
 }
 
 }  // namespace noise_estimate_test

@@ -298,7 +298,7 @@ TEST_F(TumFolder, FollowsItsOptions) {
   write_text(folder_ / "scan.yaml", "depth_unit: 0.001\n");
   const libmap::Error error = graspmap_test::error_of([&] { FrameFolder again(folder_); });
   EXPECT_EQ(error.context().file, (folder_ / "scan.yaml").string());
-  EXPECT_NE(std::string(error.what()).find("depth_unit_m"), std::string::npos);
+  EXPECT_TRUE(graspmap_test::is_error(error, {.field = "depth_unit"}));
 }
 
 // A wall at 2 m before a depth camera of half the size, 40 cm to the right: the left of the image
@@ -350,7 +350,7 @@ TEST_F(TumFolder, NamesTheCalibrationThatItMisses) {
   fs::remove(folder_ / "calibration.yaml");
   const libmap::Error error = graspmap_test::error_of([&] { FrameFolder read(folder_); });
   EXPECT_EQ(error.context().file, (folder_ / "calibration.yaml").string());
-  EXPECT_NE(error.reason().find("intrinsics"), std::string::npos);
+  EXPECT_TRUE(graspmap_test::is_error(error, {.about = "intrinsics"}));
 }
 
 TEST_F(TumFolder, NamesWhatIsBroken) {
@@ -389,19 +389,22 @@ TEST_F(TumFolder, RefusesDepthOfAnotherAspectRatio) {
 }
 
 TEST_F(TumFolder, NamesTheCellThatIsNoNumber) {
-  const std::map<std::string, std::string> refusals{
-      {"node,stamp_s,baseline_m\n1,5,0.1 x\n", "row 1, column baseline_m is 0.1 x: not a number"},
-      {"node,stamp_s,gps\n1,5,1 2 3 4 5 inf\n", "row 1, column gps is 1 2 3 4 5 inf: not a number"},
-      {"node,stamp_s\n7,5\n0,6\n", "row 2, column node is 0: not a node number (must be > 0)"},
-      {"node,stamp_s\n1,nan\n", "row 1, column stamp_s is nan: not a number of seconds"},
+  const std::vector<std::pair<std::string, graspmap_test::ExpectedError>> refusals{
+      {"node,stamp_s,baseline_m\n1,5,0.1 x\n",
+       {.field = "row 1, column baseline_m", .value = "0.1 x"}},
+      {"node,stamp_s,gps\n1,5,1 2 3 4 5 inf\n",
+       {.field = "row 1, column gps", .value = "1 2 3 4 5 inf"}},
+      {"node,stamp_s\n7,5\n0,6\n", {.field = "row 2, column node", .value = "0", .bound = "> 0"}},
+      {"node,stamp_s\n1,nan\n", {.field = "row 1, column stamp_s", .value = "nan"}},
       {"node,stamp_s,session\n1,5,2147483648\n",
-       "row 1, column session is 2147483648: not a whole number (must be of 32 bits)"},
+       {.field = "row 1, column session", .value = "2147483648", .bound = "of 32 bits"}},
       {"node,stamp_s,session\n1,5,-9223372036854775808\n",
-       "row 1, column session is -9223372036854775808: not a whole number (must be of 32 bits)"}};
-  for (const auto& [text, refusal] : refusals) {
+       {.field = "row 1, column session", .value = "-9223372036854775808", .bound = "of 32 bits"}}};
+  for (const auto& [text, expected] : refusals) {
     write_text(folder_ / "nodes.csv", text);
     const libmap::Error error = graspmap_test::error_of([&] { FrameFolder read(folder_); });
-    EXPECT_EQ(std::string(error.what()), (folder_ / "nodes.csv").string() + ": " + refusal);
+    EXPECT_EQ(error.context().file, (folder_ / "nodes.csv").string());
+    EXPECT_TRUE(graspmap_test::is_error(error, expected));
   }
 }
 
@@ -432,7 +435,7 @@ TEST(FrameFolderError, OfFoldersThatAreNoScan) {
   const fs::path folder = new_folder();
   const libmap::Error error = graspmap_test::error_of([&] { libmap::open_scan(folder); });
   EXPECT_EQ(error.context().file, folder.string());
-  EXPECT_NE(error.reason().find("associations.txt"), std::string::npos);
+  EXPECT_TRUE(graspmap_test::is_error(error, {.about = ".txt"}));
   EXPECT_THROW(FrameFolder(folder / "missing"), libmap::Error);
 }
 
@@ -440,8 +443,8 @@ TEST(FrameFolderError, OfNodesThatAreNotThere) {
   const fs::path folder = new_folder();
   write_scan(folder, graspmap_test::example_scan());
   const FrameFolder read(folder);
-  EXPECT_EQ(std::string(graspmap_test::error_of([&] { read.read_frame(4); }).what()),
-            folder.string() + ": node is 4: no such node");
+  EXPECT_TRUE(graspmap_test::is_error(graspmap_test::error_of([&] { read.read_frame(4); }),
+                                      {.file = folder, .field = "node", .value = "4"}));
 }
 
 TEST(FrameFolderError, OfFoldersThatCannotBeMade) {
@@ -451,7 +454,9 @@ TEST(FrameFolderError, OfFoldersThatCannotBeMade) {
     const libmap::Error error =
         graspmap_test::error_of([&] { libmap::FrameFolderWriter writer(place); });
     EXPECT_EQ(error.context().file, (place / "color").string());
-    EXPECT_EQ(error.reason().find("cannot be created: "), 0U) << error.what();
+    EXPECT_TRUE(
+        graspmap_test::is_error(error, {.about = "be created:", .kind = libmap::ErrorKind::failed}))
+        << error.what();
     EXPECT_EQ(error.kind(), libmap::ErrorKind::failed);
   }
 }

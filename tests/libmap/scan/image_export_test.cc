@@ -37,10 +37,10 @@ TEST(ImageExport, NodesWithoutColorOrCalibrationAreNamed) {
   execute(file, "UPDATE Data SET calibration = NULL WHERE id = 2");
   const RtabmapDatabase scan(file);
   const auto refusal_of = [&](int node) {
-    return std::string(error_of([&] { libmap::read_views(scan, node, {}); }).what());
+    return error_of([&] { libmap::read_views(scan, node, {}); });
   };
-  EXPECT_EQ(refusal_of(1), file.string() + ": node 1: has no color image");
-  EXPECT_EQ(refusal_of(2), file.string() + ": node 2: has no calibration");
+  EXPECT_TRUE(is_error(refusal_of(1), {.file = file, .field = "node 1", .about = "color"}));
+  EXPECT_TRUE(is_error(refusal_of(2), {.file = file, .field = "node 2", .about = "calibration"}));
 }
 
 }  // namespace image_export_test

@@ -1,7 +1,6 @@
 // Every sample against the closed form of its shape.
 #include "libmap/scenes/scene_sampling.h"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -22,6 +21,7 @@ namespace scene_sampling_test {
 using graspmap_test::error_of;
 using graspmap_test::from_above;
 using graspmap_test::ground_plane;
+using graspmap_test::is_error;
 using graspmap_test::mixed_scene;
 using graspmap_test::pi;
 using graspmap_test::scene_of;
@@ -346,15 +346,13 @@ TEST(SampleScene, shapes_smaller_than_the_spacing_still_get_points) {
 TEST(SampleScene, refuses_what_it_cannot_do) {
   const PrimitiveScene scene = thesis_primitive_scene();
   const auto message = [&](const SceneSamplingOptions& options) {
-    return std::string(error_of([&] { sample_scene(scene, options); }).what());
+    return error_of([&] { sample_scene(scene, options); });
   };
-  EXPECT_EQ(message({.count = 1'000'000'000}),
-            "count is 1000000000: asks for about 1000000000 points; the limit is 20000000 "
-            "(max_points)");
-  EXPECT_THAT(message({.spacing_m = 1e-4}), testing::HasSubstr("the limit is 20000000"));
-  EXPECT_THAT(message({.spacing_m = 1e-4}),
-              testing::HasSubstr("spacing_m is 1e-04: asks for about 98"));
-  EXPECT_THAT(message({.spacing_m = 1e-200}), testing::HasSubstr("the limit is"));
+  EXPECT_TRUE(
+      is_error(message({.count = 1'000'000'000}), {.field = "count", .value = "1000000000"}));
+  EXPECT_TRUE(is_error(message({.spacing_m = 1e-4}), {.field = "spacing_m", .value = "1e-04"}));
+  EXPECT_TRUE(is_error(message({.spacing_m = 1e-4}), {.field = "spacing_m", .value = "1e-04"}));
+  EXPECT_TRUE(is_error(message({.spacing_m = 1e-200}), {.field = "spacing_m", .value = "1e-200"}));
   EXPECT_THROW(sample_scene(PrimitiveScene{}, {}), Error);
 }
 

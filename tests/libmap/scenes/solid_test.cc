@@ -14,6 +14,7 @@ namespace libmap {
 namespace solid_test {
 
 using graspmap_test::error_of;
+using graspmap_test::is_error;
 using graspmap_test::Topology;
 using graspmap_test::topology_of;
 using graspmap_test::uniform;
@@ -81,19 +82,15 @@ TEST(ConvexSolid, RandomOnesKeepToTheirPlanes) {
 }
 
 TEST(ConvexSolid, NothingOrTooMuchIsAnError) {
-  EXPECT_NE(
+  EXPECT_TRUE(is_error(
       error_of([] {
         convex_solid({{Eigen::Vector3d::UnitX(), -2.0}, {-Eigen::Vector3d::UnitX(), 1.0}}, 10.0);
-      })
-          .reason()
-          .find("nothing"),
-      std::string::npos);
-  EXPECT_NE(error_of([] {
-              convex_solid({{Eigen::Vector3d::UnitX(), 1.0}}, 10.0);
-            })
-                .reason()
-                .find("10"),
-            std::string::npos);
+      }),
+      {.about = "empty"}));
+  EXPECT_TRUE(is_error(error_of([] {
+                         convex_solid({{Eigen::Vector3d::UnitX(), 1.0}}, 10.0);
+                       }),
+                       {.about = "10 m"}));
 }
 
 TEST(EllipsoidSolid, HasTheVolumeOfAnEllipsoid) {
@@ -155,8 +152,7 @@ TEST(RefineFacets, ARegionThatIsNotFlatIsAnError) {
   Solid solid = box({0.0, 0.0, 0.0}, {1.0, 1.0, 1.0});
   for (int& label : solid.labels)
     if (label == 1 || label == 3) label = 0;
-  EXPECT_EQ(error_of([&] { refine_facets(solid, 0.5); }).reason(),
-            "two corners of a facet coincide");
+  EXPECT_TRUE(is_error(error_of([&] { refine_facets(solid, 0.5); }), {.about = "two corners"}));
 }
 
 TEST(Booleans, FollowInclusionAndExclusion) {
@@ -197,13 +193,13 @@ TEST(Booleans, TouchingSolidsAreAnErrorOrAManifold) {
   // Two boxes that share one edge alone have no manifold union.
   const Solid a = box({0.0, 0.0, 0.0}, {1.0, 1.0, 1.0});
   const Solid b = box({1.0, 1.0, 0.0}, {2.0, 2.0, 1.0});
-  EXPECT_NE(error_of([&] { unite({a, b}); }).reason().find("touch"), std::string::npos);
+  EXPECT_TRUE(is_error(error_of([&] { unite({a, b}); }), {.about = "touch"}));
   // A box without two opposite quarters is not a manifold, either.
   const Solid rest = subtract(a, box({-1.0, -1.0, -1.0}, {0.5, 0.5, 2.0}));
-  EXPECT_EQ(error_of([&] {
-              subtract(rest, box({0.5, 0.5, -1.0}, {2.0, 2.0, 2.0}));
-            }).reason(),
-            "the difference of two solids is not a manifold");
+  EXPECT_TRUE(is_error(error_of([&] {
+                         subtract(rest, box({0.5, 0.5, -1.0}, {2.0, 2.0, 2.0}));
+                       }),
+                       {.about = "difference"}));
 }
 
 TEST(Booleans, SplintersGoWithoutMovingTheSurface) {

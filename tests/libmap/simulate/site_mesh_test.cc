@@ -17,6 +17,7 @@ namespace libmap {
 namespace site_mesh_test {
 
 using graspmap_test::error_of;
+using graspmap_test::is_error;
 using graspmap_test::self_intersections;
 using graspmap_test::shipped_site;
 using graspmap_test::Topology;
@@ -198,18 +199,18 @@ TEST(SiteMesh, ARockInTheAirIsAnError) {
       "rocks: [{height_m: 0.1, width_m: 0.1, depth_m: 0.1, x_m: 0.4, y_m: 0.4, ledges: 0,"
       " cleft_m: 0, overhang_deg: 0}]\n",
       "bump.yaml");
-  EXPECT_STREQ(error_of([&] { site_mesh(site, {.edge_length_m = 1.0}); }).what(),
-               "rocks[0]: does not touch the ground");
+  EXPECT_TRUE(is_error(error_of([&] { site_mesh(site, {.edge_length_m = 1.0}); }),
+                       {.field = "rocks[0] (boulder)", .about = "touch"}));
   site.rocks[0].name = "boulder";
-  EXPECT_STREQ(error_of([&] { site_mesh(site, {.edge_length_m = 1.0}); }).what(),
-               "rocks[0] (boulder): does not touch the ground");
+  EXPECT_TRUE(is_error(error_of([&] { site_mesh(site, {.edge_length_m = 1.0}); }),
+                       {.field = "rocks[0] (boulder)"}));
   EXPECT_NO_THROW(site_mesh(site, {.edge_length_m = 0.05}));
 }
 
 TEST(SiteMesh, BadOptionsAreErrors) {
   RockSite site = small_site();
-  EXPECT_NE(error_of([&] { site_mesh(site, {.edge_length_m = 1e-4}); }).reason().find("limit"),
-            std::string::npos);
+  EXPECT_TRUE(is_error(error_of([&] { site_mesh(site, {.edge_length_m = 1e-4}); }),
+                       {.field = "edge_length_m", .value = "1e-04"}));
   site.rocks[1].x_m = 0.6;
   EXPECT_NE(error_of([&] { site_mesh(site, {}); }).context().field.find("rocks[1]"),
             std::string::npos);

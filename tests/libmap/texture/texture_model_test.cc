@@ -18,6 +18,7 @@ namespace texture_model_test {
 using graspmap_test::circle_of_cameras;
 using graspmap_test::error_of;
 using graspmap_test::grid_mesh;
+using graspmap_test::is_error;
 using graspmap_test::looking_at;
 using graspmap_test::PaintedScan;
 using graspmap_test::small_camera;
@@ -232,9 +233,8 @@ TEST(TextureModel, WhatNobodySeesIsGrayAndCounted) {
   EXPECT_EQ(gray, result.unseen_triangles);
   // A mesh seen from below only has no front.
   const PaintedScan below(mesh, red_plate, small_camera(), {looking_at({0, 0, -1}, {0, 0, 0})});
-  EXPECT_NE(std::string(error_of([&] { libmap::texture_mesh(mesh, below, below.poses()); }).what())
-                .find("no triangle is visible in any"),
-            std::string::npos);
+  EXPECT_TRUE(is_error(error_of([&] { libmap::texture_mesh(mesh, below, below.poses()); }),
+                       {.about = "1 photograph"}));
 }
 
 TEST(TextureModel, AnySizeOfPages) {
@@ -341,16 +341,15 @@ TEST(TextureModel, FramesThatCannotBeUsed) {
   EXPECT_EQ(result.photos, 2U);
   ASSERT_EQ(result.skipped.size(), 2U);
   EXPECT_EQ(result.skipped[0].first, 2);
-  EXPECT_STREQ(result.skipped[0].second.what(), "painted: node 2: broken");
+  EXPECT_TRUE(is_error(result.skipped[0].second, {.file = "painted", .field = "node 2"}));
   EXPECT_EQ(result.skipped[0].second.context().file, "painted");
-  EXPECT_EQ(result.skipped[1].second.reason(), "node 3: pose is not finite");
+  EXPECT_TRUE(is_error(result.skipped[1].second, {.field = "node 3", .about = "pose"}));
   TextureOptions strict;
   strict.strict = true;
   EXPECT_THROW(libmap::texture_mesh(mesh, scan, poses, strict), libmap::Error);
   scan.without_color = true;
-  EXPECT_NE(std::string(error_of([&] { libmap::texture_mesh(mesh, scan, scan.poses()); }).what())
-                .find("no usable photograph in 4 frames"),
-            std::string::npos);
+  EXPECT_TRUE(is_error(error_of([&] { libmap::texture_mesh(mesh, scan, scan.poses()); }),
+                       {.file = "painted", .about = "4 frames"}));
   EXPECT_THROW(libmap::texture_mesh(mesh, scan, {}), libmap::Error);
 }
 
@@ -359,9 +358,8 @@ TEST(TextureModel, MeshesThatCannotBeTextured) {
   const PaintedScan scan(mesh, marks, small_camera(), circle_of_cameras(3, 0.4, 0.9));
   TriangleMesh far = mesh;
   for (Eigen::Vector3d& vertex : far.vertices) vertex += Eigen::Vector3d(1000, 0, 0);
-  EXPECT_NE(std::string(error_of([&] { libmap::texture_mesh(far, scan, scan.poses()); }).what())
-                .find("in any of the 3 photographs"),
-            std::string::npos);
+  EXPECT_TRUE(is_error(error_of([&] { libmap::texture_mesh(far, scan, scan.poses()); }),
+                       {.about = "3 photographs"}));
   EXPECT_THROW(libmap::texture_mesh({}, scan, scan.poses()), libmap::Error);
   TriangleMesh broken = mesh;
   broken.vertices[3].z() = std::nan("");

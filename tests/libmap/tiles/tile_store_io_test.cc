@@ -10,6 +10,7 @@ namespace tile_store_io_test {
 namespace fs = std::filesystem;
 
 using graspmap_test::error_of;
+using graspmap_test::is_error;
 using graspmap_test::scratch_folder;
 using graspmap_test::write_text;
 using libmap::TileJournal;
@@ -35,11 +36,16 @@ TEST(TileStore, SharesKeepTheirJournals) {
     TileJournal two = store.begin({2, 2}, nothing);
     two.add({"{\"tile\": 3}"});
     moved.add({"1", "22"});
-    EXPECT_EQ(error_of([&] {
-                store.begin({1, 2}, nothing);
-              }).reason(),
-              "another process works on share 1/2");
-    EXPECT_EQ(error_of([&] { store.require_idle(); }).reason(), "another process is writing it");
+    EXPECT_TRUE(is_error(error_of([&] {
+                           store.begin({1, 2}, nothing);
+                         }),
+                         {.file = graspmap_test::scratch_folder() / "a",
+                          .about = "works",
+                          .kind = libmap::ErrorKind::failed}));
+    EXPECT_TRUE(is_error(error_of([&] { store.require_idle(); }),
+                         {.file = graspmap_test::scratch_folder() / "a",
+                          .about = "writing",
+                          .kind = libmap::ErrorKind::failed}));
   }
   store.require_idle();
   EXPECT_EQ(lines_of(store), (std::vector<std::string>{"1", "22", "{\"tile\": 3}"}));
@@ -80,11 +86,11 @@ TEST(TileStore, NothingIsLeftOfAPlanThatFails) {
 TEST(TileStore, OtherFoldersAreNotTouched) {
   fs::create_directory(scratch_folder() / "a");
   write_text(scratch_folder() / "a/diary.txt", "dear");
-  EXPECT_EQ(error_of([&] { TileStore(scratch_folder() / "a").begin({}, nothing); }).reason(),
-            "is not empty and is not a tile store");
-  EXPECT_EQ(
-      error_of([&] { TileStore(scratch_folder() / "a/diary.txt").begin({}, nothing); }).reason(),
-      "is a file, not a tile store");
+  EXPECT_TRUE(is_error(error_of([&] { TileStore(scratch_folder() / "a").begin({}, nothing); }),
+                       {.file = graspmap_test::scratch_folder() / "a", .about = "not empty"}));
+  EXPECT_TRUE(
+      is_error(error_of([&] { TileStore(scratch_folder() / "a/diary.txt").begin({}, nothing); }),
+               {.about = "a file,"}));
   EXPECT_EQ(graspmap_test::read_text(scratch_folder() / "a/diary.txt"), "dear");
 }
 

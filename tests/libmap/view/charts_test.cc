@@ -20,6 +20,7 @@
 namespace charts_test {
 
 using graspmap_test::error_of;
+using graspmap_test::is_error;
 using libmap::Chart;
 using libmap::ChartCurve;
 using libmap::ChartHistogram;
@@ -467,7 +468,7 @@ TEST(Charts, WhatCannotBeDrawnIsNamed) {
     chart.curves[0].name = "map";
     change(chart);
     const libmap::Error error = error_of([&] { libmap::chart_svg(chart, size); });
-    error_of([&] { libmap::draw_chart(chart, size); });
+    EXPECT_STREQ(error_of([&] { libmap::draw_chart(chart, size); }).what(), error.what());
     return error.context();
   };
   EXPECT_EQ(error_with([](Chart& c) { c.curves[0].x.pop_back(); }).value, "1 and 2");
