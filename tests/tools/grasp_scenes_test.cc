@@ -72,7 +72,8 @@ TEST(GraspScenes, BadInputIsOneLineAndWritesNothing) {
   make_site();
   EXPECT_TRUE(bad_input(grasp({"--scenes", "scenes", "--scene-locations", "P3"}),
                         {.file = "points.csv", .field = "--scene-locations", .value = "P3"}));
-  EXPECT_TRUE(bad_input(grasp({"--scene-locations", "P1"}), {.field = "--scene-locations", .about = "--scenes"}));
+  EXPECT_TRUE(bad_input(grasp({"--scene-locations", "P1"}),
+                        {.field = "--scene-locations", .about = "--scenes"}));
   graspmap_test::write_text(scratch("points.csv"), "place,x,y,z\nA/B,0,0,0\nA:B,0.2,0,0\n");
   EXPECT_TRUE(bad_input(grasp({"--scenes", "scenes"}),
                         {.file = "points.csv", .field = "place", .value = "'A:B'"}));

@@ -235,8 +235,8 @@ TEST_F(ScoreBadInput, FlagsOutOfTheirBounds) {
       bad_input(score({"terrain.pcd", "--up", "0,0,0"}), {.file = "terrain.pcd", .field = "up"}));
   EXPECT_TRUE(bad_input(score({"terrain.pcd", "--up", "0,0,1", "--plane", "none"}),
                         {.field = "--up", .value = "0,0,1", .about = "--plane"}));
-  EXPECT_TRUE(
-      bad_input(score({"terrain.pcd", "--max-points-in-memory", "5"}), {.field = "--max-points-in-memory"}));
+  EXPECT_TRUE(bad_input(score({"terrain.pcd", "--max-points-in-memory", "5"}),
+                        {.field = "--max-points-in-memory"}));
   EXPECT_TRUE(bad_input(score({"terrain.pcd", "--threads", "-1"}),
                         {.field = "--threads", .value = "-1", .bound = ">= 0 and <= 4096"}));
   EXPECT_TRUE(

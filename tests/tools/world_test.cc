@@ -118,18 +118,22 @@ TEST(WorldCommand, BadInputWritesNothing) {
     words.insert(words.begin(), "convert");
     return graspmap(words);
   };
-  EXPECT_TRUE(bad_input(convert({"empty.ply", "-o", "x.world"}), {"empty.ply", "triangle"}));
+  EXPECT_TRUE(bad_input(convert({"empty.ply", "-o", "x.world"}),
+                        {.file = "empty.ply", .about = "triangle"}));
   EXPECT_TRUE(bad_input(convert({"site.ply", "-o", "x.world", "--map", "other.ply"}),
-                        {"other.ply", "is 0", "another site"}));
+                        {.file = "other.ply", .field = "points on the surface", .value = "0"}));
   EXPECT_TRUE(bad_input(convert({"site.ply", "-o", "x.world", "--rig", "none.yaml"}),
-                        {"none.yaml", "cameras"}));
+                        {.file = "none.yaml", .about = "camera"}));
   EXPECT_TRUE(bad_input(convert({"site.ply", "-o", "x.world", "--rig", "name.yaml"}),
-                        {"name.yaml", "a::b"}));
-  EXPECT_TRUE(bad_input(convert({"site.ply", "-o", "a::b.world"}), {"a::b", "SDF"}));
-  EXPECT_TRUE(bad_input(convert({"site.ply", "-o", "world.world"}), {"world", "SDF"}));
-  EXPECT_TRUE(bad_input(convert({"site.ply", "-o", "x.world", "--gravity", "venus"}), {"venus"}));
+                        {.file = "name.yaml", .value = "a::b"}));
+  EXPECT_TRUE(bad_input(convert({"site.ply", "-o", "a::b.world"}),
+                        {.file = "a::b.world", .field = "name", .value = "a::b"}));
+  EXPECT_TRUE(bad_input(convert({"site.ply", "-o", "world.world"}),
+                        {.file = "world.world", .field = "name", .value = "world"}));
+  EXPECT_TRUE(
+      bad_input(convert({"site.ply", "-o", "x.world", "--gravity", "venus"}), {.value = "venus"}));
   EXPECT_TRUE(bad_input(convert({"site.ply", "-o", "x.world", "--map", "site.ply"}),
-                        {"site.ply", "score"}));
+                        {.file = "site.ply", .field = "score"}));
   EXPECT_EQ(names_in_scratch(), before);
 }
 
