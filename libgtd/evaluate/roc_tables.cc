@@ -228,9 +228,22 @@ std::optional<bool> label_at(const Table& table, std::size_t row, std::size_t co
 }
 
 std::vector<std::string> default_score_columns(const Table& table, std::string_view label_column) {
-  static constexpr std::array<std::string_view, 15> known = {
-      "id",    "place",  "region",       "point",           "hold", "x", "y", "z", "i", "j", "k",
-      "found", "border", "trial_spread", "parameter_spread"};
+  static constexpr std::array<std::string_view, 16> known = {"id",
+                                                             "place",
+                                                             "region",
+                                                             "point",
+                                                             "hold",
+                                                             "x",
+                                                             "y",
+                                                             "z",
+                                                             "i",
+                                                             "j",
+                                                             "k",
+                                                             "found",
+                                                             "border",
+                                                             "edge",
+                                                             "trial_spread",
+                                                             "parameter_spread"};
   std::vector<std::string> names;
   for (std::size_t c = 0; c < table.columns.size(); ++c) {
     const std::string& name = table.columns[c];

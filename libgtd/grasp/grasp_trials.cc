@@ -399,10 +399,12 @@ void bind(libmap::ParameterTable& table, GraspOptions& options) {
             "approach from z (up), or along the normal of the ground");
   table.add("trials", options.poses, {1, 100000}, "poses of the gripper at each location");
   table.add("draws", options.draws, {1, 100000}, "draws of asperities at each pose");
-  table.add("best_draws", options.best_draws, {0, 100000},
-            "draws per pose with a computed force for the best load sharing");
+  table.add(
+      "best_draws", options.best_draws, {0, 100000},
+      "number of draws per pose for which the force with the best load sharing is also computed");
   table.add("seed", options.seed, not_negative, "random seed");
-  table.add("offset_m", options.offset_m, {0.0, 1.0}, "standard deviation of the palm position, m");
+  table.add("offset_m", options.offset_m, {0.0, 1.0},
+            "standard deviation of the palm position in x and in y, m");
   table.add("tilt_deg", options.tilt_deg, {0.0, 15.0},
             "standard deviation of the palm tilt, degrees");
   table.add("max_distance_m", options.max_distance_m, positive,

@@ -75,7 +75,7 @@ struct LocationResult {
   // Wilson interval of 95 %. Trials of one pose are correlated, so that a pose counts once.
   double hold_low = 0.0;
   double hold_high = 0.0;
-  std::vector<double> more_probabilities;  // for more_loads_n
+  std::vector<double> more_probabilities;  // for extra_loads_n
   std::array<double, 3> force_n{};         // equal sharing: quantiles 0.1, 0.5, 0.9
   std::array<double, 3> best_force_n{};    // best sharing: quantiles 0.1, 0.5, 0.9
   std::size_t limiting_direction = 0;      // most frequent weakest direction, trials with a force

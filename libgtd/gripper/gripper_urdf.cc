@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <optional>
@@ -352,13 +353,15 @@ class Finger {
 };
 
 Eigen::Matrix3d axis_from_palm(const UrdfMapping& mapping) {
-  Eigen::Vector3d axis = Eigen::Vector3d::Zero();
+  Eigen::Vector3d axis = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
   const auto words = libmap::split_list(mapping.palm_axis);
   for (Eigen::Index n = 0; n < 3 && words.size() == 3; ++n)
-    axis[n] = libmap::parse_double(words[static_cast<std::size_t>(n)]).value_or(0.0);
+    axis[n] = libmap::parse_double(words[static_cast<std::size_t>(n)])
+                  .value_or(std::numeric_limits<double>::quiet_NaN());
   if (!axis.allFinite() || !(axis.norm() > 0.0))
-    throw Error("not a direction",
-                {.field = "urdf.palm_axis", .value = mapping.palm_axis, .bound = "X,Y,Z"});
+    throw Error("not a direction", {.field = "urdf.palm_axis",
+                                    .value = mapping.palm_axis,
+                                    .bound = "three finite numbers X,Y,Z, not all 0"});
   return Eigen::Quaterniond::FromTwoVectors(axis, Eigen::Vector3d::UnitZ()).toRotationMatrix();
 }
 
@@ -417,7 +420,7 @@ void bind(libmap::ParameterTable& table, UrdfMapping& mapping) {
   table.add("urdf.palm_link", mapping.palm_link,
             "link with its origin at the center of the palm's face");
   table.add("urdf.palm_axis", mapping.palm_axis,
-            "X,Y,Z in the frame of the palm link, from the palm toward the ground");
+            "direction X,Y,Z from the palm toward the ground, in the frame of the palm link");
   table.add("urdf.finger_joint", mapping.finger_joint, "revolute joint between palm and finger");
   table.add("urdf.spine_joint", mapping.spine_joint, "joint between finger and spine carrier");
   table.add("urdf.tip_link", mapping.tip_link, "link with its origin at the spine tip");

@@ -47,10 +47,10 @@ struct MatchingLoops {
   // sums[n] += entering[n] - leaving[n].
   void (*slide)(std::uint16_t* sums, const std::uint16_t* entering, const std::uint16_t* leaving,
                 std::size_t count);
-  // For each index in `places`, computes the sum of `length` values of `sums` from there. Reads up
-  // to 64 bytes beyond.
-  void (*add_runs)(const std::uint16_t* sums, const std::uint32_t* bit_offsets,
-                   std::size_t bit_offset_count, std::size_t length, std::uint32_t* totals);
+  // Computes the sum of `length` values of `sums` from each index in `starts` on. Reads up to 64
+  // bytes beyond.
+  void (*add_runs)(const std::uint16_t* sums, const std::uint32_t* starts, std::size_t start_count,
+                   std::size_t length, std::uint32_t* totals);
 
   // Writes the voxel number of each point inside the box, in the order of the points, and returns
   // the number of values. `points` are coordinates, one array per axis. Up to a full set of lanes

@@ -111,15 +111,15 @@ void slide(std::uint16_t* sums, const std::uint16_t* entering, const std::uint16
 // Sums of pairs of neighbors.
 inline Numbers pairs_of(const Numbers& sums) { return (sums & 0xffff) + (sums >> 16); }
 
-void add_runs(const std::uint16_t* sums, const std::uint32_t* bit_offsets,
-              std::size_t bit_offset_count, std::size_t length, std::uint32_t* totals) {
+void add_runs(const std::uint16_t* sums, const std::uint32_t* starts, std::size_t start_count,
+              std::size_t length, std::uint32_t* totals) {
   constexpr std::size_t step = sizeof(Numbers) / sizeof(std::uint16_t);
   std::uint16_t kept[step] = {};  // values of the last register
   for (std::size_t y = 0; y < length % step; ++y) kept[y] = 0xffff;
   Numbers last, loaded;
   __builtin_memcpy(&last, kept, sizeof(Numbers));
-  for (std::size_t n = 0; n < bit_offset_count; ++n) {
-    const std::uint16_t* run = sums + bit_offsets[n];
+  for (std::size_t n = 0; n < start_count; ++n) {
+    const std::uint16_t* run = sums + starts[n];
     Numbers total = {};
     for (std::size_t k = 0; k < length / step; ++k, run += step) {
       __builtin_memcpy(&loaded, run, sizeof(Numbers));

@@ -23,7 +23,7 @@ struct Scenario {
   double voxel_size_m = 0.01;
   int extra_void_layers = 1;        // H_add
   int solid_voxel_threshold = 120;  // TSV
-  double load_n = 5.0;              // calibrated: pull of the hold probability
+  double load_n = 5.0;  // pull for which method calibrated predicts the hold probability, N
   // Minimum height of a target in the terrain frame; nullopt: 0. Not used by method calibrated,
   // which also predicts forces on level ground.
   std::optional<double> zero_plane_m;

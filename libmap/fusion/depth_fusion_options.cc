@@ -47,7 +47,8 @@ void bind(ParameterTable& table, DepthFusionOptions& options) {
   table.add("plane_radius_px", planes.radius_px, {1, 7},
             "radius of the disc of pixels that a plane is fitted to");
   table.add("min_pair_share", planes.min_pair_share, zero_to_one,
-            "minimum share of the pairs of opposite pixels around a pixel that agree with it");
+            "minimum share of pairs of opposite pixels around a pixel that agree with it; else it "
+            "has no plane");
   table.add("disc_radius_voxels", options.disc_radius_voxels, positive,
             "radius of the disc in which measurements are averaged, in voxels");
   table.add("pose_error_m", options.pose_error_m, not_negative,

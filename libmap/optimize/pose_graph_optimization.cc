@@ -466,7 +466,7 @@ PoseGraphResult Optimization::run() {
 
 void bind(ParameterTable& table, PoseGraphOptions& options) {
   table.add("recalibrate", options.recalibrate,
-            "scale the covariances of each type of links to match their residuals");
+            "scale the covariances of each group of links to match its residuals");
   table.add("recalibrations", options.recalibrations, {1},
             "maximum number of recalibration rounds of link covariances");
   table.add("robust_scale", options.robust_scale, not_negative,

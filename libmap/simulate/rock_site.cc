@@ -82,7 +82,7 @@ ParameterTable rock_parameters(SiteRock& rock) {
   ParameterTable table;
   table.add("name", rock.name, "name of the rock");
   table.add("shape", rock.shape, rock_shape_names(), "shape of the rock");
-  table.add("x_m", rock.x_m, Range{-100.0, 100.0}, "x on the ground, m");
+  table.add("x_m", rock.x_m, Range{-100.0, 100.0}, "x of the rock on the ground, m");
   table.add("y_m", rock.y_m, Range{-100.0, 100.0}, "y on the ground, m");
   table.add("height_m", rock.height_m, rock_size_range, "height of the top above the ground, m");
   table.add("width_m", rock.width_m, rock_size_range, "size along the rock's x axis, m");
@@ -93,7 +93,8 @@ ParameterTable rock_parameters(SiteRock& rock) {
   table.add("overhang_deg", rock.overhang_deg, Range{0.0, 35.0},
             "outward tilt of a third of the walls, degrees");
   table.add("cleft_m", rock.cleft_m, Range{0.0, 10.0}, "depth of a wedge cut into the top, m");
-  table.add("roughness", rock.roughness, Range{0.0, 1.5}, "relative amplitude of surface relief");
+  table.add("roughness", rock.roughness, Range{0.0, 1.5},
+            "factor of the rock's default surface relief; 0: smooth");
   table.add("seed", rock.seed, not_negative, "random seed of shape and colors");
   return table;
 }

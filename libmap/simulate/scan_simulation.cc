@@ -247,7 +247,7 @@ void bind(ParameterTable& table, LoopClosureOptions& options) {
   table.add("closure_node_gap", options.node_gap, {2.0, 1e6},
             "minimum difference between the node indices of a closure");
   table.add("closures_per_node", options.closures_per_node, {1.0, 1e6},
-            "maximum number of closures to earlier nodes, nearest first");
+            "maximum number of loop closures of each node, to the nearest earlier nodes");
   table.add("closure_shift_error_m", options.shift_error_m, positive,
             "standard deviation of a closure in each axis, m");
   table.add("closure_turn_error_deg", options.turn_error_deg, positive,

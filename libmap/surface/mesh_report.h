@@ -57,7 +57,7 @@ struct MeshReport {
   bool is_watertight() const {
     return is_closed() && is_manifold() && is_oriented() && self_intersections == 0;
   }
-  long euler_characteristic = 0;  // used vertices - edges + triangles
+  long euler_characteristic = 0;  // used vertices - edges + triangles without a repeated vertex
   // Sum over the components, with each boundary closed by a disc: components -
   // (euler_characteristic + boundaries) / 2. -1 unless manifold and oriented.
   long genus = -1;

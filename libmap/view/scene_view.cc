@@ -266,7 +266,7 @@ void bind(ParameterTable& table, SceneLayer& layer) {
             {{"automatic", PointShape::automatic},
              {"cube", PointShape::cube},
              {"square", PointShape::square}},
-            "shape of points");
+            "shape of points; automatic: cubes for points on a lattice, else squares");
   table.add("point_size_m", layer.point_size_m, not_negative,
             "side length of points, m; 0: from the point spacing");
   table.add("shading", layer.shading,

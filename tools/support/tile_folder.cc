@@ -12,7 +12,7 @@ TileFolder::TileData parse_facts(const std::string& text, const fs::path& file) 
   try {
     return libmap::parse_json<TileFolder::TileData>(text);
   } catch (const nlohmann::json::exception& error) {
-    throw libmap::Error(std::string("is broken: ") + error.what(), {.file = file.string()});
+    throw libmap::Error(std::string("cannot be parsed: ") + error.what(), {.file = file.string()});
   }
 }
 

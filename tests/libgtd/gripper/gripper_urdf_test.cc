@@ -287,6 +287,7 @@ TEST(GripperUrdf, BadMappings) {
   EXPECT_EQ(field_of(&UrdfMapping::palm_link, "plam"), "urdf.palm_link");
   EXPECT_EQ(field_of(&UrdfMapping::palm_axis, "down"), "urdf.palm_axis");
   EXPECT_EQ(field_of(&UrdfMapping::palm_axis, "0,0,0"), "urdf.palm_axis");
+  EXPECT_EQ(field_of(&UrdfMapping::palm_axis, "x,1,0"), "urdf.palm_axis");
   EXPECT_EQ(field_of(&UrdfMapping::finger_joint, "toe_*_joint"), "urdf.finger_joint");
   EXPECT_EQ(field_of(&UrdfMapping::spine_joint, "finger_*_wrist"), "urdf.spine_joint");
   EXPECT_EQ(field_of(&UrdfMapping::tip_link, "finger_*_claw"), "urdf.tip_link");
