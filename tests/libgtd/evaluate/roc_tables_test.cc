@@ -47,8 +47,8 @@ TEST(RocTables, LabelsInAnyUsualWriting) {
 
 TEST(RocTables, DefaultColumnsAreTheNumbersThatAreNeitherIdentityNorPlace) {
   const Table table = parse_csv(
-      "found,hold,place,i,x,y,z,distance_m,name,graspable,empty,score,mixed,ssv\n"
-      "1,1,1,1,1,1,1,1,a,1,,0.5,1,20\n2,2,2,2,2,2,2,2,b,0,,,b,30\n",
+      "found,hold,place,i,x,y,z,distance_m,name,graspable,empty,score,mixed,ssv,edge,border\n"
+      "1,1,1,1,1,1,1,1,a,1,,0.5,1,20,0,1\n2,2,2,2,2,2,2,2,b,0,,,b,30,1,0\n",
       "t.csv");
   EXPECT_THAT(libgtd::default_score_columns(table, "graspable"), ElementsAre("score", "ssv"));
   EXPECT_THAT(libgtd::default_score_columns(table, "score"), ElementsAre("graspable", "ssv"));
