@@ -12,8 +12,7 @@ std::vector<std::string> beginnings(const ExpectedError& expected) {
   const std::string file = expected.file.empty() ? "" : expected.file.string() + ": ";
   if (expected.field.empty())
     return {file + (expected.value.empty() ? "" : "'" + expected.value + "': ")};
-  if (expected.value.empty())
-    return {file + expected.field + ": ", file + expected.field + " is "};
+  if (expected.value.empty()) return {file + expected.field + ": ", file + expected.field + " is "};
   return {file + expected.field + " is " + expected.value + ": "};
 }
 
@@ -24,11 +23,11 @@ testing::AssertionResult is_error(const libmap::Error& error, const ExpectedErro
   const auto differs = [](const std::string& part, const std::string& expected_part) {
     return !expected_part.empty() && part != expected_part;
   };
-  const char* part = differs(context.file, expected.file.string()) ? "file"
-                     : differs(context.field, expected.field)      ? "field"
-                     : differs(context.value, expected.value)      ? "value"
-                     : differs(context.bound, expected.bound)      ? "bound"
-                     : error.kind() != expected.kind               ? "kind"
+  const char* part = differs(context.file, expected.file.string())              ? "file"
+                     : differs(context.field, expected.field)                   ? "field"
+                     : differs(context.value, expected.value)                   ? "value"
+                     : differs(context.bound, expected.bound)                   ? "bound"
+                     : error.kind() != expected.kind                            ? "kind"
                      : error.reason().find(expected.about) == std::string::npos ? "reason"
                                                                                 : nullptr;
   if (part == nullptr) return testing::AssertionSuccess();

@@ -23,8 +23,8 @@ struct ExpectedError {
 
 testing::AssertionResult is_error(const libmap::Error& error, const ExpectedError& expected);
 
-// Compares the text of an error, "FILE: FIELD is VALUE: REASON (must be BOUND)", as a command prints
-// it. Does not compare the kind.
+// Compares the text of an error, "FILE: FIELD is VALUE: REASON (must be BOUND)", as a command
+// prints it. Does not compare the kind.
 testing::AssertionResult is_error_text(const std::string& text, const ExpectedError& expected);
 
 }  // namespace graspmap_test

@@ -214,8 +214,8 @@ TEST(Extract, RefusesWhatIsNoScanAndOutputsOfNoUse) {
   EXPECT_FALSE(fs::exists(scratch("out")));
   EXPECT_TRUE(bad_input(graspmap({"convert", "scan.db", "-o", "text.db"}), {.file = "text.db"}));
   ASSERT_TRUE(succeeded(graspmap({"convert", "scan.db", "-o", "out"})));
-  EXPECT_TRUE(
-      bad_input(graspmap({"convert", "out", "-o", "out/"}), {.file = "out/", .about = "is the input"}));
+  EXPECT_TRUE(bad_input(graspmap({"convert", "out", "-o", "out/"}),
+                        {.file = "out/", .about = "is the input"}));
 }
 
 TEST(Extract, FoldersOfOtherCommandsAreKept) {

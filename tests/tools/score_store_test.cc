@@ -365,7 +365,8 @@ TEST_F(ScoreStoreAgain, ForeignFoldersAreNotTouched) {
   graspmap_test::write_text(scratch("n.tiles"), "a file");
   EXPECT_TRUE(bad_input(score("in", "n.tiles"), {.file = "n.tiles", .about = "a file"}));
   fs::rename(scratch("in"), scratch("in.tiles"));
-  EXPECT_TRUE(bad_input(score("in.tiles", "in.tiles"), {.file = "in.tiles", .about = "is the input"}));
+  EXPECT_TRUE(
+      bad_input(score("in.tiles", "in.tiles"), {.file = "in.tiles", .about = "is the input"}));
 }
 
 TEST_F(ScoreStoreAgain, OneProcessAShare) {
