@@ -54,8 +54,8 @@ SurfaceVoxels thick_plane(const Eigen::Vector3f& normal, int half) {
   for (int n = 0; n < 400 * half * half; ++n) {
     Eigen::Vector3f position(static_cast<float>(uniform(-half, half)),
                              static_cast<float>(uniform(-half, half)), 0);
-    place.z() = -(normal.x() * place.x() + normal.y() * place.y()) / normal.z();
-    voxels.add(place + static_cast<float>(uniform(-0.4, 0.4)) * normal, normal, 1.0F);
+    position.z() = -(normal.x() * position.x() + normal.y() * position.y()) / normal.z();
+    voxels.add(position + static_cast<float>(uniform(-0.4, 0.4)) * normal, normal, 1.0F);
   }
   return voxels;
 }
