@@ -69,7 +69,7 @@ TEST(LaserScan, WhatIsBroken) {
   }
   EXPECT_TRUE(is_error(
       error_of([&] { libmap::check_laser_scan(scan_blob(9, std::vector<float>(9, 1.0F)), ""); }),
-      {.value = "-1"}));
+      {.value = "9"}));
 }
 
 }  // namespace laser_scan_test

@@ -80,9 +80,9 @@ TEST(RtabmapReader, LinksWithoutAVarianceAreNamed) {
   execute(file, "UPDATE Link SET trans_variance = 9e999 WHERE from_id = 2 AND to_id = 1");
   const RtabmapDatabase scan(file);
   EXPECT_EQ(scan.graph().links.size(), links - 1);
-  EXPECT_EQ(scan.warnings(),
-            (std::vector<std::string>{"link 1 -> 2: dropped: variance is not > 0",
-                                      "link 2 -> 1: dropped: variance is not > 0"}));
+  EXPECT_EQ(scan.warnings(), (std::vector<std::string>{
+                                 "link 1 -> 2: dropped: variance is not finite and positive",
+                                 "link 2 -> 1: dropped: variance is not finite and positive"}));
   execute(file, "UPDATE Link SET rot_variance = 1e-310 WHERE from_id = 1 AND to_id = 2");
   EXPECT_EQ(RtabmapDatabase(file).warnings().front(),
             "link 1 -> 2: dropped: reciprocal of the variance exceeds 1e300");
@@ -375,7 +375,7 @@ TEST(RtabmapReader, PolygonsOfSeveralMaterials) {
        {std::pair{std::vector<std::int32_t>{2, 0, 1, 2, 3, 4}, 3}, {{-1}, 3}, {{1, 0, 1, 2}, 0}})
     EXPECT_TRUE(graspmap_test::is_error(
         error_of([&, &numbers = numbers, corners = corners] { polygons(numbers, corners); }),
-        {.file = file, .field = "Admin.opt_polygons"}));
+        {.file = file, .about = "Admin.opt_polygons"}));
 }
 
 // -------------------------------------------------------------------------------------- real files
