@@ -50,19 +50,19 @@ def run(part, options, source):
     results = json.loads((options.folder / f"{name}.tum.json").read_text())["results"]
     frames = sum(not line.startswith("#") for line in (scan / "rgb.txt").read_text().splitlines())
     found = {"frames": frames, "poses": results["poses"], "rmse_mm": 1e3 * results["trajectory_rmse_m"],
-             "rotation_deg": results["trajectory_rotation_error_deg"], "sensor": results["sensor"],
+             "rotation_deg": results["trajectory_rotation_error_deg"],
              "processor_s": processor, "wall_s": wall, "mebibytes": mebibytes}
     kept.write_text(json.dumps(found, indent=1))
     return found
 
 
 def table_of(rows):
-    lines = ["| part | poses | RMSE mm | rotation deg | processor s per frame | MiB | findings |",
-             "|---|---|---|---|---|---|---|"]
+    lines = ["| part | poses | RMSE mm | rotation deg | processor s per frame | MiB |",
+             "|---|---|---|---|---|---|"]
     for part, row in rows.items():
         lines.append(f"| {part} | {row['poses']} of {row['frames']} | {row['rmse_mm']:.1f} "
                      f"| {row['rotation_deg']:.2f} | {row['processor_s'] / row['frames']:.2f} "
-                     f"| {row['mebibytes']:.0f} | {row['sensor'] or 'none'} |")
+                     f"| {row['mebibytes']:.0f} |")
     return "\n".join(lines)
 
 
