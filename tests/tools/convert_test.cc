@@ -129,7 +129,7 @@ TEST(Convert, WhatAFormatHasNoPlaceForIsSaid) {
   };
   EXPECT_EQ(told("m.vtp"), "");
   EXPECT_NE(told("m.stl").find(".stl cannot store: colors, seen"), std::string::npos);
-  EXPECT_NE(told("m.stl").find("off by up to 100 mm"), std::string::npos);
+  EXPECT_NE(told("m.stl").find("change by up to 100 mm"), std::string::npos);
   EXPECT_NE(told("m.obj").find(".obj cannot store: seen"), std::string::npos);
   EXPECT_EQ(told("m.obj").find("single precision"), std::string::npos);
 }

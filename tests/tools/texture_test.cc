@@ -212,9 +212,7 @@ TEST(Texture, PosesThatTheScanLacksAreNamed) {
   EXPECT_TRUE(ended_with(texture({"--frame", "ground-truth"}),
                          {.file = "scan.db", .field = "--frame", .value = "ground-truth"}));
   graspmap_test::execute(scan, "UPDATE Node SET pose = x'01' WHERE id = 1");
-  EXPECT_TRUE(
-      ended_with(texture({"--strict"}),
-                 {.file = "scan.db", .field = "node 1: pose", .value = "1 bytes", .bound = "48"}));
+  EXPECT_TRUE(ended_with(texture({"--strict"}), {.file = "scan.db", .about = "node 1: pose"}));
   graspmap_test::execute(scan, "UPDATE Node SET pose = NULL");
   graspmap_test::execute(scan, "UPDATE Admin SET opt_ids = NULL, opt_poses = NULL");
   EXPECT_TRUE(ended_with(texture({}), {.file = "scan.db", .about = "--poses"}));

@@ -125,13 +125,13 @@ TEST(WorldCommand, BadInputWritesNothing) {
   EXPECT_TRUE(bad_input(convert({"site.ply", "-o", "x.world", "--rig", "none.yaml"}),
                         {.file = "none.yaml", .about = "camera"}));
   EXPECT_TRUE(bad_input(convert({"site.ply", "-o", "x.world", "--rig", "name.yaml"}),
-                        {.file = "name.yaml", .value = "a::b"}));
+                        {.file = "name.yaml", .field = "name of a camera", .value = "a::b"}));
   EXPECT_TRUE(bad_input(convert({"site.ply", "-o", "a::b.world"}),
                         {.file = "a::b.world", .field = "name", .value = "a::b"}));
   EXPECT_TRUE(bad_input(convert({"site.ply", "-o", "world.world"}),
                         {.file = "world.world", .field = "name", .value = "world"}));
-  EXPECT_TRUE(
-      bad_input(convert({"site.ply", "-o", "x.world", "--gravity", "venus"}), {.value = "venus"}));
+  EXPECT_TRUE(bad_input(convert({"site.ply", "-o", "x.world", "--gravity", "venus"}),
+                        {.field = "--gravity", .value = "venus"}));
   EXPECT_TRUE(bad_input(convert({"site.ply", "-o", "x.world", "--map", "site.ply"}),
                         {.file = "site.ply", .field = "score"}));
   EXPECT_EQ(names_in_scratch(), before);
