@@ -39,6 +39,7 @@ struct Rate {
   std::size_t count = 0;
   std::size_t total = 0;
 
+  // count / total; nullopt if total is 0.
   std::optional<double> value() const;
   std::optional<Interval> wilson_95() const;  // Wilson 1927, no continuity correction
 };

@@ -25,6 +25,7 @@ struct EdgeAgreement {
   Pose color_from_depth = Pose::Identity();  // the alternative, without a shift along the axis
   double focal_factor = 1.0;                 // focal length of depth, relative to the stored one
 
+  // Returns true if depth is clearly not registered to color.
   bool is_displaced() const;
   // The depth camera has clearly another focal length than stored.
   bool is_scaled() const;

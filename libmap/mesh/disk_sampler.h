@@ -25,6 +25,7 @@ struct PlacedFragment {
   Fragment fragment;
   std::array<Eigen::Vector3d, 3> corners;
 
+  // Area, m^2.
   double area_m2() const;
   double square_of_longest_side() const;  // m^2
   // Bisects the longest side (Rivara 1984).
@@ -55,7 +56,8 @@ class SurfaceFragments {
   SurfaceFragments(const SurfaceFragments& triangles, double longest_m, std::size_t max_parts);
 
   const std::vector<SurfaceBlock>& blocks() const { return blocks_; }
-  double area_m2() const;  // of all pieces
+  double area_m2() const;  // of all fragments
+  // Fragment with this index and the positions of its corners.
   PlacedFragment piece(std::size_t number) const;
 
  private:

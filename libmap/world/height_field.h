@@ -33,6 +33,7 @@ struct HeightField {
   // one cell.
   double deviation_m = 0.0;
 
+  // Lowest and highest node, m above base_m.
   float min_m() const;
   float max_m() const;
   // First and last column, first and last row of the cells that a triangle's box touches.

@@ -38,8 +38,10 @@ class XmlWriter {
     close();
   }
   void element(const char* name, Attributes attributes);
+  // Writes an element that contains a text.
   void text(const char* name, const std::string& text);
 
+  // Returns the document.
   std::string str() const;
 
  private:

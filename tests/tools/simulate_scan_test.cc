@@ -191,7 +191,7 @@ TEST(SimulateScanCommand, TakesASensorByName) {
   EXPECT_EQ(made({"--config", "near.yaml"}), made({"--sensor", "kinect-v1", "--near", "0.7"}));
   EXPECT_EQ(made({"--sensor", "d435"}), made({"--sensor", "realsense-d435"}));
   EXPECT_TRUE(bad_input(graspmap(scan({"-o", "x.db", "--sensor", "kinekt-v1"})),
-                        {.value = "kinekt-v1", .about = "kinect-v1"}));
+                        {.field = "sensor", .value = "kinekt-v1", .about = "kinect-v1"}));
 }
 
 TEST(SimulateScanCommand, AlongAGivenTrajectory) {
