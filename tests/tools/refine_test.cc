@@ -314,7 +314,8 @@ TEST(Refine, UnusableLinksAndFramesAreLeftOutAndNamed) {
   ASSERT_TRUE(succeeded(result));
   EXPECT_NE(result.standard_error.find("link 1 -> 2: "), std::string::npos)
       << result.standard_error;
-  EXPECT_NE(result.standard_error.find("node 4 has no features"), std::string::npos) << result.standard_error;
+  EXPECT_NE(result.standard_error.find("node 4 has no features"), std::string::npos)
+      << result.standard_error;
 }
 
 // A length twice as long makes a scale twice as large.
