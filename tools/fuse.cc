@@ -1,4 +1,5 @@
 // graspmap fuse: fuses the depth images of a scan into one oriented, colored cloud.
+#include "libmap/camera/sensor_model.h"
 #include "libmap/fusion/depth_fusion.h"
 #include "libmap/fusion/edge_agreement.h"
 #include "libmap/fusion/pose_consistency.h"
@@ -289,6 +290,7 @@ int fuse_scan(int argc, char** argv) {
   libmap::bind(command.parameters(), options.fusion);
   return command.run(argc, argv, [&](Run& run) {
     require_folder_of_share(options.output, options.tile);
+    if (options.fusion.sensor != "auto") libmap::sensor_file(options.fusion.sensor);
     fuse(options, run);
   });
 }

@@ -86,7 +86,7 @@ void prepare_normals(const MeshOptions& options, libmap::PointCloud& cloud, Run&
       [](const Eigen::Vector3f& normal) { return normal.allFinite() && !normal.isZero(0.0F); });
   if (options.normals != NormalSource::estimate && cloud.has_normals()) {
     if (has_any) return orient_if_mixed(options, cloud, run);
-    throw libmap::Error("all normals are zero or NaN; use --normals estimate",
+    throw libmap::Error("use --normals estimate",
                         {.file = options.cloud, .field = "normals", .value = "all zero or NaN"});
   }
   if (options.normals == NormalSource::cloud)

@@ -204,6 +204,8 @@ TEST(Fuse, NodesWithoutAPoseAreCounted) {
 TEST(Fuse, PosesThatAreNotThere) {
   GRASPMAP_REQUIRE_DATA();
   const std::string killed = scan_file("site_killed.db");
+  EXPECT_TRUE(bad_input(graspmap({"fuse", killed, "--sensor", "kinekt-v1", "-o", "cloud.ply"}),
+                        {.field = "sensor", .value = "kinekt-v1", .about = "kinect-v1"}));
   EXPECT_TRUE(bad_input(graspmap({"fuse", killed, "--poses", "optimized", "-o", "cloud.ply"}),
                         {.field = "--poses", .value = "optimized"}));
   EXPECT_TRUE(bad_input(graspmap({"fuse", killed, "--poses", "odometri", "-o", "cloud.ply"}),
