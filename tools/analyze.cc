@@ -56,7 +56,8 @@ void bind(libmap::ParameterTable& table, AnalyzeOptions& options) {
   table.add("points_frame", options.points_frame, point_frame_names(),
             "frame of the start or of the expected regions: of the scored cloud, the terrain, or "
             "the map before it was cropped");
-  table.add("pictures", options.images, "draw images and charts");
+  table.add_former_key("pictures", "images");
+  table.add("images", options.images, "draw images and charts");
   bind(table, options.table);
 }
 

@@ -49,9 +49,11 @@ void bind(libmap::ParameterTable& table, CompareOptions& options) {
   table.add("seed", options.seed, {}, "random seed of the samples");
   table.add("icp", options.icp, "align A with B by point-to-plane ICP first");
   bind(table, options.alignment);
-  table.add("picture_range_m", options.image_range_m, libmap::not_negative,
+  table.add_former_key("picture_range_m", "image_range_m");
+  table.add_former_key("picture_view", "image_view");
+  table.add("image_range_m", options.image_range_m, libmap::not_negative,
             "distance at the end of the image's color scale, m; 0: the 98th percentile");
-  table.add("picture_view", options.view.view,
+  table.add("image_view", options.view.view,
             {{"top", libmap::Viewpoint::top},
              {"oblique", libmap::Viewpoint::oblique},
              {"front", libmap::Viewpoint::front},
@@ -443,7 +445,8 @@ int compare_surfaces(int argc, char** argv) {
   command.input("B", options.b, "reference surface: a mesh or a cloud");
   command.output(options.output,
                  "A's points in B's frame with the fields distance and signed_distance", false);
-  command.option("--picture", "FILE.png", options.image,
+  command.renamed_flag("--picture", "--image");
+  command.option("--image", "FILE.png", options.image,
                  "image of A's points, colored by their signed distance");
   command.option("--transform", "X,Y,Z,ROLL,PITCH,YAW|FILE|crop", options.transform,
                  "transform from A to B: meters and degrees about the fixed axes, roll first; a "

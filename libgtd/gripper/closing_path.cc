@@ -22,8 +22,19 @@ constexpr std::uint64_t generator = 184;
 constexpr std::size_t step_deg = 5;  // interpolated linearly
 constexpr double max_spread = 4.0;   // of pulls that are nearly always 0
 
-// Draws psi of the facets that the spines of one finger meet, rad, descending.
-std::vector<double> draw_leans(const Gripper& gripper, double share, std::uint64_t draw) {
+// A slope of the ground or of a facet.
+struct Slope {
+  double angle = 0.0;  // rad
+  double sine = 0.0;
+  double cosine = 1.0;
+
+  explicit Slope(double angle_rad)
+      : angle(angle_rad), sine(std::sin(angle_rad)), cosine(std::cos(angle_rad)) {}
+};
+
+// Draws the facets that the spines of one finger meet: psi + atan(friction) - 90 degrees,
+// descending.
+std::vector<Slope> draw_facets(const Gripper& gripper, double share, std::uint64_t draw) {
   constexpr std::uint64_t seed = 0x66696e676572;
   libmap::RandomStream shifts(seed, 0);
   std::uint64_t power = draw;
@@ -43,24 +54,33 @@ std::vector<double> draw_leans(const Gripper& gripper, double share, std::uint64
           libmap::radians_per_degree);
   }
   std::sort(leans.begin(), leans.end(), std::greater<>());
-  return leans;
+  const double shift = std::atan(gripper.engagement.friction) - std::numbers::pi / 2.0;
+  std::vector<Slope> facets;
+  for (const double lean : leans) facets.emplace_back(lean + shift);
+  return facets;
 }
 
-// Pull in closing forces; `limit` of one spine, too.
-double pull_of(const std::vector<double>& leans, double fall, double phi, double limit,
+// Pull in closing forces; `limit` of one spine, too. `steepness` of a facet: psi + atan(friction) -
+// 90 degrees, descending.
+double pull_of(const std::vector<Slope>& steepness, const Slope& fall, double limit,
                bool drive_holds) {
   constexpr double right_angle = std::numbers::pi / 2.0;
-  const double sine = std::sin(fall);
   const double reaction =
-      drive_holds ? std::max(0.0, sine * std::cos(fall)) / (1.0 + sine * sine) : 0.0;
+      drive_holds ? std::max(0.0, fall.sine * fall.cosine) / (1.0 + fall.sine * fall.sine) : 0.0;
   double most = 0.0;
-  for (std::size_t k = 0; k < leans.size(); ++k) {
-    const double angle = fall + leans[k] + phi - right_angle;
+  double count = 0.0;
+  for (const Slope& facet : steepness) {
+    const double angle = fall.angle + facet.angle;
     if (angle <= 0.0) break;
-    double pull = static_cast<double>(k + 1) * limit * std::sin(std::min(angle, right_angle));
+    count += 1.0;
+    double pull = count * limit;
     if (angle < right_angle) {
-      const double slope = std::tan(angle);
-      if (reaction * slope < 1.0) pull = std::min(pull, slope / (1.0 - reaction * slope));
+      const double sine = fall.sine * facet.cosine + fall.cosine * facet.sine;
+      const double cosine = fall.cosine * facet.cosine - fall.sine * facet.sine;
+      pull *= sine;
+      // tan / (1 - reaction tan), without a bound where the reaction alone holds
+      if (const double rest = cosine - reaction * sine; rest > 0.0)
+        pull = std::min(pull, sine / rest);
     }
     most = std::max(most, pull);
   }
@@ -79,15 +99,17 @@ struct Pulls {
 Pulls pulls_of(const Gripper& gripper) {
   const GripperFingers& fingers = *gripper.fingers;
   const double share = engagement_share(gripper.engagement, fingers.spine_tip_radius_um);
-  const double phi = std::atan(gripper.engagement.friction);
+  std::vector<Slope> slopes;
+  for (std::size_t n = 0; n < falls; n += step_deg)
+    slopes.emplace_back((static_cast<double>(n) - 90.0) * libmap::radians_per_degree);
   Pulls pulls;
   std::array<double, falls>& means = pulls.means;
   double squares = 0.0;
   for (std::uint64_t draw = 0; draw < draws; ++draw) {
-    const std::vector<double> leans = draw_leans(gripper, share, draw);
+    const std::vector<Slope> facets = draw_facets(gripper, share, draw);
     for (std::size_t n = 0; n < falls; n += step_deg) {
       const double pull =
-          pull_of(leans, (static_cast<double>(n) - 90.0) * libmap::radians_per_degree, phi,
+          pull_of(facets, slopes[n / step_deg],
                   fingers.spine_force_limit_n / fingers.closing_force_n, fingers.holds_when_closed);
       means[n] += pull / draws;
       if (n == level) squares += pull * pull / draws;

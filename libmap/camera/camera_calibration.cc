@@ -245,7 +245,7 @@ CameraCalibrationResult calibrate_once(const std::vector<BoardImage>& images, in
                                        const CameraCalibrationOptions& options) {
   if (images.size() < min_images)
     throw Error("too few distinct images of the board",
-                {.field = "pictures",
+                {.field = "images",
                  .value = std::to_string(images.size()),
                  .bound = ">= " + std::to_string(min_images) + ", better 15 and more"});
   const BoardCorners corners = corners_of(images, options.board);
@@ -358,7 +358,8 @@ void bind(ParameterTable& table, CameraCalibrationOptions& options) {
   table.add("lens", options.lens, lens_model_names(),
             "distortion model; plumb_bob: k1 k2 p1 p2 k3; rational: k1 k2 p1 p2 k3 k4 k5 k6; "
             "equidistant: k1 k2 k3 k4 of a fisheye lens");
-  table.add("max_picture_error_px", options.max_image_error_px, not_negative,
+  table.add_former_key("max_picture_error_px", "max_image_error_px");
+  table.add("max_image_error_px", options.max_image_error_px, not_negative,
             "maximum RMS reprojection error; worse images are rejected, pixels; 0: no limit");
 }
 

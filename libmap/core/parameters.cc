@@ -141,7 +141,13 @@ std::vector<std::string> ParameterTable::keys() const {
   return keys;
 }
 
+void ParameterTable::add_former_key(std::string earlier, std::string now) {
+  former_keys_.emplace(std::move(earlier), std::move(now));
+}
+
 const Parameter* ParameterTable::find(std::string_view key) const {
+  if (const auto former = former_keys_.find(key); former != former_keys_.end())
+    key = former->second;
   for (const Parameter& parameter : parameters_)
     if (parameter.key == key) return &parameter;
   return nullptr;
@@ -224,7 +230,9 @@ std::vector<std::string> set_from_yaml(const ParameterTable& table, const std::s
             continue;
           }
           if (!table.knows(key)) throw unknown_key(key, known);
-          if (!seen.insert(key).second) throw Error("is a duplicate", {.field = key});
+          const Parameter* parameter = table.find(key);
+          if (!seen.insert(parameter == nullptr ? key : parameter->key).second)
+            throw Error("is a duplicate", {.field = key});
           if (!entry.second.IsScalar()) throw Error("not a single value", {.field = key});
           values.emplace_back(key, entry.second.as<std::string>());
         }

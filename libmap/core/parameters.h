@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -56,13 +57,20 @@ class ParameterTable {
   void add(std::string key, Enum& field, const std::vector<std::pair<std::string, Enum>>& names,
            std::string description);
 
+  // Makes `earlier`, a key of an earlier version, a second name of the key `now`.
+  void add_former_key(std::string earlier, std::string now);
+  const std::map<std::string, std::string, std::less<>>& former_keys() const {
+    return former_keys_;  // current key by its earlier name
+  }
+
   // Collects keys "PREFIX.KEY" as text for a second table that is read from a file first
   // ("gripper.opening_angle_deg"). The last text of a key counts; the caller checks the names.
   void add_overrides(std::string prefix, std::vector<std::pair<std::string, std::string>>& texts);
 
   const std::vector<Parameter>& parameters() const { return parameters_; }
-  std::vector<std::string> keys() const;              // in the order of insertion
-  const Parameter* find(std::string_view key) const;  // nullptr if there is no such key
+  std::vector<std::string> keys() const;  // in the order of insertion
+  // Returns the parameter with this current or former key, or nullptr.
+  const Parameter* find(std::string_view key) const;
   // True if set() accepts this key: a parameter, or a key with the prefix of overrides.
   bool knows(std::string_view key) const;
   // Keys and values as text in the format of set_from_yaml, overrides included.
@@ -84,6 +92,7 @@ class ParameterTable {
 
   std::vector<Parameter> parameters_;
   std::vector<std::pair<std::string, Overrides*>> overrides_;  // by prefix
+  std::map<std::string, std::string, std::less<>> former_keys_;
 };
 
 // Throws Error naming field, value and bound if a field of `options` violates the range or the

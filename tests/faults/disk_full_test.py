@@ -41,7 +41,7 @@ MORE = [
     "texture {good}/mesh.ply --scan {good}/scan.db --frame ground-truth --texture-size 256 -o out.obj",
     "texture {good}/mesh.ply --scan {good}/scan.db --frame ground-truth --texture-size 256 -o out.glb",
     "analyze {good}/map.pcd {good}/map.pcd -o out",
-    "compare {good}/terrain.pcd {good}/mesh.ply --picture out.png",
+    "compare {good}/terrain.pcd {good}/mesh.ply --image out.png",
     "calibrate {good}/pictures --report out -o out.yaml",
     "mask --sections -o out.png",
     "mask -o out.pcd",

@@ -61,7 +61,7 @@ TEST(Analyze, AgainstItselfInAnotherFrameNothingChanges) {
   score("map.pcd");
   score("input.pcd", {"--frame", "input"});
   ASSERT_TRUE(succeeded(graspmap(
-      {"analyze", "map.pcd", "--against", "input.pcd", "-o", "out", "--border", "--no-pictures"})));
+      {"analyze", "map.pcd", "--against", "input.pcd", "-o", "out", "--border", "--no-images"})));
   const auto change = json_of("out/summary.json").at("change");
   EXPECT_EQ(change.at("matching"), "lattice");
   EXPECT_EQ(change.at("evaluated").at("kappa").at("value"), 1.0);
@@ -83,7 +83,7 @@ TEST(Analyze, SameBytesForAnyNumberOfThreadsAndAnyOrderOfPoints) {
   for (const auto& [file, threads] : {std::pair("map.pcd", "1"), std::pair("turned.pcd", "2")})
     ASSERT_TRUE(succeeded(
         graspmap({"analyze", file, "--against", "map.pcd", "-o", "by_" + std::string(threads),
-                  "--threads", threads, "--no-pictures", "--border"})));
+                  "--threads", threads, "--no-images", "--border"})));
   for (const char* name : {"summary.json", "histogram.csv", "by_height.csv", "by_slope.csv",
                            "regions.csv", "region_links.csv", "change.csv", "change.pcd"})
     EXPECT_EQ(content("by_1/" + std::string(name)), content("by_2/" + std::string(name))) << name;
@@ -99,14 +99,14 @@ TEST(Analyze, MapsWithoutAManifestAndStarts) {
     }
   graspmap_test::write_text(scratch("map.csv"), text);
   const auto result =
-      graspmap({"analyze", "map.csv", "-o", "out", "--no-pictures", "--stride", "0.11"});
+      graspmap({"analyze", "map.csv", "-o", "out", "--no-images", "--stride", "0.11"});
   ASSERT_TRUE(succeeded(result));
   EXPECT_NE(result.standard_error.find("manifest"), std::string::npos);
   EXPECT_NE(result.standard_error.find("2 regions"), std::string::npos);
   auto regions = json_of("out/summary.json").at("regions");
   EXPECT_EQ(regions.at("groups"), 1);
   EXPECT_NEAR(regions.at("joining_stride_m").get<double>(), 0.11, 1e-6);
-  ASSERT_TRUE(succeeded(graspmap({"analyze", "map.csv", "-o", "out", "--no-pictures", "--stride",
+  ASSERT_TRUE(succeeded(graspmap({"analyze", "map.csv", "-o", "out", "--no-images", "--stride",
                                   "0.05", "--start", "0.18,0.05,0"})));
   regions = json_of("out/summary.json").at("regions");
   EXPECT_EQ(regions.at("start_region"), 2);
@@ -122,6 +122,7 @@ TEST(Analyze, PlacesFarFromTheOriginAreExact) {
              libmap::to_fixed_text(5334567.205 + 0.01 * j, 3) + ",100.005,0.9,1," +
              std::to_string(i) + "," + std::to_string(j) + ",0\n";
   graspmap_test::write_text(scratch("map.csv"), map);
+  // --no-pictures is the earlier name of --no-images.
   ASSERT_TRUE(succeeded(graspmap({"analyze", "map.csv", "-o", "out", "--no-pictures"})));
   const libmap::Table regions = libmap::read_csv(scratch("out/regions.csv"));
   ASSERT_EQ(regions.rows.size(), 1U);
@@ -139,7 +140,7 @@ TEST(Analyze, VoxelsTooLargeForTheirDistances) {
       R"({"made_by": "graspmap", "version": "0.1.0", "command": "score", "inputs": [],
           "parameters": {"voxel_size_m": 1e200, "zero_plane_m": 0.0}, "frame": "terrain",
           "transforms": {}, "results": {"lattice_origin_m": [0, 0, 0]}})");
-  EXPECT_TRUE(bad_input(graspmap({"analyze", "map.csv", "-o", "out", "--no-pictures"}),
+  EXPECT_TRUE(bad_input(graspmap({"analyze", "map.csv", "-o", "out", "--no-images"}),
                         {.file = "map.csv",
                          .field = "voxel_size_m",
                          .value = "1e+200",

@@ -138,8 +138,7 @@ TEST(Calibrate, BadInputIsOneLineAndLeavesNothing) {
     return graspmap(words);
   };
   EXPECT_TRUE(bad_input(run({"none.png"}), {.file = "none.png", .about = "no such"}));
-  EXPECT_TRUE(
-      bad_input(run({"shots/00.png", "shots/01.png"}), {.field = "pictures", .value = "2"}));
+  EXPECT_TRUE(bad_input(run({"shots/00.png", "shots/01.png"}), {.field = "images", .value = "2"}));
   EXPECT_TRUE(bad_input(run({"shots", "--board", "9x7"}), {.field = "--board", .value = "9x7"}));
   EXPECT_TRUE(bad_input(run({"shots", "--board", "9"}), {.field = "--board", .value = "9"}));
   EXPECT_TRUE(bad_input(run({"shots", "--square-mm", "0"}),
@@ -163,7 +162,7 @@ TEST(Calibrate, BadInputIsOneLineAndLeavesNothing) {
                         {.file = "camera.txt", .about = "YAML"}));
   // Repeated images add no information.
   EXPECT_TRUE(bad_input(run({"shots/00.png", "shots/00.png", "shots/00.png", "shots/00.png"}),
-                        {.field = "pictures", .value = "1"}));
+                        {.field = "images", .value = "1"}));
   EXPECT_TRUE(bad_input(graspmap({"calibrate", "shots", "-o", "shots/00.png"}),
                         {.file = "shots/00.png", .about = "is the input"}));
   EXPECT_FALSE(fs::exists(scratch("camera.yaml")));

@@ -281,7 +281,7 @@ TEST(Compare, ImageOfSignedDistances) {
     for (int y = 0; y < 100; ++y)
       cloud.positions.emplace_back(0.005 + 0.01 * x, 0.005 + 0.01 * y, x < 50 ? 0.004 : -0.004);
   libmap::write_cloud(scratch("halves.ply"), cloud);
-  ASSERT_TRUE(succeeded(graspmap({"compare", "halves.ply", "square.ply", "--picture", "map.png"})));
+  ASSERT_TRUE(succeeded(graspmap({"compare", "halves.ply", "square.ply", "--image", "map.png"})));
   const libmap::ColorImage image = libmap::decode_color(content("map.png"));
   std::size_t red = 0;
   std::size_t blue = 0;
@@ -302,7 +302,7 @@ TEST(Compare, ImageOfSignedDistances) {
   EXPECT_NEAR(static_cast<double>(red) / static_cast<double>(blue), 1.0, 0.05);
   EXPECT_LT(red_column / static_cast<double>(red), blue_column / static_cast<double>(blue));
   EXPECT_NEAR(json_of("map.png.json").at("results").at("rmse_m"), 0.004, 1e-8);
-  EXPECT_TRUE(bad_input(graspmap({"compare", "halves.ply", "square.ply", "--picture", "map.jpg"}),
+  EXPECT_TRUE(bad_input(graspmap({"compare", "halves.ply", "square.ply", "--image", "map.jpg"}),
                         {.file = "map.jpg", .about = ".png"}));
 }
 

@@ -360,6 +360,13 @@ libmap::Error Command::Parts::placed(const libmap::Error& error) const {
 
 // Returns the arguments with earlier names of flags replaced, up to "--".
 std::vector<std::string> Command::Parts::with_current_flags(int argc, char** argv) const {
+  std::map<std::string, std::string> renamed_flags = this->renamed_flags;
+  for (const auto& [earlier, now] : table.former_keys()) {
+    const std::string was = libmap::flag_of(earlier);
+    const std::string is = libmap::flag_of(now);
+    renamed_flags[was] = is;
+    renamed_flags["--no-" + was.substr(2)] = "--no-" + is.substr(2);
+  }
   std::vector<std::string> words(argv, argv + argc);
   for (std::string& word : words) {
     if (word == "--") break;

@@ -74,6 +74,18 @@ TEST(Parameters, TheFirstChangedKey) {
   EXPECT_EQ(libmap::changed_key(options, bind), "fill");
 }
 
+TEST_F(ParametersTest, FormerKeys) {
+  table.add_former_key("edge_m", "size_m");
+  const auto keys = libmap::set_from_yaml(table, "edge_m: 0.5\n", "old.yaml");
+  EXPECT_EQ(options.size_m, 0.5);
+  EXPECT_EQ(keys, std::vector<std::string>{"size_m"});
+  EXPECT_TRUE(is_error(refusal("edge_m", "0"), {.field = "size_m", .value = "0", .bound = "> 0"}));
+  const auto both =
+      error_of([&] { libmap::set_from_yaml(table, "size_m: 1\nedge_m: 2\n", "old.yaml"); });
+  EXPECT_TRUE(is_error(both, {.file = "old.yaml", .field = "edge_m"}));
+  EXPECT_EQ(options.size_m, 0.5);
+}
+
 TEST(Parameters, SectionsOfAFile) {
   int count = 0;
   double angle = 0.0;
