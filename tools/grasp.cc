@@ -247,10 +247,6 @@ constexpr int max_pull_poses = 12;
 constexpr int max_pull_draws = 2;
 constexpr const char* level_mesh = "level";
 
-libmap::TriangleMesh mesh_of(const GraspCommandOptions& options) {
-  return options.mesh == level_mesh ? libgtd::level_ground() : libmap::read_mesh(options.mesh).mesh;
-}
-
 libgtd::Ground ground_of(const libmap::TriangleMesh& mesh, const GraspCommandOptions& options) {
   const libgtd::SurfaceErrorOptions& bounds = options.grasp.surface;
   return in_file(options.mesh, [&] {
@@ -266,6 +262,27 @@ libgtd::Ground ground_of(const libmap::TriangleMesh& mesh, const GraspCommandOpt
     return libgtd::Ground(mesh, libgtd::constant_error(mesh, *error_m, bounds));
   });
 }
+
+// Gripper and terrain of trials at listed locations. Claims the output; `table` is the file of
+// locations or pulls.
+struct FieldTest {
+  FieldTest(const GraspCommandOptions& options, const std::string& table, Run& run)
+      : file((run.claim_output(options.output, {options.mesh, table}),
+              libmap::find_data_file("grippers", options.gripper))),
+        gripper(read_with_fingers(file, options)),
+        mesh(options.mesh == level_mesh ? libgtd::level_ground()
+                                        : libmap::read_mesh(options.mesh).mesh),
+        ground(ground_of(mesh, options)) {
+    if (options.mesh != level_mesh) run.add_input(options.mesh);
+    run.add_input(table);
+    for (const auto& input : libgtd::gripper_files(file)) run.add_input(input);
+  }
+
+  std::filesystem::path file;
+  libgtd::Gripper gripper;
+  libmap::TriangleMesh mesh;
+  libgtd::Ground ground;
+};
 
 void grasp_voxels(GraspCommandOptions& options, Run& run) {
   reject_given({{"--scenes", !options.scenes.folder.empty()},
@@ -299,7 +316,6 @@ void grasp_places(GraspCommandOptions& options, Run& run) {
   reject_given({{"--tile", options.tile != GraspCommandOptions{}.tile}}, "requires --map");
   if (libmap::format_of(options.output) != ".csv")
     throw libmap::Error("results are written as .csv", {.file = options.output});
-  run.claim_output(options.output, {options.mesh, options.points});
   for (const std::string& text : libmap::split_list(options.more_loads)) {
     const auto load = libmap::parse_double(text);
     if (!load || !(*load > 0.0))
@@ -309,22 +325,17 @@ void grasp_places(GraspCommandOptions& options, Run& run) {
   }
   claim_scenes(options.scenes, run);
   options.grasp.sequential = options.sequential == SequentialTest::on;
-  const auto file = libmap::find_data_file("grippers", options.gripper);
-  const libgtd::Gripper gripper = read_with_fingers(file, options);
+  const FieldTest test(options, options.points, run);
   libmap::Table table = libmap::read_csv(options.points);
   const std::vector<Eigen::Vector3d> locations = positions_of(table);
   if (locations.empty()) throw libmap::Error("no locations", {.file = options.points});
   const auto scenes = scenes_of(table, options.scenes);
-  const libmap::TriangleMesh mesh = mesh_of(options);
-  if (options.mesh != level_mesh) run.add_input(options.mesh);
-  run.add_input(options.points);
-  for (const auto& input : libgtd::gripper_files(file)) run.add_input(input);
   options.grasp.check();
-  const libgtd::Ground ground = ground_of(mesh, options);
   std::vector<libgtd::LocationResult> results;
   try {
     results = run.timed("grasp", [&] {
-      return libgtd::test_grasps(ground, gripper, locations, options.grasp, run.progress());
+      return libgtd::test_grasps(test.ground, test.gripper, locations, options.grasp,
+                                 run.progress());
     });
   } catch (const libmap::Error& error) {
     throw error.in_file(options.points);
@@ -339,9 +350,10 @@ void grasp_places(GraspCommandOptions& options, Run& run) {
   for (std::size_t row = 0; row < results.size(); ++row)
     for (std::string& cell : libgtd::grasp_cells(results[row]))
       table.rows[row].push_back(std::move(cell));
-  run.add_results({{"parameters_sha256", parameters_hash(gripper, options)}});
+  run.add_results({{"parameters_sha256", parameters_hash(test.gripper, options)}});
   note_results(results, run);
-  write_scenes(options.scenes, scenes, {mesh, ground, gripper, options.grasp, results}, run);
+  write_scenes(options.scenes, scenes,
+               {test.mesh, test.ground, test.gripper, options.grasp, results}, run);
   run.write_text(options.output, libmap::to_csv(table));
 }
 
@@ -396,24 +408,17 @@ void say_fit(const libgtd::PullFit& fit, std::size_t tests, Run& run) {
 }
 
 void fit_gripper(const GraspCommandOptions& options, Run& run) {
-  run.claim_output(options.output, {options.mesh, options.pulls});
-  const auto file = libmap::find_data_file("grippers", options.gripper);
-  libgtd::Gripper gripper = read_with_fingers(file, options);
+  FieldTest test(options, options.pulls, run);
   const auto tests = libgtd::pull_tests_of(libmap::read_csv(options.pulls));
-  const libmap::TriangleMesh mesh = mesh_of(options);
-  const libgtd::Ground ground = ground_of(mesh, options);
-  if (options.mesh != level_mesh) run.add_input(options.mesh);
-  run.add_input(options.pulls);
-  for (const auto& input : libgtd::gripper_files(file)) run.add_input(input);
   const libgtd::PullFit fit = run.timed("fit", [&] {
     return in_file(options.pulls, [&] {
-      return libgtd::fit_pulls(options.mesh == level_mesh ? nullptr : &ground, gripper, tests,
-                               pull_options(options), run.progress());
+      return libgtd::fit_pulls(options.mesh == level_mesh ? nullptr : &test.ground, test.gripper,
+                               tests, pull_options(options), run.progress());
     });
   });
   say_fit(fit, tests.size(), run);
-  gripper.ensemble = fit.ensemble;
-  run.write_text(options.output, libgtd::to_yaml(gripper));
+  test.gripper.ensemble = fit.ensemble;
+  run.write_text(options.output, libgtd::to_yaml(test.gripper));
 }
 
 void plan_next_pulls(const GraspCommandOptions& options, Run& run) {
@@ -421,18 +426,13 @@ void plan_next_pulls(const GraspCommandOptions& options, Run& run) {
   if (!count || *count < 1)
     throw libmap::Error("is not a number of pulls",
                         {.field = "--plan", .value = options.plan, .bound = ">= 1"});
-  run.claim_output(options.output, {options.mesh, options.points});
-  const auto file = libmap::find_data_file("grippers", options.gripper);
-  const libgtd::Gripper gripper = read_with_fingers(file, options);
+  const FieldTest test(options, options.points, run);
   const libmap::Table table = libmap::read_csv(options.points);
   const std::vector<Eigen::Vector3d> locations = positions_of(table);
-  const libmap::TriangleMesh mesh = mesh_of(options);
-  const libgtd::Ground ground = ground_of(mesh, options);
-  if (options.mesh != level_mesh) run.add_input(options.mesh);
-  run.add_input(options.points);
   const auto plans = run.timed("plan", [&] {
-    return libgtd::plan_pulls(ground, gripper, locations, static_cast<std::size_t>(*count),
-                              pull_options(options), run.progress());
+    return libgtd::plan_pulls(test.ground, test.gripper, locations,
+                              static_cast<std::size_t>(*count), pull_options(options),
+                              run.progress());
   });
   if (plans.empty()) throw libmap::Error("no pull is informative", {.file = options.points});
   libmap::Table planned;

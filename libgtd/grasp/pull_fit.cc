@@ -1,6 +1,8 @@
 #include "libgtd/grasp/pull_fit.h"
 
 #include <algorithm>
+#include <boost/math/distributions/chi_squared.hpp>
+#include <boost/math/distributions/normal.hpp>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -408,23 +410,16 @@ class PullFitting {
       result.mean_squared_score += squared / static_cast<double>(tests_.size());
       if (tail < 0.01) result.outliers.push_back(test.row);
     }
-    // Wilson and Hilferty 1931: chi squared of n degrees of freedom, as a normal score.
-    const double n = static_cast<double>(tests_.size());
-    const double z = (std::cbrt(result.mean_squared_score) - (1.0 - 2.0 / (9.0 * n))) /
-                     std::sqrt(2.0 / (9.0 * n));
-    result.chance = 1.0 - normal_share(z);
+    const auto n = static_cast<double>(tests_.size());
+    result.chance = boost::math::cdf(
+        boost::math::complement(boost::math::chi_squared(n), n * result.mean_squared_score));
   }
 
   // Squared normal score of a probability, at most 3.5^2.
   static double squared_normal_score(double share) {
-    double low = 0.0;
-    double high = 3.5;
-    const double tail = std::min(share, 1.0 - share);
-    for (int step = 0; step < 40; ++step) {
-      const double middle = 0.5 * (low + high);
-      (normal_share(-middle) > tail ? low : high) = middle;
-    }
-    return low * low;
+    const double tail = std::max(normal_share(-3.5), std::min(share, 1.0 - share));
+    const double score = boost::math::quantile(boost::math::normal(), tail);
+    return score * score;
   }
 
   PredictedForce force_on_level(const Gripper& gripper) const {
