@@ -147,7 +147,8 @@ std::size_t evaluate_obstacles(const ObstacleOptions& options, GraspabilityMap& 
 void bind(libmap::ParameterTable& table, DetectionOptions& options) {
   bind(table, options.scenario);
   table.add("plane", options.plane, {{"fit", PlaneSource::fit}, {"none", PlaneSource::none}},
-            "fit: fits the regression plane; none: the cloud is in the terrain frame");
+            "source of the terrain frame; fit: the regression plane of the points; none: the cloud "
+            "is in the terrain frame already");
 }
 
 Gripper gripper_of(const DetectionOptions& options) {

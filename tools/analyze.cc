@@ -43,19 +43,20 @@ void bind_one(libmap::ParameterTable& table, AnalyzeOptions& options) {
   bind(table, options.regions);
   bind(table, options.reach);
   table.add("start", options.start,
-            "position of the robot: X,Y,Z in the frame of --points-frame; largest: on the largest "
-            "region");
+            "start position of the robot: X,Y,Z (m) in the frame of --points-frame; largest: on "
+            "the largest region");
   bind(table, options.change);
-  table.add("transform", options.transform,
-            "transform from OTHER's points to MAP's: X,Y,Z,ROLL,PITCH,YAW in m and degrees, or a "
-            "file; auto: both were scored from clouds in one frame or cropped from one map");
+  table.add(
+      "transform", options.transform,
+      "transform from OTHER's frame to MAP's: X,Y,Z,ROLL,PITCH,YAW in m and degrees, or a file; "
+      "auto: from the manifests, for maps scored from clouds in one frame or cropped from one map");
 }
 
 void bind(libmap::ParameterTable& table, AnalyzeOptions& options) {
   bind_one(table, options);
   table.add("points_frame", options.points_frame, point_frame_names(),
-            "frame of the start or of the expected regions: of the scored cloud, the terrain, or "
-            "the map before it was cropped");
+            "frame of the start position and of the expected regions: that of the scored cloud, of "
+            "the terrain, or of the map before it was cropped");
   table.add("pictures", options.images, "draw images and charts");
   bind(table, options.table);
 }
@@ -341,9 +342,9 @@ int main(int argc, char** argv) {
   Command command("analyze");
   command.inputs("MAP", options.maps, "graspability map; several maps are tabulated");
   command.option("--against", "OTHER", options.other, "map of the same ground to compare MAP with");
-  command.option(
-      "--expected", "EXPECTED.csv", options.table.expected,
-      "regions of expected graspability for the table, e.g. data/expected/primitive_shapes.csv");
+  command.option("--expected", "EXPECTED.csv", options.table.expected,
+                 "table of regions that are expected to be graspable or not, compared with the "
+                 "map, e.g. data/expected/primitive_shapes.csv");
   command.output(options.folder,
                  "folder of summary.json, histogram, by_height, by_slope, regions, region_links "
                  "and, with OTHER, change; for several maps, of maps.csv, histograms.csv and, if "

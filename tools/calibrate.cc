@@ -44,10 +44,11 @@ struct BoardPhoto {
 };
 
 void bind(libmap::ParameterTable& table, CalibrateOptions& options) {
-  table.add("board", options.board,
-            "numbers of inner corners, COLUMNSxROWS; a board of 9 x 7 squares is 8x6");
+  table.add(
+      "board", options.board,
+      "numbers of inner corners of the chessboard, COLUMNSxROWS; 8x6 for a board of 9 x 7 squares");
   bind(table, options.calibration);
-  table.add("name", options.name, "name of the camera in the file");
+  table.add("name", options.name, "name of the camera in the written camera file");
 }
 
 bool has_image_extension(const fs::path& path) {
@@ -416,7 +417,7 @@ int main(int argc, char** argv) {
   command.inputs("IMAGES", options.images, "images, or folders of images (.png, .jpg)");
   command.output(options.output, "camera file (.yaml)");
   command.option("--report", "DIR", options.report,
-                 "folder of images.csv, residuals.csv, residuals.png and errors.png");
+                 "output folder for images.csv, residuals.csv, residuals.png and errors.png");
   bind(command.parameters(), options);
   return command.run(argc, arguments.data(), [&](Run& run) { calibrate(options, run); });
 }

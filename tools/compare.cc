@@ -43,11 +43,11 @@ struct CompareOptions {
 
 void bind(libmap::ParameterTable& table, CompareOptions& options) {
   table.add("within_m", options.within_m, libmap::positive,
-            "maximum distance at which one surface covers the other");
+            "maximum distance at which a point of one surface is covered by the other, m");
   table.add("samples_per_m2", options.samples_per_m2, libmap::positive,
             "density of the samples of a mesh's surface, per m2");
   table.add("seed", options.seed, {}, "random seed of the samples");
-  table.add("icp", options.icp, "align A with B by point-to-plane ICP first");
+  table.add("icp", options.icp, "align A with B by point-to-plane ICP before the comparison");
   bind(table, options.alignment);
   table.add("picture_range_m", options.image_range_m, libmap::not_negative,
             "distance at the end of the image's color scale, m; 0: the 98th percentile");
@@ -450,7 +450,7 @@ int compare_surfaces(int argc, char** argv) {
                  "file of four rows of four numbers, as crop writes; crop: from the manifests of "
                  "A and B, one of which was cropped from the other's map");
   command.option("--box", "XMIN,YMIN,ZMIN,XMAX,YMAX,ZMAX", options.box,
-                 "box in B's frame; only points in it are compared");
+                 "box in B's frame, m; only points inside it are compared");
   command.flag("--json", options.json, "print the results as JSON");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { compare(options, run); });

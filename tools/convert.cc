@@ -239,16 +239,16 @@ int convert_file(int argc, char** argv) {
                            {{"ascii", FileEncoding::ascii},
                             {"binary", FileEncoding::binary},
                             {"binary_compressed", FileEncoding::binary_compressed}},
-                           "encoding of numbers, if the format has several");
+                           "encoding of the output, if its format has several");
   command.parameters().add("big_endian", options.writing.big_endian,
                            "write binary PLY in big-endian order");
   command.parameters().add("pixel_size_m", options.pixel_size_m, libmap::not_negative,
-                           "pixel size of .tif, m; 0: the map's voxel size");
+                           "pixel size of a .tif output, m; 0: the map's voxel size");
   command.parameters().add("poses_format", options.poses_format, libmap::trajectory_format_names(),
-                           "format of poses in IN; auto: by its extension, else by its content");
+                           "format of the input poses; auto: by extension, else by content");
   command.parameters().add(
       "output_poses_format", options.output_poses_format, libmap::trajectory_format_names(),
-      "format of poses in OUT; auto: by its extension. RTAB-Map's formats are 0 kitti, 1 "
+      "format of the output poses; auto: by extension; RTAB-Map's export formats are 0 kitti, 1 "
       "tum-motion-capture, 2 kitti-optical, 3 toro, 4 g2o, 10 and 11 tum");
   return command.run(argc, argv, [&](Run& run) { convert(options, run); });
 }

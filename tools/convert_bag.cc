@@ -49,16 +49,18 @@ struct BagCommandOptions {
 };
 
 void bind(libmap::ParameterTable& table, BagCommandOptions& options) {
-  table.add("stamp_s", options.stamp,
-            "stamp, s. From a bag: only the nearest image set or cloud (auto: all sets; the cloud "
-            "with most points). A map to a bag: of all messages (auto: that of the inputs)");
+  table.add(
+      "stamp_s", options.stamp,
+      "time stamp, s; from a bag: of the image set or cloud to read (auto: all sets, or the cloud "
+      "with most points); from a map to a bag: of all messages (auto: that of the inputs)");
   table.add("strict", options.strict, "fail if an image cannot be used");
   bind(table, options.depth);
   table.add("frame", options.frame,
-            "frame_id of the map's points in the bag; auto: by their manifest");
+            "frame_id of the map's points in the bag; auto: from the map's manifest");
   table.add("stamp_offset_s", options.stamp_offset_s, libmap::any_number,
             "offset added to the stamps of a rig's images, s");
-  table.add("arrow_m", options.arrow_m, libmap::positive, "length of the footholds' arrows, m");
+  table.add("arrow_m", options.arrow_m, libmap::positive,
+            "length of the footholds' approach arrows, m");
   table.add("cell_size_m", options.cell_size_m, libmap::not_negative,
             "cell size of the map's grids in a ROS 2 bag, m; 0: the map's voxel size");
   table.add("compression", options.compression,
@@ -468,12 +470,13 @@ int graspmap_tools::convert_bag(int argc, char** argv) {
       "clouds (.pcd, .ply, .vtp, .csv); bag to write: OUT.bag (ROS 1), OUT.mcap, or a folder (no "
       "extension) of .db3 (ROS 2)");
   command.option("--topic", "[NAME=]TOPIC", options.topics,
-                 "topics of depth images, or of the cloud (repeatable); default: all");
-  command.option("--rig", "FILE|NAME", options.rig,
-                 "rig; default: from the bag's camera infos and transforms, or DIR/rig.yaml");
+                 "topic of a camera's depth images, or of the cloud (repeatable); default: all");
+  command.option(
+      "--rig", "FILE|NAME", options.rig,
+      "camera rig; default: from the bag's camera infos and transforms, or DIR/rig.yaml");
   command.option("--terrain", "CLOUD", options.terrain, "terrain cloud, written to /merged_pcd");
   command.option("--curvature", "CLOUD", options.curvature,
-                 "cloud for /curvature_map, instead of the map with its curvatures");
+                 "cloud to publish on /curvature_map, instead of the map with its curvatures");
   command.option("--footholds", "FOOTHOLDS", options.footholds,
                  "footholds of the map, written to /footholds and /foothold_poses");
   bind(command.parameters(), options);

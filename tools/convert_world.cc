@@ -189,9 +189,10 @@ int graspmap_tools::convert_world(int argc, char** argv) {
   command.input("SITE", options.site, "mesh of the site (.ply, .obj, .glb ...), or its folder");
   command.output(options.output,
                  "folder OUT.world of SDF (Gazebo, CoppeliaSim), MJCF (MuJoCo) and URDF (Bullet)");
-  command.option("--map", "MAP", options.map, "graspability map of the site, a second visual");
-  command.option("--footholds", "FOOTHOLDS", options.footholds, "footholds of the map as markers");
-  command.option("--rig", "FILE|NAME", options.rig, "depth cameras of a robot as sensors");
+  command.option("--map", "MAP", options.map, "graspability map of the site as a second visual");
+  command.option("--footholds", "FOOTHOLDS", options.footholds,
+                 "footholds of the map to add as markers");
+  command.option("--rig", "FILE|NAME", options.rig, "camera rig of a robot, as depth sensors");
   command.parameters().add(
       "rig_pose", options.rig_pose,
       "pose of the robot's body in the site's frame: X,Y,Z,ROLL,PITCH,YAW in m "

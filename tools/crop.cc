@@ -34,15 +34,16 @@ struct CropCommandOptions {
 };
 
 void bind(libmap::ParameterTable& table, CropCommandOptions& options) {
-  table.add("level", options.level, {{"auto", true}, {"none", false}},
-            "levelling; auto: the ground becomes z = 0; none: the map's z is unchanged");
-  table.add("up", options.up, "up direction: auto, or X,Y,Z in the map");
+  table.add(
+      "level", options.level, {{"auto", true}, {"none", false}},
+      "levelling of the site; auto: the ground becomes z = 0; none: the map's z is unchanged");
+  table.add("up", options.up, "up direction: auto, or X,Y,Z in the input map's frame");
   table.add("frame", options.crop.frame,
             {{"level", libmap::CropFrame::level}, {"map", libmap::CropFrame::map}},
             "frame of --box and --polygon: levelled and rotated, or that of the input map");
   table.add("yaw_deg", options.yaw,
-            "rotation about z, degrees; auto: with --size and --border, sides parallel to x and y, "
-            "else none");
+            "rotation of the site about z, degrees; auto: with --size or --border, such that the "
+            "sides are parallel to x and y, else none");
   bind(table, options.crop);
 }
 
@@ -312,10 +313,10 @@ int main(int argc, char** argv) {
   command.option("--polygon", "FILE.csv", options.polygon,
                  "area to keep: corners in order, columns x, y; convex or not");
   command.option("--size", "WIDTHxHEIGHT", options.size,
-                 "size of the rectangle to keep, m, which is centered in the data");
+                 "size of the rectangle to keep, m; it is centered in the data");
   command.flag("--border", options.border, "keep the area inside a white band on the ground");
   command.option("--border-size", "WIDTHxHEIGHT", options.border_size,
-                 "true size of the area inside the band, m; determines the map's scale");
+                 "true size of the area inside the white band, m; it determines the map's scale");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { crop(options, run); });
 }

@@ -284,7 +284,8 @@ int fuse_scan(int argc, char** argv) {
   command.parameters().add(
       "frame", options.frame,
       {{"poses", CloudFrame::poses}, {"ground-truth", CloudFrame::ground_truth}},
-      "frame of the cloud; ground-truth: by alignment of the poses with the true poses");
+      "frame of the cloud; poses: that of the poses; ground-truth: that of the scan's true poses, "
+      "to which the poses are aligned");
   command.parameters().add("tile_size_m", options.tile_m, libmap::positive,
                            "side of a tile if the output is a folder, m");
   libmap::bind(command.parameters(), options.fusion);

@@ -30,7 +30,7 @@ void bind(libmap::ParameterTable& table, PanoramaCommandOptions& options) {
   table.add("stamp_s", options.stamp,
             "stamp of the image set, s; fullest: the set with most cameras");
   table.add("tolerance_s", options.tolerance_s, libmap::not_negative,
-            "maximum difference of an image's stamp from that of the set");
+            "maximum difference between the stamps of an image and its set, s");
   table.add("strict", options.strict, "fail if a camera's image is late, missing or broken");
   bind(table, options.panorama);
 }

@@ -188,22 +188,23 @@ struct GraspCommandOptions {
 };
 
 void bind(libmap::ParameterTable& table, GraspCommandOptions& options) {
-  table.add("gripper", options.gripper, "scar-e, hubrobo, limbero, or a gripper file");
+  table.add("gripper", options.gripper,
+            "gripper to test: scar-e, hubrobo, limbero, or a gripper file");
   table.add_overrides("gripper", options.overrides);
   bind(table, options.grasp);
   table.add("surface_error", options.surface_error,
-            "error of the mesh: none; mesh: the field expected_error of its vertices; or a "
-            "standard deviation, m");
+            "error of the mesh that the trials simulate; none; mesh: the vertex field "
+            "expected_error; or a standard deviation, m");
   table.add("sequential", options.sequential,
             {{"auto", SequentialTest::automatic},
              {"on", SequentialTest::on},
              {"off", SequentialTest::off}},
             "end the test of a location as soon as its verdict is certain; auto: with --map");
   table.add("map_draws", options.map_draws, {1, 100000},
-            "with --map: number of draws per pose, instead of 'draws'");
+            "with --map: number of random draws per pose, instead of --draws");
   table.add("more_loads", options.more_loads,
-            "additional loads with their own verdicts, N, separated by commas");
-  table.add("prefix", options.prefix, "prefix of the names of result columns");
+            "additional loads to test, N, separated by commas; each has its own result columns");
+  table.add("prefix", options.prefix, "prefix added to the names of the result columns");
 }
 
 // Hash of all that affects the results, except mesh, locations and seed.
@@ -489,19 +490,19 @@ int main(int argc, char** argv) {
       "with --points: CSV of the locations with the results of their trials; with --map: the map "
       "with added fields (.pcd, .ply, .vtp, .csv), or a tile store (.tiles); with --fit: a "
       "gripper file (.yaml) with the fitted ensemble; with --plan: CSV of pulls");
-  command.option("--fit", "PULLS.csv", options.pulls,
-                 "pull tests for fitting the gripper's parameters: x, y, z or ground = level, "
-                 "tilt_deg, azimuth_deg, and force_n at slip, or load_n and held (0 or 1)");
+  command.option(
+      "--fit", "PULLS.csv", options.pulls,
+      "table of pull tests to which the gripper's parameters are fitted: x, y, z or ground = "
+      "level, tilt_deg, azimuth_deg, and force_n at slip, or load_n and held (0 or 1)");
   command.option("--plan", "N", options.plan,
-                 "with --points: number of pulls to plan, those with most information about the "
-                 "parameters");
+                 "with --points: number of most informative pull tests to plan");
   command.option("--tile", "K/N", options.tile,
                  "with --map: test only share K of N of the tiles, into a tile store");
   command.option("--scenes", "FOLDER", options.scenes.folder,
-                 "folder for scenes of one trial per location, with nearly the median force: "
-                 "FOLDER/PLACE.ply, by the column 'place' or the row");
+                 "output folder for one mesh per location that shows the trial nearest to the "
+                 "median force: FOLDER/PLACE.ply, named by the column 'place' or the row");
   command.option("--scene-locations", "LOCATIONS", options.scenes.locations,
-                 "locations of the scenes; default: all");
+                 "locations for which --scenes writes a scene; default: all");
   command.renamed_flag("--scene-of", "--scene-locations");
   for (const char* key : {"friction", "asperity-min", "asperity-max", "engagement-rate", "drag"}) {
     std::string name = key;

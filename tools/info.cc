@@ -321,7 +321,7 @@ int main(int argc, char** argv) {
   InfoOptions options;
   Command command("info");
   command.input("FILE", options.file,
-                "scan, camera (.yaml), cloud, mesh, map, tile store (.tiles) or bag of ROS");
+                "scan, camera (.yaml), cloud, mesh, map, tile store (.tiles) or ROS bag");
   command.flag("--json", options.json, "print the description as JSON");
   command.flag("--verify", options.verify,
                "read the whole content of a scan or a tile store and list broken parts");

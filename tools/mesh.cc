@@ -41,13 +41,13 @@ struct MeshOptions {
 };
 
 void bind(libmap::ParameterTable& table, MeshOptions& options) {
-  table.add("normals", options.normals,
-            {{"auto", NormalSource::automatic},
-             {"cloud", NormalSource::cloud},
-             {"estimate", NormalSource::estimate}},
-            "source of normals; auto: the cloud's, estimated if it has none, oriented if neighbors "
-            "face opposite sides; cloud: as stored, an error if it has none; estimate: always "
-            "estimated");
+  table.add(
+      "normals", options.normals,
+      {{"auto", NormalSource::automatic},
+       {"cloud", NormalSource::cloud},
+       {"estimate", NormalSource::estimate}},
+      "source of normals; auto: the cloud's, estimated if it has none, reoriented if neighbors "
+      "face opposite sides; cloud: the cloud's, unchanged; estimate: always estimated");
   libmap::bind(table, options.estimation);
   libmap::bind(table, options.surface.reconstruction);
   libmap::bind(table, options.surface.cleaning);
@@ -331,7 +331,7 @@ int main(int argc, char** argv) {
                  std::string("mesh (.ply, .vtp, .obj, .stl, .off, .glb)") + or_tile_folder);
   add_share_option(command, options.tile);
   command.flag("--report", options.report,
-               "print properties of the surface, and the distances of the points from it");
+               "print properties of the surface and the distances of the points from it");
   command.flag("--json", options.json, "print the report as JSON");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) {

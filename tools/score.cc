@@ -336,8 +336,9 @@ struct ScoreOptions {
 
 void bind(libmap::ParameterTable& table, ScoreOptions& options) {
   bind(table, options.detection);
-  table.add("up", options.up,
-            "up direction, on the outer side of the plane: auto, or X,Y,Z in the cloud's frame");
+  table.add(
+      "up", options.up,
+      "direction toward the outer side of the fitted plane: auto, or X,Y,Z in the cloud's frame");
   table.add("frame", options.frame, libgtd::map_frame_names(), "frame of the map's points");
 }
 
@@ -460,8 +461,8 @@ int main(int argc, char** argv) {
   command.option("--tile", "K/N", options.tile,
                  "score only share K of N of the tiles; `graspmap convert` merges the shares");
   command.option("--max-points-in-memory", "N", options.max_points_in_memory,
-                 "for a tile store: maximum number of points in memory, about 250 bytes each; the "
-                 "map does not depend on it");
+                 "for a tile store: maximum number of points in memory (about 250 bytes each); the "
+                 "map does not depend on this number");
   command.renamed_flag("--points-at-once", "--max-points-in-memory");
   command.flag("--append", options.append,
                "score the tiles affected by files that were added to the terrain's folder");

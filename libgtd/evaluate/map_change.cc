@@ -205,7 +205,7 @@ void find_unpaired(const VoxelMap& map, const VoxelMap& other, MapChange& change
 void bind(libmap::ParameterTable& table, MapChangeOptions& options) {
   table.add("match_distance_voxels", options.match_distance_voxels,
             libmap::Range{0.0, 10.0, true, false},
-            "maximum distance of matching voxels on different lattices, voxel edges");
+            "maximum distance of corresponding voxels on different lattices, in voxel edges");
 }
 
 std::string_view to_text(VoxelMatching matching) {

@@ -361,8 +361,9 @@ void describe_access(const MapRegionResult& regions, const std::vector<double>& 
 }  // namespace
 
 void bind(libmap::ParameterTable& table, MapRegionOptions& options) {
-  table.add("adjacency_voxels", options.adjacency_voxels, libmap::Range{1.0, 100.0},
-            "maximum index difference of neighbors in a region; 1: 26 neighbors");
+  table.add(
+      "adjacency_voxels", options.adjacency_voxels, libmap::Range{1.0, 100.0},
+      "maximum index difference of neighboring voxels in a region, per axis; 1: 26 neighbors");
   table.add("min_voxels", options.min_voxels, libmap::Range{1.0, 1e9},
             "minimum size of a region, voxels");
 }
@@ -394,7 +395,7 @@ MapRegionResult find_regions(const VoxelMap& map, const MapSurface& surface,
 
 void bind(libmap::ParameterTable& table, RegionReachOptions& options) {
   table.add("stride_m", options.stride_m, libmap::positive,
-            "maximum step of the robot between regions, m");
+            "maximum step of the robot from one region to another, m");
 }
 
 RegionReach find_reach(const VoxelMap& map, const MapRegionResult& regions,

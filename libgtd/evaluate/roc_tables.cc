@@ -256,11 +256,11 @@ std::vector<std::string> default_score_columns(const Table& table, std::string_v
 
 void bind(libmap::ParameterTable& table, TableEvaluationOptions& options) {
   table.add("label", options.label_column,
-            "column of labels: 1/0, true/false, yes/no, graspable/not graspable");
+            "column of the true labels: 1/0, true/false, yes/no, graspable/not graspable");
   table.add("cutoff", options.roc.rate_cutoff, libmap::any_number,
-            "minimum score of a location that is predicted graspable, for the rates");
+            "minimum score of a location that counts as predicted graspable in the rates");
   table.add("bootstrap", options.roc.bootstrap_replicates, libmap::Range{0, 1e7},
-            "bootstrap replicates for the interval of the area; 0: no interval");
+            "bootstrap replicates for the confidence interval of the AUC; 0: no interval");
   table.add("seed", options.roc.bootstrap_seed, libmap::not_negative,
             "random seed of the bootstrap");
 }

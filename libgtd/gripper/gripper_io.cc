@@ -43,9 +43,9 @@ struct GripperKeys {
     bind(table, gripper.engagement);
     for (std::size_t n = 0; n < uncertain_parameters; ++n)
       table.add("ranges." + uncertain_parameter_names()[n], ranges[n],
-                "bounds of the prior of the parameter: LOW, HIGH");
+                "prior bounds of the parameter in a fit to pull tests: LOW, HIGH");
     table.add("ensemble.sets", sets,
-              "parameter sets, one per line: weight and uncertain parameters");
+              "fitted parameter sets, one per line: weight, then the uncertain parameters");
   }
 };
 

@@ -433,14 +433,15 @@ void bind(ParameterTable& table, BagRigOptions& options) {
   table.add("depth_unit_m", options.depth_unit_m, positive,
             "meters per unit of 16-bit images in the bag");
   table.add("depth_scale_m", options.depth_scale_m, not_negative,
-            "meters per unit of the written images; 0: the rig's, or as in the bag, 0.1 mm for "
-            "floats");
+            "meters per unit of the written depth images; 0: as in the rig file, else as in the "
+            "bag (0.0001 m for floating-point images)");
   table.add("near_m", options.near_m, not_negative,
             "minimum depth of the rig, m; 0: the rig's own");
   table.add("far_m", options.far_m, positive, "maximum depth of the rig, m; inf: the rig's own");
   table.add("tolerance_s", options.tolerance_s, not_negative,
             "maximum time between an image and the stamp of its synchronized set, s");
-  table.add("every", options.every, {1.0}, "interval of the exported synchronized sets; 1: all");
+  table.add("every", options.every, {1.0},
+            "step between exported synchronized image sets; 1: export all");
 }
 
 std::vector<std::string> names_in_rig_folder(const BagRigPlan& plan) {

@@ -359,7 +359,7 @@ void bind(ParameterTable& table, CameraCalibrationOptions& options) {
             "distortion model; plumb_bob: k1 k2 p1 p2 k3; rational: k1 k2 p1 p2 k3 k4 k5 k6; "
             "equidistant: k1 k2 k3 k4 of a fisheye lens");
   table.add("max_picture_error_px", options.max_image_error_px, not_negative,
-            "maximum RMS reprojection error; worse images are rejected, pixels; 0: no limit");
+            "maximum RMS reprojection error of an accepted image, pixels; 0: no limit");
 }
 
 std::optional<std::vector<Eigen::Vector2d>> find_chessboard(const GrayImage& image,

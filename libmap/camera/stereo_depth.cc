@@ -94,13 +94,14 @@ void bind(ParameterTable& table, StereoDepthOptions& options) {
             "range of disparities, pixels; minimum depth: fx * baseline / (min_disparity + range)");
   table.add("block_px", options.block_px, Range{1, 31}, "side of the matched window, odd, pixels");
   table.add("uniqueness_percent", options.uniqueness_percent, Range{0, 100},
-            "minimum margin between best and second-best match, percent");
-  table.add("left_right_px", options.left_right_px, Range{-1, 1024},
-            "maximum difference of the left-right check, pixels; -1: disabled");
+            "minimum difference between the costs of best and second-best match, percent");
+  table.add(
+      "left_right_px", options.left_right_px, Range{-1, 1024},
+      "maximum difference between the disparities of the left-right check, pixels; -1: disabled");
   table.add("speckle_px", options.speckle_px, Range{0, 1e6},
             "minimum area of a connected patch of disparity, pixels; 0: no limit");
   table.add("min_contrast", options.min_contrast, Range{0, 255},
-            "minimum gray-level range of the matched window");
+            "minimum gray-level range of the matched window, 0 to 255");
   table.add("directions", options.directions, direction_names,
             "number of directions along which matching costs are summed");
   table.add("max_depth_m", options.max_depth_m, not_negative, "maximum depth, m; 0: no limit");

@@ -28,38 +28,39 @@ void describe_surface(ResultTable& table, const FusionCounts& counts) {
 
 void bind(ParameterTable& table, DepthFusionOptions& options) {
   DepthPlaneOptions& planes = options.planes;
-  table.add("voxel_size_m", options.voxel_size_m, positive, "size of a voxel; one point per voxel");
+  table.add("voxel_size_m", options.voxel_size_m, positive,
+            "edge length of a voxel, m; the cloud contains at most one point per voxel");
   table.add("sensor", options.sensor,
-            "depth camera, a name in data/sensors or a file: useful range and noise that no other "
-            "option sets; auto: a Kinect v2");
-  table.add("min_depth_m", planes.min_depth_m, positive, "minimum depth of measurements");
-  table.add("max_depth_m", planes.max_depth_m, positive, "maximum depth of measurements");
+            "depth camera: a name in data/sensors or a file, from which depth range and noise are "
+            "taken unless options set them; auto: a Kinect v2");
+  table.add("min_depth_m", planes.min_depth_m, positive, "minimum depth of used measurements, m");
+  table.add("max_depth_m", planes.max_depth_m, positive, "maximum depth of used measurements, m");
   table.add("max_incidence_deg", planes.max_incidence_deg, {0, 89.5, true, false},
-            "maximum angle between line of sight and surface normal");
+            "maximum angle between line of sight and surface normal, degrees");
   table.add("axial_noise_m", planes.noise.axial_m, positive,
-            "standard deviation of depth at range 0");
+            "constant term of the standard deviation of depth, m");
   table.add("range_noise", planes.noise.axial_of_range, not_negative,
-            "standard deviation of depth added by each meter of range, m/m");
+            "standard deviation of depth: term proportional to range, m per m");
   table.add("square_noise", planes.noise.axial_of_square, not_negative,
-            "standard deviation of depth added by range squared, 1/m");
+            "standard deviation of depth: term proportional to squared range, 1/m");
   table.add("lateral_noise_px", planes.noise.lateral_px, not_negative,
-            "standard deviation of measurements across the line of sight");
+            "standard deviation of measurements across the line of sight, pixels");
   table.add("plane_radius_px", planes.radius_px, {1, 7},
-            "radius of the disc of pixels that a plane is fitted to");
+            "radius of the disc of pixels to which a plane is fitted, pixels");
   table.add("min_pair_share", planes.min_pair_share, zero_to_one,
-            "minimum share of pairs of opposite pixels around a pixel that agree with it; else it "
-            "has no plane");
+            "minimum share of agreeing pairs of opposite neighbors for fitting a plane to a pixel");
   table.add("disc_radius_voxels", options.disc_radius_voxels, positive,
             "radius of the disc in which measurements are averaged, in voxels");
   table.add("pose_error_m", options.pose_error_m, not_negative,
-            "standard deviation of a whole frame along the surface normal");
+            "standard deviation of a frame's position along the surface normal due to its pose, m");
   table.add("registration_rounds", options.registration_rounds, {0, 20},
-            "maximum number of rounds of registration of the frames; 0: poses are unchanged");
+            "maximum number of rounds in which frames are registered to each other; 0: poses are "
+            "unchanged");
   table.add("enough_views", options.enough_views, not_negative,
-            "skip frames that add less than 1/enough_views to the information of earlier frames "
-            "on nearly all of their surface; 0: all frames are fused");
+            "number N of views that suffice: a frame is skipped if it adds less than 1/N to the "
+            "information of earlier frames on nearly all of its surface; 0: all frames are fused");
   table.add("min_views", options.points.min_views, {1},
-            "minimum number of frames that measured a point");
+            "minimum number of frames that measure a point of the cloud");
   table.add("max_seen_through", options.points.max_seen_through, not_negative,
             "maximum ratio of views that see through a point to views that see it");
   table.add("max_missed", options.points.max_missed, not_negative,

@@ -117,13 +117,14 @@ class ViewProjection {
 }  // namespace
 
 void bind(ParameterTable& table, PanoramaOptions& options) {
-  table.add("stride_px", options.stride_px, Range{1, 1e6}, "step between used rows and columns");
+  table.add("stride_px", options.stride_px, Range{1, 1e6},
+            "step between used rows and columns, pixels");
   table.add("flying_pixel_jump_m", options.flying_pixel_jump_m, not_negative,
-            "maximum depth difference of a pixel from both neighbors in a row or column; 0: keeps "
-            "all");
+            "maximum depth difference between a pixel and both its neighbors in a row or column, "
+            "m; 0: no limit");
   table.add("normals", options.normals, "add normals from neighboring pixels");
   table.add("normal_jump_m", options.normal_jump_m, positive,
-            "maximum depth difference of neighboring pixels on one surface");
+            "maximum depth difference between neighboring pixels of one surface, m");
 }
 
 PanoramaResult make_panorama(const std::vector<PanoramaView>& views,

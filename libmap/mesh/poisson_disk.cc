@@ -161,9 +161,9 @@ PoissonDiskResult sample(const SampledSurface& surface, const PoissonDiskOptions
 
 void bind(ParameterTable& table, PoissonDiskOptions& options) {
   table.add("radius_m", options.radius_m, positive,
-            "minimum distance between samples, and maximum distance of the surface to a sample");
+            "minimum distance between samples, and maximum distance of the surface to one, m");
   table.add("count", options.count, {0.0, max_samples},
-            "> 0: number of samples within 1 %, instead of the radius");
+            "number of samples (within 1 %), instead of a radius; 0: by radius");
   table.add("seed", options.seed, {}, "random seed");
 }
 

@@ -527,15 +527,15 @@ void bind(ParameterTable& table, RefinementOptions& options) {
   bind(table, options.odometry);
   bind(table, options.closures);
   bind(table, options.graph);
-  table.add("bundle", options.bundle, "refine poses and points by bundle adjustment");
+  table.add("bundle", options.bundle, "refine poses and landmarks by bundle adjustment");
   table.add("sensor", options.sensor,
-            "depth camera as a name in data/sensors or a file, which sets noise, useful range, "
-            "timing and bounds; auto: the noise is estimated");
+            "depth camera: a name in data/sensors or a file, from which noise, depth range, timing "
+            "and bounds are taken; auto: the noise is estimated");
   table.add("intrinsics", options.intrinsics,
             {{"fixed", IntrinsicsMode::fixed},
              {"refined", IntrinsicsMode::refined},
              {"auto", IntrinsicsMode::automatic}},
-            "focal length and principal point: as stored, or estimated; auto: estimated if the "
+            "focal length and principal point: as stored, or estimated; auto: estimated if "
             "held-out matches then fit better");
   table.add("correct_depth", options.correct_depth,
             "estimate a correction of depth by range and radius if the held-out data fit better "
@@ -544,13 +544,14 @@ void bind(ParameterTable& table, RefinementOptions& options) {
             "estimate the registration of depth to color if the held-out data fit better with it; "
             "otherwise displaced edges are only a warning");
   table.add("estimate_timing", options.estimate_timing,
-            "estimate the delay of depth and the time of an image's rows if the held-out data fit "
-            "better with them");
+            "estimate the depth delay and the rolling shutter time if the held-out data fit better "
+            "with them");
   table.add("scale_from", options.scale_from,
             {{"depth", ScaleSource::depth}, {"odometry", ScaleSource::odometry}},
-            "source of the scale if no factor, known lengths or board are given");
+            "source of the scale if no factor, known length or board is given");
   table.add("scale", options.scale, {0.5, 2.0},
-            "known factor of the scale, e.g. that of crop --border-size; 1: none is known");
+            "known scale factor of the scan, e.g. as printed by crop --border-size; 1: no factor "
+            "is known");
   bind(table, options.bundle_adjustment);
   bind(table, options.icp);
   table.add("seed", options.seed, not_negative, "random seed");

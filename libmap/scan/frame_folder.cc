@@ -216,8 +216,9 @@ void bind(ParameterTable& table, FrameFolderOptions& options) {
   table.add("calibration", options.calibration, "camera file with the intrinsics");
   table.add("depth_calibration", options.depth_calibration,
             "camera file of a separate depth camera; empty: depth is already registered to color");
-  table.add("pose_frame", options.pose_frame, pose_frame_names(),
-            "frame of the poses in the files: the camera's optical frame, or the base");
+  table.add(
+      "pose_frame", options.pose_frame, pose_frame_names(),
+      "frame of the poses in the pose files: the camera's optical frame, or the robot's base");
   table.add("pairing_tolerance_s", options.pairing_tolerance_s, not_negative,
             "maximum time difference between paired color, depth and poses, s");
 }

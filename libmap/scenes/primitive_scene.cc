@@ -26,8 +26,9 @@ struct ParameterAdder {
     table.add("radius_m", sphere.radius_m, size_range, "radius, m");
   }
   void operator()(Capsule& capsule) const {
-    table.add("radius_m", capsule.radius_m, size_range, "radius, half the width, m");
-    table.add("length_m", capsule.length_m, size_range, "length along x with the round ends, m");
+    table.add("radius_m", capsule.radius_m, size_range, "radius of the capsule, m");
+    table.add("length_m", capsule.length_m, size_range,
+              "length along x including the round ends, m");
   }
   void operator()(Cone& cone) const {
     table.add("radius_m", cone.radius_m, size_range, "radius of the base, m");
@@ -47,11 +48,12 @@ struct ParameterAdder {
     table.add("size_y_m", plane.size_y_m, size_range, "length along y, m");
   }
   void operator()(Bump& bump) const {
-    table.add("height_m", bump.height_m, Range{-1e4, 1e4}, "height, m; negative: a hollow");
+    table.add("height_m", bump.height_m, Range{-1e4, 1e4}, "bump height, m; negative: hollow");
     table.add("radius_m", bump.radius_m, size_range, "radius, m");
-    table.add("profile", bump.profile,
-              {{"cosine", BumpProfile::cosine}, {"gaussian", BumpProfile::gaussian}},
-              "profile; cosine: cos^2 up to the radius; gaussian: radius is 3 standard deviations");
+    table.add(
+        "profile", bump.profile,
+        {{"cosine", BumpProfile::cosine}, {"gaussian", BumpProfile::gaussian}},
+        "bump profile; cosine: cos^2 up to the radius; gaussian: radius is 3 standard deviations");
   }
 };
 
@@ -110,12 +112,13 @@ ParameterTable shape_parameters(SceneShape& shape) {
   table.add("name", shape.name, "name of the shape");
   std::visit(ParameterAdder{table}, shape.geometry);
   Placement& placement = shape.placement;
-  table.add("x_m", placement.x_m, position_range, "x in the scene, m");
-  table.add("y_m", placement.y_m, position_range, "y in the scene, m");
-  table.add("z_m", placement.z_m, position_range, "z in the scene, m");
-  table.add("roll_deg", placement.roll_deg, angle_range, "first rotation, about x, degrees");
-  table.add("pitch_deg", placement.pitch_deg, angle_range, "second rotation, about y, degrees");
-  table.add("yaw_deg", placement.yaw_deg, angle_range, "third rotation, about z, degrees");
+  table.add("x_m", placement.x_m, position_range, "x of the shape's origin in the scene, m");
+  table.add("y_m", placement.y_m, position_range, "y of the shape's origin in the scene, m");
+  table.add("z_m", placement.z_m, position_range, "z of the shape's origin in the scene, m");
+  table.add("roll_deg", placement.roll_deg, angle_range, "first rotation, about fixed x, degrees");
+  table.add("pitch_deg", placement.pitch_deg, angle_range,
+            "second rotation, about fixed y, degrees");
+  table.add("yaw_deg", placement.yaw_deg, angle_range, "third rotation, about fixed z, degrees");
   return table;
 }
 

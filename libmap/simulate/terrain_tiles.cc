@@ -278,7 +278,8 @@ class CellSampler {
 
 void bind(ParameterTable& table, TerrainTilesOptions& options) {
   table.add("spacing_m", options.spacing_m, Range{1e-4, 10.0}, "mean point spacing, m");
-  table.add("piece_m", options.tile_m, Range{1e-3, 1000.0}, "side of a piece, m");
+  table.add("piece_m", options.tile_m, Range{1e-3, 1000.0},
+            "side of a tile, one file of the output, m");
   bind(table, options.terrain);
 }
 

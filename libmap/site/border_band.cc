@@ -354,13 +354,14 @@ std::array<Vector2d, 4> corners_of(const std::array<Side, 4>& sides) {
 
 void bind(ParameterTable& table, BorderBandOptions& options) {
   table.add("white_level", options.white_level, {0.0, 255.0},
-            "border: minimum of red, green and blue of white, 0 to 255; 0: from the colors");
+            "border: brightness (minimum of red, green and blue, 0 to 255) from which a color is "
+            "white; 0: determined from the colors");
   table.add("max_band_width_m", options.max_width_m, positive,
             "border: maximum width of the band, m");
   table.add("min_band_side_m", options.min_side_m, positive,
             "border: minimum side of the area inside the band, m");
   table.add("min_band_seen", options.min_seen, {0.0, 1.0, true, false},
-            "border: minimum share of each side's length with white");
+            "border: minimum share of each side's length along which the band is visible");
   table.add("band_cell_m", options.cell_m, positive,
             "border: cell size of the image from above, m");
   table.add("min_band_z_m", options.min_z_m, any_number, "border: minimum height of the band, m");

@@ -16,8 +16,9 @@ namespace libmap {
 
 void bind(ParameterTable& table, EdgeCheckOptions& options) {
   table.add("places", options.positions_per_edge, {1.0, 10000.0},
-            "number of positions along each edge");
-  table.add("inset_m", options.inset_m, not_negative, "distance of the positions from the edge");
+            "number of measured positions along each edge of the site");
+  table.add("inset_m", options.inset_m, not_negative,
+            "distance of the measured positions from the edge, m");
 }
 
 namespace {

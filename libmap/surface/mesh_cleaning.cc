@@ -360,17 +360,17 @@ void bind(ParameterTable& table, MeshCleaningOptions& options) {
   table.add("repair", options.repair,
             "merge vertices, drop bad triangles, cut non-manifold edges, remove intersections");
   table.add("merge_distance_m", options.merge_distance_m, not_negative,
-            "maximum distance of vertices that are merged; 0: 1e-7 of the mesh's size");
+            "maximum distance between vertices that are merged, m; 0: 1e-7 of the mesh's size");
   table.add("min_island_area_m2", options.min_island_area_m2, not_negative,
             "minimum area of a component, m2; smaller components are dropped");
   table.add("min_island_share", options.min_island_share, zero_to_one,
             "minimum area of a component relative to the largest; smaller components are dropped");
   table.add("max_hole_m", options.max_hole_m, not_negative,
-            "maximum diameter of filled holes; outer boundaries stay open");
+            "maximum diameter of filled holes, m; outer boundaries stay open");
   table.add("smoothing_iterations", options.smoothing_iterations, not_negative,
-            "number of iterations of Taubin's smoothing, which does not shrink");
+            "number of iterations of Taubin smoothing, which avoids shrinkage");
   table.add("decimation_error_m", options.decimation_error_m, not_negative,
-            "maximum distance between the decimated and the original surface; 0: no decimation");
+            "maximum distance between the decimated and the original surface, m; 0: no decimation");
 }
 
 MeshCleaningResult clean_mesh(const TriangleMesh& mesh, const MeshCleaningOptions& options,

@@ -426,21 +426,24 @@ double CloudStatistics::median_error_m() const {
 }
 
 void bind(ParameterTable& table, SurfaceReconstructionOptions& options) {
-  table.add("method", options.method,
-            {{"implicit", SurfaceMethod::implicit}, {"poisson", SurfaceMethod::poisson}},
-            "implicit: algebraic point set surface; poisson: screened Poisson reconstruction");
-  table.add("support_cells", options.support_cells, {1.5, 10.0},
-            "implicit: radius of influence of a point, in cells or in the points' spacing");
+  table.add(
+      "method", options.method,
+      {{"implicit", SurfaceMethod::implicit}, {"poisson", SurfaceMethod::poisson}},
+      "method; implicit: algebraic point set surface; poisson: screened Poisson reconstruction");
+  table.add(
+      "support_cells", options.support_cells, {1.5, 10.0},
+      "method implicit: radius of influence of a point, in cells or, if larger, point spacings");
   table.add("cell_size_m", options.cell_size_m, not_negative,
-            "size of the finest cells and of edges; 0: the distance between the cloud's points");
+            "size of the finest cells and of the mesh's edges, m; 0: the point spacing");
   table.add("screening", options.screening, not_negative,
-            "poisson: weight of the points relative to smoothness");
+            "method poisson: weight of the points relative to the smoothness of the surface");
   table.add("weigh_by_error", options.weigh_by_error,
-            "weight points by the inverse square of their field expected_error");
+            "weight each point by the inverse square of its field expected_error (m)");
   table.add("samples_per_cell", options.samples_per_cell, positive,
-            "poisson: minimum number of points per cell; with fewer, cells are larger");
-  table.add("trim_distance_cells", options.trim_distance_cells, positive,
-            "maximum distance of the surface from all points, in cells or in the points' spacing");
+            "method poisson: minimum number of points per cell; other cells are enlarged");
+  table.add(
+      "trim_distance_cells", options.trim_distance_cells, positive,
+      "maximum distance of the surface from all points, in cells or, if larger, point spacings");
 }
 
 SurfaceReconstructionResult reconstruct_surface(const PointCloud& cloud,

@@ -232,16 +232,16 @@ void bind(ParameterTable& table, TextureOptions& options) {
   table.add("max_incidence_deg", options.views.max_incidence_deg, {0, 90, true, true},
             "maximum angle between viewing ray and surface normal, degrees");
   table.add("max_depth_m", options.views.max_depth_m, not_negative,
-            "maximum depth (z) at which a photograph is used for a surface, m; 0: no limit");
+            "maximum depth of a surface in a photograph used for it, m; 0: no limit");
   table.add("occlusion_tolerance_m", options.views.occlusion_tolerance_m, not_negative,
-            "depth behind another surface from which a surface is occluded, m");
+            "depth behind another surface beyond which a surface counts as occluded, m");
   table.add(
       "occlusion_margin_px", options.views.occlusion_margin_px, not_negative,
       "distance from an occluder's silhouette within which other views are preferred, pixels");
   table.add("border_px", options.views.border_px, not_negative,
             "width of the unused border of each photograph, pixels");
   table.add("seam_cost_m", options.labeling.seam_cost_m, not_negative,
-            "cost of a seam per meter; larger values give fewer seams but lower view quality");
+            "cost per meter of seam; larger values give fewer seams but lower view quality");
   table.add("blend_views", options.blend_views, {1, 16},
             "maximum number of photographs blended at a point; 1: one per triangle");
   table.add("blend_exponent", options.blend_exponent, not_negative,
@@ -249,7 +249,7 @@ void bind(ParameterTable& table, TextureOptions& options) {
   table.add("exposure", options.exposure.gains, "equalize the brightness of the photographs");
   table.add("vignetting", options.exposure.vignetting, "correct the vignetting of the photographs");
   table.add("max_side_m", options.max_side_m, not_negative,
-            "maximum side length of visible triangles before subdivision, m; 0: no subdivision");
+            "side length above which visible triangles are subdivided, m; 0: no subdivision");
   table.add("strict", options.strict, "treat unusable frames as errors instead of skipping them");
 }
 

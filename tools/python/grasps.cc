@@ -18,7 +18,8 @@ struct GraspOptions {
 };
 
 void bind(libmap::ParameterTable& table, GraspOptions& options) {
-  table.add("gripper", options.gripper, "scar-e, hubrobo, limbero, or a gripper file");
+  table.add("gripper", options.gripper,
+            "gripper to test: scar-e, hubrobo, limbero, or a gripper file");
   table.add_overrides("gripper", options.overrides);
   libgtd::bind(table, options.trials);
 }

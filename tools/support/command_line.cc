@@ -274,14 +274,15 @@ void Command::Parts::add_common_options() {
   if (!table.parameters().empty()) {
     app.add_option("--config", config, "YAML file of parameters; flags take precedence")
         ->type_name("FILE.yaml");
-    app.add_option("--set", overrides, "value of a key of --config (repeatable)")
+    app.add_option("--set", overrides,
+                   "value of one parameter by its key in a --config file (repeatable)")
         ->type_name("KEY=VALUE")
         ->allow_extra_args(false);
     app.add_flag("--print-config", print_config, "print the effective parameters as YAML and exit");
   }
-  app.add_flag("--dry-run", run_options.dry_run, "check everything and write nothing");
+  app.add_flag("--dry-run", run_options.dry_run, "check inputs and parameters, and write nothing");
   app.add_flag("--force", run_options.force, "overwrite outputs that graspmap did not write");
-  app.add_option("--threads", threads, "number of threads, 0 for all")->type_name("N");
+  app.add_option("--threads", threads, "number of threads; 0: all")->type_name("N");
   app.add_option("--progress", progress, "progress display: auto|json|none")->type_name("STYLE");
   app.add_flag("--quiet", run_options.quiet, "print warnings and errors only");
   app.add_flag("--verbose", run_options.verbose, "also print the time of each step");

@@ -113,9 +113,9 @@ void report_sessions(const std::string& scan, const libmap::PoseGraph& graph,
 
 void add_poses_option(Command& command, PosesOption& poses) {
   command.option("--poses", "auto|odometry|optimized|ground-truth|FILE", poses.source,
-                 "poses of the frames: from the scan, or a file (TUM, KITTI, g2o, TORO; a folder: "
-                 "COLMAP); auto: the first of optimized, odometry and ground-truth that the scan "
-                 "has; stored: the same as optimized");
+                 "poses of the frames: from the scan, or from a file (TUM, KITTI, g2o, TORO; a "
+                 "folder: COLMAP); auto: the first of optimized, odometry and ground-truth that "
+                 "the scan contains; stored: same as optimized");
   libmap::bind(command.parameters(), poses.file);
 }
 
@@ -133,9 +133,10 @@ std::vector<std::string> scan_inputs(const std::string& scan, const PosesOption&
 }
 
 void add_calibration_option(Command& command, CalibrationOption& calibration) {
-  command.option("--calibration", "auto|stored|FILE.yaml", calibration.source,
-                 "camera of the scan: stored in it, or in a file of refine --write-calibration; "
-                 "auto: the camera that the poses were estimated with, else the stored one");
+  command.option(
+      "--calibration", "auto|stored|FILE.yaml", calibration.source,
+      "camera calibration: that stored in the scan, or a file of refine --write-calibration; auto: "
+      "the one with which the poses were estimated, else the stored one");
 }
 
 std::optional<libmap::CameraFile> known_camera(const CalibrationOption& calibration,
