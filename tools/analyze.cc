@@ -70,7 +70,7 @@ struct ReadMap {
 
 ReadMap read_map(const std::string& file, Run& run) {
   if (is_tile_store(file))
-    throw libmap::Error("is a tile store: convert it to one map by `graspmap convert`",
+    throw libmap::Error("is a tile store; merge it into one map with `graspmap convert` first",
                         {.file = file});
   ReadMap map;
   map.cloud = libmap::read_cloud(file).cloud;
@@ -84,7 +84,7 @@ ReadMap read_map(const std::string& file, Run& run) {
              ": has no manifest; its points are assumed to be in the terrain frame, all above the "
              "zero plane");
   else if (map.manifest->find_parameter("zero_plane_m") == nullptr)
-    run.warn(file + ": its manifest has no zero plane; all its points are assumed to be above");
+    run.warn(file + ": its manifest has no zero plane; all its points are assumed to be above it");
   run.add_input(file);
   return map;
 }
@@ -310,7 +310,7 @@ void analyze(AnalyzeOptions& options, Run& run) {
                                   "requires several maps or --expected");
   options.map = options.maps.front();
   if (options.other.empty() && options.transform != "auto")
-    throw libmap::Error("requires --against OTHER",
+    throw libmap::Error("can only be used with --against OTHER",
                         {.field = "--transform", .value = options.transform});
   run.claim_output_tree(options.folder, output_names, {options.map, options.other});
   options.regions.border = options.change.border = options.analysis.border;

@@ -90,7 +90,7 @@ void require_nearness(const libmap::ReferenceSurface& surface, const libmap::Poi
   if (size == 0.0) return;  // the time does not depend on the distance to a point
   const double apart = ((a.max + a.min) / 2 - (b.max + b.min) / 2).norm();
   if (!(apart <= max_sizes * size))
-    throw libmap::Error("A and B are too far apart to be compared",
+    throw libmap::Error("A is too far from B to be compared: check the frames and --transform",
                         {.file = options.a,
                          .field = "distance of the centers",
                          .value = libmap::to_text(static_cast<float>(apart)) + " m",
@@ -111,7 +111,7 @@ libmap::Pose b_from_a_of(const CompareOptions& options) {
   const auto a_from_map = site_from_map_of(options.a);
   const auto b_from_map = site_from_map_of(options.b);
   if (!a_from_map && !b_from_map)
-    throw libmap::Error("neither A nor B was cropped",
+    throw libmap::Error("neither A nor B was cropped, so their manifests contain no transform",
                         {.file = options.a,
                          .field = "--transform",
                          .value = options.transform,

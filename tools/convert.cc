@@ -67,12 +67,14 @@ void refuse_ignored(const ConvertOptions& options) {
   const std::string format = libmap::format_of(options.output);
   if (options.writing.encoding == FileEncoding::binary_compressed && format != ".pcd")
     throw libmap::Error(
-        "requires a .pcd output",
+        "can be written only to .pcd",
         {.file = options.output, .field = "--encoding", .value = "binary_compressed"});
   if (options.pixel_size_m > 0.0 && !libmap::is_dem_path(options.output))
-    throw libmap::Error("requires .tif", {.file = options.output, .field = "--pixel-size"});
+    throw libmap::Error("can be used only for a .tif output",
+                        {.file = options.output, .field = "--pixel-size"});
   if (options.writing.big_endian && format != ".ply")
-    throw libmap::Error("requires .ply", {.file = options.output, .field = "--big-endian"});
+    throw libmap::Error("can be used only for a .ply output",
+                        {.file = options.output, .field = "--big-endian"});
 }
 
 // Maximum error of coordinates in single precision, m.
@@ -105,7 +107,7 @@ void convert_cloud(const ConvertOptions& options, Run& run) {
   if (read.dropped_points > 0)
     run.warn("{} points without a position were dropped", read.dropped_points);
   if (holds_meshes_alone(options.output))
-    throw libmap::Error("this format stores meshes only, and a cloud has no faces",
+    throw libmap::Error("this format stores only meshes, and the input is a cloud without faces",
                         {.file = options.output});
   run.add_results({{"points", read.cloud.size()}});
   add_input(options, run);
@@ -158,7 +160,8 @@ bool convert_textured(const ConvertOptions& options, Run& run) {
 void convert_mesh(const ConvertOptions& options, Run& run) {
   if (libmap::is_dem_path(options.output))
     throw libmap::Error(
-        "a mesh is not a raster: graspmap resample makes a cloud, gdal_translate copies a DEM",
+        "a mesh cannot be written as a raster; resample it to a cloud first, or copy a DEM with "
+        "gdal_translate",
         {.file = options.input});
   if (convert_textured(options, run)) return;
   const libmap::TriangleMesh mesh = libmap::read_mesh(options.input).mesh;
@@ -181,8 +184,9 @@ void convert_poses(const ConvertOptions& options, Run& run) {
   if (!named) libmap::require_trajectory_format(options.output);
   const libmap::TrajectoryFile read = libmap::read_trajectory(options.input, options.poses_format);
   if (!read.images.empty() || read.of_cameras)
-    throw libmap::Error("has poses of cameras, which need the scan for the base (fuse --poses)",
-                        {.file = options.input});
+    throw libmap::Error(
+        "contains poses of cameras, whose conversion to the base requires the scan (fuse --poses)",
+        {.file = options.input});
   run.add_results({{"poses", read.poses.size()}, {"links", read.links.size()}});
   add_input(options, run);
   const bool nodes = read.poses.front().node != 0;

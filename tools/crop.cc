@@ -83,7 +83,7 @@ void read_region(CropCommandOptions& options) {
   if (is_given(options.box) + is_given(options.polygon) + is_given(options.size) +
           (options.border ? 1 : 0) >
       1)
-    throw libmap::Error("several regions are given",
+    throw libmap::Error("only one region can be cropped",
                         {.bound = "one of --box, --polygon, --size and --border"});
   if (!options.box.empty()) {
     crop.region = CropRegion::box;
@@ -111,7 +111,7 @@ void read_region(CropCommandOptions& options) {
   if (options.up != "auto") crop.up = parse_vector(options.up, "--up");
   crop.yaw_deg = parse_number_or("auto", options.yaw, "not an angle", "--yaw", "auto or degrees");
   if (crop.region == CropRegion::whole && !crop.level && !crop.yaw_deg && !crop.center)
-    throw libmap::Error("there is nothing to do: no levelling and no region",
+    throw libmap::Error("without levelling, a region to crop is required",
                         {.field = "--level", .value = "none"});
 }
 

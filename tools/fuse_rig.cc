@@ -45,7 +45,7 @@ std::string absence(const std::string& name, const SynchronizedSet::Camera& came
 void report_absent(const libmap::CameraRig& rig, const SynchronizedSet& set,
                    const PanoramaCommandOptions& options, Run& run) {
   if (set.seen() == 0)
-    throw libmap::Error("no camera has an image at this time",
+    throw libmap::Error("no camera has an image near this time",
                         {.file = options.folder,
                          .field = "--stamp",
                          .value = libmap::to_text(set.stamp_s),
@@ -98,7 +98,7 @@ std::vector<libmap::PanoramaView> read_views(const libmap::CameraRig& rig,
     } catch (const libmap::Error& error) {
       // Only the camera of a broken image is left out.
       if (strict) throw;
-      run.warn(std::string(error.what()) + "; " + camera.name + " is left out");
+      run.warn(std::string(error.what()) + "; camera " + camera.name + " is left out");
       continue;
     }
     run.add_input(image.file);
@@ -132,7 +132,7 @@ void panorama(PanoramaCommandOptions& options, Run& run) {
   const libmap::PanoramaResult result =
       run.timed("project", [&] { return libmap::make_panorama(views, options.panorama); });
   if (views.empty())
-    throw libmap::Error("no image of this time can be read", {.file = options.folder});
+    throw libmap::Error("none of the images of this time can be read", {.file = options.folder});
   if (result.cloud.empty()) run.warn("no camera has measurements within its limits");
   add_rig_results(rig, set, result, views, run);
   carry_transforms(options.folder, run);

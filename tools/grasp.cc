@@ -80,7 +80,7 @@ std::vector<std::size_t> rows_of(const libmap::Table& locations,
     const auto found = std::find(names.begin(), names.end(), location);
     if (found == names.end())
       throw libmap::Error(
-          "is not a listed location" + libmap::did_you_mean(location, names),
+          "not a listed location" + libmap::did_you_mean(location, names),
           {.file = locations.file, .field = "--scene-locations", .value = location});
     const auto row = static_cast<std::size_t>(found - names.begin());
     if (std::find(rows.begin(), rows.end(), row) == rows.end()) rows.push_back(row);
@@ -114,7 +114,7 @@ std::string description(const libgtd::LocationResult& result, const libgtd::Tria
 void claim_scenes(const GraspScenesOptions& options, Run& run) {
   if (!options.folder.empty()) return run.claim_output_folder(options.folder);
   if (!options.locations.empty())
-    throw libmap::Error("requires --scenes", {.field = "--scene-locations"});
+    throw libmap::Error("can only be used with --scenes", {.field = "--scene-locations"});
 }
 
 // Returns the scenes to write. Throws Error for a location that is not in the table, two with the
@@ -127,7 +127,7 @@ std::vector<GraspScene> scenes_of(const libmap::Table& locations,
   if (options.locations.empty()) {
     if (names.size() > max_unlisted_scenes)
       throw libmap::Error(
-          "too many locations for one scene each: select some with --scene-locations",
+          "too many scenes, one per location; select locations with --scene-locations",
           {.file = locations.file,
            .field = "locations",
            .value = std::to_string(names.size()),
@@ -260,7 +260,7 @@ libgtd::Ground ground_of(const libmap::TriangleMesh& mesh, const GraspCommandOpt
       return libgtd::Ground(mesh, libgtd::errors_of(mesh, bounds));
     const auto error_m = libmap::parse_double(options.surface_error);
     if (!error_m || !(*error_m >= 0.0 && *error_m <= bounds.max_error_m))
-      throw libmap::Error("is not an error of a surface",
+      throw libmap::Error("not an error of a surface",
                           {.field = "--surface-error",
                            .value = options.surface_error,
                            .bound = "none, mesh, or 0 to --max-surface-error, m"});
@@ -304,8 +304,7 @@ void grasp_places(GraspCommandOptions& options, Run& run) {
   for (const std::string& text : libmap::split_list(options.more_loads)) {
     const auto load = libmap::parse_double(text);
     if (!load || !(*load > 0.0))
-      throw libmap::Error("is not a load",
-                          {.field = "--more-loads", .value = text, .bound = "> 0"});
+      throw libmap::Error("not a load", {.field = "--more-loads", .value = text, .bound = "> 0"});
     options.grasp.extra_loads_n.push_back(*load);
   }
   claim_scenes(options.scenes, run);
@@ -314,7 +313,8 @@ void grasp_places(GraspCommandOptions& options, Run& run) {
   const libgtd::Gripper gripper = read_with_fingers(file, options);
   libmap::Table table = libmap::read_csv(options.points);
   const std::vector<Eigen::Vector3d> locations = positions_of(table);
-  if (locations.empty()) throw libmap::Error("no locations", {.file = options.points});
+  if (locations.empty())
+    throw libmap::Error("the table has no locations", {.file = options.points});
   const auto scenes = scenes_of(table, options.scenes);
   const libmap::TriangleMesh mesh = mesh_of(options);
   if (options.mesh != level_mesh) run.add_input(options.mesh);
@@ -420,7 +420,7 @@ void fit_gripper(const GraspCommandOptions& options, Run& run) {
 void plan_next_pulls(const GraspCommandOptions& options, Run& run) {
   const auto count = libmap::parse_integer(options.plan);
   if (!count || *count < 1)
-    throw libmap::Error("is not a number of pulls",
+    throw libmap::Error("not a number of pull tests",
                         {.field = "--plan", .value = options.plan, .bound = ">= 1"});
   run.claim_output(options.output, {options.mesh, options.points});
   const auto file = libmap::find_data_file("grippers", options.gripper);
@@ -435,7 +435,9 @@ void plan_next_pulls(const GraspCommandOptions& options, Run& run) {
     return libgtd::plan_pulls(ground, gripper, locations, static_cast<std::size_t>(*count),
                               pull_options(options), run.progress());
   });
-  if (plans.empty()) throw libmap::Error("no pull is informative", {.file = options.points});
+  if (plans.empty())
+    throw libmap::Error("no pull test would give information about the gripper's parameters",
+                        {.file = options.points});
   libmap::Table planned;
   planned.columns = {"place",    "x",           "y",      "z",
                      "tilt_deg", "azimuth_deg", "load_n", "information_bits"};

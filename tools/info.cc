@@ -272,7 +272,7 @@ Json content_json(const InfoOptions& options, Run& run, Faults& faults) {
     return std::move(scan.json);
   }
   if (options.verify)
-    throw libmap::Error("requires a scan or a tile store",
+    throw libmap::Error("can only be used for a scan or a tile store",
                         {.file = options.file, .field = "--verify"});
   if (is_bag) return bag_json(options.file);
   return libmap::file_kind(options.file) == libmap::FileKind::mesh ? mesh_json(options)

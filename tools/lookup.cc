@@ -65,7 +65,7 @@ std::vector<AddedColumn> parse_columns(const std::string& text) {
     if (column.name.empty() || column.name.ends_with('>') || column.field.empty() ||
         (comparison != std::string_view::npos && !column.cutoff))
       throw libmap::Error(
-          "is not a column",
+          "not a definition of a column",
           {.field = "--column", .value = part, .bound = "NAME=FIELD or NAME=FIELD>=VALUE"});
     columns.push_back(std::move(column));
   }

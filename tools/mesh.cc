@@ -86,7 +86,7 @@ void prepare_normals(const MeshOptions& options, libmap::PointCloud& cloud, Run&
       [](const Eigen::Vector3f& normal) { return normal.allFinite() && !normal.isZero(0.0F); });
   if (options.normals != NormalSource::estimate && cloud.has_normals()) {
     if (has_any) return orient_if_mixed(options, cloud, run);
-    throw libmap::Error("use --normals estimate",
+    throw libmap::Error("the stored normals cannot be used; use --normals estimate",
                         {.file = options.cloud, .field = "normals", .value = "all zero or NaN"});
   }
   if (options.normals == NormalSource::cloud)
@@ -306,7 +306,7 @@ void make_tiles(const MeshOptions& options, TileFolder& output, Run& run) {
 
 void mesh_in_tiles(const MeshOptions& options, Run& run) {
   if (options.report || options.json)
-    throw libmap::Error("requires one mesh as output, not a folder of tiles",
+    throw libmap::Error("can only be used if the output is one mesh, not a folder of tiles",
                         {.field = options.json ? "--json" : "--report"});
   if (options.normals == NormalSource::estimate)
     throw libmap::Error("cannot be used with tiles, because orientation needs the whole cloud",

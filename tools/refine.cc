@@ -207,7 +207,7 @@ void claim_database(const RefineOptions& options, Run& run) {
   const std::string& first = options.scans.front();
   const bool is_file = options.scans.size() == 1 && fs::is_regular_file(first);
   if (!is_file && fs::exists(first))
-    throw libmap::Error("requires a single database as SCAN",
+    throw libmap::Error("can only be used if SCAN is a single database",
                         {.field = "--write-database",
                          .value = options.database,
                          .bound = "omitted for a folder or several scans"});

@@ -52,11 +52,11 @@ libmap::Verdict verdict_of(const libmap::Table& table, std::size_t row, std::siz
   if (libmap::trim(cell).empty()) return libmap::Verdict::none;
   const auto verdict = libmap::parse_bool(cell);
   if (!verdict)
-    throw libmap::Error("is not a verdict", {.file = table.file,
-                                             .field = "row " + std::to_string(row + 1) +
-                                                      ", column '" + table.columns[column] + "'",
-                                             .value = "'" + cell + "'",
-                                             .bound = "1, 0 or empty"});
+    throw libmap::Error("not a verdict", {.file = table.file,
+                                          .field = "row " + std::to_string(row + 1) + ", column '" +
+                                                   table.columns[column] + "'",
+                                          .value = "'" + cell + "'",
+                                          .bound = "1, 0 or empty"});
   return *verdict ? libmap::Verdict::pass : libmap::Verdict::fail;
 }
 
@@ -178,7 +178,8 @@ MapWindow read_window(const MapTiles& tiles, const std::optional<Eigen::AlignedB
       parts[n] = libgtd::downsample_map(parts[n], window.columns_per_point);
   });
   if (!parts.empty()) window.cloud = libgtd::merge_map_clouds(parts);
-  if (window.cloud.empty()) throw libmap::Error("contains no part of the map", {.field = "--box"});
+  if (window.cloud.empty())
+    throw libmap::Error("no part of the map is inside the box", {.field = "--box"});
   if (window.columns_per_point > 1) {
     window.cloud = libgtd::downsample_map(window.cloud, window.columns_per_point);
     libgtd::snap_to_squares(tiles.index(), window.columns_per_point, window.cloud);
@@ -220,7 +221,7 @@ SceneFile scene_of(const std::string& file, const SceneFileOptions& options, Run
   if (auto* cloud = std::get_if<libmap::PointCloud>(&layer.shape); box && cloud != nullptr)
     *cloud = points_in_box(*cloud, *box);
   else if (box)
-    throw libmap::Error("requires a cloud or a map", {.file = file, .field = "--box"});
+    throw libmap::Error("can only be used for a cloud or a map", {.file = file, .field = "--box"});
   if (const auto* cloud = std::get_if<libmap::PointCloud>(&layer.shape);
       cloud != nullptr && cloud->empty())
     throw libmap::Error("there is nothing to draw: no point with finite coordinates",
@@ -394,8 +395,9 @@ std::vector<libmap::SheetCell> read_cells(const RenderOptions& options, Run& run
 
 libmap::ColorImage draw_several(RenderOptions& options, Run& run) {
   if (options.view.view == libmap::Viewpoint::camera)
-    throw libmap::Error("requires a single file", {.field = "--view", .value = "camera"});
-  reject_changed(options, bind_one, "requires a single file");
+    throw libmap::Error("can only be used for a single file",
+                        {.field = "--view", .value = "camera"});
+  reject_changed(options, bind_one, "can only be used for a single file");
   // Maps of one cloud have the same orientation in the image.
   if (options.scene.heading == MapHeading::automatic) options.scene.heading = MapHeading::input;
   options.sheet.column_titles = split_texts(options.column_titles);

@@ -33,8 +33,9 @@ void tell_results(const libmap::PoissonDiskResult& result, std::uint64_t wanted,
 
 void require_one_of_radius_and_count(const libmap::PoissonDiskOptions& sampling) {
   if (sampling.count > 0 && sampling.radius_m != libmap::PoissonDiskOptions().radius_m)
-    throw libmap::Error("cannot be combined with --radius, which determines the number of samples",
-                        {.field = "count", .value = std::to_string(sampling.count)});
+    throw libmap::Error(
+        "--count cannot be combined with --radius, which determines the number of samples",
+        {.field = "count", .value = std::to_string(sampling.count)});
 }
 
 void resample(const ResampleOptions& options, Run& run) {

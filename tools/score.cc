@@ -72,7 +72,7 @@ void refuse_mesh(const std::string& terrain) {
   if (format == ".obj" || format == ".stl" || format == ".off" || format == ".glb" ||
       (format == ".ply" && libmap::read_cloud_info(first).faces > 0))
     throw libmap::Error(
-        "is a mesh: sample its surface by `graspmap resample MESH --radius M -o CLOUD.pcd`",
+        "is a mesh; sample its surface first with `graspmap resample MESH --radius M -o CLOUD.pcd`",
         {.file = first.string()});
 }
 
@@ -422,9 +422,11 @@ void score(ScoreOptions& options, Run& run) {
     return;
   }
   if (options.append)
-    throw libmap::Error("requires a tile store, MAP.tiles", {.field = "--append"});
+    throw libmap::Error("can only be used if the output is a tile store, MAP.tiles",
+                        {.field = "--append"});
   if (options.max_points_in_memory != ScoreOptions{}.max_points_in_memory)
-    throw libmap::Error("requires a tile store, MAP.tiles", {.field = "--max-points-in-memory"});
+    throw libmap::Error("can only be used if the output is a tile store, MAP.tiles",
+                        {.field = "--max-points-in-memory"});
   libmap::require_cloud_format(options.output);
   run.claim_output(options.output, {options.terrain});
   const libmap::TilesReadResult read =

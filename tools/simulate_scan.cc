@@ -109,7 +109,8 @@ libmap::Trajectory given_poses(const SimulateScanOptions& options) {
   reject_given({{"--target", options.target != "auto"}}, reason);
   return in_file(options.trajectory, [&] {
     const libmap::TrajectoryFile file = libmap::read_trajectory(options.trajectory);
-    if (file.of_cameras) throw libmap::Error("has poses of cameras, not of the camera's body");
+    if (file.of_cameras)
+      throw libmap::Error("contains poses of cameras, but poses of the camera's body are required");
     return libmap::assign_nodes_and_stamps(file.poses, frame_interval_s);
   });
 }
@@ -201,7 +202,7 @@ void simulate(SimulateScanOptions& options, Run& run) {
   simulation.depth.check();
   run.claim_output(options.output, {options.scene, options.camera, options.trajectory});
   if (!options.output.ends_with(".db"))
-    throw libmap::Error("a scan is written as a database",
+    throw libmap::Error("a scan can be written only as a database",
                         {.file = options.output, .bound = "a name.db"});
   if (!options.camera.empty()) {
     options.camera = libmap::find_data_file("cameras", options.camera).string();

@@ -147,7 +147,7 @@ class NearestPairs {
       smaller[s] = smaller_neighbors(s);
       pairs += smaller[s].size();
       if (pairs > max_links)
-        throw libmap::Error("links more than 10 million pairs of regions",
+        throw libmap::Error("too large: it links more than 10 million pairs of regions",
                             {.field = "stride_m", .value = libmap::to_text(given_reach_m_)});
     }
     libmap::parallel_each(sets_.size(), 8, [&](std::size_t s) {
@@ -372,7 +372,8 @@ MapRegionResult find_regions(const VoxelMap& map, const MapSurface& surface,
                              const MapRegionOptions& options) {
   libmap::check_parameters(options);
   if (surface.area_m2.size() != map.size())
-    throw libmap::Error("the surface does not match the map", {.field = "area_m2"});
+    throw libmap::Error("number of surface values differs from number of voxels",
+                        {.field = "area_m2"});
   const std::vector<std::uint32_t> graspable = graspable_voxels(map, options.border);
   MapRegionResult result;
   for (std::vector<std::uint32_t>& voxels : connected(map, graspable, options.adjacency_voxels)) {

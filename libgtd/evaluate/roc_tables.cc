@@ -273,11 +273,13 @@ TableEvaluation evaluate_table(const Table& table, const TableEvaluationOptions&
   const std::vector<std::optional<bool>> labels = read_labels(table, options.label_column);
   std::vector<std::string>& names = evaluation.options.score_columns;
   if (names.empty()) names = default_score_columns(table, options.label_column);
-  if (names.empty()) throw libmap::Error("no score column", {.file = table.file});
+  if (names.empty())
+    throw libmap::Error("the table has no column of scores: name one with --score",
+                        {.file = table.file});
   for (std::size_t n = 0; n < names.size(); ++n) {
     if (std::find(names.begin(), names.begin() + static_cast<std::ptrdiff_t>(n), names[n]) !=
         names.begin() + static_cast<std::ptrdiff_t>(n))
-      throw libmap::Error("named twice",
+      throw libmap::Error("is named twice",
                           {.file = table.file, .field = "column '" + names[n] + "'"});
     evaluation.columns.push_back(
         {names[n], evaluate_roc(labels, read_scores(table, names[n]), options.roc)});

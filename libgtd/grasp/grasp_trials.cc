@@ -371,7 +371,7 @@ void require_ground(const Ground& ground, const std::vector<Eigen::Vector3d>& lo
   for (std::size_t n = 0; n < locations.size(); ++n)
     if (!ground.distance(locations[n], max_distance_m))
       throw libmap::Error(
-          "is not on the mesh",
+          "not on the mesh",
           {.field = "location " + std::to_string(n + 1),
            .value = libmap::to_text(locations[n].x()) + "," + libmap::to_text(locations[n].y()) +
                     "," + libmap::to_text(locations[n].z()),

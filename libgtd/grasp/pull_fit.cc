@@ -257,11 +257,12 @@ class PullFitting {
       const std::string row = "row " + std::to_string(test.row);
       const Ground* under = test.on_level_ground ? &level_ : ground;
       if (under == nullptr)
-        throw libmap::Error("requires a mesh", {.field = row, .bound = "ground = level"});
+        throw libmap::Error("the test is at a location on the ground: give a mesh",
+                            {.field = row, .bound = "ground = level"});
       const Eigen::Vector3d at = test.on_level_ground ? Eigen::Vector3d::Zero() : test.location;
       if (!under->distance(at, options.grasp.max_distance_m))
         throw libmap::Error(
-            "is not on the mesh",
+            "not on the mesh",
             {.field = row,
              .value = libmap::to_text(at.x()) + "," + libmap::to_text(at.y()) + "," +
                       libmap::to_text(at.z()),
@@ -492,7 +493,8 @@ PlannedPull informative_pull(const std::vector<std::vector<double>>& forces_of_s
 
 std::vector<PullTest> pull_tests_of(const libmap::Table& table) {
   if (table.rows.empty())
-    throw libmap::Error("no pull tests", {.file = table.file, .field = "rows", .bound = ">= 1"});
+    throw libmap::Error("the table has no pull tests",
+                        {.file = table.file, .field = "rows", .bound = ">= 1"});
   const PullReader reader(table);
   std::vector<PullTest> tests;
   for (std::size_t row = 0; row < table.rows.size(); ++row) tests.push_back(reader.read(row));
@@ -516,7 +518,8 @@ PullFit fit_pulls(const Ground* ground, const Gripper& gripper, const std::vecto
   require_fingers(gripper);
   if (std::none_of(gripper.ranges.begin(), gripper.ranges.end(),
                    [](const auto& range) { return range.has_value(); }))
-    throw libmap::Error("missing: a fit requires parameters with a range", {.field = "ranges"});
+    throw libmap::Error("is missing: a fit requires the prior range of at least one parameter",
+                        {.field = "ranges"});
   return PullFitting(ground, gripper, tests, options, progress).fit();
 }
 

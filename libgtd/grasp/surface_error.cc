@@ -53,7 +53,7 @@ GroundErrors errors_of(const libmap::TriangleMesh& mesh, const SurfaceErrorOptio
     throw libmap::Error("the mesh has no such field at its vertices", {.field = "expected_error"});
   for (std::size_t n = 0; n < expected->values.size(); ++n)
     if (expected->values[n] < 0.0)
-      throw libmap::Error("is negative",
+      throw libmap::Error("a standard deviation cannot be negative",
                           {.field = "expected_error of vertex " + std::to_string(n + 1),
                            .value = libmap::to_text(expected->values[n]),
                            .bound = ">= 0"});

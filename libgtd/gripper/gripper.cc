@@ -76,7 +76,7 @@ void bind(libmap::ParameterTable& table, GripperFingers& fingers) {
 void GripperFingers::check() const {
   libmap::check_parameters(*this);
   if (curl_limit_deg < curl_deg)
-    throw libmap::Error("less than the curl of a free finger",
+    throw libmap::Error("less than the curl of a finger without contact",
                         {.field = "fingers.curl_limit_deg",
                          .value = libmap::to_text(curl_limit_deg),
                          .bound = ">= fingers.curl_deg, " + libmap::to_text(curl_deg)});
@@ -84,8 +84,9 @@ void GripperFingers::check() const {
 
 void require_fingers(const Gripper& gripper) {
   if (!gripper.fingers)
-    throw libmap::Error("missing: required for forces, not for method corrected",
-                        {.field = "fingers"});
+    throw libmap::Error(
+        "is missing: forces require this section of the gripper file (method corrected does not)",
+        {.field = "fingers"});
 }
 
 ParameterValues parameters_of(const Gripper& gripper) {

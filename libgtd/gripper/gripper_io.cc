@@ -82,7 +82,7 @@ std::vector<ParameterSet> parse_sets(const std::string& text) {
     sets.push_back(set);
   }
   if (!sets.empty() && !(sum > 0.0))
-    throw libmap::Error("has no positive weight",
+    throw libmap::Error("contains no set with a positive weight",
                         {.field = "ensemble.sets", .bound = "> 0 in sum"});
   for (ParameterSet& set : sets) set.weight /= sum;
   return sets;

@@ -57,11 +57,11 @@ void require_all_shares(const std::vector<Manifest>& manifests,
     const std::string share = share_text(manifests[n]);
     const std::string of = share.substr(std::min(share.find('/') + 1, share.size()));
     if (n > 0 && of != count)
-      throw libmap::Error("is not a share of the same tiles",
+      throw libmap::Error("not a share of the same tiles as the first file's",
                           {.file = files[n], .field = "tile", .value = share});
     count = of;
     if (!shares.insert(share).second)
-      throw libmap::Error("two files contain this share",
+      throw libmap::Error("two files contain the same share",
                           {.file = files[n], .field = "tile", .value = share});
   }
   if (std::to_string(shares.size()) != count)

@@ -30,7 +30,7 @@ PointGrid::PointGrid(const std::vector<Eigen::Vector3d>& points, double cell_siz
   if (order_.empty()) return;
   const double extent = low_.cwiseAbs().cwiseMax(high_.cwiseAbs()).maxCoeff();
   if (!(extent / cell_size_m <= 0x1.0p40))
-    throw libmap::Error("the points are too far apart for a search radius this small",
+    throw libmap::Error("the search radius is too small for points this far from the origin",
                         {.value = libmap::to_text(cell_size_m) + " m cells up to " +
                                   libmap::to_text(extent) + " m from the origin"});
 

@@ -335,11 +335,10 @@ void add_images(const SurveyedImages& images, std::size_t camera, bool calibrate
     if (count > 0)
       plan.warnings.push_back(images.topic + ": " + std::to_string(count) + " images " + text);
   };
-  warn(twice, "have a duplicate stamp and are dropped");
-  warn(otherwise, "differ from the first calibration and are dropped");
+  warn(twice, "are dropped because an earlier image has the same stamp");
+  warn(otherwise, "are dropped because their calibration differs from the first");
   if (images.unstamped)
-    plan.warnings.push_back(images.topic +
-                            ": images without a stamp; the recording times are used");
+    plan.warnings.push_back(images.topic + ": images have no stamp; the recording times are used");
 }
 
 // Selects synchronized sets and keeps their images only.
@@ -408,7 +407,7 @@ BagRigPlan plan_of(const fs::path& bag, const BagRigOptions& options,
     if (!options.rig)
       plan.rig.cameras[n].name = choices[n].name.empty() ? names[n] : choices[n].name;
     if (std::find(plan.topics.begin(), plan.topics.end(), choices[n].topic) != plan.topics.end())
-      throw Error("is named twice", {.field = "topic", .value = choices[n].topic});
+      throw Error("the topic is named twice", {.field = "topic", .value = choices[n].topic});
     if (!plan.topics[camera].empty())
       throw Error("belongs to the same camera as " + plan.topics[camera],
                   {.field = "topic", .value = choices[n].topic});

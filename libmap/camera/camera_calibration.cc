@@ -337,9 +337,9 @@ Chessboard parse_chessboard(const std::string& text, const std::string& field) {
   const int columns = side(text.substr(0, cross));
   const int rows = cross == std::string::npos ? 0 : side(text.substr(cross + 1));
   if (columns == 0 || rows == 0)
-    throw Error("no such board", {.field = field,
-                                  .value = text,
-                                  .bound = "COLUMNSxROWS inner corners, 3 to 100 each, e.g. 8x6"});
+    throw Error("not a board", {.field = field,
+                                .value = text,
+                                .bound = "COLUMNSxROWS inner corners, 3 to 100 each, e.g. 8x6"});
   Chessboard board;
   board.columns = columns;
   board.rows = rows;

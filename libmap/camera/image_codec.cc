@@ -58,7 +58,7 @@ std::optional<ImageInfo> png_info(std::string_view bytes) {
   const std::uint32_t height = big_endian(bytes, 20, 4);
   constexpr std::uint32_t most = 0x7fffffff;
   if (width == 0 || height == 0 || width > most || height > most)
-    throw Error("PNG of no valid size", {.value = size_text(width, height)});
+    throw Error("PNG has an invalid size", {.value = size_text(width, height)});
   ImageInfo info{.format = ImageFormat::png,
                  .width = static_cast<int>(width),
                  .height = static_cast<int>(height),
@@ -78,7 +78,7 @@ std::optional<ImageInfo> png_info(std::string_view bytes) {
       info.channels = 4;
       break;
     default:
-      throw Error("PNG of an unknown color type");
+      throw Error("PNG has an unknown color type");
   }
   return info;
 }
@@ -106,7 +106,7 @@ std::optional<ImageInfo> jpeg_info(std::string_view bytes) {
       info.width = static_cast<int>(big_endian(bytes, at + 7, 2));
       info.channels = static_cast<std::uint8_t>(bytes[at + 9]);
       if (info.width == 0 || info.height == 0)
-        throw Error("JPEG of no valid size", {.value = size_text(info.width, info.height)});
+        throw Error("JPEG has an invalid size", {.value = size_text(info.width, info.height)});
       return info;
     }
     at += 2 + length;
@@ -129,7 +129,7 @@ using JpegHandle = std::unique_ptr<void, decltype(&tjDestroy)>;
 void decode_jpeg(std::string_view bytes, const ImageInfo& info, int pixel_format,
                  std::uint8_t* pixels) {
   const JpegHandle handle(tjInitDecompress(), &tjDestroy);
-  if (!handle) throw Error("libjpeg-turbo cannot be used", {}, ErrorKind::failed);
+  if (!handle) throw Error("libjpeg-turbo could not be initialized", {}, ErrorKind::failed);
   const int flags = TJFLAG_ACCURATEDCT | TJFLAG_STOPONWARNING | TJFLAG_LIMITSCANS;
   const int result =
       tjDecompress2(handle.get(), reinterpret_cast<const unsigned char*>(bytes.data()),
@@ -142,14 +142,14 @@ std::string encode_jpeg(const std::uint8_t* pixels, int width, int height, int p
                         int subsampling, int quality) {
   if (width <= 0 || height <= 0) throw Error("an empty image cannot be written");
   const JpegHandle handle(tjInitCompress(), &tjDestroy);
-  if (!handle) throw Error("libjpeg-turbo cannot be used", {}, ErrorKind::failed);
+  if (!handle) throw Error("libjpeg-turbo could not be initialized", {}, ErrorKind::failed);
   unsigned char* buffer = nullptr;
   unsigned long size = 0;
   const int result = tjCompress2(handle.get(), pixels, width, 0, height, pixel_format, &buffer,
                                  &size, subsampling, quality, TJFLAG_ACCURATEDCT);
   const std::unique_ptr<unsigned char, decltype(&tjFree)> owner(buffer, &tjFree);
   if (result != 0)
-    throw Error(std::string("JPEG cannot be made: ") + tjGetErrorStr2(handle.get()),
+    throw Error(std::string("JPEG could not be encoded: ") + tjGetErrorStr2(handle.get()),
                 {.field = "image size", .value = size_text(width, height)}, ErrorKind::failed);
   return std::string(reinterpret_cast<const char*>(buffer), size);
 }
@@ -279,7 +279,7 @@ std::string encode_png(const PngPixels& pixels) {
   const bool is_written = info != nullptr && encode_png_rows(sink, pixels, png, info);
   png_destroy_write_struct(&png, &info);
   if (!is_written)
-    throw Error(std::string("PNG cannot be made: ") + sink.message,
+    throw Error(std::string("PNG could not be encoded: ") + sink.message,
                 {.field = "image size", .value = size_text(pixels.width, pixels.height)},
                 ErrorKind::failed);
   return std::move(sink.bytes);
@@ -305,7 +305,7 @@ ImageInfo require_png(std::string_view bytes, int channels, int bits) {
   const ImageInfo info = checked_info(bytes);
   if (info.format != ImageFormat::png || info.channels != channels || info.bits != bits)
     throw Error(
-        "image of another kind",
+        "is not the required kind of image",
         {.value = to_text(info.format) + " of " + std::to_string(info.channels) + " x " +
                   std::to_string(info.bits) + " bits",
          .bound = "PNG of " + std::to_string(channels) + " x " + std::to_string(bits) + " bits"});

@@ -32,7 +32,8 @@ void check(const GrayImage& image, const Camera& camera, const std::string& fiel
     refuse_pair("image and calibration differ in size", field + " image",
                 size_text(image.width, image.height), size_text(camera.width, camera.height));
   if (camera.is_distorted())
-    throw Error("not rectified: the camera has lens distortion", {.field = field + " camera"});
+    throw Error("is not rectified: it has lens distortion; rectify the images first",
+                {.field = field + " camera"});
 }
 
 void check(const StereoCamera& cameras) {
@@ -147,7 +148,7 @@ DepthImage stereo_depth(const GrayImage& left, const GrayImage& right, const Ste
 DepthImage stereo_depth(const RgbdFrame& frame, const StereoDepthOptions& options) {
   const std::string node = "node " + std::to_string(frame.node);
   if (frame.stereo.empty() || frame.right.empty() || frame.color.empty())
-    throw Error("no stereo images", {.field = node});
+    throw Error("has no stereo images", {.field = node});
   const auto pairs = static_cast<int>(frame.stereo.size());
   if (frame.right.width % pairs != 0 || frame.color.width % pairs != 0 ||
       frame.color.height != frame.right.height || frame.color.width != frame.right.width)

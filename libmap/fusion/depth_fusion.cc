@@ -110,7 +110,8 @@ class Fusion {
 
   Error no_frames(std::size_t poses) const {
     if (survey_.skipped.empty())
-      return Error(poses == 0 ? "there are no poses" : "no frame has depth");
+      return Error(poses == 0 ? "no frame can be fused: there are no poses"
+                              : "no frame can be fused: none has depth");
     return Error("none of " + std::to_string(poses) +
                  " frames can be used; the first: " + survey_.skipped.front().second.what());
   }

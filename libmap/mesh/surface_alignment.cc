@@ -65,7 +65,7 @@ std::vector<Pair> pairs_of(const std::vector<Eigen::Vector3d>& points, const Pos
   });
   const double share = static_cast<double>(pairs.size()) / static_cast<double>(points.size());
   if (pairs.size() < 6 || share < options.min_overlap)
-    throw Error("too little overlap to align with the surface",
+    throw Error("too few points are near the surface to align them with it",
                 {.field = "points within " + to_text(static_cast<float>(options.max_distance_m)) +
                           " m of the surface",
                  .value = to_fixed_text(100.0 * share, 1) + " %",
@@ -168,7 +168,7 @@ SurfaceAlignmentResult align_to_surface(const std::vector<Eigen::Vector3d>& poin
                                         const ReferenceSurface& surface,
                                         const SurfaceAlignmentOptions& options) {
   check_parameters(options);
-  if (!surface.is_oriented()) throw Error("cannot align to a surface without normals");
+  if (!surface.is_oriented()) throw Error("alignment requires a surface with normals");
   if (points.size() < 6)
     throw Error("too few points to align",
                 {.field = "points", .value = std::to_string(points.size()), .bound = ">= 6"});

@@ -433,7 +433,7 @@ IcpResult align_surfaces(const std::vector<FrameFeatures>& frames,
                          const std::vector<PoseLink>& links, const IcpOptions& options,
                          Progress& progress) {
   if (prior.size() != map_from_base.size())
-    throw Error("does not match the number of frames with a pose",
+    throw Error("differs from the number of frames with a pose",
                 {.field = "blocks of the prior",
                  .value = std::to_string(prior.size()),
                  .bound = std::to_string(map_from_base.size())});

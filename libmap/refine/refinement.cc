@@ -175,7 +175,7 @@ void start(Run& run) {
   const PoseGraph& graph = run.input.scan.graph();
   const int gauge = options.graph.gauge_node;
   if (gauge != 0 && graph.find_node(gauge) == nullptr)
-    throw Error("the scan has no such node",
+    throw Error("the scan has no node with this id",
                 {.field = "gauge_node", .value = std::to_string(gauge)});
   InitialPoses initial = initial_poses(graph, options.start);
   RefinementState& state = run.state;
@@ -205,7 +205,7 @@ void require_one_scale(const RefinementOptions& options) {
                 {.field = "board"});
   if (options.scale != 1.0 && (options.board || !options.known_lengths.empty() ||
                                options.scale_from == ScaleSource::odometry))
-    throw Error("the scale is determined twice",
+    throw Error("the scale is also determined by another option: use one of them",
                 {.field = "scale",
                  .value = to_text(options.scale),
                  .bound = "1 with known lengths, a board or the scale from odometry"});
@@ -445,7 +445,7 @@ void drop_unjoined(const RefinementInput& input, const RefinementState& state,
     if (input.tracked.contains(node)) left.push_back(node);
   std::sort(left.begin(), left.end());
   if (!left.empty())
-    result.warnings.push_back("left out, because no link joins them to the rest: nodes " +
+    result.warnings.push_back("no link connects these nodes to the others, so they are left out: " +
                               join_numbers(left));
   result.without_pose = std::move(left);
 }
@@ -505,11 +505,11 @@ void require_other_links(Run& run) {
   if (is_all_tracked(run.input, state) && state.other_links.empty()) {
     if (state.frames->empty() && !run.result.skipped.empty())
       throw run.result.skipped.front().second;
-    throw Error("no two of its images match, and there are no other links",
+    throw Error("no two images match, and the scan has no links: the poses are undetermined",
                 {.field = "frames", .value = std::to_string(state.frames->size())});
   }
   run.state.warnings.push_back(
-      "no two frames could be matched by features: the poses are from the other links only");
+      "no two frames could be matched by features: the poses depend on the scan's own links only");
 }
 
 }  // namespace

@@ -147,7 +147,7 @@ void register_to_color(RgbdFrame& frame, const Camera& depth_camera) {
     throw Error("depth_calibration requires frames with one color camera",
                 {.value = std::to_string(frame.cameras.size()) + " cameras"});
   if (frame.depth.width != depth_camera.width || frame.depth.height != depth_camera.height)
-    throw Error("size differs from the calibration",
+    throw Error("the depth image's size differs from the calibration's",
                 {.value = size_text(frame.depth.width, frame.depth.height),
                  .bound = size_text(depth_camera.width, depth_camera.height)});
   RgbdFrame only_depth;
@@ -468,7 +468,7 @@ std::string FrameFolder::image_name(int node) const {
 RgbdFrame FrameFolder::read_frame(int node, FrameParts parts) const {
   const auto entry = files_.find(node);
   if (entry == files_.end())
-    throw Error("no such node",
+    throw Error("the scan has no node with this id",
                 {.file = path_.string(), .field = "node", .value = std::to_string(node)});
   const Files& of_node = entry->second;
   RgbdFrame frame;

@@ -121,7 +121,7 @@ std::vector<CameraPose> poses_of_images(const std::vector<ImagePose>& images,
     const auto& [node, camera] = node_camera;
     const auto [earlier, is_new] = known.emplace(node_camera, images[index].image);
     if (!is_new)
-      throw Error("two images belong to one camera of node " + std::to_string(node),
+      throw Error("two images match the same camera of node " + std::to_string(node),
                   {.field = "image", .value = earlier->second + " and " + images[index].image});
     add_camera(
         scan,

@@ -66,7 +66,7 @@ Camera intrinsics_of(const YAML::Node& map, const fs::path& folder) {
   for (const char* key : {"image_width", "image_height", "camera_matrix", "distortion_model",
                           "distortion_coefficients"})
     if (map[key])
-      throw Error("is also in the calibration file; remove one of them", {.field = key});
+      throw Error("is also in the calibration file; remove it from one of them", {.field = key});
   return read_camera(folder / map["calibration"].Scalar()).camera;
 }
 
@@ -178,7 +178,7 @@ std::string camera_entry(const RigCamera& camera) {
 }  // namespace
 
 void CameraRig::check() const {
-  if (cameras.empty()) throw Error("a rig needs a camera", {.field = "cameras"});
+  if (cameras.empty()) throw Error("a rig needs at least one camera", {.field = "cameras"});
   std::set<std::string> names;
   for (const RigCamera& camera : cameras) {
     check_camera(camera);
@@ -247,7 +247,7 @@ std::vector<RigImage> images_of_table(const fs::path& folder, const CameraRig& r
     const std::string& name = table.rows[row][camera_column];
     const auto found = std::find(names.begin(), names.end(), name);
     if (found == names.end())
-      throw Error("the rig has no such camera" + did_you_mean(name, names),
+      throw Error("the rig has no camera with this name" + did_you_mean(name, names),
                   {.file = table.file, .field = "camera", .value = name});
     stamp_of(table.rows[row][stamp_column], table.file, "stamp_s");
     images.push_back({static_cast<std::size_t>(found - names.begin()),

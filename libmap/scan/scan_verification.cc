@@ -281,7 +281,7 @@ class DatabaseVerification {
       result_.bytes += static_cast<std::uint64_t>(bytes);
       if (size > 0 && (bytes == size || (bytes % 4 == 0 && bytes / 4 == size))) return;
       findings_.add(node_in(row, 0), part_of(table, "descriptor"),
-                    Error("length differs from descriptor_size",
+                    Error("the number of bytes does not match descriptor_size",
                           {.value = std::to_string(bytes) + " bytes",
                            .bound = std::to_string(size) + ", or 4 times as many"}));
     };

@@ -65,9 +65,10 @@ Error shape_error(std::size_t i, const SceneShape& shape, const Error& error) {
 void check_shape(const SceneShape& shape) {
   if (const auto* capsule = std::get_if<Capsule>(&shape.geometry)) {
     if (capsule->length_m < 2.0 * capsule->radius_m)
-      throw Error("length below the diameter", {.field = "length_m",
-                                                .value = to_text(capsule->length_m),
-                                                .bound = ">= " + to_text(2.0 * capsule->radius_m)});
+      throw Error("less than the capsule's diameter",
+                  {.field = "length_m",
+                   .value = to_text(capsule->length_m),
+                   .bound = ">= " + to_text(2.0 * capsule->radius_m)});
   }
   if (std::holds_alternative<Plane>(shape.geometry)) {
     const double up = shape.placement.pose().linear()(2, 2);

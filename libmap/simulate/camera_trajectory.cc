@@ -310,7 +310,7 @@ CameraMotion camera_motion(const TriangleMesh& mesh, const CameraTrajectoryOptio
 
 CameraMotion serpentine_motion(const GroundHeights& ground, const CameraTrajectoryOptions& options,
                                std::uint64_t seed) {
-  if (ground.empty()) throw Error("the ground has no points");
+  if (ground.empty()) throw Error("the terrain has no points");
   const Serpentine way(ground.box(), options.serpentine);
   const double height_m = options.height_m > 0.0 ? options.height_m : 1.4;
   const double ahead_m = options.serpentine.ahead_m;

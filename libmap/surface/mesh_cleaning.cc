@@ -263,7 +263,7 @@ class Cleaning {
   // `cause` describes the removed triangles.
   void require_triangles(const TriangleMesh& mesh, const ErrorContext& cause) {
     if (mesh.triangles.empty() && !options_.known)
-      throw Error("nothing is left of the mesh", cause);
+      throw Error("no triangle of the mesh would remain", cause);
   }
 
   double merge_distance() {

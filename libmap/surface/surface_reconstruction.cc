@@ -257,7 +257,7 @@ void Reconstruction::check_cell_size() {
   const double extent = (bounds.max - bounds.min).maxCoeff();
   // The surface extends by about a cell, so larger cells would create ground around the points.
   if (result_.cell_size_m > extent)
-    throw Error("cells larger than the cloud",
+    throw Error("the cells would be larger than the cloud",
                 {.field = "cell_size_m",
                  .value = to_text(static_cast<float>(result_.cell_size_m)),
                  .bound = "<= " + to_text(static_cast<float>(extent)) + " m"});
@@ -269,7 +269,7 @@ void Reconstruction::check_cell_size() {
   if (!(result_.cell_size_m >= min_cell_m))
     throw Error(is_poisson ? "the octree would be deeper than " + std::to_string(max_octree_depth) +
                                  " levels"
-                           : "cells too small for the distance between the points",
+                           : "too small for the distance between the points",
                 {.field = "cell_size_m",
                  .value = to_text(static_cast<float>(result_.cell_size_m)),
                  .bound = ">= " + to_text(static_cast<float>(min_cell_m)) + " m"});
@@ -463,7 +463,7 @@ SurfaceReconstructionResult reconstruct_part(const PointCloud& part, const Cloud
 
 double surface_margin_m(const SurfaceReconstructionOptions& options) {
   if (options.method != SurfaceMethod::implicit)
-    throw Error("reconstruction in parts requires a local method",
+    throw Error("this method cannot reconstruct a surface in tiles",
                 {.field = "method", .value = "poisson", .bound = "implicit"});
   if (!(options.cell_size_m > 0.0))
     throw Error("reconstruction in parts requires a cell size",

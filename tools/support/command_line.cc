@@ -162,7 +162,7 @@ std::unique_ptr<libmap::Progress> make_progress(const std::string& style) {
   if (style == "json") return std::make_unique<JsonLines>();
   if (style == "auto" && isatty(STDERR_FILENO) == 1) return std::make_unique<Bar>();
   if (style == "auto" || style == "none") return std::make_unique<Silent>();
-  throw libmap::Error("unknown style",
+  throw libmap::Error("not a style of progress display",
                       {.field = "--progress", .value = style, .bound = "one of auto, json, none"});
 }
 
@@ -329,7 +329,8 @@ void Command::Parts::apply_parameters() {
   for (const std::string& override : overrides) {
     const std::size_t equals = override.find('=');
     if (equals == std::string::npos)
-      throw libmap::Error("no '='", {.field = "--set", .value = override, .bound = "KEY=VALUE"});
+      throw libmap::Error("contains no '='",
+                          {.field = "--set", .value = override, .bound = "KEY=VALUE"});
     table.set(override.substr(0, equals), override.substr(equals + 1));
   }
 }

@@ -46,11 +46,11 @@ libmap::Trajectory poses_in_file(const PosesOption& poses, const libmap::ScanSou
                                  Run& run) {
   const std::string& file = poses.source;
   if (!fs::exists(file) && !libmap::is_trajectory_path(file))
-    throw libmap::Error(
-        "no such poses" + libmap::did_you_mean(file, {"odometry", "optimized", "ground-truth"}),
-        {.field = "--poses",
-         .value = file,
-         .bound = "auto, odometry, optimized, ground-truth or a file"});
+    throw libmap::Error("neither a file nor a source of poses" +
+                            libmap::did_you_mean(file, {"odometry", "optimized", "ground-truth"}),
+                        {.field = "--poses",
+                         .value = file,
+                         .bound = "auto, odometry, optimized, ground-truth or a file"});
   libmap::ImportedPoses imported = libmap::import_poses(file, scan, poses.file);
   run.add_input(libmap::file_of_trajectory(file));
   for (const std::string& warning : imported.warnings) run.warn("{}: {}", file, warning);
@@ -69,7 +69,7 @@ libmap::Trajectory poses_in_file(const PosesOption& poses, const libmap::ScanSou
 std::string best_poses(const libmap::PoseGraph& graph, const std::string& scan) {
   for (const PoseSource source : sources)
     if (!libmap::trajectory_of(graph, source).empty()) return to_text(source);
-  throw libmap::Error("the scan has no poses: give a file of poses with --poses", {.file = scan});
+  throw libmap::Error("the scan contains no poses; give a pose file with --poses", {.file = scan});
 }
 
 libmap::Trajectory wanted_poses(const libmap::ScanSource& scan, const PosesOption& wanted,
@@ -78,7 +78,7 @@ libmap::Trajectory wanted_poses(const libmap::ScanSource& scan, const PosesOptio
   if (!source) return poses_in_file(wanted, scan, run);
   libmap::Trajectory poses = libmap::trajectory_of(scan.graph(), *source);
   if (poses.empty())
-    throw libmap::Error("the scan does not have them",
+    throw libmap::Error("the scan does not contain these poses",
                         {.file = scan.path().string(),
                          .field = "--poses",
                          .value = wanted.source,
