@@ -70,11 +70,9 @@ void refuse_ignored(const ConvertOptions& options) {
         "can be written only to .pcd",
         {.file = options.output, .field = "--encoding", .value = "binary_compressed"});
   if (options.pixel_size_m > 0.0 && !libmap::is_dem_path(options.output))
-    throw libmap::Error("can be used only for a .tif output",
-                        {.file = options.output, .field = "--pixel-size"});
+    throw libmap::Error("requires a .tif file", {.file = options.output, .field = "--pixel-size"});
   if (options.writing.big_endian && format != ".ply")
-    throw libmap::Error("can be used only for a .ply output",
-                        {.file = options.output, .field = "--big-endian"});
+    throw libmap::Error("requires a .ply file", {.file = options.output, .field = "--big-endian"});
 }
 
 // Maximum error of coordinates in single precision, m.
@@ -160,8 +158,7 @@ bool convert_textured(const ConvertOptions& options, Run& run) {
 void convert_mesh(const ConvertOptions& options, Run& run) {
   if (libmap::is_dem_path(options.output))
     throw libmap::Error(
-        "a mesh cannot be written as a raster; resample it to a cloud first, or copy a DEM with "
-        "gdal_translate",
+        "a mesh cannot be written as a raster; make a cloud of it with graspmap resample",
         {.file = options.input});
   if (convert_textured(options, run)) return;
   const libmap::TriangleMesh mesh = libmap::read_mesh(options.input).mesh;
@@ -184,9 +181,8 @@ void convert_poses(const ConvertOptions& options, Run& run) {
   if (!named) libmap::require_trajectory_format(options.output);
   const libmap::TrajectoryFile read = libmap::read_trajectory(options.input, options.poses_format);
   if (!read.images.empty() || read.of_cameras)
-    throw libmap::Error(
-        "contains poses of cameras, whose conversion to the base requires the scan (fuse --poses)",
-        {.file = options.input});
+    throw libmap::Error("contains camera poses; base poses require the scan (fuse --poses)",
+                        {.file = options.input});
   run.add_results({{"poses", read.poses.size()}, {"links", read.links.size()}});
   add_input(options, run);
   const bool nodes = read.poses.front().node != 0;

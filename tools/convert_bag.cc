@@ -113,8 +113,7 @@ void report(const libmap::BagRigPlan& plan, const libmap::BagRigExport& result,
     run.add_results({{camera.name + ".topic", plan.topics[n]}});
     run.manifest().transforms.emplace_back("robot_from_" + camera.name,
                                            camera.camera.base_from_camera);
-    if (plan.topics[n].empty())
-      run.warn(camera.name + ": the bag has no topic with images of this camera");
+    if (plan.topics[n].empty()) run.warn(camera.name + ": no topic contains its images");
   }
   run.info("{} images of {} cameras, {} of {} image sets, at most {} cameras per set",
            result.images, plan.rig.cameras.size(), result.sets.size(), plan.all_sets, fullest);
@@ -139,8 +138,7 @@ void read_bag_into_folder(const BagCommandOptions& options, Run& run) {
 
 void read_bag_into_cloud(const BagCommandOptions& options, Run& run) {
   if (options.topics.size() > 1)
-    throw libmap::Error("a cloud is read from one topic, but several are given",
-                        {.field = "--topic"});
+    throw libmap::Error("a cloud is read from a single topic", {.field = "--topic"});
   run.claim_output(options.output, {options.input});
   const libmap::BagCloudResult result = run.timed("read", [&] {
     return libmap::read_bag_cloud(options.input,
@@ -265,11 +263,10 @@ libmap::BagGrid grid_of(const CloudFile& map, double cell_m) {
   const Eigen::Array2d cells = (bounds.max - bounds.min).head<2>().array() / cell_m + 1.5;
   constexpr double max_cells = 1 << 26;
   if (!(cells.prod() <= max_cells))
-    throw libmap::Error("too small: the grid would have too many cells for a message",
-                        {.file = map.path,
-                         .field = "cell_size_m",
-                         .value = libmap::to_text(cell_m),
-                         .bound = "<= 2^26 cells"});
+    throw libmap::Error("too many cells for a message", {.file = map.path,
+                                                         .field = "cell_size_m",
+                                                         .value = libmap::to_text(cell_m),
+                                                         .bound = "<= 2^26 cells"});
   grid.columns = static_cast<std::size_t>(cells.x());
   grid.rows = static_cast<std::size_t>(cells.y());
   std::vector<std::size_t> top(grid.columns * grid.rows, points.size());

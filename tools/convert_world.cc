@@ -44,8 +44,7 @@ libmap::WorldScores read_scores(const std::string& file, Run& run) {
   const libmap::PointCloud map = read_in_site(file, run);
   const libmap::ScalarField* score = map.find_field("score");
   if (score == nullptr)
-    throw libmap::Error("the file has no such field, so it is not a graspability map",
-                        {.file = file, .field = "score"});
+    throw libmap::Error("no such field: not a graspability map", {.file = file, .field = "score"});
   scores.points = map.positions;
   for (const double one : score->values) scores.colors.push_back(libmap::score_color(one));
   const auto manifest = libmap::read_manifest_of(file);
@@ -72,8 +71,7 @@ libmap::Pose rig_pose(const std::string& text, const libmap::TriangleMesh& mesh)
   above.z() = bounds.max.z() + 1.0;
   const auto hit = libmap::RayCaster(mesh).cast(above, -Eigen::Vector3d::UnitZ());
   if (!hit)
-    throw libmap::Error("there is no ground below the middle of the site; set the pose",
-                        {.field = "--rig-pose"});
+    throw libmap::Error("no ground below the site's middle; set the pose", {.field = "--rig-pose"});
   above.z() += height_m - hit->distance;
   return libmap::make_pose(above, Eigen::Quaterniond::Identity());
 }

@@ -109,10 +109,9 @@ bool is_share(const FuseOptions& options) { return libmap::parse_share(options.t
 void claim_poses(const FuseOptions& options, const std::vector<std::string>& inputs, Run& run) {
   if (options.corrected_poses.empty()) return;
   if (!libmap::is_trajectory_path(options.corrected_poses))
-    throw libmap::Error("not the extension of a pose format",
-                        {.field = "--corrected-poses",
-                         .value = options.corrected_poses,
-                         .bound = ".tum, .kitti, .g2o or .toro"});
+    throw libmap::Error("not a pose format", {.field = "--corrected-poses",
+                                              .value = options.corrected_poses,
+                                              .bound = ".tum, .kitti, .g2o or .toro"});
   if (!is_share(options)) run.claim_output(options.corrected_poses, inputs);
 }
 
@@ -228,9 +227,8 @@ void check_registration(const libmap::ScanSource& scan, const FuseOptions& optio
                                            .field = "depth_calibration",
                                            .bound = "a depth camera in scan.yaml (of convert SCAN "
                                                     "-o FOLDER), or --no-color"});
-  run.warn(
-      "{}: {}; `graspmap refine --write-calibration` estimates the registration for --calibration",
-      options.scan, edges.sentence());
+  run.warn("{}: {}; refine --write-calibration estimates the registration for --calibration",
+           options.scan, edges.sentence());
 }
 
 void fuse(FuseOptions options, Run& run) {

@@ -313,8 +313,7 @@ void grasp_places(GraspCommandOptions& options, Run& run) {
   const libgtd::Gripper gripper = read_with_fingers(file, options);
   libmap::Table table = libmap::read_csv(options.points);
   const std::vector<Eigen::Vector3d> locations = positions_of(table);
-  if (locations.empty())
-    throw libmap::Error("the table has no locations", {.file = options.points});
+  if (locations.empty()) throw libmap::Error("contains no locations", {.file = options.points});
   const auto scenes = scenes_of(table, options.scenes);
   const libmap::TriangleMesh mesh = mesh_of(options);
   if (options.mesh != level_mesh) run.add_input(options.mesh);
@@ -435,9 +434,7 @@ void plan_next_pulls(const GraspCommandOptions& options, Run& run) {
     return libgtd::plan_pulls(ground, gripper, locations, static_cast<std::size_t>(*count),
                               pull_options(options), run.progress());
   });
-  if (plans.empty())
-    throw libmap::Error("no pull test would give information about the gripper's parameters",
-                        {.file = options.points});
+  if (plans.empty()) throw libmap::Error("no pull test is informative", {.file = options.points});
   libmap::Table planned;
   planned.columns = {"place",    "x",           "y",      "z",
                      "tilt_deg", "azimuth_deg", "load_n", "information_bits"};

@@ -178,8 +178,7 @@ MapWindow read_window(const MapTiles& tiles, const std::optional<Eigen::AlignedB
       parts[n] = libgtd::downsample_map(parts[n], window.columns_per_point);
   });
   if (!parts.empty()) window.cloud = libgtd::merge_map_clouds(parts);
-  if (window.cloud.empty())
-    throw libmap::Error("no part of the map is inside the box", {.field = "--box"});
+  if (window.cloud.empty()) throw libmap::Error("no part of the map is in it", {.field = "--box"});
   if (window.columns_per_point > 1) {
     window.cloud = libgtd::downsample_map(window.cloud, window.columns_per_point);
     libgtd::snap_to_squares(tiles.index(), window.columns_per_point, window.cloud);
@@ -395,9 +394,8 @@ std::vector<libmap::SheetCell> read_cells(const RenderOptions& options, Run& run
 
 libmap::ColorImage draw_several(RenderOptions& options, Run& run) {
   if (options.view.view == libmap::Viewpoint::camera)
-    throw libmap::Error("can only be used for a single file",
-                        {.field = "--view", .value = "camera"});
-  reject_changed(options, bind_one, "can only be used for a single file");
+    throw libmap::Error("applies to a single file", {.field = "--view", .value = "camera"});
+  reject_changed(options, bind_one, "applies to a single file");
   // Maps of one cloud have the same orientation in the image.
   if (options.scene.heading == MapHeading::automatic) options.scene.heading = MapHeading::input;
   options.sheet.column_titles = split_texts(options.column_titles);

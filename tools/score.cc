@@ -422,10 +422,9 @@ void score(ScoreOptions& options, Run& run) {
     return;
   }
   if (options.append)
-    throw libmap::Error("can only be used if the output is a tile store, MAP.tiles",
-                        {.field = "--append"});
+    throw libmap::Error("requires a tile store as output, MAP.tiles", {.field = "--append"});
   if (options.max_points_in_memory != ScoreOptions{}.max_points_in_memory)
-    throw libmap::Error("can only be used if the output is a tile store, MAP.tiles",
+    throw libmap::Error("requires a tile store as output, MAP.tiles",
                         {.field = "--max-points-in-memory"});
   libmap::require_cloud_format(options.output);
   run.claim_output(options.output, {options.terrain});

@@ -186,8 +186,7 @@ MapAnalysis analyze_map(const VoxelMap& map, const MapSurface& surface,
                         const MapAnalysisOptions& options) {
   libmap::check_parameters(options);
   if (surface.slope_deg.size() != map.size() || surface.area_m2.size() != map.size())
-    throw libmap::Error("number of surface values differs from number of voxels",
-                        {.field = "slope_deg"});
+    throw libmap::Error("not one value per voxel of the map", {.field = "slope_deg"});
   return MapCounter(map, surface, options).run();
 }
 

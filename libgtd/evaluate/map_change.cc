@@ -223,8 +223,7 @@ MapChange compare_maps(const VoxelMap& map, const MapSurface& surface, const Vox
                        const MapChangeOptions& options) {
   libmap::check_parameters(options);
   if (surface.area_m2.size() != map.size())
-    throw libmap::Error("number of surface values differs from number of voxels",
-                        {.field = "area_m2"});
+    throw libmap::Error("not one value per voxel of the map", {.field = "area_m2"});
   MapChange change;
   const double size_m = std::max(map.lattice.voxel_size_m, other.lattice.voxel_size_m);
   if (const auto offset = lattice_offset(map, other, map_terrain_from_other_terrain)) {
@@ -236,8 +235,7 @@ MapChange compare_maps(const VoxelMap& map, const MapSurface& surface, const Vox
                                      options.match_distance_voxels * size_m);
   }
   if (change.pairs.empty())
-    throw libmap::Error(
-        "the maps have no voxel in common: check that they show the same ground in one frame");
+    throw libmap::Error("the maps have no common voxel: check their area and their frames");
   find_unpaired(map, other, change);
   change.common = summarize(map, surface, other, change.pairs);
   summarize_evaluated(map, surface, other, options, change);

@@ -372,8 +372,7 @@ MapRegionResult find_regions(const VoxelMap& map, const MapSurface& surface,
                              const MapRegionOptions& options) {
   libmap::check_parameters(options);
   if (surface.area_m2.size() != map.size())
-    throw libmap::Error("number of surface values differs from number of voxels",
-                        {.field = "area_m2"});
+    throw libmap::Error("not one value per voxel of the map", {.field = "area_m2"});
   const std::vector<std::uint32_t> graspable = graspable_voxels(map, options.border);
   MapRegionResult result;
   for (std::vector<std::uint32_t>& voxels : connected(map, graspable, options.adjacency_voxels)) {

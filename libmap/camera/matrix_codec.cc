@@ -45,8 +45,7 @@ struct InflateStream {
     // zlib does not modify its input. Its 32-bit size is sufficient: SQLite has the same limit.
     stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
     stream.avail_in = static_cast<uInt>(bytes.size());
-    if (inflateInit(&stream) != Z_OK)
-      throw Error("zlib could not be initialized", {}, ErrorKind::failed);
+    if (inflateInit(&stream) != Z_OK) throw Error("zlib failed to start", {}, ErrorKind::failed);
   }
   ~InflateStream() { inflateEnd(&stream); }
   InflateStream(const InflateStream&) = delete;
@@ -97,8 +96,7 @@ void for_each_matrix_chunk(std::string_view blob,
     const std::size_t bytes = piece.size() - stream.avail_out;
     done += bytes;
     if (done > wanted)
-      throw Error("compressed matrix contains more bytes than its size allows",
-                  {.value = matrix_size_text(matrix)});
+      throw Error("compressed matrix exceeds its size", {.value = matrix_size_text(matrix)});
     const bool is_at_end = result == Z_BUF_ERROR || (result == Z_OK && stream.avail_out > 0);
     if (is_at_end || (result == Z_STREAM_END && done < wanted))
       throw Error("compressed matrix is broken: ends after " + std::to_string(done) + " of " +

@@ -145,8 +145,8 @@ class Dem {
     if (type == GDT_Byte || GDALDataTypeIsComplex(type) != 0 ||
         GDALGetRasterColorTable(band_) != nullptr)
       throw Error(
-          "not a number type for heights; if the band contains heights, convert it (gdal_translate "
-          "-ot Float32)",
+          "not a type of heights; convert a height band to another type (gdal_translate -ot "
+          "Float32)",
           {.field = "type of band " + std::to_string(chosen),
            .value = info_.band_type,
            .bound = "integers of 16 bits or more, or floating point"});
@@ -285,10 +285,8 @@ class Dem {
       }
       height = height * height_scale_ + height_offset_;
       if (!(std::abs(height) <= max_height_m))
-        throw Error(
-            "not a valid height; if the value marks missing data, declare it (gdal_translate "
-            "-a_nodata)",
-            {.field = "height", .value = to_text(height), .bound = ">= -1e6 and <= 1e6"});
+        throw Error("not a height; if it marks missing data, declare it (gdal_translate -a_nodata)",
+                    {.field = "height", .value = to_text(height), .bound = ">= -1e6 and <= 1e6"});
       height -= info_.georeference.origin_m.z();
     }
   }

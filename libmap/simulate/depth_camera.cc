@@ -253,10 +253,9 @@ void DepthSensorOptions::check() const {
     throw Error("the depth range is empty",
                 {.field = "far_m", .value = to_text(far_m), .bound = "> " + to_text(near_m)});
   if (!(flying_pixels + edge_dropouts <= 1.0))
-    throw Error("the two shares of edge pixels exceed 1",
-                {.field = "flying_pixels + edge_dropouts",
-                 .value = to_text(flying_pixels + edge_dropouts),
-                 .bound = "<= 1"});
+    throw Error("the sum of both exceeds 1", {.field = "flying_pixels + edge_dropouts",
+                                              .value = to_text(flying_pixels + edge_dropouts),
+                                              .bound = "<= 1"});
 }
 
 namespace {

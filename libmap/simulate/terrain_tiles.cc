@@ -296,10 +296,9 @@ void TerrainTilesOptions::check() const {
         "too few or too many points per tile",
         {.field = "piece_m", .value = to_text(tile_m), .bound = "1 to 10,000 times spacing_m"});
   if (std::ceil(size_x_m / tile_m) * std::ceil(size_y_m / tile_m) > 1e6)
-    throw Error("too small: the terrain would have too many tiles",
-                {.field = "piece_m",
-                 .value = to_text(tile_m),
-                 .bound = "large enough for at most 1,000,000 tiles"});
+    throw Error("too many tiles", {.field = "piece_m",
+                                   .value = to_text(tile_m),
+                                   .bound = "large enough for at most 1,000,000 tiles"});
 }
 
 std::vector<XyTile> terrain_tiles(const TerrainTilesOptions& options) {

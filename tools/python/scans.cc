@@ -177,8 +177,7 @@ std::shared_ptr<Poses> read_poses(const fs::path& path, const std::shared_ptr<Sc
       return shared(Poses{libmap::import_poses(path, *scan, options).trajectory.poses});
     const libmap::TrajectoryFile file = libmap::read_trajectory(path, options.format);
     if (file.of_cameras)
-      throw libmap::Error("the file contains poses of cameras, which require their scan",
-                          {.file = path.string(), .field = "scan"});
+      throw libmap::Error("camera poses require a scan", {.file = path.string(), .field = "scan"});
     return shared(Poses{file.poses});
   });
 }

@@ -180,9 +180,8 @@ auto without_lock(const Step& step) {
 template <typename Write>
 void write_whole(const std::filesystem::path& path, const Write& write) {
   if (std::filesystem::exists(libmap::manifest_path(path)))
-    throw libmap::Error(
-        "exists as the manifest of an earlier output; remove both, or choose another name",
-        {.file = libmap::manifest_path(path).string()});
+    throw libmap::Error("is the manifest of an earlier output; remove both, or write elsewhere",
+                        {.file = libmap::manifest_path(path).string()});
   without_lock([&] {
     libmap::OutputFile output(path);
     write(output.temporary_path());
