@@ -1,4 +1,5 @@
-// Values of a map at given locations, for a map in memory or in tiles that are loaded one by one.
+// Looks up the values of a map at given locations, such as those of a field test, for a map in
+// memory or in tiles that are loaded one by one.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,4 +1,4 @@
-// Statistics of a whole map: distribution of scores, and graspable area by height and slope.
+// Statistics of a graspability map: distribution of scores, and graspable area by height and slope.
 #pragma once
 
 #include <cstddef>

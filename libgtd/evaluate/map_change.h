@@ -1,4 +1,5 @@
-// Compares two maps of the same ground voxel by voxel.
+// Compares two maps of the same ground, MAP and OTHER, voxel by voxel: changes of graspability and
+// differences of scores.
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,5 @@
-// Table rows with named columns, and rates as JSON. Used only by the sources of this folder that
-// make tables.
+// Helpers of this folder's writers: appends rows of named cells to a table, and converts rates to
+// JSON.
 #pragma once
 
 #include <nlohmann/json.hpp>

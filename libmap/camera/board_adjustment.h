@@ -1,4 +1,5 @@
-// Least-squares adjustment of a camera and the poses of calibration boards, for camera_calibration.
+// Least-squares adjustment of a camera's intrinsics and the poses of a chessboard, the last step of
+// camera_calibration.h.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,6 +1,6 @@
-// Table of the named parameters of one or more option structs. It binds each field to its key,
-// description and range. Command-line flags, YAML files, --print-config and the manifest use it, so
-// that defaults are defined once, in the struct.
+// Table of named parameters, bound to the fields of option structs with key, description and range.
+// Command-line flags, YAML files, --print-config and the manifest use it, so that defaults are
+// defined once, in the struct.
 #pragma once
 
 #include <cstdint>
@@ -56,8 +56,8 @@ class ParameterTable {
   void add(std::string key, Enum& field, const std::vector<std::pair<std::string, Enum>>& names,
            std::string description);
 
-  // Collects keys "PREFIX.KEY" as text for a second table that is read from a file first
-  // ("gripper.opening_angle_deg"). The last text of a key counts; the caller checks the names.
+  // Collects values of keys "PREFIX.KEY" as text, e.g. "gripper.opening_angle_deg", to override
+  // those of a file that is read later. The last text of a key counts; the caller checks the names.
   void add_overrides(std::string prefix, std::vector<std::pair<std::string, std::string>>& texts);
 
   const std::vector<Parameter>& parameters() const { return parameters_; }

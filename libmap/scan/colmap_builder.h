@@ -1,4 +1,5 @@
-// Conversion of a scan to a COLMAP model, with points from its depth images.
+// Converts a scan to a COLMAP model (cameras, images, points); the points are from its depth
+// images.
 #pragma once
 
 #include <cstddef>
@@ -20,8 +21,8 @@ struct ColmapBuilderOptions {
 };
 void bind(ParameterTable& table, ColmapBuilderOptions& options);
 
-// Each image adds points on a grid of the spacing, at pixels with smooth depth and in cells without
-// an earlier point. Later images observe a point at its projection if their depth agrees, so that
+// Each image adds points on a pixel grid, at pixels with smooth depth, in grid cells that show no
+// earlier point. Later images observe a point at its projection if their depth agrees, so that
 // reprojection errors are 0 by construction (ERROR is -1: unknown). Images with equal cameras share
 // a camera.
 class ColmapBuilder {

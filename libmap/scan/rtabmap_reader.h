@@ -27,7 +27,7 @@ namespace libmap {
 
 class SqliteFile;
 
-// Content of a node's row of images, by the headers of the images.
+// Data that a node contains, according to the headers of its images.
 struct NodeContent {
   int node = 0;
   std::optional<ImageInfo> color{};

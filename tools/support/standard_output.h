@@ -1,4 +1,4 @@
-// Checks that standard output was written.
+// Checks that a command's standard output was written completely, e.g. to a full disk.
 #pragma once
 
 #include <string>
