@@ -24,12 +24,10 @@ struct StoreTiling {
   int halo_voxels = 0;
 };
 
-// Stores the terrain frame in the plan: lattice, box, plane, and transform and results of its
-// manifest.
+// Stores the frame in the plan: lattice, box, plane, and transform and results of its manifest.
 void set_frame(const TerrainFrame& frame, const StoreTiling& tiling, TilePlan& plan);
 
-// Returns the terrain frame stored in a plan. Throws Error naming `plan_file` if its tiles differ
-// from those of these options.
+// Returns the frame of an earlier plan. Throws Error naming `plan_file` if its tiles differ.
 TerrainFrame frame_of(const TilePlan& plan, const DetectionOptions& detection,
                       const std::filesystem::path& plan_file);
 

@@ -1,5 +1,4 @@
-// Compares two maps of the same ground, MAP and OTHER, voxel by voxel: changes of graspability and
-// differences of scores.
+// Compares two maps of the same ground, MAP and OTHER, voxel by voxel: graspability and scores.
 #pragma once
 
 #include <cstddef>

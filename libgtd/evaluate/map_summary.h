@@ -57,8 +57,7 @@ struct SummarizedMap {
 
 // Returns one row per map: name, parameters of the detection, counts, fractions, quantiles. If one
 // of the maps has an expectation, also sensitivity and specificity of voxels and of regions with
-// Wilson 95 % intervals, Youden's index and the area under the curve. Undefined values are empty
-// cells.
+// Wilson 95 % intervals, Youden's index and the area under the curve. Undefined: empty.
 libmap::Table summary_table(const std::vector<SummarizedMap>& maps);
 
 // Returns one row per map and region of `expected`.

@@ -1,5 +1,4 @@
-// Helpers of this folder's writers: appends rows of named cells to a table, and converts rates to
-// JSON.
+// Helpers of this folder's writers: table rows of named cells, and rates as JSON.
 #pragma once
 
 #include <nlohmann/json.hpp>

@@ -1,5 +1,4 @@
-// Set of forces that each contact of a closed gripper can bear, by one of two published laws of
-// spine engagement. Input of holding_force.h.
+// Forces that each contact of a closed gripper can bear, by one of two laws of spine engagement.
 #pragma once
 
 #include <Eigen/Core>
@@ -39,8 +38,7 @@ enum class SpineSharing { best, equally };
 // cone. Forces in N, directions in the frame of the contacts.
 class BearingContact {
  public:
-  // Law `asperities`: `leans_rad` is the inclination psi of the facet of each engaged spine, or one
-  // 0 for a link.
+  // Law `asperities`: `leans_rad` are the inclinations of the engaged facets, or one 0 for a link.
   BearingContact(const GripContact& contact, std::vector<double> leans_rad, double friction,
                  double limit_n);
   // Law `adhesion`: `limit_n` is the limit of this finger.
@@ -64,8 +62,7 @@ class BearingContact {
     frame << normal_, drag_, lateral_;
     return frame;
   }
-  // Returns the maximum scalar product of a force of the set with `local`, and the force that
-  // attains it; all in the contact frame.
+  // Return the maximum scalar product with `local` (contact frame) and the force that attains it.
   double max_local_product(const Eigen::Vector3d& local, SpineSharing sharing) const;
   Eigen::Vector3d best_local_force(const Eigen::Vector3d& local, SpineSharing sharing) const;
   // Returns the edges of the cone of forces on the steepest facet (adhesion: of all forces), as

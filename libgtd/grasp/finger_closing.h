@@ -1,7 +1,7 @@
 // Closes one finger of a gripper, two links in a plane, on the profile of the ground until it makes
 // contact. The plane contains the palm's axis; its coordinates (r, z) are in meters: r away from
 // the axis, z away from the ground, palm at z = 0. Contacts are computed in closed form, so that no
-// ridge is missed between steps.
+// ridge is missed.
 #pragma once
 
 #include <Eigen/Core>

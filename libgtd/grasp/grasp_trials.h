@@ -33,8 +33,7 @@ struct GraspOptions {
   int best_draws = 2;
   // Computes LocationResult::pull_limits_n. Not bound to a key.
   bool pull_limits = false;
-  // Ends a location's test as soon as its verdict is certain, see sequential_rounds. Not bound to a
-  // key.
+  // Ends a test when its verdict is certain, see sequential_rounds. Not bound to a key.
   bool sequential = false;
   std::uint64_t seed = 1;
   double offset_m = 0.005;       // standard deviation of the palm position in x and y
@@ -107,8 +106,7 @@ struct LocationResult {
 // information. The test ends after a round if the Wilson interval of 90 %, with poses as the count,
 // excludes 0.5. It also ends if all poses are done and the distance of the holding fraction from
 // 0.5 exceeds 1.645 standard deviations of the change that the remaining draws may cause (beta
-// distribution, Jeffreys prior). A test that reaches the last round has the same trials as one that
-// is not sequential.
+// distribution, Jeffreys prior). A test that reaches the last round has all trials.
 struct SequentialRound {
   int poses = 0;
   int draws = 0;

@@ -20,9 +20,9 @@ struct CandidateOptions {
   double max_blocked = 0.15;
 };
 
-// Heights of the ground in columns. In a validation on three simulated sites (1500 voxels each, of
-// which one was not used to choose the bounds), at least 99.8 % of the voxels that hold in 32 x 8
-// trials are candidates.
+// Heights of the ground in columns. At least 99.8 % of the voxels that hold in 32 x 8 trials are
+// candidates (1500 voxels of each of three simulated sites, one of them not used to choose the
+// bounds).
 class GripCandidates {
  public:
   // Throws Error if the gripper has no `fingers`.

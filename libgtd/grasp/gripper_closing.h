@@ -1,5 +1,4 @@
-// Moves a gripper onto a mesh of the ground and closes its fingers; computes its resting pose and
-// its contacts.
+// Moves a gripper onto the ground and closes its fingers: computes resting pose and contacts.
 #pragma once
 
 #include <Eigen/Core>
@@ -63,8 +62,8 @@ struct ClosingOptions {
 void bind(libmap::ParameterTable& table, ClosingOptions& options);
 
 // Returns the part of the ground that the gripper may touch at a location (mesh frame, m) from
-// poses with offsets up to `offset_m` and tilts up to `tilt_rad`; `away` is the direction out of
-// the ground.
+// poses with offsets and tilts up to `offset_m` and `tilt_rad`; `away`: direction out of the
+// ground.
 GroundPatch patch_around(const Ground& ground, const Eigen::Vector3d& location,
                          const Eigen::Vector3d& away, const Gripper& gripper, double offset_m,
                          double tilt_rad, const ClosingOptions& options);

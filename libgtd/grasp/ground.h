@@ -1,5 +1,4 @@
-// Ground of the virtual field test: a triangle mesh, indexed for cutting out the patch around a
-// location.
+// Ground of the virtual field test: a triangle mesh, and the patch of it around a location.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,5 +1,4 @@
-// Holding force of a closed gripper: the largest pull that its contacts can balance, and its
-// minimum over 17 directions.
+// Holding force of a closed gripper: the largest pull in a direction that its contacts balance.
 #pragma once
 
 #include <Eigen/Core>
@@ -45,8 +44,7 @@ struct PullDirection {
   std::string name() const;  // "away", "45@90", "90@315"
 };
 
-// Returns the 17 tested directions: away from the ground, and tilts of 45 and 90 degrees at eight
-// azimuths.
+// Returns the 17 tested directions: tilt 0, and tilts of 45 and 90 degrees at eight azimuths.
 const std::vector<PullDirection>& pull_directions();
 
 // Minimum holding force over pull_directions().

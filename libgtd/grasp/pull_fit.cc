@@ -493,8 +493,7 @@ PlannedPull informative_pull(const std::vector<std::vector<double>>& forces_of_s
 
 std::vector<PullTest> pull_tests_of(const libmap::Table& table) {
   if (table.rows.empty())
-    throw libmap::Error("the table has no pull tests",
-                        {.file = table.file, .field = "rows", .bound = ">= 1"});
+    throw libmap::Error("no pull tests", {.file = table.file, .field = "rows", .bound = ">= 1"});
   const PullReader reader(table);
   std::vector<PullTest> tests;
   for (std::size_t row = 0; row < table.rows.size(); ++row) tests.push_back(reader.read(row));
@@ -518,8 +517,7 @@ PullFit fit_pulls(const Ground* ground, const Gripper& gripper, const std::vecto
   require_fingers(gripper);
   if (std::none_of(gripper.ranges.begin(), gripper.ranges.end(),
                    [](const auto& range) { return range.has_value(); }))
-    throw libmap::Error("is missing: a fit requires the prior range of at least one parameter",
-                        {.field = "ranges"});
+    throw libmap::Error("is missing: a fit requires a range of a parameter", {.field = "ranges"});
   return PullFitting(ground, gripper, tests, options, progress).fit();
 }
 

@@ -16,8 +16,7 @@ struct SurfaceErrorOptions {
   // Correlation length of the displacement: along an axis, the correlation is 0.285 at this
   // distance and 0 from twice this distance.
   double correlation_m = 0.025;
-  // Maximum standard deviation of seen ground. Ground with a larger one counts as unseen and is
-  // displaced with this value.
+  // Maximum standard deviation of seen ground; ground above it is unseen and displaced with it.
   double max_error_m = 0.005;
 };
 void bind(libmap::ParameterTable& table, SurfaceErrorOptions& options);

@@ -1,5 +1,4 @@
-// Checks and joins the shares of a map, the parts that several runs of `graspmap score --tile K/N`
-// wrote into separate files.
+// Checks and joins shares of a map: files that several runs of `graspmap score --tile K/N` wrote.
 #pragma once
 
 #include <cstddef>

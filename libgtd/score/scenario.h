@@ -1,5 +1,4 @@
-// Scenario: all parameters of a detection in one struct, as in a scenario file (tab. B 2-1 of the
-// thesis).
+// Scenario: all parameters of a detection, as in a scenario file (tab. B 2-1 of the thesis).
 #pragma once
 
 #include <optional>

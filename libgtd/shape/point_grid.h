@@ -1,9 +1,8 @@
 // Search grid for points within a radius, used by the curvature and normal fits. A search visits
 // few cells, always in the same order, so that sums over neighbors are reproducible to the bit.
 // Cells are aligned with the origin of the frame; the order therefore does not depend on the rest
-// of the cloud, and a tile with its surroundings has the same results as the whole cloud (a
-// libmap::PointTree has neither property, and is 8 to 12 times slower for 27 to 165 neighbors of
-// each of 200,000 points).
+// of the cloud, and a tile with its surroundings has the same results as the whole cloud (unlike a
+// libmap::PointTree, which is also 8 to 12 times slower for 27 to 165 neighbors).
 #pragma once
 
 #include <Eigen/Core>

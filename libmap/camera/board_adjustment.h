@@ -1,4 +1,4 @@
-// Least-squares adjustment of a camera's intrinsics and the poses of a chessboard, the last step of
+// Least-squares adjustment of a camera and the poses of calibration boards, for
 // camera_calibration.h.
 #pragma once
 

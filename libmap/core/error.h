@@ -31,8 +31,8 @@ class Error : public std::runtime_error {
 
   // Returns a copy that names `file`, unless the error names a file already.
   Error in_file(const std::string& file) const;
-  // Returns a copy whose field is `prefix` + `joint` + field, e.g. "camera 2: width"; only `prefix`
-  // if the error names no field.
+  // Returns a copy whose field is `prefix`, then `joint` and the field if there is one: "rig:
+  // width".
   Error in_field(const std::string& prefix, const char* joint = ": ") const;
 
  private:

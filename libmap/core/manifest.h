@@ -56,8 +56,7 @@ Manifest parse_manifest(const std::string& json, const std::string& file);
 // and field if it is invalid.
 std::optional<Manifest> read_manifest_of(const std::filesystem::path& output);
 
-// Return the SHA-256 (FIPS 180-4) of a file or of bytes, 64 hexadecimal digits. Throws Error if the
-// file cannot be read.
+// Return the SHA-256 (FIPS 180-4), 64 hexadecimal digits. Throw Error if the file cannot be read.
 std::string sha256_of_file(const std::filesystem::path& path);
 std::string sha256_of(std::string_view bytes);
 

@@ -1,6 +1,5 @@
-// Table of named parameters, bound to the fields of option structs with key, description and range.
-// Command-line flags, YAML files, --print-config and the manifest use it, so that defaults are
-// defined once, in the struct.
+// Table of parameters, bound to the fields of option structs with key, description and range.
+// Flags, YAML files, --print-config and manifests use it: defaults are defined once, in the struct.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,4 @@
-// Determines the up direction of a surface from the normals of a cloud, and whether the normals are
-// consistent enough for that.
+// Determines the up direction of a surface from normals, and whether they are consistent.
 #pragma once
 
 #include <Eigen/Core>
@@ -40,8 +39,7 @@ struct NormalVotes {
 };
 
 // Returns the share of neighboring points whose normals face opposite sides, among the first 65536
-// points; 0.5 for random sides, 0 for too few points. Ignores neighbors across a crease and
-// positions of NaN.
+// points; 0.5 for random sides, 0 for too few points. Ignores neighbors across a crease, and NaN.
 double opposing_share(const std::vector<Eigen::Vector3d>& positions,
                       const std::vector<Eigen::Vector3f>& normals);
 
@@ -57,7 +55,7 @@ struct UpOfNormals {
 
 // Returns the up direction of a surface: the mean of its normals, repeatedly restricted to normals
 // near the mean, so that walls and rocks do not tilt it. Returns +z if the mean is within 20
-// degrees of +z or if the normals do not agree. Normals can have any length; zeros and NaN are
+// degrees of it or the normals do not agree. Normals can have any length; zeros and NaN are
 // skipped.
 UpOfNormals up_of_normals(const std::vector<Eigen::Vector3d>& positions,
                           const std::vector<Eigen::Vector3f>& normals);

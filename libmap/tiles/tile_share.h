@@ -1,5 +1,4 @@
-// Divides the tiles of a terrain into shares, so that several runs or machines can each compute one
-// share.
+// Divides the tiles of a terrain into shares, which several runs or machines can compute.
 #pragma once
 
 #include <cstddef>
@@ -19,8 +18,7 @@ struct TileShare {
 TileShare parse_share(const std::string& text);
 std::string to_text(const TileShare& share);
 
-// Returns the index range [begin, end) of a share among `tiles` tiles. Throws Error naming `tile`
-// unless 1 <= number <= count.
+// Returns a share's range [begin, end) of `tiles` tiles. Throws Error unless 1 <= number <= count.
 std::pair<std::size_t, std::size_t> share_range(std::size_t tiles, const TileShare& share);
 
 // Returns the consecutive tiles of a share. Throws as share_range does.

@@ -1,4 +1,4 @@
-// Shapes that a world shows: a mesh by the pages of its texture, and the scores of a map on it.
+// Visible shapes of a simulator world: a mesh by its texture pages, and squares of map scores.
 #pragma once
 
 #include <cstddef>

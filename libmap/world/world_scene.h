@@ -1,4 +1,4 @@
-// A site as a world for simulators: its models by their files, and what stands on it.
+// Description of a site as a world for simulators: models, the robot's cameras, and footholds.
 #pragma once
 
 #include <Eigen/Core>

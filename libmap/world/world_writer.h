@@ -21,7 +21,7 @@
 
 namespace libmap {
 
-// The contents of the folder.
+// Returns the names of the folder's files.
 std::vector<std::string> world_file_names();
 
 struct WorldReport {

@@ -32,8 +32,8 @@ namespace py = pybind11;
 
 using Shape = std::vector<py::ssize_t>;
 
-// Returns a read-only array on memory of `owner`, which lives as long as the array. Strides are in
-// bytes; none: contiguous rows.
+// Returns a read-only array on memory of `owner`, which it keeps alive. Strides: bytes; none:
+// dense.
 template <typename Number>
 py::array view(const Number* data, Shape shape, py::handle owner, Shape strides = {}) {
   py::array array(py::dtype::of<Number>(), std::move(shape), std::move(strides), data, owner);
@@ -105,8 +105,7 @@ Options options_from(const py::dict& values, Options options = {}) {
 // Returns a dict of the results by key; a missing value is None.
 py::dict dict_of(const libmap::ResultTable& table);
 
-// Return one dict per parameter (key, type, default, choices, description) and per result (key,
-// type, description).
+// Return a dict per parameter (key, type, default, choices, description) or result.
 py::list list_of(const libmap::ParameterTable& table);
 py::list list_of(const libmap::ResultTable& table, const std::vector<std::string>& objects);
 

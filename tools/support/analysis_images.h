@@ -1,5 +1,4 @@
-// Images and charts of `graspmap analyze`: score histogram, ground by height and slope, regions,
-// changes.
+// Images and charts of `graspmap analyze`.
 #pragma once
 
 #include <string>
@@ -13,8 +12,7 @@
 
 namespace graspmap_tools {
 
-// Returns the score histogram: bars of the evaluated voxels in the legend's colors, and a line for
-// all voxels.
+// Score histogram: bars of the evaluated voxels in the legend's colors, and a line for all voxels.
 libmap::Chart histogram_chart(const libgtd::MapAnalysis& analysis, const std::string& title);
 
 // Returns a chart of the ground by height or slope: bars are the graspable share of a bin, a line

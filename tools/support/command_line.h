@@ -66,8 +66,8 @@ class Command {
   // parameters. Flags and --config override that file; "auto" names no file.
   void preset(const std::string& key,
               std::function<std::filesystem::path(const std::string&)> resolver);
-  // Sets the function that converts the value of --config, e.g. a scenario's name, to a file. By
-  // default the value is a path.
+  // Sets the function that finds the file of a --config value, e.g. a scenario's name. Default: a
+  // path.
   void config_resolver(std::function<std::filesystem::path(const std::string&)> resolver);
 
   // Parses, applies --config and then the flags, and runs `body`. Errors become one line on stderr.

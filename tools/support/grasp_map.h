@@ -68,8 +68,7 @@ struct GraspMapInput {
 // Names of the fields that are added to the map.
 const std::vector<std::string>& grasp_fields();
 
-// Checks the output and reserves it for this process. Throws Error for another format or if it
-// cannot be written.
+// Checks and reserves the output. Throws Error for another format or if it cannot be written.
 void require_map_output(const GraspMapInput& input, Run& run);
 
 // Writes the map with the added fields. Tiles are processed in a tile store, so that a killed run

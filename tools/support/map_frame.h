@@ -1,5 +1,4 @@
-// Frames of points listed in tables and of maps, and the transforms between them, which the
-// manifests of outputs contain.
+// Frames of listed points and of maps, and transforms between them from manifests.
 #pragma once
 
 #include <Eigen/Core>

@@ -40,9 +40,8 @@ class MapTiles {
 
   const libgtd::TileStoreIndex& index() const { return index_; }
 
-  // Returns a tile's points, at the same positions as in the merged map. Throws Error naming the
-  // tile's file if it is missing, damaged or differs from the index. Can be called from several
-  // threads.
+  // Returns a tile's points, at the positions of the merged map. Throws Error naming the tile's
+  // file if it is missing, damaged or differs from the index. Can be called from several threads.
   libmap::PointCloud load(std::size_t tile) const;
   // Like load, and compares the file's hash with the index.
   libmap::PointCloud load_checked(std::size_t tile) const;

@@ -1,6 +1,5 @@
-// One run of a command: prints its messages, measures its times and writes its outputs with
-// manifests. Also includes the headers of the standard library, fmt and libmap/core that nearly all
-// commands need.
+// One run of a command: its messages, timings and outputs with manifests. Also includes the headers
+// of the standard library, fmt and libmap/core that nearly all commands need.
 #pragma once
 
 #include <fmt/format.h>

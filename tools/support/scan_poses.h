@@ -50,9 +50,9 @@ std::unique_ptr<libmap::ScanSource> open_scan(const std::vector<std::string>& sc
                                               const std::optional<libmap::CameraFile>& camera = {});
 
 // Returns the poses (world_from_base, m) that the option selects, by ascending node. "auto" is
-// replaced by the selected source, which is reported and added to the manifest. Nodes without a
-// pose are reported as a warning. Throws Error if there are no such poses or, if `strict`, for
-// nodes without a pose.
+// replaced by the selected source, which is reported and added to the manifest. Warns of nodes
+// without a pose. Throws Error if there are no such poses or, if `strict`, for nodes without a
+// pose.
 libmap::Trajectory find_poses(const libmap::ScanSource& scan, PosesOption& poses, bool strict,
                               Run& run);
 

@@ -1,5 +1,4 @@
-// Entry points of subcommands, such as `graspmap simulate scan`, that have their own source files.
-// argv begins at the command.
+// Entry points of subcommands with their own source files. argv begins at the command.
 #pragma once
 
 #include <string>

@@ -55,8 +55,7 @@ class TileFolder {
   TileFolder(const std::string& output, const std::vector<std::string>& names,
              const std::vector<std::string>& inputs, const libmap::TileShare& share, Run& run);
 
-  // Returns true, and prints it, if earlier runs with the same parameters and inputs have completed
-  // the folder.
+  // Returns true, and reports it, if runs with equal parameters and inputs completed the folder.
   bool is_complete() const;
 
   // Begins the run and returns the data common to all tiles; null with --dry-run. The first share
@@ -68,8 +67,7 @@ class TileFolder {
   struct Work {
     std::vector<std::string> tiles;  // names of the tiles of all shares, without extension
     std::string extension;           // of their files
-    // Computes the n-th tile, writes it to `to` unless it is empty, and returns its data, a JSON
-    // object.
+    // Computes the n-th tile, writes it to `to` unless empty, and returns its data, a JSON object.
     std::function<TileData(std::size_t n, const std::filesystem::path& to)> make;
     // Fills the output with the finished tiles.
     std::function<void(const std::filesystem::path& folder)> finish;
