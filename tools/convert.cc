@@ -70,9 +70,9 @@ void refuse_ignored(const ConvertOptions& options) {
         "can be written only to .pcd",
         {.file = options.output, .field = "--encoding", .value = "binary_compressed"});
   if (options.pixel_size_m > 0.0 && !libmap::is_dem_path(options.output))
-    throw libmap::Error("requires a .tif file", {.file = options.output, .field = "--pixel-size"});
+    throw libmap::Error("requires .tif output", {.file = options.output, .field = "--pixel-size"});
   if (options.writing.big_endian && format != ".ply")
-    throw libmap::Error("requires a .ply file", {.file = options.output, .field = "--big-endian"});
+    throw libmap::Error("requires .ply output", {.file = options.output, .field = "--big-endian"});
 }
 
 // Maximum error of coordinates in single precision, m.

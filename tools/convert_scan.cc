@@ -376,8 +376,9 @@ void write_folder(const ExtractOptions& options, const libmap::ScanSource& scan,
 
 void extract(ExtractOptions& options, Run& run) {
   if (libmap::has_bag_extension(options.output))
-    throw libmap::Error("a bag requires a map or the folder of a camera rig as input, not a scan",
-                        {.file = options.output});
+    throw libmap::Error(
+        "a scan cannot be written as a bag: give a map or the folder of a camera rig",
+        {.file = options.output});
   const bool images = options.images.wanted();
   const ImageOptions unset;
   if (!images)

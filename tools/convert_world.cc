@@ -163,7 +163,7 @@ void write_world(const WorldCommandOptions& options, Run& run) {
       libmap::write_world(folder, scene);
     });
     if (2 * report.score_points < scores.points.size())
-      throw libmap::Error("the map shows another site",
+      throw libmap::Error("most points of the map are not on the surface: it shows another site",
                           {.file = options.map,
                            .field = "points on the surface",
                            .value = std::to_string(report.score_points),

@@ -241,9 +241,9 @@ PointCloud to_cloud(const FootholdResult& result, const PointCloud& map) {
 }
 
 void describe(libmap::ResultTable& table, const FootholdResult& result) {
-  table.add("candidates", result.candidates, "map points that meet the options");
+  table.add("candidates", result.candidates, "number of map points that meet the options");
   table.add("candidates_at_border", result.at_border,
-            "candidates left out at the border of the scan");
+            "number of candidates left out at the border of the scan");
 }
 
 }  // namespace libgtd

@@ -18,7 +18,7 @@ PointGrid::PointGrid(const std::vector<Eigen::Vector3d>& points, double cell_siz
     throw libmap::Error("out of range",
                         {.value = libmap::to_text(cell_size_m), .bound = "> 0 and finite"});
   if (points.size() > std::numeric_limits<std::uint32_t>::max())
-    throw libmap::Error("too many points for one search grid");
+    throw libmap::Error("the cloud has too many points (limit: 2^32)");
   high_ = Eigen::Vector3d::Constant(-std::numeric_limits<double>::infinity());
   low_ = -high_;
   for (std::size_t i = 0; i < points.size(); ++i) {

@@ -286,7 +286,7 @@ Calibration decode_calibration(std::string_view bytes) {
     try {
       return read_records(bytes);
     } catch (const std::length_error&) {
-      throw Error("calibration ends after " + std::to_string(bytes.size()) + " bytes");
+      throw Error("calibration is truncated after " + std::to_string(bytes.size()) + " bytes");
     }
   }
   const auto layout = floats_layout(bytes);

@@ -6,21 +6,25 @@ namespace {
 
 void describe_surface(ResultTable& table, const FusionCounts& counts) {
   const SurfacePointCounts& points = counts.points;
-  table.add("occupied_voxels", counts.occupied_voxels, Merge::sum, "voxels with measurements");
-  table.add("surface_elements", counts.elements, Merge::sum, "elements of the surface");
+  table.add("occupied_voxels", counts.occupied_voxels, Merge::sum,
+            "number of voxels with measurements");
+  table.add("surface_elements", counts.elements, Merge::sum,
+            "number of surface elements, one per voxel and side of a surface");
   table.add("dropped_too_few_views", points.unconfirmed, Merge::sum,
-            "elements measured by fewer than min_views frames");
+            "number of elements dropped: measured by fewer than min_views frames");
   table.add("dropped_seen_through", points.seen_through, Merge::sum,
-            "elements that too many views see through");
-  table.add("dropped_missed", points.missed, Merge::sum, "elements where views measured nothing");
+            "number of elements dropped: too many views see through them");
+  table.add("dropped_missed", points.missed, Merge::sum,
+            "number of elements dropped: too many views measured nothing there");
   table.add("dropped_beside", points.contradicted, Merge::sum,
-            "elements connected to contradicted ones");
+            "number of elements dropped: others around them are contradicted");
   table.add("dropped_beyond_edges", points.beyond_edge, Merge::sum,
-            "points beyond an edge where the surface ends");
-  table.add("merged", points.merged, Merge::sum, "elements merged with one of the same voxel");
-  table.add("points", counts.points_made, Merge::sum, "points of the cloud");
+            "number of points dropped: beyond an edge of the surface");
+  table.add("merged", points.merged, Merge::sum,
+            "number of elements merged with another one in their voxel");
+  table.add("points", counts.points_made, Merge::sum, "number of points of the cloud");
   table.add("points_beyond_edges", points.extended_points, Merge::sum,
-            "points of the cloud beyond the measured edges");
+            "number of points added beyond measured edges");
   table.add_hidden("max_views", points.max_views, Merge::max);
 }
 
@@ -78,13 +82,13 @@ void describe(ResultTable& table, const FusionCounts& counts) {
 }
 
 void describe(ResultTable& table, const DepthFusionResult& result) {
-  table.add("frames", result.frames, "frames that were fused");
+  table.add("frames", result.frames, "number of fused frames");
   table.add("redundant_frames", result.redundant_frames,
-            "frames left out because earlier frames have measured their surface");
-  table.add("skipped_frames", result.skipped.size(), "frames that could not be used");
+            "number of frames left out because earlier frames measured their surface");
+  table.add("skipped_frames", result.skipped.size(), "number of frames that could not be used");
   describe(table, result.pixels);
   table.add("registration_rounds", result.registration_rounds,
-            "rounds of registration that moved frames");
+            "number of registration rounds that moved frames");
   table.add("registration_rejected", result.registration_rejected,
             "true if held-out measurements rejected the registration");
   const auto add_check = [&](const std::string& kind, const PairCosts& costs) {
@@ -99,13 +103,13 @@ void describe(ResultTable& table, const DepthFusionResult& result) {
   add_check("depth", result.registration_check.depth);
   add_check("color", result.registration_check.color);
   table.add("registration_shift_m", result.registration_shift_m,
-            "shift of the frames by registration, root mean square");
+            "RMS translation of the frames by registration, m");
   table.add("registration_turn_deg", result.registration_turn_deg,
-            "rotation of the frames by registration, root mean square");
+            "RMS rotation of the frames by registration, degrees");
   table.add("disagreement_before_m", result.disagreement_before_m,
-            "deviation of frames' heights from the mean of all frames, with the given poses");
+            "RMS deviation of frames' surface heights from their mean, given poses, m");
   table.add("disagreement_after_m", result.disagreement_after_m,
-            "deviation of frames' heights from the mean of all frames, after registration");
+            "RMS deviation of frames' surface heights from their mean, registered poses, m");
   describe_surface(table, result);
 }
 

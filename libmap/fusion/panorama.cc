@@ -155,13 +155,14 @@ PanoramaResult make_panorama(const std::vector<PanoramaView>& views,
 
 void describe(ResultTable& table, const PanoramaCounts& counts) {
   table.add_hidden("pixels", counts.pixels, Merge::sum);
-  table.add("points", counts.points, Merge::sum, "points of the view");
-  table.add("unmeasured", counts.unmeasured, Merge::sum, "pixels without depth");
-  table.add("too_near", counts.too_near, Merge::sum, "pixels nearer than near_m");
-  table.add("too_far", counts.too_far, Merge::sum, "pixels farther than far_m");
-  table.add("flying", counts.flying, Merge::sum, "pixels that differ from both neighbors");
+  table.add("points", counts.points, Merge::sum, "number of points of the view");
+  table.add("unmeasured", counts.unmeasured, Merge::sum, "number of pixels without depth");
+  table.add("too_near", counts.too_near, Merge::sum, "number of pixels nearer than near_m");
+  table.add("too_far", counts.too_far, Merge::sum, "number of pixels farther than far_m");
+  table.add("flying", counts.flying, Merge::sum,
+            "number of flying pixels, which differ from both neighbors");
   table.add("without_ray", counts.without_ray, Merge::sum,
-            "pixels outside the invertible lens distortion");
+            "number of pixels outside the invertible lens distortion");
 }
 
 }  // namespace libmap

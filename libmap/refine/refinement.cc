@@ -607,21 +607,21 @@ void describe(ResultTable& table, const RefinementResult& result) {
     rmse_m = result.stages.back().error->absolute.rmse_m;
     rotation_deg = result.stages.back().error->absolute.mean_rotation_deg;
   }
-  table.add("poses", result.poses.size(), "poses");
-  table.add("links", result.links.size(), "links between poses");
-  table.add("closures_found", result.closures.size(), "links that refinement found");
-  table.add("parts", result.components.size(), "connected components of the pose graph");
-  table.add("nodes_without_pose", result.without_pose.size(), "nodes without a pose");
-  table.add("nodes_without_links", result.without_links.size(), "nodes without links");
-  table.add("frames_skipped", result.skipped.size(), "frames without features");
-  table.add("features", result.features, "features of all frames");
-  table.add("sensor", sensor, "findings about the sensor");
-  table.add("noise", result.noise, "noise of depth and its source");
+  table.add("number of poses", result.poses.size(), "number of poses");
+  table.add("links", result.links.size(), "number of links between poses");
+  table.add("closures_found", result.closures.size(), "number of links found by refinement");
+  table.add("parts", result.components.size(), "number of connected components of the pose graph");
+  table.add("nodes_without_pose", result.without_pose.size(), "number of nodes without a pose");
+  table.add("nodes_without_links", result.without_links.size(), "number of nodes without links");
+  table.add("frames_skipped", result.skipped.size(), "number of frames without features");
+  table.add("features", result.features, "number of features of all frames");
+  table.add("sensor", sensor, "findings about the sensor, such as calibration errors");
+  table.add("noise", result.noise, "depth noise and its source");
   table.add("scale", result.scale, "source and uncertainty of the scale");
-  table.add("stages_undone", rejected, "stages that were rejected");
-  table.add("trajectory_rmse_m", rmse_m, "absolute trajectory error, for a scan with true poses");
+  table.add("stages_undone", rejected, "names of rejected stages");
+  table.add("trajectory_rmse_m", rmse_m, "absolute trajectory error against true poses (RMS), m");
   table.add("trajectory_rotation_error_deg", rotation_deg,
-            "mean rotation error of the trajectory, for a scan with true poses");
+            "mean rotation error against true poses, degrees");
 }
 
 }  // namespace libmap

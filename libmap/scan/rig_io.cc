@@ -34,7 +34,7 @@ const std::vector<std::string> camera_keys = split_list(
     "local_transform,robot_from_camera,position_m,roll_pitch_yaw_deg,depth_scale_m,near_m,far_m");
 
 double rig_number(const YAML::Node& node, const std::string& field) {
-  if (!node.IsScalar()) throw Error("not a single number", {.field = field});
+  if (!node.IsScalar()) throw Error("must be a single number", {.field = field});
   const std::optional<double> value = parse_double(node.Scalar());
   if (!value)
     throw Error("not a number", {.field = field, .value = node.Scalar(), .bound = "a number"});
@@ -118,7 +118,7 @@ CameraRig rig_of(const YAML::Node& root, const fs::path& folder) {
   known.emplace_back("cameras");
   check_keys(root, known);
   if (!root["cameras"]) throw Error("is missing", {.field = "cameras"});
-  if (!root["cameras"].IsSequence()) throw Error("not a list", {.field = "cameras"});
+  if (!root["cameras"].IsSequence()) throw Error("must be a list", {.field = "cameras"});
   RigCamera defaults;
   read_limits(root, defaults);
   CameraRig rig;

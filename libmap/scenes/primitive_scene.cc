@@ -36,16 +36,16 @@ struct ParameterAdder {
   }
   void operator()(Cylinder& cylinder) const {
     table.add("radius_m", cylinder.radius_m, size_range, "radius, m");
-    table.add("height_m", cylinder.height_m, size_range, "height above the base, m");
+    table.add("height_m", cylinder.height_m, size_range, "height of the top above the base, m");
   }
   void operator()(Box& box) const {
-    table.add("size_x_m", box.size_x_m, size_range, "length along x, m");
-    table.add("size_y_m", box.size_y_m, size_range, "length along y, m");
-    table.add("size_z_m", box.size_z_m, size_range, "height above the base, m");
+    table.add("size_x_m", box.size_x_m, size_range, "length of the shape along x, m");
+    table.add("size_y_m", box.size_y_m, size_range, "length of the shape along y, m");
+    table.add("size_z_m", box.size_z_m, size_range, "height of the top above the base, m");
   }
   void operator()(Plane& plane) const {
-    table.add("size_x_m", plane.size_x_m, size_range, "length along x, m");
-    table.add("size_y_m", plane.size_y_m, size_range, "length along y, m");
+    table.add("size_x_m", plane.size_x_m, size_range, "length of the shape along x, m");
+    table.add("size_y_m", plane.size_y_m, size_range, "length of the shape along y, m");
   }
   void operator()(Bump& bump) const {
     table.add("height_m", bump.height_m, Range{-1e4, 1e4}, "bump height, m; negative: hollow");

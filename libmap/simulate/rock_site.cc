@@ -111,7 +111,7 @@ ParameterTable ground_parameters(SiteGround& ground) {
             {{"soil", GroundTexture::soil},
              {"rock", GroundTexture::rock},
              {"panel", GroundTexture::panel}},
-            "colors of the ground");
+            "texture of the ground's surface");
   return table;
 }
 

@@ -382,24 +382,26 @@ MeshCleaningResult clean_mesh(const TriangleMesh& mesh, const MeshCleaningOption
 }
 
 void describe(ResultTable& table, const MeshCleaningResult& result) {
-  table.add("cut_edges", result.cut_edges, "edges that were cut: non-manifold or not orientable");
-  table.add("split_vertices", result.split_vertices, "copies of vertices with several fans");
-  table.add("degenerate_triangles", result.degenerate_triangles, "removed triangles without area");
-  table.add("islands", result.islands, "small components removed");
-  table.add("island_area_m2", result.island_area_m2, "area of the small components removed");
+  table.add("cut_edges", result.cut_edges, "number of cut edges: non-manifold or not orientable");
+  table.add("split_vertices", result.split_vertices,
+            "number of copies of vertices with several fans of triangles");
+  table.add("degenerate_triangles", result.degenerate_triangles,
+            "number of removed triangles without area");
+  table.add("islands", result.islands, "number of removed small components");
+  table.add("island_area_m2", result.island_area_m2, "area of the small components removed, m2");
   table.add("intersecting_triangles", result.intersecting_triangles,
-            "triangles removed because they intersected others");
+            "number of triangles removed because they intersected others");
   table.add("remaining_intersecting_triangles", result.remaining_intersecting_triangles,
-            "triangles that still intersect others");
-  table.add("filled_holes", result.filling.holes, "holes filled");
-  table.add("filled_triangles", result.filling.triangles, "triangles that fill holes");
-  table.add("filled_area_m2", result.filling.area_m2, "area of the holes filled");
-  table.add("unfilled_holes", result.filling.unfilled, "holes that could not be filled");
+            "number of triangles that still intersect others");
+  table.add("filled_holes", result.filling.holes, "number of filled holes");
+  table.add("filled_triangles", result.filling.triangles, "number of triangles that fill holes");
+  table.add("filled_area_m2", result.filling.area_m2, "area of the holes filled, m2");
+  table.add("unfilled_holes", result.filling.unfilled, "number of holes that could not be filled");
   table.add("decimated_triangles", result.decimation.removed_triangles,
-            "triangles removed by decimation");
-  table.add("vertices", result.mesh.vertices.size(), "vertices of the mesh");
-  table.add("triangles", result.mesh.triangles.size(), "triangles of the mesh");
-  table.add("area_m2", surface_area(result.mesh), "area of the mesh");
+            "number of triangles removed by decimation");
+  table.add("vertices", result.mesh.vertices.size(), "number of vertices of the mesh");
+  table.add("triangles", result.mesh.triangles.size(), "number of triangles of the mesh");
+  table.add("area_m2", surface_area(result.mesh), "area of the mesh, m2");
 }
 
 }  // namespace libmap

@@ -293,19 +293,21 @@ TextureReport TileTexturing::report() const {
 
 void describe(ResultTable& table, const TextureCounts& counts) {
   table.add("triangles", counts.seen_triangles + counts.unseen_triangles,
-            "triangles of the textured mesh");
+            "number of triangles of the textured mesh");
   table.add("triangles_by_cutting", counts.cut_triangles, Merge::sum,
-            "triangles added by cutting long ones");
-  table.add("seen_triangles", counts.seen_triangles, Merge::sum, "triangles with a photograph");
+            "number of triangles added by cutting long ones");
+  table.add("seen_triangles", counts.seen_triangles, Merge::sum,
+            "number of triangles with a photograph");
   table.add("unseen_triangles", counts.unseen_triangles, Merge::sum,
-            "triangles without a photograph");
+            "number of triangles without a photograph");
   table.add("seen_m2", counts.seen_m2, Merge::sum, "area with a photograph, m2");
   table.add("unseen_m2", counts.unseen_m2, Merge::sum, "area without a photograph, m2");
-  table.add("charts", counts.charts, Merge::sum, "charts of the texture");
+  table.add("charts", counts.charts, Merge::sum, "number of charts of the texture");
   table.add("split_charts", counts.split_charts, Merge::sum,
-            "charts that were split to fit a page");
-  table.add("shrunk_charts", counts.shrunk_charts, Merge::sum, "charts of reduced resolution");
-  table.add("pages", counts.pages, Merge::sum, "pages of the texture");
+            "number of charts that were split to fit a page");
+  table.add("shrunk_charts", counts.shrunk_charts, Merge::sum,
+            "number of charts of reduced resolution");
+  table.add("pages", counts.pages, Merge::sum, "number of pages of the texture");
   table.add("texel_size_m", counts.texel_size_m(), "square root of the mean area of a texel, m");
   table.add("atlas_scale", counts.atlas_scale, Merge::min,
             "scale of the charts to fit max_pages; 1: not reduced");
@@ -321,7 +323,7 @@ void describe(ResultTable& table, const TextureReport& report) {
   for (const Eigen::Vector3f& gain : exposure.gains)
     for (const float channel : gain) gains.push_back(static_cast<double>(channel));
   table.add("photographs", report.photos, "number of photographs");
-  table.add("skipped_frames", report.skipped.size(), "frames that could not be used");
+  table.add("skipped_frames", report.skipped.size(), "number of frames that could not be used");
   describe(table, static_cast<const TextureCounts&>(report));
   table.add("color_spread_before", exposure.log_color_deviation_before,
             "standard deviation of the log color of a location between photographs");
