@@ -50,10 +50,10 @@ struct GraspOptions {
 };
 void bind(libmap::ParameterTable& table, GraspOptions& options);
 
-// Outcome of a trial. approach: no ground below, or the approach starts inside the ground. contact:
-// fewer than two contacts. engagement: the contacts do not balance any pull in some direction.
-// load: they balance pulls, but not the load. unseen: one of these failures, and a finger had too
-// much unseen ground.
+// Outcome of a trial. Causes of failure: approach: no ground below, or the approach starts inside
+// the ground. contact: fewer than two contacts. engagement: in some direction, the contacts balance
+// no pull at all. load: they balance a smaller pull than the load. unseen: any of these, with too
+// much unseen ground below a finger.
 enum class TrialEnd { holds, approach, contact, engagement, load, unseen };
 const std::vector<std::pair<std::string, TrialEnd>>& trial_end_names();
 
@@ -62,8 +62,8 @@ struct Trial {
   ClosedGripper gripper;
   std::vector<BearingContact> bearing;
   TrialEnd end = TrialEnd::approach;
-  double force_n = 0.0;       // equal sharing, minimum over the directions
-  std::size_t direction = 0;  // index of this direction in pull_directions()
+  double force_n = 0.0;       // holding force: equal sharing, minimum over directions
+  std::size_t direction = 0;  // direction of the minimum, index in pull_directions()
 };
 
 struct LocationResult {

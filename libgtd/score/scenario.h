@@ -35,10 +35,10 @@ struct Scenario {
   double intersection_distance_m = 0.01;
   Orientation orientation = Orientation::plane;
   double normal_radius_m = 0.0;  // radius of normal fits; 0: palm diameter of the gripper
-  // Minimum rise of a steep face that is an obstacle, like the unreachable ground above it; 0: not
-  // evaluated.
+  // Minimum rise of a steep face that counts as an obstacle; ground above it is unreachable. 0:
+  // obstacles are not evaluated.
   double obstacle_height_m = 0.0;
-  double obstacle_slope_deg = 60.0;  // minimum slope of steep voxels; 0: not evaluated
+  double obstacle_slope_deg = 60.0;  // minimum slope of a steep face; 0: not evaluated
   double tile_size_m = 1.0;
 
   // Return the values that the method uses: height of the zero plane (terrain frame, m; -infinity

@@ -144,9 +144,9 @@ DepthAtRay depth_at(const DepthPlanes& planes, const Camera& camera, const Eigen
 void check(const FeatureOptions& options) {
   check_parameters(options);
   if (!(options.planes.max_depth_m > options.planes.min_depth_m))
-    throw Error("out of range", {.field = "max_depth_m",
-                                 .value = to_text(options.planes.max_depth_m),
-                                 .bound = "> " + to_text(options.planes.min_depth_m)});
+    throw Error("not above min_depth_m", {.field = "max_depth_m",
+                                          .value = to_text(options.planes.max_depth_m),
+                                          .bound = "> " + to_text(options.planes.min_depth_m)});
 }
 
 std::uint64_t bytes_to_find(const CameraView& view) {

@@ -48,9 +48,9 @@ constexpr double coverage_voxels = 8.0;
 void check(const DepthFusionOptions& options) {
   check_parameters(options);
   if (!(options.planes.max_depth_m > options.planes.min_depth_m))
-    throw Error("out of range", {.field = "max_depth_m",
-                                 .value = to_text(options.planes.max_depth_m),
-                                 .bound = "> " + to_text(options.planes.min_depth_m)});
+    throw Error("not above min_depth_m", {.field = "max_depth_m",
+                                          .value = to_text(options.planes.max_depth_m),
+                                          .bound = "> " + to_text(options.planes.min_depth_m)});
 }
 
 std::string node_name(int node) { return "node " + std::to_string(node); }
