@@ -1,6 +1,6 @@
 // Scores single tiles of a terrain, for detect() and detect_streamed(): computes the voxels of the
 // map from points in the terrain frame and their voxel grid. A tile depends only on the data inside
-// it and in a margin around it (the halo); other data do not change a bit of it.
+// it and in a margin around it (the halo); other data do not affect it.
 #pragma once
 
 #include <cstddef>

@@ -24,7 +24,7 @@ struct MapInfo {
 };
 
 // Reads these properties from a manifest of `graspmap score`: parameters, frame, transforms and the
-// origin of the lattice.
+// origin of the lattice. Throws Error if one is not finite.
 MapInfo map_info(const libmap::Manifest& manifest);
 
 // Arrays with one entry per voxel, ascending by voxel, for any order of the map's points.

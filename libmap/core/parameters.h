@@ -67,7 +67,8 @@ class ParameterTable {
   // Keys and values as text in the format of set_from_yaml, overrides included.
   std::vector<std::pair<std::string, std::string>> values() const;
 
-  // Returns the first key with different values in both tables, which have equal keys.
+  // Returns the first key with different values in both tables, which have equal keys; else
+  // nullopt.
   std::optional<std::string> first_difference(const ParameterTable& other) const;
 
   // Sets one parameter from text. Throws Error if the key is unknown (with the nearest known key),

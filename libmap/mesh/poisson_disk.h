@@ -63,7 +63,7 @@ class TileSampler {
  private:
   std::vector<Bounds3d> boxes_;
   PoissonDiskOptions options_;
-  std::vector<std::vector<Eigen::Vector3d>> near_;  // samples of other pieces, by piece
+  std::vector<std::vector<Eigen::Vector3d>> near_;  // samples of other tiles, by tile
 };
 
 }  // namespace libmap

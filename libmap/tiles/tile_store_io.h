@@ -70,7 +70,7 @@ class TileStore {
     std::filesystem::path journal;
     std::size_t begin = 0;
   };
-  // Calls visit(text, line) for each line of all journals.
+  // Calls visit(text, line) for each line of all journals. Throws Error (failed) on a read error.
   void each_line(const std::function<void(const std::string& text, const Line& line)>& visit) const;
   static std::string read_line(const Line& line);
 

@@ -1,4 +1,4 @@
-// The files of a world: a folder that simulators load as it is.
+// Writes a site as a folder that simulators load directly ("world").
 //
 //   world.sdf                 Gazebo, CoppeliaSim
 //   world.xml                 MuJoCo
