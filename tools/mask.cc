@@ -240,7 +240,7 @@ void mask(const MaskOptions& options, Run& run) {
     throw libmap::Error("sections are drawn as .png", {.file = options.output});
   if (!options.sections) reject_changed(options, bind_sections, "requires --sections");
   if (options.view != MaskOptions{}.view && (options.sections || extension != ".png"))
-    throw libmap::Error("applies to an image (.png) without --sections", {.field = "--view"});
+    throw libmap::Error("applies only to an image (.png) without --sections", {.field = "--view"});
   run.claim_output(options.output);
   const auto file = libmap::find_data_file("grippers", options.gripper);
   const libgtd::Gripper gripper = libgtd::read_gripper(file, options.overrides);

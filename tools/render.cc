@@ -394,8 +394,8 @@ std::vector<libmap::SheetCell> read_cells(const RenderOptions& options, Run& run
 
 libmap::ColorImage draw_several(RenderOptions& options, Run& run) {
   if (options.view.view == libmap::Viewpoint::camera)
-    throw libmap::Error("applies to a single file", {.field = "--view", .value = "camera"});
-  reject_changed(options, bind_one, "applies to a single file");
+    throw libmap::Error("applies only to a single file", {.field = "--view", .value = "camera"});
+  reject_changed(options, bind_one, "applies only to a single file");
   // Maps of one cloud have the same orientation in the image.
   if (options.scene.heading == MapHeading::automatic) options.scene.heading = MapHeading::input;
   options.sheet.column_titles = split_texts(options.column_titles);

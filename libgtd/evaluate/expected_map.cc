@@ -44,7 +44,7 @@ void check_region(const ExpectedRegion& region) {
         "out of range",
         {.field = field + ", radius", .value = libmap::to_text(region.radius_m), .bound = "> 0"});
   if (!region.from.allFinite() || !region.to.allFinite())
-    throw libmap::Error("not finite", {.field = field, .bound = "finite coordinates"});
+    throw libmap::Error("is not finite", {.field = field, .bound = "finite coordinates"});
 }
 
 void check_columns(const libmap::Table& table) {

@@ -89,7 +89,7 @@ constexpr double farthest_m = std::numeric_limits<double>::max();
 void check(const RegionReachOptions& options) {
   libmap::check_parameters(options);
   if (options.start && !options.start->allFinite())
-    throw libmap::Error("not finite", {.field = "start"});
+    throw libmap::Error("is not finite", {.field = "start"});
 }
 
 // Connected regions, as points.

@@ -37,7 +37,7 @@ void Engagement::check() const {
 void bind(libmap::ParameterTable& table, Engagement& engagement) {
   constexpr libmap::Range lean{0.0, 90.0};
   table.add("engagement.friction", engagement.friction, libmap::not_negative,
-            "coefficient of Coulomb friction of spines and links");
+            "coefficient of Coulomb friction of spines and links on the ground");
   table.add("engagement.asperity_min_deg", engagement.asperity_min_deg, lean,
             "minimum inclination of an asperity's facet against the drag direction, degrees");
   table.add("engagement.asperity_max_deg", engagement.asperity_max_deg, lean,

@@ -28,7 +28,7 @@ void require_same_map(const Manifest& first, const Manifest& other, const std::s
   // Other versions may score the same points differently.
   if (other.version != first.version)
     throw libmap::Error(
-        "was scored by another version than " + first_name,
+        "not the version of graspmap that scored " + first_name,
         {.file = name, .field = "version", .value = other.version, .bound = first.version});
   std::optional<std::string> key = differing_parameter(first, other);
   if (!key) key = differing_parameter(other, first);  // parameters that only the other has

@@ -87,7 +87,7 @@ std::optional<ImageInfo> png_info(std::string_view bytes) {
 std::optional<ImageInfo> jpeg_info(std::string_view bytes) {
   std::size_t at = 2;
   while (at + 4 <= bytes.size()) {
-    if (bytes[at] != '\xff') throw Error("JPEG header is broken");
+    if (bytes[at] != '\xff') throw Error("JPEG header is damaged");
     const auto marker = static_cast<std::uint8_t>(bytes[at + 1]);
     if (marker == 0xff) {  // fill byte
       ++at;
@@ -97,7 +97,7 @@ std::optional<ImageInfo> jpeg_info(std::string_view bytes) {
     const bool is_frame =
         marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc;
     if (length < 2 || marker < 0xc0 || marker == 0xd8 || marker == 0xd9 || marker == 0xda)
-      throw Error("JPEG header is broken");
+      throw Error("JPEG header is damaged");
     if (is_frame) {
       if (at + 10 > bytes.size()) return std::nullopt;
       ImageInfo info;
@@ -117,7 +117,8 @@ std::optional<ImageInfo> jpeg_info(std::string_view bytes) {
 ImageInfo checked_info(std::string_view bytes, std::int64_t max_pixels = max_frame_pixels) {
   const std::optional<ImageInfo> info = read_image_info(bytes);
   if (!info)
-    throw Error("image ends in its header, after " + std::to_string(bytes.size()) + " bytes");
+    throw Error("image is truncated in its header, after " + std::to_string(bytes.size()) +
+                " bytes");
   check_size(*info, bytes.size(), max_pixels);
   return *info;
 }
@@ -135,7 +136,7 @@ void decode_jpeg(std::string_view bytes, const ImageInfo& info, int pixel_format
       tjDecompress2(handle.get(), reinterpret_cast<const unsigned char*>(bytes.data()),
                     static_cast<unsigned long>(bytes.size()), pixels, info.width, 0, info.height,
                     pixel_format, flags);
-  if (result != 0) throw Error(std::string("JPEG is broken: ") + tjGetErrorStr2(handle.get()));
+  if (result != 0) throw Error(std::string("JPEG is damaged: ") + tjGetErrorStr2(handle.get()));
 }
 
 std::string encode_jpeg(const std::uint8_t* pixels, int width, int height, int pixel_format,
@@ -229,7 +230,7 @@ void decode_png(std::string_view bytes, PngWanted wanted, std::uint8_t* target,
   const bool is_sound =
       info != nullptr && decode_png_rows(source, wanted, target, row_bytes, png, info);
   png_destroy_read_struct(&png, &info, nullptr);
-  if (!is_sound) throw Error(std::string("PNG is broken: ") + source.message);
+  if (!is_sound) throw Error(std::string("PNG is damaged: ") + source.message);
 }
 
 void append_bytes(png_structp png, png_bytep data, png_size_t count) {

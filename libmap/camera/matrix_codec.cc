@@ -99,10 +99,10 @@ void for_each_matrix_chunk(std::string_view blob,
       throw Error("compressed matrix exceeds its size", {.value = matrix_size_text(matrix)});
     const bool is_at_end = result == Z_BUF_ERROR || (result == Z_OK && stream.avail_out > 0);
     if (is_at_end || (result == Z_STREAM_END && done < wanted))
-      throw Error("compressed matrix is broken: ends after " + std::to_string(done) + " of " +
+      throw Error("compressed matrix is damaged: it ends after " + std::to_string(done) + " of " +
                   std::to_string(wanted) + " bytes");
     if (result != Z_OK && result != Z_STREAM_END)
-      throw Error("compressed matrix is broken: " + std::string(zError(result)));
+      throw Error("compressed matrix is damaged: " + std::string(zError(result)));
     if (bytes > 0) use(std::string_view(piece).substr(0, bytes));
   }
 }

@@ -70,10 +70,11 @@ void bind(ParameterTable& table, DepthFusionOptions& options) {
   table.add("max_missed", options.points.max_missed, not_negative,
             "maximum ratio of views that should measure a point and measure nothing to views that "
             "see it");
-  table.add("extend_edges", options.extend_edges, "add points one voxel beyond the measured edges");
-  table.add("color", options.color, "add colors, weighted towards near frontal views");
+  table.add("extend_edges", options.extend_edges,
+            "add points one voxel beyond measured edges of the surface");
+  table.add("color", options.color, "add colors, with larger weights for near and frontal views");
   table.add("stereo", options.stereo, "compute the depth of stereo pairs by semi-global matching");
-  table.add("strict", options.strict, "fail if a frame cannot be used");
+  table.add("strict", options.strict, "fail if a frame cannot be used, instead of skipping it");
 }
 
 void describe(ResultTable& table, const FusionCounts& counts) {

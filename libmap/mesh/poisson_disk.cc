@@ -164,7 +164,7 @@ void bind(ParameterTable& table, PoissonDiskOptions& options) {
             "minimum distance between samples, and maximum distance of the surface to one, m");
   table.add("count", options.count, {0.0, max_samples},
             "number of samples (within 1 %), instead of a radius; 0: by radius");
-  table.add("seed", options.seed, {}, "random seed");
+  table.add("seed", options.seed, {}, "random seed of the samples");
 }
 
 PoissonDiskResult sample_poisson_disk(const TriangleMesh& mesh, const PoissonDiskOptions& options,

@@ -90,9 +90,9 @@ void bind(ParameterTable& table, LoopClosureDetectionOptions& options) {
       "angle_deg", options.angle_deg, {0.0, 180.0},
       "maximum angle between the viewing directions of candidates for a loop closure, degrees");
   table.add("near_candidates", options.near_candidates, not_negative,
-            "maximum number of candidates per frame by distance");
+            "maximum number of loop closure candidates per frame by distance");
   table.add("similar_candidates", options.similar_candidates, not_negative,
-            "number of candidates per frame by appearance, from the whole scan");
+            "number of loop closure candidates per frame by appearance, from the whole scan");
   table.add("neighbors", options.neighbors, not_negative,
             "number of following frames with which a frame is matched");
   table.add("max_ratio", options.max_ratio, {0.0, 1.0, true, false},

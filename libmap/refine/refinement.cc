@@ -522,7 +522,8 @@ void bind(ParameterTable& table, RefinementOptions& options) {
              {"visual", StartPoses::visual}},
             "source of the initial poses; visual: images only; auto: visual for nodes without "
             "poses and links");
-  table.add("rounds", options.rounds, not_negative, "maximum number of rounds of loop closures");
+  table.add("rounds", options.rounds, not_negative,
+            "maximum number of rounds in which loop closures are searched");
   bind(table, options.features);
   bind(table, options.odometry);
   bind(table, options.closures);

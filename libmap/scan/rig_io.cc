@@ -48,7 +48,7 @@ std::vector<double> numbers_of(const YAML::Node& node, const std::string& field,
   std::vector<double> numbers;
   for (const YAML::Node& entry : node) {
     numbers.push_back(rig_number(entry, field));
-    if (!std::isfinite(numbers.back())) throw Error("not finite", {.field = field});
+    if (!std::isfinite(numbers.back())) throw Error("must be finite", {.field = field});
   }
   return numbers;
 }

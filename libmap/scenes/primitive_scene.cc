@@ -23,7 +23,7 @@ struct ParameterAdder {
   ParameterTable& table;
 
   void operator()(Sphere& sphere) const {
-    table.add("radius_m", sphere.radius_m, size_range, "radius, m");
+    table.add("radius_m", sphere.radius_m, size_range, "radius of the shape, m");
   }
   void operator()(Capsule& capsule) const {
     table.add("radius_m", capsule.radius_m, size_range, "radius of the capsule, m");
@@ -35,7 +35,7 @@ struct ParameterAdder {
     table.add("height_m", cone.height_m, size_range, "height of the apex above the base, m");
   }
   void operator()(Cylinder& cylinder) const {
-    table.add("radius_m", cylinder.radius_m, size_range, "radius, m");
+    table.add("radius_m", cylinder.radius_m, size_range, "radius of the shape, m");
     table.add("height_m", cylinder.height_m, size_range, "height of the top above the base, m");
   }
   void operator()(Box& box) const {
@@ -49,7 +49,7 @@ struct ParameterAdder {
   }
   void operator()(Bump& bump) const {
     table.add("height_m", bump.height_m, Range{-1e4, 1e4}, "bump height, m; negative: hollow");
-    table.add("radius_m", bump.radius_m, size_range, "radius, m");
+    table.add("radius_m", bump.radius_m, size_range, "radius of the shape, m");
     table.add(
         "profile", bump.profile,
         {{"cosine", BumpProfile::cosine}, {"gaussian", BumpProfile::gaussian}},

@@ -440,7 +440,7 @@ void bind(ParameterTable& table, SurfaceReconstructionOptions& options) {
   table.add("weigh_by_error", options.weigh_by_error,
             "weight each point by the inverse square of its field expected_error (m)");
   table.add("samples_per_cell", options.samples_per_cell, positive,
-            "method poisson: minimum number of points per cell; other cells are enlarged");
+            "method poisson: minimum number of points per cell; cells with fewer are enlarged");
   table.add(
       "trim_distance_cells", options.trim_distance_cells, positive,
       "maximum distance of the surface from all points, in cells or, if larger, point spacings");
