@@ -105,7 +105,7 @@ void convert_cloud(const ConvertOptions& options, Run& run) {
   if (read.dropped_points > 0)
     run.warn("{} points without a position were dropped", read.dropped_points);
   if (holds_meshes_alone(options.output))
-    throw libmap::Error("this format stores only meshes, and the input is a cloud without faces",
+    throw libmap::Error("this format stores meshes only, and a cloud has no faces",
                         {.file = options.output});
   run.add_results({{"points", read.cloud.size()}});
   add_input(options, run);
@@ -158,7 +158,8 @@ bool convert_textured(const ConvertOptions& options, Run& run) {
 void convert_mesh(const ConvertOptions& options, Run& run) {
   if (libmap::is_dem_path(options.output))
     throw libmap::Error(
-        "a mesh cannot be written as a raster; make a cloud of it with graspmap resample",
+        "a mesh is not a raster; resample it first (graspmap resample), or copy a DEM "
+        "(gdal_translate)",
         {.file = options.input});
   if (convert_textured(options, run)) return;
   const libmap::TriangleMesh mesh = libmap::read_mesh(options.input).mesh;
@@ -181,7 +182,7 @@ void convert_poses(const ConvertOptions& options, Run& run) {
   if (!named) libmap::require_trajectory_format(options.output);
   const libmap::TrajectoryFile read = libmap::read_trajectory(options.input, options.poses_format);
   if (!read.images.empty() || read.of_cameras)
-    throw libmap::Error("contains camera poses; base poses require the scan (fuse --poses)",
+    throw libmap::Error("contains poses of cameras; base poses require the scan (fuse --poses)",
                         {.file = options.input});
   run.add_results({{"poses", read.poses.size()}, {"links", read.links.size()}});
   add_input(options, run);

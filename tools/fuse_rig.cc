@@ -132,7 +132,7 @@ void panorama(PanoramaCommandOptions& options, Run& run) {
   const libmap::PanoramaResult result =
       run.timed("project", [&] { return libmap::make_panorama(views, options.panorama); });
   if (views.empty())
-    throw libmap::Error("none of the images of this time can be read", {.file = options.folder});
+    throw libmap::Error("no image of this time can be read", {.file = options.folder});
   if (result.cloud.empty()) run.warn("no camera has measurements within its limits");
   add_rig_results(rig, set, result, views, run);
   carry_transforms(options.folder, run);

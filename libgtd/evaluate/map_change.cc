@@ -235,7 +235,7 @@ MapChange compare_maps(const VoxelMap& map, const MapSurface& surface, const Vox
                                      options.match_distance_voxels * size_m);
   }
   if (change.pairs.empty())
-    throw libmap::Error("the maps have no common voxel: check their area and their frames");
+    throw libmap::Error("the maps have no voxel in common: check their area and their frames");
   find_unpaired(map, other, change);
   change.common = summarize(map, surface, other, change.pairs);
   summarize_evaluated(map, surface, other, options, change);

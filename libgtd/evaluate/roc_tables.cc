@@ -274,7 +274,7 @@ TableEvaluation evaluate_table(const Table& table, const TableEvaluationOptions&
   std::vector<std::string>& names = evaluation.options.score_columns;
   if (names.empty()) names = default_score_columns(table, options.label_column);
   if (names.empty())
-    throw libmap::Error("the table has no column of scores: name one with --score",
+    throw libmap::Error("the table has no score column: name one with --score",
                         {.file = table.file});
   for (std::size_t n = 0; n < names.size(); ++n) {
     if (std::find(names.begin(), names.begin() + static_cast<std::ptrdiff_t>(n), names[n]) !=

@@ -168,7 +168,7 @@ SurfaceAlignmentResult align_to_surface(const std::vector<Eigen::Vector3d>& poin
                                         const ReferenceSurface& surface,
                                         const SurfaceAlignmentOptions& options) {
   check_parameters(options);
-  if (!surface.is_oriented()) throw Error("alignment requires a surface with normals");
+  if (!surface.is_oriented()) throw Error("cannot align to a surface without normals");
   if (points.size() < 6)
     throw Error("too few points to align",
                 {.field = "points", .value = std::to_string(points.size()), .bound = ">= 6"});

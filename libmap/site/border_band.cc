@@ -58,7 +58,7 @@ struct TopView {
 };
 
 TopView make_top_view(const PointCloud& cloud, const BorderBandOptions& options) {
-  if (!cloud.has_colors()) throw Error("a white border cannot be detected without colors");
+  if (!cloud.has_colors()) throw Error("no colors: a white border cannot be detected");
   std::vector<std::size_t> used;
   Vector2d low = Vector2d::Constant(std::numeric_limits<double>::infinity());
   Vector2d high = -low;

@@ -96,7 +96,7 @@ void TileStore::open() const {
     throw Error("is a file, not a tile store", {.file = folder_.string()});
   if (fs::exists(folder_) && !fs::is_empty(folder_) && !fs::exists(progress()) &&
       !fs::exists(index_path()))
-    throw Error("is neither empty nor a tile store; use another folder",
+    throw Error("is not empty and is not a tile store; use another folder",
                 {.file = folder_.string()});
   for (const fs::path& folder : {folder_, progress(), tiles()}) make_folder(folder);
 }
