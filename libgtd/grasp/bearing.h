@@ -15,8 +15,8 @@
 namespace libgtd {
 
 // asperities: spines engage with facets at random, by the section `engagement` of the gripper.
-// adhesion: a finger bears a tension T along its drag up to a limit, and lateral and pull-off
-// forces up to a fraction of T (LORIS).
+// adhesion: a finger bears a tension T in drag direction (GripContact) up to a limit, and lateral
+// and pull-off forces up to a fraction of T (LORIS).
 enum class EngagementLaw { asperities, adhesion };
 const std::vector<std::pair<std::string, EngagementLaw>>& engagement_law_names();
 

@@ -1,5 +1,5 @@
-// Prefilter of locations for the virtual field test: excludes those where the ground around is too
-// high for a gripper that approaches from above, from the heights of columns of the mesh.
+// Prefilter of locations for the virtual field test: excludes locations next to ground that is too
+// high for a gripper approaching from above, using the highest point of each column of the mesh.
 #pragma once
 
 #include <Eigen/Core>

@@ -28,9 +28,9 @@ struct ClosedFinger {
 };
 
 // Contact of a finger with the ground, in the frame of the ground patch. The normal points out of
-// the ground, `outward` away from the palm's axis. `drag` is the direction along the ground, in the
-// plane of the finger, in which drive and load pull a spine: toward the axis on level ground,
-// upward on ground that falls outward. Unit vectors; `point` in m.
+// the ground, `outward` away from the palm's axis. `drag` (drag direction) is the direction along
+// the ground, in the plane of the finger, in which drive and load pull a spine: toward the axis on
+// level ground, upward on ground that falls outward. Unit vectors; `point` in m.
 struct GripContact {
   std::size_t finger = 0;
   bool by_spines = false;

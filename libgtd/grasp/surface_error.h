@@ -16,7 +16,7 @@ struct SurfaceErrorOptions {
   // Correlation length of the displacement: along an axis, the correlation is 0.285 at this
   // distance and 0 from twice this distance.
   double correlation_m = 0.025;
-  // Maximum standard deviation of seen ground; ground above it is unseen and displaced with it.
+  // Maximum standard deviation of seen ground. Where it is larger, ground is unseen; this is used.
   double max_error_m = 0.005;
 };
 void bind(libmap::ParameterTable& table, SurfaceErrorOptions& options);

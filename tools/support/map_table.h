@@ -1,4 +1,4 @@
-// `graspmap analyze MAP MAP...`: several maps in one table, one row per map.
+// Compares several maps in one table, one row per map, for `graspmap analyze MAP MAP...`.
 #pragma once
 
 #include "libmap/core/parameters.h"

@@ -1,4 +1,4 @@
-// Checks that a command's standard output was written completely, e.g. to a full disk.
+// Detects standard output that could not be written, e.g. because of a full disk.
 #pragma once
 
 #include <string>
