@@ -147,7 +147,8 @@ std::size_t evaluate_obstacles(const ObstacleOptions& options, GraspabilityMap& 
 void bind(libmap::ParameterTable& table, DetectionOptions& options) {
   bind(table, options.scenario);
   table.add("plane", options.plane, {{"fit", PlaneSource::fit}, {"none", PlaneSource::none}},
-            "fit: fits the regression plane; none: the cloud is in the terrain frame");
+            "source of the terrain frame; fit: the regression plane of the points; none: the cloud "
+            "is in the terrain frame already");
 }
 
 Gripper gripper_of(const DetectionOptions& options) {
@@ -220,14 +221,15 @@ void describe(libmap::ResultTable& table, const DetectionResult& result) {
     return is_there ? std::optional(value) : std::nullopt;
   };
   const bool has_grid = result.grid_spacing_m > 0.0;
-  table.add("lattice_origin_m", result.map.lattice.origin_m, "lowest corner of voxel (0, 0, 0)");
-  table.add("input_points", result.points, "points of the input");
+  table.add("lattice_origin_m", result.map.lattice.origin_m,
+            "lowest corner of voxel (0, 0, 0) in the terrain frame, m");
+  table.add("input_points", result.points, "number of input points");
   table.add("plane_rmse_m", result.plane ? std::optional(result.plane->rmse_m) : std::nullopt,
-            "root mean square distance of the points from the regression plane");
+            "RMS distance of the points from the regression plane, m");
   table.add(
       "up_source",
       result.plane ? std::optional(std::string(to_text(result.plane->up_source))) : std::nullopt,
-      "criterion for the side of the plane that is up");
+      "criterion that decided which side of the plane is up");
   table.add("up_normals_share", result.plane ? result.plane->normals_up : std::nullopt,
             "share of the normals that point up");
   table.add("opposing_normals",
@@ -235,26 +237,29 @@ void describe(libmap::ResultTable& table, const DetectionResult& result) {
                                                      : std::nullopt,
             "share of neighboring normals on opposite sides");
   table.add("downsampled_points", only_if(result.downsampled_points > 0, result.downsampled_points),
-            "points after downsampling");
+            "number of points after downsampling");
   table.add("interpolated_points", only_if(has_grid, result.interpolated_points),
-            "points after interpolation");
+            "number of points after interpolation");
   table.add("interpolation_grid_m", only_if(has_grid, result.grid_spacing_m),
-            "spacing of the interpolation grid");
-  table.add("occupied_voxels", result.occupied_voxels, "voxels with points");
-  table.add("lone_voxels", result.lone_voxels, "occupied voxels without a neighbor");
-  table.add("mask_side_voxels", result.mask.side, "side of the gripper mask");
-  table.add("mask_layers", result.mask.layers, "layers of the gripper mask");
-  table.add("tiles", result.tiles, "scored tiles");
-  table.add("scored_voxels", result.map.voxels.size(), "voxels of the map");
-  table.add("border_voxels", result.border_voxels, "scored voxels at the border of the terrain");
-  table.add("curvature_points", result.curvature_points, "points with a curvature");
-  table.add("convex_points", result.convex_points, "points on convex ground");
-  table.add("graspable_voxels", result.graspable_voxels, "scored voxels that are graspable");
-  table.add("normal_radius_m", result.normal_radius_m, "radius of the normal fits");
+            "spacing of the interpolation grid, m");
+  table.add("occupied_voxels", result.occupied_voxels, "number of voxels with points");
+  table.add("lone_voxels", result.lone_voxels,
+            "number of occupied voxels without an occupied neighbor");
+  table.add("mask_side_voxels", result.mask.side, "side of the gripper mask, voxels");
+  table.add("mask_layers", result.mask.layers, "number of layers of the gripper mask");
+  table.add("tiles", result.tiles, "number of scored tiles");
+  table.add("scored_voxels", result.map.voxels.size(), "number of voxels of the map");
+  table.add("border_voxels", result.border_voxels,
+            "number of scored voxels at the border of the terrain");
+  table.add("curvature_points", result.curvature_points,
+            "number of points with an estimated curvature");
+  table.add("convex_points", result.convex_points, "number of points on convex ground");
+  table.add("graspable_voxels", result.graspable_voxels, "number of graspable voxels");
+  table.add("normal_radius_m", result.normal_radius_m, "radius of the surface normal fits, m");
   table.add("unoriented_voxels", only_if(result.map.content.normals, result.unoriented_voxels),
-            "voxels without a normal, scored upright");
+            "number of voxels without a normal, scored with an upright mask");
   table.add("obstacle_voxels", only_if(result.map.content.obstacles, result.obstacle_voxels),
-            "voxels that are obstacles");
+            "number of voxels that are obstacles");
 }
 
 }  // namespace libgtd

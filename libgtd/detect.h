@@ -1,5 +1,6 @@
-// Detection of graspable targets: computes a graspability map from a point cloud ("Graspable Target
-// Detection for Hexapod Robots", 2023, chapters 2.5 and 3.2).
+// Main entry of the detection: computes a graspability map, which scores every voxel of a terrain
+// as a target of a spined gripper, from a point cloud in memory ("Graspable Target Detection for
+// Hexapod Robots", 2023, chapters 2.5 and 3.2).
 #pragma once
 
 #include <optional>
@@ -27,8 +28,8 @@ struct DetectionOptions {
   Scenario scenario;
   std::optional<Gripper> gripper;  // default: the gripper named by the scenario
   PlaneSource plane = PlaneSource::fit;
-  std::optional<Eigen::Vector3d> up;  // points out of the ground, in the cloud's frame
-  double max_tilt_deg = 90.0;         // between `up` and the plane's normal
+  std::optional<Eigen::Vector3d> up;  // direction out of the ground, cloud's frame
+  double max_tilt_deg = 90.0;         // maximum angle between `up` and the plane's normal
   libmap::TileShare share;            // tiles to score
 };
 // Binds the keys of the scenario and `plane`.
@@ -48,7 +49,7 @@ struct DetectionResult {
   Voxel grid_max;
   std::size_t tiles = 0;             // scored tiles
   std::size_t curvature_points = 0;  // points with a measured curvature
-  std::size_t convex_points = 0;
+  std::size_t convex_points = 0;     // among them
   std::size_t graspable_voxels = 0;
   std::size_t border_voxels = 0;
   std::size_t unoriented_voxels = 0;      // orientation surface: no normal, scored upright
@@ -56,16 +57,16 @@ struct DetectionResult {
   std::optional<double> normal_radius_m;  // nullopt if no surface normals were fitted
   libmap::StageTimings timings_s;         // wall time of each step
 };
-// Binds the names of the results (libmap/core/result_table.h).
+// Names each result for manifests and tables (libmap/core/result_table.h).
 void describe(libmap::ResultTable& table, const DetectionResult& result);
 
 // Returns options.gripper, or else the gripper of the scenario with its overrides. Throws like
 // find_gripper.
 Gripper gripper_of(const DetectionOptions& options);
 
-// Detects graspable targets in `terrain` (meters). Throws Error for an empty cloud, options out of
-// range, points too sparse for the voxel size (voxel_grid.h), and all errors of the individual
-// stages.
+// Detects graspable targets in `terrain` (m, any frame); the frame of the result is the terrain
+// frame. Throws Error for an empty cloud, options out of range, points too sparse for the voxel
+// size (voxel_grid.h), and all errors of the individual stages.
 DetectionResult detect(const libmap::PointCloud& terrain, const DetectionOptions& options,
                        libmap::Progress& progress = libmap::no_progress());
 

@@ -103,7 +103,7 @@ void require_appendable(const TilePlan& earlier, const TilePlan& plan,
   if (before.parameters != now.parameters || before.version != now.version)
     refuse("contains tiles of other parameters; use --force to start again");
   if (before.georeference != now.georeference)
-    refuse("has its offset from a different first file: new files must sort after it");
+    refuse("was started with another first file: names of new files must sort after it");
   auto at = plan.terrain.begin();
   for (const TerrainFile& file : earlier.terrain) {
     at = std::find_if(at, plan.terrain.end(),

@@ -1,5 +1,6 @@
-// Plans a run that scores a terrain into a tile store: compares it with an earlier plan, and finds
-// the tiles to keep and the points that the missing tiles depend on.
+// Plans how `graspmap score` computes a map in a tile store (a folder with one file per tile). If
+// the store has tiles of an earlier run, it finds the tiles that remain valid, the missing tiles
+// and the points that these depend on.
 #pragma once
 
 #include <Eigen/Core>
@@ -23,15 +24,14 @@ struct StoreTiling {
   int halo_voxels = 0;
 };
 
-// Adds the frame to the plan: lattice, box, plane, and the transform and results of the manifest.
+// Stores the frame in the plan: lattice, box, plane, and transform and results of its manifest.
 void set_frame(const TerrainFrame& frame, const StoreTiling& tiling, TilePlan& plan);
 
-// Returns the frame of an earlier plan. Throws Error naming `plan_file` if the tiles of the plan
-// differ from those of these options.
+// Returns the frame of an earlier plan. Throws Error naming `plan_file` if its tiles differ.
 TerrainFrame frame_of(const TilePlan& plan, const DetectionOptions& detection,
                       const std::filesystem::path& plan_file);
 
-// Throws Error naming `plan_file` if a point is outside the box of the frame.
+// Throws Error naming `plan_file` if a point is outside the frame's box of voxels.
 void require_in_frame(const libmap::PointCloud& terrain, const TerrainFrame& frame,
                       const std::filesystem::path& plan_file);
 
@@ -45,14 +45,14 @@ std::vector<StoredTile> unaffected_tiles(const std::map<TileNumber, StoredTile>&
                                          const TilePlan& earlier, const TilePlan& plan,
                                          const TerrainFrame& frame, const StoreTiling& tiling);
 
-// Returns the rectangle that contains all points on which the tiles depend.
+// Returns the rectangle with all points that the tiles depend on, in the terrain frame.
 PointsRectangle points_for(const std::vector<TileNumber>& tiles, const TerrainFrame& frame,
                            const StoreTiling& tiling);
 // Returns true if a point of the file may be in the rectangle.
 bool may_intersect(const TerrainFile& file, const PointsRectangle& wanted,
                    const TerrainFrame& frame);
 
-// Returns the box and counts of the tile, without the fields of its file.
+// Returns the index entry of a scored tile: its box and counts, without file name, size and hash.
 StoredTile stored_tile(const StreamedTile& tile);
 
 }  // namespace libgtd

@@ -1,6 +1,6 @@
-// Detection for terrains larger than memory. A first pass over all points determines the frame and
-// the box of voxels; then each tile is scored from the points nearby. The voxels equal those of
-// detect() on the same points to the bit.
+// Detection of graspable targets for terrains larger than memory, in tiles. A first pass over all
+// points determines the terrain frame and the box of voxels; then each tile is scored from the
+// points in it and in a margin around it (the halo). The voxels equal those of detect() to the bit.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,7 +17,7 @@
 
 namespace libgtd {
 
-// Frame and box that all tiles of a terrain share.
+// Terrain frame and box of voxels, common to all tiles of a terrain.
 struct TerrainFrame {
   std::optional<RegressionPlane> plane;  // nullopt: the points are in the terrain frame
   VoxelLattice lattice;
@@ -38,8 +38,8 @@ TerrainFrame frame_terrain(const libmap::PointStream& points, const DetectionOpt
 // Transforms a block of points into the terrain frame; normals with random sides are dropped.
 libmap::PointCloud to_terrain(const libmap::PointCloud& block, const TerrainFrame& frame);
 
-// Returns the tiles of the box that belong to the share, ascending. Throws Error naming tile_size_m
-// if the box has more than 2^20 tiles.
+// Returns the tiles of the box, ascending; of several runs that divide the tiles, those of one run
+// (`share`). Throws Error naming tile_size_m if the box has more than 2^20 tiles.
 std::vector<TileNumber> tiles_of(const TerrainFrame& frame, int tile_voxels,
                                  const libmap::TileShare& share = {});
 
@@ -60,11 +60,11 @@ struct PointsRectangle {
   Eigen::Vector2d low;
   Eigen::Vector2d high;
 };
-// Returns the rectangle that contains all points on which the columns depend.
+// Returns the rectangle with all points that the result in `columns` depends on.
 PointsRectangle points_for(const TileBounds& columns, const TerrainFrame& frame, int halo_voxels);
 
-// Scores the tiles `wanted` from `points` in the terrain frame. Calls `visit` with a few tiles at a
-// time, each tile once, from one thread.
+// Scores the tiles `wanted` from `points` in the terrain frame, which must cover their halo. Calls
+// `visit` with a few tiles at a time, each tile once, from one thread.
 void detect_streamed(const TerrainFrame& frame, const libmap::PointTileStore& points,
                      const std::vector<TileNumber>& wanted, const DetectionOptions& options,
                      const std::function<void(std::vector<StreamedTile> tiles)>& visit,

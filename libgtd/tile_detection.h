@@ -1,6 +1,6 @@
-// Per-tile part of a detection: computes the voxels of the map from points in the terrain frame and
-// their voxels. A tile depends only on the data inside it and in a halo around it, and its result
-// is the same to the bit whatever else is present.
+// Scores single tiles of a terrain, for detect() and detect_streamed(): computes the voxels of the
+// map from points in the terrain frame and their voxel grid. A tile depends only on the data inside
+// it and in a margin around it (the halo); other data do not affect it.
 #pragma once
 
 #include <cstddef>
@@ -23,29 +23,29 @@ namespace libgtd {
 // `envelope`).
 bool follows_thesis(Method method);
 
-// Plane fit of a method: `thesis` and `envelope` as in the author's program, `climblab` by least
-// squares as in its source, the others robust.
+// Returns the plane fit of a method: `thesis` and `envelope` as in the author's program, `climblab`
+// by least squares as in its source, the others robust.
 PlaneMethod plane_method(Method method);
 
-// Width of a tile in voxels. Throws Error naming tile_size_m if it is out of range.
+// Returns the width of a tile in voxels. Throws Error naming tile_size_m if it is out of range.
 int tile_voxels(const Scenario& scenario);
 
-// Width of the halo in voxels: the columns around a tile on which its voxels depend. It covers the
-// mask window, the closing of the scanned area, the points that decide convexity with all their
-// neighbors, and the points of surface normals, but not interpolation and obstacles, which use the
-// whole terrain. Throws Error naming a radius that is too large for the voxel size.
+// Returns the width of the halo in voxels: the columns around a tile on which its voxels depend. It
+// covers the mask window, the closing of the scanned area, the points that decide convexity with
+// all their neighbors, and the points of surface normals, but not interpolation and obstacles,
+// which use the whole terrain. Throws Error naming a radius that is too large for the voxel size.
 int halo_voxels(const GripperMask& mask, const Scenario& scenario);
 
-// Radius of the surface normals that the scenario requests, m.
+// Returns the radius of the surface normal fits of a scenario, m.
 double normal_radius_m(const GripperMask& mask, const Scenario& scenario);
 
-// Optional fields of the map that a detection with these parameters computes, except obstacles.
+// Returns the optional fields of the map that a scenario computes, except obstacles.
 MapContent content_of(const Scenario& scenario);
 
 // Options for the curvature near scored voxels and the convexity test.
 struct ConvexityStage {
   CurvatureOptions curvature;
-  bool average_per_voxel = true;  // averages points per voxel, so that density has no effect
+  bool average_per_voxel = true;  // average points per voxel; density has no effect
   double zero_plane_m = 0.0;      // CurvatureMethod::thesis: lower bound of convex points
   double distance_m = 0.01;       // maximum distance of a convex voxel from a convex point
 };
@@ -59,16 +59,16 @@ struct GraspableRule {
   bool needs_convexity = false;
 };
 
-// Options of detect_tiles, resolved from a scenario.
+// Options of detect_tiles; tile_detection_options derives them from a scenario.
 struct TileDetectionOptions {
-  bool tilts_mask = false;                  // to the surface normal
+  bool tilts_mask = false;                  // mask axis along the surface normal
   std::optional<double> normal_radius_m;    // nullopt: no normals or slopes
   std::optional<ConvexityStage> convexity;  // nullopt: not evaluated
   GraspableRule graspable;
 };
 TileDetectionOptions tile_detection_options(const GripperMask& mask, const Scenario& scenario);
 
-// Input of the tiles: it contains at least the data in the tiles and their halo.
+// Data of the terrain, at least inside the tiles and their halo, in the terrain frame.
 struct TileSurroundings {
   const libmap::PointCloud& terrain;  // measured points, for the curvature
   const libmap::PointCloud& surface;  // points from which the voxels were made

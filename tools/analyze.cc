@@ -43,20 +43,21 @@ void bind_one(libmap::ParameterTable& table, AnalyzeOptions& options) {
   bind(table, options.regions);
   bind(table, options.reach);
   table.add("start", options.start,
-            "position of the robot: X,Y,Z in the frame of --points-frame; largest: on the largest "
-            "region");
+            "start position of the robot: X,Y,Z (m) in the frame of --points-frame; largest: on "
+            "the largest region");
   bind(table, options.change);
-  table.add("transform", options.transform,
-            "transform from OTHER's points to MAP's: X,Y,Z,ROLL,PITCH,YAW in m and degrees, or a "
-            "file; auto: both were scored from clouds in one frame or cropped from one map");
+  table.add(
+      "transform", options.transform,
+      "transform from OTHER's frame to MAP's: X,Y,Z,ROLL,PITCH,YAW in m and degrees, or a file; "
+      "auto: from the manifests, for maps scored from clouds in one frame or cropped from one map");
 }
 
 void bind(libmap::ParameterTable& table, AnalyzeOptions& options) {
   bind_one(table, options);
   table.add("points_frame", options.points_frame, point_frame_names(),
             "frame of the start or of the expected regions: of the scored cloud, the terrain, or "
-            "the map before it was cropped");
-  table.add_former_key("pictures", "images");
+            "frame of the start position and of the expected regions: that of the scored cloud, of "
+            "the terrain, or of the map before it was cropped");
   table.add("images", options.images, "draw images and charts");
   bind(table, options.table);
 }
@@ -70,7 +71,7 @@ struct ReadMap {
 
 ReadMap read_map(const std::string& file, Run& run) {
   if (is_tile_store(file))
-    throw libmap::Error("is a tile store: convert it to one map by `graspmap convert`",
+    throw libmap::Error("is a tile store; merge it into one map with `graspmap convert` first",
                         {.file = file});
   ReadMap map;
   map.cloud = libmap::read_cloud(file).cloud;
@@ -84,7 +85,7 @@ ReadMap read_map(const std::string& file, Run& run) {
              ": has no manifest; its points are assumed to be in the terrain frame, all above the "
              "zero plane");
   else if (map.manifest->find_parameter("zero_plane_m") == nullptr)
-    run.warn(file + ": its manifest has no zero plane; all its points are assumed to be above");
+    run.warn(file + ": its manifest has no zero plane; all its points are assumed to be above it");
   run.add_input(file);
   return map;
 }
@@ -310,7 +311,7 @@ void analyze(AnalyzeOptions& options, Run& run) {
                                   "requires several maps or --expected");
   options.map = options.maps.front();
   if (options.other.empty() && options.transform != "auto")
-    throw libmap::Error("requires --against OTHER",
+    throw libmap::Error("can only be used with --against OTHER",
                         {.field = "--transform", .value = options.transform});
   run.claim_output_tree(options.folder, output_names, {options.map, options.other});
   options.regions.border = options.change.border = options.analysis.border;
@@ -342,9 +343,9 @@ int main(int argc, char** argv) {
   Command command("analyze");
   command.inputs("MAP", options.maps, "graspability map; several maps are tabulated");
   command.option("--against", "OTHER", options.other, "map of the same ground to compare MAP with");
-  command.option(
-      "--expected", "EXPECTED.csv", options.table.expected,
-      "regions of expected graspability for the table, e.g. data/expected/primitive_shapes.csv");
+  command.option("--expected", "EXPECTED.csv", options.table.expected,
+                 "table of regions that are expected to be graspable or not, compared with the "
+                 "map, e.g. data/expected/primitive_shapes.csv");
   command.output(options.folder,
                  "folder of summary.json, histogram, by_height, by_slope, regions, region_links "
                  "and, with OTHER, change; for several maps, of maps.csv, histograms.csv and, if "

@@ -44,10 +44,11 @@ struct BoardPhoto {
 };
 
 void bind(libmap::ParameterTable& table, CalibrateOptions& options) {
-  table.add("board", options.board,
-            "numbers of inner corners, COLUMNSxROWS; a board of 9 x 7 squares is 8x6");
+  table.add(
+      "board", options.board,
+      "numbers of inner corners of the chessboard, COLUMNSxROWS; 8x6 for a board of 9 x 7 squares");
   bind(table, options.calibration);
-  table.add("name", options.name, "name of the camera in the file");
+  table.add("name", options.name, "name of the camera in the written camera file");
 }
 
 bool has_image_extension(const fs::path& path) {
@@ -82,7 +83,7 @@ BoardPhoto read_photo(const std::string& file, const libmap::Chessboard& board) 
     const std::string bytes = libmap::read_whole_file(file);
     const auto info = libmap::read_image_info(bytes);
     if (info && std::int64_t{info->width} * info->height > max_pixels)
-      throw libmap::Error("too large for finding the board",
+      throw libmap::Error("too large for the detection of the board",
                           {.field = "image size",
                            .value = fmt::format("{} x {}", info->width, info->height),
                            .bound = fmt::format("<= {} pixels", max_pixels)});
@@ -117,9 +118,9 @@ std::vector<BoardPhoto> read_photos(const std::vector<std::string>& files,
   };
   for (const BoardPhoto& photo : photos) {
     if (photo.fault)
-      run.warn(std::string(photo.fault->what()) + "; it is left out");
+      run.warn(std::string(photo.fault->what()) + "; the image is left out");
     else if (size(photo) != size(first))
-      throw libmap::Error("the images differ in size",
+      throw libmap::Error("all images must have the same size",
                           {.file = photo.name,
                            .field = "size",
                            .value = size(photo),
@@ -134,7 +135,7 @@ std::vector<libmap::BoardImage> boards_of(const std::vector<BoardPhoto>& photos,
   for (const BoardPhoto& photo : photos)
     if (photo.corners) boards.push_back({photo.name, *photo.corners});
   if (boards.empty())
-    throw libmap::Error("no image shows the whole board",
+    throw libmap::Error("no image shows a whole board with these inner corners",
                         {.field = "--board",
                          .value = options.board,
                          .bound = "the number of inner corners, one less than squares"});
@@ -247,9 +248,9 @@ void note_results(const std::vector<BoardPhoto>& photos, const CameraCalibration
 
 void warn_of_weaknesses(const CameraCalibrationResult& result, Run& run) {
   for (const std::string& name : result.repeated)
-    run.warn(name + ": left out: an earlier image shows the board in the same pose");
+    run.warn(name + ": left out because an earlier image shows the board in the same pose");
   for (const std::string& name : result.rejected)
-    run.warn(name + ": left out for its reprojection error");
+    run.warn(name + ": left out because of its reprojection error");
   for (const CalibratedImage& photo : result.images)
     if (photo.rms_px > good_error_px)
       run.warn("{}: reprojection error {:.2f} px, above {} px", photo.name, photo.rms_px,
@@ -381,7 +382,7 @@ void calibrate(CalibrateOptions& options, Run& run) {
   for (const std::string& file : files) libmap::require_readable_file(file);
   run.claim_output(options.output, files);
   if (!options.output.ends_with(".yaml") && !options.output.ends_with(".yml"))
-    throw libmap::Error("a camera is written as YAML",
+    throw libmap::Error("a camera can be written only as YAML",
                         {.file = options.output, .bound = "a name.yaml"});
   if (!options.report.empty()) run.claim_output_folder(options.report);
   const std::vector<BoardPhoto> photos =
@@ -416,7 +417,7 @@ int main(int argc, char** argv) {
   command.inputs("IMAGES", options.images, "images, or folders of images (.png, .jpg)");
   command.output(options.output, "camera file (.yaml)");
   command.option("--report", "DIR", options.report,
-                 "folder of images.csv, residuals.csv, residuals.png and errors.png");
+                 "output folder for images.csv, residuals.csv, residuals.png and errors.png");
   bind(command.parameters(), options);
   return command.run(argc, arguments.data(), [&](Run& run) { calibrate(options, run); });
 }

@@ -43,11 +43,11 @@ struct CompareOptions {
 
 void bind(libmap::ParameterTable& table, CompareOptions& options) {
   table.add("within_m", options.within_m, libmap::positive,
-            "maximum distance at which one surface covers the other");
+            "maximum distance at which a point of one surface is covered by the other, m");
   table.add("samples_per_m2", options.samples_per_m2, libmap::positive,
             "density of the samples of a mesh's surface, per m2");
   table.add("seed", options.seed, {}, "random seed of the samples");
-  table.add("icp", options.icp, "align A with B by point-to-plane ICP first");
+  table.add("icp", options.icp, "align A with B by point-to-plane ICP before the comparison");
   bind(table, options.alignment);
   table.add_former_key("picture_range_m", "image_range_m");
   table.add_former_key("picture_view", "image_view");
@@ -92,7 +92,7 @@ void require_nearness(const libmap::ReferenceSurface& surface, const libmap::Poi
   if (size == 0.0) return;  // the time does not depend on the distance to a point
   const double apart = ((a.max + a.min) / 2 - (b.max + b.min) / 2).norm();
   if (!(apart <= max_sizes * size))
-    throw libmap::Error("A and B are too far apart to be compared",
+    throw libmap::Error("A is too far from B to be compared: check the frames and --transform",
                         {.file = options.a,
                          .field = "distance of the centers",
                          .value = libmap::to_text(static_cast<float>(apart)) + " m",
@@ -113,7 +113,7 @@ libmap::Pose b_from_a_of(const CompareOptions& options) {
   const auto a_from_map = site_from_map_of(options.a);
   const auto b_from_map = site_from_map_of(options.b);
   if (!a_from_map && !b_from_map)
-    throw libmap::Error("neither A nor B was cropped",
+    throw libmap::Error("neither A nor B was cropped, so their manifests contain no transform",
                         {.file = options.a,
                          .field = "--transform",
                          .value = options.transform,
@@ -453,7 +453,7 @@ int compare_surfaces(int argc, char** argv) {
                  "file of four rows of four numbers, as crop writes; crop: from the manifests of "
                  "A and B, one of which was cropped from the other's map");
   command.option("--box", "XMIN,YMIN,ZMIN,XMAX,YMAX,ZMAX", options.box,
-                 "box in B's frame; only points in it are compared");
+                 "box in B's frame, m; only points inside it are compared");
   command.flag("--json", options.json, "print the results as JSON");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { compare(options, run); });

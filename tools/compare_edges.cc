@@ -49,19 +49,20 @@ struct SpotCheckCommandOptions {
 
 void bind(libmap::ParameterTable& table, SpotCheckCommandOptions& options) {
   bind(table, options.check);
-  table.add("radius_m", options.radius_m, libmap::positive,
-            "for a cloud: a height is the median of the points within this horizontal distance");
+  table.add(
+      "radius_m", options.radius_m, libmap::positive,
+      "for a cloud: horizontal radius of the points whose median is the height of a position, m");
   table.add("min_points", options.min_points, {1.0, 1e9},
-            "for a cloud: minimum number of points for a height");
-  table.add("outline", options.outline,
-            {{"axes", SiteOutline::axes}, {"turned", SiteOutline::turned}},
-            "site's outline, the smallest rectangle around the data: along the axes, or rotated");
+            "for a cloud: minimum number of points for the height of a position");
+  table.add(
+      "outline", options.outline, {{"axes", SiteOutline::axes}, {"turned", SiteOutline::turned}},
+      "outline of the site: smallest rectangle around the data, parallel to the axes or rotated");
   table.add("ground", options.ground,
             {{"auto", Ground::automatic}, {"zero", Ground::zero}, {"fit", Ground::fit}},
             "reference of heights: z = 0, or a fitted plane; auto: z = 0 for a levelled site");
   table.add("truth_frame", options.truth_frame,
             {{"site", TruthFrame::site}, {"map", TruthFrame::map}},
-            "frame of --truth: that of the site, or of the map that the site was cropped from");
+            "frame of --truth: that of the site, or of the map from which the site was cropped");
   bind(table, options.plane);
 }
 
@@ -281,7 +282,7 @@ int graspmap_tools::compare_edges(int argc, char** argv) {
   command.option("--truth", "MESH", options.truth,
                  "true surface as the reference of heights (see --truth-frame)");
   command.option("--box", "XMIN,YMIN,ZMIN,XMAX,YMAX,ZMAX", options.box,
-                 "extent of the site, instead of the rectangle around the data");
+                 "extent of the site, m, instead of the rectangle around the data");
   command.flag("--json", options.json, "print the results as JSON, with each location");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { edge_check(options, run); });

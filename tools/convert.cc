@@ -67,12 +67,12 @@ void refuse_ignored(const ConvertOptions& options) {
   const std::string format = libmap::format_of(options.output);
   if (options.writing.encoding == FileEncoding::binary_compressed && format != ".pcd")
     throw libmap::Error(
-        "requires a .pcd output",
+        "can be written only to .pcd",
         {.file = options.output, .field = "--encoding", .value = "binary_compressed"});
   if (options.pixel_size_m > 0.0 && !libmap::is_dem_path(options.output))
-    throw libmap::Error("requires .tif", {.file = options.output, .field = "--pixel-size"});
+    throw libmap::Error("requires .tif output", {.file = options.output, .field = "--pixel-size"});
   if (options.writing.big_endian && format != ".ply")
-    throw libmap::Error("requires .ply", {.file = options.output, .field = "--big-endian"});
+    throw libmap::Error("requires .ply output", {.file = options.output, .field = "--big-endian"});
 }
 
 // Maximum error of coordinates in single precision, m.
@@ -158,7 +158,8 @@ bool convert_textured(const ConvertOptions& options, Run& run) {
 void convert_mesh(const ConvertOptions& options, Run& run) {
   if (libmap::is_dem_path(options.output))
     throw libmap::Error(
-        "a mesh is not a raster: graspmap resample makes a cloud, gdal_translate copies a DEM",
+        "a mesh is not a raster; resample it first (graspmap resample), or copy a DEM "
+        "(gdal_translate)",
         {.file = options.input});
   if (convert_textured(options, run)) return;
   const libmap::TriangleMesh mesh = libmap::read_mesh(options.input).mesh;
@@ -181,7 +182,7 @@ void convert_poses(const ConvertOptions& options, Run& run) {
   if (!named) libmap::require_trajectory_format(options.output);
   const libmap::TrajectoryFile read = libmap::read_trajectory(options.input, options.poses_format);
   if (!read.images.empty() || read.of_cameras)
-    throw libmap::Error("has poses of cameras, which need the scan for the base (fuse --poses)",
+    throw libmap::Error("contains poses of cameras; base poses require the scan (fuse --poses)",
                         {.file = options.input});
   run.add_results({{"poses", read.poses.size()}, {"links", read.links.size()}});
   add_input(options, run);
@@ -239,16 +240,16 @@ int convert_file(int argc, char** argv) {
                            {{"ascii", FileEncoding::ascii},
                             {"binary", FileEncoding::binary},
                             {"binary_compressed", FileEncoding::binary_compressed}},
-                           "encoding of numbers, if the format has several");
+                           "encoding of the output, if its format has several");
   command.parameters().add("big_endian", options.writing.big_endian,
                            "write binary PLY in big-endian order");
   command.parameters().add("pixel_size_m", options.pixel_size_m, libmap::not_negative,
-                           "pixel size of .tif, m; 0: the map's voxel size");
+                           "pixel size of a .tif output, m; 0: the map's voxel size");
   command.parameters().add("poses_format", options.poses_format, libmap::trajectory_format_names(),
-                           "format of poses in IN; auto: by its extension, else by its content");
+                           "format of the input poses; auto: by extension, else by content");
   command.parameters().add(
       "output_poses_format", options.output_poses_format, libmap::trajectory_format_names(),
-      "format of poses in OUT; auto: by its extension. RTAB-Map's formats are 0 kitti, 1 "
+      "format of the output poses; auto: by extension; RTAB-Map's export formats are 0 kitti, 1 "
       "tum-motion-capture, 2 kitti-optical, 3 toro, 4 g2o, 10 and 11 tum");
   return command.run(argc, argv, [&](Run& run) { convert(options, run); });
 }

@@ -49,16 +49,18 @@ struct BagCommandOptions {
 };
 
 void bind(libmap::ParameterTable& table, BagCommandOptions& options) {
-  table.add("stamp_s", options.stamp,
-            "stamp, s. From a bag: only the nearest image set or cloud (auto: all sets; the cloud "
-            "with most points). A map to a bag: of all messages (auto: that of the inputs)");
+  table.add(
+      "stamp_s", options.stamp,
+      "time stamp, s; from a bag: of the image set or cloud to read (auto: all sets, or the cloud "
+      "with most points); from a map to a bag: of all messages (auto: that of the inputs)");
   table.add("strict", options.strict, "fail if an image cannot be used");
   bind(table, options.depth);
   table.add("frame", options.frame,
-            "frame_id of the map's points in the bag; auto: by their manifest");
+            "frame_id of the map's points in the bag; auto: from the map's manifest");
   table.add("stamp_offset_s", options.stamp_offset_s, libmap::any_number,
             "offset added to the stamps of a rig's images, s");
-  table.add("arrow_m", options.arrow_m, libmap::positive, "length of the footholds' arrows, m");
+  table.add("arrow_m", options.arrow_m, libmap::positive,
+            "length of the footholds' approach arrows, m");
   table.add("cell_size_m", options.cell_size_m, libmap::not_negative,
             "cell size of the map's grids in a ROS 2 bag, m; 0: the map's voxel size");
   table.add("compression", options.compression,
@@ -111,7 +113,7 @@ void report(const libmap::BagRigPlan& plan, const libmap::BagRigExport& result,
     run.add_results({{camera.name + ".topic", plan.topics[n]}});
     run.manifest().transforms.emplace_back("robot_from_" + camera.name,
                                            camera.camera.base_from_camera);
-    if (plan.topics[n].empty()) run.warn(camera.name + ": there is no topic of its images");
+    if (plan.topics[n].empty()) run.warn(camera.name + ": no topic contains its images");
   }
   run.info("{} images of {} cameras, {} of {} image sets, at most {} cameras per set",
            result.images, plan.rig.cameras.size(), result.sets.size(), plan.all_sets, fullest);
@@ -136,7 +138,7 @@ void read_bag_into_folder(const BagCommandOptions& options, Run& run) {
 
 void read_bag_into_cloud(const BagCommandOptions& options, Run& run) {
   if (options.topics.size() > 1)
-    throw libmap::Error("a cloud output requires a single topic", {.field = "--topic"});
+    throw libmap::Error("a cloud is read from a single topic", {.field = "--topic"});
   run.claim_output(options.output, {options.input});
   const libmap::BagCloudResult result = run.timed("read", [&] {
     return libmap::read_bag_cloud(options.input,
@@ -245,7 +247,7 @@ void add_transform(const CloudFile& map, const std::string& map_frame,
   if (pose && map.frame() == "terrain")
     content.transforms.push_back({map_frame, terrain_frame, *pose});
   else
-    run.warn("the transform from {} to {} is unknown", terrain_frame, map_frame);
+    run.warn("the transform from {} to {} is unknown and not written", terrain_frame, map_frame);
 }
 
 // Grid of the map from above: each cell has the values of its topmost voxel.
@@ -468,12 +470,13 @@ int graspmap_tools::convert_bag(int argc, char** argv) {
       "clouds (.pcd, .ply, .vtp, .csv); bag to write: OUT.bag (ROS 1), OUT.mcap, or a folder (no "
       "extension) of .db3 (ROS 2)");
   command.option("--topic", "[NAME=]TOPIC", options.topics,
-                 "topics of depth images, or of the cloud (repeatable); default: all");
-  command.option("--rig", "FILE|NAME", options.rig,
-                 "rig; default: from the bag's camera infos and transforms, or DIR/rig.yaml");
+                 "topic of a camera's depth images, or of the cloud (repeatable); default: all");
+  command.option(
+      "--rig", "FILE|NAME", options.rig,
+      "camera rig; default: from the bag's camera infos and transforms, or DIR/rig.yaml");
   command.option("--terrain", "CLOUD", options.terrain, "terrain cloud, written to /merged_pcd");
   command.option("--curvature", "CLOUD", options.curvature,
-                 "cloud for /curvature_map, instead of the map with its curvatures");
+                 "cloud to publish on /curvature_map, instead of the map with its curvatures");
   command.option("--footholds", "FOOTHOLDS", options.footholds,
                  "footholds of the map, written to /footholds and /foothold_poses");
   bind(command.parameters(), options);

@@ -190,10 +190,10 @@ void write_colmap(const ImageOptions& options, const std::vector<ScanImage>& ima
 
 void add_options(Command& command, ImageOptions& options) {
   command.option("--bundler", "DIR", options.bundler,
-                 "folder for cameras and images as Bundler v0.3 for MeshLab's registered rasters: "
-                 "bundle.out, list.txt, images");
+                 "output folder for cameras and images in Bundler v0.3 format (MeshLab's "
+                 "registered rasters): bundle.out, list.txt, images");
   command.option("--colmap", "DIR", options.colmap,
-                 "folder for cameras, all images and points as a model of COLMAP: "
+                 "output folder for cameras, all images and points as a COLMAP model: "
                  "sparse/cameras.txt, images.txt, points3D.txt; images");
   add_poses_option(command, options.poses);
   command.option("--transform", "X,Y,Z,ROLL,PITCH,YAW|FILE", options.transform,
@@ -203,7 +203,7 @@ void add_options(Command& command, ImageOptions& options) {
   command.parameters().add(
       "keep", options.keep,
       {{"sharpest", ImagePreference::sharpest}, {"first", ImagePreference::first}},
-      "with --bundler: choice among images with similar poses");
+      "with --bundler: image that is kept of several with similar poses");
   bind(command.parameters(), options.points);
 }
 
@@ -376,8 +376,9 @@ void write_folder(const ExtractOptions& options, const libmap::ScanSource& scan,
 
 void extract(ExtractOptions& options, Run& run) {
   if (libmap::has_bag_extension(options.output))
-    throw libmap::Error("a bag requires a map or the folder of a camera rig as input, not a scan",
-                        {.file = options.output});
+    throw libmap::Error(
+        "a scan cannot be written as a bag: give a map or the folder of a camera rig",
+        {.file = options.output});
   const bool images = options.images.wanted();
   const ImageOptions unset;
   if (!images)
@@ -418,7 +419,7 @@ int graspmap_tools::convert_scan(int argc, char** argv) {
       "With a scan: the scan as plain files, for MeshLab (--bundler) or COLMAP (--colmap).");
   command.input("SCAN", options.scan, "RTAB-Map database, or a folder of frames");
   command.output(options.output, "folder for the whole scan; replaced if it exists", false);
-  command.flag("--strict", options.strict, "fail at a broken frame");
+  command.flag("--strict", options.strict, "fail if a frame is broken, instead of leaving it out");
   add_calibration_option(command, options.calibration);
   add_options(command, options.images);
   return command.run(argc, argv, [&](Run& run) { extract(options, run); });

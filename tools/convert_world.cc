@@ -44,7 +44,7 @@ libmap::WorldScores read_scores(const std::string& file, Run& run) {
   const libmap::PointCloud map = read_in_site(file, run);
   const libmap::ScalarField* score = map.find_field("score");
   if (score == nullptr)
-    throw libmap::Error("no such field: is this a map?", {.file = file, .field = "score"});
+    throw libmap::Error("no such field: not a graspability map", {.file = file, .field = "score"});
   scores.points = map.positions;
   for (const double one : score->values) scores.colors.push_back(libmap::score_color(one));
   const auto manifest = libmap::read_manifest_of(file);
@@ -70,7 +70,8 @@ libmap::Pose rig_pose(const std::string& text, const libmap::TriangleMesh& mesh)
   Eigen::Vector3d above = 0.5 * (bounds.min + bounds.max);
   above.z() = bounds.max.z() + 1.0;
   const auto hit = libmap::RayCaster(mesh).cast(above, -Eigen::Vector3d::UnitZ());
-  if (!hit) throw libmap::Error("no ground below the middle of the site", {.field = "--rig-pose"});
+  if (!hit)
+    throw libmap::Error("no ground below the site's middle; set the pose", {.field = "--rig-pose"});
   above.z() += height_m - hit->distance;
   return libmap::make_pose(above, Eigen::Quaterniond::Identity());
 }
@@ -85,7 +86,7 @@ libmap::WorldRig read_world_rig(const WorldCommandOptions& options,
     in_file(file, [&] { libmap::require_world_name(camera.name, "name of a camera"); });
   for (const libmap::RigCamera& camera : rig.rig.cameras)
     if (camera.camera.is_distorted())
-      run.warn("{}: simulators do not know the distortion of its lens", camera.name);
+      run.warn("{}: lens distortion is ignored, because simulators do not support it", camera.name);
   return rig;
 }
 
@@ -162,7 +163,7 @@ void write_world(const WorldCommandOptions& options, Run& run) {
       libmap::write_world(folder, scene);
     });
     if (2 * report.score_points < scores.points.size())
-      throw libmap::Error("is the map of another site",
+      throw libmap::Error("most points of the map are not on the surface: it shows another site",
                           {.file = options.map,
                            .field = "points on the surface",
                            .value = std::to_string(report.score_points),
@@ -189,9 +190,10 @@ int graspmap_tools::convert_world(int argc, char** argv) {
   command.input("SITE", options.site, "mesh of the site (.ply, .obj, .glb ...), or its folder");
   command.output(options.output,
                  "folder OUT.world of SDF (Gazebo, CoppeliaSim), MJCF (MuJoCo) and URDF (Bullet)");
-  command.option("--map", "MAP", options.map, "graspability map of the site, a second visual");
-  command.option("--footholds", "FOOTHOLDS", options.footholds, "footholds of the map as markers");
-  command.option("--rig", "FILE|NAME", options.rig, "depth cameras of a robot as sensors");
+  command.option("--map", "MAP", options.map, "graspability map of the site as a second visual");
+  command.option("--footholds", "FOOTHOLDS", options.footholds,
+                 "footholds of the map to add as markers");
+  command.option("--rig", "FILE|NAME", options.rig, "camera rig of a robot, as depth sensors");
   command.parameters().add(
       "rig_pose", options.rig_pose,
       "pose of the robot's body in the site's frame: X,Y,Z,ROLL,PITCH,YAW in m "

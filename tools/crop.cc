@@ -34,15 +34,16 @@ struct CropCommandOptions {
 };
 
 void bind(libmap::ParameterTable& table, CropCommandOptions& options) {
-  table.add("level", options.level, {{"auto", true}, {"none", false}},
-            "levelling; auto: the ground becomes z = 0; none: the map's z is unchanged");
-  table.add("up", options.up, "up direction: auto, or X,Y,Z in the map");
+  table.add(
+      "level", options.level, {{"auto", true}, {"none", false}},
+      "levelling of the site; auto: the ground becomes z = 0; none: the map's z is unchanged");
+  table.add("up", options.up, "up direction: auto, or X,Y,Z in the input map's frame");
   table.add("frame", options.crop.frame,
             {{"level", libmap::CropFrame::level}, {"map", libmap::CropFrame::map}},
             "frame of --box and --polygon: levelled and rotated, or that of the input map");
   table.add("yaw_deg", options.yaw,
-            "rotation about z, degrees; auto: with --size and --border, sides parallel to x and y, "
-            "else none");
+            "rotation of the site about z, degrees; auto: with --size or --border, such that the "
+            "sides are parallel to x and y, else none");
   bind(table, options.crop);
 }
 
@@ -82,7 +83,7 @@ void read_region(CropCommandOptions& options) {
   if (is_given(options.box) + is_given(options.polygon) + is_given(options.size) +
           (options.border ? 1 : 0) >
       1)
-    throw libmap::Error("several regions are given",
+    throw libmap::Error("only one region can be cropped",
                         {.bound = "one of --box, --polygon, --size and --border"});
   if (!options.box.empty()) {
     crop.region = CropRegion::box;
@@ -110,7 +111,7 @@ void read_region(CropCommandOptions& options) {
   if (options.up != "auto") crop.up = parse_vector(options.up, "--up");
   crop.yaw_deg = parse_number_or("auto", options.yaw, "not an angle", "--yaw", "auto or degrees");
   if (crop.region == CropRegion::whole && !crop.level && !crop.yaw_deg && !crop.center)
-    throw libmap::Error("there is nothing to do: no levelling and no region",
+    throw libmap::Error("without levelling, a region to crop is required",
                         {.field = "--level", .value = "none"});
 }
 
@@ -312,10 +313,10 @@ int main(int argc, char** argv) {
   command.option("--polygon", "FILE.csv", options.polygon,
                  "area to keep: corners in order, columns x, y; convex or not");
   command.option("--size", "WIDTHxHEIGHT", options.size,
-                 "size of the rectangle to keep, m, which is centered in the data");
+                 "size of the rectangle to keep, m; it is centered in the data");
   command.flag("--border", options.border, "keep the area inside a white band on the ground");
   command.option("--border-size", "WIDTHxHEIGHT", options.border_size,
-                 "true size of the area inside the band, m; determines the map's scale");
+                 "true size of the area inside the white band, m; it determines the map's scale");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { crop(options, run); });
 }

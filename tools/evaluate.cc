@@ -26,8 +26,8 @@ struct EvaluateOptions {
 void bind(libmap::ParameterTable& parameters, EvaluateOptions& options) {
   bind(parameters, options.evaluation);
   parameters.add("score", options.scores,
-                 "columns of scores, separated by commas; none: every numeric column that is not "
-                 "an identity, position or length");
+                 "columns to evaluate as scores, separated by commas; none: every numeric column "
+                 "that is not an id, position or length");
   parameters.add("title", options.title, "title of the plot and of the summary");
 }
 
@@ -126,7 +126,8 @@ int main(int argc, char** argv) {
   Command command("evaluate");
   command.former_flag("--hold-model", "not needed: forces need no fit for a gripper");
   command.inputs("TABLE.csv", options.tables,
-                 "labels and scores, one row per location; of several tables, common columns");
+                 "table of labels and scores, one row per location; of several tables, the common "
+                 "columns are evaluated");
   command.output(
       options.folder,
       "folder of roc.csv, rates.csv, accuracy.csv, summary.json, summary.md, roc.png and roc.svg");

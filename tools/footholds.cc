@@ -67,9 +67,10 @@ std::vector<Eigen::Vector3d> positions_on(const libgtd::Ground& ground,
 
 void bind(libmap::ParameterTable& table, FootholdTrialsOptions& options) {
   table.add("gripper", options.gripper,
-            "gripper of the test: scar-e, hubrobo, limbero or a file; default: that of the map");
+            "gripper of the test on --mesh: scar-e, hubrobo, limbero or a gripper file; default: "
+            "that of the map");
   table.add("min_probability", options.min_probability, libmap::zero_to_one,
-            "minimum hold_probability of a foothold");
+            "minimum hold_probability of a foothold in the test on --mesh");
   bind(table, options.grasp);
 }
 

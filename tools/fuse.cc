@@ -109,9 +109,9 @@ bool is_share(const FuseOptions& options) { return libmap::parse_share(options.t
 void claim_poses(const FuseOptions& options, const std::vector<std::string>& inputs, Run& run) {
   if (options.corrected_poses.empty()) return;
   if (!libmap::is_trajectory_path(options.corrected_poses))
-    throw libmap::Error("not a format of poses", {.field = "--corrected-poses",
-                                                  .value = options.corrected_poses,
-                                                  .bound = ".tum, .kitti, .g2o or .toro"});
+    throw libmap::Error("not a pose format", {.field = "--corrected-poses",
+                                              .value = options.corrected_poses,
+                                              .bound = ".tum, .kitti, .g2o or .toro"});
   if (!is_share(options)) run.claim_output(options.corrected_poses, inputs);
 }
 
@@ -227,8 +227,8 @@ void check_registration(const libmap::ScanSource& scan, const FuseOptions& optio
                                            .field = "depth_calibration",
                                            .bound = "a depth camera in scan.yaml (of convert SCAN "
                                                     "-o FOLDER), or --no-color"});
-  run.warn("{}: {}: refine --write-calibration estimates it for --calibration", options.scan,
-           edges.sentence());
+  run.warn("{}: {}; refine --write-calibration estimates the registration for --calibration",
+           options.scan, edges.sentence());
 }
 
 void fuse(FuseOptions options, Run& run) {
@@ -284,7 +284,8 @@ int fuse_scan(int argc, char** argv) {
   command.parameters().add(
       "frame", options.frame,
       {{"poses", CloudFrame::poses}, {"ground-truth", CloudFrame::ground_truth}},
-      "frame of the cloud; ground-truth: by alignment of the poses with the true poses");
+      "frame of the cloud; poses: that of the poses; ground-truth: that of the scan's true poses, "
+      "to which the poses are aligned");
   command.parameters().add("tile_size_m", options.tile_m, libmap::positive,
                            "side of a tile if the output is a folder, m");
   libmap::bind(command.parameters(), options.fusion);

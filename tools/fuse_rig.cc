@@ -30,7 +30,7 @@ void bind(libmap::ParameterTable& table, PanoramaCommandOptions& options) {
   table.add("stamp_s", options.stamp,
             "stamp of the image set, s; fullest: the set with most cameras");
   table.add("tolerance_s", options.tolerance_s, libmap::not_negative,
-            "maximum difference of an image's stamp from that of the set");
+            "maximum difference between the stamps of an image and its set, s");
   table.add("strict", options.strict, "fail if a camera's image is late, missing or broken");
   bind(table, options.panorama);
 }
@@ -45,7 +45,7 @@ std::string absence(const std::string& name, const SynchronizedSet::Camera& came
 void report_absent(const libmap::CameraRig& rig, const SynchronizedSet& set,
                    const PanoramaCommandOptions& options, Run& run) {
   if (set.seen() == 0)
-    throw libmap::Error("no camera has an image at this time",
+    throw libmap::Error("no camera has an image near this time",
                         {.file = options.folder,
                          .field = "--stamp",
                          .value = libmap::to_text(set.stamp_s),
@@ -98,7 +98,7 @@ std::vector<libmap::PanoramaView> read_views(const libmap::CameraRig& rig,
     } catch (const libmap::Error& error) {
       // Only the camera of a broken image is left out.
       if (strict) throw;
-      run.warn(std::string(error.what()) + "; " + camera.name + " is left out");
+      run.warn(std::string(error.what()) + "; camera " + camera.name + " is left out");
       continue;
     }
     run.add_input(image.file);

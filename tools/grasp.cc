@@ -80,7 +80,7 @@ std::vector<std::size_t> rows_of(const libmap::Table& locations,
     const auto found = std::find(names.begin(), names.end(), location);
     if (found == names.end())
       throw libmap::Error(
-          "is not a listed location" + libmap::did_you_mean(location, names),
+          "not a listed location" + libmap::did_you_mean(location, names),
           {.file = locations.file, .field = "--scene-locations", .value = location});
     const auto row = static_cast<std::size_t>(found - names.begin());
     if (std::find(rows.begin(), rows.end(), row) == rows.end()) rows.push_back(row);
@@ -114,7 +114,7 @@ std::string description(const libgtd::LocationResult& result, const libgtd::Tria
 void claim_scenes(const GraspScenesOptions& options, Run& run) {
   if (!options.folder.empty()) return run.claim_output_folder(options.folder);
   if (!options.locations.empty())
-    throw libmap::Error("requires --scenes", {.field = "--scene-locations"});
+    throw libmap::Error("can only be used with --scenes", {.field = "--scene-locations"});
 }
 
 // Returns the scenes to write. Throws Error for a location that is not in the table, two with the
@@ -127,7 +127,7 @@ std::vector<GraspScene> scenes_of(const libmap::Table& locations,
   if (options.locations.empty()) {
     if (names.size() > max_unlisted_scenes)
       throw libmap::Error(
-          "too many locations for one scene each: select some with --scene-locations",
+          "too many scenes, one per location; select locations with --scene-locations",
           {.file = locations.file,
            .field = "locations",
            .value = std::to_string(names.size()),
@@ -188,22 +188,23 @@ struct GraspCommandOptions {
 };
 
 void bind(libmap::ParameterTable& table, GraspCommandOptions& options) {
-  table.add("gripper", options.gripper, "scar-e, hubrobo, limbero, or a gripper file");
+  table.add("gripper", options.gripper,
+            "gripper to test: scar-e, hubrobo, limbero, or a gripper file");
   table.add_overrides("gripper", options.overrides);
   bind(table, options.grasp);
   table.add("surface_error", options.surface_error,
-            "error of the mesh: none; mesh: the field expected_error of its vertices; or a "
-            "standard deviation, m");
+            "error of the mesh that the trials simulate; none; mesh: the vertex field "
+            "expected_error; or a standard deviation, m");
   table.add("sequential", options.sequential,
             {{"auto", SequentialTest::automatic},
              {"on", SequentialTest::on},
              {"off", SequentialTest::off}},
             "end the test of a location as soon as its verdict is certain; auto: with --map");
   table.add("map_draws", options.map_draws, {1, 100000},
-            "with --map: number of draws per pose, instead of 'draws'");
+            "with --map: number of random draws per pose, instead of --draws");
   table.add("more_loads", options.more_loads,
-            "additional loads with their own verdicts, N, separated by commas");
-  table.add("prefix", options.prefix, "prefix of the names of result columns");
+            "additional loads to test, N, separated by commas; each has its own result columns");
+  table.add("prefix", options.prefix, "prefix added to the names of the result columns");
 }
 
 // Hash of all that affects the results, except mesh, locations and seed.
@@ -255,7 +256,7 @@ libgtd::Ground ground_of(const libmap::TriangleMesh& mesh, const GraspCommandOpt
       return libgtd::Ground(mesh, libgtd::errors_of(mesh, bounds));
     const auto error_m = libmap::parse_double(options.surface_error);
     if (!error_m || !(*error_m >= 0.0 && *error_m <= bounds.max_error_m))
-      throw libmap::Error("is not an error of a surface",
+      throw libmap::Error("not an error of a surface",
                           {.field = "--surface-error",
                            .value = options.surface_error,
                            .bound = "none, mesh, or 0 to --max-surface-error, m"});
@@ -319,8 +320,7 @@ void grasp_places(GraspCommandOptions& options, Run& run) {
   for (const std::string& text : libmap::split_list(options.more_loads)) {
     const auto load = libmap::parse_double(text);
     if (!load || !(*load > 0.0))
-      throw libmap::Error("is not a load",
-                          {.field = "--more-loads", .value = text, .bound = "> 0"});
+      throw libmap::Error("not a load", {.field = "--more-loads", .value = text, .bound = "> 0"});
     options.grasp.extra_loads_n.push_back(*load);
   }
   claim_scenes(options.scenes, run);
@@ -328,7 +328,7 @@ void grasp_places(GraspCommandOptions& options, Run& run) {
   const FieldTest test(options, options.points, run);
   libmap::Table table = libmap::read_csv(options.points);
   const std::vector<Eigen::Vector3d> locations = positions_of(table);
-  if (locations.empty()) throw libmap::Error("no locations", {.file = options.points});
+  if (locations.empty()) throw libmap::Error("contains no locations", {.file = options.points});
   const auto scenes = scenes_of(table, options.scenes);
   options.grasp.check();
   std::vector<libgtd::LocationResult> results;
@@ -424,7 +424,7 @@ void fit_gripper(const GraspCommandOptions& options, Run& run) {
 void plan_next_pulls(const GraspCommandOptions& options, Run& run) {
   const auto count = libmap::parse_integer(options.plan);
   if (!count || *count < 1)
-    throw libmap::Error("is not a number of pulls",
+    throw libmap::Error("not a number of pull tests",
                         {.field = "--plan", .value = options.plan, .bound = ">= 1"});
   const FieldTest test(options, options.points, run);
   const libmap::Table table = libmap::read_csv(options.points);
@@ -434,7 +434,7 @@ void plan_next_pulls(const GraspCommandOptions& options, Run& run) {
                               static_cast<std::size_t>(*count), pull_options(options),
                               run.progress());
   });
-  if (plans.empty()) throw libmap::Error("no pull is informative", {.file = options.points});
+  if (plans.empty()) throw libmap::Error("no pull test is informative", {.file = options.points});
   libmap::Table planned;
   planned.columns = {"place",    "x",           "y",      "z",
                      "tilt_deg", "azimuth_deg", "load_n", "information_bits"};
@@ -489,19 +489,19 @@ int main(int argc, char** argv) {
       "with --points: CSV of the locations with the results of their trials; with --map: the map "
       "with added fields (.pcd, .ply, .vtp, .csv), or a tile store (.tiles); with --fit: a "
       "gripper file (.yaml) with the fitted ensemble; with --plan: CSV of pulls");
-  command.option("--fit", "PULLS.csv", options.pulls,
-                 "pull tests for fitting the gripper's parameters: x, y, z or ground = level, "
-                 "tilt_deg, azimuth_deg, and force_n at slip, or load_n and held (0 or 1)");
+  command.option(
+      "--fit", "PULLS.csv", options.pulls,
+      "table of pull tests to which the gripper's parameters are fitted: x, y, z or ground = "
+      "level, tilt_deg, azimuth_deg, and force_n at slip, or load_n and held (0 or 1)");
   command.option("--plan", "N", options.plan,
-                 "with --points: number of pulls to plan, those with most information about the "
-                 "parameters");
+                 "with --points: number of most informative pull tests to plan");
   command.option("--tile", "K/N", options.tile,
                  "with --map: test only share K of N of the tiles, into a tile store");
   command.option("--scenes", "FOLDER", options.scenes.folder,
-                 "folder for scenes of one trial per location, with nearly the median force: "
-                 "FOLDER/PLACE.ply, by the column 'place' or the row");
+                 "output folder for one mesh per location that shows the trial nearest to the "
+                 "median force: FOLDER/PLACE.ply, named by the column 'place' or the row");
   command.option("--scene-locations", "LOCATIONS", options.scenes.locations,
-                 "locations of the scenes; default: all");
+                 "locations for which --scenes writes a scene; default: all");
   command.renamed_flag("--scene-of", "--scene-locations");
   for (const char* key : {"friction", "asperity-min", "asperity-max", "engagement-rate", "drag"}) {
     std::string name = key;

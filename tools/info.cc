@@ -272,7 +272,7 @@ Json content_json(const InfoOptions& options, Run& run, Faults& faults) {
     return std::move(scan.json);
   }
   if (options.verify)
-    throw libmap::Error("requires a scan or a tile store",
+    throw libmap::Error("can only be used for a scan or a tile store",
                         {.file = options.file, .field = "--verify"});
   if (is_bag) return bag_json(options.file);
   return libmap::file_kind(options.file) == libmap::FileKind::mesh ? mesh_json(options)
@@ -321,7 +321,7 @@ int main(int argc, char** argv) {
   InfoOptions options;
   Command command("info");
   command.input("FILE", options.file,
-                "scan, camera (.yaml), cloud, mesh, map, tile store (.tiles) or bag of ROS");
+                "scan, camera (.yaml), cloud, mesh, map, tile store (.tiles) or ROS bag");
   command.flag("--json", options.json, "print the description as JSON");
   command.flag("--verify", options.verify,
                "read the whole content of a scan or a tile store and list broken parts");

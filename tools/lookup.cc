@@ -33,7 +33,7 @@ void bind(libmap::ParameterTable& table, LookupCommandOptions& options) {
             "columns to add, separated by commas: NAME=FIELD, or NAME=FIELD>=VALUE for 1 or 0; "
             "none: found, distance_m and every field of the map");
   table.add("visible_radius_m", options.visible_radius_m, libmap::positive,
-            "with --visible: maximum distance of the nearest measured point, m");
+            "with --visible: maximum distance of a location from the nearest measured point, m");
 }
 
 // Appends a column, with the prefix map_ if the points already have one of this name.
@@ -65,7 +65,7 @@ std::vector<AddedColumn> parse_columns(const std::string& text) {
     if (column.name.empty() || column.name.ends_with('>') || column.field.empty() ||
         (comparison != std::string_view::npos && !column.cutoff))
       throw libmap::Error(
-          "is not a column",
+          "not a definition of a column",
           {.field = "--column", .value = part, .bound = "NAME=FIELD or NAME=FIELD>=VALUE"});
     columns.push_back(std::move(column));
   }
@@ -222,11 +222,12 @@ int main(int argc, char** argv) {
   LookupCommandOptions options;
   Command command("lookup");
   command.input("MAP", options.map, "graspability map, or a tile store (.tiles)");
-  command.input("POINTS", options.points, "CSV with the columns x, y, z in meters, and any others");
+  command.input("POINTS", options.points,
+                "table of locations: CSV with the columns x, y, z in meters, and any others");
   command.output(options.output, "CSV of the points with the map's values");
   command.option("--visible", "CLOUD", options.visible,
-                 "measured cloud in the frame of the scored cloud (usually the scored cloud); "
-                 "locations without a near point of it get no values");
+                 "measured cloud in the frame of the scored cloud (usually the scored cloud "
+                 "itself); locations far from all its points get no values");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { lookup(options, run); });
 }

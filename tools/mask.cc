@@ -30,17 +30,19 @@ struct MaskOptions {
 // Options of sections only.
 void bind_sections(libmap::ParameterTable& table, MaskOptions& options) {
   table.add("section_layer", options.section_layer, {0, 1e6},
-            "layer of the lower horizontal section; 0 is the lowest");
-  table.add("cell_width_px", options.cell_width_px, {64, 5000}, "width of a section's image");
+            "layer of the mask shown by the lower horizontal section; 0: the lowest layer");
+  table.add("cell_width_px", options.cell_width_px, {64, 5000}, "image width of a section, pixels");
 }
 
 void bind(libmap::ParameterTable& table, MaskOptions& options) {
-  table.add("gripper", options.gripper, "scar-e, hubrobo, limbero, or a gripper file");
+  table.add("gripper", options.gripper,
+            "gripper of the mask: scar-e, hubrobo, limbero, or a gripper file");
   table.add_overrides("gripper", options.overrides);
-  table.add("method", options.mask.method, libgtd::method_names(), "design of the mask");
-  table.add("voxel_size_m", options.mask.voxel_size_m, libmap::positive, "edge length of a voxel");
+  table.add("method", options.mask.method, libgtd::method_names(),
+            "scoring method for which the mask is designed");
+  table.add("voxel_size_m", options.mask.voxel_size_m, libmap::positive, "edge of a voxel, m");
   table.add("extra_void_layers", options.mask.extra_void_layers, {0, 10000},
-            "number of void layers on top (H_add)");
+            "number of void layers added on top of the mask (H_add)");
   table.add("view", options.view, libmap::viewpoint_names(), "viewpoint of the image");
   table.add("sections", options.sections, "draw three sections of the mask instead of a view");
   bind_sections(table, options);
@@ -238,7 +240,7 @@ void mask(const MaskOptions& options, Run& run) {
     throw libmap::Error("sections are drawn as .png", {.file = options.output});
   if (!options.sections) reject_changed(options, bind_sections, "requires --sections");
   if (options.view != MaskOptions{}.view && (options.sections || extension != ".png"))
-    throw libmap::Error("requires an image (.png) without --sections", {.field = "--view"});
+    throw libmap::Error("applies only to an image (.png) without --sections", {.field = "--view"});
   run.claim_output(options.output);
   const auto file = libmap::find_data_file("grippers", options.gripper);
   const libgtd::Gripper gripper = libgtd::read_gripper(file, options.overrides);

@@ -41,13 +41,13 @@ struct MeshOptions {
 };
 
 void bind(libmap::ParameterTable& table, MeshOptions& options) {
-  table.add("normals", options.normals,
-            {{"auto", NormalSource::automatic},
-             {"cloud", NormalSource::cloud},
-             {"estimate", NormalSource::estimate}},
-            "source of normals; auto: the cloud's, estimated if it has none, oriented if neighbors "
-            "face opposite sides; cloud: as stored, an error if it has none; estimate: always "
-            "estimated");
+  table.add(
+      "normals", options.normals,
+      {{"auto", NormalSource::automatic},
+       {"cloud", NormalSource::cloud},
+       {"estimate", NormalSource::estimate}},
+      "source of normals; auto: the cloud's, estimated if it has none, reoriented if neighbors "
+      "face opposite sides; cloud: the cloud's, unchanged; estimate: always estimated");
   libmap::bind(table, options.estimation);
   libmap::bind(table, options.surface.reconstruction);
   libmap::bind(table, options.surface.cleaning);
@@ -86,7 +86,7 @@ void prepare_normals(const MeshOptions& options, libmap::PointCloud& cloud, Run&
       [](const Eigen::Vector3f& normal) { return normal.allFinite() && !normal.isZero(0.0F); });
   if (options.normals != NormalSource::estimate && cloud.has_normals()) {
     if (has_any) return orient_if_mixed(options, cloud, run);
-    throw libmap::Error("use --normals estimate",
+    throw libmap::Error("the stored normals cannot be used; use --normals estimate",
                         {.file = options.cloud, .field = "normals", .value = "all zero or NaN"});
   }
   if (options.normals == NormalSource::cloud)
@@ -306,7 +306,7 @@ void make_tiles(const MeshOptions& options, TileFolder& output, Run& run) {
 
 void mesh_in_tiles(const MeshOptions& options, Run& run) {
   if (options.report || options.json)
-    throw libmap::Error("requires one mesh as output, not a folder of tiles",
+    throw libmap::Error("can only be used if the output is one mesh, not a folder of tiles",
                         {.field = options.json ? "--json" : "--report"});
   if (options.normals == NormalSource::estimate)
     throw libmap::Error("cannot be used with tiles, because orientation needs the whole cloud",
@@ -331,7 +331,7 @@ int main(int argc, char** argv) {
                  std::string("mesh (.ply, .vtp, .obj, .stl, .off, .glb)") + or_tile_folder);
   add_share_option(command, options.tile);
   command.flag("--report", options.report,
-               "print properties of the surface, and the distances of the points from it");
+               "print properties of the surface and the distances of the points from it");
   command.flag("--json", options.json, "print the report as JSON");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) {

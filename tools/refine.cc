@@ -207,7 +207,7 @@ void claim_database(const RefineOptions& options, Run& run) {
   const std::string& first = options.scans.front();
   const bool is_file = options.scans.size() == 1 && fs::is_regular_file(first);
   if (!is_file && fs::exists(first))
-    throw libmap::Error("requires a single database as SCAN",
+    throw libmap::Error("can only be used if SCAN is a single database",
                         {.field = "--write-database",
                          .value = options.database,
                          .bound = "omitted for a folder or several scans"});
@@ -286,7 +286,7 @@ int main(int argc, char** argv) {
                  "scan: an RTAB-Map database, or a folder of images; several scans of overlapping "
                  "ground, or a folder of databases, are joined");
   command.output(options.output, "poses (.tum, .kitti, .g2o, .toro, or a folder .colmap)");
-  command.option("--links", "LINKS.g2o", options.links, "output for poses and links as a graph");
+  command.option("--links", "LINKS.g2o", options.links, "output for poses and links, a pose graph");
   command.option(
       "--write-database", "OUT.db", options.database,
       "output for a copy of the database with refined poses, found links, and corrected camera "
@@ -295,19 +295,19 @@ int main(int argc, char** argv) {
   command.option("--write-calibration", "OUT.yaml", options.new_calibration,
                  "output for the estimated camera, for --calibration of other commands and scans");
   command.option("--known-length", "NODE:X:Y-NODE:X:Y=METERS", options.known_lengths,
-                 "measured distance between two points, given as pixels of images; repeatable; "
-                 "determines the scale");
+                 "measured distance between two points, each given by node and pixel of its image; "
+                 "repeatable; it determines the scale");
   command.option("--board", "COLUMNSxROWS:METERS", options.board,
-                 "numbers of inner corners and side of a square of a static chessboard in the "
-                 "scene; determines the scale");
+                 "numbers of inner corners and square side of a static chessboard in the scene; it "
+                 "determines the scale");
   command.option("--report", "FILE.json|FILE.txt", options.reports,
-                 "output for a report on each stage and the deviations of the poses");
+                 "output for a report on each stage and the standard deviations of the poses");
   command.option("--feature-cache", "FOLDER|off", options.feature_cache,
-                 "folder for features of frames for later runs; default: OUTPUT.features");
-  command.flag("--nodes", options.nodes, "write the node's id as a ninth column of .tum");
+                 "folder of frames' features, reused by later runs; default: OUTPUT.features");
+  command.flag("--nodes", options.nodes, "add the node id as a ninth column of a .tum output");
   libmap::bind(command.parameters(), options.refinement);
   command.parameters().add("strict", options.strict,
-                           "fail for missing parts of the scan's file instead of a warning");
+                           "fail if parts of the scan are missing, instead of warning");
   return command.run(argc, argv, [&](Run& run) {
     for (const std::string& text : options.known_lengths)
       options.refinement.known_lengths.push_back(libmap::parse_known_length(text));

@@ -52,11 +52,11 @@ libmap::Verdict verdict_of(const libmap::Table& table, std::size_t row, std::siz
   if (libmap::trim(cell).empty()) return libmap::Verdict::none;
   const auto verdict = libmap::parse_bool(cell);
   if (!verdict)
-    throw libmap::Error("is not a verdict", {.file = table.file,
-                                             .field = "row " + std::to_string(row + 1) +
-                                                      ", column '" + table.columns[column] + "'",
-                                             .value = "'" + cell + "'",
-                                             .bound = "1, 0 or empty"});
+    throw libmap::Error("not a verdict", {.file = table.file,
+                                          .field = "row " + std::to_string(row + 1) + ", column '" +
+                                                   table.columns[column] + "'",
+                                          .value = "'" + cell + "'",
+                                          .bound = "1, 0 or empty"});
   return *verdict ? libmap::Verdict::pass : libmap::Verdict::fail;
 }
 
@@ -178,7 +178,7 @@ MapWindow read_window(const MapTiles& tiles, const std::optional<Eigen::AlignedB
       parts[n] = libgtd::downsample_map(parts[n], window.columns_per_point);
   });
   if (!parts.empty()) window.cloud = libgtd::merge_map_clouds(parts);
-  if (window.cloud.empty()) throw libmap::Error("contains no part of the map", {.field = "--box"});
+  if (window.cloud.empty()) throw libmap::Error("no part of the map is in it", {.field = "--box"});
   if (window.columns_per_point > 1) {
     window.cloud = libgtd::downsample_map(window.cloud, window.columns_per_point);
     libgtd::snap_to_squares(tiles.index(), window.columns_per_point, window.cloud);
@@ -220,7 +220,7 @@ SceneFile scene_of(const std::string& file, const SceneFileOptions& options, Run
   if (auto* cloud = std::get_if<libmap::PointCloud>(&layer.shape); box && cloud != nullptr)
     *cloud = points_in_box(*cloud, *box);
   else if (box)
-    throw libmap::Error("requires a cloud or a map", {.file = file, .field = "--box"});
+    throw libmap::Error("can only be used for a cloud or a map", {.file = file, .field = "--box"});
   if (const auto* cloud = std::get_if<libmap::PointCloud>(&layer.shape);
       cloud != nullptr && cloud->empty())
     throw libmap::Error("there is nothing to draw: no point with finite coordinates",
@@ -252,13 +252,13 @@ SceneFile scene_of(const std::string& file, const SceneFileOptions& options, Run
 // Options of marked locations only.
 void bind_points(libmap::ParameterTable& table, SceneFileOptions& options) {
   table.add("label", options.label,
-            "column of the marked points' names; auto: the first column, unless it is x, y or z; "
-            "none: no names");
+            "column of the marked locations' names; auto: the first column, unless it is x, y or "
+            "z; none: no names");
   table.add("verdict", options.verdict,
-            "column of the marked points' verdicts: 1 green, 0 red, empty neutral");
+            "column of the marked locations' verdicts: 1 green, 0 red, empty neutral");
   table.add("points_frame", options.points_frame, listed_point_frame_names(),
-            "frame of the marked points: input: the scored cloud; terrain; map: the map before it "
-            "was cropped; auto: by their manifest, else input");
+            "frame of the marked locations; input: of the scored cloud; terrain; map: of the map "
+            "before it was cropped; auto: by their manifest, else input");
 }
 
 // Binds all options except `points`, which is a separate option.
@@ -267,15 +267,15 @@ void bind(libmap::ParameterTable& table, SceneFileOptions& options) {
   table.add(
       "zero_plane", options.zero_plane,
       "height in the terrain frame below which ground is white, m; auto: the map's own, none");
-  table.add("box", options.box, "rectangle of a cloud or map to show: X0,Y0,X1,Y1 in its frame, m");
+  table.add("box", options.box, "shown rectangle of a cloud or map: X0,Y0,X1,Y1 in its frame, m");
   table.add("max_points", options.max_points, libmap::Range{1'000.0, 1e9},
-            "approximate number of points to which larger parts of a tile store are downsampled");
+            "approximate maximum number of drawn points of a tile store; more are downsampled");
   bind_points(table, options);
   table.add("heading", options.heading,
             {{"auto", MapHeading::automatic},
              {"terrain", MapHeading::terrain},
              {"input", MapHeading::input}},
-            "horizontal frame of a map: the terrain frame, or the x and y of its input");
+            "horizontal axes of a map's image: those of the terrain frame, or of the map's input");
 }
 
 // Reads a cloud, mesh, graspability map or tile store. Throws Error naming the file.
@@ -310,15 +310,16 @@ struct RenderOptions {
 // Options of an image of one file.
 void bind_one(libmap::ParameterTable& table, RenderOptions& options) {
   libmap::bind_single(table, options.view);
-  table.add("camera_position", options.camera_position, "position X,Y,Z for view: camera");
-  table.add("camera_target", options.camera_target, "target X,Y,Z for view: camera");
+  table.add("camera_position", options.camera_position,
+            "camera position X,Y,Z for --view camera, m");
+  table.add("camera_target", options.camera_target, "camera target X,Y,Z for --view camera, m");
 }
 
 // Options of a page of several files.
 void bind_page(libmap::ParameterTable& table, RenderOptions& options) {
   libmap::ImageGridOptions& sheet = options.sheet;
   table.add("columns", sheet.columns, libmap::Range{0, 1000},
-            "for several files: number of columns of cells; 0: for an approximately square page");
+            "for several files: number of columns; 0: for an approximately square sheet");
   table.add("cell_width_px", sheet.cell_width_px, libmap::Range{16, 16384},
             "for several files: width of a cell, pixels");
   table.add("cell_height_px", sheet.cell_height_px, libmap::Range{0, 16384},
@@ -332,7 +333,7 @@ void bind_page(libmap::ParameterTable& table, RenderOptions& options) {
             "for several files: titles of the rows, separated by |");
   table.add("shared_view", sheet.shared_view,
             {{"sheet", libmap::SharedView::sheet}, {"row", libmap::SharedView::row}},
-            "for several files: maps with common scale and extent: all, or those of a row");
+            "for several files: maps with common scale and extent: all, or those of each row");
 }
 
 void bind(libmap::ParameterTable& table, RenderOptions& options) {
@@ -393,8 +394,8 @@ std::vector<libmap::SheetCell> read_cells(const RenderOptions& options, Run& run
 
 libmap::ColorImage draw_several(RenderOptions& options, Run& run) {
   if (options.view.view == libmap::Viewpoint::camera)
-    throw libmap::Error("requires a single file", {.field = "--view", .value = "camera"});
-  reject_changed(options, bind_one, "requires a single file");
+    throw libmap::Error("applies only to a single file", {.field = "--view", .value = "camera"});
+  reject_changed(options, bind_one, "applies only to a single file");
   // Maps of one cloud have the same orientation in the image.
   if (options.scene.heading == MapHeading::automatic) options.scene.heading = MapHeading::input;
   options.sheet.column_titles = split_texts(options.column_titles);

@@ -39,8 +39,8 @@ void bind(libmap::ParameterTable& table, ReportCommandOptions& options) {
   table.add("max_size_mb", options.max_size_mb, libmap::Range{1.0, 1000.0},
             "maximum size of the file, MB; images and maps are reduced until they fit");
   table.add("max_cells", options.max_cells, libmap::Range{100.0, 10'000'000.0},
-            "maximum number of cells in a map's 3-D view; cubes of voxels of larger maps become "
-            "one cell");
+            "maximum number of cells in a map's 3-D view; in larger maps, cubes of voxels are "
+            "merged into one cell");
 }
 
 // Bytes per cell in the page: at most eleven, in base64.
@@ -231,9 +231,10 @@ int main(int argc, char** argv) {
   command.input("DIR", options.folder, "folder of the run");
   command.output(options.output, "report (.html); default: report.html in DIR", false);
   command.option("--outline", "OUTLINE", options.outline,
-                 "removed: a report shows the content of DIR in the order of the names");
+                 "removed option; a report shows the content of DIR in the order of the names");
   command.flag("--no-3d", options.no_views, "omit the 3-D views");
-  command.option("--three", "FOLDER", options.three, "folder of three.js");
+  command.option("--three", "FOLDER", options.three,
+                 "folder that contains three.js, for the 3-D views");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { make_report(options, run); });
 }

@@ -33,7 +33,7 @@ void tell_results(const libmap::PoissonDiskResult& result, std::uint64_t wanted,
 
 void require_one_of_radius_and_count(const libmap::PoissonDiskOptions& sampling) {
   if (sampling.count > 0 && sampling.radius_m != libmap::PoissonDiskOptions().radius_m)
-    throw libmap::Error("cannot be combined with --radius, which determines the number of samples",
+    throw libmap::Error("a number of samples cannot be combined with --radius, which determines it",
                         {.field = "count", .value = std::to_string(sampling.count)});
 }
 

@@ -72,7 +72,7 @@ void refuse_mesh(const std::string& terrain) {
   if (format == ".obj" || format == ".stl" || format == ".off" || format == ".glb" ||
       (format == ".ply" && libmap::read_cloud_info(first).faces > 0))
     throw libmap::Error(
-        "is a mesh: sample its surface by `graspmap resample MESH --radius M -o CLOUD.pcd`",
+        "is a mesh; sample its surface first with `graspmap resample MESH --radius M -o CLOUD.pcd`",
         {.file = first.string()});
 }
 
@@ -336,8 +336,9 @@ struct ScoreOptions {
 
 void bind(libmap::ParameterTable& table, ScoreOptions& options) {
   bind(table, options.detection);
-  table.add("up", options.up,
-            "up direction, on the outer side of the plane: auto, or X,Y,Z in the cloud's frame");
+  table.add(
+      "up", options.up,
+      "direction toward the outer side of the fitted plane: auto, or X,Y,Z in the cloud's frame");
   table.add("frame", options.frame, libgtd::map_frame_names(), "frame of the map's points");
 }
 
@@ -421,9 +422,10 @@ void score(ScoreOptions& options, Run& run) {
     return;
   }
   if (options.append)
-    throw libmap::Error("requires a tile store, MAP.tiles", {.field = "--append"});
+    throw libmap::Error("requires a tile store as output, MAP.tiles", {.field = "--append"});
   if (options.max_points_in_memory != ScoreOptions{}.max_points_in_memory)
-    throw libmap::Error("requires a tile store, MAP.tiles", {.field = "--max-points-in-memory"});
+    throw libmap::Error("requires a tile store as output, MAP.tiles",
+                        {.field = "--max-points-in-memory"});
   libmap::require_cloud_format(options.output);
   run.claim_output(options.output, {options.terrain});
   const libmap::TilesReadResult read =
@@ -460,8 +462,8 @@ int main(int argc, char** argv) {
   command.option("--tile", "K/N", options.tile,
                  "score only share K of N of the tiles; `graspmap convert` merges the shares");
   command.option("--max-points-in-memory", "N", options.max_points_in_memory,
-                 "for a tile store: maximum number of points in memory, about 250 bytes each; the "
-                 "map does not depend on it");
+                 "for a tile store: maximum number of points in memory (about 250 bytes each); the "
+                 "map does not depend on this number");
   command.renamed_flag("--points-at-once", "--max-points-in-memory");
   command.flag("--append", options.append,
                "score the tiles affected by files that were added to the terrain's folder");

@@ -32,16 +32,18 @@ struct SimulateCamerasOptions {
 
 void bind(libmap::ParameterTable& table, SimulateCamerasOptions& options) {
   using libmap::any_number;
-  table.add("rig", options.rig, "robot of the toolkit, or a rig file (.yaml)");
+  table.add("rig", options.rig, "camera rig: a robot of the toolkit, or a rig file (.yaml)");
   table.add("depth_scale_m", options.depth_scale_m, libmap::not_negative,
-            "meters per unit of the images; 0: as in the rig file");
+            "meters per unit of the written depth images; 0: as in the rig file");
   table.add("x_m", options.x_m, any_number, "x of the robot's body in the mesh's frame, m");
   table.add("y_m", options.y_m, any_number, "y of the robot's body in the mesh's frame, m");
-  table.add("z_m", options.z_m, any_number, "height of the body above the ground, m");
-  table.add("absolute_z", options.absolute_z, "z is in the mesh's frame, not above the ground");
-  table.add("roll_deg", options.roll_deg, any_number, "rotation of the body about its x axis");
-  table.add("pitch_deg", options.pitch_deg, any_number, "rotation about y; positive: nose down");
-  table.add("yaw_deg", options.yaw_deg, any_number, "rotation of the body about z");
+  table.add("z_m", options.z_m, any_number, "height of the robot's body above the ground, m");
+  table.add("absolute_z", options.absolute_z,
+            "measure z in the mesh's frame, not above the ground");
+  table.add("roll_deg", options.roll_deg, any_number, "rotation of the body about x, degrees");
+  table.add("pitch_deg", options.pitch_deg, any_number,
+            "rotation of the body about y, degrees; positive: nose down");
+  table.add("yaw_deg", options.yaw_deg, any_number, "rotation of the body about z, degrees");
   bind(table, options.cameras);
 }
 

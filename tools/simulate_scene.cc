@@ -26,13 +26,13 @@ using libmap::not_negative;
 using libmap::positive;
 
 void bind_cloud(libmap::ParameterTable& table, SimulateOptions& options) {
-  table.add("spacing_m", options.sampling.spacing_m, positive, "mean distance of the samples, m");
+  table.add("spacing_m", options.sampling.spacing_m, positive, "mean distance between samples, m");
   table.add("count", options.sampling.count, not_negative,
-            "number of samples (within 2 %) instead of a spacing; 0: by spacing");
+            "number of samples (within 2 %), instead of a spacing; 0: by spacing");
   table.add("jitter", options.sampling.jitter, libmap::zero_to_one,
-            "random offset of samples from their grid: 0 none, 1 a whole cell");
+            "random offset of the samples from their grid, as a share of a cell");
   table.add("noise_m", options.sampling.noise_m, not_negative,
-            "standard deviation of the noise along the normal, m");
+            "standard deviation of the samples' noise along the surface normal, m");
   table.add("seed", options.sampling.seed, not_negative, "random seed of jitter and noise");
 }
 

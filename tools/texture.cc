@@ -49,15 +49,16 @@ void bind(libmap::ParameterTable& table, TextureCommandOptions& options) {
             {{"auto", MeshFrame::automatic},
              {"poses", MeshFrame::poses},
              {"ground-truth", MeshFrame::ground_truth}},
-            "frame of the mesh; ground-truth: poses are aligned with the true ones; auto: by the "
-            "mesh's manifest, else poses");
+            "frame of the mesh; poses: that of the poses; ground-truth: that of the scan's true "
+            "poses, to which the poses are aligned; auto: by the mesh's manifest, else poses");
   libmap::bind(table, options.texture);
   table.add("margin_m", options.margin_m, libmap::not_negative,
-            "for an output folder: maximum distance of occluding parts from a tile, m");
+            "for an output folder: maximum distance of occluding surfaces from a tile, m");
   table.add("image_format", options.writing.image_format,
             {{"png", libmap::ImageFormat::png}, {"jpeg", libmap::ImageFormat::jpeg}},
             "image format of the texture's pages");
-  table.add("jpeg_quality", options.writing.jpeg_quality, {1.0, 100.0}, "JPEG quality of pages");
+  table.add("jpeg_quality", options.writing.jpeg_quality, {1.0, 100.0},
+            "JPEG quality of texture pages");
 }
 
 bool in_true_frame(const TextureCommandOptions& options) {

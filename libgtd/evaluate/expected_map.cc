@@ -37,14 +37,14 @@ double distance(const ExpectedRegion& a, const ExpectedRegion& b) {
 }
 
 void check_region(const ExpectedRegion& region) {
-  if (region.name.empty()) throw libmap::Error("a region without a name", {.field = "region"});
+  if (region.name.empty()) throw libmap::Error("every region needs a name", {.field = "region"});
   const std::string field = "region '" + region.name + "'";
   if (!(region.radius_m > 0.0) || !std::isfinite(region.radius_m))
     throw libmap::Error(
         "out of range",
         {.field = field + ", radius", .value = libmap::to_text(region.radius_m), .bound = "> 0"});
   if (!region.from.allFinite() || !region.to.allFinite())
-    throw libmap::Error("not finite", {.field = field, .bound = "finite coordinates"});
+    throw libmap::Error("is not finite", {.field = field, .bound = "finite coordinates"});
 }
 
 void check_columns(const libmap::Table& table) {
@@ -55,7 +55,7 @@ void check_columns(const libmap::Table& table) {
       throw libmap::Error("unknown column" + libmap::did_you_mean(column, known),
                           {.file = table.file, .field = column});
     if (!seen.insert(column).second)
-      throw libmap::Error("is a duplicate", {.file = table.file, .field = column});
+      throw libmap::Error("occurs more than once", {.file = table.file, .field = column});
   }
 }
 
@@ -77,7 +77,7 @@ Eigen::Vector3d read_to(const libmap::Table& table, std::size_t row, const Eigen
     ++given;
   }
   if (given != 0 && given != 3)
-    throw libmap::Error("incomplete end of a segment",
+    throw libmap::Error("the end of the segment is incomplete",
                         {.file = table.file,
                          .field = "row " + std::to_string(row + 1) + ", columns to_x, to_y, to_z",
                          .bound = "all three, or none for a ball"});
@@ -138,17 +138,17 @@ void ExpectedMap::check() const {
     const ExpectedRegion& region = regions[i];
     check_region(region);
     if (!names.insert(region.name).second)
-      throw libmap::Error("is a duplicate", {.field = "region '" + region.name + "'"});
+      throw libmap::Error("occurs more than once", {.field = "region '" + region.name + "'"});
     any = any || region.graspable.has_value();
     for (std::size_t j = 0; j < i; ++j) {
       const ExpectedRegion& other = regions[j];
       if (!region.graspable || !other.graspable || *region.graspable == *other.graspable) continue;
       if (distance(region, other) <= region.radius_m + other.radius_m)
-        throw libmap::Error("overlap, but only one of them is expected to be graspable",
+        throw libmap::Error("overlap, but only one is expected to be graspable: shrink or move one",
                             {.field = "regions '" + other.name + "' and '" + region.name + "'"});
     }
   }
-  if (!any) throw libmap::Error("no region with a verdict");
+  if (!any) throw libmap::Error("no region has a verdict on being graspable");
 }
 
 ExpectedMap parse_expected_map(const libmap::Table& table) {

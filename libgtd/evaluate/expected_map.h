@@ -1,5 +1,5 @@
-// Compares a map with regions whose graspability is expected by reasoning instead of a field test.
-// Every voxel in a region counts.
+// Evaluates a map against regions whose graspability is known by reasoning, such as "the top of a
+// ball can be held", instead of a field test. Every voxel in a region counts.
 #pragma once
 
 #include <Eigen/Core>
@@ -21,8 +21,8 @@ struct ExpectedRegion {
   Eigen::Vector3d from = Eigen::Vector3d::Zero();  // meters
   Eigen::Vector3d to = Eigen::Vector3d::Zero();
   double radius_m = 0.0;
-  std::optional<bool> graspable;  // nullopt: undecided
-  std::string why;
+  std::optional<bool> graspable;  // expectation; nullopt: undecided
+  std::string why;                // reason of the expectation
 
   // Returns true if the point is at most radius_m from the segment.
   bool contains(const Eigen::Vector3d& point) const;
@@ -43,11 +43,11 @@ struct ExpectedMap {
 // column.
 ExpectedMap parse_expected_map(const libmap::Table& table);
 
-// Transforms the regions into the frame of a map.
+// Returns the regions in the frame of a map.
 ExpectedMap transformed(const ExpectedMap& expected, const libmap::Pose& map_from_expected);
 
 struct RegionResult {
-  std::size_t voxels = 0;            // in the region; if decided, not in any undecided region
+  std::size_t voxels = 0;            // in the region and, if it is decided, in no undecided region
   std::size_t reached = 0;           // voxels whose score reaches the cutoff
   std::size_t graspable = 0;         // voxels with the flag of the map
   std::optional<double> mean_score;  // nullopt without voxels
@@ -64,10 +64,10 @@ struct ExpectedMapResult {
   // border. A voxel is predicted graspable if its score reaches the cutoff (voxels_by_score), or if
   // it has the flag of the map and is no obstacle (voxels_by_flag). A voxel in several regions
   // counts once. Neighboring voxels are not independent, so that Wilson intervals of voxel rates
-  // are too narrow; those of places are valid.
+  // are too narrow; those of regions are valid.
   Confusion voxels_by_score;
   std::optional<Confusion> voxels_by_flag;  // nullopt if the map has no field "graspable"
-  Confusion region_confusion;               // one place per region with voxels
+  Confusion region_confusion;               // each region with voxels counts once
   std::optional<AreaUnderCurve> area;       // by voxel scores; nullopt unless both classes exist
 };
 

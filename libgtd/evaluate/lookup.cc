@@ -278,11 +278,12 @@ std::vector<std::pair<std::string, LookupMode>> lookup_mode_names() {
 }
 
 void bind(libmap::ParameterTable& table, LookupOptions& options) {
-  table.add("mode", options.mode, lookup_mode_names(),
-            "map points to use: the closest, the best or all within the radius");
-  table.add("radius_m", options.radius_m, libmap::positive, "radius for maximum and mean, m");
+  table.add(
+      "mode", options.mode, lookup_mode_names(),
+      "map points used for a location: the closest, the best within a radius, or all within it");
+  table.add("radius_m", options.radius_m, libmap::positive, "radius of modes maximum and mean, m");
   table.add("max_distance_m", options.max_distance_m, libmap::positive,
-            "maximum distance for nearest, m");
+            "maximum distance of the map point used by mode nearest, m");
 }
 
 std::vector<LookupAnswer> look_up(const libmap::PointCloud& map,

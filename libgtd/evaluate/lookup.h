@@ -1,4 +1,5 @@
-// Values of a map at given locations, for a map in memory or in tiles that are loaded one by one.
+// Looks up the values of a map at given locations, such as those of a field test, for a map in
+// memory or in tiles that are loaded one by one.
 #pragma once
 
 #include <Eigen/Core>
@@ -47,8 +48,8 @@ std::vector<LookupAnswer> look_up(const libmap::PointCloud& map,
 using TileLoader = std::function<libmap::PointCloud(std::size_t tile)>;
 
 // Returns the answers of look_up over the whole map, except that `map_point` is an index within a
-// tile. Points are sorted by tile, some 10^5 at a time: only required tiles are loaded, few of them
-// twice, and memory contains one tile per thread besides the answers. Throws like look_up, and all
+// tile. Points are sorted by tile, about 10^5 at a time. Only required tiles are loaded, few of
+// them twice; memory contains the answers and one tile per thread. Throws like look_up, and all
 // errors of `load`.
 std::vector<LookupAnswer> look_up_tiles(const TileStoreIndex& index, const TileLoader& load,
                                         const std::vector<Eigen::Vector3d>& points,

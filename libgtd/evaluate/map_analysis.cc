@@ -161,11 +161,12 @@ constexpr double rounding = 1e-9;  // relative to the bin width
 
 void bind(libmap::ParameterTable& table, MapAnalysisOptions& options) {
   table.add("score_bin", options.score_bin, libmap::Range{0.0, 1.0, true, false},
-            "width of score bins");
-  table.add("height_bin_m", options.height_bin_m, libmap::positive, "width of height bins, m");
+            "bin width of the score histogram");
+  table.add("height_bin_m", options.height_bin_m, libmap::positive,
+            "bin width of the height histogram, m");
   table.add("slope_bin_deg", options.slope_bin_deg, libmap::Range{0.0, 90.0, true, false},
-            "width of slope bins, degrees");
-  table.add("border", options.border, "includes voxels whose mask window leaves the scanned area");
+            "bin width of the slope histogram, degrees");
+  table.add("border", options.border, "include voxels whose mask extends beyond the scan");
 }
 
 std::optional<double> GroundBin::graspable_share() const {
@@ -185,7 +186,7 @@ MapAnalysis analyze_map(const VoxelMap& map, const MapSurface& surface,
                         const MapAnalysisOptions& options) {
   libmap::check_parameters(options);
   if (surface.slope_deg.size() != map.size() || surface.area_m2.size() != map.size())
-    throw libmap::Error("the surface does not match the map", {.field = "slope_deg"});
+    throw libmap::Error("not one value per voxel of the map", {.field = "slope_deg"});
   return MapCounter(map, surface, options).run();
 }
 

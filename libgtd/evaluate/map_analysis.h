@@ -1,4 +1,4 @@
-// Statistics of a whole map: distribution of scores, and graspable area by height and slope.
+// Statistics of a graspability map: distribution of scores, and graspable area by height and slope.
 #pragma once
 
 #include <cstddef>
@@ -61,7 +61,7 @@ struct GroundBin {
   double graspable_area_m2 = 0.0;
   double score_sum = 0.0;
 
-  std::optional<double> graspable_share() const;  // fraction of the area
+  std::optional<double> graspable_share() const;  // fraction of the area; nullopt without area
   std::optional<double> mean_score() const;       // nullopt without voxels
 };
 

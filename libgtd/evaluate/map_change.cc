@@ -205,7 +205,7 @@ void find_unpaired(const VoxelMap& map, const VoxelMap& other, MapChange& change
 void bind(libmap::ParameterTable& table, MapChangeOptions& options) {
   table.add("match_distance_voxels", options.match_distance_voxels,
             libmap::Range{0.0, 10.0, true, false},
-            "maximum distance of matching voxels on different lattices, voxel edges");
+            "maximum distance of corresponding voxels on different lattices, in voxel edges");
 }
 
 std::string_view to_text(VoxelMatching matching) {
@@ -223,7 +223,7 @@ MapChange compare_maps(const VoxelMap& map, const MapSurface& surface, const Vox
                        const MapChangeOptions& options) {
   libmap::check_parameters(options);
   if (surface.area_m2.size() != map.size())
-    throw libmap::Error("the surface does not match the map", {.field = "area_m2"});
+    throw libmap::Error("not one value per voxel of the map", {.field = "area_m2"});
   MapChange change;
   const double size_m = std::max(map.lattice.voxel_size_m, other.lattice.voxel_size_m);
   if (const auto offset = lattice_offset(map, other, map_terrain_from_other_terrain)) {
@@ -235,7 +235,7 @@ MapChange compare_maps(const VoxelMap& map, const MapSurface& surface, const Vox
                                      options.match_distance_voxels * size_m);
   }
   if (change.pairs.empty())
-    throw libmap::Error("the maps have no voxel in common: check their area and frames");
+    throw libmap::Error("the maps have no voxel in common: check their area and their frames");
   find_unpaired(map, other, change);
   change.common = summarize(map, surface, other, change.pairs);
   summarize_evaluated(map, surface, other, options, change);

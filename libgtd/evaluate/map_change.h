@@ -1,4 +1,4 @@
-// Compares two maps of the same ground voxel by voxel.
+// Compares two maps of the same ground, MAP and OTHER, voxel by voxel: graspability and scores.
 #pragma once
 
 #include <cstddef>

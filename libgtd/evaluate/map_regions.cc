@@ -89,7 +89,7 @@ constexpr double farthest_m = std::numeric_limits<double>::max();
 void check(const RegionReachOptions& options) {
   libmap::check_parameters(options);
   if (options.start && !options.start->allFinite())
-    throw libmap::Error("not finite", {.field = "start"});
+    throw libmap::Error("is not finite", {.field = "start"});
 }
 
 // Connected regions, as points.
@@ -147,7 +147,7 @@ class NearestPairs {
       smaller[s] = smaller_neighbors(s);
       pairs += smaller[s].size();
       if (pairs > max_links)
-        throw libmap::Error("links more than 10 million pairs of regions",
+        throw libmap::Error("too large: it links more than 10 million pairs of regions",
                             {.field = "stride_m", .value = libmap::to_text(given_reach_m_)});
     }
     libmap::parallel_each(sets_.size(), 8, [&](std::size_t s) {
@@ -361,8 +361,9 @@ void describe_access(const MapRegionResult& regions, const std::vector<double>& 
 }  // namespace
 
 void bind(libmap::ParameterTable& table, MapRegionOptions& options) {
-  table.add("adjacency_voxels", options.adjacency_voxels, libmap::Range{1.0, 100.0},
-            "maximum index difference of neighbors in a region; 1: 26 neighbors");
+  table.add(
+      "adjacency_voxels", options.adjacency_voxels, libmap::Range{1.0, 100.0},
+      "maximum index difference of neighboring voxels in a region, per axis; 1: 26 neighbors");
   table.add("min_voxels", options.min_voxels, libmap::Range{1.0, 1e9},
             "minimum size of a region, voxels");
 }
@@ -371,7 +372,7 @@ MapRegionResult find_regions(const VoxelMap& map, const MapSurface& surface,
                              const MapRegionOptions& options) {
   libmap::check_parameters(options);
   if (surface.area_m2.size() != map.size())
-    throw libmap::Error("the surface does not match the map", {.field = "area_m2"});
+    throw libmap::Error("not one value per voxel of the map", {.field = "area_m2"});
   const std::vector<std::uint32_t> graspable = graspable_voxels(map, options.border);
   MapRegionResult result;
   for (std::vector<std::uint32_t>& voxels : connected(map, graspable, options.adjacency_voxels)) {
@@ -394,7 +395,7 @@ MapRegionResult find_regions(const VoxelMap& map, const MapSurface& surface,
 
 void bind(libmap::ParameterTable& table, RegionReachOptions& options) {
   table.add("stride_m", options.stride_m, libmap::positive,
-            "maximum step of the robot between regions, m");
+            "maximum step of the robot from one region to another, m");
 }
 
 RegionReach find_reach(const VoxelMap& map, const MapRegionResult& regions,

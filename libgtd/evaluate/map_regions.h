@@ -62,7 +62,7 @@ struct RegionLink {
   std::uint32_t voxel_b = 0;
 };
 
-// Access to a region from the start.
+// Reachability of a region from the start of the robot.
 struct RegionAccess {
   std::uint32_t group = 0;  // connected regions; numbered by their first region
   bool reachable = false;
@@ -80,7 +80,7 @@ struct RegionReach {
   // nullopt for none.
   std::optional<double> joining_stride_m;
   std::optional<std::uint32_t> start_region;  // region nearest to the start
-  double start_distance_m = 0.0;              // distance of this region
+  double start_distance_m = 0.0;              // m
   std::size_t reachable_regions = 0;
   double reachable_area_m2 = 0.0;
 };

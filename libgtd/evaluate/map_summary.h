@@ -1,5 +1,5 @@
-// Summarizes maps in one row each: parameters of the detection, distribution of scores, and
-// agreement with expectations, if known.
+// Summarizes several maps in one table row each: parameters of the detection, distribution of
+// scores, and agreement with expected regions, if known.
 #pragma once
 
 #include <array>
@@ -27,8 +27,7 @@ struct MapSummary {
   std::size_t evaluated = 0;
   std::size_t reached = 0;    // voxels whose score reaches the threshold
   std::size_t graspable = 0;  // voxels with the flag of the map
-  // Voxels with fewer solid voxels than the threshold TSV, which affects only their scores. nullopt
-  // if TSV or SSV is unknown.
+  // Voxels with fewer solid voxels in the mask (SSV) than TSV. nullopt if one of them is unknown.
   std::optional<std::size_t> few_solid;
   // Quantiles summary_quantiles by nearest rank; empty if no voxel was evaluated.
   std::vector<double> scores;
@@ -57,9 +56,8 @@ struct SummarizedMap {
 };
 
 // Returns one row per map: name, parameters of the detection, counts, fractions, quantiles. If one
-// of the maps has an expectation, also sensitivity and specificity of voxels and of places with
-// Wilson 95 % intervals, Youden's index and the area under the curve. Undefined values are empty
-// cells.
+// of the maps has an expectation, also sensitivity and specificity of voxels and of regions with
+// Wilson 95 % intervals, Youden's index and the area under the curve. Undefined: empty.
 libmap::Table summary_table(const std::vector<SummarizedMap>& maps);
 
 // Returns one row per map and region of `expected`.

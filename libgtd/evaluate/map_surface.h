@@ -1,4 +1,4 @@
-// Slope and surface area of each voxel of a map.
+// Slope and surface area of the ground at each voxel of a map.
 #pragma once
 
 #include <cstddef>

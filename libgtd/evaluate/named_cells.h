@@ -1,5 +1,4 @@
-// Table rows with named columns, and rates as JSON. Used only by the sources of this folder that
-// make tables.
+// Helpers of this folder's writers: table rows of named cells, and rates as JSON.
 #pragma once
 
 #include <nlohmann/json.hpp>

@@ -206,7 +206,7 @@ bool reaches_cutoff(double score, double cutoff) {
 }
 
 void RocOptions::check() const {
-  if (cutoffs.empty()) throw libmap::Error("no cutoffs", {.field = "cutoffs"});
+  if (cutoffs.empty()) throw libmap::Error("at least one cutoff is required", {.field = "cutoffs"});
   for (std::size_t k = 0; k < cutoffs.size(); ++k) {
     if (!std::isfinite(cutoffs[k]) || (k > 0 && !(cutoffs[k] > cutoffs[k - 1])))
       throw libmap::Error("cutoffs do not ascend", {.field = "cutoffs",

@@ -256,11 +256,11 @@ std::vector<std::string> default_score_columns(const Table& table, std::string_v
 
 void bind(libmap::ParameterTable& table, TableEvaluationOptions& options) {
   table.add("label", options.label_column,
-            "column of labels: 1/0, true/false, yes/no, graspable/not graspable");
+            "column of the true labels: 1/0, true/false, yes/no, graspable/not graspable");
   table.add("cutoff", options.roc.rate_cutoff, libmap::any_number,
-            "minimum score of a location that is predicted graspable, for the rates");
+            "minimum score of a location that counts as predicted graspable in the rates");
   table.add("bootstrap", options.roc.bootstrap_replicates, libmap::Range{0, 1e7},
-            "bootstrap replicates for the interval of the area; 0: no interval");
+            "bootstrap replicates for the confidence interval of the AUC; 0: no interval");
   table.add("seed", options.roc.bootstrap_seed, libmap::not_negative,
             "random seed of the bootstrap");
 }
@@ -273,11 +273,13 @@ TableEvaluation evaluate_table(const Table& table, const TableEvaluationOptions&
   const std::vector<std::optional<bool>> labels = read_labels(table, options.label_column);
   std::vector<std::string>& names = evaluation.options.score_columns;
   if (names.empty()) names = default_score_columns(table, options.label_column);
-  if (names.empty()) throw libmap::Error("no score column", {.file = table.file});
+  if (names.empty())
+    throw libmap::Error("the table has no score column: name one with --score",
+                        {.file = table.file});
   for (std::size_t n = 0; n < names.size(); ++n) {
     if (std::find(names.begin(), names.begin() + static_cast<std::ptrdiff_t>(n), names[n]) !=
         names.begin() + static_cast<std::ptrdiff_t>(n))
-      throw libmap::Error("named twice",
+      throw libmap::Error("is named twice",
                           {.file = table.file, .field = "column '" + names[n] + "'"});
     evaluation.columns.push_back(
         {names[n], evaluate_roc(labels, read_scores(table, names[n]), options.roc)});

@@ -1,4 +1,5 @@
-// ROC evaluation of table columns, and its results as tables, JSON and Markdown.
+// Evaluates columns of scores against a column of labels (ROC curves, rates), and writes the
+// results as tables, JSON and Markdown. For `graspmap evaluate`.
 #pragma once
 
 #include <optional>
@@ -36,18 +37,19 @@ struct TableEvaluation {
 // non-, un-, with '-', '_' or a space). Returns nullopt for any other text.
 std::optional<bool> parse_label(std::string_view text);
 
-// Returns the label in a cell; nullopt for an empty cell. Throws Error naming file, row and column.
+// Returns the label in a cell; nullopt for an empty cell. Throws Error naming file, row and column
+// if the cell contains another text.
 std::optional<bool> label_at(const libmap::Table& table, std::size_t row, std::size_t column);
 
-// Returns all columns that contain only numbers and empty cells, with at least one number, except
-// the label, identities (id, point, hold, i, j, k), positions and distances (x, y, z, or a name
-// that ends with a unit of length such as "_m"), and the look-up flags found and edge.
+// Returns the columns evaluated by default: those with numbers and empty cells only, and at least
+// one number, except the label, ids (id, point, hold, i, j, k), positions and distances (x, y, z,
+// or a name that ends with a unit of length such as "_m"), and the look-up flags found and edge.
 std::vector<std::string> default_score_columns(const libmap::Table& table,
                                                std::string_view label_column);
 
-// Evaluates the score columns of a table. Empty cells are left out: unknown labels and locations
-// that are not visible. Throws Error naming file, row and column for a missing column, a cell that
-// is no label or number, and a table without score columns.
+// Evaluates the score columns of a table. Rows with an empty cell (unknown label, or location that
+// is not visible) are left out of that column. Throws Error naming file, row and column for a
+// missing column, a cell that is no label or number, and a table without score columns.
 TableEvaluation evaluate_table(const libmap::Table& table, const TableEvaluationOptions& options);
 
 // Returns one row per score column and cutoff. `at` is "cutoff" for given cutoffs, with their terms

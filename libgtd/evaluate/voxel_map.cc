@@ -58,9 +58,8 @@ VoxelLattice fitted_lattice(const PointCloud& map, const libmap::Pose& terrain_f
     squares += offset.squaredNorm();
   }
   if (!(products > 0.0))
-    throw libmap::Error(
-        "unknown voxel size: the map has neither a manifest nor the fields i, j and k",
-        {.field = "voxel_size_m"});
+    throw libmap::Error("is unknown: the map has neither a manifest nor the fields i, j and k",
+                        {.field = "voxel_size_m"});
   const double size_m = products / squares;
   return {mean_point - size_m * (mean_voxel.array() + 0.5).matrix(), size_m};
 }
@@ -89,7 +88,7 @@ void require_on_lattice(const PointCloud& map, const VoxelMap& result,
     const Eigen::Vector3d point = result.terrain_from_map * map.positions[kept[n]];
     if (!((point - center).cwiseAbs().array() <= bound_m).all())
       throw libmap::Error(
-          "points are not at the centers of the map's voxels",
+          "not at the center of a voxel of the map",
           {.field = "point " + std::to_string(kept[n] + 1),
            .value = libmap::to_text(static_cast<float>((point - center).cwiseAbs().maxCoeff())) +
                     " m off",
@@ -114,7 +113,7 @@ void sort_by_voxel(std::vector<Voxel>& voxels, std::vector<std::uint32_t>& kept)
   }
   const auto twice = std::adjacent_find(voxels.begin(), voxels.end());
   if (twice != voxels.end())
-    throw libmap::Error("two points of one voxel",
+    throw libmap::Error("two points of the map are in the same voxel",
                         {.field = "i, j, k",
                          .value = std::to_string(twice->i) + ", " + std::to_string(twice->j) +
                                   ", " + std::to_string(twice->k)});
@@ -155,7 +154,7 @@ MapInfo map_info(const libmap::Manifest& manifest) {
   if (size_m && *size_m > 0.0 && origin != nullptr && origin->size() == 3) {
     facts.lattice = VoxelLattice{{(*origin)[0], (*origin)[1], (*origin)[2]}, *size_m};
     if (!facts.lattice->origin_m.allFinite() || !std::isfinite(*size_m))
-      throw libmap::Error("not finite in the map's manifest",
+      throw libmap::Error("is not finite in the map's manifest",
                           {.field = "lattice_origin_m or voxel_size_m"});
   }
   if (const libmap::Pose* pose = manifest.find_transform("terrain_from_input");

@@ -1,4 +1,5 @@
-// Map as arrays on its lattice, for statistics and comparisons of voxels.
+// Graspability map as arrays with one entry per voxel: the common input of map statistics, regions
+// and comparisons (analyze_map, find_regions, compare_maps).
 #pragma once
 
 #include <Eigen/Core>
@@ -15,7 +16,7 @@
 
 namespace libgtd {
 
-// Properties of a map in addition to its points.
+// Properties of a map that are in its manifest, not in its points.
 struct MapInfo {
   std::optional<VoxelLattice> lattice{};  // in the terrain frame; nullopt: unknown
   libmap::Pose terrain_from_map = libmap::Pose::Identity();        // from the frame of the points
@@ -23,7 +24,7 @@ struct MapInfo {
 };
 
 // Reads these properties from a manifest of `graspmap score`: parameters, frame, transforms and the
-// origin of the lattice.
+// origin of the lattice. Throws Error if one is not finite.
 MapInfo map_info(const libmap::Manifest& manifest);
 
 // Arrays with one entry per voxel, ascending by voxel, for any order of the map's points.
@@ -53,7 +54,7 @@ struct VoxelMap {
 // Converts a map with the fields "score" and "graspable" and voxel indices: the fields i, j and k,
 // or a known lattice. With the fields only, the lattice is fitted to the points in the terrain
 // frame. Points without a position are left out. Throws Error for a map without points, a missing
-// or invalid field, points that are not at their voxels, and two points of one voxel.
+// or invalid field, points that are not at voxel centers, and two points in one voxel.
 VoxelMap voxel_map_of(const libmap::PointCloud& map, const MapInfo& facts = {});
 
 }  // namespace libgtd

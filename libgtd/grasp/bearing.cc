@@ -87,13 +87,13 @@ const std::vector<std::pair<std::string, EngagementLaw>>& engagement_law_names()
 void bind(libmap::ParameterTable& table, EngagementOptions& options) {
   using libmap::positive;
   constexpr libmap::Range cone{0.0, 89.0};
-  table.add("law", options.law, engagement_law_names(), "law of spine engagement");
+  table.add("law", options.law, engagement_law_names(), "law of the force a spine bears");
   table.add("adhesion_limit_n", options.adhesion_limit_n, positive,
-            "law adhesion: maximum tension of all fingers, N");
+            "law adhesion: maximum total tension of all fingers, N");
   table.add("adhesion_lateral_deg", options.adhesion_lateral_deg, cone,
-            "law adhesion: maximum angle of the lateral force to the tension");
+            "law adhesion: maximum angle between lateral force and tension, degrees");
   table.add("adhesion_pull_deg", options.adhesion_pull_deg, cone,
-            "law adhesion: maximum angle of the pull-off to the tension");
+            "law adhesion: maximum angle between pull-off force and tension, degrees");
 }
 
 // Edge of a pyramid: its product with `worth`, and the edge in normal, drag and lateral.

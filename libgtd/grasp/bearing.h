@@ -1,4 +1,4 @@
-// Forces that a contact of the gripper can bear, by one of two published laws of spine engagement.
+// Forces that each contact of a closed gripper can bear, by one of two laws of spine engagement.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,31 +14,31 @@
 
 namespace libgtd {
 
-// asperities: by the section `engagement` of the gripper. adhesion: a finger bears a tension T
-// along its drag up to a limit, and lateral force and pull-off in proportion to T (LORIS).
+// asperities: spines engage with facets at random, by the section `engagement` of the gripper.
+// adhesion: a finger bears a tension T in drag direction (GripContact) up to a limit, and lateral
+// and pull-off forces up to a fraction of T (LORIS).
 enum class EngagementLaw { asperities, adhesion };
 const std::vector<std::pair<std::string, EngagementLaw>>& engagement_law_names();
 
 struct EngagementOptions {
   EngagementLaw law = EngagementLaw::asperities;
-  double adhesion_limit_n = 20.0;      // maximum T, sum over all fingers
+  double adhesion_limit_n = 20.0;      // N; maximum of T, summed over all fingers
   double adhesion_lateral_deg = 45.0;  // maximum lateral force: T tan(adhesion_lateral_deg)
   double adhesion_pull_deg = 20.0;     // maximum pull-off: T tan(adhesion_pull_deg)
 };
 void bind(libmap::ParameterTable& table, EngagementOptions& options);
 
 // Distribution of a contact's force over its spines. best: the distribution with the largest force.
-// equally: equal parts; a spine that slips drops out, and spines on steeper facets take over its
-// part.
+// equally: equal parts; if a spine slips, spines on steeper facets take over its part.
 enum class SpineSharing { best, equally };
 
-// Convex set of forces that a contact can exert on the gripper; it contains 0. A spine is in the
-// corner between the ground and its facet. Its force is the sum of one force from each of them,
-// both at most `limit_n` and inside a pyramid of eight edges in Coulomb's cone, exact in the plane
-// of normal and drag. Forces in N.
+// Convex set of forces that a contact can exert on the gripper; it contains 0. A spine touches both
+// the ground and its facet. Its force is the sum of one force from each of these two planes, both
+// at most `limit_n` and inside a pyramid with eight edges that approximates Coulomb's friction
+// cone. Forces in N, directions in the frame of the contacts.
 class BearingContact {
  public:
-  // Law `asperities`: `leans_rad` is psi of each spine that meets a facet, or one 0 for a link.
+  // Law `asperities`: `leans_rad` are the inclinations of the engaged facets, or one 0 for a link.
   BearingContact(const GripContact& contact, std::vector<double> leans_rad, double friction,
                  double limit_n);
   // Law `adhesion`: `limit_n` is the limit of this finger.
@@ -52,22 +52,21 @@ class BearingContact {
   bool is_link() const { return is_link_; }
   std::size_t spines() const { return spines_; }
 
-  // Returns a force of the set with the maximum product with `worth`.
+  // Returns the force of the set with the maximum scalar product with `worth`, N.
   Eigen::Vector3d best_force(const Eigen::Vector3d& worth, SpineSharing sharing) const {
     return best_local_force(frame().transpose() * worth, sharing);
   }
-  // Contact frame; the columns are normal, drag and lateral.
+  // Returns the contact frame; the columns are normal, drag and lateral direction.
   Eigen::Matrix3d frame() const {
     Eigen::Matrix3d frame;
     frame << normal_, drag_, lateral_;
     return frame;
   }
-  // Maximum product of a force with `local`, a vector in the contact frame, and a force that
-  // attains it.
+  // Return the maximum scalar product with `local` (contact frame) and the force that attains it.
   double max_local_product(const Eigen::Vector3d& local, SpineSharing sharing) const;
   Eigen::Vector3d best_local_force(const Eigen::Vector3d& local, SpineSharing sharing) const;
-  // Edges of the cone of forces on the steepest facet (adhesion: of all forces), as unit vectors in
-  // order around it; for images.
+  // Returns the edges of the cone of forces on the steepest facet (adhesion: of all forces), as
+  // unit vectors in order around it, for images.
   std::vector<Eigen::Vector3d> cone() const;
 
  private:
@@ -91,8 +90,8 @@ class BearingContact {
   std::vector<Eigen::Vector3d> adhesion_;  // edges for `limit_n_`; empty for asperities
 };
 
-// Draws the spines of the contacts of a closed gripper at random. Contacts without an engaged spine
-// are left out. Law `adhesion` draws no random numbers.
+// Draws at random which spines of a closed gripper's contacts engage, and their facets. Contacts
+// without an engaged spine are left out. Law `adhesion` draws no random numbers.
 std::vector<BearingContact> draw_bearing(const std::vector<GripContact>& contacts,
                                          const Gripper& gripper, const EngagementOptions& options,
                                          libmap::RandomStream& random);

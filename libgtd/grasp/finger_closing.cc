@@ -141,7 +141,8 @@ Eigen::Vector2d FingerGeometry::tip(double proximal_rad, double curl) const {
 
 FingerGeometry finger_geometry(const Gripper& gripper) {
   if (!gripper.fingers)
-    throw libmap::Error("missing: required for closing the gripper", {.field = "fingers"});
+    throw libmap::Error("is missing: closing the gripper requires this section of the gripper file",
+                        {.field = "fingers"});
   constexpr double radians = libmap::radians_per_degree;
   FingerGeometry finger;
   finger.joint_radius_m = 0.0005 * gripper.finger_joint_diameter_mm;

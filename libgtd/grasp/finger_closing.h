@@ -1,6 +1,7 @@
-// Closes a finger of two links in its plane on the profile of the ground. The plane contains the
-// palm's axis; its coordinates (r, z) are in meters: r away from the axis, z away from the ground,
-// palm at z = 0. The first contact is computed in closed form, so that no ridge is skipped.
+// Closes one finger of a gripper, two links in a plane, on the profile of the ground until it makes
+// contact. The plane contains the palm's axis; its coordinates (r, z) are in meters: r away from
+// the axis, z away from the ground, palm at z = 0. Contacts are computed in closed form, so that no
+// ridge is missed.
 #pragma once
 
 #include <Eigen/Core>
@@ -41,8 +42,8 @@ struct GroundSegment {
   bool faces_palm = true;  // the triangle's front faces the palm
 };
 
-// Contact at the end of closing. spines: the outer half of the distal link or its tip touches.
-// link: only another part touches. end_stop: no part touches.
+// Result of closing. spines: the outer half of the distal link or its tip is in contact. link: only
+// another part is in contact. end_stop: no part is.
 enum class FingerEnd { spines, link, end_stop };
 
 struct FingerClosing {
@@ -54,9 +55,9 @@ struct FingerClosing {
   std::optional<Eigen::Vector2d> link;  // on the proximal link or the inner half of the distal one
 };
 
-// Closes a finger that is open and does not touch the profile. The proximal link turns inward with
-// the distal link at the free curl. If the proximal link is stopped, the distal link continues
-// alone up to the limit of the curl.
+// Closes a finger that is open and does not touch the profile. The proximal link turns inward, with
+// the distal link at its curl without contact (curl_rad). When the ground stops the proximal link,
+// the distal link curls further, up to curl_limit_rad.
 FingerClosing close_finger(const FingerGeometry& finger, std::span<const GroundSegment> profile);
 
 // Returns the minimum height of the palm at which the open finger is above the whole profile;

@@ -1,4 +1,4 @@
-// Results of the virtual field test as columns of a table.
+// Results of the virtual field test as table columns, for `graspmap grasp` and `footholds`.
 #pragma once
 
 #include <string>

@@ -371,7 +371,7 @@ void require_ground(const Ground& ground, const std::vector<Eigen::Vector3d>& lo
   for (std::size_t n = 0; n < locations.size(); ++n)
     if (!ground.distance(locations[n], max_distance_m))
       throw libmap::Error(
-          "is not on the mesh",
+          "not on the mesh",
           {.field = "location " + std::to_string(n + 1),
            .value = libmap::to_text(locations[n].x()) + "," + libmap::to_text(locations[n].y()) +
                     "," + libmap::to_text(locations[n].z()),
@@ -393,25 +393,25 @@ void bind(libmap::ParameterTable& table, GraspOptions& options) {
   using libmap::not_negative;
   using libmap::positive;
   table.add("load_n", options.load_n, positive, "pull that the gripper must hold, N");
-  table.add("safety", options.safety, positive, "safety factor of the load");
+  table.add("safety", options.safety, positive, "safety factor by which the load is multiplied");
   table.add("approach", options.approach,
             {{"up", ApproachDirection::up}, {"normal", ApproachDirection::normal}},
-            "approach from z (up), or along the normal of the ground");
-  table.add("trials", options.poses, {1, 100000}, "poses of the gripper at each location");
-  table.add("draws", options.draws, {1, 100000}, "draws of asperities at each pose");
-  table.add(
-      "best_draws", options.best_draws, {0, 100000},
-      "number of draws per pose for which the force with the best load sharing is also computed");
+            "approach direction: from above, along z (up), or along the ground's normal");
+  table.add("trials", options.poses, {1, 100000}, "number of gripper poses at each location");
+  table.add("draws", options.draws, {1, 100000}, "number of draws of asperities at each pose");
+  table.add("best_draws", options.best_draws, {0, 100000},
+            "number of draws per pose for which the holding force with optimal load sharing is "
+            "also computed");
   table.add("seed", options.seed, not_negative, "random seed");
   table.add("offset_m", options.offset_m, {0.0, 1.0},
-            "standard deviation of the palm position in x and in y, m");
+            "standard deviation of the random palm position in x and in y, m");
   table.add("tilt_deg", options.tilt_deg, {0.0, 15.0},
-            "standard deviation of the palm tilt, degrees");
+            "standard deviation of the random palm tilt, degrees");
   table.add("max_distance_m", options.max_distance_m, positive,
-            "maximum distance of a location from the mesh, m");
+            "maximum distance of a tested location from the mesh, m");
   table.add(
       "ensemble", options.ensemble,
-      "trials cycle through the parameter sets of the gripper; else all use its own parameters");
+      "cycle through the gripper's ensemble of parameter sets, instead of its nominal parameters");
   bind(table, options.closing);
   bind(table, options.engagement);
   bind(table, options.surface);

@@ -29,12 +29,11 @@ struct GraspOptions {
   ApproachDirection approach = ApproachDirection::up;
   int poses = 32;  // poses per location
   int draws = 32;  // draws of asperities per pose
-  // Number of draws per pose for which the force with the best sharing (SpineSharing) is also
-  // computed.
+  // Number of draws per pose for which the force with SpineSharing::best is also computed.
   int best_draws = 2;
   // Computes LocationResult::pull_limits_n. Not bound to a key.
   bool pull_limits = false;
-  // Ends early if the verdict is clear, see sequential_rounds. Not bound to a key.
+  // Ends a test when its verdict is certain, see sequential_rounds. Not bound to a key.
   bool sequential = false;
   std::uint64_t seed = 1;
   double offset_m = 0.005;       // standard deviation of the palm position in x and y
@@ -51,10 +50,10 @@ struct GraspOptions {
 };
 void bind(libmap::ParameterTable& table, GraspOptions& options);
 
-// Outcome of a trial. approach: no ground below, or the approach starts inside the ground. contact:
-// fewer than two contacts. engagement: the contacts do not balance any pull in some direction.
-// load: they balance pulls, but not the load. unseen: one of these failures, and a finger had too
-// much unseen ground.
+// Outcome of a trial. Causes of failure: approach: no ground below, or the approach starts inside
+// the ground. contact: fewer than two contacts. engagement: in some direction, the contacts balance
+// no pull at all. load: they balance a smaller pull than the load. unseen: any of these, with too
+// much unseen ground below a finger.
 enum class TrialEnd { holds, approach, contact, engagement, load, unseen };
 const std::vector<std::pair<std::string, TrialEnd>>& trial_end_names();
 
@@ -63,8 +62,8 @@ struct Trial {
   ClosedGripper gripper;
   std::vector<BearingContact> bearing;
   TrialEnd end = TrialEnd::approach;
-  double force_n = 0.0;       // equal sharing, minimum over the directions
-  std::size_t direction = 0;  // index of this direction in pull_directions()
+  double force_n = 0.0;       // holding force: equal sharing, minimum over directions
+  std::size_t direction = 0;  // direction of the minimum, index in pull_directions()
 };
 
 struct LocationResult {
@@ -101,13 +100,13 @@ struct LocationResult {
   bool holds() const { return hold_probability >= 0.5; }
 };
 
-// Numbers of poses and draws per pose after a round of a sequential test. Rounds have 4, 8, 16, ...
-// and all poses with a quarter of the draws, then all poses with twice as many draws, until all
-// draws are used: further draws of a pose add little information. The test ends after a round if
-// the Wilson interval of 90 %, with poses as the count, excludes 0.5. It also ends if all poses are
-// done and the distance of the holding fraction from 0.5 exceeds 1.645 standard deviations of the
-// change that the remaining draws may cause (beta distribution, Jeffreys prior). A test that
-// reaches the last round has the same trials as one that is not sequential.
+// Round of a sequential test of a location: numbers of poses, and of draws per pose, that are
+// completed after it. Rounds first increase the poses (4, 8, 16, ... to all) with a quarter of the
+// draws, then double the draws until all are used, because further draws of a pose add little
+// information. The test ends after a round if the Wilson interval of 90 %, with poses as the count,
+// excludes 0.5. It also ends if all poses are done and the distance of the holding fraction from
+// 0.5 exceeds 1.645 standard deviations of the change that the remaining draws may cause (beta
+// distribution, Jeffreys prior). A test that reaches the last round has all trials.
 struct SequentialRound {
   int poses = 0;
   int draws = 0;
@@ -127,8 +126,8 @@ std::vector<LocationResult> test_grasps(const Ground& ground, const Gripper& gri
 Trial repeat_trial(const Ground& ground, const Gripper& gripper, const Eigen::Vector3d& location,
                    const GraspOptions& options, int pose, int draw);
 
-// Gripper closed at random poses of one location (GraspOptions::poses), for pulls with any
-// parameters.
+// Gripper closed in random poses at one location (GraspOptions::poses). Computes pulls for any
+// force parameters without closing it again, for fits to pull tests.
 class ClosedPoses {
  public:
   // Does not throw if the location has no ground, see touch_ground().
@@ -137,9 +136,9 @@ class ClosedPoses {
 
   // Returns true if at least one pose has two contacts.
   bool touch_ground() const;
-  // Returns the largest pulls (N) along a unit vector in the frame of the location (GroundPatch)
-  // that `draws` draws of asperities per pose hold with the parameters of `gripper`. All parameters
-  // use the same random draws.
+  // Returns the holding forces (N) along a unit vector in the frame of the location (GroundPatch)
+  // with the parameters of `gripper`, one for each pose and each of `draws` draws of asperities.
+  // All parameters use the same random draws.
   std::vector<double> pull_forces(const Gripper& gripper, const Eigen::Vector3d& direction,
                                   int draws) const;
 

@@ -1,5 +1,5 @@
-// Fast test whether a gripper that approaches from above can close at a location, from the highest
-// ground around it.
+// Prefilter of locations for the virtual field test: excludes locations next to ground that is too
+// high for a gripper approaching from above, using the highest point of each column of the mesh.
 #pragma once
 
 #include <Eigen/Core>
@@ -21,16 +21,16 @@ struct CandidateOptions {
 };
 
 // Heights of the ground in columns. At least 99.8 % of the voxels that hold in 32 x 8 trials are
-// candidates (1500 voxels of each of three simulated sites; the bounds were not chosen on one of
-// them).
+// candidates (1500 voxels of each of three simulated sites, one of them not used to choose the
+// bounds).
 class GripCandidates {
  public:
   // Throws Error if the gripper has no `fingers`.
   GripCandidates(const libmap::TriangleMesh& mesh, const Gripper& gripper,
                  const CandidateOptions& options);
 
-  // Returns false if the top of the location's own column, or of too many columns around it, is
-  // above the start of the approach. For approach `up`.
+  // Returns false if the ground in the location's own column, or in too many columns around it, is
+  // above the start of the approach. For ApproachDirection::up only.
   bool may_hold(const Eigen::Vector3d& location) const;
 
  private:

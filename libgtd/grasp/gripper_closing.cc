@@ -240,11 +240,11 @@ void add_contacts(const GroundPatch& patch, std::size_t number, const ClosingOpt
 
 void bind(libmap::ParameterTable& table, ClosingOptions& options) {
   table.add("start_height_m", options.start_height_m, {0.0, 10.0, true, false},
-            "start height of the approach above the location, m");
+            "height above the location at which the approach starts, m");
   table.add("normal_radius_m", options.normal_radius_m, {1e-5, 0.1},
-            "radius of the mean ground normal at a contact, m");
+            "radius within which the ground normal at a contact is averaged, m");
   table.add("max_unseen", options.max_unseen, libmap::zero_to_one,
-            "maximum unseen share of the strip of a finger with contacts");
+            "maximum share of unseen ground below a finger that has contacts");
 }
 
 GroundPatch patch_around(const Ground& ground, const Eigen::Vector3d& location,

@@ -1,4 +1,4 @@
-// Moves a gripper onto the ground and closes its fingers: resting pose and contacts.
+// Moves a gripper onto the ground and closes its fingers: computes resting pose and contacts.
 #pragma once
 
 #include <Eigen/Core>
@@ -22,15 +22,15 @@ struct ApproachPose {
 struct ClosedFinger {
   FingerClosing closing;
   double azimuth_rad = 0.0;  // in the gripper frame
-  // Fraction of the finger's strip (from the palm's axis to the open tip, weighted as a sector of
-  // the disc) without reliable ground below: holes and border of the scan, and large errors.
+  // Share of the finger's sector (from the palm's axis to the open tip) without reliable ground
+  // below: holes and border of the scan, and ground with large errors.
   double unseen = 0.0;
 };
 
-// Contact in the frame of the patch. The normal points out of the ground, `outward` away from the
-// palm's axis. `drag` is the direction along the ground, in the plane of the finger, in which drive
-// and load pull a spine: toward the axis on level ground, upward on ground that falls outward. Unit
-// vectors; `point` in m.
+// Contact of a finger with the ground, in the frame of the ground patch. The normal points out of
+// the ground, `outward` away from the palm's axis. `drag` (drag direction) is the direction along
+// the ground, in the plane of the finger, in which drive and load pull a spine: toward the axis on
+// level ground, upward on ground that falls outward. Unit vectors; `point` in m.
 struct GripContact {
   std::size_t finger = 0;
   bool by_spines = false;
@@ -61,8 +61,9 @@ struct ClosingOptions {
 };
 void bind(libmap::ParameterTable& table, ClosingOptions& options);
 
-// Returns the part of the ground that the gripper may touch from poses with offsets up to
-// `offset_m` and tilts up to `tilt_rad`.
+// Returns the part of the ground that the gripper may touch at a location (mesh frame, m) from
+// poses with offsets and tilts up to `offset_m` and `tilt_rad`; `away`: direction out of the
+// ground.
 GroundPatch patch_around(const Ground& ground, const Eigen::Vector3d& location,
                          const Eigen::Vector3d& away, const Gripper& gripper, double offset_m,
                          double tilt_rad, const ClosingOptions& options);

@@ -1,4 +1,4 @@
-// Largest pull that the contacts of a closed gripper balance.
+// Holding force of a closed gripper: the largest pull in a direction that its contacts balance.
 #pragma once
 
 #include <Eigen/Core>
@@ -34,8 +34,8 @@ double holding_force(const std::vector<BearingContact>& contacts, const Eigen::V
                      const HoldingOptions& options,
                      double enough = std::numeric_limits<double>::infinity());
 
-// Direction of a pull: `tilt_deg` from the direction away from the ground and, if the tilt is not
-// 0, `azimuth_deg` from the x axis of the frame.
+// Direction of a pull: at the angle `tilt_deg` to the direction away from the ground and the
+// azimuth `azimuth_deg` from the x axis of the frame (0 if the tilt is 0).
 struct PullDirection {
   int tilt_deg = 0;
   int azimuth_deg = 0;
@@ -44,7 +44,7 @@ struct PullDirection {
   std::string name() const;  // "away", "45@90", "90@315"
 };
 
-// Returns the 17 tested directions: away, and 45 and 90 degrees at eight azimuths.
+// Returns the 17 tested directions: tilt 0, and tilts of 45 and 90 degrees at eight azimuths.
 const std::vector<PullDirection>& pull_directions();
 
 // Minimum holding force over pull_directions().
@@ -53,8 +53,8 @@ struct LeastForce {
   std::size_t direction = 0;  // index in pull_directions(); any of equal ones
 };
 
-// Computes the minimum. `first` is tested first: a good guess saves time and only affects the
-// choice among equal directions.
+// Computes the minimum. Direction `first` is tested first; a good guess saves time and only affects
+// the choice among equal directions.
 LeastForce least_holding_force(const std::vector<BearingContact>& contacts,
                                const HoldingOptions& options, std::size_t first = 0);
 

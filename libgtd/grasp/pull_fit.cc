@@ -259,11 +259,12 @@ class PullFitting {
       const std::string row = "row " + std::to_string(test.row);
       const Ground* under = test.on_level_ground ? &level_ : ground;
       if (under == nullptr)
-        throw libmap::Error("requires a mesh", {.field = row, .bound = "ground = level"});
+        throw libmap::Error("the test is at a location on the ground: give a mesh",
+                            {.field = row, .bound = "ground = level"});
       const Eigen::Vector3d at = test.on_level_ground ? Eigen::Vector3d::Zero() : test.location;
       if (!under->distance(at, options.grasp.max_distance_m))
         throw libmap::Error(
-            "is not on the mesh",
+            "not on the mesh",
             {.field = row,
              .value = libmap::to_text(at.x()) + "," + libmap::to_text(at.y()) + "," +
                       libmap::to_text(at.z()),
@@ -511,7 +512,7 @@ PullFit fit_pulls(const Ground* ground, const Gripper& gripper, const std::vecto
   require_fingers(gripper);
   if (std::none_of(gripper.ranges.begin(), gripper.ranges.end(),
                    [](const auto& range) { return range.has_value(); }))
-    throw libmap::Error("missing: a fit requires parameters with a range", {.field = "ranges"});
+    throw libmap::Error("is missing: a fit requires a range of a parameter", {.field = "ranges"});
   return PullFitting(ground, gripper, tests, options, progress).fit();
 }
 

@@ -1,5 +1,6 @@
-// Fits the parameters of a gripper to pull tests: an ensemble of parameter sets, by population
-// Monte Carlo (Cappe et al. 2004) from the prior of the gripper file.
+// Fits the uncertain force parameters of a gripper to measured pull tests. The result is an
+// ensemble of weighted parameter sets, by population Monte Carlo (Cappe et al. 2004) from the prior
+// of the gripper file. Also plans informative tests.
 #pragma once
 
 #include <array>

@@ -41,9 +41,9 @@ GroundErrors bounded(const libmap::TriangleMesh& mesh, std::vector<double> error
 
 void bind(libmap::ParameterTable& table, SurfaceErrorOptions& options) {
   table.add("surface_correlation_m", options.correlation_m, {1e-4, 10.0},
-            "with a surface error: distance at which displacements correlate by 0.29, m");
+            "distance at which simulated mesh errors of two points correlate by 0.29, m");
   table.add("max_surface_error_m", options.max_error_m, {0.0, 0.1, true, false},
-            "with a surface error: maximum error of seen ground, m");
+            "maximum standard deviation of the mesh error of seen ground, m");
 }
 
 GroundErrors errors_of(const libmap::TriangleMesh& mesh, const SurfaceErrorOptions& options) {
@@ -53,7 +53,7 @@ GroundErrors errors_of(const libmap::TriangleMesh& mesh, const SurfaceErrorOptio
     throw libmap::Error("the mesh has no such field at its vertices", {.field = "expected_error"});
   for (std::size_t n = 0; n < expected->values.size(); ++n)
     if (expected->values[n] < 0.0)
-      throw libmap::Error("is negative",
+      throw libmap::Error("a standard deviation cannot be negative",
                           {.field = "expected_error of vertex " + std::to_string(n + 1),
                            .value = libmap::to_text(expected->values[n]),
                            .bound = ">= 0"});

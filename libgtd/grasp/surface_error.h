@@ -1,4 +1,5 @@
-// Ground with errors: reads standard deviations of the surface, and draws random surfaces.
+// Measurement errors of the ground mesh, for the virtual field test: reads standard deviations of
+// the surface, and draws random surfaces with these errors.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,18 +16,17 @@ struct SurfaceErrorOptions {
   // Correlation length of the displacement: along an axis, the correlation is 0.285 at this
   // distance and 0 from twice this distance.
   double correlation_m = 0.025;
-  // Maximum error of seen ground. Ground with a larger error counts as unseen and is displaced with
-  // this error.
+  // Maximum standard deviation of seen ground. Where it is larger, ground is unseen; this is used.
   double max_error_m = 0.005;
 };
 void bind(libmap::ParameterTable& table, SurfaceErrorOptions& options);
 
 // Reads the vertex field `expected_error` of a mesh as written by `graspmap fuse` and `mesh` (m,
-// one standard deviation along the normal). A triangle is unsure if the error of a vertex exceeds
-// the bound or is not finite, or if the face field `filled` marks it as closing a hole of the scan.
-// Throws Error if the field is missing or an error is negative.
+// one standard deviation along the normal). A triangle counts as unseen if the error of a vertex
+// exceeds the bound or is not finite, or if the face field `filled` marks it as closing a hole of
+// the scan. Throws Error if the field is missing or an error is negative.
 GroundErrors errors_of(const libmap::TriangleMesh& mesh, const SurfaceErrorOptions& options);
-// Returns the same error for all vertices.
+// Returns the same standard deviation `error_m` for all vertices.
 GroundErrors constant_error(const libmap::TriangleMesh& mesh, double error_m,
                             const SurfaceErrorOptions& options);
 

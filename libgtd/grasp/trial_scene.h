@@ -1,4 +1,5 @@
-// Scene of one trial for images: ground, closed gripper, contacts and forces as one colored mesh.
+// Draws one trial of the virtual field test as a colored mesh: ground, closed gripper, contacts and
+// forces. For images of `graspmap grasp --scenes`.
 #pragma once
 
 #include <cstddef>
@@ -11,8 +12,9 @@
 
 namespace libgtd {
 
-// Part of the scene, value of the vertex field `scene_part`. idle: a finger that bears no force.
-// cone: forces of the steepest facet of a contact. pull: the limiting direction.
+// Part of the scene, stored in the vertex field `scene_part`. engaged, link: contacts that bear a
+// force. idle: a finger that bears no force. cone: forces that a contact can bear on its steepest
+// facet. pull: the direction with the least holding force.
 enum class ScenePart { ground, gripper, engaged, link, idle, cone, pull, load };
 
 struct ScenePartStyle {

@@ -1,5 +1,5 @@
-// Path of closing fingers over a map, and the pull that the spines of a finger bear as a function
-// of the slope of the ground below it.
+// Gripper model of method `calibrated`: the path of a closing finger over the voxel columns of a
+// map, and the pull that its spines bear as a function of the slope of the ground.
 #pragma once
 
 #include <cstddef>
@@ -9,13 +9,13 @@
 
 namespace libgtd {
 
-// Largest force away from the ground that a finger bears, in closing forces, for ground that falls
-// outward by -90 .. 90 degrees and for each parameter set; mean over draws of its spines. Spines
-// share the force in equal parts. A finger bears on its k steepest facets
-//   min(P tan b / (1 - c tan b), k L sin b),  b = fall + psi_k + atan(friction) - 90 deg,
-// where P is the closing force, L the limit of a spine and c = sin g cos g / (1 + sin^2 g) on
-// ground that falls by g if the drive resists opening (else 0), as in holding_force.h. The maximum
-// over k counts.
+// Largest force away from the ground that a finger bears, in units of the closing force P, for each
+// parameter set and for ground that falls outward by g = -90 .. 90 degrees; mean over draws of its
+// spines' facets. Spines share the force in equal parts. With its k steepest facets a finger bears
+//   min(P tan b / (1 - c tan b), k L sin b),  b = g + psi_k + atan(friction) - 90 deg,
+// where psi_k is the inclination of the k-th facet, L the force limit of a spine and c = sin g cos
+// g / (1 + sin^2 g) if the drive resists opening (else 0), as in holding_force.h. The maximum over
+// k counts.
 struct FingerPulls {
   std::size_t sets = 0;
   std::vector<float> pulls;   // at (fall + 90) * sets + set

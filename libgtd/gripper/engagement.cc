@@ -37,15 +37,15 @@ void Engagement::check() const {
 void bind(libmap::ParameterTable& table, Engagement& engagement) {
   constexpr libmap::Range lean{0.0, 90.0};
   table.add("engagement.friction", engagement.friction, libmap::not_negative,
-            "coefficient of Coulomb friction of spines and links");
+            "coefficient of Coulomb friction of spines and links on the ground");
   table.add("engagement.asperity_min_deg", engagement.asperity_min_deg, lean,
-            "minimum inclination of a facet against the drag, degrees");
+            "minimum inclination of an asperity's facet against the drag direction, degrees");
   table.add("engagement.asperity_max_deg", engagement.asperity_max_deg, lean,
-            "maximum inclination of a facet against the drag, degrees");
+            "maximum inclination of an asperity's facet against the drag direction, degrees");
   table.add("engagement.engagement_rate", engagement.engagement_rate, libmap::not_negative,
-            "rate at which a dragged spine meets facets, 1/mm");
+            "mean number of facets that a dragged spine meets, 1/mm");
   table.add("engagement.drag_mm", engagement.drag_mm, libmap::not_negative,
-            "distance that spines are dragged, mm");
+            "distance over which the closing gripper drags its spines, mm");
 }
 
 double engagement_share(const Engagement& engagement, double spine_tip_radius_um) {

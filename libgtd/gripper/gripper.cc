@@ -17,29 +17,29 @@ void bind(libmap::ParameterTable& table, Gripper& gripper) {
   using libmap::not_negative;
   using libmap::positive;
   table.add("name", gripper.name, "name of the gripper");
-  table.add("palm_diameter_mm", gripper.palm_diameter_mm, positive, "diameter of the palm");
+  table.add("palm_diameter_mm", gripper.palm_diameter_mm, positive, "diameter of the palm, mm");
   table.add("finger_joint_diameter_mm", gripper.finger_joint_diameter_mm, positive,
-            "diameter of the circle of the finger joints");
+            "diameter of the circle through the finger joints, mm");
   table.add("finger_length_mm", gripper.finger_length_mm, positive,
-            "length of a finger, joint to spine carrier");
+            "length of a finger from its joint to the spine carrier, mm");
   table.add("spine_length_mm", gripper.spine_length_mm, positive,
-            "length of a spine, carrier to tip");
+            "length of a spine from its carrier to its tip, mm");
   table.add("spine_depth_mm", gripper.spine_depth_mm, not_negative,
-            "depth of a spine in the ground");
+            "depth to which a spine penetrates the ground, mm");
   table.add("opening_angle_deg", gripper.opening_angle_deg, {0.0, 90.0, true, false},
-            "angle of a finger to the palm's axis, open");
+            "angle between a finger and the palm's axis when open, degrees");
   table.add("closing_angle_deg", gripper.closing_angle_deg, angle,
-            "angle of a finger to the palm's axis, closed");
+            "angle between a finger and the palm's axis when closed, degrees");
   table.add("opening_spine_radius_mm", gripper.opening_spine_radius_mm, positive,
-            "radius of the circle of spine tips, open");
+            "radius of the circle through the spine tips when open, mm");
   table.add("opening_spine_depth_mm", gripper.opening_spine_depth_mm, not_negative,
-            "depth of the spine tips below the palm, open");
+            "depth of the spine tips below the palm when open, mm");
   table.add("closing_height_mm", gripper.closing_height_mm, positive,
-            "height of the palm above the spine tips, closed");
+            "height of the palm above the spine tips when closed, mm");
   table.add("top_solid_margin_mm", gripper.top_solid_margin_mm, not_negative,
-            "margin of the diameter of the solid disc on top of the mask");
+            "margin added to the diameter of the solid disc at the top of the mask, mm");
   table.add("bottom_void_margin_mm", gripper.bottom_void_margin_mm, not_negative,
-            "margin of the radius of the void at the bottom of the mask");
+            "margin added to the radius of the void at the bottom of the mask, mm");
 }
 
 void Gripper::check() const {
@@ -56,10 +56,11 @@ void Gripper::check() const {
 void bind(libmap::ParameterTable& table, GripperFingers& fingers) {
   using libmap::positive;
   table.add("fingers.count", fingers.count, {1, 64}, "number of fingers");
-  table.add("fingers.curl_deg", fingers.curl_deg, {0.0, 90.0},
-            "inward angle of the distal link to the proximal link, free finger, degrees");
+  table.add(
+      "fingers.curl_deg", fingers.curl_deg, {0.0, 90.0},
+      "inward angle of the distal link to the proximal link of a finger without contact, degrees");
   table.add("fingers.curl_limit_deg", fingers.curl_limit_deg, {0.0, 170.0},
-            "maximum inward angle of the distal link, proximal link stopped, degrees");
+            "maximum inward angle of the distal link after the proximal link has stopped, degrees");
   table.add("fingers.spines_per_finger", fingers.spines_per_finger, {1, 1000},
             "number of spines per finger");
   table.add("fingers.spine_tip_radius_um", fingers.spine_tip_radius_um, {0.0, 1000.0, true, false},
@@ -69,13 +70,13 @@ void bind(libmap::ParameterTable& table, GripperFingers& fingers) {
   table.add("fingers.closing_force_n", fingers.closing_force_n, positive,
             "force of one finger toward the palm's axis, N");
   table.add("fingers.holds_when_closed", fingers.holds_when_closed,
-            "the drive resists any opening force");
+            "true if the drive resists any force that opens the fingers");
 }
 
 void GripperFingers::check() const {
   libmap::check_parameters(*this);
   if (curl_limit_deg < curl_deg)
-    throw libmap::Error("less than the curl of a free finger",
+    throw libmap::Error("less than the curl of a finger without contact",
                         {.field = "fingers.curl_limit_deg",
                          .value = libmap::to_text(curl_limit_deg),
                          .bound = ">= fingers.curl_deg, " + libmap::to_text(curl_deg)});
@@ -83,8 +84,9 @@ void GripperFingers::check() const {
 
 void require_fingers(const Gripper& gripper) {
   if (!gripper.fingers)
-    throw libmap::Error("missing: required for forces, not for method corrected",
-                        {.field = "fingers"});
+    throw libmap::Error(
+        "is missing: forces require this section of the gripper file (method corrected does not)",
+        {.field = "fingers"});
 }
 
 ParameterValues parameters_of(const Gripper& gripper) {

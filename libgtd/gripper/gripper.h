@@ -22,7 +22,7 @@ struct GripperFingers {
   double spine_tip_radius_um = 0.0;  // radius of the rounded tip
   double spine_force_limit_n = 0.0;  // maximum force on one spine or the asperity below it
   double closing_force_n = 0.0;      // force of one finger toward the palm's axis
-  bool holds_when_closed = false;    // the drive resists any opening force, e.g. a ball screw
+  bool holds_when_closed = false;    // drive resists any opening force, e.g. a ball screw
 
   // Throws Error naming the key, its value and its bound.
   void check() const;

@@ -43,9 +43,9 @@ struct GripperKeys {
     bind(table, gripper.engagement);
     for (std::size_t n = 0; n < uncertain_parameters; ++n)
       table.add("ranges." + uncertain_parameter_names()[n], ranges[n],
-                "bounds of the prior of the parameter: LOW, HIGH");
+                "prior bounds of the parameter in a fit to pull tests: LOW, HIGH");
     table.add("ensemble.sets", sets,
-              "parameter sets, one per line: weight and uncertain parameters");
+              "fitted parameter sets, one per line: weight, then the uncertain parameters");
   }
 };
 
@@ -82,7 +82,7 @@ std::vector<ParameterSet> parse_sets(const std::string& text) {
     sets.push_back(set);
   }
   if (!sets.empty() && !(sum > 0.0))
-    throw libmap::Error("has no positive weight",
+    throw libmap::Error("contains no set with a positive weight",
                         {.field = "ensemble.sets", .bound = "> 0 in sum"});
   for (ParameterSet& set : sets) set.weight /= sum;
   return sets;

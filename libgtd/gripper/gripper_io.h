@@ -18,7 +18,7 @@ Gripper read_gripper(const std::filesystem::path& path,
                      const std::vector<std::pair<std::string, std::string>>& overrides = {});
 
 // Parses the text of a gripper file, called `file` in errors. A URDF path is relative to its
-// folder.
+// folder. Throws like read_gripper.
 Gripper parse_gripper(const std::string& yaml, const std::string& file,
                       const std::vector<std::pair<std::string, std::string>>& overrides = {});
 

@@ -143,7 +143,7 @@ class Robot {
   }
   static Error missing(const std::string& key, const std::string& name,
                        const std::vector<std::string>& known) {
-    return Error("is not in the URDF" + libmap::did_you_mean(name, known),
+    return Error("not in the URDF" + libmap::did_you_mean(name, known),
                  {.field = key, .value = name});
   }
 
@@ -181,7 +181,7 @@ std::vector<FingerNames> matching_fingers(const UrdfMapping& mapping, const Robo
       fingers.push_back(finger);
   }
   if (fingers.empty())
-    throw Error("no joint of the URDF has a matching name and a spine joint or tip for it",
+    throw Error("no joint of the URDF matches this name and has a matching spine joint or tip link",
                 {.field = "urdf.finger_joint", .value = pattern});
   return fingers;
 }
@@ -258,19 +258,20 @@ class Finger {
       throw wrong_joint(joint.name, "is not revolute with limits (open and closed finger)");
     for (const double limit : {joint.limits->lower, joint.limits->upper})
       if (!(std::abs(limit) <= 2.0 * std::numbers::pi))
-        throw Error("expected radians", {.field = "limit of joint " + joint.name,
-                                         .value = libmap::to_text(limit),
-                                         .bound = ">= -2 pi and <= 2 pi"});
+        throw Error("not an angle in radians", {.field = "limit of joint " + joint.name,
+                                                .value = libmap::to_text(limit),
+                                                .bound = ">= -2 pi and <= 2 pi"});
     if (!(joint.limits->lower < joint.limits->upper))
-      throw Error("no range of motion", {.field = "upper limit of joint " + joint.name,
-                                         .value = libmap::to_text(joint.limits->upper),
-                                         .bound = "> " + libmap::to_text(joint.limits->lower)});
+      throw Error("the joint has no range of motion",
+                  {.field = "upper limit of joint " + joint.name,
+                   .value = libmap::to_text(joint.limits->upper),
+                   .bound = "> " + libmap::to_text(joint.limits->lower)});
   }
   void require_length(const std::string& what, double length_m) const {
     if (!(length_m > 0.0 && length_m <= max_length_m))
-      throw Error("expected meters", {.field = what + " of joint " + joint_.name,
-                                      .value = libmap::to_text(length_m),
-                                      .bound = "> 0 and <= 1 m"});
+      throw Error("not a length in meters", {.field = what + " of joint " + joint_.name,
+                                             .value = libmap::to_text(length_m),
+                                             .bound = "> 0 and <= 1 m"});
   }
   void require_tangential(const urdf::Joint& joint, const Eigen::Vector3d& axis) const {
     const double cosine = std::abs(axis.dot(tangent()));

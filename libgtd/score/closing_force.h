@@ -1,20 +1,5 @@
-// Predicts the force that a gripper holds at a voxel from the heights of the surrounding columns:
-// method `calibrated`.
-//
-// The palm descends upright on a column until it or an open finger meets ground. Each of 16 fingers
-// then follows its closing path until one of its positions is inside the ground. If this is the
-// outer half of the distal link, its spines pull with the force of FingerPulls for the fall of the
-// ground there, and all of them push. The capacity C of the column is the largest pull away from
-// the ground that these forces balance, including moments about horizontal axes, computed by its
-// dual on a grid,
-//   C = min over sides b and u of mean over azimuths a of f(a, 1 - u cos(a - b)),
-// f(a, w) = w pull for w > 0, else -w push; lateral pulls bound it: C / sqrt(1 + (C / 0.55)^2).
-//
-// The resting position of the gripper is uncertain. Capacities are therefore averaged over the
-// columns around the voxel, with normal weights of a standard deviation of a quarter of the finger
-// length. From these means, 13 coefficients fitted once to the virtual field test
-// (closing_force.cc) give, for each parameter set, the fraction of trials with a force and the mean
-// and spread of its logarithm.
+// Predicts the force that a gripper can hold at each voxel from the heights of the surrounding
+// voxel columns, for the scoring method `calibrated`.
 #pragma once
 
 #include <vector>

@@ -31,20 +31,19 @@ struct FootholdFrame {
 struct Foothold {
   std::size_t map_point = 0;  // index in the map
   double score = 0.0;         // hold_probability if the map has this field, else the score
-  double force_n = 0.0;       // holding_force_n of the map, else 0; orders equal scores
+  double force_n = 0.0;  // holding_force_n of the map, else 0; first criterion for equal scores
   // Mean score of the map points within half of the separation, weighted by the Epanechnikov
-  // kernel. It orders footholds of equal score and force: the middle of a plateau precedes its
-  // border.
+  // kernel. Second criterion for equal scores: the middle of a plateau precedes its border.
   double mean_score = 0.0;
   std::size_t graspable_points = 0;  // graspable points within half of the separation
-  // Unit surface normal, outward (the side of the map's normals, or else up), principal curvatures
-  // in 1/m as in curvature.h, and the angle between normal and up. NaN if the fit failed.
+  // Unit surface normal, outward (on the side of the map's normals, or else up); principal
+  // curvatures, 1/m (curvature.h); angle between normal and up. NaN if the fit failed.
   Eigen::Vector3f normal = Eigen::Vector3f::Zero();
   float k1 = 0.0F;
   float k2 = 0.0F;
   double slope_deg = 0.0;
-  // Unit direction of the approach, opposite to the axis of the matched mask. The axis is the
-  // normal of the map, or up if the map has no normals.
+  // Unit direction of the gripper's approach: opposite to the normal of the map, or to up if the
+  // map has no normals.
   Eigen::Vector3d approach = Eigen::Vector3d::Zero();
 };
 

@@ -33,7 +33,7 @@ void append(PointCloud& whole, const PointCloud& part) {
   for (ScalarField& field : whole.fields) {
     const ScalarField* other = part.find_field(field.name);
     if (other == nullptr || part.fields.size() != whole.fields.size())
-      throw libmap::Error("the parts have different fields", {.field = field.name});
+      throw libmap::Error("is not a field of all parts of the map", {.field = field.name});
     // Text files have no types: a part that contains only integers is read as int32.
     if (field.type != other->type) field.type = ScalarType::float64;
     add(field.values, other->values);

@@ -28,7 +28,7 @@ void require_same_map(const Manifest& first, const Manifest& other, const std::s
   // Other versions may score the same points differently.
   if (other.version != first.version)
     throw libmap::Error(
-        "was scored by another version than " + first_name,
+        "not the version of graspmap that scored " + first_name,
         {.file = name, .field = "version", .value = other.version, .bound = first.version});
   std::optional<std::string> key = differing_parameter(first, other);
   if (!key) key = differing_parameter(other, first);  // parameters that only the other has
@@ -57,11 +57,11 @@ void require_all_shares(const std::vector<Manifest>& manifests,
     const std::string share = share_text(manifests[n]);
     const std::string of = share.substr(std::min(share.find('/') + 1, share.size()));
     if (n > 0 && of != count)
-      throw libmap::Error("is not a share of the same tiles",
+      throw libmap::Error("not a share of the same tiles as the first file's",
                           {.file = files[n], .field = "tile", .value = share});
     count = of;
     if (!shares.insert(share).second)
-      throw libmap::Error("two files contain this share",
+      throw libmap::Error("two files contain the same share",
                           {.file = files[n], .field = "tile", .value = share});
   }
   if (std::to_string(shares.size()) != count)

@@ -1,4 +1,4 @@
-// Joins shares of a map that `graspmap score --tile K/N` wrote into separate files.
+// Checks and joins shares of a map: files that several runs of `graspmap score --tile K/N` wrote.
 #pragma once
 
 #include <cstddef>
@@ -18,12 +18,12 @@ bool is_map_share(const libmap::Manifest& manifest);
 void require_shares_of_one_map(const std::vector<libmap::Manifest>& manifests,
                                const std::vector<std::string>& files);
 
-// Copies parameters, frame, transforms and those results of a share or tile that are valid for the
-// whole map.
+// Copies to the manifest of the whole map what is equal in all shares: parameters, frame,
+// transforms, and results such as those of the plane.
 void copy_common_facts(const libmap::Manifest& part, libmap::Manifest& whole);
 
-// Adds obstacles with the parameters of a share and returns the number of obstacle points. Throws
-// like add_obstacles.
+// Adds obstacles to the merged map `whole` with the parameters of a share, and returns the number
+// of obstacle points. Throws like add_obstacles.
 std::size_t add_obstacles_of(const libmap::Manifest& part, libmap::PointCloud& whole);
 
 // Returns the number of points whose field `flag` is 1; 0 if the map has no such field.

@@ -1,6 +1,6 @@
-// Inner loops of upright and tilted voxel matching, compiled for several instruction sets with
-// identical results. The interface uses plain pointers only: sources compiled for more than the
-// base instruction set must not see types with inline functions that other sources compile, too.
+// Inner loops of voxel matching (voxel_matching.h, tilted_matching.h), compiled for several
+// instruction sets with identical results. The interface uses plain pointers only: sources compiled
+// for larger instruction sets must not contain types with inline functions of other sources.
 #pragma once
 
 #include <cstddef>

@@ -46,7 +46,7 @@ void check(const std::vector<Voxel>& voxels, const std::vector<float>& slopes_de
                          .bound = std::to_string(voxels.size())});
   for (std::size_t n = 1; n < voxels.size(); ++n)
     if (!(voxels[n - 1] < voxels[n]))
-      throw libmap::Error("the voxels do not ascend", {.field = "i, j, k"});
+      throw libmap::Error("the voxels are not sorted", {.field = "i, j, k"});
 }
 
 void check(double voxel_size_m, const ObstacleOptions& options) {

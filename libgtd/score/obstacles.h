@@ -1,6 +1,6 @@
-// Finds voxels of a map that are too high and too steep to be reached, for a planner (slope and
-// step height as measures of traversability: Wermelinger et al., "Navigation Planning for Legged
-// Robots in Challenging Terrain", 2016).
+// Finds obstacles for a planner: voxels of a map on faces that are too steep and too high to climb,
+// and the ground above them (slope and step height as measures of traversability: Wermelinger et
+// al., "Navigation Planning for Legged Robots in Challenging Terrain", 2016).
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,5 @@
-// Scanned columns of voxels: the occupied columns, closed over the gaps between points.
+// Finds the scanned area of a voxel grid: the occupied voxel columns, closed over the gaps between
+// points. Mask windows that leave it are at the border of the map.
 #pragma once
 
 #include <cstddef>

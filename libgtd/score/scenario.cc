@@ -16,21 +16,22 @@ void bind(libmap::ParameterTable& table, Scenario& scenario) {
   using libmap::not_negative;
   using libmap::positive;
   table.add("method", scenario.method, method_names(),
-            "calibrated: hold probability; corrected: shape only; others: earlier programs");
-  table.add("gripper", scenario.gripper, "scar-e, hubrobo, limbero, or a gripper file");
+            "scoring method; calibrated: hold probability; corrected: shape only; others: earlier "
+            "programs");
+  table.add("gripper", scenario.gripper, "gripper: scar-e, hubrobo, limbero, or a gripper file");
   table.add("voxel_size_m", scenario.voxel_size_m, positive, "edge of a voxel, m");
   table.add("extra_void_layers", scenario.extra_void_layers, {0, 10000},
-            "void layers on top of the gripper mask (H_add), voxels");
+            "number of void layers added on top of the gripper mask (H_add)");
   table.add("solid_voxel_threshold", scenario.solid_voxel_threshold, {1, 2147483647},
-            "number of solid voxels below which the score is reduced (TSV)");
+            "number of solid voxels inside the mask below which the score is reduced (TSV)");
   table.add("load_n", scenario.load_n, positive,
-            "pull for which method calibrated predicts the hold probability, N");
+            "pull on the gripper for which method calibrated predicts the hold probability, N");
   table.add(
       "zero_plane_m", scenario.zero_plane_m, libmap::any_number,
       "minimum height of a target in the terrain frame, m; auto: 0; not used by method calibrated");
-  table.add("interpolation", scenario.interpolation, "fills gaps by Delaunay interpolation");
+  table.add("interpolation", scenario.interpolation, "fill gaps by Delaunay interpolation");
   table.add("interpolation_max_edge_m", scenario.interpolation_max_edge_m, not_negative,
-            "maximum edge of an interpolated triangle, m; 0: no limit");
+            "maximum edge length of an interpolated triangle, m; 0: no limit");
   table.add("graspability_threshold", scenario.graspability_threshold, libmap::zero_to_one,
             "minimum score of a graspable voxel; auto: 0.8; not used by method calibrated");
   table.add("probability_threshold", scenario.probability_threshold, libmap::zero_to_one,
@@ -40,7 +41,7 @@ void bind(libmap::ParameterTable& table, Scenario& scenario) {
   table.add("intersection_distance_m", scenario.intersection_distance_m, positive,
             "maximum distance of a convex voxel from a convex point, m");
   table.add("orientation", scenario.orientation, orientation_names(),
-            "axis of the mask: normal of the plane, or of the surface at each voxel");
+            "mask axis: normal of the regression plane, or of the surface at each voxel");
   table.add("normal_radius_m", scenario.normal_radius_m, not_negative,
             "radius of the surface normal fits, m; 0: palm diameter of the gripper");
   table.add("obstacle_height_m", scenario.obstacle_height_m, not_negative,

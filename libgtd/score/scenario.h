@@ -1,4 +1,4 @@
-// Parameters of a detection, as in a scenario file (tab. B 2-1 of the thesis).
+// Scenario: all parameters of a detection, as in a scenario file (tab. B 2-1 of the thesis).
 #pragma once
 
 #include <optional>
@@ -35,23 +35,23 @@ struct Scenario {
   double intersection_distance_m = 0.01;
   Orientation orientation = Orientation::plane;
   double normal_radius_m = 0.0;  // radius of normal fits; 0: palm diameter of the gripper
-  // Minimum rise of a steep face that is an obstacle, like the unreachable ground above it; 0: not
-  // evaluated.
+  // Minimum rise of a steep face that counts as an obstacle; ground above it is unreachable. 0:
+  // obstacles are not evaluated.
   double obstacle_height_m = 0.0;
-  double obstacle_slope_deg = 60.0;  // minimum slope of steep voxels; 0: not evaluated
+  double obstacle_slope_deg = 60.0;  // minimum slope of a steep face; 0: not evaluated
   double tile_size_m = 1.0;
 
-  // Zero plane (m; -infinity with method calibrated) and minimum score of a graspable voxel that
-  // the method uses.
+  // Return the values that the method uses: height of the zero plane (terrain frame, m; -infinity
+  // with method calibrated), and minimum score of a graspable voxel.
   double lowest_target_m() const;
   double score_threshold() const;
-  // Sets zero plane and threshold to these values, so that a manifest contains them.
+  // Sets zero_plane_m and graspability_threshold to these values, so that a manifest contains them.
   void set_defaults();
   bool evaluates_obstacles() const { return obstacle_height_m > 0.0 && obstacle_slope_deg > 0.0; }
   bool fits_normals() const { return orientation == Orientation::surface || evaluates_obstacles(); }
 
-  // Throws Error naming the field, its value and its bound. `orientation` surface is rejected with
-  // methods that prepare the cloud on a lattice of their own, as the author's program does.
+  // Throws Error naming the field, its value and its bound, also for orientation `surface` with the
+  // methods thesis, envelope and calibrated.
   void check() const;
 };
 

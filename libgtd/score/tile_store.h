@@ -1,5 +1,5 @@
-// Index of a tile store as plain data. A store is a folder NAME.tiles with an index and one cloud
-// file per tile, each a part of the map as made by to_cloud. tile_store_io.h reads and writes it.
+// Index of a map in a tile store: a folder NAME.tiles with one cloud file per tile, each a part of
+// the map as made by to_cloud. Plain data; tile_store_io.h reads and writes it.
 #pragma once
 
 #include <compare>

@@ -134,10 +134,10 @@ Json json_of(const TileStoreIndex& index) {
 TileStoreIndex index_from(const Json& json, const std::string& file) {
   if (json.at("format") != format_name)
     throw libmap::Error(
-        "is not of this format",
+        "not the format of a tile store",
         {.field = "format", .value = json.at("format").dump(), .bound = format_name});
   if (json.at("version") != format_version)
-    throw libmap::Error("is of a version that this graspmap does not read",
+    throw libmap::Error("this graspmap cannot read this version",
                         {.field = "version",
                          .value = json.at("version").dump(),
                          .bound = std::to_string(format_version)});
@@ -161,7 +161,7 @@ TileStoreIndex index_from(const Json& json, const std::string& file) {
   for (const Json& one : json.at("tiles")) {
     const StoredTile tile = tile_from(one, index);
     if (!index.tiles.empty() && !(index.tiles.back().number < tile.number))
-      throw libmap::Error("tiles do not ascend", {.field = "tiles", .value = tile.file});
+      throw libmap::Error("the tiles are not sorted", {.field = "tiles", .value = tile.file});
     index.tiles.push_back(tile);
   }
   return index;
@@ -255,7 +255,7 @@ TerrainFile terrain_file_from(const Json& json) {
 
 TilePlan plan_from(const Json& json, const std::string& file) {
   if (json.at("format") != plan_format || json.at("version") != plan_version)
-    throw libmap::Error("is not of this format and version",
+    throw libmap::Error("not the format and version of a plan that this graspmap reads",
                         {.field = "format and version",
                          .value = json.at("format").dump() + ", " + json.at("version").dump(),
                          .bound = Json(plan_format).dump() + ", " + std::to_string(plan_version)});
@@ -298,7 +298,7 @@ void add_totals(const std::map<TileNumber, StoredTile>& tiles, TileStoreIndex& i
 
 libmap::Error not_the_tile(const fs::path& path, libmap::ErrorContext context) {
   context.file = path.string();
-  return libmap::Error("differs from the tile in the index; score again to replace it",
+  return libmap::Error("is not the tile that the index describes; score again to replace it",
                        std::move(context));
 }
 

@@ -30,15 +30,14 @@ bool is_tile_store_name(const std::filesystem::path& path);
 // version or with inconsistent content.
 TileStoreIndex read_tile_store(const std::filesystem::path& store);
 
-// Reads the index. If it is missing although all tiles are done, as after shares that ended at the
-// same time, it is written first. Throws like read_tile_store.
+// Reads the index. If it is missing although all tiles are done (after shares that ended at the
+// same time), writes it first. Throws like read_tile_store.
 TileStoreIndex finish_tile_store(const std::filesystem::path& store);
 
-// Returns the path of a tile file. Throws Error naming the file if it is missing or its size
-// differs from the index.
+// Returns the path of a tile file. Throws Error naming it if it is missing or differs in size.
 std::filesystem::path tile_path(const std::filesystem::path& store, const StoredTile& tile);
 
-// Also throws Error if the SHA-256 of the file differs from the index.
+// As tile_path, but also throws Error if the SHA-256 of the file differs from the index.
 std::filesystem::path checked_tile_path(const std::filesystem::path& store, const StoredTile& tile);
 
 // Input file of the terrain. Size and modification time identify it without reading it.

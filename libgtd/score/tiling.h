@@ -1,5 +1,6 @@
-// Scores the voxels of a terrain tile by tile. A tile reads its own voxels and a halo. The result
-// does not depend on the tile size, the order of the tiles or the number of threads.
+// Scores the voxels of a terrain with an upright gripper mask, tile by tile. A tile reads its own
+// voxels and those in a margin around it. The result does not depend on the tile size, the order of
+// the tiles or the number of threads.
 #pragma once
 
 #include <cstddef>

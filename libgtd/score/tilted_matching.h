@@ -1,5 +1,6 @@
-// Scores voxels with the mask tilted to the surface. Around each pivot, the points of the terrain
-// are voxelized on a separate lattice whose third axis is the surface normal.
+// Scores voxels with the gripper mask tilted to the surface normal (orientation `surface`), for
+// walls. Around each pivot voxel, the points of the terrain are voxelized on a separate lattice
+// whose third axis is the surface normal.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,7 +1,8 @@
-// Inner loops over the neighbors of a point, compiled for several instruction sets with identical
-// results: sums run in eight lanes, whatever the width of the registers, and are joined in a fixed
-// order. The interface uses plain pointers only: sources compiled for more than the base
-// instruction set must not see types with inline functions that other sources compile, too.
+// Inner loops of the curvature and normal fits over the neighbors of a point, compiled for several
+// instruction sets with identical results: sums run in eight lanes, whatever the width of the
+// registers, and are joined in a fixed order. The interface uses plain pointers only: sources
+// compiled for larger instruction sets must not contain types with inline functions of other
+// sources.
 #pragma once
 
 #include <cstddef>

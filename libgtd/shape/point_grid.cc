@@ -18,7 +18,7 @@ PointGrid::PointGrid(const std::vector<Eigen::Vector3d>& points, double cell_siz
     throw libmap::Error("out of range",
                         {.value = libmap::to_text(cell_size_m), .bound = "> 0 and finite"});
   if (points.size() > std::numeric_limits<std::uint32_t>::max())
-    throw libmap::Error("too many points for one search grid");
+    throw libmap::Error("the cloud has too many points (limit: 2^32)");
   high_ = Eigen::Vector3d::Constant(-std::numeric_limits<double>::infinity());
   low_ = -high_;
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -30,7 +30,7 @@ PointGrid::PointGrid(const std::vector<Eigen::Vector3d>& points, double cell_siz
   if (order_.empty()) return;
   const double extent = low_.cwiseAbs().cwiseMax(high_.cwiseAbs()).maxCoeff();
   if (!(extent / cell_size_m <= 0x1.0p40))
-    throw libmap::Error("the points are too far apart for a search radius this small",
+    throw libmap::Error("the search radius is too small for points this far from the origin",
                         {.value = libmap::to_text(cell_size_m) + " m cells up to " +
                                   libmap::to_text(extent) + " m from the origin"});
 

@@ -1,9 +1,8 @@
-// Points sorted into cubic cells for radius searches. A search visits few cells, always in the same
-// order, so that sums over neighbors are reproducible to the bit. The cells are on the lattice
-// through the origin of the frame, so that this order does not depend on the rest of the cloud: a
-// tile with its surroundings has the same results as the whole cloud. In a libmap::PointTree the
-// order depends on all points, and a search takes 8 times as long for the 27 neighbors of each of
-// 200,000 points, 12 times for 165.
+// Search grid for points within a radius, used by the curvature and normal fits. A search visits
+// few cells, always in the same order, so that sums over neighbors are reproducible to the bit.
+// Cells are aligned with the origin of the frame; the order therefore does not depend on the rest
+// of the cloud, and a tile with its surroundings has the same results as the whole cloud (unlike a
+// libmap::PointTree, which is also 8 to 12 times slower for 27 to 165 neighbors).
 #pragma once
 
 #include <Eigen/Core>
@@ -25,8 +24,7 @@ class PointGrid {
   // point is more than 2^40 cells from the origin of the frame.
   PointGrid(const std::vector<Eigen::Vector3d>& points, double cell_size_m);
 
-  // Returns true if a position is finite and at most one cell away from the bounding box of the
-  // points.
+  // Returns true if a position is finite and at most one cell away from the points' bounding box.
   bool reaches(const Eigen::Vector3d& position) const;
   // Returns the cell of a position for which reaches() is true.
   Cell cell_of(const Eigen::Vector3d& position) const;
@@ -66,8 +64,8 @@ class PointGrid {
   std::vector<Column> columns_;  // with a sentinel at the end
 };
 
-// Bits of a position. Points with the same bits have the same neighborhood results. Zeros of
-// different sign differ, because sums of differences may depend on the sign.
+// Returns the bits of a position. Points with the same bits have the same neighborhood results.
+// Zeros of different sign differ, because sums of differences may depend on the sign.
 inline std::array<std::uint64_t, 3> position_bits(const Eigen::Vector3d& position) {
   return {std::bit_cast<std::uint64_t>(position.x()), std::bit_cast<std::uint64_t>(position.y()),
           std::bit_cast<std::uint64_t>(position.z())};

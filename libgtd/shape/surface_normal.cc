@@ -80,7 +80,7 @@ std::vector<SurfaceNormal> fit_surface_normals(const libmap::PointCloud& cloud,
   if (!options.up.allFinite() || !(options.up.norm() > 0))
     throw libmap::Error("has length zero or is not finite", {.field = "up"});
   if (!outsides.empty() && outsides.size() != positions.size())
-    throw libmap::Error("number of outsides differs from number of places",
+    throw libmap::Error("number of outer directions differs from number of positions",
                         {.field = "outsides",
                          .value = std::to_string(outsides.size()),
                          .bound = std::to_string(positions.size())});

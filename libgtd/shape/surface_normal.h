@@ -1,4 +1,4 @@
-// Surface normals and slopes of a terrain, fitted within a radius.
+// Fits surface normals and slopes of a terrain to the points within a radius.
 #pragma once
 
 #include <Eigen/Core>
@@ -40,10 +40,10 @@ inline bool determines_plane(const Eigen::Vector3d& variances) {
 }
 
 // Fits the regression plane (eq. 2-13..2-15) to the points of the cloud within the radius of each
-// of `places`. Normals face `outsides`, directions of any length, one per place or none at all. If
-// an outside is zero, not finite or along the surface, `up` replaces it. A result does not depend
-// on points outside the radius, on the other places or on the number of threads. Throws Error for a
-// radius that is not positive, an `up` of length zero, and arrays of different length.
+// of `positions` (m). Normals face `outsides`, directions of any length, one per position or none
+// at all. If an outside is zero, not finite or along the surface, `up` replaces it. A result does
+// not depend on points outside the radius, other positions or the number of threads. Throws Error
+// for a radius that is not positive, an `up` of length zero, and arrays that differ in length.
 std::vector<SurfaceNormal> fit_surface_normals(const libmap::PointCloud& cloud,
                                                const std::vector<Eigen::Vector3d>& positions,
                                                const std::vector<Eigen::Vector3f>& outsides,

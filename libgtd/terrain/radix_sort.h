@@ -1,6 +1,6 @@
-// Stable, linear-time radix sort by unsigned integers (least significant digit first). The voxels
-// of a terrain of 72,669 points take 1.7 ms, std::sort 5.2 ms; Boost's spreadsort takes 2.8 ms and
-// is not stable.
+// Sorts voxels and cells in linear time: stable radix sort by unsigned integers (least significant
+// digit first). The voxels of a terrain of 72,669 points take 1.7 ms, std::sort 5.2 ms; Boost's
+// spreadsort takes 2.8 ms and is not stable.
 #pragma once
 
 #include <array>

@@ -157,8 +157,7 @@ void check_spread(const Vector3d& variances, const Vector3d& centroid, std::size
                         {.field = "points", .value = std::to_string(count), .bound = ">= 3"});
   const double size = std::sqrt(variances[2]);
   const double rounding = 1e-15 * centroid.norm();
-  if (!(size > 4 * rounding))
-    throw libmap::Error("all points are in one place: no plane can be fitted");
+  if (!(size > 4 * rounding)) throw libmap::Error("all points coincide: no plane can be fitted");
   // Single-precision coordinates have noise of about 1e-7 of the offset across an exact line.
   if (!(std::sqrt(variances[1]) > 1e-6 * size + 4 * rounding))
     throw libmap::Error("all points are on a line: no plane can be fitted");
@@ -341,8 +340,8 @@ double choose_up(const Facts& facts, const RegressionPlaneOptions& options, cons
     const double side = side_of(fit.normal, *options.up);
     if (side == 0)
       throw libmap::Error(
-          "this direction does not determine which side of the plane is up: it has length zero or "
-          "is in the plane",
+          "does not determine which side of the plane is up: its length is zero or it is parallel "
+          "to the plane",
           {.field = "up"});
     const double tilt_deg = std::acos(std::min(1.0, std::abs(side))) * 180.0 / std::numbers::pi;
     if (tilt_deg > options.max_tilt_deg)

@@ -68,10 +68,10 @@ void visit_pairs(const std::vector<Voxel>& voxels, int reach, const Visit& visit
 // Returns the number of voxels without an occupied one among their 26 neighbors.
 std::size_t count_isolated(const std::vector<Voxel>& voxels);
 
-// Throws Error naming the spacing of the points if more than 60 % of the voxels are lone: such
-// points do not form a surface at this voxel size. A regular grid with a spacing of more than two
-// voxels has 100 %, one of 1.5 voxels less than half. The published pre-scanned cloud of scenario 2
-// has 54 % at its published voxel size and must be accepted.
+// Throws Error naming the spacing of the points if more than 60 % of the voxels are lone (have no
+// neighbor): such points do not form a surface at this voxel size. A regular grid with a spacing of
+// more than two voxels has 100 %, one of 1.5 voxels less than half. The published pre-scanned cloud
+// of scenario 2 has 54 % at its published voxel size and must be accepted.
 void require_dense(std::size_t lone, std::size_t voxels, double voxel_size_m,
                    const std::vector<Eigen::Vector3d>& points);
 

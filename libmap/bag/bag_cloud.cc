@@ -35,9 +35,9 @@ constexpr std::pair<std::uint8_t, StoredType> field_types[] = {
 StoredType type_of(const PointField& field) {
   for (const auto& [number, type] : field_types)
     if (number == field.datatype) return type;
-  throw Error("unknown type", {.field = "datatype of field " + field.name,
-                               .value = std::to_string(field.datatype),
-                               .bound = "1 to 8"});
+  throw Error("unknown type of number", {.field = "datatype of field " + field.name,
+                                         .value = std::to_string(field.datatype),
+                                         .bound = "1 to 8"});
 }
 
 // Returns the number of a type; all types have one.
@@ -49,7 +49,7 @@ std::uint8_t number_of(ScalarType type) {
 
 Error does_not_fit(const std::string& field, std::uint64_t value, std::uint64_t least) {
   return Error(
-      "too small for its content",
+      "too small for the content of the message",
       {.field = field, .value = std::to_string(value), .bound = ">= " + std::to_string(least)});
 }
 
@@ -91,7 +91,7 @@ void add_columns(const PointField& field, const PointCloud2& message, const std:
     return add_packed_color_columns(first + field.offset, message.point_step, message.is_bigendian,
                                     set);
   if (count > max_columns || set.columns.size() + count > max_columns)
-    throw Error("more than 1024 numbers per point", {.field = "field " + name});
+    throw Error("has more than 1024 numbers per point", {.field = "field " + name});
   for (std::size_t n = 0; n < count; ++n)
     set.columns.push_back({count == 1 ? name : name + "_" + std::to_string(n), scalar_type_of(type),
                            type, first + field.offset + n * bytes, message.point_step, swapped});

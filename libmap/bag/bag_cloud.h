@@ -1,4 +1,4 @@
-// Reader of a point cloud from a bag.
+// Reads a point cloud from a ROS bag.
 #pragma once
 
 #include <cstddef>

@@ -20,10 +20,11 @@ const BagStorage& storage_of(const fs::path& file) {
   if (head.starts_with("#ROSBAG V2.0\n") || head.starts_with("#ROSBAG V1.")) return ros1_storage;
   if (head.starts_with("SQLite format 3")) return sqlite_storage;
   if (head.starts_with("\x89MCAP0\r\n")) return mcap_storage;
-  throw Error("not a bag", {.file = file.string(),
-                            .field = "first line",
-                            .value = ros_message::printable(head.substr(0, head.find('\n'))),
-                            .bound = "#ROSBAG V2.0 or V1.x, SQLite format 3 or MCAP"});
+  throw Error("the file is not a bag",
+              {.file = file.string(),
+               .field = "first line",
+               .value = ros_message::printable(head.substr(0, head.find('\n'))),
+               .bound = "#ROSBAG V2.0 or V1.x, SQLite format 3 or MCAP"});
 }
 
 }  // namespace
@@ -118,10 +119,10 @@ const BagTopic& require_topic(const BagListing& listing, const std::string& name
   for (const BagTopic& topic : listing.topics) {
     if (topic.name == name && topic.has_definition_of(type)) return topic;
     if (topic.name == name && topic.is(type))
-      throw Error("not the supported definition of " + topic.type,
+      throw Error("not the md5sum of the supported definition of " + topic.type,
                   {.field = "md5sum of " + name, .value = topic.md5sum, .bound = type.md5sum});
     if (topic.name == name)
-      throw Error("wrong type",
+      throw Error("not the required type",
                   {.field = "type of " + name, .value = topic.type, .bound = type.name});
     names.push_back(topic.name);
   }

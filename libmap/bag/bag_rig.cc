@@ -335,11 +335,10 @@ void add_images(const SurveyedImages& images, std::size_t camera, bool calibrate
     if (count > 0)
       plan.warnings.push_back(images.topic + ": " + std::to_string(count) + " images " + text);
   };
-  warn(twice, "have a duplicate stamp and are dropped");
-  warn(otherwise, "differ from the first calibration and are dropped");
+  warn(twice, "are dropped because an earlier image has the same stamp");
+  warn(otherwise, "are dropped because their calibration differs from the first");
   if (images.unstamped)
-    plan.warnings.push_back(images.topic +
-                            ": images without a stamp; the recording times are used");
+    plan.warnings.push_back(images.topic + ": images have no stamp; the recording times are used");
 }
 
 // Selects synchronized sets and keeps their images only.
@@ -408,7 +407,7 @@ BagRigPlan plan_of(const fs::path& bag, const BagRigOptions& options,
     if (!options.rig)
       plan.rig.cameras[n].name = choices[n].name.empty() ? names[n] : choices[n].name;
     if (std::find(plan.topics.begin(), plan.topics.end(), choices[n].topic) != plan.topics.end())
-      throw Error("is named twice", {.field = "topic", .value = choices[n].topic});
+      throw Error("the topic is named twice", {.field = "topic", .value = choices[n].topic});
     if (!plan.topics[camera].empty())
       throw Error("belongs to the same camera as " + plan.topics[camera],
                   {.field = "topic", .value = choices[n].topic});
@@ -433,14 +432,15 @@ void bind(ParameterTable& table, BagRigOptions& options) {
   table.add("depth_unit_m", options.depth_unit_m, positive,
             "meters per unit of 16-bit images in the bag");
   table.add("depth_scale_m", options.depth_scale_m, not_negative,
-            "meters per unit of the written images; 0: the rig's, or as in the bag, 0.1 mm for "
-            "floats");
+            "meters per unit of the written depth images; 0: as in the rig file, else as in the "
+            "bag (0.0001 m for floating-point images)");
   table.add("near_m", options.near_m, not_negative,
             "minimum depth of the rig, m; 0: the rig's own");
   table.add("far_m", options.far_m, positive, "maximum depth of the rig, m; inf: the rig's own");
   table.add("tolerance_s", options.tolerance_s, not_negative,
             "maximum time between an image and the stamp of its synchronized set, s");
-  table.add("every", options.every, {1.0}, "interval of the exported synchronized sets; 1: all");
+  table.add("every", options.every, {1.0},
+            "step between exported synchronized image sets; 1: export all");
 }
 
 std::vector<std::string> names_in_rig_folder(const BagRigPlan& plan) {

@@ -1,5 +1,4 @@
-// Export of the depth images of a robot's cameras from a bag to a rig and a folder of images
-// (rig_io.h).
+// Exports depth images of a robot's cameras from a ROS bag to a rig and its images (rig_io.h).
 #pragma once
 
 #include <cstddef>

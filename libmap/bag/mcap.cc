@@ -188,7 +188,7 @@ class McapReader {
       const auto id = record.number<std::uint16_t>();
       const auto channel = channels_.find(id);
       if (channel == channels_.end())
-        throw Error("is not declared",
+        throw Error("the file does not declare this channel",
                     {.field = "channel of a message", .value = std::to_string(id)});
       record.take(4);  // sequence number
       const auto stamp = static_cast<std::int64_t>(record.number<std::uint64_t>());
@@ -252,7 +252,7 @@ constexpr std::size_t chunk_bytes = std::size_t{4} << 20;
 
 std::string compression_name(BagCompression compression) {
   if (compression == BagCompression::bz2)
-    throw Error("is not supported by MCAP",
+    throw Error("MCAP does not support it",
                 {.field = "compression", .value = "bz2", .bound = "none, lz4 or zstd"});
   return compression == BagCompression::lz4    ? "lz4"
          : compression == BagCompression::zstd ? "zstd"
@@ -443,7 +443,7 @@ std::unique_ptr<BagSink> new_mcap(const fs::path& path, BagCompression compressi
 std::string decompress_chunk(const std::string& compression, std::string_view bytes,
                              std::uint64_t size) {
   if (size > max_chunk_bytes)
-    throw Error("is too large",
+    throw Error("too large",
                 {.field = "size of a chunk", .value = std::to_string(size), .bound = "<= 1 GiB"});
   std::string result;
   if (compression == "lz4")
@@ -454,7 +454,7 @@ std::string decompress_chunk(const std::string& compression, std::string_view by
     result = bytes;
   else
     throw Error(
-        "is not supported",
+        "not supported",
         {.field = "compression of a chunk", .value = compression, .bound = "lz4, zstd or none"});
   if (result.size() != size)
     throw Error("has a wrong size", {.field = "chunk",

@@ -322,7 +322,7 @@ rosbag::CompressionType to_rosbag(BagCompression compression) {
     case BagCompression::zstd:
       break;
   }
-  throw Error("is not supported by bags of ROS 1",
+  throw Error("bags of ROS 1 do not support it",
               {.field = "compression", .value = "zstd", .bound = "none, bz2 or lz4"});
 }
 

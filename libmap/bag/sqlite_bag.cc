@@ -62,8 +62,8 @@ std::string lines_of_times(const RecordedTopics& topics, const std::string& inde
 std::vector<std::string> read_rosbag2_metadata(const fs::path& path) {
   if (!fs::exists(path))
     throw Error(
-        "no such file: not a bag, or its recording was not ended; repair it with "
-        "`ros2 bag reindex`",
+        "no such file: the folder is not a bag, or its recording was not ended (`ros2 bag reindex` "
+        "repairs it)",
         {.file = path.string()});
   std::vector<std::string> names;
   read_yaml(read_whole_file(path, max_yaml_bytes), path.string(), [&](const YAML::Node& document) {
@@ -135,7 +135,8 @@ std::map<std::int64_t, BagTopic> stored_topics(const SqliteFile& file) {
   // SQLite reads missing bytes of the last page as zeros.
   file.each_row("PRAGMA page_size", {}, [&](const SqliteRow& row) {
     if (fs::file_size(file.path()) % static_cast<std::uint64_t>(row.integer(0)) != 0)
-      throw Error("is truncated: no whole number of pages", {.file = file.path().string()});
+      throw Error("is truncated: its size is not a multiple of the page size",
+                  {.file = file.path().string()});
   });
   require_columns(file, "topics", {"id", "name", "type", "serialization_format"});
   require_columns(file, "messages", {"topic_id", "timestamp", "data"});
@@ -164,9 +165,9 @@ void list_sqlite(const fs::path& path, RecordedTopics& recorded) {
       {}, [&](const SqliteRow& row) {
         const auto found = index.find(row.integer(0));
         if (found == index.end())
-          throw Error("is not in the table topics", {.file = path.string(),
-                                                     .field = "topic_id of a message",
-                                                     .value = std::to_string(row.integer(0))});
+          throw Error("not in the table topics", {.file = path.string(),
+                                                  .field = "topic_id of a message",
+                                                  .value = std::to_string(row.integer(0))});
         recorded.add(found->second, static_cast<std::size_t>(row.integer(1)), row.integer(2),
                      row.integer(3));
       });
@@ -234,7 +235,7 @@ class SqliteSink : public BagSink {
   void write(const StoredMessage& message) override {
     constexpr std::size_t max_bytes = 1'000'000'000;  // SQLite's own
     if (message.bytes.size() > max_bytes)
-      throw Error("is too large for a .db3; use .mcap",
+      throw Error("too large for a .db3; use .mcap",
                   {.field = "bytes of a message on " + message.topic,
                    .value = std::to_string(message.bytes.size()),
                    .bound = "<= 10^9"});

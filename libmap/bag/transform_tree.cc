@@ -39,7 +39,8 @@ void TransformTree::add(const std::string& parent, const std::string& child,
   const double change =
       (link.parent_from_child.matrix() - parent_from_child.matrix()).cwiseAbs().maxCoeff();
   if (link.parent != above || change > same_pose)
-    throw Error("a transform changes: the frame is not static", {.field = "frame", .value = frame});
+    throw Error("the frame is not static: its transform changes",
+                {.field = "frame", .value = frame});
 }
 
 bool TransformTree::has(const std::string& frame) const {

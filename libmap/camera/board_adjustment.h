@@ -1,4 +1,5 @@
-// Least-squares adjustment of a camera and the poses of calibration boards, for camera_calibration.
+// Least-squares adjustment of a camera and the poses of calibration boards, for
+// camera_calibration.h.
 #pragma once
 
 #include <Eigen/Core>

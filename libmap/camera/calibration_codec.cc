@@ -83,7 +83,7 @@ StereoCalibrationRecord read_stereo_record(ByteReader& reader) {
     const std::size_t before = reader.rest().size();
     *side = read_record(reader);
     if (static_cast<std::int64_t>(before - reader.rest().size()) != size)
-      throw Error("calibration of a stereo camera: length differs from the stored one",
+      throw Error("calibration of a stereo camera has a wrong length",
                   {.value = std::to_string(size)});
   }
   return stereo;
@@ -128,7 +128,7 @@ Calibration read_records(std::string_view bytes) {
       calibration.stereo.push_back(read_stereo_record(reader));
   }
   if (!calibration.cameras.empty() && !calibration.stereo.empty())
-    throw Error("calibration contains single and stereo cameras");
+    throw Error("calibration contains both single and stereo cameras, which is not supported");
   return calibration;
 }
 
@@ -286,12 +286,12 @@ Calibration decode_calibration(std::string_view bytes) {
     try {
       return read_records(bytes);
     } catch (const std::length_error&) {
-      throw Error("calibration ends after " + std::to_string(bytes.size()) + " bytes");
+      throw Error("calibration is truncated after " + std::to_string(bytes.size()) + " bytes");
     }
   }
   const auto layout = floats_layout(bytes);
   if (!layout)
-    throw Error("calibration of an unknown layout, " + std::to_string(bytes.size()) + " bytes");
+    throw Error("calibration is in no known layout: " + std::to_string(bytes.size()) + " bytes");
   return read_floats(bytes, layout->first, layout->second);
 }
 

@@ -337,9 +337,9 @@ Chessboard parse_chessboard(const std::string& text, const std::string& field) {
   const int columns = side(text.substr(0, cross));
   const int rows = cross == std::string::npos ? 0 : side(text.substr(cross + 1));
   if (columns == 0 || rows == 0)
-    throw Error("no such board", {.field = field,
-                                  .value = text,
-                                  .bound = "COLUMNSxROWS inner corners, 3 to 100 each, e.g. 8x6"});
+    throw Error("not a board", {.field = field,
+                                .value = text,
+                                .bound = "COLUMNSxROWS inner corners, 3 to 100 each, e.g. 8x6"});
   Chessboard board;
   board.columns = columns;
   board.rows = rows;
@@ -360,7 +360,7 @@ void bind(ParameterTable& table, CameraCalibrationOptions& options) {
             "equidistant: k1 k2 k3 k4 of a fisheye lens");
   table.add_former_key("max_picture_error_px", "max_image_error_px");
   table.add("max_image_error_px", options.max_image_error_px, not_negative,
-            "maximum RMS reprojection error; worse images are rejected, pixels; 0: no limit");
+            "maximum RMS reprojection error of an accepted image, pixels; 0: no limit");
 }
 
 std::optional<std::vector<Eigen::Vector2d>> find_chessboard(const GrayImage& image,

@@ -56,7 +56,7 @@ void append_numbers(const YAML::Node& list, const std::string& field, int depth,
     else
       numbers.push_back(number_of(entry, field));
     if (numbers.size() > max_numbers)
-      throw Error("too many numbers for a camera", {.field = field});
+      throw Error("has too many numbers for a camera", {.field = field});
   }
 }
 
@@ -76,7 +76,7 @@ std::vector<double> matrix_of(const YAML::Node& node, const std::string& field,
         number_of(node["rows"], field + ".rows") * number_of(node["cols"], field + ".cols");
     if (promised != static_cast<double>(numbers.size()))
       refuse(field + ".data", std::to_string(numbers.size()) + " numbers",
-             "does not fit rows and cols", to_text(promised) + " numbers");
+             "differs from rows x cols", to_text(promised) + " numbers");
   }
   return numbers;
 }
@@ -183,7 +183,7 @@ void read_timing(const YAML::Node& root, CameraFile& file) {
     return a.stamp_s < b.stamp_s;
   };
   if (!std::is_sorted(file.motions.begin(), file.motions.end(), by_stamp))
-    throw Error("stamps do not ascend", {.field = "frame_motions"});
+    throw Error("the stamps are not in ascending order", {.field = "frame_motions"});
 }
 
 void read_findings(const YAML::Node& root, CameraFile& file) {

@@ -139,7 +139,7 @@ std::optional<DepthInfo> read_depth_info(std::string_view bytes) {
 
 DepthImage decode_depth(std::string_view bytes) {
   const std::optional<DepthInfo> info = read_depth_info(bytes);
-  if (!info) throw Error("not a depth image: neither RVL, 16-bit PNG nor float PNG");
+  if (!info) throw Error("not a depth image: must be RVL, 16-bit PNG or float PNG");
   if (info->format == DepthFormat::rvl) return to_meters(decode_rvl(bytes));
   if (info->format == DepthFormat::png16) return to_meters(decode_gray16(bytes));
   DepthImage image = decode_float_png(bytes);

@@ -1,7 +1,7 @@
-// Smooth correction of a camera's depth: an offset that depends on depth (uniform cubic B-spline)
-// and image radius, and a scale of the sum. The offset is linear in its coefficients, which are
-// estimated by least squares. Teichman et al. (2013) correct each range and pixel; a scan has too
-// few data for that. Also registers depth images to another camera.
+// Corrects systematic errors of a depth camera: adds a smooth offset that depends on depth (uniform
+// cubic B-spline) and image radius, and multiplies the sum by a scale. The offset is linear in its
+// coefficients, which are estimated by least squares. (Teichman et al. 2013 correct each range and
+// pixel, for which a scan has too few data.) Also registers depth images to another camera.
 #pragma once
 
 #include <array>
@@ -34,7 +34,7 @@ struct DepthCorrection {
   Terms terms(double depth_m, double radius2) const;
   // Corrected depth minus `depth_m`, m.
   double at(double depth_m, double radius2) const;
-  // at() without the change of `depth_m` by the scale.
+  // Returns at() without the change of `depth_m` by the scale.
   double bend(double depth_m, double radius2) const {
     return at(depth_m, radius2) - (scale - 1.0) * depth_m;
   }

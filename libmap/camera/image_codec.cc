@@ -58,7 +58,7 @@ std::optional<ImageInfo> png_info(std::string_view bytes) {
   const std::uint32_t height = big_endian(bytes, 20, 4);
   constexpr std::uint32_t most = 0x7fffffff;
   if (width == 0 || height == 0 || width > most || height > most)
-    throw Error("PNG of no valid size", {.value = size_text(width, height)});
+    throw Error("PNG has an invalid size", {.value = size_text(width, height)});
   ImageInfo info{.format = ImageFormat::png,
                  .width = static_cast<int>(width),
                  .height = static_cast<int>(height),
@@ -78,7 +78,7 @@ std::optional<ImageInfo> png_info(std::string_view bytes) {
       info.channels = 4;
       break;
     default:
-      throw Error("PNG of an unknown color type");
+      throw Error("PNG has an unknown color type");
   }
   return info;
 }
@@ -87,7 +87,7 @@ std::optional<ImageInfo> png_info(std::string_view bytes) {
 std::optional<ImageInfo> jpeg_info(std::string_view bytes) {
   std::size_t at = 2;
   while (at + 4 <= bytes.size()) {
-    if (bytes[at] != '\xff') throw Error("JPEG header is broken");
+    if (bytes[at] != '\xff') throw Error("JPEG header is damaged");
     const auto marker = static_cast<std::uint8_t>(bytes[at + 1]);
     if (marker == 0xff) {  // fill byte
       ++at;
@@ -97,7 +97,7 @@ std::optional<ImageInfo> jpeg_info(std::string_view bytes) {
     const bool is_frame =
         marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc;
     if (length < 2 || marker < 0xc0 || marker == 0xd8 || marker == 0xd9 || marker == 0xda)
-      throw Error("JPEG header is broken");
+      throw Error("JPEG header is damaged");
     if (is_frame) {
       if (at + 10 > bytes.size()) return std::nullopt;
       ImageInfo info;
@@ -106,7 +106,7 @@ std::optional<ImageInfo> jpeg_info(std::string_view bytes) {
       info.width = static_cast<int>(big_endian(bytes, at + 7, 2));
       info.channels = static_cast<std::uint8_t>(bytes[at + 9]);
       if (info.width == 0 || info.height == 0)
-        throw Error("JPEG of no valid size", {.value = size_text(info.width, info.height)});
+        throw Error("JPEG has an invalid size", {.value = size_text(info.width, info.height)});
       return info;
     }
     at += 2 + length;
@@ -117,7 +117,8 @@ std::optional<ImageInfo> jpeg_info(std::string_view bytes) {
 ImageInfo checked_info(std::string_view bytes, std::int64_t max_pixels = max_frame_pixels) {
   const std::optional<ImageInfo> info = read_image_info(bytes);
   if (!info)
-    throw Error("image ends in its header, after " + std::to_string(bytes.size()) + " bytes");
+    throw Error("image is truncated in its header, after " + std::to_string(bytes.size()) +
+                " bytes");
   check_size(*info, bytes.size(), max_pixels);
   return *info;
 }
@@ -129,27 +130,27 @@ using JpegHandle = std::unique_ptr<void, decltype(&tjDestroy)>;
 void decode_jpeg(std::string_view bytes, const ImageInfo& info, int pixel_format,
                  std::uint8_t* pixels) {
   const JpegHandle handle(tjInitDecompress(), &tjDestroy);
-  if (!handle) throw Error("libjpeg-turbo cannot be used", {}, ErrorKind::failed);
+  if (!handle) throw Error("libjpeg-turbo could not be initialized", {}, ErrorKind::failed);
   const int flags = TJFLAG_ACCURATEDCT | TJFLAG_STOPONWARNING | TJFLAG_LIMITSCANS;
   const int result =
       tjDecompress2(handle.get(), reinterpret_cast<const unsigned char*>(bytes.data()),
                     static_cast<unsigned long>(bytes.size()), pixels, info.width, 0, info.height,
                     pixel_format, flags);
-  if (result != 0) throw Error(std::string("JPEG is broken: ") + tjGetErrorStr2(handle.get()));
+  if (result != 0) throw Error(std::string("JPEG is damaged: ") + tjGetErrorStr2(handle.get()));
 }
 
 std::string encode_jpeg(const std::uint8_t* pixels, int width, int height, int pixel_format,
                         int subsampling, int quality) {
   if (width <= 0 || height <= 0) throw Error("an empty image cannot be written");
   const JpegHandle handle(tjInitCompress(), &tjDestroy);
-  if (!handle) throw Error("libjpeg-turbo cannot be used", {}, ErrorKind::failed);
+  if (!handle) throw Error("libjpeg-turbo could not be initialized", {}, ErrorKind::failed);
   unsigned char* buffer = nullptr;
   unsigned long size = 0;
   const int result = tjCompress2(handle.get(), pixels, width, 0, height, pixel_format, &buffer,
                                  &size, subsampling, quality, TJFLAG_ACCURATEDCT);
   const std::unique_ptr<unsigned char, decltype(&tjFree)> owner(buffer, &tjFree);
   if (result != 0)
-    throw Error(std::string("JPEG cannot be made: ") + tjGetErrorStr2(handle.get()),
+    throw Error(std::string("JPEG could not be encoded: ") + tjGetErrorStr2(handle.get()),
                 {.field = "image size", .value = size_text(width, height)}, ErrorKind::failed);
   return std::string(reinterpret_cast<const char*>(buffer), size);
 }
@@ -229,7 +230,7 @@ void decode_png(std::string_view bytes, PngWanted wanted, std::uint8_t* target,
   const bool is_sound =
       info != nullptr && decode_png_rows(source, wanted, target, row_bytes, png, info);
   png_destroy_read_struct(&png, &info, nullptr);
-  if (!is_sound) throw Error(std::string("PNG is broken: ") + source.message);
+  if (!is_sound) throw Error(std::string("PNG is damaged: ") + source.message);
 }
 
 void append_bytes(png_structp png, png_bytep data, png_size_t count) {
@@ -279,7 +280,7 @@ std::string encode_png(const PngPixels& pixels) {
   const bool is_written = info != nullptr && encode_png_rows(sink, pixels, png, info);
   png_destroy_write_struct(&png, &info);
   if (!is_written)
-    throw Error(std::string("PNG cannot be made: ") + sink.message,
+    throw Error(std::string("PNG could not be encoded: ") + sink.message,
                 {.field = "image size", .value = size_text(pixels.width, pixels.height)},
                 ErrorKind::failed);
   return std::move(sink.bytes);
@@ -305,7 +306,7 @@ ImageInfo require_png(std::string_view bytes, int channels, int bits) {
   const ImageInfo info = checked_info(bytes);
   if (info.format != ImageFormat::png || info.channels != channels || info.bits != bits)
     throw Error(
-        "image of another kind",
+        "is not the required kind of image",
         {.value = to_text(info.format) + " of " + std::to_string(info.channels) + " x " +
                   std::to_string(info.bits) + " bits",
          .bound = "PNG of " + std::to_string(channels) + " x " + std::to_string(bits) + " bits"});

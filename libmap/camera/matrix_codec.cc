@@ -45,7 +45,7 @@ struct InflateStream {
     // zlib does not modify its input. Its 32-bit size is sufficient: SQLite has the same limit.
     stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
     stream.avail_in = static_cast<uInt>(bytes.size());
-    if (inflateInit(&stream) != Z_OK) throw Error("zlib cannot be used", {}, ErrorKind::failed);
+    if (inflateInit(&stream) != Z_OK) throw Error("zlib failed to start", {}, ErrorKind::failed);
   }
   ~InflateStream() { inflateEnd(&stream); }
   InflateStream(const InflateStream&) = delete;
@@ -68,11 +68,11 @@ StoredMatrix read_matrix_header(std::string_view blob) {
   std::memcpy(numbers.data(), blob.data() + blob.size() - trailer_bytes, trailer_bytes);
   const auto [rows, columns, type] = numbers;
   if (rows < 0 || columns < 0)
-    throw Error("compressed matrix of invalid size",
+    throw Error("compressed matrix has an invalid size",
                 {.value = std::to_string(rows) + " x " + std::to_string(columns)});
   if (type < 0 || (type & 7) > static_cast<int>(MatrixElement::float64) ||
       (type >> 3) + 1 > max_channels)
-    throw Error("compressed matrix of an unknown type", {.value = std::to_string(type)});
+    throw Error("compressed matrix has an unknown type of number", {.value = std::to_string(type)});
   return {.rows = rows,
           .columns = columns,
           .channels = (type >> 3) + 1,
@@ -96,13 +96,13 @@ void for_each_matrix_chunk(std::string_view blob,
     const std::size_t bytes = piece.size() - stream.avail_out;
     done += bytes;
     if (done > wanted)
-      throw Error("compressed matrix is longer than its size", {.value = matrix_size_text(matrix)});
+      throw Error("compressed matrix exceeds its size", {.value = matrix_size_text(matrix)});
     const bool is_at_end = result == Z_BUF_ERROR || (result == Z_OK && stream.avail_out > 0);
     if (is_at_end || (result == Z_STREAM_END && done < wanted))
-      throw Error("compressed matrix is broken: ends after " + std::to_string(done) + " of " +
+      throw Error("compressed matrix is damaged: it ends after " + std::to_string(done) + " of " +
                   std::to_string(wanted) + " bytes");
     if (result != Z_OK && result != Z_STREAM_END)
-      throw Error("compressed matrix is broken: " + std::string(zError(result)));
+      throw Error("compressed matrix is damaged: " + std::string(zError(result)));
     if (bytes > 0) use(std::string_view(piece).substr(0, bytes));
   }
 }

@@ -1,5 +1,5 @@
-// Reads and writes matrices and texts as compressed by RTAB-Map: a zlib stream, followed by rows,
-// columns and OpenCV's type as little-endian int32.
+// Reads and writes the compressed matrices and texts in RTAB-Map databases: a zlib stream, followed
+// by rows, columns and OpenCV's type as little-endian int32.
 #pragma once
 
 #include <cstddef>

@@ -13,7 +13,7 @@ namespace {
 int part_width(int node, const std::string& what, int width, std::size_t count) {
   const int cameras = static_cast<int>(count);
   if (width % cameras != 0)
-    throw Error("the image cannot be divided among the cameras",
+    throw Error("images of several cameras, side by side, must have equal widths",
                 {.field = "node " + std::to_string(node) + ": " + what + " width",
                  .value = std::to_string(width),
                  .bound = "a multiple of " + std::to_string(cameras)});

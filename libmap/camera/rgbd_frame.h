@@ -1,4 +1,4 @@
-// Images and cameras of one node of a scan.
+// RGB-D frame: color and depth images with their cameras, as one node of a scan contains them.
 #pragma once
 
 #include <cstddef>
@@ -46,11 +46,11 @@ struct CameraView {
 // width is not a multiple of their number.
 std::vector<CameraView> camera_views(const RgbdFrame& frame);
 
-// Number of pixels of the frame's cameras, color or depth image, whichever is largest.
+// Returns the number of pixels of the largest of: all cameras, the color image, the depth image.
 std::size_t image_pixels(const RgbdFrame& frame);
 
-// Number of frames in memory at a time: 8 of up to 2 megapixels, fewer of larger ones, at least 1.
-// It does not depend on the number of threads, as results must not.
+// Returns the number of frames to keep in memory at a time: 8 of up to 2 megapixels, fewer of
+// larger ones, at least 1. It does not depend on the number of threads, because results must not.
 std::size_t frames_in_batch(std::size_t max_image_pixels);
 
 }  // namespace libmap

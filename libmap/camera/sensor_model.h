@@ -1,4 +1,4 @@
-// Reads published properties of depth cameras from data/sensors/NAME.yaml.
+// Published properties of depth cameras (noise, range, timing), read from data/sensors/NAME.yaml.
 #pragma once
 
 #include <filesystem>

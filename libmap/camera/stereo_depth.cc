@@ -32,7 +32,8 @@ void check(const GrayImage& image, const Camera& camera, const std::string& fiel
     refuse_pair("image and calibration differ in size", field + " image",
                 size_text(image.width, image.height), size_text(camera.width, camera.height));
   if (camera.is_distorted())
-    throw Error("not rectified: the camera has lens distortion", {.field = field + " camera"});
+    throw Error("is not rectified: it has lens distortion; rectify the images first",
+                {.field = field + " camera"});
 }
 
 void check(const StereoCamera& cameras) {
@@ -94,13 +95,14 @@ void bind(ParameterTable& table, StereoDepthOptions& options) {
             "range of disparities, pixels; minimum depth: fx * baseline / (min_disparity + range)");
   table.add("block_px", options.block_px, Range{1, 31}, "side of the matched window, odd, pixels");
   table.add("uniqueness_percent", options.uniqueness_percent, Range{0, 100},
-            "minimum margin between best and second-best match, percent");
-  table.add("left_right_px", options.left_right_px, Range{-1, 1024},
-            "maximum difference of the left-right check, pixels; -1: disabled");
+            "minimum difference between the costs of best and second-best match, percent");
+  table.add(
+      "left_right_px", options.left_right_px, Range{-1, 1024},
+      "maximum difference between the disparities of the left-right check, pixels; -1: disabled");
   table.add("speckle_px", options.speckle_px, Range{0, 1e6},
             "minimum area of a connected patch of disparity, pixels; 0: no limit");
   table.add("min_contrast", options.min_contrast, Range{0, 255},
-            "minimum gray-level range of the matched window");
+            "minimum gray-level range of the matched window, 0 to 255");
   table.add("directions", options.directions, direction_names,
             "number of directions along which matching costs are summed");
   table.add("max_depth_m", options.max_depth_m, not_negative, "maximum depth, m; 0: no limit");
@@ -146,7 +148,7 @@ DepthImage stereo_depth(const GrayImage& left, const GrayImage& right, const Ste
 DepthImage stereo_depth(const RgbdFrame& frame, const StereoDepthOptions& options) {
   const std::string node = "node " + std::to_string(frame.node);
   if (frame.stereo.empty() || frame.right.empty() || frame.color.empty())
-    throw Error("no stereo images", {.field = node});
+    throw Error("has no stereo images", {.field = node});
   const auto pairs = static_cast<int>(frame.stereo.size());
   if (frame.right.width % pairs != 0 || frame.color.width % pairs != 0 ||
       frame.color.height != frame.right.height || frame.color.width != frame.right.width)

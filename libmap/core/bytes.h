@@ -1,4 +1,4 @@
-// Reader and writer of consecutive little-endian numbers, as in binary file formats.
+// Reads and writes consecutive little-endian numbers, for binary file formats.
 #pragma once
 
 #include <cstddef>

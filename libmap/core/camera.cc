@@ -81,7 +81,7 @@ Distorted distort(const Camera& camera, const Eigen::Vector2d& ray) {
 }
 
 [[noreturn]] void refuse(const std::string& field, double value, const std::string& bound) {
-  throw Error("camera cannot be used", {.field = field, .value = to_text(value), .bound = bound});
+  throw Error("invalid camera", {.field = field, .value = to_text(value), .bound = bound});
 }
 
 }  // namespace

@@ -44,7 +44,7 @@ fs::path find_data_file(const std::string& kind, const std::string& name) {
   std::sort(known.begin(), known.end());
   std::string names;
   for (const std::string& one : known) names += (names.empty() ? "" : ", ") + one;
-  throw Error("is neither a file nor one of " + names + did_you_mean(name, known),
+  throw Error("neither a file nor one of " + names + did_you_mean(name, known),
               {.field = kind.substr(0, kind.size() - 1), .value = name});
 }
 

@@ -31,7 +31,8 @@ class Error : public std::runtime_error {
 
   // Returns a copy that names `file`, unless the error names a file already.
   Error in_file(const std::string& file) const;
-  // Returns a copy with the field "PLACE: FIELD", or "PLACE" if the error names no field.
+  // Returns a copy whose field is `prefix`, then `joint` and the field if there is one: "rig:
+  // width".
   Error in_field(const std::string& prefix, const char* joint = ": ") const;
 
  private:
@@ -50,7 +51,7 @@ auto in_file(const std::filesystem::path& file, const Step& step) {
   }
 }
 
-// Returns step(). Prefixes the field of its Errors with `place`, as Error::in_field does.
+// Returns step(). Puts `prefix` before the field of its Errors, as Error::in_field does.
 template <typename Step>
 auto in_field(const std::string& prefix, const Step& step) {
   try {

@@ -20,8 +20,7 @@ void require_readable_file(const std::filesystem::path& path);
 // Throws Error if the file `path` is larger than `max_bytes`, or missing.
 void require_file_size(const std::filesystem::path& path, std::uint64_t max_bytes);
 
-// Returns the content. Throws Error if the file is missing, a folder, not readable, or larger than
-// `max_bytes`.
+// Returns the file's content. Throws Error for a folder, and a missing, unreadable or larger file.
 std::string read_whole_file(const std::filesystem::path& path,
                             std::uint64_t max_bytes = std::uint64_t{1} << 30);
 

@@ -1,4 +1,5 @@
-// Relation of local coordinates to a coordinate reference system of the Earth or another body.
+// Georeference of a terrain: relation of its local coordinates to a coordinate reference system
+// (CRS) of the Earth or another body.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,7 +12,7 @@ namespace libmap {
 // height = origin_m.z + z in meters.
 struct Georeference {
   std::string crs_wkt;  // WKT 2 (ISO 19162:2019); empty: unknown reference system
-  double unit_m = 1.0;  // of eastings and northings
+  double unit_m = 1.0;  // meters per unit of eastings and northings
   Eigen::Vector3d origin_m = Eigen::Vector3d::Zero();
 
   bool operator==(const Georeference&) const = default;

@@ -1,5 +1,5 @@
-// Instruction sets of the innermost loops. No inline functions: sources that are compiled for more
-// than the base instruction set include this header.
+// Selects the instruction set (AVX2, AVX-512) of speed-critical inner loops. Contains no inline
+// functions, because sources that are compiled for more than the base instruction set include it.
 #pragma once
 
 namespace libmap {

@@ -1,7 +1,7 @@
-// Compiles the functions of GRASPMAP_LOOPS, a file that ends with their table `all`, once per
-// instruction set; GRASPMAP_REGISTER is the size of its vector registers, bytes. Include this in an
-// anonymous namespace of a source that is compiled alone. GRASPMAP_LOOPS must not use types whose
-// inline functions are compiled in other sources too.
+// Compiles inner loops once per instruction set: GRASPMAP_LOOPS is a file of functions that ends
+// with their table `all`; GRASPMAP_REGISTER is the size of the vector registers, bytes. Include
+// this in an anonymous namespace of a source that is compiled alone. GRASPMAP_LOOPS must not use
+// types whose inline functions are compiled in other sources too.
 
 #define GRASPMAP_REGISTER 16
 namespace portable {

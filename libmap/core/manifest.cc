@@ -95,7 +95,7 @@ std::vector<double> to_numbers(const Pose& pose) {
 
 Pose from_numbers(const std::vector<double>& numbers) {
   if (numbers.size() != 12)
-    throw Error("a transform must have 12 numbers",
+    throw Error("a transform must have 12 numbers (3 x 4, by rows)",
                 {.field = "transforms", .value = std::to_string(numbers.size()) + " numbers long"});
   Pose pose = Pose::Identity();
   std::size_t n = 0;

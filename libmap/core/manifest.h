@@ -1,5 +1,5 @@
-// Manifest of an output (OUTPUT.json): command, parameters, inputs and results. All sections but
-// "run" are reproducible for equal input, seed and version.
+// Manifest of an output file: OUTPUT.json with the command, its parameters, inputs and results. All
+// sections but "run" are reproducible for equal input, seed and version.
 #pragma once
 
 #include <cstdint>
@@ -30,7 +30,7 @@ struct Manifest {
   std::string version;
   std::vector<std::pair<std::string, ManifestValue>> parameters;
   std::vector<ManifestInput> inputs;
-  std::string frame;  // of the output's coordinates; lengths are meters
+  std::string frame;                                     // frame of the output's coordinates (m)
   std::vector<std::pair<std::string, Pose>> transforms;  // by name, e.g. "terrain_from_input"
   // Georeference of the frame before site_from_map and terrain_from_input.
   std::optional<Georeference> georeference;
@@ -56,7 +56,7 @@ Manifest parse_manifest(const std::string& json, const std::string& file);
 // and field if it is invalid.
 std::optional<Manifest> read_manifest_of(const std::filesystem::path& output);
 
-// SHA-256 (FIPS 180-4) of a file's bytes, 64 hexadecimal digits.
+// Return the SHA-256 (FIPS 180-4), 64 hexadecimal digits. Throw Error if the file cannot be read.
 std::string sha256_of_file(const std::filesystem::path& path);
 std::string sha256_of(std::string_view bytes);
 

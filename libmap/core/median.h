@@ -7,7 +7,7 @@
 
 namespace libmap {
 
-// Median of at least one value; the upper median if the number of values is even.
+// Returns the median of at least one value; of an even number of values, the upper one.
 inline double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());

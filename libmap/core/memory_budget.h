@@ -1,4 +1,4 @@
-// Limit on the memory that several threads use at the same time.
+// Limits the memory that several threads use at the same time.
 #pragma once
 
 #include <condition_variable>
@@ -7,10 +7,10 @@
 
 namespace libmap {
 
-// Physical memory of the machine in bytes.
+// Returns the physical memory of the machine in bytes.
 std::uint64_t machine_memory();
 
-// Memory budget that threads share. A thread takes a share before work that needs much memory, and
+// Memory budget of several threads. A thread takes a share before work that needs much memory, and
 // waits while too little is free. Results do not depend on the budget.
 //
 // A thread that owns a share must not run a parallel loop: while it waits for the loop, it can

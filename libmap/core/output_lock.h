@@ -1,4 +1,4 @@
-// File locks, file synchronization and errors of system calls.
+// Low-level file functions of outputs: locks, synchronization to disk, errors of system calls.
 #pragma once
 
 #include <filesystem>

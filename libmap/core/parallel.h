@@ -1,5 +1,5 @@
-// Parallel loops with results that do not depend on the number of threads. Chunks depend on count
-// and grain only, and reductions join the chunks in order.
+// Parallel loops whose results do not depend on the number of threads: the chunks of a loop depend
+// on count and grain only, and reductions join the chunks in order.
 #pragma once
 
 #include <cstddef>
@@ -28,7 +28,7 @@ void parallel_each(std::size_t count, const Step& step) {
   parallel_each(count, 1, step);
 }
 
-// Returns the results of chunk(begin, end) of all ranges, joined left to right with join(a, b).
+// Returns the results of chunk(begin, end) for all ranges, joined left to right with join(a, b).
 template <typename T, typename Chunk, typename Join>
 T parallel_reduce(std::size_t count, std::size_t grain, T identity, const Chunk& chunk,
                   const Join& join) {

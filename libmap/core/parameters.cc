@@ -233,7 +233,7 @@ std::vector<std::string> set_from_yaml(const ParameterTable& table, const std::s
           const Parameter* parameter = table.find(key);
           if (!seen.insert(parameter == nullptr ? key : parameter->key).second)
             throw Error("is a duplicate", {.field = key});
-          if (!entry.second.IsScalar()) throw Error("not a single value", {.field = key});
+          if (!entry.second.IsScalar()) throw Error("is not a single value", {.field = key});
           values.emplace_back(key, entry.second.as<std::string>());
         }
       };

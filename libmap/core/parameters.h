@@ -1,6 +1,5 @@
-// Table of the named parameters of one or more option structs. It binds each field to its key,
-// description and range. Command-line flags, YAML files, --print-config and the manifest use it, so
-// that defaults are defined once, in the struct.
+// Table of parameters, bound to the fields of option structs with key, description and range.
+// Flags, YAML files, --print-config and manifests use it: defaults are defined once, in the struct.
 #pragma once
 
 #include <cstdint>
@@ -63,8 +62,8 @@ class ParameterTable {
     return former_keys_;  // current key by its earlier name
   }
 
-  // Collects keys "PREFIX.KEY" as text for a second table that is read from a file first
-  // ("gripper.opening_angle_deg"). The last text of a key counts; the caller checks the names.
+  // Collects values of keys "PREFIX.KEY" as text, e.g. "gripper.opening_angle_deg", to override
+  // those of a file that is read later. The last text of a key counts; the caller checks the names.
   void add_overrides(std::string prefix, std::vector<std::pair<std::string, std::string>>& texts);
 
   const std::vector<Parameter>& parameters() const { return parameters_; }
@@ -76,7 +75,8 @@ class ParameterTable {
   // Keys and values as text in the format of set_from_yaml, overrides included.
   std::vector<std::pair<std::string, std::string>> values() const;
 
-  // Returns the first key with different values in both tables, which have equal keys.
+  // Returns the first key with different values in both tables, which have equal keys; else
+  // nullopt.
   std::optional<std::string> first_difference(const ParameterTable& other) const;
 
   // Sets one parameter from text. Throws Error if the key is unknown (with the nearest known key),

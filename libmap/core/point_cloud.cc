@@ -29,7 +29,7 @@ ScalarField& PointCloud::add_field(std::string_view name, ScalarType type) {
 void PointCloud::check() const {
   const auto require = [&](const std::string& what, std::size_t length, bool may_be_empty) {
     if (length == size() || (may_be_empty && length == 0)) return;
-    throw Error("the cloud has " + std::to_string(size()) + " points",
+    throw Error("not one value for each of the cloud's " + std::to_string(size()) + " points",
                 {.field = what, .value = std::to_string(length) + " values long"});
   };
   require("normals", normals.size(), true);

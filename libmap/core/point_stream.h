@@ -1,4 +1,4 @@
-// Stream of points in blocks, for clouds that do not fit into memory.
+// Stream of a cloud's points in blocks, for clouds that do not fit into memory.
 #pragma once
 
 #include <cstddef>

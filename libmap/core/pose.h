@@ -21,16 +21,16 @@ Pose make_pose_from_rpy(const Eigen::Vector3d& translation,
 // +-90, yaw and roll have the same axis and yaw is arbitrary.
 Eigen::Vector3d roll_pitch_yaw_deg(const Pose& pose);
 
-// Least-squares target_from_source of at least three corresponding columns (Umeyama 1991), as a
-// homogeneous matrix: rotation, translation and, with `with_scale`, scale.
+// Returns the least-squares target_from_source of at least three corresponding columns (Umeyama
+// 1991), as a homogeneous matrix: rotation, translation and, with `with_scale`, scale.
 Eigen::Matrix4d align_points(const Eigen::Matrix3Xd& source, const Eigen::Matrix3Xd& target,
                              bool with_scale);
 
-// Smallest rotation from direction `from` to `to`, both not zero. For opposite directions, it is a
-// half turn about an arbitrary perpendicular axis.
+// Returns the smallest rotation from direction `from` to `to`, both not zero. For opposite
+// directions, it is a half turn about an arbitrary perpendicular axis.
 Eigen::Matrix3d shortest_rotation(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
 
-// Nearest proper rotation in the least-squares sense (Kabsch 1976), for matrices read from text.
+// Returns the nearest rotation in the least-squares sense (Kabsch 1976), for matrices from text.
 Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& matrix);
 
 }  // namespace libmap

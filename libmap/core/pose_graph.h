@@ -42,8 +42,8 @@ struct PoseLink {
 // True for links of a single node: pose priors and gravity. Only these have from = to.
 bool is_absolute(const PoseLink& link);
 
-// Maximum coordinates of poses and entries of information matrices that readers accept. They keep
-// values in range in all formats; formats with half angles multiply the entries by 4.
+// Maximum coordinate of a pose and maximum entry of an information matrix that readers accept, so
+// that values remain in range in all file formats (some multiply the entries by 4).
 inline constexpr double max_position_m = 1e8;
 inline constexpr double max_information = 1e300;
 
@@ -56,7 +56,7 @@ struct GpsFix {
   double bearing_deg = 0.0;  // clockwise from north
 };
 
-// Node of the pose graph: one recorded frame.
+// Node of the pose graph: one frame of the scan.
 struct GraphNode {
   static constexpr int invalid_weight = -9;  // RTAB-Map's, of nodes without a usable signature
 

@@ -1,5 +1,5 @@
-// Random number streams keyed by seed and purpose, so that results do not depend on the order of
-// calls. A stream is cheap enough to have one per pixel.
+// Random numbers from streams that are identified by a seed and a key (e.g. a pixel), so that
+// results do not depend on the order of calls. Creating a stream is cheap enough for one per pixel.
 #pragma once
 
 #include <cmath>

@@ -1,6 +1,6 @@
-// Table of the named results of a stage, the counterpart of ParameterTable. describe(table, result)
-// next to a result struct binds each field to its key and description. The manifest, --json,
-// printed lists, the progress of tiles and the Python module use it.
+// Table of the named results of a stage, the counterpart of ParameterTable for outputs.
+// describe(table, result) next to a result struct binds each field to its key and description. The
+// manifest, --json, printed lists, the merging of tiles and the Python module use it.
 #pragma once
 
 #include <cstddef>
@@ -19,7 +19,7 @@ namespace libmap {
 using ManifestValue = std::variant<bool, std::int64_t, double, std::string, std::vector<double>>;
 
 struct NamedResult {
-  // `found` is a boolean, a number, a text, a range of numbers, or an optional of one of these.
+  // `found` is the value: a boolean, a number, a text, a range of numbers, or an optional of these.
   template <typename Found>
   NamedResult(std::string result_key, const Found& found, std::string text = {})
       : key(std::move(result_key)),

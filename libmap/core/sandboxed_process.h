@@ -1,5 +1,5 @@
-// Child process for libraries that overrun their buffers on damaged input. A crash of the child
-// does not end this process.
+// Runs a function in a child process, for libraries that can crash on damaged input files. A crash
+// of the child does not end this process.
 #pragma once
 
 #include <cstddef>
@@ -41,8 +41,8 @@ class SandboxedProcess {
   std::unique_ptr<std::FILE, CloseFile> pipe_;
 };
 
-// Writing end of the pipe. It has the same functions as SandboxReader, so that one template both
-// sends and receives a result.
+// Sends a result from the child process. Has the same functions as SandboxReader, so that one
+// template both sends and receives a result.
 class SandboxWriter {
  public:
   explicit SandboxWriter(const SandboxedProcess::Write& write) : write_(write) {}
@@ -70,8 +70,8 @@ class SandboxWriter {
   const SandboxedProcess::Write& write_;
 };
 
-// Reading end of the pipe. If the data end too early, each function throws Error with the reason
-// `broken` and the cause of the child's end.
+// Receives a result in the parent process. If the data end too early, each function throws Error
+// with the reason `broken` and the cause of the child's end.
 class SandboxReader {
  public:
   SandboxReader(SandboxedProcess& process, std::string broken)

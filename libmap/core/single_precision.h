@@ -1,4 +1,4 @@
-// Rounding to single precision.
+// Rounds numbers to single precision (float32), as files store them.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,4 +1,4 @@
-// Wall times of the steps of a stage, for its result struct and the manifest.
+// Measures the wall times of the steps of a stage, for its result struct and the manifest.
 #pragma once
 
 #include <algorithm>
@@ -35,7 +35,7 @@ class StageTimer {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-// Returns step() and adds its time.
+// Returns step() and adds its time to `timings_s` under `name`.
 template <typename Step>
 auto timed(StageTimings& timings_s, const char* name, const Step& step) {
   const StageTimer timer(timings_s, name);

@@ -15,7 +15,7 @@ struct Table {
   std::vector<std::vector<std::string>> rows;  // each as long as `columns`
   std::string file;                            // source file, for errors; can be empty
 
-  std::optional<std::size_t> find_column(std::string_view name) const;  // index of a column
+  std::optional<std::size_t> find_column(std::string_view name) const;  // or nullopt
   // Returns the index of a column. Throws Error naming file, column and the nearest known column.
   std::size_t column(std::string_view name) const;
   // Returns a cell as a number. Throws Error naming file, row and column if it is not a number.

@@ -1,4 +1,4 @@
-// Parser of text formats with one record per line of words.
+// Parses text formats with one record per line of words, such as TUM, g2o and OBJ.
 #pragma once
 
 #include <array>

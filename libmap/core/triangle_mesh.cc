@@ -12,7 +12,7 @@ namespace {
 
 void require_length(const std::string& what, std::size_t length, std::size_t wanted) {
   if (length == wanted) return;
-  throw Error("the mesh needs " + std::to_string(wanted),
+  throw Error("does not match the mesh, which needs " + std::to_string(wanted),
               {.field = what, .value = std::to_string(length) + " values long"});
 }
 
@@ -93,9 +93,9 @@ namespace {
 
 void require_one_per_triangle(const TexturedMesh& model, const char* name, std::size_t count) {
   if (count == model.mesh.triangles.size()) return;
-  throw Error("not one per triangle", {.field = name,
-                                       .value = std::to_string(count) + " values",
-                                       .bound = std::to_string(model.mesh.triangles.size())});
+  throw Error("not one value per triangle", {.field = name,
+                                             .value = std::to_string(count) + " values",
+                                             .bound = std::to_string(model.mesh.triangles.size())});
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// YAML parser whose errors name file and line.
+// Parses YAML; errors name file, key and line.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// Residuals of observations and their derivatives by poses, points and camera parameters.
+// Residuals of bundle adjustment, and their derivatives by poses, points and camera parameters.
 #pragma once
 
 #include <Eigen/Core>

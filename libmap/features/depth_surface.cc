@@ -68,7 +68,7 @@ DepthSurface::DepthSurface(const Camera& depth_camera, int step_px, std::vector<
   }
   if (cells_.empty() ||
       cells_.size() != static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_))
-    throw Error("number of cells does not match the camera's image size",
+    throw Error("number of depth cells does not match the camera's image size",
                 {.field = "cells",
                  .value = std::to_string(cells_.size()),
                  .bound = std::to_string(columns_) + " x " + std::to_string(rows_)});

@@ -53,7 +53,8 @@ Json binary(const std::vector<T>& values) {
 template <typename T>
 std::vector<T> values_of(const Json& json) {
   const std::vector<std::uint8_t>& bytes = json.get_binary();
-  if (bytes.size() % sizeof(T) != 0) throw Error("number of bytes is not a multiple of the type's");
+  if (bytes.size() % sizeof(T) != 0)
+    throw Error("number of bytes is not a multiple of the number type's size");
   std::vector<T> values(bytes.size() / sizeof(T));
   if (!values.empty()) std::memcpy(values.data(), bytes.data(), bytes.size());
   return values;
@@ -112,7 +113,7 @@ class DepthCheck : public Json::json_sax_t {
 
 FrameFeatures decode(std::string_view bytes, FeatureType type,
                      const std::vector<Camera>& depth_cameras) {
-  if (!DepthCheck::passes(bytes)) throw Error("not CBOR or nested too deeply");
+  if (!DepthCheck::passes(bytes)) throw Error("is not CBOR, or is nested too deeply");
   const Json json = Json::from_cbor(bytes);
   if (json.at("version") != format_version) throw Error("unknown format version");
   FrameFeatures frame;

@@ -1,4 +1,5 @@
-// Features stored between runs: one file per frame in a folder, named by a hash of the inputs.
+// Cache of image features on disk, so that later runs need not compute them: one file per frame in
+// a folder, named by a hash of the inputs.
 #pragma once
 
 #include <filesystem>

@@ -144,9 +144,9 @@ DepthAtRay depth_at(const DepthPlanes& planes, const Camera& camera, const Eigen
 void check(const FeatureOptions& options) {
   check_parameters(options);
   if (!(options.planes.max_depth_m > options.planes.min_depth_m))
-    throw Error("out of range", {.field = "max_depth_m",
-                                 .value = to_text(options.planes.max_depth_m),
-                                 .bound = "> " + to_text(options.planes.min_depth_m)});
+    throw Error("not above min_depth_m", {.field = "max_depth_m",
+                                          .value = to_text(options.planes.max_depth_m),
+                                          .bound = "> " + to_text(options.planes.min_depth_m)});
 }
 
 std::uint64_t bytes_to_find(const CameraView& view) {
@@ -226,22 +226,21 @@ void bind(ParameterTable& table, FeatureOptions& options) {
   table.add("min_contrast", options.min_contrast, positive,
             "minimum contrast of a SIFT feature, for image values from 0 to 1");
   table.add("pixel_noise_px", options.pixel_noise_px, positive,
-            "standard deviation of a feature's image position at the finest scale");
+            "standard deviation of a feature's image position at the finest scale, pixels");
   table.add("scale_noise", options.scale_noise, not_negative,
-            "standard deviation of a feature's position per pixel of its size, px/px");
+            "standard deviation of a feature's image position per pixel of its size, px/px");
   table.add("surface_noise_m", options.surface_noise_m, not_negative,
-            "standard deviation of fitted depth that does not decrease with more pixels");
+            "constant term of the standard deviation of depth fitted to many pixels, m");
   table.add("surface_step_px", options.surface_step_px, {1, 32},
-            "step of the grid to which depth images are downsampled");
-  table.add("min_depth_m", options.planes.min_depth_m, positive, "nearer measurements are dropped");
-  table.add("max_depth_m", options.planes.max_depth_m, positive,
-            "farther measurements are dropped");
+            "step of the grid to which depth images are downsampled, pixels");
+  table.add("min_depth_m", options.planes.min_depth_m, positive, "minimum used depth, m");
+  table.add("max_depth_m", options.planes.max_depth_m, positive, "maximum used depth, m");
   table.add("axial_noise_m", options.planes.noise.axial_m, positive,
-            "standard deviation of depth at range 0");
+            "constant term of the standard deviation of depth, m");
   table.add("range_noise", options.planes.noise.axial_of_range, not_negative,
-            "standard deviation of depth added by each meter of range, m/m");
+            "standard deviation of depth: term proportional to range, m per m");
   table.add("square_noise", options.planes.noise.axial_of_square, not_negative,
-            "standard deviation of depth per squared range (stereo, structured light), 1/m");
+            "standard deviation of depth: term proportional to squared range, 1/m");
 }
 
 Eigen::Vector3d FrameFeatures::point_in_camera(std::size_t n) const {

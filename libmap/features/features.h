@@ -1,5 +1,5 @@
-// Inputs of pose estimation: image features with depth, and depth images downsampled to a grid of
-// planes. Frames are read one by one. Each needs a few hundred kilobytes of memory afterwards.
+// Extracts the inputs of pose estimation from a scan: image features with depth, and depth images
+// downsampled to a grid of planes. Each frame needs a few hundred kilobytes of memory.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,5 +1,5 @@
-// Held-out observations, which no pose is estimated from, for evaluating each refinement stage by
-// their residuals before and after it.
+// Evaluates refinement stages by held-out observations, which are never used to estimate poses:
+// their residuals before and after a stage.
 #pragma once
 
 #include <cstddef>
@@ -40,7 +40,7 @@ struct SurfaceResidual {
   double noise_m = 0.0;     // standard deviation of the distance
   double range_m = 0.0;     // larger range of the two measurements
 };
-// Residuals behind surface_costs, in the same order.
+// Returns the residuals from which surface_costs computes costs, in the same order.
 std::vector<SurfaceResidual> surface_residuals(const std::vector<FrameFeatures>& frames,
                                                const std::vector<FeatureLink>& links,
                                                const std::map<int, Pose>& map_from_base);

@@ -1,4 +1,4 @@
-// Samples of a frame's surfaces, in the base frame.
+// Samples planes from a frame's depth images, in the base frame, for ICP and its checks.
 #pragma once
 
 #include <Eigen/Core>

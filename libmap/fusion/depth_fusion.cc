@@ -48,9 +48,9 @@ constexpr double coverage_voxels = 8.0;
 void check(const DepthFusionOptions& options) {
   check_parameters(options);
   if (!(options.planes.max_depth_m > options.planes.min_depth_m))
-    throw Error("out of range", {.field = "max_depth_m",
-                                 .value = to_text(options.planes.max_depth_m),
-                                 .bound = "> " + to_text(options.planes.min_depth_m)});
+    throw Error("not above min_depth_m", {.field = "max_depth_m",
+                                          .value = to_text(options.planes.max_depth_m),
+                                          .bound = "> " + to_text(options.planes.min_depth_m)});
 }
 
 std::string node_name(int node) { return "node " + std::to_string(node); }
@@ -110,7 +110,8 @@ class Fusion {
 
   Error no_frames(std::size_t poses) const {
     if (survey_.skipped.empty())
-      return Error(poses == 0 ? "there are no poses" : "no frame has depth");
+      return Error(poses == 0 ? "no frame can be fused: there are no poses"
+                              : "no frame can be fused: none has depth");
     return Error("none of " + std::to_string(poses) +
                  " frames can be used; the first: " + survey_.skipped.front().second.what());
   }

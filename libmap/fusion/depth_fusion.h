@@ -34,13 +34,12 @@ namespace libmap {
 
 struct DepthFusionOptions {
   double voxel_size_m = 0.01;  // > 0
-  // Name in data/sensors or a path: its useful range and noise where other options have their
-  // defaults; "auto": the defaults, a Kinect v2's.
+  // Depth camera: a name in data/sensors or a path. Its range and noise replace options that have
+  // their defaults; "auto": the defaults, those of a Kinect v2.
   std::string sensor = "auto";
   DepthPlaneOptions planes{};
   double disc_radius_voxels = 1.5;  // > 0: radius of the discs in which measurements are averaged
-  // >= 0: standard deviation of a whole frame along a normal. Prevents the nearest frame from
-  // dominating.
+  // >= 0: standard deviation of a frame along a normal; prevents the nearest frame from dominating.
   double pose_error_m = 0.0;
   // >= 0: maximum number of rounds of registration (frame_registration) before fusion; 0: the poses
   // are used unchanged.
@@ -90,10 +89,10 @@ struct RegistrationCheck {
   bool is_accepted(bool refined_poses) const;
 };
 
-// Usable frames with their registered poses, shared by all tiles.
+// Result of the first step: usable frames with registered poses, common to all tiles.
 struct FusionSurvey {
-  // World position of the grid's origin, a corner of the world's voxels near the first camera.
-  // Relative to it single precision is enough for scans at any offset.
+  // World position of the voxel grid's origin, near the first camera. Relative to it, single
+  // precision is enough for scans at any offset.
   Eigen::Vector3d grid_origin = Eigen::Vector3d::Zero();
   std::vector<FusionFrame> frames;               // by ascending node
   std::vector<std::pair<int, Error>> skipped{};  // nodes with the reason
@@ -101,8 +100,7 @@ struct FusionSurvey {
   int registration_rounds = 0;                   // rounds that moved frames; 0: poses are unchanged
   bool registration_rejected = false;            // the first round was rejected
   RegistrationCheck registration_check{};        // of the first round
-  // RMS deviation of frames' heights from the mean height of a surface element, with the given and
-  // with the final poses.
+  // RMS deviation of single frames' surface heights from their mean, with given and final poses.
   double disagreement_before_m = 0.0;
   double disagreement_after_m = 0.0;
 };
@@ -146,9 +144,8 @@ inline constexpr double whole_plan = std::numeric_limits<double>::infinity();
 // identical, bit for bit, to the point without tiles.
 class TileFusion {
  public:
-  // Surveys and registers the frames, or uses the earlier result `known`. `scan` and `progress`
-  // must outlive this object. Throws the errors of fuse_depth, and Error if poses are too far from
-  // the origin for tiles.
+  // Selects and registers frames, or uses the earlier result `known`. `scan` and `progress` must
+  // outlive this object. Throws as fuse_depth does, and if poses are too far from the origin.
   TileFusion(const ScanSource& scan, const Trajectory& world_from_base,
              const DepthFusionOptions& options, double tile_m, Progress& progress = no_progress(),
              const FusionSurvey* known = nullptr);

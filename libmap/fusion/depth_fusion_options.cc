@@ -6,21 +6,25 @@ namespace {
 
 void describe_surface(ResultTable& table, const FusionCounts& counts) {
   const SurfacePointCounts& points = counts.points;
-  table.add("occupied_voxels", counts.occupied_voxels, Merge::sum, "voxels with measurements");
-  table.add("surface_elements", counts.elements, Merge::sum, "elements of the surface");
+  table.add("occupied_voxels", counts.occupied_voxels, Merge::sum,
+            "number of voxels with measurements");
+  table.add("surface_elements", counts.elements, Merge::sum,
+            "number of surface elements, one per voxel and side of a surface");
   table.add("dropped_too_few_views", points.unconfirmed, Merge::sum,
-            "elements measured by fewer than min_views frames");
+            "number of elements dropped: measured by fewer than min_views frames");
   table.add("dropped_seen_through", points.seen_through, Merge::sum,
-            "elements that too many views see through");
-  table.add("dropped_missed", points.missed, Merge::sum, "elements where views measured nothing");
+            "number of elements dropped: too many views see through them");
+  table.add("dropped_missed", points.missed, Merge::sum,
+            "number of elements dropped: too many views measured nothing there");
   table.add("dropped_beside", points.contradicted, Merge::sum,
-            "elements connected to contradicted ones");
+            "number of elements dropped: others around them are contradicted");
   table.add("dropped_beyond_edges", points.beyond_edge, Merge::sum,
-            "points beyond an edge where the surface ends");
-  table.add("merged", points.merged, Merge::sum, "elements merged with one of the same voxel");
-  table.add("points", counts.points_made, Merge::sum, "points of the cloud");
+            "number of points dropped: beyond an edge of the surface");
+  table.add("merged", points.merged, Merge::sum,
+            "number of elements merged with another one in their voxel");
+  table.add("points", counts.points_made, Merge::sum, "number of points of the cloud");
   table.add("points_beyond_edges", points.extended_points, Merge::sum,
-            "points of the cloud beyond the measured edges");
+            "number of points added beyond measured edges");
   table.add_hidden("max_views", points.max_views, Merge::max);
 }
 
@@ -28,47 +32,49 @@ void describe_surface(ResultTable& table, const FusionCounts& counts) {
 
 void bind(ParameterTable& table, DepthFusionOptions& options) {
   DepthPlaneOptions& planes = options.planes;
-  table.add("voxel_size_m", options.voxel_size_m, positive, "size of a voxel; one point per voxel");
+  table.add("voxel_size_m", options.voxel_size_m, positive,
+            "edge length of a voxel, m; the cloud contains at most one point per voxel");
   table.add("sensor", options.sensor,
-            "depth camera, a name in data/sensors or a file: useful range and noise that no other "
-            "option sets; auto: a Kinect v2");
-  table.add("min_depth_m", planes.min_depth_m, positive, "minimum depth of measurements");
-  table.add("max_depth_m", planes.max_depth_m, positive, "maximum depth of measurements");
+            "depth camera: a name in data/sensors or a file, from which depth range and noise are "
+            "taken unless options set them; auto: a Kinect v2");
+  table.add("min_depth_m", planes.min_depth_m, positive, "minimum depth of used measurements, m");
+  table.add("max_depth_m", planes.max_depth_m, positive, "maximum depth of used measurements, m");
   table.add("max_incidence_deg", planes.max_incidence_deg, {0, 89.5, true, false},
-            "maximum angle between line of sight and surface normal");
+            "maximum angle between line of sight and surface normal, degrees");
   table.add("axial_noise_m", planes.noise.axial_m, positive,
-            "standard deviation of depth at range 0");
+            "constant term of the standard deviation of depth, m");
   table.add("range_noise", planes.noise.axial_of_range, not_negative,
-            "standard deviation of depth added by each meter of range, m/m");
+            "standard deviation of depth: term proportional to range, m per m");
   table.add("square_noise", planes.noise.axial_of_square, not_negative,
-            "standard deviation of depth added by range squared, 1/m");
+            "standard deviation of depth: term proportional to squared range, 1/m");
   table.add("lateral_noise_px", planes.noise.lateral_px, not_negative,
-            "standard deviation of measurements across the line of sight");
+            "standard deviation of measurements across the line of sight, pixels");
   table.add("plane_radius_px", planes.radius_px, {1, 7},
-            "radius of the disc of pixels that a plane is fitted to");
+            "radius of the disc of pixels to which a plane is fitted, pixels");
   table.add("min_pair_share", planes.min_pair_share, zero_to_one,
-            "minimum share of pairs of opposite pixels around a pixel that agree with it; else it "
-            "has no plane");
+            "minimum share of agreeing pairs of opposite neighbors for fitting a plane to a pixel");
   table.add("disc_radius_voxels", options.disc_radius_voxels, positive,
             "radius of the disc in which measurements are averaged, in voxels");
   table.add("pose_error_m", options.pose_error_m, not_negative,
-            "standard deviation of a whole frame along the surface normal");
+            "standard deviation of a frame's position along the surface normal due to its pose, m");
   table.add("registration_rounds", options.registration_rounds, {0, 20},
-            "maximum number of rounds of registration of the frames; 0: poses are unchanged");
+            "maximum number of rounds in which frames are registered to each other; 0: poses are "
+            "unchanged");
   table.add("enough_views", options.enough_views, not_negative,
-            "skip frames that add less than 1/enough_views to the information of earlier frames "
-            "on nearly all of their surface; 0: all frames are fused");
+            "number N of views that suffice: a frame is skipped if it adds less than 1/N to the "
+            "information of earlier frames on nearly all of its surface; 0: all frames are fused");
   table.add("min_views", options.points.min_views, {1},
-            "minimum number of frames that measured a point");
+            "minimum number of frames that measure a point of the cloud");
   table.add("max_seen_through", options.points.max_seen_through, not_negative,
             "maximum ratio of views that see through a point to views that see it");
   table.add("max_missed", options.points.max_missed, not_negative,
             "maximum ratio of views that should measure a point and measure nothing to views that "
             "see it");
-  table.add("extend_edges", options.extend_edges, "add points one voxel beyond the measured edges");
-  table.add("color", options.color, "add colors, weighted towards near frontal views");
+  table.add("extend_edges", options.extend_edges,
+            "add points one voxel beyond measured edges of the surface");
+  table.add("color", options.color, "add colors, with larger weights for near and frontal views");
   table.add("stereo", options.stereo, "compute the depth of stereo pairs by semi-global matching");
-  table.add("strict", options.strict, "fail if a frame cannot be used");
+  table.add("strict", options.strict, "fail if a frame cannot be used, instead of skipping it");
 }
 
 void describe(ResultTable& table, const FusionCounts& counts) {
@@ -77,13 +83,13 @@ void describe(ResultTable& table, const FusionCounts& counts) {
 }
 
 void describe(ResultTable& table, const DepthFusionResult& result) {
-  table.add("frames", result.frames, "frames that were fused");
+  table.add("frames", result.frames, "number of fused frames");
   table.add("redundant_frames", result.redundant_frames,
-            "frames left out because earlier frames have measured their surface");
-  table.add("skipped_frames", result.skipped.size(), "frames that could not be used");
+            "number of frames left out because earlier frames measured their surface");
+  table.add("skipped_frames", result.skipped.size(), "number of frames that could not be used");
   describe(table, result.pixels);
   table.add("registration_rounds", result.registration_rounds,
-            "rounds of registration that moved frames");
+            "number of registration rounds that moved frames");
   table.add("registration_rejected", result.registration_rejected,
             "true if held-out measurements rejected the registration");
   const auto add_check = [&](const std::string& kind, const PairCosts& costs) {
@@ -98,13 +104,13 @@ void describe(ResultTable& table, const DepthFusionResult& result) {
   add_check("depth", result.registration_check.depth);
   add_check("color", result.registration_check.color);
   table.add("registration_shift_m", result.registration_shift_m,
-            "shift of the frames by registration, root mean square");
+            "RMS translation of the frames by registration, m");
   table.add("registration_turn_deg", result.registration_turn_deg,
-            "rotation of the frames by registration, root mean square");
+            "RMS rotation of the frames by registration, degrees");
   table.add("disagreement_before_m", result.disagreement_before_m,
-            "deviation of frames' heights from the mean of all frames, with the given poses");
+            "RMS deviation of frames' surface heights from their mean, given poses, m");
   table.add("disagreement_after_m", result.disagreement_after_m,
-            "deviation of frames' heights from the mean of all frames, after registration");
+            "RMS deviation of frames' surface heights from their mean, registered poses, m");
   describe_surface(table, result);
 }
 

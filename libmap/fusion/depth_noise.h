@@ -1,4 +1,4 @@
-// Range and noise of a depth camera.
+// Range limits and noise model of a depth camera.
 #pragma once
 
 namespace libmap {
@@ -28,7 +28,7 @@ struct DepthSensor {
 };
 
 struct SensorModel;
-// The model's useful range and noise, where the sensor has the default ones.
+// Sets the range and noise of `sensor` that have their defaults to those of the model.
 void apply(const SensorModel& model, DepthSensor& sensor);
 
 }  // namespace libmap

@@ -1,7 +1,7 @@
-// Inner loops of depth_planes over the pixels of one row, for several instruction sets. All sets
-// compute the same bits, because no pixel depends on other lanes. Only plain pointers are used:
+// Inner loops of depth_planes.h over the pixels of one row, compiled for several instruction sets
+// with identical results, because no pixel depends on other lanes. Only plain pointers are used:
 // sources compiled for an extended instruction set must not include types with inline functions
-// that other sources compile too.
+// that other sources compile, too.
 #pragma once
 
 #include <cstddef>
@@ -34,7 +34,7 @@ struct DepthPlaneLoops {
   MeasureCounts (*measure)(const float* depth, int count, const Limits& limits, float* inverse,
                            float* tolerance);
 
-  // A pair of opposite pixels.
+  // A pair of pixels on opposite sides of the fitted pixel.
   struct Offset {
     std::ptrdiff_t pixels;  // offset in the image of inverse depths
     std::int32_t counts;    // 1 + 2^8 columns^2 + 2^20 rows^2

@@ -417,16 +417,17 @@ DepthPixelCounts add_depth_planes(const DepthImage& depth, const PixelRays& rays
 }
 
 void describe(ResultTable& table, const DepthPixelCounts& counts) {
-  table.add("pixels", counts.pixels, Merge::sum, "depth pixels of all frames");
-  table.add("measurements_used", counts.used, Merge::sum, "pixels that were fused");
-  table.add("rejected_unmeasured", counts.unmeasured, Merge::sum, "pixels without depth");
+  table.add("pixels", counts.pixels, Merge::sum, "number of depth pixels of all frames");
+  table.add("measurements_used", counts.used, Merge::sum, "number of pixels that were fused");
+  table.add("rejected_unmeasured", counts.unmeasured, Merge::sum, "number of pixels without depth");
   table.add("rejected_out_of_range", counts.out_of_range, Merge::sum,
-            "pixels outside the depth range");
+            "number of pixels outside the depth range");
   table.add("rejected_without_ray", counts.without_ray, Merge::sum,
-            "pixels outside the invertible lens distortion");
+            "number of pixels outside the invertible lens distortion");
   table.add("rejected_flying", counts.flying, Merge::sum,
-            "pixels that are not on a surface of their neighbors");
-  table.add("rejected_grazing", counts.grazing, Merge::sum, "pixels seen at a grazing angle");
+            "number of pixels that are not on a surface of their neighbors");
+  table.add("rejected_grazing", counts.grazing, Merge::sum,
+            "number of pixels seen at a grazing angle");
 }
 
 }  // namespace libmap

@@ -1,4 +1,4 @@
-// Viewing rays of a camera's pixels.
+// Undistorted viewing rays of all pixels of a camera, with a cache.
 #pragma once
 
 #include <Eigen/Core>

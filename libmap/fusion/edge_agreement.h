@@ -1,4 +1,4 @@
-// Agreement of depth edges and image edges: detects depth that is not registered to color.
+// Detects depth that is not registered to color, by comparing edges of depth and color images.
 #pragma once
 
 #include <cstddef>
@@ -9,27 +9,27 @@
 
 namespace libmap {
 
-// How well the edges of depth images agree with those of the color images.
+// Agreement of the edges of depth images with those of the color images.
 struct EdgeAgreement {
   std::size_t frames = 0;
   std::size_t edges = 0;  // pixels
-  // Mean contrast of the color images at the edges of depth, 0 to 1: as stored, and by the
-  // alternative: another place and focal length of the depth camera.
+  // Mean contrast of the color images at the edges of depth, 0 to 1: as stored, and with the best
+  // other pose and focal length of the depth camera ("the alternative").
   double stored = 0.0;
   double aligned = 0.0;
-  // Gain of the alternative in frames that it was not estimated from, in standard errors.
+  // Gain of the alternative in frames that were not used to estimate it, in standard errors.
   double significance = 0.0;
   double displacement_px = 0.0;      // RMS displacement of the edges, pixels of depth
   double uncertainty_px = 0.0;       // RMS difference of the alternatives by halves of the frames
-  double min_displacement_px = 0.0;  // below which the images agree
+  double min_displacement_px = 0.0;  // smaller displacements: the images agree
   Pose color_from_depth = Pose::Identity();  // the alternative, without a shift along the axis
   double focal_factor = 1.0;                 // focal length of depth, relative to the stored one
 
   // Returns true if depth is clearly not registered to color.
   bool is_displaced() const;
-  // The depth camera has clearly another focal length than stored.
+  // Returns true if the depth camera clearly has another focal length than stored.
   bool is_scaled() const;
-  // States the displacement; empty if the images agree.
+  // Returns a sentence on the displacement for messages; empty if the images agree.
   std::string sentence() const;
 };
 

@@ -1,5 +1,4 @@
-// Corrects poses of depth frames so that their measurements of a surface agree. Private to
-// depth_fusion.
+// Corrects poses of depth frames so that their surfaces agree. Private to depth_fusion.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,7 +14,7 @@ struct FrameRegistrationOptions {
   // > 0: standard deviations of the given poses.
   double position_error_m = 0.02;
   double rotation_error_deg = 1.0;
-  // > 0: heights that differ from the others by more than this have less weight.
+  // > 0: heights that differ from those of other frames by more than this have less weight.
   double scatter_m = 0.005;
   // > 0: mean number of independent heights per frame, whatever the number of observations. Limits
   // their weight against the given poses: because of noisy normals, sliding along a plane seems to

@@ -32,12 +32,12 @@ FusionFrame frame_at(const TrajectoryPose& pose, const Eigen::Vector3d& grid_ori
   const double bound = 0.9 * voxel_cell_limit * voxel_size_m;
   const double needed = reach + max_depth_m;
   if (needed > bound && reach <= max_depth_m)
-    throw Error("voxels are too small for the range of the depth images",
+    throw Error("too small for the range of the depth images",
                 {.field = "voxel_size_m",
                  .value = to_text(voxel_size_m),
                  .bound = "> " + to_text(static_cast<float>(voxel_size_m * needed / bound))});
   if (needed > bound)
-    throw Error("poses are too far apart for the voxel size",
+    throw Error("the pose is too far from the first for this voxel size",
                 {.field = "node " + std::to_string(pose.node),
                  .value = to_text(static_cast<float>(reach)) + " m from the first",
                  .bound = "< " + to_text(static_cast<float>(bound)) + " m"});

@@ -1,4 +1,4 @@
-// Frames of a scan for fusion, with a cache of decoded depth. Private to depth_fusion.
+// Reads frames of a scan for fusion, with a cache of depth. Private to depth_fusion.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -24,7 +24,7 @@ struct FusionFrame {
   int node = 0;
   Pose grid_from_base = Pose::Identity();
   std::size_t image_pixels = 0;
-  // Box in the grid, m, around the cameras and their rays up to the surface or maximum depth.
+  // Box in the grid frame, m, around the cameras and all measured points.
   Eigen::AlignedBox3d reach;
   double max_ray_length = 1.0;   // maximum length of a ray per depth
   double max_pixel_pitch = 0.0;  // maximum distance of adjacent rays per depth

@@ -1,4 +1,5 @@
-// Tiles of the x-y plane for fusion, with their margins. Private to depth_fusion.
+// Divides the x-y plane into tiles for fusion, each with the margin of voxels that affects its
+// points. Private to depth_fusion.
 #pragma once
 
 #include <Eigen/Core>

@@ -117,13 +117,14 @@ class ViewProjection {
 }  // namespace
 
 void bind(ParameterTable& table, PanoramaOptions& options) {
-  table.add("stride_px", options.stride_px, Range{1, 1e6}, "step between used rows and columns");
+  table.add("stride_px", options.stride_px, Range{1, 1e6},
+            "step between used rows and columns, pixels");
   table.add("flying_pixel_jump_m", options.flying_pixel_jump_m, not_negative,
-            "maximum depth difference of a pixel from both neighbors in a row or column; 0: keeps "
-            "all");
+            "maximum depth difference between a pixel and both its neighbors in a row or column, "
+            "m; 0: no limit");
   table.add("normals", options.normals, "add normals from neighboring pixels");
   table.add("normal_jump_m", options.normal_jump_m, positive,
-            "maximum depth difference of neighboring pixels on one surface");
+            "maximum depth difference between neighboring pixels of one surface, m");
 }
 
 PanoramaResult make_panorama(const std::vector<PanoramaView>& views,
@@ -154,13 +155,14 @@ PanoramaResult make_panorama(const std::vector<PanoramaView>& views,
 
 void describe(ResultTable& table, const PanoramaCounts& counts) {
   table.add_hidden("pixels", counts.pixels, Merge::sum);
-  table.add("points", counts.points, Merge::sum, "points of the view");
-  table.add("unmeasured", counts.unmeasured, Merge::sum, "pixels without depth");
-  table.add("too_near", counts.too_near, Merge::sum, "pixels nearer than near_m");
-  table.add("too_far", counts.too_far, Merge::sum, "pixels farther than far_m");
-  table.add("flying", counts.flying, Merge::sum, "pixels that differ from both neighbors");
+  table.add("points", counts.points, Merge::sum, "number of points of the view");
+  table.add("unmeasured", counts.unmeasured, Merge::sum, "number of pixels without depth");
+  table.add("too_near", counts.too_near, Merge::sum, "number of pixels nearer than near_m");
+  table.add("too_far", counts.too_far, Merge::sum, "number of pixels farther than far_m");
+  table.add("flying", counts.flying, Merge::sum,
+            "number of flying pixels, which differ from both neighbors");
   table.add("without_ray", counts.without_ray, Merge::sum,
-            "pixels outside the invertible lens distortion");
+            "number of pixels outside the invertible lens distortion");
 }
 
 }  // namespace libmap

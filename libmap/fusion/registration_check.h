@@ -1,4 +1,4 @@
-// Validation of a registration of frames by held-out measurements. Private to depth_fusion.
+// Validates a registration of frames by held-out measurements. Private to depth_fusion.
 #pragma once
 
 #include <span>

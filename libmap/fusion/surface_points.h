@@ -1,5 +1,5 @@
-// Makes a cloud of refined surface elements: one point per voxel, without points that views
-// contradict.
+// Last step of fusion: converts refined surface elements to a cloud with one point per voxel, and
+// removes points that other views contradict.
 #pragma once
 
 #include <cstddef>
@@ -11,8 +11,8 @@
 
 namespace libmap {
 
-// Side, in voxels, of the squares of the x-y plane in which measurements of one or two frames are
-// evaluated together, each square with its eight neighbors.
+// Side, in voxels, of the squares of the x-y plane in which points that only one or two frames
+// measured are kept or dropped together, each square with its eight neighbors.
 inline constexpr int contradiction_block = 16;
 
 struct SurfacePointOptions {

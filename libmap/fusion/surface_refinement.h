@@ -1,4 +1,4 @@
-// Refines surface elements: moves each along its normal to the weighted mean of all views.
+// Second pass of fusion: moves surface elements along their normals to the mean of all views.
 #pragma once
 
 #include <Eigen/Core>
@@ -19,7 +19,7 @@
 
 namespace libmap {
 
-// Neighborhood of the measurements that are used for an element.
+// Region around an element from which measurements are used.
 struct SurfaceSearch {
   double disc_radius_m = 0.015;  // > 0: radius of the disc in which measurements are averaged
   double search_m = 0.01;        // >= 0: maximum error of an element along its normal

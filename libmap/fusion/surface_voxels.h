@@ -1,5 +1,5 @@
-// Hashed voxel grid with the weighted means of measured positions and normals, and surface elements
-// from it. Only voxels with measurements are stored.
+// First pass of fusion: a hashed voxel grid of the weighted means of measured positions and
+// normals, and the surface elements made of it. Only voxels with measurements are stored.
 #pragma once
 
 #include <Eigen/Core>
@@ -24,8 +24,8 @@ class SurfaceVoxels {
     std::uint32_t frames = 0;
   };
 
-  // Adds one measurement at the position `place`, in voxels; ignored beyond voxel_cell_limit. A
-  // voxel has two sides: normals opposite to the mean of the first belong to the second.
+  // Adds one measurement at `position`, in voxels; ignored beyond voxel_cell_limit. A voxel has two
+  // sides: normals opposite to the mean of the first belong to the second.
   void add(const Eigen::Vector3f& position, const Eigen::Vector3f& normal, float weight);
   // Sums of one frame without the hash index, which would need most of the memory.
   struct Frame {
@@ -59,7 +59,7 @@ struct SurfaceElement {
 // Returns one element per column of voxels and surface in it. Columns are parallel to the axis
 // nearest to the normal; elements are on their center lines. If noise spreads a surface over two
 // voxels of a column, the voxel with more weight is used. With `extend`, adjacent empty columns get
-// an element too. The order depends on the voxels only, and is near in memory for neighbors.
+// an element too. Their order depends on the voxels only; neighbors are near in memory.
 std::vector<SurfaceElement> surface_elements(const SurfaceVoxels& voxels, bool extend);
 
 }  // namespace libmap

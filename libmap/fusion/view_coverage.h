@@ -1,5 +1,4 @@
-// Information that frames have measured of a surface, in cells of the grid. Private to
-// depth_fusion.
+// Information of earlier frames about a surface, to skip redundant ones. Private to depth_fusion.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// Compares depth and color of two cameras at a given relative pose.
+// Compares depth and color of two views of a surface at a given relative pose.
 #pragma once
 
 #include <vector>

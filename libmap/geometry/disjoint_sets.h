@@ -1,4 +1,4 @@
-// Disjoint-set forest (Galler and Fischer 1964).
+// Disjoint-set forest (Galler and Fischer 1964), for connected components.
 #pragma once
 
 #include <algorithm>

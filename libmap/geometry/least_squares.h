@@ -1,5 +1,5 @@
-// Nonlinear least squares: the loops of Levenberg-Marquardt and Gauss-Newton. The problem provides
-// its normal equations and their solver, dense, sparse or of fixed size.
+// Solvers for nonlinear least squares: Levenberg-Marquardt and Gauss-Newton iterations. The problem
+// provides its normal equations and their solution, dense, sparse or of fixed size.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,4 +1,4 @@
-// Upper side of a surface, decided by its normals.
+// Determines the up direction of a surface from normals, and whether they are consistent.
 #pragma once
 
 #include <Eigen/Core>
@@ -33,13 +33,13 @@ struct NormalVotes {
     return *this;
   }
   bool empty() const { return !(along + against > 0.0); }
-  // Share of the larger side, 0.5 to 1; 0 without votes. 0.5 for a closed surface.
+  // Returns the share of the larger side, 0.5 (e.g. a closed surface) to 1; 0 without votes.
   double share() const { return empty() ? 0.0 : std::max(along, against) / (along + against); }
   bool agree() const { return share() >= min_agreeing_share; }
 };
 
-// Share of neighboring points whose normals face opposite sides, among the first 65536 points; 0.5
-// for random sides, 0 for too few points. Ignores neighbors across a crease and positions of NaN.
+// Returns the share of neighboring points whose normals face opposite sides, among the first 65536
+// points; 0.5 for random sides, 0 for too few points. Ignores neighbors across a crease, and NaN.
 double opposing_share(const std::vector<Eigen::Vector3d>& positions,
                       const std::vector<Eigen::Vector3f>& normals);
 
@@ -53,9 +53,10 @@ struct UpOfNormals {
   bool decided = false;   // true if the normals agree; else `direction` is +z
 };
 
-// Up direction of a surface: the mean of its normals, repeatedly restricted to normals near the
-// mean, so that walls and rocks do not tilt it. Returns +z if the mean is within 20 degrees of +z
-// or if the normals do not agree. Normals can have any length; zeros and NaN are skipped.
+// Returns the up direction of a surface: the mean of its normals, repeatedly restricted to normals
+// near the mean, so that walls and rocks do not tilt it. Returns +z if the mean is within 20
+// degrees of it or the normals do not agree. Normals can have any length; zeros and NaN are
+// skipped.
 UpOfNormals up_of_normals(const std::vector<Eigen::Vector3d>& positions,
                           const std::vector<Eigen::Vector3f>& normals);
 

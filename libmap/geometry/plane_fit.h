@@ -1,4 +1,4 @@
-// Weighted least-squares planes, the inner step of robust plane fits.
+// Fits planes to weighted points by their principal axes; the inner step of robust plane fits.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,6 +1,6 @@
-// Small rigid motions and their derivatives. A step e = (x y z, rotation vector), m and rad, moves
-// a pose T in its own frame: moved(T, e) = T * [exp(rotation) | translation]. Covariances and
-// information matrices of poses refer to such steps, in the order of PoseLink::information.
+// Small rigid motions and their derivatives, for least squares over poses. A step e = (x y z,
+// rotation vector), m and rad, moves a pose T in its own frame: moved(T, e) = T * [exp(rotation) |
+// translation]. Covariances and information matrices refer to such steps, ordered as in PoseLink.
 #pragma once
 
 #include <Eigen/Core>

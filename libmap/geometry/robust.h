@@ -1,4 +1,4 @@
-// Weights of residuals in robust least squares (iteratively reweighted).
+// Weights of residuals for robust, iteratively reweighted least squares.
 #pragma once
 
 namespace libmap {

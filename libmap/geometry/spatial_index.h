@@ -100,7 +100,7 @@ class GrowingGrid {
     return false;
   }
 
-  // True if a point is closer to `place` than `radius_m`, the square root of `square_m2`.
+  // True if a point is closer to `position` than `radius_m`, the square root of `square_m2`.
   bool any_nearer(const Eigen::Vector3d& position, double radius_m, double square_m2) const {
     const Eigen::Vector3d reach = Eigen::Vector3d::Constant(radius_m);
     return any_in_box(position - reach, position + reach,

@@ -1,5 +1,5 @@
-// Voxel indices packed into 64-bit keys, and a hash table from keys to consecutive numbers. Inline,
-// for innermost loops.
+// Packs voxel indices into 64-bit keys, and maps keys to consecutive numbers by a hash table. For
+// the fusion of depth images; inline, for innermost loops.
 #pragma once
 
 #include <Eigen/Core>

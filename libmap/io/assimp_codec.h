@@ -1,4 +1,4 @@
-// Codec of OBJ, STL and GLB by assimp.
+// Reads and writes OBJ, STL and GLB meshes and textured models by assimp.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// Conversion between named columns and clouds.
+// Conversion between clouds and the named columns (columns.h) that cloud files contain.
 //
 // Recognized names: x y z, X Y Z; normal_x .., nx .., Normals_0 ..; red green blue, r g b,
 // diffuse_red ... Three columns form a triple only if all three exist; all other columns become

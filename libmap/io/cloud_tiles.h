@@ -1,7 +1,7 @@
-// Terrain in one or many cloud files, read in blocks. For binary PCD and binary PLY without lists
-// at its vertices, memory is proportional to the size of a block. Files of other encodings are read
-// completely, one at a time. Only positions and normals are read. All DEMs (.tif) are in the local
-// frame of the first DEM.
+// Reads a terrain that is stored in one or many cloud files, in blocks. For binary PCD and binary
+// PLY without lists at its vertices, memory is proportional to the size of a block. Files of other
+// encodings are read completely, one at a time. Only positions and normals are read. All DEMs
+// (.tif) are in the local frame of the first DEM.
 #pragma once
 
 #include <cstddef>

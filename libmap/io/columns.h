@@ -1,5 +1,5 @@
-// Named columns of numbers, the common data of all codecs. A column is a view on memory with
-// another owner, so that reading and writing do not copy a cloud.
+// Named columns of numbers: the common format between the file codecs and clouds or meshes. A
+// column is a view on memory with another owner, so that reading and writing do not copy a cloud.
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// Format-independent description of cloud and mesh files.
+// Description of a cloud or mesh file in any format: encoding, sizes, fields.
 #pragma once
 
 #include <cstddef>

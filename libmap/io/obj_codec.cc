@@ -53,7 +53,7 @@ class ObjReader {
   static Numbers numbers(const TextLine& line, std::size_t least) {
     Numbers values = Numbers::Zero();
     if (line.words.size() <= least)
-      throw Error("too few numbers",
+      throw Error("contains too few numbers",
                   {.field = name_of(line), .bound = ">= " + std::to_string(least)});
     for (std::size_t n = 1; n < std::min<std::size_t>(line.words.size(), 8); ++n) {
       const std::optional<double> value = parse_double(line.words[n]);

@@ -1,4 +1,4 @@
-// Generates a maximal set of Poisson-disk samples for a given radius. Private to libmap/mesh.
+// Generates Poisson-disk samples for a given radius, for poisson_disk.h. Private to libmap/mesh.
 #pragma once
 
 #include <Eigen/Core>
@@ -36,7 +36,7 @@ PlacedFragment placed(const TriangleMesh& mesh, const Fragment& fragment);
 // Maps two random numbers from 0 to 1 to a uniformly distributed point of the fragment.
 TrianglePoint point_of(const Fragment& fragment, double first, double second);
 
-// Range of consecutive pieces of a surface.
+// Range of consecutive fragments of a surface, with its bounds.
 struct SurfaceBlock {
   std::size_t begin = 0;
   std::size_t end = 0;
@@ -46,10 +46,10 @@ struct SurfaceBlock {
   double longest_m = 0.0;  // longest side
 };
 
-// A surface in pieces: the triangles of a mesh, and parts of triangles that are too large.
+// A surface as fragments: the triangles of a mesh, and parts of triangles that are too large.
 class SurfaceFragments {
  public:
-  // Takes all triangles of `mesh`, which must outlive the pieces.
+  // Takes all triangles of `mesh`, which must outlive this object.
   explicit SurfaceFragments(const TriangleMesh& mesh);
   // Divides `triangles` until no side is longer than `longest_m`. Throws Error if there are more
   // than `max_parts` parts.
@@ -89,11 +89,11 @@ struct DiskSamples {
 // Saturation density of random discs in the plane: samples * radius^2 / area. Discs of half the
 // radius cover 0.547 of the plane.
 inline constexpr double saturation_density = 0.6965;
-// Approximate share of the samples that darts over the whole surface find.
+// Approximate share of the samples found by darts (random points) over the whole surface.
 inline constexpr double dart_fraction = 0.808;
 
-// Throws darts over the whole surface. Then, if goes_on(samples so far), it fills the gaps;
-// otherwise the samples are not maximal. Throws Error if the mesh is too large for the radius.
+// Tries random points (darts) over the whole surface. Then, if goes_on(samples so far) is true, it
+// fills the gaps; otherwise gaps remain. Throws Error if the mesh is too large for the radius.
 DiskSamples sample_disks(const SampledSurface& surface, double radius_m, std::uint64_t seed,
                          const std::function<bool(std::size_t thrown)>& goes_on,
                          Progress& progress);

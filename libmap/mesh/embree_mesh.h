@@ -1,4 +1,4 @@
-// Triangle mesh in Embree, for ray casting and distances. Private to libmap/mesh.
+// Triangle mesh in Embree's data structures, for ray casting and distances. Private to libmap/mesh.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,4 +1,4 @@
-// Adjacency of triangles along edges and around vertices.
+// Adjacency of a mesh's triangles along edges (half-edges) and around vertices.
 #pragma once
 
 #include <cstddef>

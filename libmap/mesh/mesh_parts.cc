@@ -91,9 +91,10 @@ std::size_t count_of(const std::vector<bool>& marks) {
 
 TriangleMesh select_triangles(const TriangleMesh& mesh, const std::vector<bool>& keep_triangle) {
   if (keep_triangle.size() != mesh.triangles.size())
-    throw Error("not one mark per triangle", {.field = "marked triangles",
-                                              .value = std::to_string(keep_triangle.size()),
-                                              .bound = std::to_string(mesh.triangles.size())});
+    throw Error("number of marks differs from number of triangles",
+                {.field = "marked triangles",
+                 .value = std::to_string(keep_triangle.size()),
+                 .bound = std::to_string(mesh.triangles.size())});
   std::vector<std::uint32_t> triangles;
   std::vector<std::uint32_t> new_index(mesh.vertices.size(), unused);
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {

@@ -1,4 +1,4 @@
-// Selection, components and interpolation of meshes with their normals, colors and fields.
+// Parts of meshes: selection, connected components, interpolation of normals, colors and fields.
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,5 @@
-// Access to a mesh in many files: each piece with the surface around it. Memory depends on the size
-// of a piece.
+// Access to a mesh that is stored in many files (tiles): each tile with a margin of the surface
+// around it. Memory depends on the size of a tile.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -27,18 +27,17 @@ void append_part_within(const TriangleMesh& other, const Eigen::AlignedBox2d& bo
 
 class MeshTileIndex {
  public:
-  // Reads each piece once. Throws Error naming the file that cannot be read.
+  // Reads each tile once. Throws Error naming the file that cannot be read.
   explicit MeshTileIndex(std::vector<std::filesystem::path> tiles);
 
-  // Number of pieces; indices are those of the given paths.
+  // Number of tiles; indices are those of the given paths.
   std::size_t size() const { return tiles_.size(); }
   const std::filesystem::path& path(std::size_t tile) const { return tiles_[tile].path; }
   // Bounding box in x and y.
   const Eigen::AlignedBox2d& box(std::size_t tile) const { return tiles_[tile].box; }
 
-  // Returns the piece, and the triangles of other pieces with a corner within `margin_m` of its
-  // box. Caches recently used pieces, up to 1 million triangles. Throws Error if a file cannot be
-  // read.
+  // Returns the tile, and the triangles of other tiles with a corner within `margin_m` of its box.
+  // Caches recently used tiles, up to 1 million triangles. Throws Error if a file cannot be read.
   MeshWithMargin with_margin(std::size_t tile, double margin_m);
 
  private:

@@ -161,10 +161,10 @@ PoissonDiskResult sample(const SampledSurface& surface, const PoissonDiskOptions
 
 void bind(ParameterTable& table, PoissonDiskOptions& options) {
   table.add("radius_m", options.radius_m, positive,
-            "minimum distance between samples, and maximum distance of the surface to a sample");
+            "minimum distance between samples, and maximum distance of the surface to one, m");
   table.add("count", options.count, {0.0, max_samples},
-            "> 0: number of samples within 1 %, instead of the radius");
-  table.add("seed", options.seed, {}, "random seed");
+            "number of samples (within 1 %), instead of a radius; 0: by radius");
+  table.add("seed", options.seed, {}, "random seed of the samples");
 }
 
 PoissonDiskResult sample_poisson_disk(const TriangleMesh& mesh, const PoissonDiskOptions& options,
@@ -203,10 +203,10 @@ PoissonDiskResult TileSampler::sample(const TriangleMesh& mesh, std::size_t numb
 
 void describe(ResultTable& table, const PoissonDiskResult& result) {
   table.add("points", result.cloud.size(), "number of samples");
-  table.add("area_m2", result.area_m2, "area of the surface");
-  table.add("radius_m", result.radius_m, "required minimum distance between samples");
+  table.add("area_m2", result.area_m2, "area of the surface, m2");
+  table.add("radius_m", result.radius_m, "required minimum distance between samples, m");
   table.add("smallest_distance_m", result.smallest_distance_m,
-            "actual minimum distance between samples");
+            "actual minimum distance between samples, m");
   table.add("relative_radius", result.relative_radius,
             "minimum distance relative to the densest packing of as many discs");
   table.add("radii_tried", result.tries, "number of radii that were tried");

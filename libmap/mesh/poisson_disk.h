@@ -1,4 +1,4 @@
-// Poisson-disk sampling of a surface: a maximal set of samples with a minimum distance.
+// Samples a surface evenly by Poisson disks: random samples with a minimum distance, without gaps.
 #pragma once
 
 #include <cstddef>
@@ -18,7 +18,7 @@ struct PoissonDiskOptions {
   // The default is half of the scenarios' voxel of 1 cm. Every disc of this radius on the surface
   // contains a sample, and so does every voxel that level ground intersects.
   double radius_m = 0.005;  // > 0: minimum distance between samples
-  std::uint64_t count = 0;  // > 0: number of samples within 1 %, instead of the radius
+  std::uint64_t count = 0;  // > 0: number of samples (within 1 %), instead of the radius
   std::uint64_t seed = 1;
 };
 void bind(ParameterTable& table, PoissonDiskOptions& options);
@@ -49,22 +49,21 @@ void describe(ResultTable& table, const PoissonDiskResult& result);
 PoissonDiskResult sample_poisson_disk(const TriangleMesh& mesh, const PoissonDiskOptions& options,
                                       Progress& progress = no_progress());
 
-// Samples a surface in consecutive pieces by radius. The minimum distance also holds between
-// pieces, and seams have no gaps. Memory depends on the size of a piece and on the samples near
-// seams.
+// Samples a surface that is divided into tiles, one after the other, by radius. The minimum
+// distance also applies between tiles, and seams have no gaps. Memory depends on the size of a
+// tile.
 class TileSampler {
  public:
-  // Takes the bounding boxes of all pieces. Throws Error if options.count is not 0.
+  // Takes the bounding boxes of all tiles. Throws Error if options.count is not 0.
   TileSampler(std::vector<Bounds3d> boxes, const PoissonDiskOptions& options);
-  // Samples piece `number`, once per piece. Without area, the result has no samples. Throws as
-  // sample_poisson_disk.
+  // Samples tile `number`, once. Without area, there are no samples. Throws as sample_poisson_disk.
   PoissonDiskResult sample(const TriangleMesh& mesh, std::size_t number,
                            Progress& progress = no_progress());
 
  private:
   std::vector<Bounds3d> boxes_;
   PoissonDiskOptions options_;
-  std::vector<std::vector<Eigen::Vector3d>> near_;  // samples of other pieces, by piece
+  std::vector<std::vector<Eigen::Vector3d>> near_;  // samples of other tiles, by tile
 };
 
 }  // namespace libmap

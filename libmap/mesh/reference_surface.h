@@ -1,4 +1,4 @@
-// Reference surface, a mesh or a cloud, for distances and alignment of points.
+// Reference surface (a mesh or a cloud) for measuring distances of points and for alignment.
 #pragma once
 
 #include <Eigen/Core>

@@ -19,17 +19,18 @@ namespace libmap {
 
 void bind(ParameterTable& table, SurfaceAlignmentOptions& options) {
   table.add("icp_max_distance_m", options.max_distance_m, positive,
-            "maximum distance from the surface of points used by ICP");
+            "maximum distance from the surface of points used by ICP, m");
   table.add("icp_min_overlap", options.min_overlap, zero_to_one,
             "minimum share of the points that overlap the surface in ICP");
   table.add("icp_max_iterations", options.max_iterations, {1.0, 1e6},
             "maximum number of ICP iterations");
   table.add("icp_tolerance_m", options.tolerance_m, positive,
-            "step below which ICP has converged, m");
+            "step of the points below which ICP has converged, m");
   table.add("icp_max_points", options.max_points, {6.0, 1e8},
             "maximum number of points used by ICP");
   table.add("icp_min_curvature", options.min_curvature, zero_to_one,
-            "share of the maximum curvature below which ICP does not change a motion");
+            "share of the largest eigenvalue of the ICP information matrix below which a direction "
+            "of motion is left unchanged");
 }
 
 namespace {
@@ -64,7 +65,7 @@ std::vector<Pair> pairs_of(const std::vector<Eigen::Vector3d>& points, const Pos
   });
   const double share = static_cast<double>(pairs.size()) / static_cast<double>(points.size());
   if (pairs.size() < 6 || share < options.min_overlap)
-    throw Error("too little overlap to align with the surface",
+    throw Error("too few points are near the surface to align them with it",
                 {.field = "points within " + to_text(static_cast<float>(options.max_distance_m)) +
                           " m of the surface",
                  .value = to_fixed_text(100.0 * share, 1) + " %",

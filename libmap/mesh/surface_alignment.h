@@ -18,8 +18,8 @@ struct SurfaceAlignmentOptions {
   double tolerance_m = 1e-7;    // > 0: converged if a step moves the points by less (RMS)
   int max_points = 50000;       // >= 6: maximum number of points used, evenly over the list
   // 0 to 1: minimum curvature of the sum of squares along a motion, relative to the maximum.
-  // Motions with less are not determined by the surface and are not changed (Zhang, Kaess and Singh
-  // 2016), for example the translation along a plane.
+  // Motions with a lower curvature are not determined by the surface and are not changed (Zhang,
+  // Kaess and Singh 2016), for example the translation along a plane.
   double min_curvature = 1e-4;
 };
 void bind(ParameterTable& table, SurfaceAlignmentOptions& options);

@@ -201,11 +201,11 @@ double share_of(const std::vector<bool>& flags) {
 }
 
 void describe(ResultTable& table, const DistanceStatistics& statistics) {
-  table.add("rmse_m", statistics.rmse_m, "root mean square distance");
-  table.add("mean_m", statistics.mean_m, "mean distance");
-  table.add("median_m", statistics.median_m, "median distance");
-  table.add("p95_m", statistics.p95_m, "95th percentile of the distances");
-  table.add("max_m", statistics.max_m, "maximum distance");
+  table.add("rmse_m", statistics.rmse_m, "root mean square distance, m");
+  table.add("mean_m", statistics.mean_m, "mean distance, m");
+  table.add("median_m", statistics.median_m, "median distance, m");
+  table.add("p95_m", statistics.p95_m, "95th percentile of the distances, m");
+  table.add("max_m", statistics.max_m, "maximum distance, m");
 }
 
 }  // namespace libmap

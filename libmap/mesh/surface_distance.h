@@ -1,4 +1,4 @@
-// Distances of points from a mesh's surface, random samples of the surface, and their coverage.
+// Distances of points from a mesh, random samples of a mesh, and their coverage by points.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,4 +1,4 @@
-// Sparse normal equations with one block of six unknowns per pose, and their solver.
+// Sparse normal equations of pose optimization, one block of six unknowns per pose; and a solver.
 #pragma once
 
 #include <cstddef>

@@ -460,22 +460,22 @@ void bind(ParameterTable& table, BundleAdjustmentOptions& options) {
   table.add("bundle_iterations", options.max_iterations, {1, 10000},
             "maximum number of bundle adjustment iterations");
   table.add("focal_prior", options.focal_prior, positive,
-            "prior standard deviation of the focal length, relative");
+            "prior standard deviation of the focal length, relative to the focal length");
   table.add("center_prior_px", options.center_prior_px, positive,
-            "prior standard deviation of the principal point");
+            "prior standard deviation of the principal point, pixels");
   table.add("depth_prior", options.depth_prior, positive,
             "prior standard deviation of the depth correction, relative to the depth noise");
   table.add("depth_bend", options.depth_smoothness_prior, positive,
             "prior standard deviation of the depth correction's second differences between knots, "
             "relative to the depth noise");
   table.add("depth_knot_m", options.depth_knot_m, {0.02},
-            "distance between knots of the depth correction");
+            "distance in depth between the knots of the depth correction, m");
   table.add("frame_time_s", options.bounds.frame_time_s, positive,
-            "maximum depth delay and rolling shutter time of a possible calibration");
+            "maximum depth delay and rolling shutter time that a calibration may contain, s");
   table.add("max_bend_m", options.bounds.max_depth_correction_m, not_negative,
-            "maximum depth correction at range 0");
+            "maximum depth correction: constant term, m");
   table.add("bend_of_range", options.bounds.max_depth_correction_per_m, not_negative,
-            "increase of max_bend_m per meter of range, m/m");
+            "maximum depth correction: term proportional to range, m per m");
 }
 
 namespace {

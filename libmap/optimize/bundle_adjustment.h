@@ -18,11 +18,11 @@
 
 namespace libmap {
 
-// Bounds of physically possible calibrations. Larger values compensate other errors.
+// Bounds of physically possible calibrations. Estimates beyond them compensate other errors.
 struct CalibrationBounds {
   double frame_time_s = 0.033;               // > 0: maximum depth delay and rolling shutter time
-  double max_depth_correction_m = 0.01;      // >= 0: maximum depth correction at range 0
-  double max_depth_correction_per_m = 0.02;  // >= 0: increase of max_bend_m per meter of range, m/m
+  double max_depth_correction_m = 0.01;      // >= 0: maximum depth correction: constant term
+  double max_depth_correction_per_m = 0.02;  // >= 0: term proportional to range, m/m
   double deviations = 4.0;  // not bound; other parameters, in deviations of their prior
 };
 
@@ -89,13 +89,12 @@ struct BundleAdjustmentResult {
   bool converged = false;
 };
 
-// Adjusts poses, points and free camera parameters. The resulting poses fit frames after
-// calibrate() with the result's calibration. `links` are those of the graph at its optimum
-// (odometry, other closures, priors). The gauge node of each component is fixed. The information is
-// computed from `system_tracks` if there are any: with TrackFrames::linked tracks it is sparse and
-// slightly smaller. `start` is the initial calibration; by default the stored cameras and the
-// motion between poses. Memory grows with the square of the number of poses. Throws Error: options
-// out of range.
+// Adjusts poses, points and free camera parameters. The resulting poses fit frames with the
+// resulting calibration (calibrate()). `links` are those of the graph at its optimum (odometry,
+// other closures, priors). The gauge node of each component is fixed. The information is computed
+// from `system_tracks` if there are any: with TrackFrames::linked tracks it is sparse and slightly
+// smaller. `start` is the initial calibration; by default the stored cameras and the motion between
+// poses. Memory grows with the square of the number of poses. Throws Error: options out of range.
 BundleAdjustmentResult adjust_bundle(
     const std::vector<FrameFeatures>& frames, const std::vector<FeatureTrack>& tracks,
     const std::map<int, Pose>& map_from_base, const std::vector<GraphLinkResult>& links,

@@ -1,5 +1,4 @@
-// Links of a pose graph, and their residuals for pose graph optimization, bundle adjustment and
-// covariances.
+// Links of a pose graph and their residuals, for all optimizations of poses and covariances.
 #pragma once
 
 #include <map>

@@ -1,4 +1,4 @@
-// Selects the pairs of frames for ICP. Private to icp_refinement.
+// Selects the pairs of frames that ICP aligns. Private to icp_refinement.
 #pragma once
 
 #include <map>

@@ -415,13 +415,14 @@ void bind(ParameterTable& table, IcpOptions& options) {
             "ICP between depth images: of frames joined by links, or of all that overlap");
   table.add("icp_iterations", options.iterations, {1, 1000}, "maximum number of ICP iterations");
   table.add("icp_pairs", options.pairs_per_frame, {1, 1000},
-            "maximum number of frames that ICP aligns a frame with");
+            "maximum number of other frames to which ICP aligns a frame");
   table.add("icp_samples", options.samples, {1, 1000000},
             "approximate number of ICP samples per frame");
   table.add("icp_distance_m", options.max_distance_m, positive,
-            "initial maximum ICP distance between a sample and a surface");
+            "maximum distance between an ICP sample and its surface in the first iteration, m");
   table.add("icp_degenerate", options.degenerate, zero_to_one,
-            "share of the largest ICP information below which a direction is ignored");
+            "share of the largest eigenvalue of the ICP information matrix below which a direction "
+            "is ignored");
   table.add("icp_correlation", options.correlation, {1.0},
             "number of correlated ICP samples equivalent to one independent sample");
 }
@@ -432,7 +433,7 @@ IcpResult align_surfaces(const std::vector<FrameFeatures>& frames,
                          const std::vector<PoseLink>& links, const IcpOptions& options,
                          Progress& progress) {
   if (prior.size() != map_from_base.size())
-    throw Error("does not match the number of frames with a pose",
+    throw Error("differs from the number of frames with a pose",
                 {.field = "blocks of the prior",
                  .value = std::to_string(prior.size()),
                  .bound = std::to_string(map_from_base.size())});

@@ -1,5 +1,5 @@
-// Bundle adjustment in one dense system of poses, motions and camera parameters, with points
-// eliminated. Private to libmap/optimize.
+// Bundle adjustment with free camera parameters: one dense system of poses, motions and camera
+// parameters, from which points are eliminated. Private to libmap/optimize.
 #pragma once
 
 #include <Eigen/Core>

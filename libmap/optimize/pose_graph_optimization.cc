@@ -474,7 +474,7 @@ void bind(ParameterTable& table, PoseGraphOptions& options) {
   table.add("max_chi_square", options.max_chi_square, positive,
             "maximum chi-square of a loop closure's residuals; closures above are rejected");
   table.add("gauge_node", options.gauge_node, not_negative,
-            "node whose pose is fixed; 0: the first node");
+            "id of the node whose pose is fixed; 0: the first node");
 }
 
 PoseGraphResult optimize_pose_graph(const std::map<int, Pose>& map_from_base,

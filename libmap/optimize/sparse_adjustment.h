@@ -1,6 +1,6 @@
-// Bundle adjustment of long scans: a sparse system of poses, with each point at its optimum for the
-// poses (variable projection). Memory and time are proportional to the number of observations, and
-// grow with the fill-in of the graph of the links.
+// Bundle adjustment of long scans with fixed cameras: a sparse system of poses, with each point at
+// its optimum for the poses (variable projection). Memory and time are proportional to the number
+// of observations, plus the fill-in of the links' graph.
 #pragma once
 
 #include <map>

@@ -2,8 +2,8 @@
 // folder with cameras.txt, images.txt and points3D.txt (https://colmap.github.io/format.html).
 // Numbers are written with the fewest digits that parse to the same number.
 //
-// In COLMAP, the first pixel's center has u = 0.5, in this project 0. The scale and the axes of
-// COLMAP's world are arbitrary.
+// In COLMAP, the center of the first pixel has u = 0.5, in this project 0. The scale and the axes
+// of COLMAP's world are arbitrary.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// Pairing of data by time, for example of color and depth images of a camera.
+// Pairs data by time stamps, for example color and depth images of a camera.
 #pragma once
 
 #include <cstddef>

@@ -200,11 +200,11 @@ TrajectoryError relative_trajectory_error(const Trajectory& estimate, const Traj
 
 void describe(ResultTable& table, const TrajectoryError& error) {
   table.add("poses", error.poses, "number of compared poses");
-  table.add("rmse_m", error.rmse_m, "root mean square error of the positions");
-  table.add("median_m", error.median_m, "median error of the positions");
-  table.add("max_m", error.max_m, "maximum error of the positions");
-  table.add("mean_rotation_deg", error.mean_rotation_deg, "mean error of the rotations");
-  table.add("max_rotation_deg", error.max_rotation_deg, "maximum error of the rotations");
+  table.add("rmse_m", error.rmse_m, "root mean square error of the positions, m");
+  table.add("median_m", error.median_m, "median error of the positions, m");
+  table.add("max_m", error.max_m, "maximum error of the positions, m");
+  table.add("mean_rotation_deg", error.mean_rotation_deg, "mean error of the rotations, degrees");
+  table.add("max_rotation_deg", error.max_rotation_deg, "maximum error of the rotations, degrees");
 }
 
 }  // namespace libmap

@@ -73,7 +73,7 @@ NodePairs pair_by_order(const Trajectory& trajectory, const PoseGraph& graph,
   if (trajectory.size() != valid)
     std::erase_if(nodes, [&](const GraphNode* node) { return !has_stored_pose(node); });
   if (trajectory.size() != nodes.size())
-    throw Error("has no nodes or stamps, and the number of poses differs from the scan's nodes",
+    throw Error("has neither node ids nor stamps, and not one pose per node of the scan",
                 {.field = "poses",
                  .value = std::to_string(trajectory.size()),
                  .bound = std::to_string(valid)});
@@ -261,7 +261,8 @@ NodeTrajectory assign_nodes(const Trajectory& trajectory, const PoseGraph& graph
   for (const auto& [node, pose] : pairs)
     if (!poses.emplace(node->id, TrajectoryPose{node->id, node->stamp_s, pose->world_from_base})
              .second)
-      throw Error("two poses for one node", {.field = "node", .value = std::to_string(node->id)});
+      throw Error("two poses belong to this node",
+                  {.field = "node", .value = std::to_string(node->id)});
   NodeTrajectory result;
   for (const auto& [id, pose] : poses) result.poses.push_back(pose);
   result.unmatched = trajectory.size() - pairs.size();

@@ -100,7 +100,7 @@ class Dem {
     info_.rows = GDALGetRasterYSize(dataset_.get());
     const double pixels = static_cast<double>(info_.columns) * static_cast<double>(info_.rows);
     if (pixels > max_pixels)
-      throw Error("is too large; crop it (gdal_translate -srcwin)",
+      throw Error("too large; crop the raster (gdal_translate -srcwin)",
                   {.field = "pixels", .value = to_text(pixels), .bound = "<= 2^33"});
     choose_band();
     choose_window();
@@ -145,7 +145,8 @@ class Dem {
     if (type == GDT_Byte || GDALDataTypeIsComplex(type) != 0 ||
         GDALGetRasterColorTable(band_) != nullptr)
       throw Error(
-          "not a type of heights; if it is a height band, convert it (gdal_translate -ot Float32)",
+          "not a type of heights; convert a height band to another type (gdal_translate -ot "
+          "Float32)",
           {.field = "type of band " + std::to_string(chosen),
            .value = info_.band_type,
            .bound = "integers of 16 bits or more, or floating point"});
@@ -186,7 +187,7 @@ class Dem {
     if (!(area_m2 > 1e-12) || !(area_m2 < 1e12) ||
         !(info_.local_from_pixel.cwiseAbs().maxCoeff() < max_position_m) ||
         !(center_m.cwiseAbs().maxCoeff() < max_position_m))
-      throw Error("pixels have no area or are farther than 1e8 m",
+      throw Error("the pixels have no area or are more than 1e8 m from the origin",
                   {.field = "affine transform",
                    .value = "pixels of " + to_text(static_cast<float>(area_m2)) + " m2"});
     height_scale_ = GDALGetRasterScale(band_, nullptr) * height_unit_m(band_, srs);
@@ -284,7 +285,7 @@ class Dem {
       }
       height = height * height_scale_ + height_offset_;
       if (!(std::abs(height) <= max_height_m))
-        throw Error("not a valid height; if it means nodata, declare it (gdal_translate -a_nodata)",
+        throw Error("not a height; if it marks missing data, declare it (gdal_translate -a_nodata)",
                     {.field = "height", .value = to_text(height), .bound = ">= -1e6 and <= 1e6"});
       height -= info_.georeference.origin_m.z();
     }

@@ -1,4 +1,4 @@
-// Rasterization of clouds and maps: one band per field, one pixel per vertical column of points.
+// Converts clouds and maps to rasters (GeoTIFF): one band per field, one pixel per column.
 #pragma once
 
 #include <Eigen/Core>

@@ -288,7 +288,7 @@ Chessboard parse_known_board(const std::string& text) {
   const auto square_m =
       colon == std::string::npos ? std::nullopt : parse_double(text.substr(colon + 1));
   if (!square_m || !(*square_m > 0.0 && *square_m <= max_square_m))
-    throw Error("is not a board of known size",
+    throw Error("not a board of known size",
                 {.field = "board",
                  .value = text,
                  .bound = "COLUMNSxROWS:METERS with METERS > 0 and <= 1, e.g. 8x6:0.03"});

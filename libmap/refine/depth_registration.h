@@ -1,4 +1,4 @@
-// Depth that is not registered to color: detected by edges, and registered before a refinement.
+// Detects depth that is not registered to color, and registers it coarsely before refinement.
 #pragma once
 
 #include <memory>
@@ -11,8 +11,9 @@
 namespace libmap {
 
 struct CoarseRegistration {
-  std::unique_ptr<ScanSource> scan{};        // with registered depth; nullptr: the given one is
-  Pose color_from_depth = Pose::Identity();  // of the given scan
+  std::unique_ptr<ScanSource>
+      scan{};  // scan with registered depth; nullptr: the given scan is registered
+  Pose color_from_depth = Pose::Identity();  // in the given scan
   std::string finding{};                     // empty if depth is registered
 };
 

@@ -1,4 +1,4 @@
-// Initial poses for the optimization of a scan's poses.
+// Selects the initial poses of a scan for refinement: odometry, stored poses, or links.
 #pragma once
 
 #include <map>
@@ -26,8 +26,8 @@ struct InitialPoses {
 // Throws Error if `start` is odometry or stored and the scan has no such poses.
 InitialPoses initial_poses(const PoseGraph& graph, StartPoses start);
 
-// Transforms each part rigidly so that it agrees with its links to larger parts; of several links,
-// the one that most others agree with. Returns the joined parts.
+// Joins parts: transforms each rigidly by a link to a larger part; of several links, by the one
+// with which most others agree. Returns the joined parts.
 std::vector<std::vector<int>> join_parts(std::map<int, Pose>& map_from_base,
                                          const std::vector<std::vector<int>>& parts,
                                          const std::vector<PoseLink>& links);

@@ -85,24 +85,26 @@ bool agree(const FeatureLink& one, const FeatureLink& other, const PoseGraphResu
 
 void bind(ParameterTable& table, LoopClosureDetectionOptions& options) {
   table.add("radius_m", options.radius_m, not_negative,
-            "maximum distance between candidates for closures");
-  table.add("angle_deg", options.angle_deg, {0.0, 180.0},
-            "maximum angle between viewing directions of candidates for closures");
+            "maximum distance between candidates for a loop closure, m");
+  table.add(
+      "angle_deg", options.angle_deg, {0.0, 180.0},
+      "maximum angle between the viewing directions of candidates for a loop closure, degrees");
   table.add("near_candidates", options.near_candidates, not_negative,
-            "maximum number of near candidates per frame");
+            "maximum number of loop closure candidates per frame by distance");
   table.add("similar_candidates", options.similar_candidates, not_negative,
-            "candidates per frame by appearance, in the whole scan");
+            "number of loop closure candidates per frame by appearance, from the whole scan");
   table.add("neighbors", options.neighbors, not_negative,
-            "number of following frames that a frame is matched with");
+            "number of following frames with which a frame is matched");
   table.add("max_ratio", options.max_ratio, {0.0, 1.0, true, false},
-            "maximum distance of a match's descriptors by that of the second-best match");
+            "maximum ratio of the descriptor distances of the best and second-best match");
   table.add("min_inliers", options.estimate.min_inliers, {6, 100000},
-            "minimum number of matches that agree on a motion");
+            "minimum number of matches that agree with the relative pose of two frames");
   table.add("min_spread", options.estimate.min_spread, not_negative,
             "minimum spread of agreeing matches in the image, in focal lengths");
   table.add("max_graph_chi_square", options.max_graph_chi_square, positive,
-            "maximum chi-square of a closure against the pose graph");
-  table.add("words", options.appearance.words, {1, 65536}, "words in the vocabulary of appearance");
+            "maximum chi-square of a loop closure's deviation from the pose graph");
+  table.add("words", options.appearance.words, {1, 65536},
+            "number of visual words in the vocabulary for appearance");
 }
 
 std::set<FramePair> consecutive_pairs(const std::vector<FrameFeatures>& frames, int neighbors) {

@@ -1,4 +1,4 @@
-// Candidates for loop closures, and their check against the pose graph.
+// Finds candidates for loop closures, and rejects closures that contradict the pose graph.
 #pragma once
 
 #include <cstddef>
@@ -19,7 +19,7 @@ struct LoopClosureDetectionOptions : MatchingOptions {
   double angle_deg = 60.0;     // >= 0: maximum angle between their viewing directions
   int near_candidates = 10;    // >= 0: maximum number of near candidates per frame
   int similar_candidates = 4;  // >= 0: maximum number of candidates by appearance per frame
-  int neighbors = 2;           // >= 0: number of following frames that a frame is matched with
+  int neighbors = 2;           // >= 0: number of following frames with which a frame is matched
   double max_graph_chi_square = 22.5;  // > 0: maximum of a closure against the graph; 99.9 %
   double graph_slack_m = 0.01;         // >= 0: added to the deviations of the graph's estimate
   double graph_slack_deg = 0.4;

@@ -175,7 +175,7 @@ void start(Run& run) {
   const PoseGraph& graph = run.input.scan.graph();
   const int gauge = options.graph.gauge_node;
   if (gauge != 0 && graph.find_node(gauge) == nullptr)
-    throw Error("the scan has no such node",
+    throw Error("the scan has no node with this id",
                 {.field = "gauge_node", .value = std::to_string(gauge)});
   InitialPoses initial = initial_poses(graph, options.start);
   RefinementState& state = run.state;
@@ -205,7 +205,7 @@ void require_one_scale(const RefinementOptions& options) {
                 {.field = "board"});
   if (options.scale != 1.0 && (options.board || !options.known_lengths.empty() ||
                                options.scale_from == ScaleSource::odometry))
-    throw Error("the scale is determined twice",
+    throw Error("the scale is also determined by another option: use one of them",
                 {.field = "scale",
                  .value = to_text(options.scale),
                  .bound = "1 with known lengths, a board or the scale from odometry"});
@@ -445,7 +445,7 @@ void drop_unjoined(const RefinementInput& input, const RefinementState& state,
     if (input.tracked.contains(node)) left.push_back(node);
   std::sort(left.begin(), left.end());
   if (!left.empty())
-    result.warnings.push_back("left out, because no link joins them to the rest: nodes " +
+    result.warnings.push_back("no link connects these nodes to the others, so they are left out: " +
                               join_numbers(left));
   result.without_pose = std::move(left);
 }
@@ -505,11 +505,11 @@ void require_other_links(Run& run) {
   if (is_all_tracked(run.input, state) && state.other_links.empty()) {
     if (state.frames->empty() && !run.result.skipped.empty())
       throw run.result.skipped.front().second;
-    throw Error("no two of its images match, and there are no other links",
+    throw Error("no two images match, and the scan has no links: the poses are undetermined",
                 {.field = "frames", .value = std::to_string(state.frames->size())});
   }
   run.state.warnings.push_back(
-      "no two frames could be matched by features: the poses are from the other links only");
+      "no two frames could be matched by features: the poses depend on the scan's own links only");
 }
 
 }  // namespace
@@ -522,20 +522,21 @@ void bind(ParameterTable& table, RefinementOptions& options) {
              {"visual", StartPoses::visual}},
             "source of the initial poses; visual: images only; auto: visual for nodes without "
             "poses and links");
-  table.add("rounds", options.rounds, not_negative, "maximum number of rounds of loop closures");
+  table.add("rounds", options.rounds, not_negative,
+            "maximum number of rounds in which loop closures are searched");
   bind(table, options.features);
   bind(table, options.odometry);
   bind(table, options.closures);
   bind(table, options.graph);
-  table.add("bundle", options.bundle, "refine poses and points by bundle adjustment");
+  table.add("bundle", options.bundle, "refine poses and landmarks by bundle adjustment");
   table.add("sensor", options.sensor,
-            "depth camera as a name in data/sensors or a file, which sets noise, useful range, "
-            "timing and bounds; auto: the noise is estimated");
+            "depth camera: a name in data/sensors or a file, from which noise, depth range, timing "
+            "and bounds are taken; auto: the noise is estimated");
   table.add("intrinsics", options.intrinsics,
             {{"fixed", IntrinsicsMode::fixed},
              {"refined", IntrinsicsMode::refined},
              {"auto", IntrinsicsMode::automatic}},
-            "focal length and principal point: as stored, or estimated; auto: estimated if the "
+            "focal length and principal point: as stored, or estimated; auto: estimated if "
             "held-out matches then fit better");
   table.add("correct_depth", options.correct_depth,
             "estimate a correction of depth by range and radius if the held-out data fit better "
@@ -544,13 +545,14 @@ void bind(ParameterTable& table, RefinementOptions& options) {
             "estimate the registration of depth to color if the held-out data fit better with it; "
             "otherwise displaced edges are only a warning");
   table.add("estimate_timing", options.estimate_timing,
-            "estimate the delay of depth and the time of an image's rows if the held-out data fit "
-            "better with them");
+            "estimate the depth delay and the rolling shutter time if the held-out data fit better "
+            "with them");
   table.add("scale_from", options.scale_from,
             {{"depth", ScaleSource::depth}, {"odometry", ScaleSource::odometry}},
-            "source of the scale if no factor, known lengths or board are given");
+            "source of the scale if no factor, known length or board is given");
   table.add("scale", options.scale, {0.5, 2.0},
-            "known factor of the scale, e.g. that of crop --border-size; 1: none is known");
+            "known scale factor of the scan, e.g. as printed by crop --border-size; 1: no factor "
+            "is known");
   bind(table, options.bundle_adjustment);
   bind(table, options.icp);
   table.add("seed", options.seed, not_negative, "random seed");
@@ -606,21 +608,21 @@ void describe(ResultTable& table, const RefinementResult& result) {
     rmse_m = result.stages.back().error->absolute.rmse_m;
     rotation_deg = result.stages.back().error->absolute.mean_rotation_deg;
   }
-  table.add("poses", result.poses.size(), "poses");
-  table.add("links", result.links.size(), "links between poses");
-  table.add("closures_found", result.closures.size(), "links that refinement found");
-  table.add("parts", result.components.size(), "connected components of the pose graph");
-  table.add("nodes_without_pose", result.without_pose.size(), "nodes without a pose");
-  table.add("nodes_without_links", result.without_links.size(), "nodes without links");
-  table.add("frames_skipped", result.skipped.size(), "frames without features");
-  table.add("features", result.features, "features of all frames");
-  table.add("sensor", sensor, "findings about the sensor");
-  table.add("noise", result.noise, "noise of depth and its source");
+  table.add("number of poses", result.poses.size(), "number of poses");
+  table.add("links", result.links.size(), "number of links between poses");
+  table.add("closures_found", result.closures.size(), "number of links found by refinement");
+  table.add("parts", result.components.size(), "number of connected components of the pose graph");
+  table.add("nodes_without_pose", result.without_pose.size(), "number of nodes without a pose");
+  table.add("nodes_without_links", result.without_links.size(), "number of nodes without links");
+  table.add("frames_skipped", result.skipped.size(), "number of frames without features");
+  table.add("features", result.features, "number of features of all frames");
+  table.add("sensor", sensor, "findings about the sensor, such as calibration errors");
+  table.add("noise", result.noise, "depth noise and its source");
   table.add("scale", result.scale, "source and uncertainty of the scale");
-  table.add("stages_undone", rejected, "stages that were rejected");
-  table.add("trajectory_rmse_m", rmse_m, "absolute trajectory error, for a scan with true poses");
+  table.add("stages_undone", rejected, "names of rejected stages");
+  table.add("trajectory_rmse_m", rmse_m, "absolute trajectory error against true poses (RMS), m");
   table.add("trajectory_rotation_error_deg", rotation_deg,
-            "mean rotation error of the trajectory, for a scan with true poses");
+            "mean rotation error against true poses, degrees");
 }
 
 }  // namespace libmap

@@ -290,10 +290,11 @@ CameraFile refined_camera(const RefinementResult& result, const ScanSource& scan
         scan.read_frame(pose.node, {.color = false, .depth = false}).cameras;
     if (cameras.empty()) continue;
     if (cameras.size() > 1)
-      throw Error("a calibration file has one camera", {.file = scan.path().string(),
-                                                        .field = "cameras",
-                                                        .value = std::to_string(cameras.size()),
-                                                        .bound = "1"});
+      throw Error("a calibration file requires a scan with one camera",
+                  {.file = scan.path().string(),
+                   .field = "cameras",
+                   .value = std::to_string(cameras.size()),
+                   .bound = "1"});
     CameraFile file = calibrated_camera(cameras.front(), result.cameras.front(), result.calibration,
                                         scan.graph());
     file.findings = result.findings;

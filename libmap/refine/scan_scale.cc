@@ -61,10 +61,11 @@ MeasuredEnd measured_end(const KnownLength::End& length_end,
   SurfacePatch element;
   if (frame.surfaces.empty() ||
       !frame.surfaces.front().nearest_to(guessed_depth_m * ray->homogeneous(), element))
-    refuse(length_end, "no depth was measured there", "a pixel on a surface");
+    refuse(length_end, "no depth was measured at this pixel", "a pixel on a surface");
   // Intersects the ray with the plane of the nearest element.
   const double depth = element.normal.dot(element.point) / element.normal.dot(ray->homogeneous());
-  if (!(depth > 0.0)) refuse(length_end, "no depth was measured there", "a pixel on a surface");
+  if (!(depth > 0.0))
+    refuse(length_end, "no depth was measured at this pixel", "a pixel on a surface");
   frame.features.push_back({ray->cast<float>(), static_cast<float>(depth), 0.0F, 0.0F, 0});
   calibrate(frame, calibration);
   const double picked_m = picked_px * depth / std::min(camera.fx, camera.fy);
@@ -83,9 +84,9 @@ KnownLength parse_known_length(const std::string& text) {
     const auto length = parse_double(std::string_view(text).substr(equals + 1));
     if (from && to && length && *length > 0.0 && *length < 1e6) return {*from, *to, *length};
   }
-  throw Error("is not a known length", {.field = "known length",
-                                        .value = text,
-                                        .bound = "NODE:X:Y-NODE:X:Y=METERS with METERS > 0"});
+  throw Error("not a known length", {.field = "known length",
+                                     .value = text,
+                                     .bound = "NODE:X:Y-NODE:X:Y=METERS with METERS > 0"});
 }
 
 void check_known_lengths(const std::vector<FrameFeatures>& frames,
@@ -108,7 +109,7 @@ ScaleEstimate scale_by_lengths(const std::vector<FrameFeatures>& frames,
     const double distance = (to.in_map - from.in_map).norm();
     const double deviation = std::sqrt(from.variance + to.variance);
     if (!(distance > 3.0 * deviation))
-      refuse(known.to, "its distance from the other end is within the noise",
+      refuse(known.to, "the other end is too near: the distance is within the noise of depth",
              "> " + to_fixed_text(3e3 * deviation, 1) + " mm");
     const double ratio = known.length_m / distance;
     const double weight = std::pow(distance / (ratio * deviation), 2);

@@ -431,13 +431,14 @@ VisualOdometryResult Tracker::run(Progress& progress) {
 
 void bind(ParameterTable& table, VisualOdometryOptions& options) {
   table.add("keyframe_inliers", options.keyframe_inliers, not_negative,
-            "visual odometry: a frame with fewer matches becomes the next key frame");
+            "visual odometry: number of matches with the key frame below which a frame becomes the "
+            "next key frame");
   table.add("keyframe_distance_m", options.keyframe_distance_m, positive,
-            "maximum distance of a frame from its key frame");
+            "visual odometry: maximum distance of a frame from its key frame, m");
   table.add("keyframe_angle_deg", options.keyframe_angle_deg, positive,
-            "maximum rotation of a frame from its key frame");
+            "visual odometry: maximum rotation of a frame from its key frame, degrees");
   table.add("relocalization_candidates", options.relocalization_candidates, not_negative,
-            "number of similar earlier frames that a lost frame is compared with");
+            "number of similar earlier frames with which a lost frame is compared");
 }
 
 VisualOdometryResult track_frames(const std::vector<FrameFeatures>& frames,

@@ -59,8 +59,9 @@ std::string escape_code(std::string_view code) {
 std::string to_base64(std::string_view bytes) {
   constexpr std::size_t max_bytes = static_cast<std::size_t>(std::numeric_limits<int>::max()) / 2;
   if (bytes.size() > max_bytes)
-    throw Error("too large for a page", {.value = std::to_string(bytes.size()) + " bytes",
-                                         .bound = "<= " + std::to_string(max_bytes)});
+    throw Error("too large for the report's page",
+                {.value = std::to_string(bytes.size()) + " bytes",
+                 .bound = "<= " + std::to_string(max_bytes)});
   std::string text((bytes.size() + 2) / 3 * 4 + 1, '\0');
   const int length = EVP_EncodeBlock(reinterpret_cast<unsigned char*>(text.data()),
                                      reinterpret_cast<const unsigned char*>(bytes.data()),

@@ -51,8 +51,9 @@ ReportImage read_image_bytes(std::string bytes) {
   ReportImage report_image;
   if (is_svg(bytes)) {
     if (bytes.size() > max_svg_bytes)
-      throw Error("too large for a page", {.value = std::to_string(bytes.size()) + " bytes",
-                                           .bound = "<= " + std::to_string(max_svg_bytes)});
+      throw Error("too large for the report's page",
+                  {.value = std::to_string(bytes.size()) + " bytes",
+                   .bound = "<= " + std::to_string(max_svg_bytes)});
     report_image.media_type = "image/svg+xml";
     report_image.bytes = std::move(bytes);
     return report_image;

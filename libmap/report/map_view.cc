@@ -120,7 +120,7 @@ MapView make_map_view(const PointCloud& map, const MapViewOptions& options) {
     for (std::size_t n = 0; n < map.size(); ++n) {
       const double index = cell_of(axis, n) - lowest;
       if (!(index <= std::numeric_limits<std::uint16_t>::max()))
-        throw Error("too wide for a view",
+        throw Error("the map is too large for a 3-D view",
                     {.field = "cells along an axis", .value = to_text(index), .bound = "<= 65535"});
       view.cells[n].index[axis] = static_cast<std::uint16_t>(index);
     }

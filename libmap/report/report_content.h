@@ -1,4 +1,4 @@
-// Content of a report, read from files and ready for output.
+// Data of a report: what report_reader.h reads from files and report_page.h writes.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,4 @@
-// Reads the files of a report.
+// Reads the files that a planned report (report_plan.h) shows.
 #pragma once
 
 #include <filesystem>

@@ -67,7 +67,7 @@ void bind(ParameterTable& table, ColmapBuilderOptions& options) {
   table.add("point_spacing_px", options.point_spacing_px, {1.0, 10000.0},
             "spacing of the COLMAP model's points in each depth image, pixels");
   table.add("point_depth_tolerance", options.depth_tolerance, {0.0, 1.0, true, false},
-            "share of the depth within which two images observe the same COLMAP point");
+            "maximum relative depth difference at which two images observe the same COLMAP point");
 }
 
 ColmapBuilder::ColmapBuilder(const ColmapBuilderOptions& options) : options_(options) {

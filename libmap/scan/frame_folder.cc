@@ -147,7 +147,7 @@ void register_to_color(RgbdFrame& frame, const Camera& depth_camera) {
     throw Error("depth_calibration requires frames with one color camera",
                 {.value = std::to_string(frame.cameras.size()) + " cameras"});
   if (frame.depth.width != depth_camera.width || frame.depth.height != depth_camera.height)
-    throw Error("size differs from the calibration",
+    throw Error("the depth image's size differs from the calibration's",
                 {.value = size_text(frame.depth.width, frame.depth.height),
                  .bound = size_text(depth_camera.width, depth_camera.height)});
   RgbdFrame only_depth;
@@ -216,8 +216,9 @@ void bind(ParameterTable& table, FrameFolderOptions& options) {
   table.add("calibration", options.calibration, "camera file with the intrinsics");
   table.add("depth_calibration", options.depth_calibration,
             "camera file of a separate depth camera; empty: depth is already registered to color");
-  table.add("pose_frame", options.pose_frame, pose_frame_names(),
-            "frame of the poses in the files: the camera's optical frame, or the base");
+  table.add(
+      "pose_frame", options.pose_frame, pose_frame_names(),
+      "frame of the poses in the pose files: the camera's optical frame, or the robot's base");
   table.add("pairing_tolerance_s", options.pairing_tolerance_s, not_negative,
             "maximum time difference between paired color, depth and poses, s");
 }
@@ -467,7 +468,7 @@ std::string FrameFolder::image_name(int node) const {
 RgbdFrame FrameFolder::read_frame(int node, FrameParts parts) const {
   const auto entry = files_.find(node);
   if (entry == files_.end())
-    throw Error("no such node",
+    throw Error("the scan has no node with this id",
                 {.file = path_.string(), .field = "node", .value = std::to_string(node)});
   const Files& of_node = entry->second;
   RgbdFrame frame;

@@ -37,7 +37,7 @@ void make_folder(const fs::path& folder) {
   std::error_code code;
   fs::create_directory(folder, code);
   if (code)
-    throw Error("cannot be created: " + code.message(), {.file = folder.string()},
+    throw Error("the folder cannot be created: " + code.message(), {.file = folder.string()},
                 ErrorKind::failed);
 }
 

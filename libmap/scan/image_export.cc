@@ -42,7 +42,8 @@ std::vector<CameraView> read_views(const ScanSource& scan, int node, FrameParts 
 
 void bind(ParameterTable& table, ViewSelectionOptions& options) {
   table.add("radius_m", options.radius_m, not_negative,
-            "distance within which only one of several similar images is kept, m");
+            "distance between camera positions within which only one of several similar images is "
+            "kept, m");
   table.add("angle_deg", options.angle_deg, {0.0, 180.0},
             "maximum angle between the optical axes of similar images, degrees");
 }

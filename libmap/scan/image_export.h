@@ -1,4 +1,4 @@
-// Export of a scan's color images to files, selection of representative views, and Bundler files.
+// Exports color images of a scan to files: selects representative views, and writes Bundler files.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,4 @@
-// Cache of the pixel rays of a lens.
+// Caches the rays of all pixels of a lens, which are costly to compute for each frame.
 #pragma once
 
 #include <Eigen/Core>

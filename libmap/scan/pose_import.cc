@@ -121,7 +121,7 @@ std::vector<CameraPose> poses_of_images(const std::vector<ImagePose>& images,
     const auto& [node, camera] = node_camera;
     const auto [earlier, is_new] = known.emplace(node_camera, images[index].image);
     if (!is_new)
-      throw Error("two images belong to one camera of node " + std::to_string(node),
+      throw Error("two images match the same camera of node " + std::to_string(node),
                   {.field = "image", .value = earlier->second + " and " + images[index].image});
     add_camera(
         scan,
@@ -272,18 +272,17 @@ Pose with_quaternion_order(const Pose& read, QuaternionOrder order) {
 
 void bind(ParameterTable& table, PoseImportOptions& options) {
   table.add("poses_format", options.format, trajectory_format_names(),
-            "format of the pose file; auto: by extension, else by content. tum-motion-capture and "
-            "kitti-optical are RTAB-Map's formats 1 and 2, which have other axes");
+            "format of the pose file; auto: by extension, else by content; tum-motion-capture and "
+            "kitti-optical: RTAB-Map's export formats 1 and 2 with their own axes");
   table.add("poses_quaternion", options.quaternion,
             {{"xyzw", QuaternionOrder::xyzw}, {"wxyz", QuaternionOrder::wxyz}},
             "order of the quaternions in the pose file (TUM, g2o)");
-  table.add(
-      "poses_of", options.frame, pose_frame_names(),
-      "frame of the poses in the file: the base, or the first camera's optical frame; COLMAP, "
-      "nerfstudio and Open3D always use the camera's");
+  table.add("poses_of", options.frame, pose_frame_names(),
+            "frame of the poses in the pose file: the robot's base, or the first camera's optical "
+            "frame; COLMAP, nerfstudio and Open3D files always use the camera's");
   table.add("poses_scale", options.scale, not_negative,
-            "meters per unit of the file's positions (arbitrary for COLMAP); 0: the best fit to "
-            "the scan's odometry");
+            "meters per unit of the positions in the pose file (arbitrary for COLMAP); 0: "
+            "determined by the best fit to the scan's odometry");
 }
 
 ImportedPoses import_poses(const fs::path& path, const ScanSource& scan,

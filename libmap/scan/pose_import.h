@@ -1,4 +1,4 @@
-// Import of a pose file of any format for the frames of a scan.
+// Imports a pose file of any format and assigns its poses to the frames of a scan.
 #pragma once
 
 #include <cstddef>

@@ -34,7 +34,7 @@ const std::vector<std::string> camera_keys = split_list(
     "local_transform,robot_from_camera,position_m,roll_pitch_yaw_deg,depth_scale_m,near_m,far_m");
 
 double rig_number(const YAML::Node& node, const std::string& field) {
-  if (!node.IsScalar()) throw Error("not a single number", {.field = field});
+  if (!node.IsScalar()) throw Error("must be a single number", {.field = field});
   const std::optional<double> value = parse_double(node.Scalar());
   if (!value)
     throw Error("not a number", {.field = field, .value = node.Scalar(), .bound = "a number"});
@@ -48,7 +48,7 @@ std::vector<double> numbers_of(const YAML::Node& node, const std::string& field,
   std::vector<double> numbers;
   for (const YAML::Node& entry : node) {
     numbers.push_back(rig_number(entry, field));
-    if (!std::isfinite(numbers.back())) throw Error("not finite", {.field = field});
+    if (!std::isfinite(numbers.back())) throw Error("must be finite", {.field = field});
   }
   return numbers;
 }
@@ -66,7 +66,7 @@ Camera intrinsics_of(const YAML::Node& map, const fs::path& folder) {
   for (const char* key : {"image_width", "image_height", "camera_matrix", "distortion_model",
                           "distortion_coefficients"})
     if (map[key])
-      throw Error("is also in the calibration file; remove one of them", {.field = key});
+      throw Error("is also in the calibration file; remove it from one of them", {.field = key});
   return read_camera(folder / map["calibration"].Scalar()).camera;
 }
 
@@ -118,7 +118,7 @@ CameraRig rig_of(const YAML::Node& root, const fs::path& folder) {
   known.emplace_back("cameras");
   check_keys(root, known);
   if (!root["cameras"]) throw Error("is missing", {.field = "cameras"});
-  if (!root["cameras"].IsSequence()) throw Error("not a list", {.field = "cameras"});
+  if (!root["cameras"].IsSequence()) throw Error("must be a list", {.field = "cameras"});
   RigCamera defaults;
   read_limits(root, defaults);
   CameraRig rig;
@@ -178,7 +178,7 @@ std::string camera_entry(const RigCamera& camera) {
 }  // namespace
 
 void CameraRig::check() const {
-  if (cameras.empty()) throw Error("a rig needs a camera", {.field = "cameras"});
+  if (cameras.empty()) throw Error("a rig needs at least one camera", {.field = "cameras"});
   std::set<std::string> names;
   for (const RigCamera& camera : cameras) {
     check_camera(camera);
@@ -247,7 +247,7 @@ std::vector<RigImage> images_of_table(const fs::path& folder, const CameraRig& r
     const std::string& name = table.rows[row][camera_column];
     const auto found = std::find(names.begin(), names.end(), name);
     if (found == names.end())
-      throw Error("the rig has no such camera" + did_you_mean(name, names),
+      throw Error("the rig has no camera with this name" + did_you_mean(name, names),
                   {.file = table.file, .field = "camera", .value = name});
     stamp_of(table.rows[row][stamp_column], table.file, "stamp_s");
     images.push_back({static_cast<std::size_t>(found - names.begin()),

@@ -89,7 +89,7 @@ void require_optimized_poses(const std::string& ids_blob, const std::string& pos
   const StoredMatrix ids = read_matrix_header(ids_blob);
   const StoredMatrix poses = read_matrix_header(poses_blob);
   if (ids.element != MatrixElement::int32 || poses.element != MatrixElement::float32)
-    throw Error("the matrices are not of int32 and float32");
+    throw Error("ids and poses are not matrices of int32 and float32");
   constexpr std::uint64_t pose_numbers = pose_bytes / sizeof(float);
   if (elements_of(poses) % pose_numbers != 0 ||
       elements_of(poses) / pose_numbers != elements_of(ids))

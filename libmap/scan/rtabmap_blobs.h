@@ -1,4 +1,5 @@
-// Little-endian binary formats of an RTAB-Map database.
+// Encodes and decodes the binary columns (blobs) of an RTAB-Map database: poses, information
+// matrices, velocities, GPS. All are little-endian.
 #pragma once
 
 #include <array>

@@ -165,7 +165,7 @@ class LinkReader {
     const std::optional<int> from = as_id(row.integer(0));
     const std::optional<int> to = as_id(row.integer(1));
     const std::optional<int> type = as_id(row.integer(2));
-    if (!from || !to || !type) throw Error("ids or type are not valid");
+    if (!from || !to || !type) throw Error("node ids or type of the link are invalid");
     PoseLink link{.from = *from, .to = *to, .type = static_cast<LinkType>(*type)};
     // Before 0.7.4, the types were neighbor, loop closure and child.
     if (form_ == InformationForm::none && *type != 0) link.type = LinkType::global_closure;

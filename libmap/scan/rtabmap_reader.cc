@@ -161,7 +161,7 @@ RtabmapDatabase::~RtabmapDatabase() = default;
 
 FrameBlobs RtabmapDatabase::read_blobs(int node, FrameParts parts) const {
   if (graph_.find_node(node) == nullptr)
-    throw Error("no such node",
+    throw Error("the scan has no node with this id",
                 {.file = path_.string(), .field = "node", .value = std::to_string(node)});
   FrameBlobs blobs;
   if (!columns_.has_table("Data") && !columns_.has_table("Image")) return blobs;

@@ -27,7 +27,7 @@ namespace libmap {
 
 class SqliteFile;
 
-// Content of a node's row of images, by the headers of the images.
+// Data that a node contains, according to the headers of its images.
 struct NodeContent {
   int node = 0;
   std::optional<ImageInfo> color{};
@@ -87,7 +87,7 @@ class RtabmapDatabase : public ScanSource {
   // Calls `use` for each node in ascending order; reads headers only.
   void each_content(const std::function<void(const NodeContent&)>& use) const;
 
-  // Returns a node's stored images; the color image is a JPEG or PNG file.
+  // Returns a node's stored images; color is a JPEG or PNG file. Throws Error for an unknown node.
   FrameBlobs read_blobs(int node) const { return read_blobs(node, {}); }
 
   const SqliteFile& file() const { return *file_; }

@@ -377,7 +377,7 @@ void add_links(SQLite::Database& database, const std::vector<PoseLink>& links) {
 void write_calibration(SQLite::Database& database, const RtabmapDatabase& scan,
                        const CameraFile& calibration) {
   if (!scan.columns().has("Data", "calibration"))
-    throw Error("cannot store calibrations", {.file = scan.path().string()});
+    throw Error("this kind of scan cannot store calibrations", {.file = scan.path().string()});
   SQLite::Statement update(database, "UPDATE Data SET depth = ?, calibration = ? WHERE id = ?");
   for (const GraphNode& node : scan.graph().nodes) {
     const FrameBlobs blobs = scan.read_blobs(node.id);

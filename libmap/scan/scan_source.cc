@@ -74,7 +74,7 @@ class JoinedScan : public ScanSource {
   const ScanSource& of(int node) const {
     const auto scan = static_cast<std::size_t>(node / step_);
     if (node < 0 || scan >= scans_.size())
-      throw Error("no such node",
+      throw Error("the scan has no node with this id",
                   {.file = path().string(), .field = "node", .value = std::to_string(node)});
     return *scans_[scan];
   }
@@ -103,7 +103,7 @@ void JoinedScan::find_step() {
   std::int64_t step = 10;
   while (step <= largest) step *= 10;
   if (step > most)
-    throw Error("node numbers are too large for so many scans",
+    throw Error("node ids are too large for joining this many scans",
                 {.file = path().string(),
                  .field = "node",
                  .value = std::to_string(largest),
@@ -263,14 +263,14 @@ DepthImage registered_depth(const RgbdFrame& frame, const Pose& color_from_depth
 void apply(RgbdFrame& frame, const CameraFile& calibration, LensRays& rays) {
   if (frame.cameras.empty() && frame.stereo.empty()) return;
   if (frame.cameras.size() != 1 || !frame.stereo.empty())
-    throw Error("a calibration requires frames with one camera",
+    throw Error("a calibration file describes one camera, but the frame has several",
                 {.field = "cameras",
                  .value = std::to_string(frame.cameras.size() + 2 * frame.stereo.size()),
                  .bound = "1"});
   Camera& camera = frame.cameras.front();
   const Camera& known = calibration.camera;
   if (camera.width != known.width || camera.height != known.height)
-    throw Error("size differs from the calibration",
+    throw Error("the image size differs from the calibration's",
                 {.field = "camera",
                  .value = size_text(camera.width, camera.height),
                  .bound = size_text(known.width, known.height)});

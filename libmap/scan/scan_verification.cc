@@ -48,7 +48,7 @@ constexpr std::array<LaserFormat, 13> laser_formats{{{"unknown", 0},
 
 std::size_t format_of(float number) {
   if (!(number >= 0) || number > 12 || number != std::floor(number))
-    throw Error("unknown format of laser scan", {.value = to_text(number)});
+    throw Error("laser scan has an unknown format", {.value = to_text(number)});
   return static_cast<std::size_t>(number);
 }
 
@@ -56,7 +56,7 @@ std::size_t format_of(float number) {
 std::size_t format_of_info(std::string_view info) {
   if (info.empty()) return unknown_format;
   if (info.size() != 76 && info.size() != 60 && info.size() != 56)
-    throw Error("unknown length of scan_info",
+    throw Error("scan_info has an unknown length",
                 {.value = std::to_string(info.size()) + " bytes", .bound = "56, 60 or 76"});
   std::vector<float> numbers(info.size() / sizeof(float));
   std::memcpy(numbers.data(), info.data(), info.size());
@@ -75,15 +75,17 @@ std::size_t format_of_info(std::string_view info) {
 void check_laser_scan(std::string_view scan, std::string_view info) {
   const std::size_t format = format_of_info(info);
   const StoredMatrix matrix = decode_matrix(scan);
-  if (matrix.element != MatrixElement::float32) throw Error("laser scan is not of float32");
+  if (matrix.element != MatrixElement::float32)
+    throw Error("laser scan does not consist of float32 numbers");
   // Versions before 0.16.1 do not store the format; they used 2 to 7 channels.
   if (format == unknown_format && (matrix.channels < 2 || matrix.channels > 7))
-    throw Error("unknown number of channels of laser scan",
+    throw Error("laser scan has an unknown number of channels",
                 {.value = std::to_string(matrix.channels)});
   if (format != unknown_format && matrix.channels != laser_formats[format].channels)
-    throw Error("wrong number of channels of laser scan " + std::string(laser_formats[format].name),
-                {.value = std::to_string(matrix.channels),
-                 .bound = std::to_string(laser_formats[format].channels)});
+    throw Error(
+        "laser scan has a wrong number of channels for " + std::string(laser_formats[format].name),
+        {.value = std::to_string(matrix.channels),
+         .bound = std::to_string(laser_formats[format].channels)});
 }
 
 namespace {
@@ -110,7 +112,7 @@ void check_depth(const std::string& blob) {
 // Checks the length: three float64 per sensor.
 void check_sensors(const std::string& blob) {
   if (blob.size() % 24 != 0)
-    throw Error("wrong length of env_sensors",
+    throw Error("env_sensors has a wrong length",
                 {.value = std::to_string(blob.size()) + " bytes", .bound = "a multiple of 24"});
 }
 
@@ -281,7 +283,7 @@ class DatabaseVerification {
       result_.bytes += static_cast<std::uint64_t>(bytes);
       if (size > 0 && (bytes == size || (bytes % 4 == 0 && bytes / 4 == size))) return;
       findings_.add(node_in(row, 0), part_of(table, "descriptor"),
-                    Error("length differs from descriptor_size",
+                    Error("the number of bytes does not match descriptor_size",
                           {.value = std::to_string(bytes) + " bytes",
                            .bound = std::to_string(size) + ", or 4 times as many"}));
     };

@@ -166,8 +166,8 @@ void SqliteFile::copy_to(const fs::path& target) const {
     // An incomplete copy is useless, so no journal is needed for rolling back.
     copy.exec("PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF;");
     if (SQLite::Backup(copy, connection_->database).executeStep() != SQLITE_DONE)
-      throw Error("another program keeps writing to it", {.file = path_.string()},
-                  ErrorKind::failed);
+      throw Error("another program is writing to the file; try again when it has ended",
+                  {.file = path_.string()}, ErrorKind::failed);
     // The copy of a file in WAL mode would require its own -wal.
     copy.exec("PRAGMA locking_mode = EXCLUSIVE; PRAGMA journal_mode = DELETE;");
   } catch (const SQLite::Exception& error) {

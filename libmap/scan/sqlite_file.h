@@ -32,12 +32,12 @@ class SqliteRow {
   const void* statement_;
 };
 
-// Opens a file read-only without creating files next to it: no journal, no -wal, no -shm. - A file
-// in rollback mode is read with SQLite's locks; it waits up to 10 s for a writer. - A file in WAL
-// mode with a -wal and a -shm is read with both, so that data committed by another program are
-// visible. - With a -wal only (its program crashed), the -wal is read into memory. - With neither,
-// no program has the file open, and it is read as an unchanging file. A journal of an interrupted
-// write is an Error: only a program with write access can roll it back.
+// Opens a file read-only and creates no files next to it (no journal, -wal or -shm). In rollback
+// mode, the file is read with SQLite's locks, after waiting up to 10 s for a writer. In WAL mode
+// with a -wal and a -shm, both are used, so that data committed by another program are visible;
+// with a -wal only (its program crashed), the -wal is read into memory; with neither, no program
+// has the file open, and it is read as an unchanging file. A journal of an interrupted write is an
+// Error: only a program with write access can roll it back.
 class SqliteFile {
  public:
   // Throws Error if the file is not an SQLite file, damaged or not readable.

@@ -23,35 +23,37 @@ struct ParameterAdder {
   ParameterTable& table;
 
   void operator()(Sphere& sphere) const {
-    table.add("radius_m", sphere.radius_m, size_range, "radius, m");
+    table.add("radius_m", sphere.radius_m, size_range, "radius of the shape, m");
   }
   void operator()(Capsule& capsule) const {
-    table.add("radius_m", capsule.radius_m, size_range, "radius, half the width, m");
-    table.add("length_m", capsule.length_m, size_range, "length along x with the round ends, m");
+    table.add("radius_m", capsule.radius_m, size_range, "radius of the capsule, m");
+    table.add("length_m", capsule.length_m, size_range,
+              "length along x including the round ends, m");
   }
   void operator()(Cone& cone) const {
     table.add("radius_m", cone.radius_m, size_range, "radius of the base, m");
     table.add("height_m", cone.height_m, size_range, "height of the apex above the base, m");
   }
   void operator()(Cylinder& cylinder) const {
-    table.add("radius_m", cylinder.radius_m, size_range, "radius, m");
-    table.add("height_m", cylinder.height_m, size_range, "height above the base, m");
+    table.add("radius_m", cylinder.radius_m, size_range, "radius of the shape, m");
+    table.add("height_m", cylinder.height_m, size_range, "height of the top above the base, m");
   }
   void operator()(Box& box) const {
-    table.add("size_x_m", box.size_x_m, size_range, "length along x, m");
-    table.add("size_y_m", box.size_y_m, size_range, "length along y, m");
-    table.add("size_z_m", box.size_z_m, size_range, "height above the base, m");
+    table.add("size_x_m", box.size_x_m, size_range, "length of the shape along x, m");
+    table.add("size_y_m", box.size_y_m, size_range, "length of the shape along y, m");
+    table.add("size_z_m", box.size_z_m, size_range, "height of the top above the base, m");
   }
   void operator()(Plane& plane) const {
-    table.add("size_x_m", plane.size_x_m, size_range, "length along x, m");
-    table.add("size_y_m", plane.size_y_m, size_range, "length along y, m");
+    table.add("size_x_m", plane.size_x_m, size_range, "length of the shape along x, m");
+    table.add("size_y_m", plane.size_y_m, size_range, "length of the shape along y, m");
   }
   void operator()(Bump& bump) const {
-    table.add("height_m", bump.height_m, Range{-1e4, 1e4}, "height, m; negative: a hollow");
-    table.add("radius_m", bump.radius_m, size_range, "radius, m");
-    table.add("profile", bump.profile,
-              {{"cosine", BumpProfile::cosine}, {"gaussian", BumpProfile::gaussian}},
-              "profile; cosine: cos^2 up to the radius; gaussian: radius is 3 standard deviations");
+    table.add("height_m", bump.height_m, Range{-1e4, 1e4}, "bump height, m; negative: hollow");
+    table.add("radius_m", bump.radius_m, size_range, "radius of the shape, m");
+    table.add(
+        "profile", bump.profile,
+        {{"cosine", BumpProfile::cosine}, {"gaussian", BumpProfile::gaussian}},
+        "bump profile; cosine: cos^2 up to the radius; gaussian: radius is 3 standard deviations");
   }
 };
 
@@ -63,9 +65,10 @@ Error shape_error(std::size_t i, const SceneShape& shape, const Error& error) {
 void check_shape(const SceneShape& shape) {
   if (const auto* capsule = std::get_if<Capsule>(&shape.geometry)) {
     if (capsule->length_m < 2.0 * capsule->radius_m)
-      throw Error("length below the diameter", {.field = "length_m",
-                                                .value = to_text(capsule->length_m),
-                                                .bound = ">= " + to_text(2.0 * capsule->radius_m)});
+      throw Error("less than the capsule's diameter",
+                  {.field = "length_m",
+                   .value = to_text(capsule->length_m),
+                   .bound = ">= " + to_text(2.0 * capsule->radius_m)});
   }
   if (std::holds_alternative<Plane>(shape.geometry)) {
     const double up = shape.placement.pose().linear()(2, 2);
@@ -110,12 +113,13 @@ ParameterTable shape_parameters(SceneShape& shape) {
   table.add("name", shape.name, "name of the shape");
   std::visit(ParameterAdder{table}, shape.geometry);
   Placement& placement = shape.placement;
-  table.add("x_m", placement.x_m, position_range, "x in the scene, m");
-  table.add("y_m", placement.y_m, position_range, "y in the scene, m");
-  table.add("z_m", placement.z_m, position_range, "z in the scene, m");
-  table.add("roll_deg", placement.roll_deg, angle_range, "first rotation, about x, degrees");
-  table.add("pitch_deg", placement.pitch_deg, angle_range, "second rotation, about y, degrees");
-  table.add("yaw_deg", placement.yaw_deg, angle_range, "third rotation, about z, degrees");
+  table.add("x_m", placement.x_m, position_range, "x of the shape's origin in the scene, m");
+  table.add("y_m", placement.y_m, position_range, "y of the shape's origin in the scene, m");
+  table.add("z_m", placement.z_m, position_range, "z of the shape's origin in the scene, m");
+  table.add("roll_deg", placement.roll_deg, angle_range, "first rotation, about fixed x, degrees");
+  table.add("pitch_deg", placement.pitch_deg, angle_range,
+            "second rotation, about fixed y, degrees");
+  table.add("yaw_deg", placement.yaw_deg, angle_range, "third rotation, about fixed z, degrees");
   return table;
 }
 

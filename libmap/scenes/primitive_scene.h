@@ -1,13 +1,4 @@
-// Scenes of primitive shapes as exact geometry, the reference for testing all later stages.
-//
-// A scene is the union of its shapes, seen from outside. Spheres, capsules, cones, cylinders and
-// boxes are solids. A plane is the top of solid ground, unbounded below its rectangle (its sides
-// are not a surface). Bumps displace the first plane, the ground, along its normal. Points inside
-// another solid and points where two faces touch are not part of the surface.
-//
-// Principal curvatures are in 1/m and positive where the surface is convex: +1/r, +1/r on a sphere
-// of radius r, negative in a hollow, 0 on a plane. On an edge, a crease or an apex, normal and
-// curvatures are those of one of the adjacent faces.
+// Test scenes of primitive shapes (spheres, boxes, ...) with exact geometry and ground truth.
 #pragma once
 
 #include <Eigen/Core>

@@ -406,7 +406,7 @@ void require_count(double count, std::uint64_t max_count, const std::string& wha
   };
   const auto limit = static_cast<double>(max_count);
   if (count > limit)
-    throw Error("asks for about " + text(count) + " " + what + "; the limit is " + text(limit) +
+    throw Error("would create about " + text(count) + " " + what + "; the limit is " + text(limit) +
                     " (max_" + what + ")",
                 {.field = field, .value = value});
 }

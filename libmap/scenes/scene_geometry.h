@@ -1,5 +1,4 @@
-// Geometric queries on the posed solids of a scene, for sampling, meshing and sites. Lengths are in
-// meters, angles in radians.
+// Exact geometric queries on the shapes of a test scene, for sampling and meshing. Units: m, rad.
 #pragma once
 
 #include <Eigen/Core>

@@ -11,8 +11,8 @@
 namespace libmap {
 
 struct SceneMeshOptions {
-  double edge_length_m = 0.01;    // > 0: maximum along rows and rings; diagonals up to 1.5 times
-  double chord_error_m = 0.0002;  // > 0: for round shapes; bumps depend on edge_length_m only
+  double edge_length_m = 0.01;  // > 0: maximum edge along rows and rings; diagonals up to 1.5 times
+  double chord_error_m = 0.0002;  // > 0: maximum distance from round shapes; not for bumps
   std::uint64_t max_triangles = 20'000'000;
 };
 

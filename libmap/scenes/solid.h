@@ -1,4 +1,4 @@
-// Closed triangle surfaces, and operations on them for building sites.
+// Solids as closed triangle surfaces, and Boolean operations on them, for building test sites.
 #pragma once
 
 #include <Eigen/Core>

@@ -241,11 +241,13 @@ class Serpentine {
 }  // namespace
 
 void bind(ParameterTable& table, SerpentineOptions& options) {
-  table.add("lane_m", options.lane_m, positive, "maximum distance between serpentine lanes, m");
+  table.add("lane_m", options.lane_m, positive,
+            "maximum distance between the lanes of a serpentine path, m");
   table.add("border_m", options.border_m, not_negative,
-            "distance between a serpentine and the border of the ground, m");
-  table.add("ahead_m", options.ahead_m, positive,
-            "distance along a serpentine of the ground point that the camera looks at, m");
+            "distance of a serpentine path from the border of the ground, m");
+  table.add(
+      "ahead_m", options.ahead_m, positive,
+      "distance ahead along a serpentine path of the ground point at which the camera looks, m");
 }
 
 void bind(ParameterTable& table, CameraTrajectoryOptions& options) {
@@ -265,16 +267,14 @@ void bind(ParameterTable& table, CameraTrajectoryOptions& options) {
             "camera height above the ground on the first loop, m; 0: 0.6 times its radius");
   table.add("last_height_m", options.last_height_m, not_negative,
             "camera height on the last loop, m; 0: 0.8 times the first radius");
-  table.add(
-      "start_deg", options.start_deg, any_number,
-      "direction of the start of the first loop, degrees counter-clockwise from x; at a wall: "
-      "offset from the default start");
-  table.add(
-      "sweep_deg", options.sweep_deg, {-360.0, 360.0},
-      "angle of each loop, degrees; every other loop runs backwards if it is below 360; 0: 360, "
-      "at a wall 120");
+  table.add("start_deg", options.start_deg, any_number,
+            "direction from the site's center to the start of the first loop, degrees "
+            "counter-clockwise from x; at a wall: offset from the default start");
+  table.add("sweep_deg", options.sweep_deg, {-360.0, 360.0},
+            "angle swept by each loop, degrees; below 360, every second loop runs backwards; 0: "
+            "360, or 120 at a wall");
   table.add("gaze_deg", options.gaze_deg, {0.0, 45.0},
-            "standard deviation of the view direction from the target, degrees");
+            "standard deviation of the angle between view direction and target, degrees");
   table.add("sway_m", options.sway_m, not_negative,
             "standard deviation of the camera position from its path, per axis, m");
   table.add("tremor_deg", options.tremor_deg, not_negative,
@@ -310,7 +310,7 @@ CameraMotion camera_motion(const TriangleMesh& mesh, const CameraTrajectoryOptio
 
 CameraMotion serpentine_motion(const GroundHeights& ground, const CameraTrajectoryOptions& options,
                                std::uint64_t seed) {
-  if (ground.empty()) throw Error("the ground has no points");
+  if (ground.empty()) throw Error("the terrain has no points");
   const Serpentine way(ground.box(), options.serpentine);
   const double height_m = options.height_m > 0.0 ? options.height_m : 1.4;
   const double ahead_m = options.serpentine.ahead_m;

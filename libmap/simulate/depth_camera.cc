@@ -208,13 +208,14 @@ void bind_noise(ParameterTable& table, DepthSensorOptions& options) {
             "standard deviation of depth noise: term proportional to range, m per m");
   table.add("noise_of_square", options.noise_of_square, not_negative,
             "standard deviation of depth noise: term proportional to squared range, 1/m");
-  table.add("depth_offset_m", options.depth_offset_m, any_number, "offset added to every range, m");
+  table.add("depth_offset_m", options.depth_offset_m, any_number,
+            "offset added to every measured range, m");
   table.add("max_incidence_deg", options.max_incidence_deg, {0.0, 90.0},
             "maximum angle between ray and normal of measured surfaces, degrees; 90: no limit");
   table.add("edge_gap_m", options.edge_gap_m, positive,
-            "minimum depth discontinuity within a pixel for it to be an edge pixel, m");
+            "minimum depth discontinuity inside an edge pixel, m");
   table.add("flying_pixels", options.flying_pixels, zero_to_one,
-            "share of edge pixels measured between foreground and background");
+            "share of edge pixels whose depth is measured between foreground and background");
   table.add("edge_dropouts", options.edge_dropouts, zero_to_one,
             "share of edge pixels without depth");
 }
@@ -222,7 +223,7 @@ void bind_noise(ParameterTable& table, DepthSensorOptions& options) {
 void bind(ParameterTable& table, DepthSensorOptions& options) {
   bind_noise(table, options);
   table.add("depth_step_m", options.depth_step_m, not_negative,
-            "resolution of depth, m; 0: not rounded");
+            "step to which measured depth is rounded, m; 0: not rounded");
   table.add("near_m", options.near_m, not_negative, "minimum measured depth, m");
   table.add("far_m", options.far_m, positive, "maximum measured depth, m");
 }
@@ -252,9 +253,9 @@ void DepthSensorOptions::check() const {
     throw Error("the depth range is empty",
                 {.field = "far_m", .value = to_text(far_m), .bound = "> " + to_text(near_m)});
   if (!(flying_pixels + edge_dropouts <= 1.0))
-    throw Error("shares exceed all edge pixels", {.field = "flying_pixels + edge_dropouts",
-                                                  .value = to_text(flying_pixels + edge_dropouts),
-                                                  .bound = "<= 1"});
+    throw Error("the sum of both exceeds 1", {.field = "flying_pixels + edge_dropouts",
+                                              .value = to_text(flying_pixels + edge_dropouts),
+                                              .bound = "<= 1"});
 }
 
 namespace {

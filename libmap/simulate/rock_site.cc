@@ -82,17 +82,18 @@ ParameterTable rock_parameters(SiteRock& rock) {
   ParameterTable table;
   table.add("name", rock.name, "name of the rock");
   table.add("shape", rock.shape, rock_shape_names(), "shape of the rock");
-  table.add("x_m", rock.x_m, Range{-100.0, 100.0}, "x of the rock on the ground, m");
-  table.add("y_m", rock.y_m, Range{-100.0, 100.0}, "y on the ground, m");
+  table.add("x_m", rock.x_m, Range{-100.0, 100.0}, "x of the rock's center on the ground, m");
+  table.add("y_m", rock.y_m, Range{-100.0, 100.0}, "y of the rock's center on the ground, m");
   table.add("height_m", rock.height_m, rock_size_range, "height of the top above the ground, m");
   table.add("width_m", rock.width_m, rock_size_range, "size along the rock's x axis, m");
   table.add("depth_m", rock.depth_m, rock_size_range, "size along the rock's y axis, m");
-  table.add("yaw_deg", rock.yaw_deg, Range{-360.0, 360.0}, "rotation about z, degrees");
+  table.add("yaw_deg", rock.yaw_deg, Range{-360.0, 360.0}, "rotation of the rock about z, degrees");
   table.add("sides", rock.sides, Range{4.0, 12.0}, "number of walls of a block");
   table.add("ledges", rock.ledges, Range{0.0, 3.0}, "number of lower blocks merged with a block");
   table.add("overhang_deg", rock.overhang_deg, Range{0.0, 35.0},
             "outward tilt of a third of the walls, degrees");
-  table.add("cleft_m", rock.cleft_m, Range{0.0, 10.0}, "depth of a wedge cut into the top, m");
+  table.add("cleft_m", rock.cleft_m, Range{0.0, 10.0},
+            "depth of a wedge cut into the top, m; 0: none");
   table.add("roughness", rock.roughness, Range{0.0, 1.5},
             "factor of the rock's default surface relief; 0: smooth");
   table.add("seed", rock.seed, not_negative, "random seed of shape and colors");
@@ -101,8 +102,8 @@ ParameterTable rock_parameters(SiteRock& rock) {
 
 ParameterTable ground_parameters(SiteGround& ground) {
   ParameterTable table;
-  table.add("size_x_m", ground.size_x_m, ground_size_range, "length along x, m");
-  table.add("size_y_m", ground.size_y_m, ground_size_range, "length along y, m");
+  table.add("size_x_m", ground.size_x_m, ground_size_range, "length of the ground along x, m");
+  table.add("size_y_m", ground.size_y_m, ground_size_range, "length of the ground along y, m");
   table.add("unevenness_m", ground.relief_m, Range{0.0, 1.0}, "maximum height of random relief, m");
   table.add("tilt_deg", ground.tilt_deg, Range{0.0, 135.0},
             "tilt of the ground, degrees; 90: a wall");
@@ -110,7 +111,7 @@ ParameterTable ground_parameters(SiteGround& ground) {
             {{"soil", GroundTexture::soil},
              {"rock", GroundTexture::rock},
              {"panel", GroundTexture::panel}},
-            "colors of the ground");
+            "texture of the ground's surface");
   return table;
 }
 
@@ -125,11 +126,11 @@ ParameterTable layout_parameters(SiteLayout& layout) {
 
 ParameterTable field_point_parameters(FieldPointOptions& options) {
   ParameterTable table;
-  table.add("count", options.count, Range{1.0, 10'000.0}, "number of locations");
+  table.add("count", options.count, Range{1.0, 10'000.0}, "number of field points");
   table.add("min_height_m", options.min_height_m, not_negative,
-            "minimum height of locations above the ground, m");
+            "minimum height of field points above the ground, m");
   table.add("radius_m", options.radius_m, Range{0.005, 1.0},
-            "radius of the neighborhood that determines the kind of a location, m");
+            "radius within which the kind of a field point (flat, edge, ...) is determined, m");
   return table;
 }
 

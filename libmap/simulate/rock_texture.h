@@ -1,5 +1,5 @@
 // Procedural colors of rock, soil and climbing walls as functions of position and seed, without
-// images or seams. Marks of 1 to 10 cm provide image features.
+// images or seams. Marks of 1 to 10 cm serve as image features.
 #pragma once
 
 #include <Eigen/Core>

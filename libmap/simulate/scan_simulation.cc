@@ -231,7 +231,7 @@ DepthMeasurement ScanCamera::take(std::size_t n, const VisibleSurface& surface,
 
 void bind(ParameterTable& table, OdometryOptions& options) {
   table.add("odometry_error_of_distance", options.error_of_distance, not_negative,
-            "standard deviation of odometry in each axis, m per m of distance");
+            "standard deviation of odometry along each axis, m per m of distance");
   table.add("odometry_error_of_turn", options.error_of_turn, not_negative,
             "standard deviation of odometry about each axis, degrees per degree of turn");
   table.add("odometry_turn_of_distance_deg", options.turn_of_distance_deg, not_negative,
@@ -245,11 +245,11 @@ void bind(ParameterTable& table, LoopClosureOptions& options) {
   table.add("closure_angle_deg", options.angle_deg, {0.0, 180.0},
             "maximum angle between the poses of a closure, degrees");
   table.add("closure_node_gap", options.node_gap, {2.0, 1e6},
-            "minimum difference between the node indices of a closure");
+            "minimum difference between the indices of the two nodes of a closure");
   table.add("closures_per_node", options.closures_per_node, {1.0, 1e6},
-            "maximum number of loop closures of each node, to the nearest earlier nodes");
+            "maximum number of loop closures from each node to its nearest earlier nodes");
   table.add("closure_shift_error_m", options.shift_error_m, positive,
-            "standard deviation of a closure in each axis, m");
+            "standard deviation of a closure along each axis, m");
   table.add("closure_turn_error_deg", options.turn_error_deg, positive,
             "standard deviation of a closure about each axis, degrees");
 }

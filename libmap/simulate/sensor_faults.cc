@@ -182,12 +182,12 @@ void bind(ParameterTable& table, DepthFaults& faults) {
       "depth_wiggle_m", faults.periodic_error_m, any_number,
       "fault: amplitude of a periodic depth error (time of flight: Lindner and Kolb 2006), m");
   table.add("depth_wiggle_period_m", faults.wiggle_period_m, positive,
-            "period of the periodic depth error over depth, m");
+            "period, in depth, of the periodic depth error, m");
   table.add("depth_corner_m", faults.corner_m, any_number,
             "fault: depth error in the image corners, proportional to the squared radius "
             "(Teichman et al. 2013), m");
   table.add("depth_holes", faults.holes, zero_to_one,
-            "fault: share of the image in discs without depth");
+            "fault: share of the depth image covered by discs without depth");
   table.add("multipath", faults.multipath, zero_to_one,
             "fault: reflectance of surfaces for multipath interference of a time-of-flight camera, "
             "which rounds concave edges (Fuchs 2010)");
@@ -201,7 +201,7 @@ void bind(ParameterTable& table, PhotoFaults& faults) {
   table.add("exposure_s", faults.exposure_s, not_negative,
             "fault: exposure time of motion blur, s");
   table.add("blurred_frames", faults.blurred_frames, zero_to_one,
-            "share of frames with motion blur, if exposure_s is above 0");
+            "share of frames with motion blur if an exposure time is set");
   table.add("jpeg_quality", faults.jpeg_quality, {0, 100},
             "fault: JPEG quality of a compression of color images before storing; 0: none");
 }

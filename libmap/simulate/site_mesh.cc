@@ -356,7 +356,7 @@ Solid part_of_ground(const Solid& solid, const RockSite& site) {
     if (part == ground || volumes[part] < 0.0) continue;
     const SiteRock& rock = site.rocks[static_cast<std::size_t>(labels[part]) - 1];
     const std::string name = rock.name.empty() ? "" : " (" + rock.name + ")";
-    throw Error("does not touch the ground",
+    throw Error("the rock does not touch the ground",
                 {.field = "rocks[" + std::to_string(labels[part] - 1) + "]" + name});
   }
   return select(solid, [&](std::size_t n) { return parts[n] == ground; });

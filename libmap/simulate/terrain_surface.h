@@ -1,5 +1,5 @@
-// Renders terrain of any size from points: a height field, triangulated in the plan (Delaunay) in
-// squares. Only squares in view are in memory, and a cache of earlier ones.
+// Surface of a large terrain for simulated scans: a height field of points, triangulated in squares
+// of the x-y plane (Delaunay). Only squares in view and a cache of earlier ones are in memory.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -24,10 +24,10 @@ struct ViewRange {
 };
 ViewRange view_range(const ViewRays& rays, double far_m);
 
-// Delaunay triangulation in the plan, with vertex normals: the triangles that intersect the
-// rectangle and have a circumradius of at most `max_radius_m`, so that wider gaps stay open. The
-// result is the same for any point set that contains all points within 4 `max_radius_m` of the
-// rectangle, except for the diagonals of squares.
+// Returns a Delaunay triangulation in the x-y plane with vertex normals: the triangles that
+// intersect the rectangle and have a circumradius of at most `max_radius_m`, so that wider gaps
+// stay open. The result is the same for any point set that contains all points within 4
+// `max_radius_m` of the rectangle, except for the diagonals of squares.
 TriangleMesh triangulate_plan(const std::vector<Eigen::Vector3d>& points,
                               const Eigen::AlignedBox2d& rectangle, double max_radius_m);
 

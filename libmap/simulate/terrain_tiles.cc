@@ -55,10 +55,9 @@ void bind(ParameterTable& table, RockyTerrainOptions& options) {
 
 void RockyTerrainOptions::check() const {
   if (max_rock_m < min_rock_m)
-    throw Error("maximum height below the minimum",
-                {.field = "max_rock_m",
-                 .value = to_text(max_rock_m),
-                 .bound = ">= min_rock_m, " + to_text(min_rock_m)});
+    throw Error("less than the minimum height", {.field = "max_rock_m",
+                                                 .value = to_text(max_rock_m),
+                                                 .bound = ">= min_rock_m, " + to_text(min_rock_m)});
 }
 
 RockyTerrain::RockyTerrain(const RockyTerrainOptions& options,
@@ -278,7 +277,8 @@ class CellSampler {
 
 void bind(ParameterTable& table, TerrainTilesOptions& options) {
   table.add("spacing_m", options.spacing_m, Range{1e-4, 10.0}, "mean point spacing, m");
-  table.add("piece_m", options.tile_m, Range{1e-3, 1000.0}, "side of a piece, m");
+  table.add("piece_m", options.tile_m, Range{1e-3, 1000.0},
+            "side of a tile, one file of the output, m");
   bind(table, options.terrain);
 }
 
@@ -293,12 +293,12 @@ void TerrainTilesOptions::check() const {
   const double cells = tile_m / spacing_m;
   if (cells < 1.0 || cells * cells > 1e8)
     throw Error(
-        "too few or too many points per piece",
+        "too few or too many points per tile",
         {.field = "piece_m", .value = to_text(tile_m), .bound = "1 to 10,000 times spacing_m"});
   if (std::ceil(size_x_m / tile_m) * std::ceil(size_y_m / tile_m) > 1e6)
-    throw Error("too many pieces", {.field = "piece_m",
-                                    .value = to_text(tile_m),
-                                    .bound = "large enough for at most 1,000,000 pieces"});
+    throw Error("too many tiles", {.field = "piece_m",
+                                   .value = to_text(tile_m),
+                                   .bound = "large enough for at most 1,000,000 tiles"});
 }
 
 std::vector<XyTile> terrain_tiles(const TerrainTilesOptions& options) {

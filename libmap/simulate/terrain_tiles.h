@@ -1,5 +1,5 @@
-// Unbounded procedural rocky terrain, a height field as a function of position and seed, and its
-// points in square pieces indexed from the origin.
+// Unbounded procedural rocky terrain (a height field as a function of position and seed), and its
+// points in square tiles indexed from the origin.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -79,21 +79,20 @@ struct TerrainTilesOptions {
   double spacing_m = 0.01;
   RockyTerrainOptions terrain;
 
-  // Throws Error naming the field, its value and its bound: a field out of range, more than 10^6
-  // pieces, or more than 10^8 cells per piece.
+  // Throws Error naming the field: out of range, more than 10^6 tiles or 10^8 cells per tile.
   void check() const;
 };
 // Binds all fields except the size.
 void bind(ParameterTable& table, TerrainTilesOptions& options);
 
-// Pieces that cover the terrain, ascending. Throws Error as TerrainTilesOptions::check does.
+// Returns the tiles that cover the terrain, ascending. Throws as TerrainTilesOptions::check.
 std::vector<XyTile> terrain_tiles(const TerrainTilesOptions& options);
 
-// Points of one piece with normals, m, z up. Each square cell of the plan with side `spacing_m`
-// contains one point per spacing_m^2 of its surface, randomly rounded up or down, at least one. A
-// piece depends only on its index, the seed, the spacing and the terrain; a piece cropped by the
-// terrain's size is a subset of the complete one. Sizes are rounded to multiples of the spacing.
-// Throws Error as TerrainTilesOptions::check does.
+// Returns the points of one tile with normals, m, z up. Each square cell of the x-y plane with side
+// `spacing_m` contains one point per spacing_m^2 of its surface, randomly rounded up or down, at
+// least one. A tile depends only on its index, the seed, the spacing and the terrain; a tile
+// cropped by the terrain's size is a subset of the complete one. Sizes are rounded to multiples of
+// the spacing. Throws Error as TerrainTilesOptions::check does.
 PointCloud sample_tile(const TerrainTilesOptions& options, const XyTile& tile);
 
 }  // namespace libmap

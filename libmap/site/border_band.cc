@@ -58,7 +58,7 @@ struct TopView {
 };
 
 TopView make_top_view(const PointCloud& cloud, const BorderBandOptions& options) {
-  if (!cloud.has_colors()) throw Error("no colors for detecting a white border");
+  if (!cloud.has_colors()) throw Error("no colors: a white border cannot be detected");
   std::vector<std::size_t> used;
   Vector2d low = Vector2d::Constant(std::numeric_limits<double>::infinity());
   Vector2d high = -low;
@@ -70,7 +70,7 @@ TopView make_top_view(const PointCloud& cloud, const BorderBandOptions& options)
     high = high.cwiseMax(point.head<2>());
   }
   if (used.empty())
-    throw Error("no points at the heights of a border band",
+    throw Error("no points are at the heights at which the border band is searched",
                 {.field = "height",
                  .bound = to_text(options.min_z_m) + " to " + to_text(options.max_z_m) + " m"});
   TopView view;
@@ -230,7 +230,7 @@ Frame find_frame(const TopView& view, double white_level, const BorderBandOption
       if (view.levels.at(x, y) >= white_level)
         white.push_back(view.corner + view.cell * Vector2d(x + 0.5, y + 0.5));
   if (white.empty())
-    throw Error("no white cells, no border band; reduce white_level",
+    throw Error("no part of the ground is white enough for a border band; reduce white_level",
                 {.field = "white_level", .value = to_text(white_level)});
   const double bin = 2.0 * view.cell;
   std::vector<Frame> frames(180);
@@ -240,7 +240,7 @@ Frame find_frame(const TopView& view, double white_level, const BorderBandOption
   Frame best = *std::max_element(frames.begin(), frames.end(),
                                  [](const Frame& a, const Frame& b) { return a.score < b.score; });
   if (!(best.score > 0.0))
-    throw Error("no white band with four sides on the ground",
+    throw Error("no white band with four visible sides was found on the ground",
                 {.field = "share of white along each side",
                  .bound = ">= " + to_text(100.0 * options.min_seen) + " %"});
   return best;
@@ -354,13 +354,14 @@ std::array<Vector2d, 4> corners_of(const std::array<Side, 4>& sides) {
 
 void bind(ParameterTable& table, BorderBandOptions& options) {
   table.add("white_level", options.white_level, {0.0, 255.0},
-            "border: minimum of red, green and blue of white, 0 to 255; 0: from the colors");
+            "border: brightness (minimum of red, green and blue, 0 to 255) from which a color is "
+            "white; 0: determined from the colors");
   table.add("max_band_width_m", options.max_width_m, positive,
             "border: maximum width of the band, m");
   table.add("min_band_side_m", options.min_side_m, positive,
             "border: minimum side of the area inside the band, m");
   table.add("min_band_seen", options.min_seen, {0.0, 1.0, true, false},
-            "border: minimum share of each side's length with white");
+            "border: minimum share of each side's length along which the band is visible");
   table.add("band_cell_m", options.cell_m, positive,
             "border: cell size of the image from above, m");
   table.add("min_band_z_m", options.min_z_m, any_number, "border: minimum height of the band, m");
@@ -419,7 +420,7 @@ BorderScale scale_by_border(const BorderBand& band, const Vector2d& inner_size_m
     std::string sides;
     for (const double side : measured)
       sides += (sides.empty() ? "" : ", ") + to_fixed_text(side, 3);
-    throw Error("the size does not match that of the white band",
+    throw Error("the given size does not match the white band's",
                 {.field = "border_size",
                  .value = to_text(inner_size_m.x()) + "x" + to_text(inner_size_m.y()),
                  .bound = "within " + to_text(100.0 * max_size_error) +

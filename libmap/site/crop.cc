@@ -169,7 +169,7 @@ void require_sound(const CropOptions& options) {
     throw Error("a size or a border requires the level frame",
                 {.field = "frame", .value = "map", .bound = "level"});
   if (options.yaw_deg && !std::isfinite(*options.yaw_deg))
-    throw Error("not an angle", {.field = "yaw", .value = to_text(*options.yaw_deg)});
+    throw Error("not a finite angle", {.field = "yaw", .value = to_text(*options.yaw_deg)});
   if (options.region == CropRegion::box &&
       !(options.box.min.array() < options.box.max.array()).all())
     throw Error("a minimum of the box is not below its maximum", {.field = "box"});

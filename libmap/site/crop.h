@@ -72,9 +72,9 @@ struct CropMeshResult {
 CropCloudResult crop_cloud(const PointCloud& cloud, const CropOptions& options);
 CropMeshResult crop_mesh(const TriangleMesh& mesh, const CropOptions& options);
 
-// Crops a mesh in pieces. each(use) must call use(piece) for every piece, in the same order on
-// every call. `use` receives the cropped pieces in this order; a piece may be empty. Throws as
-// crop_mesh.
+// Crops a mesh that is stored in tiles. each(use) must call use(tile) for every tile, in the same
+// order on every call. The third argument `use` receives the cropped tiles in this order; a tile
+// may be empty. Throws as crop_mesh.
 using UseMesh = std::function<void(const TriangleMesh& mesh)>;
 using EachMesh = std::function<void(const UseMesh& use)>;
 CropReport crop_mesh_tiles(const EachMesh& each, const CropOptions& options,

@@ -16,8 +16,9 @@ namespace libmap {
 
 void bind(ParameterTable& table, EdgeCheckOptions& options) {
   table.add("places", options.positions_per_edge, {1.0, 10000.0},
-            "number of positions along each edge");
-  table.add("inset_m", options.inset_m, not_negative, "distance of the positions from the edge");
+            "number of measured positions along each edge of the site");
+  table.add("inset_m", options.inset_m, not_negative,
+            "distance of the measured positions from the edge, m");
 }
 
 namespace {
@@ -92,7 +93,7 @@ SiteCorners corners_of(const TurnedBox& box) {
 }  // namespace
 
 SiteCorners bounding_corners(const std::vector<Eigen::Vector3d>& points, bool turned) {
-  if (points.empty()) throw Error("no points to place a site around");
+  if (points.empty()) throw Error("the data contain no points");
   std::vector<Eigen::Vector2d> plan_points;
   plan_points.reserve(points.size());
   for (const Eigen::Vector3d& point : points) plan_points.emplace_back(point.head<2>());
@@ -149,7 +150,7 @@ void check(const EdgeCheckOptions& options, const SiteCorners& site) {
   const double least = std::min((site.corners[1] - site.corners[0]).norm(),
                                 (site.corners[2] - site.corners[1]).norm());
   if (!(2.0 * options.inset_m < least))
-    throw Error("positions are not inside the site",
+    throw Error("the positions would not be inside the site",
                 {.field = "inset_m",
                  .value = to_text(options.inset_m),
                  .bound = "< " + to_text(static_cast<float>(least / 2)) + ", half a side"});

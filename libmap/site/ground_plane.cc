@@ -249,13 +249,14 @@ std::string remedy(const Points& points, const GroundPlaneOptions& options,
 void bind(ParameterTable& table, GroundPlaneOptions& options) {
   constexpr Range share{0.0, 1.0, true, false};
   table.add("plane_tolerance_m", options.tolerance_m, positive,
-            "maximum distance of the points of a plane, m");
+            "maximum distance from a plane of the points that belong to it, m");
   table.add("max_tilt_deg", options.max_tilt_deg, {0.0, 90.0, true, true},
             "maximum angle between the ground's normal and up, degrees");
   table.add("min_ground_share", options.min_share, share,
-            "minimum share of the points (of a mesh: of the area) on the ground");
-  table.add("min_share_of_largest", options.min_share_of_largest, share,
-            "minimum size of a lower plane to be the ground, relative to the largest plane");
+            "minimum share of the cloud's points, or of the mesh's area, on the ground plane");
+  table.add(
+      "min_share_of_largest", options.min_share_of_largest, share,
+      "minimum size, relative to the largest plane, of a lower plane that is taken as the ground");
   table.add("plane_hypotheses", options.hypotheses, {1.0, 1e6},
             "number of random planes through three points that are tried for each plane");
   table.add("seed", options.seed, not_negative, "random seed");

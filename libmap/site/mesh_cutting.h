@@ -1,4 +1,4 @@
-// Cuts meshes along a polygon of the x-y plane and at two heights.
+// Cuts a mesh along a polygon of the x-y plane and at two heights, for cropping.
 #pragma once
 
 #include "libmap/core/triangle_mesh.h"

@@ -259,7 +259,7 @@ void bind(ParameterTable& table, SiteRectangleOptions& options) {
   table.add("site_cell_m", options.cell_m, positive,
             "cell size for finding the site in the data, m");
   table.add("max_gap_m", options.max_gap_m, not_negative,
-            "holes that contain no square of this size count as data, m");
+            "side of a square, m; holes of the data into which it does not fit are ignored");
   table.add("margin_m", options.margin_m, not_negative,
             "minimum distance of the site from holes, data borders and the border band, m");
 }
@@ -267,7 +267,7 @@ void bind(ParameterTable& table, SiteRectangleOptions& options) {
 SiteRectangle find_site_rectangle(const std::vector<Vector2d>& points, const Vector2d& size_m,
                                   const SiteRectangleOptions& options) {
   require_ranges(size_m, options);
-  if (points.empty()) throw Error("no data to find a site in");
+  if (points.empty()) throw Error("the data contain no points");
   const Ground ground = make_ground(points, options);
   if (ground.cell > std::max(options.cell_m, size_m.minCoeff() / min_on_site))
     throw Error("the data extend too far for a site of this size; remove stray points",
@@ -287,7 +287,7 @@ SiteRectangle find_site_rectangle(const std::vector<Vector2d>& points, const Vec
   result.yaw_deg = best.yaw_deg;
   result.clearance_m = growth_of(best) * ground.cell;
   if (!best.fit || result.clearance_m < options.margin_m - 1.001 * ground.cell)
-    throw Error("no site of this size fits into the data",
+    throw Error("no rectangle of this size fits into the data",
                 {.field = "size",
                  .value = size_text(size_m),
                  .bound = "at most " +

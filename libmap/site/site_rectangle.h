@@ -1,4 +1,4 @@
-// Finds a rectangle of a given size inside the measured area.
+// Finds the best-centered rectangle of a given size inside the measured area, for cropping.
 #pragma once
 
 #include <Eigen/Core>

@@ -68,7 +68,7 @@ XyPolygon::XyPolygon(std::vector<Vector2d> corners) : corners_(std::move(corners
   for (std::size_t n = 0; n < corners_.size(); ++n) {
     const Vector2d& next = corners_[(n + 1) % corners_.size()];
     if ((next - corners_[n]).norm() <= on_border_m)
-      throw Error("duplicate corner of the outline",
+      throw Error("the corner occurs twice in the outline",
                   {.field = corner_name(n), .value = text_of(corners_[n])});
     twice += cross(corners_[n] - corners_.front(), next - corners_.front());
     min_ = min_.cwiseMin(corners_[n]);

@@ -1,4 +1,4 @@
-// Simple polygons of the x-y plane, convex or not.
+// Polygons of the x-y plane without self-intersections, convex or not, and cropping of clouds.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,8 +11,7 @@
 
 namespace libmap {
 
-// z of the cross product: twice the signed area of the triangle (0, a, b), > 0 if
-// counter-clockwise.
+// Cross product: twice the signed area of the triangle (0, a, b), > 0 if counter-clockwise.
 inline double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   return a.x() * b.y() - a.y() * b.x();
 }

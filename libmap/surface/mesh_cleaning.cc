@@ -263,7 +263,7 @@ class Cleaning {
   // `cause` describes the removed triangles.
   void require_triangles(const TriangleMesh& mesh, const ErrorContext& cause) {
     if (mesh.triangles.empty() && !options_.known)
-      throw Error("nothing is left of the mesh", cause);
+      throw Error("no triangle of the mesh would remain", cause);
   }
 
   double merge_distance() {
@@ -360,17 +360,17 @@ void bind(ParameterTable& table, MeshCleaningOptions& options) {
   table.add("repair", options.repair,
             "merge vertices, drop bad triangles, cut non-manifold edges, remove intersections");
   table.add("merge_distance_m", options.merge_distance_m, not_negative,
-            "maximum distance of vertices that are merged; 0: 1e-7 of the mesh's size");
+            "maximum distance between vertices that are merged, m; 0: 1e-7 of the mesh's size");
   table.add("min_island_area_m2", options.min_island_area_m2, not_negative,
             "minimum area of a component, m2; smaller components are dropped");
   table.add("min_island_share", options.min_island_share, zero_to_one,
             "minimum area of a component relative to the largest; smaller components are dropped");
   table.add("max_hole_m", options.max_hole_m, not_negative,
-            "maximum diameter of filled holes; outer boundaries stay open");
+            "maximum diameter of filled holes, m; outer boundaries stay open");
   table.add("smoothing_iterations", options.smoothing_iterations, not_negative,
-            "number of iterations of Taubin's smoothing, which does not shrink");
+            "number of iterations of Taubin smoothing, which avoids shrinkage");
   table.add("decimation_error_m", options.decimation_error_m, not_negative,
-            "maximum distance between the decimated and the original surface; 0: no decimation");
+            "maximum distance between the decimated and the original surface, m; 0: no decimation");
 }
 
 MeshCleaningResult clean_mesh(const TriangleMesh& mesh, const MeshCleaningOptions& options,
@@ -382,24 +382,26 @@ MeshCleaningResult clean_mesh(const TriangleMesh& mesh, const MeshCleaningOption
 }
 
 void describe(ResultTable& table, const MeshCleaningResult& result) {
-  table.add("cut_edges", result.cut_edges, "edges that were cut: non-manifold or not orientable");
-  table.add("split_vertices", result.split_vertices, "copies of vertices with several fans");
-  table.add("degenerate_triangles", result.degenerate_triangles, "removed triangles without area");
-  table.add("islands", result.islands, "small components removed");
-  table.add("island_area_m2", result.island_area_m2, "area of the small components removed");
+  table.add("cut_edges", result.cut_edges, "number of cut edges: non-manifold or not orientable");
+  table.add("split_vertices", result.split_vertices,
+            "number of copies of vertices with several fans of triangles");
+  table.add("degenerate_triangles", result.degenerate_triangles,
+            "number of removed triangles without area");
+  table.add("islands", result.islands, "number of removed small components");
+  table.add("island_area_m2", result.island_area_m2, "area of the small components removed, m2");
   table.add("intersecting_triangles", result.intersecting_triangles,
-            "triangles removed because they intersected others");
+            "number of triangles removed because they intersected others");
   table.add("remaining_intersecting_triangles", result.remaining_intersecting_triangles,
-            "triangles that still intersect others");
-  table.add("filled_holes", result.filling.holes, "holes filled");
-  table.add("filled_triangles", result.filling.triangles, "triangles that fill holes");
-  table.add("filled_area_m2", result.filling.area_m2, "area of the holes filled");
-  table.add("unfilled_holes", result.filling.unfilled, "holes that could not be filled");
+            "number of triangles that still intersect others");
+  table.add("filled_holes", result.filling.holes, "number of filled holes");
+  table.add("filled_triangles", result.filling.triangles, "number of triangles that fill holes");
+  table.add("filled_area_m2", result.filling.area_m2, "area of the holes filled, m2");
+  table.add("unfilled_holes", result.filling.unfilled, "number of holes that could not be filled");
   table.add("decimated_triangles", result.decimation.removed_triangles,
-            "triangles removed by decimation");
-  table.add("vertices", result.mesh.vertices.size(), "vertices of the mesh");
-  table.add("triangles", result.mesh.triangles.size(), "triangles of the mesh");
-  table.add("area_m2", surface_area(result.mesh), "area of the mesh");
+            "number of triangles removed by decimation");
+  table.add("vertices", result.mesh.vertices.size(), "number of vertices of the mesh");
+  table.add("triangles", result.mesh.triangles.size(), "number of triangles of the mesh");
+  table.add("area_m2", surface_area(result.mesh), "area of the mesh, m2");
 }
 
 }  // namespace libmap

@@ -39,7 +39,7 @@ struct MeshCleaningOptions {
   int smoothing_iterations = 0;  // >= 0
   // >= 0: maximum distance between the decimated and the original surface; 0: no decimation.
   double decimation_error_m = 0.0;
-  // Box in x and y beyond which the mesh continues: what extends beyond it is no island or hole.
+  // Box in x and y beyond which the mesh continues: parts beyond it are no islands or holes.
   std::optional<XyBox> known = std::nullopt;
 };
 void bind(ParameterTable& table, MeshCleaningOptions& options);
@@ -78,25 +78,22 @@ void describe(ResultTable& table, const MeshCleaningResult& result);
 // Cleans a mesh. A clean mesh is returned unchanged except for `filled` and normals. The result
 // does not depend on the number of threads. Throws Error: an option out of its range, arrays of
 // inconsistent sizes, an index out of range, a vertex that is not finite, no triangle in the input
-// or the result, a mesh that is no oriented manifold if holes or decimation are wanted without
-// repair.
+// or the result, filling or decimation without repair of a mesh that is not an oriented manifold.
 MeshCleaningResult clean_mesh(const TriangleMesh& mesh, const MeshCleaningOptions& options = {},
                               Progress& progress = no_progress());
 
 // Collapses edges into one of their ends by quadric error (OpenMesh). Removed vertices stay within
 // a tolerance of the triangles that replace theirs, normals turn by at most 30 degrees, and needles
 // are avoided. Then the distance between both surfaces is bounded in both directions: triangles are
-// divided until all corners of a part are within the bound of one triangle, which then holds for
-// the whole part by convexity. Vertices where it exceeds `max_error_m` are locked, and decimation
-// is repeated, later with a smaller tolerance. If no attempt succeeds, the mesh is unchanged.
-// Remaining vertices and triangles keep their values and order. The mesh must be an oriented
-// manifold.
+// divided until all corners of a part are within the bound of one triangle, and so, by convexity,
+// is the whole part. Vertices where it exceeds `max_error_m` are locked, and decimation is
+// repeated, later with a smaller tolerance. If all attempts fail, the mesh is unchanged. Remaining
+// vertices and triangles keep their values and order. The mesh must be an oriented manifold.
 MeshDecimation decimate_mesh(TriangleMesh& mesh, double max_error_m,
                              Progress& progress = no_progress());
 
-// Simplification with this bound in one round: places that exceed it get the original triangles
-// back, which overlap those around them. A quarter of the time; the result is no manifold. For
-// collision.
+// Decimates with the same bound in one round: original triangles replace those that exceed it, and
+// overlap their neighbors. Takes a quarter of the time. The result is not a manifold.
 MeshDecimation decimate_triangles(TriangleMesh& mesh, double max_error_m);
 
 }  // namespace libmap

@@ -1,4 +1,5 @@
-// Repairs coincident vertices, triangles without area, and non-manifold edges and vertices.
+// Repairs a mesh: merges coincident vertices, finds triangles without area, and cuts non-manifold
+// edges and vertices. Steps of mesh_cleaning.h.
 #pragma once
 
 #include <cstddef>
@@ -32,7 +33,7 @@ std::vector<bool> repeated_triangles(const std::vector<Triangle>& triangles);
 
 // Removes caps, degenerate triangles with a corner on the opposite edge, from an oriented manifold.
 // Flips that edge, or drops the triangle if the edge is open. Returns the number of caps removed.
-// Caps whose new edge exists already stay, and so do rows of caps that depend on each other.
+// Caps are kept if their new edge exists already, or if they depend on other caps.
 std::size_t flip_caps(TriangleMesh& mesh);
 
 struct ManifoldCuts {

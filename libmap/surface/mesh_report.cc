@@ -129,18 +129,21 @@ void describe(ResultTable& table, const MeshReport& report) {
   std::vector<double> lengths_m;
   for (const MeshBoundary& boundary : report.boundaries) lengths_m.push_back(boundary.length_m);
   table.add("watertight", report.is_watertight(), "closed, manifold, oriented, not intersecting");
-  table.add("manifold", report.is_manifold(), "no edge and no vertex has several sheets");
+  table.add("manifold", report.is_manifold(),
+            "every edge has at most two triangles, every vertex one fan of them");
   table.add("oriented", report.is_oriented(), "neighboring triangles have the same orientation");
-  table.add("components", report.components, "components connected by edges");
+  table.add("components", report.components, "number of components connected by edges");
   table.add("genus", report.genus, "handles of a manifold and oriented mesh, otherwise -1");
-  table.add("boundaries", lengths_m.size(), "closed chains of boundary edges");
-  table.add("boundary_lengths_m", lengths_m, "length of each boundary, longest first");
-  table.add("area_m2", report.area_m2, "area of the mesh");
-  table.add("non_manifold_edges", report.non_manifold_edges, "edges with more than two triangles");
+  table.add("boundaries", lengths_m.size(), "number of closed chains of boundary edges");
+  table.add("boundary_lengths_m", lengths_m, "length of each boundary, longest first, m");
+  table.add("area_m2", report.area_m2, "area of the mesh, m2");
+  table.add("non_manifold_edges", report.non_manifold_edges,
+            "number of edges with more than two triangles");
   table.add("non_manifold_vertices", report.non_manifold_vertices,
-            "vertices with more than one fan of triangles");
-  table.add("self_intersections", report.self_intersections, "pairs of intersecting triangles");
-  table.add("median_edge_m", report.edge_lengths.median_m, "median length of the edges");
+            "number of vertices with more than one fan of triangles");
+  table.add("self_intersections", report.self_intersections,
+            "number of pairs of intersecting triangles");
+  table.add("median_edge_m", report.edge_lengths.median_m, "median length of the edges, m");
 }
 
 }  // namespace libmap

@@ -1,4 +1,4 @@
-// Reports topology and defects of a triangle mesh: components, boundaries, genus, and errors.
+// Report on the topology and defects of a mesh, for `graspmap info` and `graspmap mesh --report`.
 #pragma once
 
 #include <cstddef>

@@ -257,7 +257,7 @@ void Reconstruction::check_cell_size() {
   const double extent = (bounds.max - bounds.min).maxCoeff();
   // The surface extends by about a cell, so larger cells would create ground around the points.
   if (result_.cell_size_m > extent)
-    throw Error("cells larger than the cloud",
+    throw Error("the cells would be larger than the cloud",
                 {.field = "cell_size_m",
                  .value = to_text(static_cast<float>(result_.cell_size_m)),
                  .bound = "<= " + to_text(static_cast<float>(extent)) + " m"});
@@ -269,7 +269,7 @@ void Reconstruction::check_cell_size() {
   if (!(result_.cell_size_m >= min_cell_m))
     throw Error(is_poisson ? "the octree would be deeper than " + std::to_string(max_octree_depth) +
                                  " levels"
-                           : "cells too small for the distance between the points",
+                           : "too small for the distance between the points",
                 {.field = "cell_size_m",
                  .value = to_text(static_cast<float>(result_.cell_size_m)),
                  .bound = ">= " + to_text(static_cast<float>(min_cell_m)) + " m"});
@@ -426,21 +426,24 @@ double CloudStatistics::median_error_m() const {
 }
 
 void bind(ParameterTable& table, SurfaceReconstructionOptions& options) {
-  table.add("method", options.method,
-            {{"implicit", SurfaceMethod::implicit}, {"poisson", SurfaceMethod::poisson}},
-            "implicit: algebraic point set surface; poisson: screened Poisson reconstruction");
-  table.add("support_cells", options.support_cells, {1.5, 10.0},
-            "implicit: radius of influence of a point, in cells or in the points' spacing");
+  table.add(
+      "method", options.method,
+      {{"implicit", SurfaceMethod::implicit}, {"poisson", SurfaceMethod::poisson}},
+      "method; implicit: algebraic point set surface; poisson: screened Poisson reconstruction");
+  table.add(
+      "support_cells", options.support_cells, {1.5, 10.0},
+      "method implicit: radius of influence of a point, in cells or, if larger, point spacings");
   table.add("cell_size_m", options.cell_size_m, not_negative,
-            "size of the finest cells and of edges; 0: the distance between the cloud's points");
+            "size of the finest cells and of the mesh's edges, m; 0: the point spacing");
   table.add("screening", options.screening, not_negative,
-            "poisson: weight of the points relative to smoothness");
+            "method poisson: weight of the points relative to the smoothness of the surface");
   table.add("weigh_by_error", options.weigh_by_error,
-            "weight points by the inverse square of their field expected_error");
+            "weight each point by the inverse square of its field expected_error (m)");
   table.add("samples_per_cell", options.samples_per_cell, positive,
-            "poisson: minimum number of points per cell; with fewer, cells are larger");
-  table.add("trim_distance_cells", options.trim_distance_cells, positive,
-            "maximum distance of the surface from all points, in cells or in the points' spacing");
+            "method poisson: minimum number of points per cell; cells with fewer are enlarged");
+  table.add(
+      "trim_distance_cells", options.trim_distance_cells, positive,
+      "maximum distance of the surface from all points, in cells or, if larger, point spacings");
 }
 
 SurfaceReconstructionResult reconstruct_surface(const PointCloud& cloud,
@@ -460,7 +463,7 @@ SurfaceReconstructionResult reconstruct_part(const PointCloud& part, const Cloud
 
 double surface_margin_m(const SurfaceReconstructionOptions& options) {
   if (options.method != SurfaceMethod::implicit)
-    throw Error("reconstruction in parts requires a local method",
+    throw Error("this method cannot reconstruct a surface in tiles",
                 {.field = "method", .value = "poisson", .bound = "implicit"});
   if (!(options.cell_size_m > 0.0))
     throw Error("reconstruction in parts requires a cell size",
@@ -475,14 +478,14 @@ double surface_margin_m(const SurfaceReconstructionOptions& options) {
 }
 
 void describe(ResultTable& table, const SurfaceReconstructionResult& result) {
-  table.add("dropped_points", result.dropped_points, "points without a normal");
-  table.add("cell_size_m", result.cell_size_m, "size of the cells of the surface");
-  table.add("spacing_m", result.spacing_m, "median distance of neighboring points");
-  table.add("samples", result.samples, "samples that the points were reduced to");
+  table.add("dropped_points", result.dropped_points, "number of points without a normal");
+  table.add("cell_size_m", result.cell_size_m, "size of the cells of the surface, m");
+  table.add("spacing_m", result.spacing_m, "median distance between neighboring points, m");
+  table.add("samples", result.samples, "number of samples to which the points were reduced");
   table.add("octree_depth", result.octree_depth,
             "depth of the octree of method poisson, otherwise 0");
   table.add("trimmed_triangles", result.trimmed_triangles,
-            "triangles removed because of their distance from all points");
+            "number of triangles removed because they are far from all points");
 }
 
 }  // namespace libmap

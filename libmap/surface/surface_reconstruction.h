@@ -1,6 +1,5 @@
-// Reconstructs a surface from a cloud with normals, in cells of a given size: as an algebraic point
-// set surface (surface_solvers.h), or by PCL's screened Poisson reconstruction (Kazhdan and Hoppe
-// 2013).
+// Reconstructs a mesh from a cloud with normals, as an algebraic point set surface
+// (surface_solvers.h) or by PCL's screened Poisson reconstruction (Kazhdan and Hoppe 2013).
 #pragma once
 
 #include <cstddef>
@@ -23,7 +22,8 @@ enum class SurfaceMethod { implicit, poisson };
 
 struct SurfaceReconstructionOptions {
   SurfaceMethod method = SurfaceMethod::implicit;
-  double support_cells = 2.5;  // >= 1.5: implicit: support of a sample; see surface_solvers.h
+  double support_cells =
+      2.5;  // >= 1.5: implicit: radius of influence of a point; surface_solvers.h
   // >= 0: size of the grid's or the octree's finest cells, and about the length of the mesh's
   // edges. 0: the median distance of points to their nearest neighbors (median_spacing).
   double cell_size_m = 0.0;
@@ -43,8 +43,7 @@ void bind(ParameterTable& table, SurfaceReconstructionOptions& options);
 // margin. The memory of PCL's tables grows with the square of that number.
 inline constexpr int max_octree_depth = 12;
 
-// Properties of a whole cloud, for reconstructing its surface in parts. The cloud may be added in
-// parts, in any order.
+// Statistics of a whole cloud for reconstruct_part. Parts of the cloud may be added in any order.
 class CloudStatistics {
  public:
   // Throws Error if the cloud has points but no normals.
@@ -62,7 +61,7 @@ class CloudStatistics {
   std::size_t points_ = 0;
   std::size_t dropped_ = 0;
   Bounds3d bounds_;
-  std::map<std::uint64_t, std::size_t> errors_;  // histogram by their leading bits
+  std::map<std::uint64_t, std::size_t> errors_;  // histogram
 };
 
 struct SurfaceReconstructionResult {
@@ -91,23 +90,24 @@ using AnnounceWork = std::function<void(const SurfaceWork& work)>;
 // one thread, because its result depends on the number of threads; during this time, standard
 // output and error of the process are discarded. The result does not depend on the number of
 // threads and the order of the points, except for different values at equal position and normal. A
-// shift of the cloud shifts the mesh, except for rounding. `announce` is called before the work.
-// Throws Error: no normals, no point with a normal, inconsistent normals, fewer than 3 positions,
-// positions on a line, options out of their ranges, cells larger than the cloud or too small for
-// its point spacing, an octree deeper than max_octree_depth, PCL failed.
+// shift of the cloud shifts the mesh, except for rounding. `announce` is called with the estimated
+// work before it begins. Throws Error: no normals, no point with a normal, inconsistent normals,
+// fewer than 3 positions, positions on a line, options out of their ranges, cells larger than the
+// cloud or too small for its point spacing, an octree deeper than max_octree_depth, PCL failed.
 SurfaceReconstructionResult reconstruct_surface(const PointCloud& cloud,
                                                 const SurfaceReconstructionOptions& options = {},
                                                 Progress& progress = no_progress(),
                                                 const AnnounceWork& announce = {});
 
-// Reconstructs the surface of a part of the cloud of `survey`. At a distance of surface_margin_m()
-// from missing points, it equals the surface of the whole cloud, except for the order. Empty for
-// too few points. Throws Error as reconstruct_surface and surface_margin_m.
+// Reconstructs the surface of a part of a cloud; `survey` are the statistics of the whole cloud. At
+// a distance of surface_margin_m() from missing points, the surface equals that of the whole cloud,
+// except for the order. Returns an empty mesh for too few points. Throws Error as
+// reconstruct_surface and surface_margin_m.
 SurfaceReconstructionResult reconstruct_part(const PointCloud& part, const CloudStatistics& survey,
                                              const SurfaceReconstructionOptions& options,
                                              Progress& progress = no_progress());
-// Distance up to which points influence the surface, m. Throws Error unless the method is implicit
-// and a cell size is given.
+// Returns the distance up to which points influence the surface, m. Throws Error unless the method
+// is implicit and a cell size is given.
 double surface_margin_m(const SurfaceReconstructionOptions& options);
 
 }  // namespace libmap

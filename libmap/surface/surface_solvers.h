@@ -1,4 +1,5 @@
-// Solvers for surfaces of oriented samples, without trimming. Private to surface_reconstruction.
+// Computes surfaces from samples with normals: implicit (algebraic point set surface) and Poisson,
+// without trimming. Private to surface_reconstruction.
 #pragma once
 
 #include <Eigen/Core>

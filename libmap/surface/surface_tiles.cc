@@ -91,7 +91,7 @@ void SurfaceTileOptions::check() const {
                  .bound = ">= " + to_text(margin_m() / max_margin_tiles) +
                           ", from cell_size_m, trim_distance_cells and max_hole_m"});
   if (cleaning.decimation_error_m > 0.0)
-    throw Error("decimation requires the whole surface, not tiles",
+    throw Error("surfaces in tiles cannot be decimated",
                 {.field = "decimation_error_m",
                  .value = to_text(cleaning.decimation_error_m),
                  .bound = "0"});

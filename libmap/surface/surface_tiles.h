@@ -1,5 +1,5 @@
-// Reconstructs and cleans a surface in tiles of the x-y plane, so that memory does not depend on
-// its area. Adjacent tiles have the same vertices on their seam.
+// Reconstructs and cleans the surface of a large cloud in tiles of the x-y plane, so that memory
+// does not depend on its area. Adjacent tiles have the same vertices on their border (seam).
 #pragma once
 
 #include <Eigen/Geometry>
@@ -29,11 +29,11 @@ struct SurfaceTileOptions {
   double margin_m() const;
 };
 
-// Box of a tile, enlarged by a margin on each side.
+// Returns the box of a tile, enlarged by a margin on each side.
 XyBox xy_box_of(const XyTile& tile, double tile_m, double margin_m);
 
-// Counts, for each tile that may contain a part of the cloud's surface, the points near it. Throws
-// Error if tile_m is too small for the coordinates.
+// Adds, for each tile that may contain a part of the cloud's surface, the number of points near it.
+// Throws Error if tile_m is too small for the coordinates.
 void add_surface_tiles(const PointCloud& cloud, const SurfaceTileOptions& options,
                        std::map<XyTile, std::size_t>& points_in_tiles);
 
@@ -49,11 +49,11 @@ struct SurfaceTile {
   MeshCleaningResult cleaning;                 // of the tile with its margin, without mesh
 };
 
-// Makes the surface of one tile from the `points` within margin_m() of it; `survey` describes the
-// whole cloud. The surface is that of reconstruct_surface() and clean_mesh(), except for islands
-// that may continue beyond the margin, which SurfaceIslands finds. Such components, if narrower
-// than min_island_area_m2 / margin_m(), may prevent a hole beside them from being filled. Throws
-// Error as options.check(), reconstruct_part and clean_mesh.
+// Reconstructs the surface of one tile from the `points` within margin_m() of it; `survey` are the
+// statistics of the whole cloud. The surface equals that of reconstruct_surface() and clean_mesh()
+// for the whole cloud, except that small components (islands) at the margin are kept, for
+// SurfaceIslands. If they are narrower than min_island_area_m2 / margin_m(), holes beside them may
+// stay open. Throws Error as options.check(), reconstruct_part and clean_mesh.
 SurfaceTile make_surface_tile(const PointCloud& points, const CloudStatistics& survey,
                               const XyTile& tile, const SurfaceTileOptions& options,
                               Progress& progress = no_progress());
@@ -62,7 +62,7 @@ SurfaceTile make_surface_tile(const PointCloud& points, const CloudStatistics& s
 TriangleMesh without_components(const TriangleMesh& mesh,
                                 const std::vector<std::uint32_t>& components);
 
-// Finds islands across tiles by joining components along seams.
+// Finds islands (components below the minimum area) by joining components of tiles along seams.
 class SurfaceIslands {
  public:
   // Adds the components of one tile.

@@ -1,4 +1,4 @@
-// Subdivides a mesh without changing its surface. Private to libmap/texture.
+// Subdivides long triangles of a mesh without changing its surface. Private to libmap/texture.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// Relative exposure of photographs and vignetting of the lens, estimated from common observations.
+// Estimates the exposure of photographs and the vignetting of the lens from common surface points.
 // Colors are divided by both before they are blended. Private to libmap/texture.
 #pragma once
 

@@ -232,16 +232,16 @@ void bind(ParameterTable& table, TextureOptions& options) {
   table.add("max_incidence_deg", options.views.max_incidence_deg, {0, 90, true, true},
             "maximum angle between viewing ray and surface normal, degrees");
   table.add("max_depth_m", options.views.max_depth_m, not_negative,
-            "maximum depth (z) at which a photograph is used for a surface, m; 0: no limit");
+            "maximum depth of a surface in a photograph used for it, m; 0: no limit");
   table.add("occlusion_tolerance_m", options.views.occlusion_tolerance_m, not_negative,
-            "depth behind another surface from which a surface is occluded, m");
+            "depth behind another surface beyond which a surface counts as occluded, m");
   table.add(
       "occlusion_margin_px", options.views.occlusion_margin_px, not_negative,
       "distance from an occluder's silhouette within which other views are preferred, pixels");
   table.add("border_px", options.views.border_px, not_negative,
             "width of the unused border of each photograph, pixels");
   table.add("seam_cost_m", options.labeling.seam_cost_m, not_negative,
-            "cost of a seam per meter; larger values give fewer seams but lower view quality");
+            "cost per meter of seam; larger values give fewer seams but lower view quality");
   table.add("blend_views", options.blend_views, {1, 16},
             "maximum number of photographs blended at a point; 1: one per triangle");
   table.add("blend_exponent", options.blend_exponent, not_negative,
@@ -249,7 +249,7 @@ void bind(ParameterTable& table, TextureOptions& options) {
   table.add("exposure", options.exposure.gains, "equalize the brightness of the photographs");
   table.add("vignetting", options.exposure.vignetting, "correct the vignetting of the photographs");
   table.add("max_side_m", options.max_side_m, not_negative,
-            "maximum side length of visible triangles before subdivision, m; 0: no subdivision");
+            "side length above which visible triangles are subdivided, m; 0: no subdivision");
   table.add("strict", options.strict, "treat unusable frames as errors instead of skipping them");
 }
 
@@ -293,19 +293,21 @@ TextureReport TileTexturing::report() const {
 
 void describe(ResultTable& table, const TextureCounts& counts) {
   table.add("triangles", counts.seen_triangles + counts.unseen_triangles,
-            "triangles of the textured mesh");
+            "number of triangles of the textured mesh");
   table.add("triangles_by_cutting", counts.cut_triangles, Merge::sum,
-            "triangles added by cutting long ones");
-  table.add("seen_triangles", counts.seen_triangles, Merge::sum, "triangles with a photograph");
+            "number of triangles added by cutting long ones");
+  table.add("seen_triangles", counts.seen_triangles, Merge::sum,
+            "number of triangles with a photograph");
   table.add("unseen_triangles", counts.unseen_triangles, Merge::sum,
-            "triangles without a photograph");
+            "number of triangles without a photograph");
   table.add("seen_m2", counts.seen_m2, Merge::sum, "area with a photograph, m2");
   table.add("unseen_m2", counts.unseen_m2, Merge::sum, "area without a photograph, m2");
-  table.add("charts", counts.charts, Merge::sum, "charts of the texture");
+  table.add("charts", counts.charts, Merge::sum, "number of charts of the texture");
   table.add("split_charts", counts.split_charts, Merge::sum,
-            "charts that were split to fit a page");
-  table.add("shrunk_charts", counts.shrunk_charts, Merge::sum, "charts of reduced resolution");
-  table.add("pages", counts.pages, Merge::sum, "pages of the texture");
+            "number of charts that were split to fit a page");
+  table.add("shrunk_charts", counts.shrunk_charts, Merge::sum,
+            "number of charts of reduced resolution");
+  table.add("pages", counts.pages, Merge::sum, "number of pages of the texture");
   table.add("texel_size_m", counts.texel_size_m(), "square root of the mean area of a texel, m");
   table.add("atlas_scale", counts.atlas_scale, Merge::min,
             "scale of the charts to fit max_pages; 1: not reduced");
@@ -321,7 +323,7 @@ void describe(ResultTable& table, const TextureReport& report) {
   for (const Eigen::Vector3f& gain : exposure.gains)
     for (const float channel : gain) gains.push_back(static_cast<double>(channel));
   table.add("photographs", report.photos, "number of photographs");
-  table.add("skipped_frames", report.skipped.size(), "frames that could not be used");
+  table.add("skipped_frames", report.skipped.size(), "number of frames that could not be used");
   describe(table, static_cast<const TextureCounts&>(report));
   table.add("color_spread_before", exposure.log_color_deviation_before,
             "standard deviation of the log color of a location between photographs");

@@ -45,7 +45,7 @@ struct TextureOptions {
 };
 void bind(ParameterTable& table, TextureOptions& options);
 
-// Statistics of one model, or of several pieces together.
+// Statistics of one model, or of several tiles together.
 struct TextureCounts {
   std::size_t cut_triangles = 0;  // triangles added by subdivision
   std::size_t seen_triangles = 0;
@@ -85,26 +85,26 @@ TextureResult texture_mesh(const TriangleMesh& mesh, const ScanSource& scan,
                            const Trajectory& world_from_base, const TextureOptions& options = {},
                            Progress& progress = no_progress());
 
-// Textures the pieces of a mesh one by one; memory depends on the size of a piece. Throws Error as
-// texture_mesh does, except for a piece that no photograph sees.
+// Textures a mesh that is stored in tiles, one by one; memory depends on the size of a tile. Throws
+// Error as texture_mesh does, except for a tile that no photograph shows.
 class TileTexturing {
  public:
-  // Only the mesh within `margin_m` of a piece is considered as an occluder. `pieces`, `scan` and
+  // Only the mesh within `margin_m` of a tile is considered as an occluder. `pieces`, `scan` and
   // `progress` must outlive this object.
   TileTexturing(MeshTileIndex& pieces, double margin_m, const ScanSource& scan,
                 const Trajectory& world_from_base, const TextureOptions& options,
                 Progress& progress = no_progress());
   ~TileTexturing();
 
-  // Estimates the common exposure from all pieces.
+  // Estimates the common exposure from all tiles.
   TextureExposure find_exposure();
   struct Piece {
     TexturedMesh model;
     TextureCounts counts;
   };
-  // Textures one piece with the result of find_exposure.
+  // Textures one tile with the result of find_exposure.
   Piece make(std::size_t piece, const TextureExposure& exposure);
-  // Report on the photographs, with the running times so far and empty counts.
+  // Returns the report on the photographs, with the running times so far and empty counts.
   TextureReport report() const;
 
  private:

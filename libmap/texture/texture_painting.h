@@ -1,4 +1,4 @@
-// Paints the pages of a texture from the photographs. Private to libmap/texture.
+// Computes the colors of texture pages from photographs. Private to libmap/texture.
 #pragma once
 
 #include <cstdint>
@@ -26,9 +26,9 @@ struct BlendingWeights {
   std::vector<std::uint32_t> first;
 };
 
-// Weights of the best `views` photographs of each vertex: quality^exponent minus that of the next
-// best photograph, normalized, so that weights are continuous over the surface (masked photo
-// blending, Callieri et al. 2008). Returns no weights if `views` is 1.
+// Returns the weights of the best `views` photographs of each vertex: quality^exponent minus that
+// of the next best photograph, normalized. The weights are continuous over the surface (masked
+// photo blending, Callieri et al. 2008). Returns no weights if `views` is 1.
 BlendingWeights blending_weights(const ViewTable& of_vertices, int views, double exponent);
 
 struct TexturePaint {
@@ -39,8 +39,8 @@ struct TexturePaint {
 };
 
 // Paints all charts of `atlas` into the pages of `model`, the result of atlas.make_model. Texels
-// outside all triangles continue the colors of the nearest triangle of their chart. The result is
-// the same for any number of threads.
+// outside all triangles get the color of the nearest triangle of their chart. Independent of the
+// number of threads.
 void paint_texture(const TextureAtlas& atlas, const TexturePaint& paint, TexturedMesh& model,
                    Progress& progress);
 

@@ -36,7 +36,7 @@ double largest_ray(const Camera& camera) {
 }
 
 Error no_photographs(const std::vector<std::pair<int, Error>>& skipped, std::size_t poses) {
-  if (poses == 0) return Error("no poses for texturing");
+  if (poses == 0) return Error("no frame has a pose, so there are no photographs for the texture");
   return Error("no usable photograph in " + std::to_string(poses) + " frames; the first frame: " +
                (skipped.empty() ? "no camera" : skipped.front().second.what()));
 }

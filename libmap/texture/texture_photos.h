@@ -1,5 +1,4 @@
-// The photographs of a scan: camera pose and sharpness of each, and its pixels on demand. Private
-// to libmap/texture.
+// Photographs of a scan: camera, pose, sharpness, pixels on demand. Private to libmap/texture.
 #pragma once
 
 #include <Eigen/Core>

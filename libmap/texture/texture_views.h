@@ -1,5 +1,4 @@
-// Visibility and quality of a mesh's triangles and vertices in photographs. Private to
-// libmap/texture.
+// Visibility of triangles and vertices in photographs, with quality. Private to libmap/texture.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,5 +1,5 @@
-// Conversion of Eigen's types and messages of Errors to and from nlohmann's JSON. Numbers are
-// preserved bit for bit.
+// JSON conversion (nlohmann) of Eigen vectors, matrices, poses and boxes, and of error messages,
+// for the JSON files of tile stores. Numbers are preserved bit for bit.
 #pragma once
 
 #include <Eigen/Geometry>

@@ -1,4 +1,5 @@
-// Points of a large terrain in tiles on disk, for reading the points of a rectangle only.
+// Temporary store of a large terrain's points on disk, sorted into tiles, from which the points of
+// a rectangle can be read without the others.
 #pragma once
 
 #include <Eigen/Core>
@@ -18,7 +19,7 @@ namespace libmap {
 struct PointTileStoreOptions {
   double tile_m = 1.0;                                // side of a tile
   bool has_normals = false;                           // true to store the points' normals
-  std::size_t buffer_bytes = std::size_t{64} << 20U;  // total for all tiles
+  std::size_t buffer_bytes = std::size_t{64} << 20U;  // memory for unwritten points
 };
 
 class PointTileStore {
@@ -35,8 +36,7 @@ class PointTileStore {
   // Returns the points with low <= (x, y) <= high in the order of add(). Reads the tiles that
   // intersect the rectangle.
   PointCloud points_in(const Eigen::Vector2d& low, const Eigen::Vector2d& high) const;
-  // Upper bound of the number of points in the rectangle: the points of the tiles that intersect
-  // it.
+  // Returns an upper bound of the number of points in the rectangle: those of its tiles.
   std::size_t count_in(const Eigen::Vector2d& low, const Eigen::Vector2d& high) const;
   std::size_t size() const { return size_; }
 

@@ -11,7 +11,7 @@ TileShare parse_share(const std::string& text) {
   const auto count =
       slash == std::string::npos ? std::nullopt : parse_integer(text.substr(slash + 1));
   if (!number || !count || *count < 1 || *number < 1 || *number > *count || *count > 1000000)
-    throw Error("invalid share of the tiles",
+    throw Error("not a share of the tiles",
                 {.field = "--tile", .value = text, .bound = "K/N with 1 <= K <= N"});
   return {static_cast<int>(*number), static_cast<int>(*count)};
 }
@@ -22,7 +22,7 @@ std::string to_text(const TileShare& share) {
 
 std::pair<std::size_t, std::size_t> share_range(std::size_t tiles, const TileShare& share) {
   if (share.count < 1 || share.number < 1 || share.number > share.count)
-    throw Error("invalid share",
+    throw Error("not a share of the tiles",
                 {.field = "tile", .value = to_text(share), .bound = "K/N with 1 <= K <= N"});
   const auto number = static_cast<std::size_t>(share.number);
   const auto count = static_cast<std::size_t>(share.count);

@@ -1,4 +1,4 @@
-// Shares of the tiles, for distributing the tiles over several runs.
+// Divides the tiles of a terrain into shares, which several runs or machines can compute.
 #pragma once
 
 #include <cstddef>
@@ -14,11 +14,11 @@ struct TileShare {
   int count = 1;
 };
 
-// Conversion from and to "K/N". parse_share throws Error naming --tile.
+// Converts from and to "K/N". parse_share throws Error naming --tile for any other text.
 TileShare parse_share(const std::string& text);
 std::string to_text(const TileShare& share);
 
-// Returns the index range [begin, end) of a share among `tiles` tiles. Throws Error naming `tile`.
+// Returns a share's range [begin, end) of `tiles` tiles. Throws Error unless 1 <= number <= count.
 std::pair<std::size_t, std::size_t> share_range(std::size_t tiles, const TileShare& share);
 
 // Returns the consecutive tiles of a share. Throws as share_range does.

@@ -47,7 +47,7 @@ void make_folder(const fs::path& folder) {
 FileLock lock_journal(const fs::path& journal, const fs::path& store, const TileShare& share) {
   std::optional<FileLock> lock = FileLock::try_lock(journal);
   if (!lock)
-    throw Error("another process works on share " + to_text(share), {.file = store.string()},
+    throw Error("another process is computing share " + to_text(share), {.file = store.string()},
                 ErrorKind::failed);
   return std::move(*lock);
 }
@@ -96,7 +96,8 @@ void TileStore::open() const {
     throw Error("is a file, not a tile store", {.file = folder_.string()});
   if (fs::exists(folder_) && !fs::is_empty(folder_) && !fs::exists(progress()) &&
       !fs::exists(index_path()))
-    throw Error("is not empty and is not a tile store", {.file = folder_.string()});
+    throw Error("is not empty and is not a tile store; use another folder",
+                {.file = folder_.string()});
   for (const fs::path& folder : {folder_, progress(), tiles()}) make_folder(folder);
 }
 

@@ -23,7 +23,7 @@
 
 namespace libmap {
 
-// SHA-256 of the manifest's version, its parameters and its inputs' hashes.
+// Returns the SHA-256 of the manifest's version, its parameters and its inputs' hashes.
 std::string key_of(const Manifest& manifest);
 
 // Journal of one share, locked by one process at a time.
@@ -43,7 +43,7 @@ class TileJournal {
   int file_ = -1;
 };
 
-// Access of one run to a tile store.
+// Access of one run to a tile store on disk.
 class TileStore {
  public:
   // Does not access the disk.
@@ -70,7 +70,7 @@ class TileStore {
     std::filesystem::path journal;
     std::size_t begin = 0;
   };
-  // Calls visit(text, line) for each line of all journals.
+  // Calls visit(text, line) for each line of all journals. Throws Error (failed) on a read error.
   void each_line(const std::function<void(const std::string& text, const Line& line)>& visit) const;
   static std::string read_line(const Line& line);
 

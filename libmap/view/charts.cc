@@ -35,7 +35,7 @@ constexpr int max_axis_ticks = 10;
 void check_numbers(const std::vector<double>& values, const std::string& field) {
   for (const double value : values)
     if (!std::isfinite(value))
-      throw Error("cannot be drawn",
+      throw Error("the chart cannot be drawn",
                   {.field = field, .value = to_text(value), .bound = "a finite number"});
 }
 
@@ -43,9 +43,9 @@ void check_axis(const ChartAxis& axis, const std::string& field) {
   if (!axis.range) return;
   const auto [low, high] = *axis.range;
   if (!std::isfinite(high - low) || !(low < high))
-    throw Error("cannot be drawn", {.field = field,
-                                    .value = to_text(low) + " to " + to_text(high),
-                                    .bound = "finite and ascending, of finite width"});
+    throw Error("the chart cannot be drawn", {.field = field,
+                                              .value = to_text(low) + " to " + to_text(high),
+                                              .bound = "finite and ascending, of finite width"});
 }
 
 // Range of the values, widened to round numbers; 0 to 1 without values.
@@ -285,9 +285,10 @@ void check(const Chart& chart, const ChartSize& size) {
   chart.check();
   if (size.width_px < 200 || size.height_px < 200 || size.width_px > 16384 ||
       size.height_px > 16384)
-    throw Error("cannot be drawn", {.field = "chart size",
-                                    .value = size_text(size.width_px, size.height_px) + " pixels",
-                                    .bound = "from 200 to 16384 each"});
+    throw Error("the chart cannot be drawn",
+                {.field = "chart size",
+                 .value = size_text(size.width_px, size.height_px) + " pixels",
+                 .bound = "from 200 to 16384 each"});
 }
 
 // Text alternative of the chart.
@@ -320,7 +321,7 @@ void Chart::check() const {
     check_numbers({histogram.first_edge, histogram.bin_width}, field + ", edges");
     if (!(histogram.bin_width > 0.0))
       throw Error(
-          "cannot be drawn",
+          "the chart cannot be drawn",
           {.field = field + ", bin width", .value = to_text(histogram.bin_width), .bound = "> 0"});
   }
 }

@@ -14,8 +14,8 @@
 
 namespace libmap {
 
-// A scene or an image. Scenes are created on demand, twice each, so that only one is in memory.
-// Images are scaled down if they are larger than the cell.
+// Content of a cell: a scene or an image. Scenes are created on demand (twice each), so that only
+// one is in memory. Images larger than the cell are scaled down.
 struct SheetCell {
   std::string caption;
   std::function<Scene()> scene{};  // empty: show `image`

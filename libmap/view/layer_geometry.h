@@ -30,9 +30,9 @@ struct PreparedLayer {
   std::vector<Eigen::Vector2f> coordinates{};  // one per position, from the top left
 };
 
-// Prepares a layer. A mesh shown with its texture gives one layer per page, which refers to the
-// page in `layer`; triangles without a page have untextured_color. All others give one layer.
-// Throws Error: arrays of wrong length, mode `texture` without a texture, and as color_points does.
+// Prepares a layer. A textured mesh becomes one layer per page, which refers to the page in
+// `layer`; triangles without a page have untextured_color. Other shapes become one layer. Throws
+// Error: arrays of wrong length, mode `texture` without a texture, and as color_points does.
 std::vector<PreparedLayer> prepare_layers(const SceneLayer& layer, const Pose& terrain_from_scene);
 
 inline constexpr Color untextured_color{128, 128, 128};

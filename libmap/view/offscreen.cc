@@ -195,7 +195,8 @@ void VirtualDisplay::start() {
 
   std::array<int, 2> number_pipe{};
   if (pipe2(number_pipe.data(), O_CLOEXEC) != 0)
-    throw Error(std::string("pipe to Xvfb failed: ") + std::strerror(errno), {}, ErrorKind::failed);
+    throw Error(std::string("a pipe to the display server Xvfb failed: ") + std::strerror(errno),
+                {}, ErrorKind::failed);
   const pid_t parent = getpid();
   const pid_t child = fork();
   if (child == 0) become_server(program.c_str(), arguments.data(), number_pipe[1], parent);

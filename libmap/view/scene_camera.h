@@ -1,4 +1,4 @@
-// Cameras of a scene's views, and the projection of points into the image.
+// Cameras for views of a scene (top, oblique, ...), and projection of points into the image.
 #pragma once
 
 #include <Eigen/Core>

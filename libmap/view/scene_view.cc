@@ -43,7 +43,7 @@ void check(const SceneViewOptions& options) {
   check_side("height", options.height);
   parse_color(options.background, "background");
   if (options.extent && !((options.extent->max - options.extent->min).minCoeff() >= 0.0))
-    throw Error("the box is empty", {.field = "extent"});
+    throw Error("the box contains nothing", {.field = "extent"});
 }
 
 // A scene ready to be drawn, in the terrain frame.
@@ -250,10 +250,11 @@ void bind(ParameterTable& table, SceneLayer& layer) {
              {"height", ColorMode::height},
              {"single", ColorMode::single},
              {"texture", ColorMode::texture}},
-            "quantity shown by colors");
-  table.add("field", coloring.field, "scalar field for color modes field and automatic");
+            "quantity that the colors show; automatic: chosen by the content of the file");
+  table.add("field", coloring.field,
+            "name of the scalar field shown by color modes field and automatic");
   table.add("load_n", coloring.load_n, positive,
-            "load of hold_probability in the legend, N; auto: load of the map");
+            "load shown in the legend of hold_probability, N; auto: the load stored with the map");
   table.add("color_scale", coloring.scale,
             {{"viridis", ColorScale::viridis}, {"diverging", ColorScale::diverging}},
             "color scale of continuous values; diverging: blue below and red above 0");
@@ -275,7 +276,7 @@ void bind(ParameterTable& table, SceneLayer& layer) {
 }
 
 void bind(ParameterTable& table, SceneViewOptions& options) {
-  table.add("view", options.view, viewpoint_names(), "viewpoint");
+  table.add("view", options.view, viewpoint_names(), "viewpoint of the image");
   table.add("title", options.title, "title above the scene");
   table.add("scale_bar", options.scale_bar, "show the scale bar");
   table.add("background", options.background, "background color, #rrggbb or a name");

@@ -12,7 +12,7 @@ namespace libmap {
 // behind their center.
 struct ConvexPiece {
   Eigen::Vector3d center = Eigen::Vector3d::Zero();
-  std::vector<Eigen::Vector3d> corners_m;  // from `center`; the last one is behind
+  std::vector<Eigen::Vector3d> corners_m;  // from `center`; the last one is behind the surface
 };
 
 struct ConvexPieces {

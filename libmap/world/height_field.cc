@@ -69,7 +69,7 @@ HeightField make_grid(const TriangleMesh& mesh, double cell_size_m) {
   const Eigen::Array2d high = (bounds.max.head<2>() / cell_size_m).array().ceil() + 1;
   const Eigen::Array2d nodes = high - low + 1;
   if (!(nodes.prod() <= max_nodes))
-    throw Error("makes too many nodes",
+    throw Error("too small: the height field would have too many nodes",
                 {.field = "cell_size_m", .value = to_text(cell_size_m), .bound = "<= 2^26 nodes"});
   field.corner_m = low * cell_size_m;
   field.base_m = bounds.min.z();
@@ -245,7 +245,8 @@ std::array<std::size_t, 4> HeightField::cells_of(
 HeightField make_height_field(const TriangleMesh& mesh, const HeightFieldOptions& options) {
   HeightField field = make_grid(mesh, options.cell_size_m);
   for (const Triangle& t : mesh.triangles) lower_nodes(corners_of(mesh, t), field);
-  if (field.min_m() == missing) throw Error("no triangle faces up");
+  if (field.min_m() == missing)
+    throw Error("no triangle of the mesh faces up, so there is no height field");
   extend_border(field);
   leave_out(deviations(mesh, field), options.max_deviation_m, field);
   sink_nodes(field);

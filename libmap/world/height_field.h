@@ -1,4 +1,4 @@
-// A regular grid of heights for simulators that collide meshes only by their convex hulls.
+// Height field of a site for MuJoCo, which collides meshes only by their convex hulls.
 #pragma once
 
 #include <Eigen/Core>
@@ -24,8 +24,8 @@ struct HeightField {
   std::size_t rows = 0;                                // nodes along y
   double base_m = 0.0;                                 // z of height 0
   std::vector<float> heights_m;                        // above base_m, row by row
-  // Cells, (columns - 1) x (rows - 1), that another shape must cover: the surface overhangs, or
-  // the field deviates from it. Nodes of no other cells are below the surface.
+  // Cells, (columns - 1) x (rows - 1), that another shape must cover: the surface overhangs, or the
+  // field deviates from it. Nodes that belong only to such cells are below the surface.
   std::vector<bool> left_out;
   std::size_t left_out_cells = 0;
   // In the other cells no point of the field is farther from the surface, and no point of the

@@ -1,4 +1,4 @@
-// Shapes that a world shows: a mesh by the pages of its texture, and the scores of a map on it.
+// Visible shapes of a simulator world: a mesh by its texture pages, and squares of map scores.
 #pragma once
 
 #include <cstddef>
@@ -10,12 +10,12 @@
 
 namespace libmap {
 
-// The mesh with its vertex colors as a texture: each triangle has 2 x 2 texels, between whose
-// centers bilinear interpolation is that of the colors. Without colors there are no pages.
+// Returns the mesh with its vertex colors as a texture: 2 x 2 texels per triangle, whose bilinear
+// interpolation equals that of the colors. Without colors, there are no pages.
 TexturedMesh bake_vertex_colors(TriangleMesh mesh);
 
-// The triangles of one page (no_page: without texture), with this page alone. No two of them run
-// along an edge in the same sense.
+// Returns the triangles of one page (no_page: without texture), with this page only. No two of them
+// have a common edge in the same direction.
 TexturedMesh page_of(const TexturedMesh& model, std::int32_t page);
 
 struct ColoredMesh {

@@ -24,15 +24,16 @@ void bind(ParameterTable& table, WorldOptions& options) {
   table.add("cell_size_m", options.field.cell_size_m, positive,
             "cell size of MuJoCo's height field, m");
   table.add("field_error_m", options.field.max_deviation_m, positive,
-            "maximum distance between height field and surface, m; convex pieces replace the rest");
+            "maximum distance between MuJoCo's height field and the surface, m; convex pieces "
+            "replace cells with a larger distance");
   table.add("piece_depth_m", options.piece_depth_m, positive,
-            "maximum depth of the convex pieces behind the surface, m");
-  table.add("gravity", options.gravity, "gravity, m/s2, or earth, moon, mars");
+            "maximum depth to which the convex collision pieces extend behind the surface, m");
+  table.add("gravity", options.gravity, "gravity in m/s2, or earth, moon or mars");
   table.add("friction", options.friction, not_negative, "coefficient of friction of the ground");
   table.add("restitution", options.restitution, zero_to_one,
             "coefficient of restitution of the ground");
   table.add("sensor_noise_m", options.sensor_noise_m, not_negative,
-            "standard deviation of the depth of the rig's cameras, m");
+            "standard deviation of the depth that the rig's simulated cameras measure, m");
 }
 
 double gravity_of(const std::string& text) {

@@ -1,4 +1,4 @@
-// A site as a world for simulators: its models by their files, and what stands on it.
+// Description of a site as a world for simulators: models, the robot's cameras, and footholds.
 #pragma once
 
 #include <Eigen/Core>
@@ -35,7 +35,7 @@ double gravity_of(const std::string& text);
 // "::" or a control character, or between two double underscores.
 void require_world_name(const std::string& name, const std::string& field);
 
-// A mesh to look at.
+// Visible mesh, without collisions.
 struct WorldVisual {
   std::string file;     // .obj in the folder of meshes
   std::string texture;  // image beside it; empty: none
@@ -48,7 +48,7 @@ struct WorldModel {
   std::vector<WorldVisual> visuals;
   std::vector<WorldVisual> graspability;
   std::string collision;   // .obj in the folder of meshes
-  std::string field_file;  // of MuJoCo's height field
+  std::string field_file;  // file of MuJoCo's height field
   HeightField field;       // without the cells
   std::vector<ConvexPiece> pieces;
 };
@@ -76,12 +76,12 @@ struct WorldScene {
 inline constexpr const char* world_mesh_folder = "meshes";
 inline constexpr double foothold_radius_m = 0.01;
 
-// A file's path from the descriptions, and gravity as a vector.
+// Return a mesh file's path relative to the descriptions, and gravity as "x y z", m/s2.
 std::string mesh_path(const std::string& file);
 std::string gravity_text(const WorldOptions& options);
 
-// Descriptions that name the meshes relative to their own folder. Gazebo and CoppeliaSim read SDF;
-// MuJoCo MJCF; Bullet, PyBullet and Isaac URDF.
+// Return the descriptions of the world; mesh paths are relative to their folder. Gazebo and
+// CoppeliaSim read SDF; MuJoCo MJCF; Bullet, PyBullet and Isaac URDF.
 std::string to_sdf(const WorldScene& scene);
 std::string to_mjcf(const WorldScene& scene);
 std::string to_urdf(const WorldScene& scene);

@@ -212,7 +212,7 @@ void write_world(const fs::path& folder, const WorldScene& scene) {
   for (const WorldModel& model : scene.models) {
     require_world_name(model.name, "name");
     if (!names.insert(model.name).second)
-      throw Error("is the name of two models", {.field = "name", .value = model.name});
+      throw Error("two models have this name", {.field = "name", .value = model.name});
   }
   if (folder.empty()) return;
   write_text(folder / "world.sdf", to_sdf(scene));

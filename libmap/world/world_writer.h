@@ -1,4 +1,4 @@
-// The files of a world: a folder that simulators load as it is.
+// Writes a site as a folder that simulators load directly ("world").
 //
 //   world.sdf                 Gazebo, CoppeliaSim
 //   world.xml                 MuJoCo
@@ -21,7 +21,7 @@
 
 namespace libmap {
 
-// The contents of the folder.
+// Returns the names of the folder's files.
 std::vector<std::string> world_file_names();
 
 struct WorldReport {

@@ -1,4 +1,4 @@
-// XML by TinyXML-2, and the texts in it. Private to libmap/world.
+// Writes XML by TinyXML-2, and converts values to its texts. Private to libmap/world.
 #pragma once
 
 #include <Eigen/Core>

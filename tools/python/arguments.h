@@ -1,4 +1,4 @@
-// Conversion of a call's arguments from Python; errors name the parameter.
+// Converts the arguments of a call from Python to C++ types; errors name the parameter.
 #pragma once
 
 #include <array>
@@ -11,7 +11,7 @@
 
 namespace graspmap_python {
 
-// An argument of a type of the module, which lives during the call.
+// Argument of a class of the module; the object lives at least as long as the call.
 template <typename Object>
 struct Kept {
   std::shared_ptr<Object> object;
@@ -28,8 +28,9 @@ constexpr const char* bound_of() {
   return "a str";
 }
 
-// from(given, name) converts an argument to a T, or to a Kept<T>. Throws Error with the parameter's
-// name as field, the given value and the bound. Here: a number, a text or a path.
+// Argument<T>::from(given, name) converts an argument to a T, or to a Kept<T>. Throws Error with
+// the parameter's name as field, the given value and the bound. This default converts numbers,
+// texts and paths.
 template <typename T>
 struct Argument {
   static T from(const py::object& given, const std::string& name) {
@@ -54,7 +55,7 @@ struct Argument<py::dict> {
   }
 };
 
-// An object of a class of the module, and nothing else.
+// Accepts only an object of a class of the module.
 template <typename Object>
 struct ObjectArgument {
   static Kept<Object> from(const py::object& given, const std::string& name) {
@@ -67,10 +68,10 @@ struct ObjectArgument {
 constexpr const char* cloud_bound = "a Cloud, or numbers of shape (N, 3)";
 std::shared_ptr<libmap::PointCloud> cloud_from(const py::object& given, const std::string& name,
                                                const std::string& bound = cloud_bound);
-// A tuple or list of two arrays of two dimensions, as vertices and triangles are.
+// Returns true for a tuple or list of two 2-D arrays, such as vertices and triangles.
 bool is_pair_of_tables(const py::object& given);
 
-// A Cloud, or its positions.
+// Accepts a Cloud, or an array of positions (N, 3).
 template <>
 struct Argument<libmap::PointCloud> {
   static Kept<libmap::PointCloud> from(const py::object& given, const std::string& name) {
@@ -78,7 +79,7 @@ struct Argument<libmap::PointCloud> {
   }
 };
 
-// A Mesh, or a pair of its vertices and its triangles.
+// Accepts a Mesh, or a pair of vertices (V, 3) and triangles (T, 3).
 template <>
 struct Argument<libmap::TriangleMesh> {
   static Kept<libmap::TriangleMesh> from(const py::object& given, const std::string& name);
@@ -99,7 +100,7 @@ struct Argument<std::vector<Eigen::Vector3d>> {
   }
 };
 
-// Any iterable but a text.
+// Accepts any iterable except a text.
 template <typename T>
 struct Argument<std::vector<T>> {
   static std::vector<T> from(const py::object& given, const std::string& name) {
@@ -113,7 +114,7 @@ struct Argument<std::vector<T>> {
   }
 };
 
-// None, or a T.
+// Accepts None, or a T.
 template <typename T>
 struct Argument<std::optional<T>> {
   static std::optional<T> from(const py::object& given, const std::string& name) {
@@ -142,7 +143,7 @@ decltype(auto) call(const Function& function, const std::array<py::object, sizeo
 template <typename>
 using Given = const py::object&;
 
-// The function with its arguments as objects of Python.
+// Returns the function with checked arguments, for pybind.
 template <typename Result, typename... Types>
 auto checked(Result (*function)(Types...), std::array<const char*, sizeof...(Types)> names) {
   return [=](Given<Types>... given) -> Result {
@@ -151,7 +152,7 @@ auto checked(Result (*function)(Types...), std::array<const char*, sizeof...(Typ
   };
 }
 
-// A method: its object is not an argument.
+// Returns a method with checked arguments; its object is not one of them.
 template <typename Result, typename Self, typename... Types>
 auto checked(Result (*method)(const Self&, Types...),
              std::array<const char*, sizeof...(Types)> names) {

@@ -18,7 +18,8 @@ struct GraspOptions {
 };
 
 void bind(libmap::ParameterTable& table, GraspOptions& options) {
-  table.add("gripper", options.gripper, "scar-e, hubrobo, limbero, or a gripper file");
+  table.add("gripper", options.gripper,
+            "gripper to test: scar-e, hubrobo, limbero, or a gripper file");
   table.add_overrides("gripper", options.overrides);
   libgtd::bind(table, options.trials);
 }
@@ -34,7 +35,7 @@ libgtd::GroundErrors errors_of(const libmap::TriangleMesh& mesh, const py::objec
     if (error_m >= 0.0 && error_m <= bounds.max_error_m)
       return libgtd::constant_error(mesh, error_m, bounds);
   }
-  throw libmap::Error("no error of a surface",
+  throw libmap::Error("not an error of a surface",
                       {.field = "surface_error",
                        .value = py::repr(given).cast<std::string>(),
                        .bound = "None, \"mesh\", or 0 to max_surface_error_m, m"});

@@ -37,8 +37,7 @@ ScoreOptions score_options(const std::optional<std::string>& scenario,
   if (!up) return options;
   options.detection.up = *up;
   if (options.detection.plane == libgtd::PlaneSource::none)
-    throw libmap::Error("says on which side of the fitted plane up is: with plane none it is z",
-                        {.field = "up"});
+    throw libmap::Error("requires a fitted plane; with plane none, up is z", {.field = "up"});
   return options;
 }
 
@@ -129,9 +128,10 @@ libmap::Table table_from(const py::dict& columns) {
     const auto cells = given.cast<std::vector<std::string>>();
     if (table.columns.size() == 1) table.rows.resize(cells.size());
     if (cells.size() != table.rows.size())
-      throw libmap::Error("wrong length", {.field = column,
-                                           .value = std::to_string(cells.size()),
-                                           .bound = std::to_string(table.rows.size())});
+      throw libmap::Error("number of values differs from number of rows",
+                          {.field = column,
+                           .value = std::to_string(cells.size()),
+                           .bound = std::to_string(table.rows.size())});
     for (std::size_t row = 0; row < cells.size(); ++row) table.rows[row].push_back(cells[row]);
   }
   return table;

@@ -13,7 +13,7 @@ const graspmap_python::Stage& stage_of(const std::string& name) {
   }
   std::string known;
   for (const std::string& other : names) known += (known.empty() ? "" : ", ") + other;
-  throw libmap::Error("takes no options" + libmap::did_you_mean(name, names),
+  throw libmap::Error("no stage with options has this name" + libmap::did_you_mean(name, names),
                       {.field = "stage", .value = name, .bound = "one of " + known});
 }
 

@@ -82,10 +82,10 @@ std::shared_ptr<Poses> poses_of(const ScanSource& scan, const std::string& wante
     libmap::Trajectory poses = libmap::trajectory_of(scan.graph(), source);
     if (!poses.empty()) return shared(Poses{std::move(poses)});
   }
-  throw libmap::Error("the scan has none", {.file = scan.path().string(),
-                                            .field = "source",
-                                            .value = wanted,
-                                            .bound = "auto, " + found});
+  throw libmap::Error("the scan has no poses from this source", {.file = scan.path().string(),
+                                                                 .field = "source",
+                                                                 .value = wanted,
+                                                                 .bound = "auto, " + found});
 }
 
 std::shared_ptr<ScanSource> open_source(const fs::path& path,
@@ -177,7 +177,7 @@ std::shared_ptr<Poses> read_poses(const fs::path& path, const std::shared_ptr<Sc
       return shared(Poses{libmap::import_poses(path, *scan, options).trajectory.poses});
     const libmap::TrajectoryFile file = libmap::read_trajectory(path, options.format);
     if (file.of_cameras)
-      throw libmap::Error("poses of cameras need a scan", {.file = path.string(), .field = "scan"});
+      throw libmap::Error("camera poses require a scan", {.file = path.string(), .field = "scan"});
     return shared(Poses{file.poses});
   });
 }

@@ -121,8 +121,8 @@ std::vector<libmap::Triangle> triangles_from(const py::object& given, const std:
     for (std::uint32_t& corner : triangle) {
       if (*from < 0 || *from > std::numeric_limits<std::uint32_t>::max())
         throw libmap::Error(
-            "no index of a vertex",
-            {.field = name, .value = std::to_string(*from), .bound = "indices of vertices"});
+            "not an index of a vertex",
+            {.field = name, .value = std::to_string(*from), .bound = ">= 0 and < 2^32"});
       corner = static_cast<std::uint32_t>(*from++);
     }
   return triangles;
@@ -153,7 +153,7 @@ std::shared_ptr<PointCloud> selected(const PointCloud& cloud, const py::object& 
   if (array.dtype().kind() == 'b') {
     if (array.size() != size)
       throw libmap::Error(
-          "wrong length",
+          "number of truth values differs from number of points",
           {.field = "index", .value = std::to_string(array.size()), .bound = std::to_string(size)});
     array = numpy.attr("flatnonzero")(array);
   }

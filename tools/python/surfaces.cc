@@ -42,8 +42,8 @@ py::dict mesh(const libmap::PointCloud& cloud, const py::dict& values, const py:
     raw = libmap::reconstruct_surface(cloud, options.reconstruction, bar);
     if (raw.mesh.triangles.empty())
       throw libmap::Error(
-          "no surface was found: the points are too few, their normals cancel, or "
-          "it is too far from them",
+          "no surface was found: there are too few points, their normals cancel, or trimming "
+          "removed all of it",
           {.field = "trim_distance_cells",
            .value = libmap::to_text(options.reconstruction.trim_distance_cells)});
     return libmap::clean_mesh(raw.mesh, options.cleaning, bar);

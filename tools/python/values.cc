@@ -50,7 +50,7 @@ std::string text_of(const std::string& key, py::handle value) {
   if (py::isinstance(value, py::module_::import("numpy").attr("generic")))
     return text_of(key, value.attr("item")());
   throw libmap::Error(
-      "is no value of an option",
+      "not a value of an option",
       {.field = key, .value = short_repr(value), .bound = "a truth value, a number or a text"});
 }
 

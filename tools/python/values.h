@@ -1,4 +1,4 @@
-// Conversions between Python and the libraries: arrays, options, errors, progress.
+// Converts values between Python and the libraries: arrays, options, results, errors, progress.
 #pragma once
 
 #include <pybind11/numpy.h>
@@ -32,8 +32,8 @@ namespace py = pybind11;
 
 using Shape = std::vector<py::ssize_t>;
 
-// A read-only array on memory of `owner`, which lives as long as the array does. Strides in bytes;
-// none: rows one after the other.
+// Returns a read-only array on memory of `owner`, which it keeps alive. Strides: bytes; none:
+// dense.
 template <typename Number>
 py::array view(const Number* data, Shape shape, py::handle owner, Shape strides = {}) {
   py::array array(py::dtype::of<Number>(), std::move(shape), std::move(strides), data, owner);
@@ -41,13 +41,13 @@ py::array view(const Number* data, Shape shape, py::handle owner, Shape strides 
   return array;
 }
 
-// Gets `view_of` a member of an object, which lives as long as the view does.
+// Returns a getter of an array on a member of an object, which lives as long as the array.
 template <typename Object, typename Member, typename ViewOf>
 auto viewing(Member Object::*member, ViewOf view_of) {
   return [=](const py::object& self) { return view_of(self.cast<Object&>().*member, self); };
 }
 
-// An array of one number for each item.
+// Returns an array with one number per item.
 template <typename Number, typename Items, typename NumberOf>
 py::array_t<Number> column(const Items& items, const NumberOf& number_of) {
   py::array_t<Number> array(static_cast<py::ssize_t>(items.size()));
@@ -72,7 +72,7 @@ constexpr Numbers byte_numbers = {"u", 1}, whole_numbers = {"iu"}, real_numbers 
 constexpr Numbers indices_or_truth = {"biu"}, real_or_truth = {"biuf"};
 constexpr py::ssize_t any_length = -1;
 
-// The array itself after a check of its type and shape.
+// Returns the array after a check of its type and shape.
 py::array checked_array(const py::object& given, const std::string& name, const Numbers& numbers,
                         const Shape& shape, const std::string& bound);
 template <typename Number>
@@ -102,11 +102,10 @@ Options options_from(const py::dict& values, Options options = {}) {
   return options;
 }
 
-// By key; none is None.
+// Returns a dict of the results by key; a missing value is None.
 py::dict dict_of(const libmap::ResultTable& table);
 
-// One dict for each parameter: key, type, default, choices, description; for each result: key,
-// type, description.
+// Return a dict per parameter (key, type, default, choices, description) or result.
 py::list list_of(const libmap::ParameterTable& table);
 py::list list_of(const libmap::ResultTable& table, const std::vector<std::string>& objects);
 
@@ -116,7 +115,8 @@ struct Stage {
   std::function<py::list()> results;
 };
 std::vector<Stage>& stages();
-// `objects`: described results that Python has as something else than a number or a text.
+// Registers a stage with its options and results for the documentation and the stubs. `objects` are
+// results that are no number or text in Python.
 template <typename Options, typename... Results>
 void add_stage(const std::string& name, const std::vector<std::string>& objects = {}) {
   const auto options = [] {
@@ -134,7 +134,7 @@ void add_stage(const std::string& name, const std::vector<std::string>& objects 
 }
 
 // Calls callback(stage, done, total) when a stage begins, at most ten times a second, and when it
-// ends; sees to Ctrl-C. What the callback raises ends the work.
+// ends; handles Ctrl-C. An exception of the callback ends the work.
 class CallProgress : public libmap::Progress {
  public:
   explicit CallProgress(py::object callback) : callback_(std::move(callback)) {}
@@ -153,7 +153,7 @@ class CallProgress : public libmap::Progress {
   std::chrono::steady_clock::time_point last_call_{};
 };
 
-// step(progress) without the interpreter's lock, on at most `threads` threads (0: all).
+// Calls step(progress) without the interpreter's lock, on at most `threads` threads (0: all).
 template <typename Step>
 auto run(unsigned threads, const py::object& callback, const Step& step) {
   constexpr unsigned max_threads = 4096;
@@ -175,12 +175,12 @@ auto without_lock(const Step& step) {
   return step();
 }
 
-// write(temporary) writes the file, which appears whole or not at all. Throws Error where a
-// manifest is beside it: that would go on saying how an earlier output was made.
+// Calls write(temporary), then moves the file to `path`. Throws Error if the path has a manifest,
+// which would describe an earlier output.
 template <typename Write>
 void write_whole(const std::filesystem::path& path, const Write& write) {
   if (std::filesystem::exists(libmap::manifest_path(path)))
-    throw libmap::Error("an earlier output has a manifest there: remove both, or write elsewhere",
+    throw libmap::Error("is the manifest of an earlier output; remove both, or write elsewhere",
                         {.file = libmap::manifest_path(path).string()});
   without_lock([&] {
     libmap::OutputFile output(path);
@@ -196,10 +196,10 @@ std::shared_ptr<T> shared(T&& value) {
 
 py::dict numbers_of(const std::vector<std::pair<std::string, double>>& numbers);
 
-// libmap::Error becomes graspmap.Error.
+// Makes libmap::Error a graspmap.Error in Python.
 void translate_errors();
 
-// The module's parts.
+// Add the classes and functions of each part to the module.
 void add_shapes(py::module_& module);    // Cloud, Mesh, their files and manifests
 void add_scans(py::module_& module);     // Scan, Frame, Camera, Poses, refine, fuse
 void add_surfaces(py::module_& module);  // estimate_normals, mesh, resample

@@ -1,4 +1,4 @@
-// Images and charts of an analysis of maps.
+// Images and charts of `graspmap analyze`.
 #pragma once
 
 #include <string>
@@ -15,7 +15,8 @@ namespace graspmap_tools {
 // Score histogram: bars of the evaluated voxels in the legend's colors, and a line for all voxels.
 libmap::Chart histogram_chart(const libgtd::MapAnalysis& analysis, const std::string& title);
 
-// Ground by a property: bars are the graspable share of a bin, a line its share of all ground.
+// Returns a chart of the ground by height or slope: bars are the graspable share of a bin, a line
+// shows the bin's share of all ground.
 libmap::Chart ground_chart(const std::vector<libgtd::GroundBin>& bins,
                            const std::string& axis_title, const std::string& title);
 

@@ -162,7 +162,7 @@ std::unique_ptr<libmap::Progress> make_progress(const std::string& style) {
   if (style == "json") return std::make_unique<JsonLines>();
   if (style == "auto" && isatty(STDERR_FILENO) == 1) return std::make_unique<Bar>();
   if (style == "auto" || style == "none") return std::make_unique<Silent>();
-  throw libmap::Error("unknown style",
+  throw libmap::Error("not a style of progress display",
                       {.field = "--progress", .value = style, .bound = "one of auto, json, none"});
 }
 
@@ -274,14 +274,15 @@ void Command::Parts::add_common_options() {
   if (!table.parameters().empty()) {
     app.add_option("--config", config, "YAML file of parameters; flags take precedence")
         ->type_name("FILE.yaml");
-    app.add_option("--set", overrides, "value of a key of --config (repeatable)")
+    app.add_option("--set", overrides,
+                   "value of one parameter by its key in a --config file (repeatable)")
         ->type_name("KEY=VALUE")
         ->allow_extra_args(false);
     app.add_flag("--print-config", print_config, "print the effective parameters as YAML and exit");
   }
-  app.add_flag("--dry-run", run_options.dry_run, "check everything and write nothing");
+  app.add_flag("--dry-run", run_options.dry_run, "check inputs and parameters, and write nothing");
   app.add_flag("--force", run_options.force, "overwrite outputs that graspmap did not write");
-  app.add_option("--threads", threads, "number of threads, 0 for all")->type_name("N");
+  app.add_option("--threads", threads, "number of threads; 0: all")->type_name("N");
   app.add_option("--progress", progress, "progress display: auto|json|none")->type_name("STYLE");
   app.add_flag("--quiet", run_options.quiet, "print warnings and errors only");
   app.add_flag("--verbose", run_options.verbose, "also print the time of each step");
@@ -328,7 +329,8 @@ void Command::Parts::apply_parameters() {
   for (const std::string& override : overrides) {
     const std::size_t equals = override.find('=');
     if (equals == std::string::npos)
-      throw libmap::Error("no '='", {.field = "--set", .value = override, .bound = "KEY=VALUE"});
+      throw libmap::Error("contains no '='",
+                          {.field = "--set", .value = override, .bound = "KEY=VALUE"});
     table.set(override.substr(0, equals), override.substr(equals + 1));
   }
 }

@@ -62,12 +62,12 @@ class Command {
   // and a KEY of --set KEY=VALUE.
   libmap::ParameterTable& parameters();
 
-  // Sets the parameter that names a file of parameters, which flags and --config override; "auto"
-  // names no file.
+  // Declares a parameter, such as a sensor's name, whose value names a file with further
+  // parameters. Flags and --config override that file; "auto" names no file.
   void preset(const std::string& key,
               std::function<std::filesystem::path(const std::string&)> resolver);
-  // Sets the function from the value of --config to its file, e.g. from a scenario's name. By
-  // default the value is a path.
+  // Sets the function that finds the file of a --config value, e.g. a scenario's name. Default: a
+  // path.
   void config_resolver(std::function<std::filesystem::path(const std::string&)> resolver);
 
   // Parses, applies --config and then the flags, and runs `body`. Errors become one line on stderr.

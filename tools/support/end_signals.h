@@ -1,4 +1,4 @@
-// Handling of signals that end a command.
+// Removes unfinished outputs when a signal (SIGHUP, SIGINT, SIGTERM) ends a command.
 #pragma once
 
 namespace graspmap_tools {

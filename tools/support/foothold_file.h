@@ -1,4 +1,4 @@
-// Footholds as `graspmap footholds` writes them.
+// Reads the footholds that `graspmap footholds` wrote.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,7 +15,8 @@ struct FootholdMark {
   double score = 0.0;
 };
 
-// Throws Error naming `file` for a cloud without the fields of footholds.
+// Returns the footholds in a cloud (frame of the map, m). Throws Error naming `file` if the cloud
+// does not have their fields, and for an approach direction of length zero.
 std::vector<FootholdMark> foothold_marks(const libmap::PointCloud& cloud, const std::string& file);
 
 }  // namespace graspmap_tools

@@ -179,7 +179,7 @@ class MapGrasping {
                   : 0;
     }
     if (on_mesh == 0)
-      throw libmap::Error("none of its voxels is on the mesh",
+      throw libmap::Error("no voxel of the map is on the mesh: check the frames of map and mesh",
                           {.bound = "within " + libmap::to_text(options_.max_distance_m) + " m"});
     if (2 * on_mesh < voxels)
       run_.warn("only {} of {} voxels are within {} m of the mesh: is the map in its frame?",
@@ -399,7 +399,7 @@ const std::vector<std::string>& grasp_fields() {
 void require_map_output(const GraspMapInput& input, Run& run) {
   if (!libgtd::is_tile_store_name(input.output)) {
     if (input.share.count > 1)
-      throw libmap::Error("requires a tile store, MAP.tiles, as output",
+      throw libmap::Error("can only be used if the output is a tile store, MAP.tiles",
                           {.file = input.output, .field = "--tile"});
     libmap::require_cloud_format(input.output);
     run.claim_output(input.output, {input.mesh_file, input.map_file});

@@ -23,7 +23,7 @@ namespace graspmap_tools {
 // in memory.
 class GroundTiles {
  public:
-  // A tile with the mesh around it within reach of a gripper on the tile.
+  // Mesh of one tile and of its surroundings within reach of a gripper.
   struct Piece {
     const libmap::TriangleMesh mesh;
     const libgtd::Ground ground;  // ground of `mesh`
@@ -35,8 +35,8 @@ class GroundTiles {
   GroundTiles(const std::string& mesh, const libgtd::Gripper& gripper, double start_height_m,
               MakeGround make_ground);
 
-  // Returns the index of the tile at the position, by x and y; of several, the one with the nearest
-  // center. Returns the nearest tile if none is there.
+  // Returns the index of the tile that contains the position's x and y (m, mesh frame): of several,
+  // the one with the nearest center; of none, the nearest tile.
   std::size_t tile_at(const Eigen::Vector3d& position) const;
 
   // Returns the tile with this index; the reference is valid until two other tiles are requested.
@@ -68,7 +68,7 @@ struct GraspMapInput {
 // Names of the fields that are added to the map.
 const std::vector<std::string>& grasp_fields();
 
-// Checks and claims the output. Throws Error for another format or if it cannot be written.
+// Checks and reserves the output. Throws Error for another format or if it cannot be written.
 void require_map_output(const GraspMapInput& input, Run& run);
 
 // Writes the map with the added fields. Tiles are processed in a tile store, so that a killed run

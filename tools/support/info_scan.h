@@ -1,4 +1,4 @@
-// Description of scans and camera files for `graspmap info`.
+// Describes scans and camera files as JSON, for `graspmap info`.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -16,8 +16,8 @@ struct ScanInfo {
   nlohmann::ordered_json json;
   std::vector<libmap::ScanFault> faults;  // found with `verify`
 };
-// Describe a camera file and a scan. Throw Error if the file cannot be read. `verify` checks all
-// data of the scan and lists the faults.
+// Return the description of a camera file and of a scan. Throw Error if the file cannot be read.
+// `verify` checks all data of the scan and lists the faults.
 nlohmann::ordered_json camera_info(const std::string& path);
 ScanInfo scan_info(const std::string& path, bool verify, libmap::Progress& progress);
 

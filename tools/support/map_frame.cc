@@ -54,7 +54,7 @@ void require_same_terrain_frame(const libmap::Manifest& points, const std::strin
   const auto of_map = manifest_of(map);
   const libmap::Pose* others = terrain_from_input_of(of_map);
   if (others == nullptr || own->matrix() != others->matrix())
-    throw libmap::Error("its points are in the terrain frame of another map",
+    throw libmap::Error("the points are in the terrain frame of another map",
                         {.file = file,
                          .field = "--points-frame",
                          .value = "auto",

@@ -1,4 +1,4 @@
-// Frames of listed points and maps, and transforms between them from manifests.
+// Frames of listed points and of maps, and transforms between them from manifests.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,9 +9,9 @@
 
 namespace graspmap_tools {
 
-// Frame of listed points. input: the cloud that was scored; terrain: the terrain frame; map: the
-// map before `graspmap crop`, or the map of a simulated robot; automatic: by the manifest of the
-// points' file, else input.
+// Frame of the points in a table of locations. input: the cloud that was scored; terrain: the
+// terrain frame; map: the map before `graspmap crop`, or the map of a simulated robot; automatic:
+// by the manifest of the points' file, else input.
 enum class PointFrame { input, terrain, map, automatic };
 // Names without `automatic`, for points that are not from a file.
 using PointFrameNames = std::vector<std::pair<std::string, PointFrame>>;
@@ -48,15 +48,15 @@ inline constexpr const char* truth_from_poses_name = "ground_truth_from_poses";
 // Returns true if, by its manifest, `file` or its source is in the frame of true poses.
 bool is_from_true_frame(const std::string& file);
 
-// Copies site_from_map, ground_truth_from_poses and georeference from the input's manifest to the
-// run's, for an output in the frame of `input`.
+// Copies site_from_map, ground_truth_from_poses and georeference from the manifest of `input` to
+// the run's, for an output in the same frame.
 void carry_transforms(const std::string& input, Run& run);
-// Also copies the frame's name.
+// As carry_transforms, and copies the frame's name.
 void copy_frame(const std::string& input, Run& run);
 // For a map made from a map: copies frame, transforms, georeference, and the parameters and results
 // that the run's manifest does not have, such as zero plane, lattice and method.
 void carry_facts(const libmap::Manifest& source, Run& run);
-// Copy one of them only; the georeference of a DEM (.tif) is read from the file itself.
+// Copy one of these only; the georeference of a DEM (.tif) is read from the file itself.
 void carry_truth_transform(const std::string& input, Run& run);
 void carry_georeference(const std::string& input, Run& run);
 

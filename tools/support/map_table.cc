@@ -15,13 +15,14 @@ void bind(libmap::ParameterTable& table, MapTableOptions& options) {
             "for several maps: minimum score of a graspable voxel; auto: each map's own "
             "threshold");
   table.add("names", options.names,
-            "for several maps: their names in the tables, separated by |; default: their files");
+            "for several maps: names of the maps, separated by |; default: file names");
   table.add("pairs", options.pairs, "for several maps of one cloud: compare all pairs of maps");
   table.add("varied", options.varied,
-            "for several maps: varied parameter, a column of maps.csv; charts show the graspable "
-            "share and, with --expected, Youden's index against it");
-  table.add("series", options.series,
-            "columns of maps.csv, separated by commas; charts have one curve per combination");
+            "for several maps: column of maps.csv with the varied parameter; charts show the "
+            "graspable share and, with --expected, Youden's index against this parameter");
+  table.add(
+      "series", options.series,
+      "columns of maps.csv, separated by commas; charts have one curve per combination of values");
 }
 
 namespace {
@@ -48,7 +49,7 @@ ReadMap summarize_one(const std::string& file, const MapTableOptions& options,
   read.voxels = libgtd::voxel_map_of(cloud, libgtd::map_info(map.manifest));
   if (map.manifest.find_parameter("zero_plane_m") == nullptr)
     run.warn(file +
-             ": has no manifest with the zero plane; all its points are assumed to be above");
+             ": has no manifest with a zero plane; all its points are assumed to be above it");
   map.summary = libgtd::summarize_map(cloud, read.voxels, own);
   if (expected != nullptr)
     map.expected = libgtd::evaluate_expected_map(

@@ -1,4 +1,4 @@
-// `graspmap analyze MAP MAP...`: several maps in one table, one row per map.
+// Compares several maps in one table, one row per map, for `graspmap analyze MAP MAP...`.
 #pragma once
 
 #include "libmap/core/parameters.h"
@@ -9,7 +9,7 @@ namespace graspmap_tools {
 struct MapTableOptions {
   std::string expected;  // CSV of regions of expected graspability; empty: none
   PointFrame points_frame = PointFrame::input;  // frame of these regions
-  std::string cutoff = "auto";                  // score, or auto: each map's own threshold
+  std::string cutoff = "auto";                  // minimum score, or each map's own threshold
   std::string names;                            // separated by '|'
   bool pairs = false;
   std::string varied;  // column of maps.csv, the horizontal axis of charts; empty: no such charts

@@ -1,4 +1,4 @@
-// Reads, fills and merges tile stores and shares of maps.
+// Reads and merges the parts of a map: tile stores, and the shares that several runs wrote.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -24,11 +24,11 @@ std::filesystem::path store_index_path(const std::string& store);
 // no tiles. Returns nullopt if the manifest has no lattice.
 std::optional<libgtd::TileStoreIndex> index_of(const libmap::Manifest& manifest);
 
-// Writes the file of a tile of the store, and adds its hash and size to `tile`.
+// Writes the file of one tile of the store, and adds its hash and size to `tile`.
 void write_tile(const std::filesystem::path& store, const libmap::PointCloud& points,
                 libgtd::StoredTile& tile);
 
-// Throws Error if a store has an index but no plan for resuming.
+// Throws Error if a store has an index but no plan, so that its run cannot be resumed.
 void require_no_index(const libgtd::MapTileStore& store);
 
 class MapTiles {
@@ -40,9 +40,8 @@ class MapTiles {
 
   const libgtd::TileStoreIndex& index() const { return index_; }
 
-  // Returns a tile's points at the positions that the file of the merged map has. Throws Error
-  // naming the tile's file if it is missing, damaged or differs from the index. Can be called from
-  // several threads.
+  // Returns a tile's points, at the positions of the merged map. Throws Error naming the tile's
+  // file if it is missing, damaged or differs from the index. Can be called from several threads.
   libmap::PointCloud load(std::size_t tile) const;
   // Like load, and compares the file's hash with the index.
   libmap::PointCloud load_checked(std::size_t tile) const;

@@ -1,4 +1,4 @@
-// Parses the texts of options.
+// Parses the values of command-line options: lists, vectors, sizes, numbers.
 #pragma once
 
 #include <Eigen/Core>

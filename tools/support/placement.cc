@@ -19,7 +19,7 @@ libmap::Pose read_matrix(const fs::path& path) {
   const std::string text = libmap::read_whole_file(path, std::uint64_t{1} << 16U);
   const auto refuse = [&](const std::string& field, const std::string& value) {
     throw libmap::Error(
-        "is not a transform",
+        "not a transform",
         {.file = file, .field = field, .value = value, .bound = "four rows of four numbers"});
   };
   Eigen::Matrix4d matrix;

@@ -1,4 +1,4 @@
-// Parses poses and boxes of the command line.
+// Parses transforms and boxes that are given on the command line.
 #pragma once
 
 #include <optional>

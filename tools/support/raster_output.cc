@@ -31,7 +31,7 @@ libmap::MapRaster raster_of(const libmap::CloudParts& parts, const libmap::Manif
     grid.corner_m = (frame_from_lattice * index->lattice.origin_m).head<2>();
   }
   if (grid.pixel_size_m == 0.0)
-    throw libmap::Error("is missing, and the manifest of the input has no voxel size",
+    throw libmap::Error("is required, because the manifest of the input has no voxel size",
                         {.field = "--pixel-size"});
   libmap::MapRaster raster = libmap::make_map_raster(parts, grid);
   if (manifest.georeference) raster.georeference = *manifest.georeference;

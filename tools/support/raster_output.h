@@ -8,7 +8,7 @@
 
 namespace graspmap_tools {
 
-// Makes the raster of a map or cloud, whose points `parts` visits.
+// Returns the raster of a map or cloud, whose points `parts` visits.
 //
 // The raster is in the CRS of the manifest's georeference, else in the frame of the points. Pixels
 // are columns of voxels: their axes are the lattice's x and y axes, projected to the horizontal
@@ -17,8 +17,8 @@ namespace graspmap_tools {
 libmap::MapRaster raster_of(const libmap::CloudParts& parts, const libmap::Manifest& manifest,
                             double pixel_size_m);
 
-// Writes the raster to `output`, which must be claimed. The run's manifest must have facts and
-// inputs; for a raster in a CRS, its transforms are removed.
+// Writes the raster to `output`, which must be claimed. The run's manifest must already have frame,
+// transforms and inputs; if the raster is in a CRS, the transforms are removed.
 void write_raster(const std::string& output, const libmap::MapRaster& raster, Run& run);
 
 }  // namespace graspmap_tools

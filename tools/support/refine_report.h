@@ -1,4 +1,4 @@
-// Reports of `graspmap refine` by stage, as JSON and as text.
+// Report of `graspmap refine` (--report) on each stage of the refinement, as JSON and as text.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// Converts results to JSON, and to and from the stored results of finished tiles.
+// Converts the results of stages to JSON for output, and stores those of finished tiles as JSON.
 #pragma once
 
 #include <nlohmann/json.hpp>

@@ -1,5 +1,5 @@
-// One run of a command: its messages, timings and outputs. Also includes the headers of the
-// standard library, fmt and libmap/core that nearly all commands need.
+// One run of a command: its messages, timings and outputs with manifests. Also includes the headers
+// of the standard library, fmt and libmap/core that nearly all commands need.
 #pragma once
 
 #include <fmt/format.h>
@@ -27,9 +27,8 @@ namespace graspmap_tools {
 
 using libmap::in_file;
 
-// Converts a text, possibly from a file, to one line of printable UTF-8 for a terminal. Control
-// characters and invalid bytes become \xNN, line breaks become spaces; a long text is shortened in
-// the middle.
+// Converts any text to one line of printable UTF-8 for a terminal: control characters and invalid
+// bytes become \xNN, line breaks become spaces, a long text is shortened in the middle.
 std::string sanitize_text(const std::string& text);
 
 // Removes a trailing slash: "maps/" and "maps" are the same folder with the same manifest.
@@ -86,7 +85,7 @@ class Run {
 
   // Reserves the output for this process until the end of the run; called before the work. Throws
   // Error if `path` is one of the inputs, exists and was not written by this toolkit (unless
-  // --force), cannot be written, or is claimed by another process.
+  // --force), cannot be written, or is reserved by another process.
   void claim_output(const std::filesystem::path& path, const std::vector<std::string>& inputs = {});
 
   // Calls writer(temporary), which writes the file, then moves it to `path` together with its

@@ -46,11 +46,11 @@ libmap::Trajectory poses_in_file(const PosesOption& poses, const libmap::ScanSou
                                  Run& run) {
   const std::string& file = poses.source;
   if (!fs::exists(file) && !libmap::is_trajectory_path(file))
-    throw libmap::Error(
-        "no such poses" + libmap::did_you_mean(file, {"odometry", "optimized", "ground-truth"}),
-        {.field = "--poses",
-         .value = file,
-         .bound = "auto, odometry, optimized, ground-truth or a file"});
+    throw libmap::Error("neither a file nor a source of poses" +
+                            libmap::did_you_mean(file, {"odometry", "optimized", "ground-truth"}),
+                        {.field = "--poses",
+                         .value = file,
+                         .bound = "auto, odometry, optimized, ground-truth or a file"});
   libmap::ImportedPoses imported = libmap::import_poses(file, scan, poses.file);
   run.add_input(libmap::file_of_trajectory(file));
   for (const std::string& warning : imported.warnings) run.warn("{}: {}", file, warning);
@@ -69,7 +69,7 @@ libmap::Trajectory poses_in_file(const PosesOption& poses, const libmap::ScanSou
 std::string best_poses(const libmap::PoseGraph& graph, const std::string& scan) {
   for (const PoseSource source : sources)
     if (!libmap::trajectory_of(graph, source).empty()) return to_text(source);
-  throw libmap::Error("the scan has no poses: give a file of poses with --poses", {.file = scan});
+  throw libmap::Error("the scan contains no poses; give a pose file with --poses", {.file = scan});
 }
 
 libmap::Trajectory wanted_poses(const libmap::ScanSource& scan, const PosesOption& wanted,
@@ -78,7 +78,7 @@ libmap::Trajectory wanted_poses(const libmap::ScanSource& scan, const PosesOptio
   if (!source) return poses_in_file(wanted, scan, run);
   libmap::Trajectory poses = libmap::trajectory_of(scan.graph(), *source);
   if (poses.empty())
-    throw libmap::Error("the scan does not have them",
+    throw libmap::Error("the scan does not contain these poses",
                         {.file = scan.path().string(),
                          .field = "--poses",
                          .value = wanted.source,
@@ -113,9 +113,9 @@ void report_sessions(const std::string& scan, const libmap::PoseGraph& graph,
 
 void add_poses_option(Command& command, PosesOption& poses) {
   command.option("--poses", "auto|odometry|optimized|ground-truth|FILE", poses.source,
-                 "poses of the frames: from the scan, or a file (TUM, KITTI, g2o, TORO; a folder: "
-                 "COLMAP); auto: the first of optimized, odometry and ground-truth that the scan "
-                 "has; stored: the same as optimized");
+                 "poses of the frames: from the scan, or from a file (TUM, KITTI, g2o, TORO; a "
+                 "folder: COLMAP); auto: the first of optimized, odometry and ground-truth that "
+                 "the scan contains; stored: same as optimized");
   libmap::bind(command.parameters(), poses.file);
 }
 
@@ -133,9 +133,10 @@ std::vector<std::string> scan_inputs(const std::string& scan, const PosesOption&
 }
 
 void add_calibration_option(Command& command, CalibrationOption& calibration) {
-  command.option("--calibration", "auto|stored|FILE.yaml", calibration.source,
-                 "camera of the scan: stored in it, or in a file of refine --write-calibration; "
-                 "auto: the camera that the poses were estimated with, else the stored one");
+  command.option(
+      "--calibration", "auto|stored|FILE.yaml", calibration.source,
+      "camera calibration: that stored in the scan, or a file of refine --write-calibration; auto: "
+      "the one with which the poses were estimated, else the stored one");
 }
 
 std::optional<libmap::CameraFile> known_camera(const CalibrationOption& calibration,

@@ -1,4 +1,4 @@
-// Options and functions for a scan, its poses and its camera: SCAN, --poses and --calibration.
+// Opens a scan and selects its poses and its camera by the options --poses and --calibration.
 #pragma once
 
 #include <optional>
@@ -19,7 +19,7 @@ struct PosesOption {
 };
 void add_poses_option(Command& command, PosesOption& poses);
 
-// Counts the nodes that the recording does not declare invalid.
+// Returns the number of nodes that the recording does not declare invalid.
 std::size_t count_valid_nodes(const libmap::PoseGraph& graph);
 
 // Returns the paths of the scan and, if it is a file, of the poses, for Run::claim_output.
@@ -32,8 +32,8 @@ struct CalibrationOption {
 };
 void add_calibration_option(Command& command, CalibrationOption& calibration);
 
-// Returns the camera of the option, and reports its findings; nullopt for the stored camera. Throws
-// Error if the file cannot be read.
+// Returns the camera that the option selects, and reports its calibration findings; nullopt for the
+// stored camera. Throws Error if the file cannot be read.
 std::optional<libmap::CameraFile> known_camera(const CalibrationOption& calibration,
                                                const std::string& scan, const PosesOption& poses,
                                                Run& run);
@@ -49,9 +49,10 @@ std::unique_ptr<libmap::ScanSource> open_scan(const std::vector<std::string>& sc
                                               Run& run,
                                               const std::optional<libmap::CameraFile>& camera = {});
 
-// Returns the poses of the option, by ascending node. "auto" is replaced by the selected source,
-// which is reported and added to the manifest. Nodes without a pose are reported as a warning.
-// Throws Error if there are no such poses or, if `strict`, for nodes without a pose.
+// Returns the poses (world_from_base, m) that the option selects, by ascending node. "auto" is
+// replaced by the selected source, which is reported and added to the manifest. Warns of nodes
+// without a pose. Throws Error if there are no such poses or, if `strict`, for nodes without a
+// pose.
 libmap::Trajectory find_poses(const libmap::ScanSource& scan, PosesOption& poses, bool strict,
                               Run& run);
 

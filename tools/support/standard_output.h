@@ -1,4 +1,4 @@
-// Checks that standard output was written.
+// Detects standard output that could not be written, e.g. because of a full disk.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// Subcommands in their own files; argv begins at the command.
+// Entry points of subcommands with their own source files. argv begins at the command.
 #pragma once
 
 #include <string>
@@ -11,7 +11,7 @@ int convert_world(int argc, char** argv);  // convert SITE -o OUT.world
 int convert_scan(int argc, char** argv);   // convert SCAN
 int fuse_rig(int argc, char** argv);       // fuse RIG_FOLDER
 
-// simulate WHAT; argv begins at WHAT.
+// simulate SUBCOMMAND; argv begins at SUBCOMMAND.
 int simulate_cameras(int argc, char** argv);
 int simulate_scan(int argc, char** argv);
 int simulate_scene(int argc, char** argv);

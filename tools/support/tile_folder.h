@@ -21,7 +21,7 @@
 
 namespace graspmap_tools {
 
-// Part of the description of an output.
+// Last part of an output's option text.
 inline constexpr const char* or_tile_folder = ", or a folder of tiles (no extension)";
 
 // Returns true if the output is a folder of tiles: its name has no extension.
@@ -38,7 +38,7 @@ inline std::vector<std::string> tile_folder_names(
   return names;
 }
 
-// --tile K/N: share of the tiles that a run makes.
+// --tile K/N: share of the tiles that this run computes.
 inline constexpr const char* whole_share = "1/1";
 void add_share_option(Command& command, std::string& share);
 // Throws Error if a share is requested and the output is one file.
@@ -55,8 +55,7 @@ class TileFolder {
   TileFolder(const std::string& output, const std::vector<std::string>& names,
              const std::vector<std::string>& inputs, const libmap::TileShare& share, Run& run);
 
-  // Returns true, and reports it, if shares with the same parameters and inputs have completed the
-  // folder.
+  // Returns true, and reports it, if runs with equal parameters and inputs completed the folder.
   bool is_complete() const;
 
   // Begins the run and returns the data common to all tiles; null with --dry-run. The first share
@@ -68,7 +67,7 @@ class TileFolder {
   struct Work {
     std::vector<std::string> tiles;  // names of the tiles of all shares, without extension
     std::string extension;           // of their files
-    // Writes the n-th tile to `to`, unless it is empty, and returns its data, a JSON object.
+    // Computes the n-th tile, writes it to `to` unless empty, and returns its data, a JSON object.
     std::function<TileData(std::size_t n, const std::filesystem::path& to)> make;
     // Fills the output with the finished tiles.
     std::function<void(const std::filesystem::path& folder)> finish;

@@ -286,7 +286,7 @@ TEST(RegressionPlaneErrors, AllInOnePlace) {
   for (const Vector3d& place : {Vector3d(0, 0, 0), Vector3d(0.1, 0.7, 1e6)}) {
     PointCloud cloud;
     cloud.positions.assign(1000, place);
-    EXPECT_TRUE(is_error(error_of([&] { fit_regression_plane(cloud); }), {.about = "one place"}));
+    EXPECT_TRUE(is_error(error_of([&] { fit_regression_plane(cloud); }), {.about = "coincide"}));
   }
 }
 

@@ -110,7 +110,7 @@ TEST(MatrixCodec, StreamsOfAnotherLengthThanTheirSize) {
   for (const int rows : {0, 1, 299}) {
     EXPECT_TRUE(
         is_error(error_of([&, rows] { libmap::decode_matrix(with_trailer(matrix, rows, 300, 0)); }),
-                 {.about = "longer"}));
+                 {.about = "exceeds"}));
   }
   EXPECT_TRUE(is_error(error_of([&] { libmap::decode_matrix(with_trailer(matrix, 301, 300, 0)); }),
                        {.about = "90000"}));

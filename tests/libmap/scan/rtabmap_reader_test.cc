@@ -197,7 +197,8 @@ TEST(RtabmapReader, OptimizedPosesThatDoNotFitTheirIdsAreLeftOut) {
     return scan.warnings();
   };
   EXPECT_EQ(warnings_with(libmap::MatrixElement::float32, 3),
-            std::vector<std::string>{"Admin.opt_poses: the matrices are not of int32 and float32"});
+            std::vector<std::string>{
+                "Admin.opt_poses: ids and poses are not matrices of int32 and float32"});
   EXPECT_EQ(
       warnings_with(libmap::MatrixElement::int32, 2),
       std::vector<std::string>{"Admin.opt_poses: '2 and 3': the numbers of ids and poses differ"});
@@ -347,7 +348,8 @@ TEST(RtabmapReader, OptimizedPosesAreCountedBeforeTheyAreInflated) {
        {std::tuple{claims(1000, 4), claims(11999, 5),
                    "'1000 and 999': the numbers of ids and poses differ"},
         {claims(1000, 4), claims(12001, 5), "'1000 and 1000': the numbers of ids and poses differ"},
-        {claims(1000, 5), claims(12000, 5), "the matrices are not of int32 and float32"}}) {
+        {claims(1000, 5), claims(12000, 5),
+         "ids and poses are not matrices of int32 and float32"}}) {
     execute(file, "UPDATE Admin SET opt_ids = ?, opt_poses = ?", {ids, poses});
     const RtabmapDatabase scan(file);
     EXPECT_EQ(scan.warnings(),

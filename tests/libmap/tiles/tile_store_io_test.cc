@@ -40,7 +40,7 @@ TEST(TileStore, SharesKeepTheirJournals) {
                            store.begin({1, 2}, nothing);
                          }),
                          {.file = graspmap_test::scratch_folder() / "a",
-                          .about = "works",
+                          .about = "computing",
                           .kind = libmap::ErrorKind::failed}));
     EXPECT_TRUE(is_error(error_of([&] { store.require_idle(); }),
                          {.file = graspmap_test::scratch_folder() / "a",
