@@ -35,7 +35,7 @@ namespace libmap {
 struct DepthFusionOptions {
   double voxel_size_m = 0.01;  // > 0
   // Name in data/sensors or a path: its useful range and noise where other options have their
-  // defaults; "auto": the defaults, a Kinect v2's.
+  // defaults. "auto": the noise of `planes`, which choose_noise (libmap/refine) estimates.
   std::string sensor = "auto";
   DepthPlaneOptions planes{};
   double disc_radius_voxels = 1.5;  // > 0: radius of the discs in which measurements are averaged
@@ -105,6 +105,7 @@ struct FusionSurvey {
   // with the final poses.
   double disagreement_before_m = 0.0;
   double disagreement_after_m = 0.0;
+  DepthNoise noise{};  // noise of all passes
 };
 
 struct DepthFusionResult : FusionCounts {
@@ -125,6 +126,7 @@ struct DepthFusionResult : FusionCounts {
   double registration_turn_deg = 0.0;
   double disagreement_before_m = 0.0;
   double disagreement_after_m = 0.0;
+  DepthNoise noise{};
   std::vector<std::pair<int, Error>> skipped;
   StageTimings timings_s;
 };

@@ -31,7 +31,7 @@ void bind(ParameterTable& table, DepthFusionOptions& options) {
   table.add("voxel_size_m", options.voxel_size_m, positive, "size of a voxel; one point per voxel");
   table.add("sensor", options.sensor,
             "depth camera, a name in data/sensors or a file: useful range and noise that no other "
-            "option sets; auto: a Kinect v2");
+            "option sets; auto: the noise is estimated if it differs from a Kinect v2's");
   table.add("min_depth_m", planes.min_depth_m, positive, "minimum depth of measurements");
   table.add("max_depth_m", planes.max_depth_m, positive, "maximum depth of measurements");
   table.add("max_incidence_deg", planes.max_incidence_deg, {0, 89.5, true, false},
@@ -82,6 +82,11 @@ void describe(ResultTable& table, const DepthFusionResult& result) {
             "frames left out because earlier frames have measured their surface");
   table.add("skipped_frames", result.skipped.size(), "frames that could not be used");
   describe(table, result.pixels);
+  table.add("axial_noise_m", result.noise.axial_m, "assumed noise of depth: constant term");
+  table.add("range_noise", result.noise.axial_of_range,
+            "assumed noise of depth: term proportional to range, m/m");
+  table.add("square_noise", result.noise.axial_of_square,
+            "assumed noise of depth: term proportional to squared range, 1/m");
   table.add("registration_rounds", result.registration_rounds,
             "rounds of registration that moved frames");
   table.add("registration_rejected", result.registration_rejected,
