@@ -1,10 +1,11 @@
 // graspmap fuse: fuses the depth images of a scan into one oriented, colored cloud.
 #include "libmap/camera/sensor_model.h"
+#include "libmap/consistency/edge_agreement.h"
+#include "libmap/consistency/pose_consistency.h"
 #include "libmap/fusion/depth_fusion.h"
-#include "libmap/fusion/edge_agreement.h"
-#include "libmap/fusion/pose_consistency.h"
 #include "libmap/io/cloud_io.h"
 #include "libmap/poses/trajectory_io.h"
+#include "libmap/refine/noise_estimate.h"
 #include "libmap/scan/rig_io.h"
 #include "libmap/scan/scan_source.h"
 #include "libmap/tiles/eigen_json.h"
@@ -21,7 +22,8 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FusionFrame, node, grid_from_base, image_pixe
                                    max_ray_length, max_pixel_pitch)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(PairCosts, count, before, after, deviation)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(RegistrationCheck, depth, color)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FusionSurvey, grid_origin, frames, skipped, redundant,
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(DepthNoise, axial_m, axial_of_range, axial_of_square, lateral_px)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FusionSurvey, noise, grid_origin, frames, skipped, redundant,
                                    registration_rounds, registration_rejected, registration_check,
                                    disagreement_before_m, disagreement_after_m)
 
@@ -143,13 +145,29 @@ void write_poses(const FuseOptions& options, const libmap::DepthFusionResult& re
   run.manifest().results = results;
 }
 
+// States an estimate that replaces the assumed noise.
+libmap::DepthNoise choose_noise(const libmap::DepthFusionOptions& options,
+                                const libmap::ScanSource& scan, const libmap::Trajectory& poses,
+                                Run& run) {
+  const libmap::ScanNoise chosen = run.timed("noise", [&] {
+    return libmap::choose_noise(scan, poses, options.sensor, options.planes, run.progress());
+  });
+  if (chosen.is_estimated)
+    run.info("{}", chosen.sentence);
+  else
+    run.detail("{}", chosen.sentence);
+  return chosen.noise;
+}
+
 // Makes and writes the tiles one by one; a cloud in one file is one tile.
 void make_tiles(const FuseOptions& options, const libmap::ScanSource& scan,
                 const libmap::Trajectory& poses, TileFolder* folder, Run& run) {
   std::optional<libmap::TileFusion> fusion;
   const double tile_m = folder == nullptr ? libmap::whole_plan : options.tile_m;
   const auto survey = [&] {
-    fusion.emplace(scan, poses, options.fusion, tile_m, run.progress());
+    libmap::DepthFusionOptions with_noise = options.fusion;
+    with_noise.planes.noise = choose_noise(options.fusion, scan, poses, run);
+    fusion.emplace(scan, poses, with_noise, tile_m, run.progress());
     return TileFolder::TileData(fusion->survey());
   };
   const TileFolder::TileData found =

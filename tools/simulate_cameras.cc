@@ -1,5 +1,6 @@
 // graspmap simulate cameras: depth images of a robot's cameras at one pose.
 #include "libmap/camera/image_codec.h"
+#include "libmap/camera/sensor_model.h"
 #include "libmap/core/data_folder.h"
 #include "libmap/io/mesh_io.h"
 #include "libmap/scan/rig_io.h"
@@ -113,6 +114,7 @@ void add_results(const libmap::CameraRig& rig, const std::vector<libmap::RobotCa
 
 void simulate(const SimulateCamerasOptions& options, Run& run) {
   run.claim_output_folder(options.output);
+  if (options.cameras.sensor != "auto") run.add_input(libmap::sensor_file(options.cameras.sensor));
   const libmap::CameraRig rig = load_rig(options, run);
   const libmap::TriangleMesh mesh =
       run.timed("read", [&] { return libmap::read_mesh(options.mesh).mesh; });

@@ -164,6 +164,7 @@ PairVerification verify_pairs(const std::vector<FrameFeatures>& frames,
       if (matches == nullptr) {
         fresh[n] = match_features(descriptor_vectors(frames[a]), descriptor_vectors(frames[b]),
                                   options.max_ratio);
+        fresh[n].shrink_to_fit();
         matches = &fresh[n];
       }
       verified[n] = verify_pair(frames[a], frames[b], pairs[n], *matches, options, own);

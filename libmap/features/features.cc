@@ -162,7 +162,7 @@ struct FoundFeatures {
 
 FoundFeatures features_of(const ScanSource& scan, int node, const FeatureOptions& options,
                           PixelRayCache& rays, const FeatureCache& cache, MemoryBudget& memory) {
-  const RgbdFrame read = scan.read_frame(node);
+  const RgbdFrame read = scan.read_frame(node, {.color = !options.surfaces_only, .depth = true});
   if (read.depth.empty()) throw Error("has no depth");
   FoundFeatures result;
   FrameFeatures& frame = result.frame;

@@ -36,6 +36,7 @@ struct FeatureOptions {
   double surface_noise_m = 5e-4;  // >= 0: part of a plane's deviation that averaging leaves
   int surface_step_px = 3;        // 1 to 32: minimum step of the grid of planes
   DepthPlaneOptions planes{};     // planes of the depth images
+  bool surfaces_only = false;     // not bound: color is not read, and frames have no features
   // Not bound, for long scans: memory of the surfaces of all frames.
   std::size_t max_surface_bytes = std::size_t{256} << 20U;
   std::size_t max_frames_in_memory = 300;  // not bound; with more, descriptors are stored on disk

@@ -13,8 +13,7 @@ namespace libmap {
 namespace {
 
 constexpr double scale = 9.0;
-constexpr double behind = 1e6;  // chi-square of a match behind the camera
-constexpr int samples_of_frame = 60;
+constexpr double behind = 1e6;      // chi-square of a match behind the camera
 constexpr double min_cosine = 0.8;  // between the normals
 constexpr double rounding = 1e-6;
 constexpr double clear_rise = 0.005;
@@ -100,7 +99,8 @@ std::vector<double> match_costs(const std::vector<FrameFeatures>& frames,
 
 std::vector<SurfaceResidual> surface_residuals(const std::vector<FrameFeatures>& frames,
                                                const std::vector<FeatureLink>& links,
-                                               const std::map<int, Pose>& map_from_base) {
+                                               const std::map<int, Pose>& map_from_base,
+                                               int samples_of_frame) {
   std::vector<std::vector<PlacedElement>> samples(frames.size());
   parallel_for(frames.size(), 8, [&](std::size_t begin, std::size_t end) {
     for (std::size_t f = begin; f < end; ++f)

@@ -40,10 +40,12 @@ struct SurfaceResidual {
   double noise_m = 0.0;     // standard deviation of the distance
   double range_m = 0.0;     // larger range of the two measurements
 };
+inline constexpr int held_out_samples = 60;  // about, per frame
 // Returns the residuals from which surface_costs computes costs, in the same order.
 std::vector<SurfaceResidual> surface_residuals(const std::vector<FrameFeatures>& frames,
                                                const std::vector<FeatureLink>& links,
-                                               const std::map<int, Pose>& map_from_base);
+                                               const std::map<int, Pose>& map_from_base,
+                                               int samples = held_out_samples);
 
 struct HeldOutCosts {
   std::vector<double> matches;

@@ -8,6 +8,7 @@
 
 #include "libmap/core/random_stream.h"
 #include "libmap/features/bundle_residuals.h"
+#include "libmap/features/match_loops.h"
 #include "libmap/geometry/least_squares.h"
 #include "libmap/geometry/rigid_motion.h"
 #include "libmap/geometry/robust.h"
@@ -18,31 +19,38 @@ namespace {
 
 constexpr int max_steps = 20;
 
-// Index of the best row for each column, or -1 if none passes the ratio test.
-std::vector<int> best_matches(const Eigen::MatrixXf& similarities, double max_ratio) {
-  std::vector<int> best(static_cast<std::size_t>(similarities.cols()), -1);
-  const auto limit = static_cast<float>(max_ratio * max_ratio);
-  for (Eigen::Index column = 0; column < similarities.cols(); ++column) {
-    float first = -2.0F;
-    float second = -2.0F;
-    int nearest = -1;
-    for (Eigen::Index row = 0; row < similarities.rows(); ++row) {
-      const float value = similarities(row, column);
-      if (value > first) {
-        second = first;
-        first = value;
-        nearest = static_cast<int>(row);
-      } else if (value > second) {
-        second = value;
-      }
-    }
-    // |x - y|^2 = 2 - 2 x.y for unit vectors; max() covers rounding.
-    const float best_square = std::max(0.0F, 1.0F - first);
-    const float next_square = std::max(0.0F, 1.0F - second);
-    if (nearest >= 0 && (max_ratio >= 1.0 || best_square < limit * next_square))
-      best[static_cast<std::size_t>(column)] = nearest;
-  }
-  return best;
+Eigen::Index padded(Eigen::Index count, int step) { return (count + step - 1) / step * step; }
+
+// Nearest descriptors of both sets, MatchLoops::Output.
+struct NearestDescriptors {
+  std::vector<float> first_of_a;
+  std::vector<float> second_of_a;
+  std::vector<int> of_a;
+  std::vector<int> of_b;
+};
+
+NearestDescriptors nearest_descriptors(const Eigen::MatrixXf& a, const Eigen::MatrixXf& b) {
+  const Eigen::Index a_count = padded(a.cols(), MatchLoops::group);
+  const Eigen::Index b_count = padded(b.cols(), MatchLoops::lanes);
+  // The last descriptor is repeated, which does not change the first index of equal products.
+  Eigen::MatrixXf of_a(a.rows(), a_count);
+  of_a << a, a.rightCols<1>().replicate(1, a_count - a.cols());
+  Eigen::MatrixXf of_b = Eigen::MatrixXf::Zero(b_count, b.rows());
+  of_b.topRows(b.cols()) = b.transpose();
+  std::vector<float> bias(static_cast<std::size_t>(b_count), 0.0F);
+  std::fill(bias.begin() + b.cols(), bias.end(), -4.0F);
+  std::vector<float> first_of_b(bias.size(), -2.0F);
+  NearestDescriptors nearest;
+  nearest.first_of_a.resize(static_cast<std::size_t>(a_count));
+  nearest.second_of_a.resize(static_cast<std::size_t>(a_count));
+  nearest.of_a.resize(static_cast<std::size_t>(a_count));
+  nearest.of_b.resize(bias.size(), -1);
+  static const MatchLoops& loops = match_loops_of(best_instruction_set());
+  loops.find_nearest({of_a.data(), of_b.data(), bias.data(), static_cast<int>(a.rows()),
+                      static_cast<int>(a_count), static_cast<int>(b_count)},
+                     {nearest.first_of_a.data(), nearest.second_of_a.data(), nearest.of_a.data(),
+                      first_of_b.data(), nearest.of_b.data()});
+  return nearest;
 }
 
 struct PointPair {
@@ -218,12 +226,17 @@ std::vector<FeatureMatch> match_features(const Eigen::MatrixXf& a, const Eigen::
                                          double max_ratio) {
   std::vector<FeatureMatch> matches;
   if (a.cols() == 0 || b.cols() == 0 || a.rows() != b.rows()) return matches;
-  const Eigen::MatrixXf similarities = b.transpose() * a;  // b x a
-  const std::vector<int> of_a = best_matches(similarities, max_ratio);
-  const std::vector<int> of_b = best_matches(similarities.transpose(), 1.0);
-  for (std::size_t n = 0; n < of_a.size(); ++n)
-    if (of_a[n] >= 0 && of_b[static_cast<std::size_t>(of_a[n])] == static_cast<int>(n))
-      matches.push_back({static_cast<int>(n), of_a[n]});
+  const NearestDescriptors nearest = nearest_descriptors(a, b);
+  const auto limit = static_cast<float>(max_ratio * max_ratio);
+  for (std::size_t n = 0; n < static_cast<std::size_t>(a.cols()); ++n) {
+    const int of_a = nearest.of_a[n];
+    // |x - y|^2 = 2 - 2 x.y for unit vectors; max() covers rounding.
+    const float best_square = std::max(0.0F, 1.0F - nearest.first_of_a[n]);
+    const float next_square = std::max(0.0F, 1.0F - nearest.second_of_a[n]);
+    if (of_a >= 0 && nearest.of_b[static_cast<std::size_t>(of_a)] == static_cast<int>(n) &&
+        (max_ratio >= 1.0 || best_square < limit * next_square))
+      matches.push_back({static_cast<int>(n), of_a});
+  }
   return matches;
 }
 

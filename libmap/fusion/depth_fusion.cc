@@ -81,7 +81,9 @@ class Fusion {
     check(options);
     if (known != nullptr) {
       survey_ = *known;
+      options_.planes.noise = survey_.noise;
     } else {
+      survey_.noise = options_.planes.noise;
       const std::vector<FusionFrame> given = place_frames();
       timed("survey", [&] { survey(given); });
       timed("registration", [&] { register_frames(); });
@@ -385,6 +387,7 @@ DepthFusionResult Fusion::report() const {
   result.registration_check = survey_.registration_check;
   result.disagreement_before_m = survey_.disagreement_before_m;
   result.disagreement_after_m = survey_.disagreement_after_m;
+  result.noise = survey_.noise;
   result.skipped = survey_.skipped;
   result.timings_s = timings_s_;
   double turns = 0.0;

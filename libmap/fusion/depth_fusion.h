@@ -35,7 +35,7 @@ namespace libmap {
 struct DepthFusionOptions {
   double voxel_size_m = 0.01;  // > 0
   // Depth camera: a name in data/sensors or a path. Its range and noise replace options that have
-  // their defaults; "auto": the defaults, those of a Kinect v2.
+  // their defaults. "auto": the noise of `planes`, which choose_noise (libmap/refine) estimates.
   std::string sensor = "auto";
   DepthPlaneOptions planes{};
   double disc_radius_voxels = 1.5;  // > 0: radius of the discs in which measurements are averaged
@@ -103,6 +103,7 @@ struct FusionSurvey {
   // RMS deviation of single frames' surface heights from their mean, with given and final poses.
   double disagreement_before_m = 0.0;
   double disagreement_after_m = 0.0;
+  DepthNoise noise{};  // noise of all passes
 };
 
 struct DepthFusionResult : FusionCounts {
@@ -123,6 +124,7 @@ struct DepthFusionResult : FusionCounts {
   double registration_turn_deg = 0.0;
   double disagreement_before_m = 0.0;
   double disagreement_after_m = 0.0;
+  DepthNoise noise{};
   std::vector<std::pair<int, Error>> skipped;
   StageTimings timings_s;
 };

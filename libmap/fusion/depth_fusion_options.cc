@@ -36,7 +36,8 @@ void bind(ParameterTable& table, DepthFusionOptions& options) {
             "edge length of a voxel, m; the cloud contains at most one point per voxel");
   table.add("sensor", options.sensor,
             "depth camera: a name in data/sensors or a file, from which depth range and noise are "
-            "taken unless options set them; auto: a Kinect v2");
+            "taken unless options set them; auto: the noise is estimated if it differs from a "
+            "Kinect v2's");
   table.add("min_depth_m", planes.min_depth_m, positive, "minimum depth of used measurements, m");
   table.add("max_depth_m", planes.max_depth_m, positive, "maximum depth of used measurements, m");
   table.add("max_incidence_deg", planes.max_incidence_deg, {0, 89.5, true, false},
@@ -88,6 +89,11 @@ void describe(ResultTable& table, const DepthFusionResult& result) {
             "number of frames left out because earlier frames measured their surface");
   table.add("skipped_frames", result.skipped.size(), "number of frames that could not be used");
   describe(table, result.pixels);
+  table.add("axial_noise_m", result.noise.axial_m, "assumed standard deviation of depth: constant term, m");
+  table.add("range_noise", result.noise.axial_of_range,
+            "assumed standard deviation of depth: term proportional to range, m per m");
+  table.add("square_noise", result.noise.axial_of_square,
+            "assumed standard deviation of depth: term proportional to squared range, 1/m");
   table.add("registration_rounds", result.registration_rounds,
             "number of registration rounds that moved frames");
   table.add("registration_rejected", result.registration_rejected,

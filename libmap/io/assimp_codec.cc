@@ -406,11 +406,11 @@ TriangleMesh decode_by_assimp(const std::string& bytes, const std::string& forma
   return decode_guarded(bytes.size(), [&] { return decode(format, read, take); }).model.mesh;
 }
 
-DecodedModel decode_model_by_assimp(const std::filesystem::path& path, const std::string& format) {
-  if (format == "glb") require_sound_glb(file_head(path, 20), std::filesystem::file_size(path));
+DecodedModel decode_glb_model(const std::filesystem::path& path) {
+  require_sound_glb(file_head(path, 20), std::filesystem::file_size(path));
   const auto read = [&](Assimp::Importer& importer) { return importer.ReadFile(path.string(), 0); };
   return decode_guarded(std::filesystem::file_size(path),
-                        [&] { return decode(format, read, model_of); });
+                        [&] { return decode("glb", read, model_of); });
 }
 
 std::string encode_by_assimp(const TriangleMesh& mesh, const std::string& format, bool ascii) {

@@ -1,4 +1,4 @@
-// Reads and writes OBJ, STL and GLB meshes and textured models by assimp.
+// Reads and writes STL and GLB by assimp.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 namespace libmap {
 
-// Decodes a mesh; `format` is "obj", "stl" or "glb". Equal corners become one vertex. Throws Error
+// Decodes a mesh; `format` is "stl" or "glb". Equal corners become one vertex. Throws Error
 // (without the file's name) with assimp's reason.
 TriangleMesh decode_by_assimp(const std::string& bytes, const std::string& format);
 
@@ -27,8 +27,8 @@ struct DecodedModel {
   std::vector<TextureImage> images;
 };
 
-// Reads the .obj (with its materials) or .glb at `path`. Throws as decode_by_assimp does.
-DecodedModel decode_model_by_assimp(const std::filesystem::path& path, const std::string& format);
+// Reads the .glb at `path`. Throws as decode_by_assimp does.
+DecodedModel decode_glb_model(const std::filesystem::path& path);
 
 // Encodes a mesh; `format` is "stl" or "glb". Throws Error if the mesh has no triangles, or if
 // assimp fails.

@@ -2,9 +2,9 @@
 
 #include <utility>
 
+#include "libmap/consistency/edge_agreement.h"
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
-#include "libmap/fusion/edge_agreement.h"
 
 namespace libmap {
 

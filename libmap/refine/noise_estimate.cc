@@ -4,8 +4,14 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
+#include <set>
 
+#include "libmap/consistency/pose_consistency.h"
+#include "libmap/core/parallel.h"
 #include "libmap/core/text.h"
+#include "libmap/features/features.h"
+#include "libmap/optimize/icp_refinement.h"
 
 namespace libmap {
 
@@ -16,6 +22,9 @@ constexpr std::size_t min_residuals = 1000;
 constexpr double median_of_normal = 0.6745;  // of absolute values, in standard deviations
 constexpr double min_axial_m = 1e-4;
 constexpr int terms = 3;
+// An estimate that differs from the assumed noise by this factor replaces it.
+constexpr double other_noise = 1.8;
+constexpr int samples_per_frame = 200;
 
 // Fits non-negative terms of the noise with the least relative errors, by trying all subsets of
 // terms.
@@ -82,6 +91,60 @@ std::optional<NoiseEstimate> estimate_noise(const std::vector<SurfaceResidual>& 
     estimate.largest_ratio = std::max({estimate.largest_ratio, ratio, 1.0 / ratio});
   }
   return estimate;
+}
+
+bool is_noise_given(const std::string& sensor, const DepthNoise& noise) {
+  DepthNoise unset;
+  unset.lateral_px = noise.lateral_px;
+  return sensor != "auto" || !(noise == unset);
+}
+
+ScanNoise choose_noise(const std::vector<SurfaceResidual>& residuals, const DepthNoise& assumed) {
+  const auto found = estimate_noise(residuals, assumed);
+  if (!found)
+    return {assumed, false,
+            "depth noise " + describe(assumed) + " assumed: too few held-out depths"};
+  ScanNoise chosen{assumed, found->largest_ratio > other_noise, {}};
+  chosen.sentence =
+      "depth noise " + describe(found->noise) + " by " + std::to_string(found->residuals) +
+      " held-out depths from " + to_fixed_text(found->nearest_m, 1) + " to " +
+      to_fixed_text(found->farthest_m, 1) +
+      " m: " + (chosen.is_estimated ? "replaces " : "agrees with ") + describe(assumed);
+  if (chosen.is_estimated) chosen.noise = found->noise;
+  return chosen;
+}
+
+ScanNoise choose_noise(const ScanSource& scan, const Trajectory& world_from_base,
+                       const std::string& sensor, const DepthPlaneOptions& planes,
+                       Progress& progress) {
+  if (is_noise_given(sensor, planes.noise))
+    return {planes.noise, false,
+            sensor == "auto" ? "depth noise " + describe(planes.noise) + " as given"
+                             : "depth noise of " + sensor};
+  const auto pairs = near_pairs_of(world_from_base);
+  std::set<int> nodes;
+  for (const auto& [a, b] : pairs) nodes.insert({world_from_base[a].node, world_from_base[b].node});
+  FeatureOptions options{.planes = planes};
+  options.surfaces_only = true;
+  const FeatureResult found = find_features(scan, {nodes.begin(), nodes.end()}, options, progress);
+  std::map<int, const FrameFeatures*> frame_of;
+  for (const FrameFeatures& frame : found.frames) frame_of[frame.node] = &frame;
+  std::vector<std::vector<SurfaceResidual>> of_pair(pairs.size());
+  parallel_each(pairs.size(), [&](std::size_t n) {
+    const TrajectoryPose& a = world_from_base[pairs[n].first];
+    const TrajectoryPose& b = world_from_base[pairs[n].second];
+    if (!frame_of.contains(a.node) || !frame_of.contains(b.node)) return;
+    const std::vector<FrameFeatures> frames = {*frame_of.at(a.node), *frame_of.at(b.node)};
+    const auto link =
+        align_pair(frames[0], frames[1], a.world_from_base.inverse() * b.world_from_base);
+    if (link)
+      of_pair[n] = surface_residuals(frames, {{.frames = {0, 1}}},
+                                     {{a.node, Pose::Identity()}, {b.node, link->from_from_to}},
+                                     samples_per_frame);
+  });
+  std::vector<SurfaceResidual> residuals;
+  for (const auto& some : of_pair) residuals.insert(residuals.end(), some.begin(), some.end());
+  return choose_noise(residuals, planes.noise);
 }
 
 std::string describe(const DepthNoise& noise) {

@@ -5,8 +5,11 @@
 #include <string>
 #include <vector>
 
+#include "libmap/core/pose_graph.h"
+#include "libmap/core/progress.h"
 #include "libmap/features/held_out.h"
-#include "libmap/fusion/depth_noise.h"
+#include "libmap/fusion/depth_planes.h"
+#include "libmap/scan/scan_source.h"
 
 namespace libmap {
 
@@ -22,6 +25,25 @@ struct NoiseEstimate {
 // bins of range. Returns nullopt for fewer than a thousand residuals.
 std::optional<NoiseEstimate> estimate_noise(const std::vector<SurfaceResidual>& residuals,
                                             const DepthNoise& assumed);
+
+// Noise that a stage uses for a scan.
+struct ScanNoise {
+  DepthNoise noise{};
+  bool is_estimated = false;  // the estimate replaces the assumed noise
+  std::string sentence{};     // noise and source
+};
+// Replaces the assumed noise by an estimate that differs by a factor of 1.8.
+ScanNoise choose_noise(const std::vector<SurfaceResidual>& residuals, const DepthNoise& assumed);
+
+// Chooses the noise by held-out depth of up to 24 pairs of near frames, each aligned by the rest of
+// its depth. Noise that is given by a sensor or by other terms than the default ones is kept.
+// Frames that cannot be read are ignored.
+ScanNoise choose_noise(const ScanSource& scan, const Trajectory& world_from_base,
+                       const std::string& sensor, const DepthPlaneOptions& planes,
+                       Progress& progress = no_progress());
+
+// Returns true if the noise is not the default one, or a sensor has it.
+bool is_noise_given(const std::string& sensor, const DepthNoise& noise);
 
 // Returns the terms as text, e.g. "1.2 mm + 0.10 % of range + 1.9 mm/m2 of range squared".
 std::string describe(const DepthNoise& noise);

@@ -7,9 +7,9 @@
 #include <utility>
 
 #include "libmap/camera/sensor_model.h"
+#include "libmap/consistency/pose_consistency.h"
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
-#include "libmap/fusion/pose_consistency.h"
 #include "libmap/optimize/graph_covariance.h"
 #include "libmap/refine/depth_registration.h"
 #include "libmap/refine/noise_estimate.h"
@@ -28,8 +28,6 @@ constexpr double settled_s = 1e-3;
 // Errors of features in images of one location are correlated, which residuals do not show.
 // Measured on simulated scans.
 constexpr double min_deviation_scale = 1.3;
-// An estimated depth noise that differs from the assumed one by this factor replaces it.
-constexpr double other_noise = 1.8;
 constexpr double explained_cost = 0.35;  // of held-out matches; 0.26 for normal errors
 
 bool is_motion(const PoseLink& link) {
@@ -146,12 +144,6 @@ struct Run {
   bool propose(StageResult stage) { return propose(std::move(stage), state); }
 };
 
-bool has_noise(const DepthSensor& sensor, const DepthNoise& noise) {
-  return sensor.noise.axial_m == noise.axial_m &&
-         sensor.noise.axial_of_range == noise.axial_of_range &&
-         sensor.noise.axial_of_square == noise.axial_of_square;
-}
-
 // Poses that the depth images contradict follow another convention or unit. Sessions are in frames
 // of their own, of which the largest is compared.
 void warn_of_contradictions(Run& run) {
@@ -255,9 +247,11 @@ void link_frames(Run& run, const std::string& suffix = {}) {
     std::vector<FramePair> pairs;
     for (const FramePair& pair : candidate_pairs(input, state, round))
       if (state.tried.insert(pair).second) pairs.push_back(pair);
-    if (pairs.empty() && round > 0) break;
-    if (pairs.empty()) continue;
     const std::size_t before = state.feature_links.size();
+    if (round > 0 &&
+        static_cast<double>(pairs.size()) <= settled_share * static_cast<double>(before))
+      break;
+    if (pairs.empty()) continue;
     StageResult stage = named(link_stage(input, state, round, pairs));
     const std::size_t fresh = stage.state.feature_links.size() - before;
     if (run.propose(std::move(stage)))
@@ -313,28 +307,19 @@ RefinementOptions with_sensor(RefinementOptions options) {
 bool adapt_noise(Run& run) {
   RefinementState& state = run.state;
   const RefinementOptions& options = run.input.options;
-  if (options.sensor != "auto" || !has_noise(options.features.planes, DepthNoise{})) {
+  if (is_noise_given(options.sensor, options.features.planes.noise)) {
     run.result.noise = "depth noise " + describe(state.noise) + " as given";
     return false;
   }
-  const auto found = estimate_noise(
-      surface_residuals(*state.frames, state.feature_links, state.poses), state.noise);
-  if (!found) {
-    run.result.noise = "depth noise " + describe(state.noise) + " assumed: too few held-out depths";
-    return false;
-  }
-  const bool is_other = found->largest_ratio > other_noise;
-  run.result.noise = "depth noise " + describe(found->noise) + " by " +
-                     std::to_string(found->residuals) + " held-out depths from " +
-                     to_fixed_text(found->nearest_m, 1) + " to " +
-                     to_fixed_text(found->farthest_m, 1) +
-                     " m: " + (is_other ? "replaces " : "agrees with ") + describe(state.noise);
-  if (!is_other) return false;
+  ScanNoise chosen =
+      choose_noise(surface_residuals(*state.frames, state.feature_links, state.poses), state.noise);
+  run.result.noise = std::move(chosen.sentence);
+  if (!chosen.is_estimated) return false;
   for (const SharedFrames& frames : {state.frames, state.stored_frames}) {
-    for (FrameFeatures& frame : *frames) set_depth_noise(frame, state.noise, found->noise);
+    for (FrameFeatures& frame : *frames) set_depth_noise(frame, state.noise, chosen.noise);
     if (state.frames == state.stored_frames) break;
   }
-  state.noise = found->noise;
+  state.noise = chosen.noise;
   return true;
 }
 
@@ -461,7 +446,7 @@ RefinementResult finish(const RefinementInput& input, RefinementState state,
   result.calibration = std::move(state.calibration);
   add_registration(input.color_from_depth, result.cameras.size(), result.calibration);
   result.findings = findings(result.calibration, result.deviations, result.cameras);
-  if (!has_noise(input.options.features.planes, state.noise))
+  if (!(input.options.features.planes.noise == state.noise))
     result.findings.push_back(result.noise);
   result.components = std::move(state.graph.components);
   result.without_links = std::move(state.graph.without_links);
@@ -572,8 +557,7 @@ RefinementResult refine_poses(const ScanSource& given_scan, const RefinementOpti
   require_one_scale(options);
   find_frames(run, cache);
   KnownMatches matches;
-  if (state.frames->size() <= options.features.max_frames_in_memory)
-    run.input.known_matches = &matches;
+  run.input.known_matches = &matches;
   link_frames(run);
   link_by_depth(run);
   CalibrationMoves moves;

@@ -146,7 +146,7 @@ StageResult calibrate_stage(const RefinementInput& input, const RefinementState&
   next.poses = std::move(estimate.adjustment.map_from_base);
   if (result.report.rejected) return result;
   if (!is_of_all && !estimate.calibration.timing.empty())
-    estimate_motions(data, false, estimate.calibration);
+    estimate_motions(data, false, estimate.calibration, state.calibration);
   next.calibration = std::move(estimate.calibration);
   next.frames = calibrated(data.frames, next.calibration);
   if (!is_of_all) {

@@ -24,8 +24,7 @@ struct RefinementInput {
   std::vector<std::vector<int>> start_parts{};  // nodes whose initial poses are in one frame
   std::set<int> tracked{};                      // nodes whose poses come from visual odometry
   std::vector<BoardView> board_views{};
-  // Matches of pairs of frames, cached for matching with another calibration; nullptr for long
-  // scans, whose descriptors are compared again.
+  // Matches of pairs of frames, cached for matching with another calibration.
   KnownMatches* known_matches = nullptr;
   Pose color_from_depth = Pose::Identity();  // by which the depth of `scan` has been registered
 };

@@ -120,8 +120,9 @@ BundleAdjustmentOptions with_free(const CalibrationParts& parts, BundleAdjustmen
 }
 
 constexpr int max_rounds = 4;
-// Motions are estimated in windows of consecutive frames.
-constexpr std::size_t frames_per_window = 64;
+// Motions are estimated in windows of consecutive frames. The time of a dense system grows with the
+// cube of its frames.
+constexpr std::size_t frames_per_window = 24;
 constexpr std::size_t window_margin = 8;    // margin on each side, whose motions are not used
 constexpr double max_interpolated_s = 1.0;  // maximum gap for interpolating motions
 constexpr int motion_rounds = 2;            // other motions hit other points of the depth planes
@@ -405,7 +406,9 @@ BundleAdjustmentResult vary_calibration(const CalibrationInput& input,
 }
 
 void estimate_motions(const CalibrationInput& input, bool fixes_poses,
-                      SensorCalibration& calibration) {
+                      SensorCalibration& calibration, const SensorCalibration& known) {
+  const int rounds = fixes_poses || !known.timing.empty() ? 1 : motion_rounds;
+  if (!known.timing.empty()) add_other_motions(known, calibration);
   const std::vector<FrameFeatures>& frames = input.frames;
   BundleAdjustmentOptions moving = with_free(parts_of(calibration), input.options);
   moving.fixes_poses = fixes_poses;
@@ -422,7 +425,7 @@ void estimate_motions(const CalibrationInput& input, bool fixes_poses,
     const SubScan part = sub_scan_of(input, window);
     std::map<int, Pose> poses = part.poses;
     start.motion = calibration.motion;
-    for (int round = 0; round < (fixes_poses ? 1 : motion_rounds); ++round) {
+    for (int round = 0; round < rounds; ++round) {
       BundleAdjustmentResult adjusted =
           adjust_bundle(part.frames, part.tracks.tracks, poses, part.graph_links, part.components,
                         moving, {}, start);

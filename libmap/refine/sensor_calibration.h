@@ -69,10 +69,10 @@ BundleAdjustmentResult vary_calibration(const CalibrationInput& input,
                                         const SensorCalibration& known, std::size_t count);
 
 // Replaces the motions in `calibration` by motions of all frames with a pose, estimated at its
-// timing. `fixes_poses` fixes the poses during the estimate. The rest of `calibration` is
-// unchanged.
+// timing. `fixes_poses` fixes the poses during the estimate. The estimate begins at the motions of
+// `known`, if any. The rest of `calibration` is unchanged.
 void estimate_motions(const CalibrationInput& input, bool fixes_poses,
-                      SensorCalibration& calibration);
+                      SensorCalibration& calibration, const SensorCalibration& known = {});
 
 // Returns true if registrations and timings of all cameras differ by at most these bounds.
 bool is_similar_registration(const SensorCalibration& a, const SensorCalibration& b, double shift_m,

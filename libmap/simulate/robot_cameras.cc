@@ -1,8 +1,10 @@
 #include "libmap/simulate/robot_cameras.h"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
+#include "libmap/camera/sensor_model.h"
 #include "libmap/core/error.h"
 #include "libmap/core/random_stream.h"
 #include "libmap/core/text.h"
@@ -27,10 +29,41 @@ Image<std::uint16_t> to_units(const DepthImage& depth, double depth_scale_m) {
   return units;
 }
 
+DepthSensorOptions with_sensor(DepthSensorOptions depth, const std::string& sensor) {
+  if (sensor == "auto") return depth;
+  const SensorModel model = read_sensor_model(sensor);
+  depth.near_m = std::max(depth.near_m, model.near_m);
+  depth.far_m = std::min(depth.far_m, model.far_m);
+  if (depth.noise_m != 0.0 || depth.noise_of_range != 0.0 || depth.noise_of_square != 0.0)
+    return depth;
+  depth.noise_m = model.noise_m;
+  depth.noise_of_range = model.noise_of_range;
+  depth.noise_of_square = model.noise_of_square;
+  return depth;
+}
+
+// Limits the range of the sensor to that of the camera.
+DepthSensorOptions sensor_of(const RigCamera& camera, DepthSensorOptions depth,
+                             const std::string& sensor) {
+  depth.depth_step_m = 0.0;
+  depth.near_m = std::max(depth.near_m, camera.near_m);
+  depth.far_m = std::min(depth.far_m, camera.far_m);
+  if (!(depth.far_m > depth.near_m))
+    throw Error("the range of camera " + camera.name + " is outside that of the sensor",
+                {.file = sensor_file(sensor).string(),
+                 .field = "far_m",
+                 .value = to_text(depth.far_m),
+                 .bound = "> " + to_text(depth.near_m)});
+  return depth;
+}
+
 }  // namespace
 
 void bind(ParameterTable& table, RobotCamerasOptions& options) {
-  bind_noise(table, options.sensor);
+  table.add("sensor", options.sensor,
+            "depth camera, a name in data/sensors or a file: its range within that of the rig, and "
+            "its noise if no other option sets it; auto: no noise, and the range of the rig");
+  bind_noise(table, options.depth);
   bind(table, options.faults);
   table.add("stamp_s", options.stamp_s, not_negative, "time of the images, s");
   table.add("stamp_spread_s", options.stamp_spread_s, not_negative,
@@ -41,15 +74,13 @@ void bind(ParameterTable& table, RobotCamerasOptions& options) {
 std::vector<RobotCameraImage> simulate_robot_cameras(const TriangleMesh& mesh, const CameraRig& rig,
                                                      const Pose& world_from_robot,
                                                      const RobotCamerasOptions& options) {
+  const DepthSensorOptions depth = with_sensor(options.depth, options.sensor);
   const VisibleSurface surface(mesh);
   RandomStream stamps(options.seed, stamp_key);
   std::vector<RobotCameraImage> images;
   for (std::size_t i = 0; i < rig.cameras.size(); ++i) {
     const RigCamera& camera = rig.cameras[i];
-    DepthSensorOptions sensor = options.sensor;
-    sensor.depth_step_m = 0.0;
-    sensor.near_m = camera.near_m;
-    sensor.far_m = camera.far_m;
+    const DepthSensorOptions sensor = sensor_of(camera, depth, options.sensor);
     const ViewRays rays = make_view_rays(camera.camera);
     const Pose world_from_camera = world_from_robot * camera.camera.base_from_camera;
     SurfaceView view = surface.view(rays, world_from_camera, false);

@@ -3,6 +3,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
+#include <string>
 #include <vector>
 
 #include "libmap/core/image.h"
@@ -16,8 +18,10 @@
 namespace libmap {
 
 struct RobotCamerasOptions {
-  // Limits and resolution are not used; the rig determines them.
-  DepthSensorOptions sensor = ideal_depth_sensor(0.0, 1.0);
+  // Name in data/sensors or a file: range, and noise if `depth` has none. "auto": that of `depth`.
+  std::string sensor = "auto";
+  // The range is limited to that of the rig's cameras, which also determine the resolution.
+  DepthSensorOptions depth = ideal_depth_sensor(0.0, std::numeric_limits<double>::infinity());
   DepthFaults faults{};
   double stamp_s = 0.0;
   double stamp_spread_s = 0.004;  // cameras without a common trigger: stamps are between stamp_s
@@ -33,7 +37,8 @@ struct RobotCameraImage {
 };
 
 // Returns one image per camera of the rig, which does not move. An image may have no depth at all.
-// Throws Error for a mesh without triangles.
+// Throws Error for a mesh without triangles, or a sensor that is unknown or has no range in common
+// with a camera.
 std::vector<RobotCameraImage> simulate_robot_cameras(const TriangleMesh& mesh, const CameraRig& rig,
                                                      const Pose& world_from_robot,
                                                      const RobotCamerasOptions& options);

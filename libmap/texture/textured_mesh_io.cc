@@ -11,6 +11,7 @@
 #include "libmap/io/assimp_codec.h"
 #include "libmap/io/cloud_io.h"
 #include "libmap/io/mesh_io.h"
+#include "libmap/io/obj_codec.h"
 
 namespace libmap {
 
@@ -193,6 +194,14 @@ ColorImage read_image(const TextureImage& image, const fs::path& model) {
   return in_file(path, [&] { return decode_color(read_whole_file(path), max_decoded_pixels); });
 }
 
+// A model without its material library has no textures.
+DecodedModel read_obj_model(const fs::path& path) {
+  return decode_obj_model(read_whole_file(path), [&](const std::string& name) {
+    const fs::path library = path.parent_path() / name;
+    return fs::is_regular_file(library) ? read_whole_file(library) : std::string();
+  });
+}
+
 }  // namespace
 
 fs::path texture_page_path(const fs::path& model, std::size_t page, ImageFormat format) {
@@ -253,7 +262,8 @@ TexturedMesh read_textured_mesh(const fs::path& path) {
   require_readable_file(path);
   require_file_size(path, machine_memory());
   return in_file(path, [&] {
-    DecodedModel decoded = decode_model_by_assimp(path, format_of(path).substr(1));
+    DecodedModel decoded =
+        format_of(path) == ".glb" ? decode_glb_model(path) : read_obj_model(path);
     if (decoded.model.mesh.triangles.empty()) throw Error("contains no triangle");
     for (const TextureImage& image : decoded.images)
       decoded.model.pages.push_back(read_image(image, path));

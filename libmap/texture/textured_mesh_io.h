@@ -1,7 +1,6 @@
 // Reads and writes textured meshes.
 //
-// .obj: MODEL.obj, MODEL.mtl and one image per page, MODEL_0.png ...; coordinates are written as
-// doubles and read as float32.
+// .obj: MODEL.obj, MODEL.mtl and one image per page, MODEL_0.png ...; coordinates are doubles.
 // .glb: glTF 2.0 in one file with its images, unlit (KHR_materials_unlit), float32. glTF is y-up
 // and this project z-up: writing and reading rotate the mesh about x.
 //

@@ -115,6 +115,60 @@ TEST(SimulateCamerasCommand, AnotherRunLeavesNothingOfTheFirst) {
   EXPECT_EQ(content("rig/front.png"), first);
 }
 
+std::vector<double> depths_of(const std::string& folder) {
+  std::vector<double> depths;
+  const libmap::CameraRig rig = libmap::read_rig(scratch(folder) / "rig.yaml");
+  for (const auto& image : libmap::list_rig_images(scratch(folder), rig))
+    for (const float depth : libmap::read_rig_depth(image, rig.cameras[image.camera]).pixels)
+      depths.push_back(static_cast<double>(depth));
+  return depths;
+}
+
+// The noise and the range are those of the file, except that options replace the noise and the rig
+// limits the range.
+TEST(SimulateCamerasCommand, TakesASensorByName) {
+  write_ground();
+  write_text(scratch("short.yaml"),
+             "noise_m: 0.004\nnoise_of_range: 0.01\nnear_m: 0.3\n"
+             "far_m: 0.6\nrolling_shutter_s: 0.02\n");
+  const auto made = [&](const std::string& folder, std::vector<std::string> more) {
+    more.insert(more.begin(), {"-o", folder, "--z", "0.3"});
+    EXPECT_TRUE(succeeded(graspmap(cameras(more))));
+    return depths_of(folder);
+  };
+  const std::vector<double> ideal = made("ideal", {});
+  const std::vector<double> noisy = made("noisy", {"--sensor", "short.yaml"});
+  ASSERT_EQ(ideal.size(), noisy.size());
+  double squares = 0.0;
+  std::size_t count = 0;
+  for (std::size_t n = 0; n < ideal.size(); ++n) {
+    if (noisy[n] > 0.0) {
+      EXPECT_GE(noisy[n], 0.299);
+      EXPECT_LE(noisy[n], 0.601);
+    }
+    if (!(noisy[n] > 0.0) || !(ideal[n] > 0.35) || !(ideal[n] < 0.55)) continue;
+    const double off = (noisy[n] - ideal[n]) / (0.004 + 0.01 * ideal[n]);
+    squares += off * off;
+    ++count;
+  }
+  ASSERT_GT(count, 1000U);
+  EXPECT_NEAR(std::sqrt(squares / static_cast<double>(count)), 1.0, 0.05);
+  const std::vector<double> given = made("given", {"--sensor", "short.yaml", "--noise", "0.001"});
+  EXPECT_EQ(made("same", {"--noise", "0.001"}).size(), given.size());
+  EXPECT_LT(*std::max_element(given.begin(), given.end()), 0.61);
+  EXPECT_EQ(made("d435", {"--sensor", "d435"}), made("name", {"--sensor", "realsense-d435"}));
+}
+
+TEST(SimulateCamerasCommand, UnknownAndUselessSensorsAreNamed) {
+  write_ground();
+  EXPECT_TRUE(bad_input(graspmap(cameras({"-o", "rig", "--sensor", "kinekt-v1"})),
+                        {.field = "sensor", .value = "kinekt-v1", .about = "kinect-v1"}));
+  write_text(scratch("far.yaml"), "noise_m: 0.004\nnear_m: 30\nfar_m: 40\n");
+  EXPECT_TRUE(bad_input(graspmap(cameras({"-o", "rig", "--sensor", "far.yaml"})),
+                        {.file = "far.yaml", .field = "far_m", .bound = "> 30"}));
+  EXPECT_FALSE(std::filesystem::exists(scratch("rig")));
+}
+
 TEST(SimulateCamerasCommand, UnitsTooFineForTheRangeAreRefused) {
   write_ground();
   libmap::CameraRig rig;

@@ -3,6 +3,7 @@
 #include "class_documentation.h"
 #include "libmap/core/error.h"
 #include "libmap/fusion/depth_fusion.h"
+#include "libmap/refine/noise_estimate.h"
 #include "libmap/refine/refinement.h"
 #include "libmap/scan/pose_import.h"
 #include "libmap/scan/scan_source.h"
@@ -278,11 +279,14 @@ py::dict refine(const ScanSource& scan, const std::vector<std::string>& known_le
 
 py::dict fuse(const ScanSource& scan, const std::shared_ptr<Poses>& given, const py::dict& values,
               const py::object& progress, unsigned threads) {
-  const auto options = options_from<libmap::DepthFusionOptions>(values);
+  auto options = options_from<libmap::DepthFusionOptions>(values);
   const std::shared_ptr<Poses> poses = given != nullptr ? given : poses_of(scan, "auto");
   libmap::DepthFusionResult result = run(threads, progress, [&](libmap::Progress& bar) {
-    return libmap::in_file(scan.path(),
-                           [&] { return libmap::fuse_depth(scan, poses->poses, options, bar); });
+    return libmap::in_file(scan.path(), [&] {
+      options.planes.noise =
+          libmap::choose_noise(scan, poses->poses, options.sensor, options.planes, bar).noise;
+      return libmap::fuse_depth(scan, poses->poses, options, bar);
+    });
   });
   py::dict made = dict_of(libmap::described(result));
   made["cloud"] = shared(std::move(result.cloud));

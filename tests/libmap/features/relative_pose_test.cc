@@ -2,6 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "libmap/features/match_loops.h"
 #include "tests/libmap/features/synthetic_features.h"
 #include "tests/support/test_support.h"
 
@@ -33,6 +39,71 @@ TEST(MatchFeatures, FindsEachOnesBestAndLeavesDoubtfulOnesOut) {
   EXPECT_EQ(matches.size(), 48U);
   EXPECT_EQ(matches.front(), (FeatureMatch{2, 2}));
   EXPECT_TRUE(libmap::match_features(vectors, Eigen::MatrixXf(128, 0), 0.8).empty());
+}
+
+// Random unit vectors; some are equal, and values are coarse, so that products are equal too.
+Eigen::MatrixXf coarse_vectors(Eigen::Index count) {
+  Eigen::MatrixXf vectors(16, count);
+  for (Eigen::Index n = 0; n < vectors.size(); ++n)
+    vectors(n % 16, n / 16) = uniform(0, 1) < 0.5 ? -0.25F : 0.25F;
+  if (count > 5) vectors.col(5) = vectors.col(2);
+  return vectors;
+}
+
+std::vector<FeatureMatch> matches_by_definition(const Eigen::MatrixXf& a, const Eigen::MatrixXf& b,
+                                                double max_ratio) {
+  std::vector<FeatureMatch> matches;
+  const Eigen::MatrixXf products = b.transpose() * a;
+  for (Eigen::Index n = 0; n < a.cols(); ++n) {
+    Eigen::Index nearest = 0;
+    Eigen::Index back = 0;
+    const float best = products.col(n).maxCoeff(&nearest);
+    float next = -2.0F;
+    for (Eigen::Index m = 0; m < b.cols(); ++m)
+      if (m != nearest) next = std::max(next, products(m, n));
+    products.row(nearest).maxCoeff(&back);
+    const double ratio = std::sqrt(static_cast<double>((1.0F - best) / (1.0F - next)));
+    if (back == n && (max_ratio >= 1.0 || ratio < max_ratio))
+      matches.push_back({static_cast<int>(n), static_cast<int>(nearest)});
+  }
+  return matches;
+}
+
+// For numbers that fill registers and steps, or not.
+TEST(MatchFeatures, EqualsItsDefinition) {
+  for (const Eigen::Index a_count : {1, 2, 3, 4, 7, 64, 101})
+    for (const Eigen::Index b_count : {1, 2, 15, 31, 32, 33, 100}) {
+      const Eigen::MatrixXf a = coarse_vectors(a_count);
+      const Eigen::MatrixXf b = coarse_vectors(b_count);
+      for (const double max_ratio : {0.8, 1.0})
+        EXPECT_EQ(libmap::match_features(a, b, max_ratio), matches_by_definition(a, b, max_ratio))
+            << a_count << " " << b_count;
+    }
+}
+
+TEST(MatchLoops, AllInstructionSetsYieldTheSame) {
+  constexpr int size = 24;
+  constexpr int a_count = 3 * libmap::MatchLoops::group;
+  constexpr int b_count = 2 * libmap::MatchLoops::lanes;
+  std::vector<float> a(size * a_count);
+  std::vector<float> b(size * b_count);
+  std::vector<float> bias(b_count, 0.0F);
+  std::fill(bias.end() - 9, bias.end(), -4.0F);
+  for (std::vector<float>* values : {&a, &b})
+    for (float& value : *values) value = static_cast<float>(uniform(-0.2, 0.2));
+  const auto found_with = [&](libmap::InstructionSet instructions) {
+    std::vector<float> numbers(2 * a_count + b_count, -2.0F);
+    std::vector<int> indices(a_count + b_count, -1);
+    libmap::match_loops_of(instructions)
+        .find_nearest({a.data(), b.data(), bias.data(), size, a_count, b_count},
+                      {numbers.data(), numbers.data() + a_count, indices.data(),
+                       numbers.data() + 2 * a_count, indices.data() + a_count});
+    return std::pair(numbers, indices);
+  };
+  const auto truth = found_with(libmap::InstructionSet::portable);
+  EXPECT_EQ(truth.second.back(), -1);
+  for (const auto set : {libmap::InstructionSet::avx2, libmap::InstructionSet::avx512})
+    if (libmap::has_instruction_set(set)) EXPECT_EQ(found_with(set), truth);
 }
 
 TEST(RelativePose, ExactMatchesGiveTheExactMotionDespiteOutliers) {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <memory>
 
-#include "libmap/fusion/edge_agreement.h"
+#include "libmap/consistency/edge_agreement.h"
 #include "libmap/refine/refinement.h"
 #include "tests/support/test_support.h"
 

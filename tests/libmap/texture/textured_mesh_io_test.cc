@@ -100,6 +100,44 @@ TEST(TexturedMeshIo, ReadsBackWhatItWrote) {
     }
 }
 
+// Map coordinates, of which float32 keeps half a meter.
+TEST(TexturedMeshIo, ObjKeepsMapCoordinates) {
+  TexturedMesh model = random_model(true);
+  for (Eigen::Vector3d& vertex : model.mesh.vertices)
+    vertex += Eigen::Vector3d(500000.123456789, 4649776.22, 1830.4);
+  const auto path = scratch_folder() / "utm.obj";
+  graspmap_test::write_textured_mesh(path, model);
+  expect_same(libmap::read_textured_mesh(path), model, 0.0);
+}
+
+// Materials as other programs write them: options, backslashes, names with spaces, none at all.
+TEST(TexturedMeshIo, MaterialsOfOtherPrograms) {
+  const auto folder = scratch_folder();
+  std::filesystem::create_directory(folder / "maps");
+  for (const char* name : {"a.png", "b c.png"})
+    graspmap_test::write_text(folder / "maps" / name, libmap::encode_png(libmap::ColorImage(4, 4)));
+  graspmap_test::write_text(folder / "my model.mtl",
+                            "# by hand\nnewmtl first one\r\n  Kd 1 1 1\r\n"
+                            "\tmap_Kd -s 1 1 1 maps\\a.png\r\nnewmtl plain\nKd 1 0 0\n"
+                            "newmtl second\nmap_Kd maps/b c.png \n");
+  graspmap_test::write_text(folder / "m.obj",
+                            "mtllib my model.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\n"
+                            "vt 0 0\nvt 1 0.25\nvt 0 1\nf 1/1 2/2 3/3\nusemtl second\n"
+                            "f 1/1 2/2 4/3 3/1\nusemtl first one\nf 1/1 2/-2 3/3\nf 1 2 3\n"
+                            "usemtl plain\nf 1/1 2/2 3/3\nusemtl missing\nf 1/1 2/2 3/3\n");
+  const TexturedMesh read = libmap::read_textured_mesh(folder / "m.obj");
+  EXPECT_EQ(read.page_of_triangle,
+            (std::vector<std::int32_t>{libmap::no_page, 1, 1, 0, libmap::no_page, libmap::no_page,
+                                       libmap::no_page}));
+  EXPECT_EQ(read.pages.size(), 2U);
+  EXPECT_EQ(read.mesh.vertices.size(), 4U);
+  EXPECT_EQ(read.texture_coordinates[2][1], Eigen::Vector2f(0, 0));
+  EXPECT_EQ(read.texture_coordinates[3][1], Eigen::Vector2f(1, 0.75F));
+  graspmap_test::write_text(folder / "bad.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1/1 2/1 3/1\n");
+  EXPECT_TRUE(is_error(error_of([&] { libmap::read_textured_mesh(folder / "bad.obj"); }),
+                       {.field = "line 4", .value = "'1'"}));
+}
+
 TEST(TexturedMeshIo, FilesOfAModel) {
   const TexturedMesh model = random_model(false);
   const auto folder = scratch_folder();

@@ -4,6 +4,8 @@
 
 #include <cstddef>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "libmap/core/pose_graph.h"
 #include "libmap/scan/scan_source.h"
@@ -28,8 +30,12 @@ struct PoseConsistency {
   std::string warning() const;
 };
 
-// Compares up to 24 frames with the next frame that has moved by 8 degrees or 0.1 m. If they
-// disagree, these conventions are tried: quaternions as w x y z; poses of the base, the camera's
+// Returns indices of up to 24 poses, each with that of the next pose that has moved by 8 degrees or
+// 0.1 m.
+std::vector<std::pair<std::size_t, std::size_t>> near_pairs_of(const Trajectory& poses);
+
+// Compares the frames of near_pairs_of(world_from_base). If they disagree, these conventions are
+// tried: quaternions as w x y z; poses of the base, the camera's
 // optical frame or a camera with y up; inverse poses; positions in other axes than the rotations;
 // depth in a unit 5 or 1000 times larger or smaller. Frames that cannot be read are ignored.
 PoseConsistency check_pose_consistency(const ScanSource& scan, const Trajectory& world_from_base);

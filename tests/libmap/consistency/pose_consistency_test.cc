@@ -1,4 +1,4 @@
-#include "libmap/fusion/pose_consistency.h"
+#include "libmap/consistency/pose_consistency.h"
 
 #include <gmock/gmock.h>
 

@@ -1,4 +1,4 @@
-#include "libmap/fusion/edge_agreement.h"
+#include "libmap/consistency/edge_agreement.h"
 
 #include <gmock/gmock.h>
 

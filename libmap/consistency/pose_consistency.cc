@@ -1,4 +1,4 @@
-#include "libmap/fusion/pose_consistency.h"
+#include "libmap/consistency/pose_consistency.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -150,12 +150,7 @@ std::optional<std::size_t> partner_of(std::size_t first, const Trajectory& poses
 
 std::vector<ViewedPair> read_pairs(const ScanSource& scan, const Trajectory& poses) {
   FusionFrames images(scan, {});
-  std::vector<std::pair<std::size_t, std::size_t>> numbers;
-  const std::size_t anchors = std::min(max_pairs, poses.size());
-  for (std::size_t n = 0; n < anchors; ++n) {
-    const std::size_t first = n * poses.size() / anchors;
-    if (const auto second = partner_of(first, poses)) numbers.emplace_back(first, *second);
-  }
+  const auto numbers = near_pairs_of(poses);
   std::vector<std::optional<ViewedPair>> read(numbers.size());
   parallel_each(numbers.size(), [&](std::size_t n) {
     const auto view = [&](std::size_t number) {
@@ -192,6 +187,16 @@ std::string PoseConsistency::warning() const {
            " with it";
   if (given.measurements < min_measurements || given.contradicted < contradictory_share) return {};
   return found + ": poses, depth unit or calibration are wrong, and no usual convention fits";
+}
+
+std::vector<std::pair<std::size_t, std::size_t>> near_pairs_of(const Trajectory& poses) {
+  std::vector<std::pair<std::size_t, std::size_t>> pairs;
+  const std::size_t anchors = std::min(max_pairs, poses.size());
+  for (std::size_t n = 0; n < anchors; ++n) {
+    const std::size_t first = n * poses.size() / anchors;
+    if (const auto second = partner_of(first, poses)) pairs.emplace_back(first, *second);
+  }
+  return pairs;
 }
 
 PoseConsistency check_pose_consistency(const ScanSource& scan, const Trajectory& world_from_base) {
