@@ -108,34 +108,42 @@ class DeviationBound {
   DeviationBound(const TriangleMesh& to, double allowed_m)
       : to_(to), surface_(to), allowed_(allowed_m) {}
 
-  Deviation of(const Corners& part) const {
+  // `near` is a triangle that may be near, and becomes the nearest one. If it is within the bound,
+  // it needs no search.
+  Deviation of(const Corners& part, std::uint32_t& near) const {
+    const double known = near == none ? HUGE_VAL : farthest_from(near, part);
+    if (known <= allowed_) return {.bound_m = known};
     const Eigen::Vector3d middle = (part[0] + part[1] + part[2]) / 3.0;
     const SurfacePoint nearest = surface_.nearest(middle);
-    double largest = 0.0;
+    near = nearest.triangle;
     double radius = 0.0;
-    for (const Eigen::Vector3d& corner : part) {
-      largest = std::max(largest, distance_from(nearest.triangle, corner));
-      radius = std::max(radius, (corner - middle).norm());
-    }
-    largest = std::min(largest, nearest.distance_m + radius);
+    for (const Eigen::Vector3d& corner : part) radius = std::max(radius, (corner - middle).norm());
+    const double largest = std::min(farthest_from(near, part), nearest.distance_m + radius);
     if (largest <= allowed_) return {.bound_m = largest};
     if (nearest.distance_m > allowed_ || radius < smallest_part * allowed_)
-      return {.bound_m = HUGE_VAL, .nearest_there = nearest.triangle};
-    return of_quarters(part);
+      return {.bound_m = HUGE_VAL, .nearest_there = near};
+    return of_quarters(part, near);
   }
 
  private:
-  Deviation of_quarters(const Corners& part) const {
+  Deviation of_quarters(const Corners& part, std::uint32_t& near) const {
     const Eigen::Vector3d ab = (part[0] + part[1]) / 2.0;
     const Eigen::Vector3d bc = (part[1] + part[2]) / 2.0;
     const Eigen::Vector3d ca = (part[2] + part[0]) / 2.0;
     Deviation largest;
-    for (const Corners& quarter : {Corners{part[0], ab, ca}, Corners{ab, part[1], bc},
-                                   Corners{ca, bc, part[2]}, Corners{ab, bc, ca}}) {
-      const Deviation here = of(quarter);
+    for (const Corners& quarter : {Corners{ab, bc, ca}, Corners{part[0], ab, ca},
+                                   Corners{ab, part[1], bc}, Corners{ca, bc, part[2]}}) {
+      const Deviation here = of(quarter, near);
       if (here.bound_m > largest.bound_m) largest = here;
       if (here.nearest_there != none) break;
     }
+    return largest;
+  }
+
+  double farthest_from(std::uint32_t triangle, const Corners& part) const {
+    double largest = 0.0;
+    for (const Eigen::Vector3d& corner : part)
+      largest = std::max(largest, distance_from(triangle, corner));
     return largest;
   }
 
@@ -155,9 +163,12 @@ std::vector<Deviation> deviations(const TriangleMesh& from, const TriangleMesh& 
                                   double allowed_m) {
   const DeviationBound bound(to, allowed_m);
   std::vector<Deviation> result(from.triangles.size());
-  parallel_each(result.size(), triangles_grain, [&](std::size_t n) {
-    const Triangle& t = from.triangles[n];
-    result[n] = bound.of({from.vertices[t[0]], from.vertices[t[1]], from.vertices[t[2]]});
+  parallel_for(result.size(), triangles_grain, [&](std::size_t begin, std::size_t end) {
+    std::uint32_t near = none;
+    for (std::size_t n = begin; n < end; ++n) {
+      const Triangle& t = from.triangles[n];
+      result[n] = bound.of({from.vertices[t[0]], from.vertices[t[1]], from.vertices[t[2]]}, near);
+    }
   });
   return result;
 }
