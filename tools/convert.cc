@@ -13,7 +13,6 @@
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
 #include "tools/support/map_tiles.h"
-#include "tools/support/raster_output.h"
 #include "tools/support/subcommands.h"
 
 using namespace graspmap_tools;

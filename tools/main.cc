@@ -25,7 +25,7 @@
 #include "commit.h"  // of the build folder
 #include "libmap/core/text.h"
 #include "tools/support/commands.h"
-#include "tools/support/standard_output.h"
+#include "tools/support/process_end.h"
 
 namespace {
 

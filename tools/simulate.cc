@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "libmap/core/text.h"
-#include "tools/support/standard_output.h"
+#include "tools/support/process_end.h"
 
 namespace {
 

@@ -19,7 +19,6 @@
 #include <optional>
 #include <stdexcept>
 #include <string_view>
-#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -150,15 +149,8 @@ class MeshBuilder {
       };
       color = {byte(c.r), byte(c.g), byte(c.b)};
     }
-    const Corner corner = corner_of(position, normal, color);
-    const auto [found, is_new] =
-        known_.try_emplace(corner, static_cast<std::uint32_t>(mesh_.vertices.size()));
-    if (is_new) {
-      mesh_.vertices.push_back(position);
-      if (has_normals_) mesh_.vertex_normals.push_back(normal);
-      if (has_colors_) mesh_.vertex_colors.push_back(color);
-    }
-    return found->second;
+    return welder_.vertex(position, has_normals_ ? &normal : nullptr,
+                          has_colors_ ? &color : nullptr, mesh_);
   }
 
   const aiScene& scene_;
@@ -168,7 +160,7 @@ class MeshBuilder {
   TriangleMesh mesh_;
   std::vector<TextureCorners> coordinates_;
   std::vector<unsigned> materials_;
-  std::unordered_map<Corner, std::uint32_t, CornerHash> known_;
+  CornerWelder welder_;
 };
 
 std::unique_ptr<aiNode> make_root(std::size_t parts, bool y_up) {

@@ -1,4 +1,4 @@
-// Hash keys of face corners, for merging corners that are equal bit for bit into one vertex.
+// Merges face corners that are equal bit for bit into one vertex.
 #pragma once
 
 #include <Eigen/Core>
@@ -6,8 +6,9 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <unordered_map>
 
-#include "libmap/core/point_cloud.h"
+#include "libmap/core/triangle_mesh.h"
 
 namespace libmap {
 
@@ -36,5 +37,28 @@ inline Corner corner_of(const Eigen::Vector3d& position, const Eigen::Vector3f& 
   }
   return corner;
 }
+
+class CornerWelder {
+ public:
+  // Adds a corner to the mesh, with its normal and its color if they are not nullptr. Returns its
+  // vertex: an equal one, or a new one.
+  std::uint32_t vertex(const Eigen::Vector3d& position, const Eigen::Vector3f* normal,
+                       const Color* color, TriangleMesh& mesh) {
+    const Corner corner =
+        corner_of(position, normal != nullptr ? *normal : Eigen::Vector3f(Eigen::Vector3f::Zero()),
+                  color != nullptr ? *color : Color{});
+    const auto [found, is_new] =
+        known_.try_emplace(corner, static_cast<std::uint32_t>(mesh.vertices.size()));
+    if (is_new) {
+      mesh.vertices.push_back(position);
+      if (normal != nullptr) mesh.vertex_normals.push_back(*normal);
+      if (color != nullptr) mesh.vertex_colors.push_back(*color);
+    }
+    return found->second;
+  }
+
+ private:
+  std::unordered_map<Corner, std::uint32_t, CornerHash> known_;
+};
 
 }  // namespace libmap

@@ -6,7 +6,6 @@
 #include <limits>
 #include <optional>
 #include <string>
-#include <unordered_map>
 #include <unordered_set>
 #include <utility>
 #include <vector>
@@ -236,24 +235,16 @@ class ObjReader {
 
   TriangleMesh weld() {
     TriangleMesh mesh;
-    std::unordered_map<Corner, std::uint32_t, CornerHash> known;
+    CornerWelder welder;
     std::vector<std::uint32_t> welded(positions_.size(), none);
     has_colors_ = has_colors_ && !positions_.empty();
     for (Triangle& triangle : triangles_) {
       for (std::uint32_t& corner : triangle) {
         std::uint32_t& vertex = welded[corner];
         if (vertex == none) {
-          const Color color = has_colors_ ? colors_[corner] : Color{};
           const Eigen::Vector3f normal = normal_at(corner);
-          const auto [found, is_new] =
-              known.try_emplace(corner_of(positions_[corner], normal, color),
-                                static_cast<std::uint32_t>(mesh.vertices.size()));
-          vertex = found->second;
-          if (is_new) {
-            mesh.vertices.push_back(positions_[corner]);
-            if (has_normals_) mesh.vertex_normals.push_back(normal);
-            if (has_colors_) mesh.vertex_colors.push_back(color);
-          }
+          vertex = welder.vertex(positions_[corner], has_normals_ ? &normal : nullptr,
+                                 has_colors_ ? &colors_[corner] : nullptr, mesh);
         }
         corner = vertex;
       }

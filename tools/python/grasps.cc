@@ -2,7 +2,7 @@
 #include "libgtd/grasp/grasp_trials.h"
 #include "libgtd/gripper/gripper_io.h"
 #include "libmap/core/error.h"
-#include "tools/python/arguments.h"
+#include "tools/python/values.h"
 
 namespace graspmap_python {
 

@@ -1,6 +1,6 @@
 #include "libmap/core/error.h"
 #include "libmap/view/scene_view.h"
-#include "tools/python/arguments.h"
+#include "tools/python/values.h"
 
 namespace graspmap_python {
 

@@ -9,7 +9,7 @@
 #include "libmap/core/data_folder.h"
 #include "libmap/core/error.h"
 #include "libmap/core/table.h"
-#include "tools/python/arguments.h"
+#include "tools/python/values.h"
 
 namespace graspmap_python {
 

@@ -1,7 +1,7 @@
 // The extension module graspmap._core: the libraries on arrays. The face of it is in graspmap/.
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
-#include "tools/python/arguments.h"
+#include "tools/python/values.h"
 
 namespace {
 

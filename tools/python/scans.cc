@@ -7,7 +7,7 @@
 #include "libmap/refine/refinement.h"
 #include "libmap/scan/pose_import.h"
 #include "libmap/scan/scan_source.h"
-#include "tools/python/arguments.h"
+#include "tools/python/values.h"
 
 namespace graspmap_python {
 

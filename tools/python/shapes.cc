@@ -5,7 +5,7 @@
 #include "libmap/core/manifest.h"
 #include "libmap/io/cloud_io.h"
 #include "libmap/io/mesh_io.h"
-#include "tools/python/arguments.h"
+#include "tools/python/values.h"
 
 namespace graspmap_python {
 

@@ -3,7 +3,7 @@
 #include "libmap/mesh/poisson_disk.h"
 #include "libmap/surface/mesh_cleaning.h"
 #include "libmap/surface/surface_reconstruction.h"
-#include "tools/python/arguments.h"
+#include "tools/python/values.h"
 
 namespace graspmap_python {
 

@@ -14,8 +14,7 @@
 
 #include "libmap/core/parallel.h"
 #include "tools/support/commands.h"
-#include "tools/support/end_signals.h"
-#include "tools/support/standard_output.h"
+#include "tools/support/process_end.h"
 
 namespace graspmap_tools {
 

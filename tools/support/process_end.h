@@ -1,5 +1,8 @@
-// Removes unfinished outputs when a signal (SIGHUP, SIGINT, SIGTERM) ends a command.
+// Removes unfinished outputs when a signal (SIGHUP, SIGINT, SIGTERM) ends a command, and detects
+// standard output that could not be written.
 #pragma once
+
+#include <string>
 
 namespace graspmap_tools {
 
@@ -13,5 +16,11 @@ void end_cleanly_on_signals();
 
 // Does not return if such a signal was received, because later errors are caused by it.
 void exit_if_signaled();
+
+// Flushes standard output. Throws Error (failed) if not all of it was written.
+void require_printed();
+
+// Flushes standard output. Returns 0, or 1 with an error line on stderr if it was not all written.
+int exit_code_of_printing(const std::string& program);
 
 }  // namespace graspmap_tools

@@ -1,4 +1,4 @@
-#include "tools/support/end_signals.h"
+#include "tools/support/process_end.h"
 
 #include <fcntl.h>
 #include <pthread.h>
@@ -7,13 +7,16 @@
 #include <atomic>
 #include <cerrno>
 #include <csignal>
+#include <cstdio>
 #include <cstring>
 #include <future>
+#include <iostream>
 #include <thread>
 #include <utility>
 
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
+#include "libmap/core/output_lock.h"
 
 namespace graspmap_tools {
 
@@ -83,6 +86,25 @@ void end_cleanly_on_signals() {
 
 void exit_if_signaled() {
   while (is_told) pause();
+}
+
+void require_printed() {
+  errno = 0;
+  std::cout.flush();
+  std::fflush(stdout);
+  // Failed writes are visible in the streams' state only.
+  if (std::cout && std::ferror(stdout) == 0) return;
+  throw libmap::system_failure("standard output", "cannot be written", errno);
+}
+
+int exit_code_of_printing(const std::string& program) {
+  try {
+    require_printed();
+    return 0;
+  } catch (const libmap::Error& error) {
+    std::cerr << program << ": error: " << error.what() << "\n";
+    return 1;
+  }
 }
 
 }  // namespace graspmap_tools
