@@ -142,10 +142,29 @@ decltype(auto) call(const Function& function, const std::array<py::object, sizeo
 template <typename>
 using Given = const py::object&;
 
+// The value of a required parameter that the call does not give.
+inline py::object missing_value() { return py::reinterpret_borrow<py::object>(Py_NotImplemented); }
+inline py::arg_v with_default(const py::arg& required) {
+  return {required.name, missing_value(), "..."};
+}
+inline py::arg_v with_default(const py::arg_v& optional) { return optional; }
+
+template <std::size_t count>
+void check_given(const std::array<const char*, count>& names,
+                 const std::array<py::object, count>& given, const py::kwargs& others) {
+  std::vector<std::string> unknown;
+  for (const auto& other : others) unknown.push_back(other.first.cast<std::string>());
+  std::vector<std::string> missing;
+  for (std::size_t n = 0; n < count; ++n)
+    if (given[n].is(missing_value())) missing.emplace_back(names[n]);
+  check_names({names.begin(), names.end()}, unknown, missing);
+}
+
 // The function with its arguments as objects of Python.
 template <typename Result, typename... Types>
 auto checked(Result (*function)(Types...), std::array<const char*, sizeof...(Types)> names) {
-  return [=](Given<Types>... given) -> Result {
+  return [=](Given<Types>... given, const py::kwargs& others) -> Result {
+    check_given<sizeof...(Types)>(names, {given...}, others);
     return call<std::remove_cvref_t<Types>...>(function, {given...}, names,
                                                std::index_sequence_for<Types...>{});
   };
@@ -155,7 +174,8 @@ auto checked(Result (*function)(Types...), std::array<const char*, sizeof...(Typ
 template <typename Result, typename Self, typename... Types>
 auto checked(Result (*method)(const Self&, Types...),
              std::array<const char*, sizeof...(Types)> names) {
-  return [=](const Self& self, Given<Types>... given) -> Result {
+  return [=](const Self& self, Given<Types>... given, const py::kwargs& others) -> Result {
+    check_given<sizeof...(Types)>(names, {given...}, others);
     const auto bound = [&](const auto&... arguments) { return method(self, arguments...); };
     return call<std::remove_cvref_t<Types>...>(bound, {given...}, names,
                                                std::index_sequence_for<Types...>{});
@@ -168,18 +188,18 @@ void define(py::module_& module, const char* name, Result (*function)(Types...),
   module.def(name, checked(function, parameters));
 }
 
-// Parameters are py::arg, with default values.
+// Parameters are py::arg; those without a default value are required.
 template <typename Class, typename Method, typename... Parameters>
 void define_method(Class& type, const char* name, Method method, const char* documentation,
                    const Parameters&... parameters) {
   const std::array<const char*, sizeof...(Parameters)> names{parameters.name...};
-  type.def(name, checked(method, names), documentation, parameters...);
+  type.def(name, checked(method, names), documentation, with_default(parameters)...);
 }
 
 template <typename Class, typename Function, typename... Parameters>
 void define_constructor(Class& type, Function make, const Parameters&... parameters) {
   const std::array<const char*, sizeof...(Parameters)> names{parameters.name...};
-  type.def(py::init(checked(make, names)), parameters...);
+  type.def(py::init(checked(make, names)), with_default(parameters)...);
 }
 
 }  // namespace graspmap_python

@@ -63,6 +63,14 @@ inline Shape rows(std::size_t count, py::ssize_t width) {
 // Error of a parameter whose value has a wrong type or shape.
 libmap::Error wrong_value(py::handle given, const std::string& name, const std::string& bound);
 
+// Throws Error for the first of `others`, keywords that no parameter has, or else for the first of
+// `missing`, parameters without a value.
+void check_names(const std::vector<std::string>& parameters, const std::vector<std::string>& others,
+                 const std::vector<std::string>& missing);
+
+// Bound of a name, as in "one of a b".
+std::string one_of(const std::vector<std::string>& names);
+
 // Types of numbers: NumPy's letters, and their size (0: any).
 struct Numbers {
   std::string_view kinds;
