@@ -123,7 +123,7 @@ MapRaster make_map_raster(const CloudParts& parts, const RasterGrid& grid) {
 }
 
 void write_map_raster(const std::filesystem::path& path, const MapRaster& raster) {
-  raster_module().write_raster(path, raster);
+  in_file(path, [&] { raster_module().write_raster(path, raster); });
 }
 
 }  // namespace libmap

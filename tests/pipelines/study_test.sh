@@ -83,6 +83,6 @@ run -j2 LOOKUP="--mode maximum --radius 0.05" >"$scratch/log"
   fail "the look-up changed the map"
 for wrong in SCENARIOS=5 METHODS=theses STAGES=all OUT= 'OUT=two words'; do
   if run "$wrong" >/dev/null 2>"$scratch/errors"; then fail "$wrong was accepted"; fi
-  grep -q 'not one of\|not set\|contains a space' "$scratch/errors" || fail "no clear error for $wrong"
+  grep -q "\*\*\* ${wrong%%=*} .*${wrong#*=}" "$scratch/errors" || fail "the error does not name $wrong"
 done
 echo "passed"

@@ -78,7 +78,7 @@ class Arrays(unittest.TestCase):
             cloud[[len(cloud)]]
         with self.assertRaises(graspmap.Error) as raised:
             cloud[high[1:]]
-        self.assertEqual(raised.exception.bound, str(len(cloud)))
+        self.assertEqual((raised.exception.field, raised.exception.bound), ("index", str(len(cloud))))
 
     def test_transform(self):
         turn = np.array([[0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1.0]])
@@ -120,7 +120,8 @@ class Arrays(unittest.TestCase):
         self.assertIsNone(graspmap.read_manifest(folder / "mesh.ply"))
         with self.assertRaises(graspmap.Error) as raised:
             graspmap.write_cloud(folder / "cloud.ply", plain())
-        self.assertEqual(raised.exception.file, str(folder / "cloud.ply.json"))
+        self.assertEqual((raised.exception.file, raised.exception.kind),
+                         (str(folder / "cloud.ply.json"), "bad_input"))
 
 
 class Errors(unittest.TestCase):
@@ -137,16 +138,21 @@ class Errors(unittest.TestCase):
             self.assertEqual(error.field, "positions")
             self.assertIn(value, error.value)
             self.assertIn("(N, 3)", error.bound)
-        self.assertIn("row 1", self.error(graspmap.Cloud, [[0, 0, 0], [0, np.nan, 0]]).field)
+        error = self.error(graspmap.Cloud, [[0, 0, 0], [0, np.nan, 0]])
+        self.assertEqual(error.field, "positions, row 1")
         points = np.zeros((2, 3))
         self.assertEqual(self.error(graspmap.Cloud, points, colors=[[0.5, 0, 0]] * 2).field, "colors")
-        self.assertIn("score", self.error(graspmap.Cloud, points, fields={"score": ["a", "b"]}).field)
-        self.error(graspmap.Cloud, points, normals=np.zeros((3, 3)))
+        error = self.error(graspmap.Cloud, points, fields={"score": ["a", "b"]})
+        self.assertEqual(error.field, "field score")
+        error = self.error(graspmap.Cloud, points, normals=np.zeros((3, 3)))
+        self.assertEqual((error.field, error.value), ("normals", "3 values long"))
         self.assertEqual(self.error(graspmap.Mesh, points, [[0, 1, -1]]).field, "triangles")
-        self.error(graspmap.Mesh, points, [[0, 1, 2]])
+        error = self.error(graspmap.Mesh, points, [[0, 1, 2]])
+        self.assertEqual((error.field, error.value, error.bound), ("triangle 0", "vertex 2", "< 2"))
         self.assertEqual(self.error(plain().transformed, 2 * np.eye(4)).field, "target_from_source")
-        self.error(graspmap.Poses, [1, 2], np.eye(4)[None])
-        self.error(graspmap.to_png, np.zeros((3, 3), np.uint8))
+        error = self.error(graspmap.Poses, [1, 2], np.eye(4)[None])
+        self.assertEqual(error.field, "world_from_base")
+        self.assertEqual(self.error(graspmap.to_png, np.zeros((3, 3), np.uint8)).field, "image")
 
     def test_options_are_checked_as_on_the_command_line(self):
         error = self.error(graspmap.resample, square(), radius_m=-1.0)
@@ -168,24 +174,40 @@ class Errors(unittest.TestCase):
     def test_files_that_are_none(self):
         error = self.error(graspmap.read_cloud, "none.pcd")
         self.assertEqual((error.file, error.kind), ("none.pcd", "bad_input"))
-        self.error(graspmap.read_mesh, "none.ply")
-        self.error(graspmap.open_scan, "none.db")
-        self.error(graspmap.write_cloud, "cloud.txt", plain())
-        self.error(graspmap.write_cloud, "no/such/folder/cloud.pcd", plain())
+        for function, name in [(graspmap.read_mesh, "none.ply"), (graspmap.open_scan, "none.db")]:
+            error = self.error(function, name)
+            self.assertEqual((error.file, error.field, error.kind), (name, "", "bad_input"))
+        error = self.error(graspmap.write_cloud, "cloud.txt", plain())
+        self.assertEqual((error.file, error.field, error.value, error.bound),
+                         ("cloud.txt", "extension", ".txt", ".pcd, .ply, .csv or .vtp"))
+        error = self.error(graspmap.write_cloud, "no/such/folder/cloud.pcd", plain())
+        self.assertEqual((error.file, error.kind), ("no/such/folder/cloud.pcd", "bad_input"))
+        self.assertIn("no/such/folder", error.reason)
 
     def test_an_error_can_be_pickled(self):
         error = pickle.loads(pickle.dumps(self.error(graspmap.read_cloud, "none.pcd")))
         self.assertEqual(error.file, "none.pcd")
 
     def test_wrong_data(self):
-        self.error(graspmap.score, graspmap.Cloud(np.zeros((0, 3))))
-        self.error(graspmap.lookup, graspmap.Cloud(np.zeros((0, 3))), [[0, 0, 0]])
-        self.error(graspmap.grasp, square(), [[9, 9, 9]])
-        self.error(graspmap.grasp, square(), [[0.1, 0.1, 0]], surface_error="much")
-        self.error(graspmap.evaluate, {"graspable": [1, 0], "score": [0.5]})
-        self.error(graspmap.evaluate, {"graspable": [1, 0], "score": [0.5, 0.1]}, label="verdict")
-        self.error(graspmap.render, plain(), markers=[[0, 0, 0]], labels=["a", "b"])
-        self.error(graspmap.mesh, graspmap.Cloud(plain().positions))
+        empty = graspmap.Cloud(np.zeros((0, 3)))
+        for function, arguments, about in [
+                (graspmap.score, [empty], "points"),
+                (graspmap.lookup, [empty, [[0, 0, 0]]], "points"),
+                (graspmap.mesh, [graspmap.Cloud(plain().positions)], "normals")]:
+            error = self.error(function, *arguments)
+            self.assertIn(about, error.reason)
+            self.assertEqual(error.kind, "bad_input")
+        error = self.error(graspmap.grasp, square(), [[9, 9, 9]])
+        self.assertEqual((error.field, error.value), ("location 1", "9,9,9"))
+        error = self.error(graspmap.grasp, square(), [[0.1, 0.1, 0]], surface_error="much")
+        self.assertEqual((error.field, error.value), ("surface_error", "'much'"))
+        error = self.error(graspmap.evaluate, {"graspable": [1, 0], "score": [0.5]})
+        self.assertEqual((error.field, error.value, error.bound), ("column score", "1", "2"))
+        table = {"graspable": [1, 0], "score": [0.5, 0.1]}
+        self.assertEqual(self.error(graspmap.evaluate, table, label="verdict").field,
+                         "column 'verdict'")
+        error = self.error(graspmap.render, plain(), markers=[[0, 0, 0]], labels=["a", "b"])
+        self.assertEqual((error.field, error.value, error.bound), ("labels", "2", "1"))
 
 
 def table_of_labels():
@@ -244,6 +266,36 @@ class Arguments(unittest.TestCase):
                         self.assertTrue(raised.exception.bound)
                         count += 1
         self.assertGreater(count, 150)
+
+    def test_unknown_parameters_are_named(self):
+        """Also one that replaces a required one; the parameters of the function are the bound."""
+        for function, parameters in self.functions():
+            given = {name: self.GIVEN[name] for name, default in parameters.items()
+                     if default is inspect.Parameter.empty}
+            if inspect.isfunction(function) and "values" in inspect.signature(function).parameters:
+                continue  # an unknown option, which the stage names
+            for arguments in (given, {}):
+                with self.subTest(function=function.__name__, arguments=list(arguments)):
+                    with self.assertRaises(graspmap.Error) as raised:
+                        function(**arguments | {"nonsense": 1})
+                    error = raised.exception
+                    self.assertEqual((error.field, error.kind), ("nonsense", "bad_input"))
+                    self.assertEqual(error.bound, " ".join(["one of", *parameters]))
+        self.assertEqual(self.field_of_error(graspmap.Cloud, position=np.zeros((1, 3))), "position")
+        self.assertEqual(self.field_of_error(graspmap.score, plain(9), voxel_sise_m=1),
+                         "voxel_sise_m")
+
+    def test_missing_arguments_are_named(self):
+        count = 0
+        for function, parameters in self.functions():
+            given = {name: self.GIVEN[name] for name, default in parameters.items()
+                     if default is inspect.Parameter.empty}
+            for name in given:
+                with self.subTest(function=function.__name__, parameter=name):
+                    others = {one: value for one, value in given.items() if one != name}
+                    self.assertEqual(self.field_of_error(function, **others), name)
+                    count += 1
+        self.assertGreater(count, 30)
 
     def field_of_error(self, function, *arguments, **values):
         with self.assertRaises(graspmap.Error) as raised:

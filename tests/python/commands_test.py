@@ -99,6 +99,11 @@ class Commands(unittest.TestCase):
             with self.assertRaises(graspmap.Error) as raised:
                 method(**given | {name: object()})
             self.assertEqual(raised.exception.field, name)
+        for method, given, name in [(scan.frame, {"nodes": 1}, "nodes"), (scan.frame, {}, "node"),
+                                    (scan.poses, {"sources": "auto"}, "sources")]:
+            with self.assertRaises(graspmap.Error) as raised:
+                method(**given)
+            self.assertEqual(raised.exception.field, name)
 
     def test_surface(self):
         made = graspmap.mesh(graspmap.read_cloud(self.example("cloud.ply")))

@@ -16,7 +16,7 @@ struct ExpectedError {
   std::string field{};
   std::string value{};
   std::string bound{};
-  // A word of the reason, for an error that its other parts do not identify.
+  // A name or number in the reason, for an error that its other parts do not identify.
   std::string about{};
   libmap::ErrorKind kind = libmap::ErrorKind::bad_input;
 };
@@ -24,7 +24,7 @@ struct ExpectedError {
 testing::AssertionResult is_error(const libmap::Error& error, const ExpectedError& expected);
 
 // Compares the text of an error, "FILE: FIELD is VALUE: REASON (must be BOUND)", as a command
-// prints it. Does not compare the kind.
+// prints it, or of a warning of this form. Does not compare the kind.
 testing::AssertionResult is_error_text(const std::string& text, const ExpectedError& expected);
 
 }  // namespace graspmap_test

@@ -157,8 +157,8 @@ TEST(CommandLine, DryRunWritesNothing) {
   EXPECT_TRUE(bad_input(score_quickly({"--dry-run", "--voxel-size", "10"}),
                         {.field = "voxel_size_m", .value = "10"}))
       << "it checks all the same";
-  EXPECT_TRUE(
-      bad_input(graspmap({"score", "none.pcd", "-o", "m.csv", "--dry-run"}), {.file = "none.pcd"}));
+  EXPECT_TRUE(bad_input(graspmap({"score", "none.pcd", "-o", "m.csv", "--dry-run"}),
+                        {.file = "none.pcd", .about = "no such"}));
   EXPECT_EQ(graspmap_test::names_in_scratch(), before);
 }
 

@@ -153,7 +153,7 @@ TEST(Crop, Polygons) {
                 {.file = "outline.csv", .field = "corners", .value = "2", .bound = ">= 3"}));
   EXPECT_TRUE(bad_input(
       with("x,y\n"), {.file = "outline.csv", .field = "corners", .value = "0", .bound = ">= 3"}));
-  EXPECT_TRUE(bad_input(with(""), {.file = "outline.csv"}));
+  EXPECT_TRUE(bad_input(with(""), {.file = "outline.csv", .about = "no header"}));
   EXPECT_TRUE(
       bad_input(with("x,z\n0,0\n1,0\n1,1\n"), {.file = "outline.csv", .field = "column 'y'"}));
   EXPECT_TRUE(bad_input(with("x,y\n0,0\n1,one\n1,1\n"),
@@ -234,8 +234,10 @@ TEST(Crop, BadInput) {
                          .field = "extension",
                          .value = ".pcd",
                          .bound = ".ply, .obj, .stl, .off, .glb or .vtp"}));
-  EXPECT_TRUE(bad_input(graspmap({"crop", "map.ply", "-o", "map.ply"}), {.file = "map.ply"}));
-  EXPECT_TRUE(bad_input(graspmap({"crop", "none.ply", "-o", "new.ply"}), {.file = "none.ply"}));
+  EXPECT_TRUE(bad_input(graspmap({"crop", "map.ply", "-o", "map.ply"}),
+                        {.file = "map.ply", .about = "is the input"}));
+  EXPECT_TRUE(bad_input(graspmap({"crop", "none.ply", "-o", "new.ply"}),
+                        {.file = "none.ply", .about = "no such"}));
   EXPECT_TRUE(wrong_usage(graspmap({"crop", "map.ply"}), {"--output"}));
   EXPECT_EQ(names_in_scratch(), (Words{"map.ply"}));
   // A file of the user has the name of the transform's file.
@@ -266,8 +268,7 @@ TEST(Crop, BorderOfKnownSizeGivesTheScale) {
   };
   const auto result = with("site.ply", {"--border", "--border-size", "1x1.2", "--margin", "0.05"});
   ASSERT_TRUE(succeeded(result));
-  EXPECT_NE(result.standard_error.find("refine --scale 0.99"), std::string::npos)
-      << result.standard_error;
+  EXPECT_NE(result.standard_error.find("--scale 0.99"), std::string::npos) << result.standard_error;
   const nlohmann::json results = json_of("site.ply.json").at("results");
   EXPECT_NEAR(results.at("border_scale"), 1 / 1.008, 0.004);
   EXPECT_LT(results.at("border_scale_deviation"), 0.004);

@@ -163,7 +163,8 @@ TEST(SpotCheckCommand, BadInput) {
     more.insert(more.begin(), {"compare", "--edges", "site.ply", "--quiet"});
     return graspmap(more);
   };
-  EXPECT_TRUE(bad_input(graspmap({"compare", "--edges", "none.ply"}), {.file = "none.ply"}));
+  EXPECT_TRUE(bad_input(graspmap({"compare", "--edges", "none.ply"}),
+                        {.file = "none.ply", .about = "no such"}));
   EXPECT_TRUE(bad_input(run({"-o", "check.txt"}), {.file = "check.txt", .about = ".csv"}));
   EXPECT_TRUE(bad_input(run({"--places", "0"}),
                         {.field = "--places", .value = "0", .bound = ">= 1 and <= 10000"}));
@@ -179,10 +180,11 @@ TEST(SpotCheckCommand, BadInput) {
   EXPECT_TRUE(bad_input(run({"--box", "10,10,0,12,12,1"}), {.file = "site.ply", .about = "edges"}));
   EXPECT_TRUE(bad_input(run({"--truth", "mesh.ply", "--ground", "fit"}),
                         {.field = "--ground", .about = "--truth"}));
-  EXPECT_TRUE(bad_input(run({"--truth", "site.ply"}), {.file = "site.ply"}));
+  EXPECT_TRUE(
+      bad_input(run({"--truth", "site.ply"}), {.file = "site.ply", .about = "no triangle"}));
   libmap::write_cloud(scratch("empty.ply"), {});
   EXPECT_TRUE(bad_input(graspmap({"compare", "--edges", "empty.ply", "--ground", "zero"}),
-                        {.file = "empty.ply"}));
+                        {.file = "empty.ply", .about = "no points"}));
   ASSERT_TRUE(succeeded(run({"--ground", "zero", "-o", "check.csv", "--dry-run"})));
   EXPECT_EQ(graspmap_test::names_in_scratch(), (Words{"empty.ply", "mesh.ply", "site.ply"}));
 }

@@ -142,7 +142,8 @@ TEST(InfoScan, WhatIsNoScan) {
   EXPECT_TRUE(bad_input(graspmap({"info", "other.db"}), {.file = "other.db", .about = "no table"}));
   EXPECT_TRUE(bad_input(graspmap({"info", "none.db"}), {.file = "none.db", .about = "no such"}));
   std::filesystem::create_directory(scratch("folder"));
-  EXPECT_TRUE(bad_input(graspmap({"info", "folder"}), {.file = "folder"}));
+  EXPECT_TRUE(
+      bad_input(graspmap({"info", "folder"}), {.file = "folder", .about = "associations.txt"}));
   write_terrain();
   EXPECT_TRUE(bad_input(graspmap({"info", "terrain.pcd", "--verify"}),
                         {.file = "terrain.pcd", .field = "--verify"}));

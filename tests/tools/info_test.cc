@@ -154,7 +154,7 @@ TEST(Info, BadInput) {
   EXPECT_TRUE(bad_input(graspmap({"info", "a.txt"}),
                         {.file = "a.txt", .field = "extension", .value = ".txt"}));
   graspmap_test::write_text(scratch("a.ply"), "hello");
-  EXPECT_TRUE(bad_input(graspmap({"info", "a.ply", "--json"}), {.file = "a.ply"}));
+  EXPECT_TRUE(bad_input(graspmap({"info", "a.ply", "--json"}), {.file = "a.ply", .about = "PLY"}));
   EXPECT_TRUE(bad_input(graspmap({"info", "."}), {.file = ".", .about = "associations.txt"}));
 }
 

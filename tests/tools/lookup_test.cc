@@ -258,7 +258,7 @@ TEST_F(LookupBadInput, MissingColumn) {
   EXPECT_TRUE(
       bad_input(lookup("x,y,hight\n1,2,3\n"), {.file = "points.csv", .field = "column 'z'"}));
   EXPECT_TRUE(bad_input(lookup("X,Y,Z\n1,2,3\n"), {.file = "points.csv", .field = "column 'x'"}));
-  EXPECT_TRUE(bad_input(lookup(""), {.file = "points.csv"}));
+  EXPECT_TRUE(bad_input(lookup(""), {.file = "points.csv", .about = "no header"}));
 }
 
 TEST_F(LookupBadInput, TextInANumber) {
@@ -274,7 +274,8 @@ TEST_F(LookupBadInput, BrokenTable) {
   EXPECT_TRUE(bad_input(lookup("x,y,z\n1,2\n"),
                         {.file = "points.csv", .field = "line 2", .value = "2 cells long"}));
   EXPECT_TRUE(bad_input(lookup("x,y,z\n1,\"2,3\n"), {.file = "points.csv", .field = "line 3"}));
-  EXPECT_TRUE(bad_input(lookup(std::string("x,y,z\n1,\0002,3\n", 13)), {.file = "points.csv"}));
+  EXPECT_TRUE(bad_input(lookup(std::string("x,y,z\n1,\0002,3\n", 13)),
+                        {.file = "points.csv", .about = "text file"}));
 }
 
 TEST_F(LookupBadInput, MapsThatCannotBe) {
@@ -290,7 +291,7 @@ TEST_F(LookupBadInput, MapsThatCannotBe) {
                         {.file = "empty.csv", .about = "no points"}));
   write_text(scratch("map.csv.json"), "{broken");
   EXPECT_TRUE(bad_input(graspmap({"lookup", "map.csv", "points.csv", "-o", "out.csv"}),
-                        {.file = "map.csv.json"}));
+                        {.file = "map.csv.json", .about = "manifest"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("out.csv")));
 }
 
@@ -321,9 +322,8 @@ TEST_F(LookupBadInput, CloudsThatCannotHaveBeenMeasured) {
   const auto visible = [](const std::string& cloud) {
     return graspmap({"lookup", "map.csv", "points.csv", "-o", "out.csv", "--visible", cloud});
   };
-  for (const std::string cloud : {"none.pcd", "empty.csv"}) {
-    EXPECT_TRUE(ended_with(visible(cloud), {.file = cloud}));
-  }
+  EXPECT_TRUE(ended_with(visible("none.pcd"), {.file = "none.pcd", .about = "no such"}));
+  EXPECT_TRUE(ended_with(visible("empty.csv"), {.file = "empty.csv", .about = "no points"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("out.csv")));
 }
 

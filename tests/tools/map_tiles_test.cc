@@ -152,26 +152,32 @@ TEST(MapTiles, DamageIsNamed) {
   const auto commands = {Words{"convert", "map.tiles", "-o", "merged.pcd"},
                          Words{"lookup", "map.tiles", "points.csv", "-o", "answers.csv"},
                          Words{"render", "map.tiles", "-o", "map.png"}};
-  const auto all_refuse = [&](const std::string& what) {
-    for (const Words& words : commands)
-      EXPECT_TRUE(bad_input(graspmap(words), {.file = tile})) << what;
+  const auto all_refuse = [&](const std::string& what,
+                              const graspmap_test::ExpectedError& expected) {
+    for (const Words& words : commands) EXPECT_TRUE(bad_input(graspmap(words), expected)) << what;
     EXPECT_TRUE(verified_as_broken(tile)) << what;
   };
   write_text(scratch(tile), whole.substr(0, whole.size() - 10));
-  all_refuse("cut off");
+  all_refuse("cut off", {.file = tile,
+                         .field = "size",
+                         .value = std::to_string(whole.size() - 10) + " bytes",
+                         .bound = std::to_string(whole.size())});
   fs::remove(scratch(tile));
-  all_refuse("missing");
+  all_refuse("missing", {.file = tile, .about = "no such"});
   // The hash reveals a changed byte of a score.
   std::string changed = whole;
   changed[changed.size() - 30] = static_cast<char>(changed[changed.size() - 30] ^ 1);
   write_text(scratch(tile), changed);
-  EXPECT_TRUE(bad_input(graspmap({"convert", "map.tiles", "-o", "merged.pcd"}), {.file = tile}));
+  EXPECT_TRUE(bad_input(graspmap({"convert", "map.tiles", "-o", "merged.pcd"}),
+                        {.file = tile, .field = "SHA-256"}));
   EXPECT_TRUE(verified_as_broken(tile));
   write_text(scratch(tile), whole);
   EXPECT_TRUE(succeeded(graspmap({"info", "map.tiles", "--verify"})));
   write_text(scratch("map.tiles/index.json"), "{");
-  EXPECT_TRUE(bad_input(graspmap({"info", "map.tiles"}), {.file = "map.tiles/index.json"}));
-  EXPECT_TRUE(bad_input(graspmap({"info", "none.tiles"}), {.file = "none.tiles"}));
+  EXPECT_TRUE(bad_input(graspmap({"info", "map.tiles"}),
+                        {.file = "map.tiles/index.json", .about = "index"}));
+  EXPECT_TRUE(
+      bad_input(graspmap({"info", "none.tiles"}), {.file = "none.tiles", .about = "no such"}));
   EXPECT_TRUE(bad_input(graspmap({"convert", "map.tiles", "map.pcd", "-o", "merged.pcd"}),
                         {.file = "map.tiles", .about = "merged"}));
 }

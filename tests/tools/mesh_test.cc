@@ -18,6 +18,7 @@ using graspmap_test::graspmap;
 using graspmap_test::json_of;
 using graspmap_test::scratch;
 using graspmap_test::succeeded;
+using graspmap_test::warned;
 using ::testing::HasSubstr;
 using Words = std::vector<std::string>;
 
@@ -90,7 +91,7 @@ TEST(Mesh, NormalsWithoutSidesAreOriented) {
   write_ball(cloud);
   const auto result = graspmap({"mesh", "ball.ply", "-o", "mesh.ply"});
   ASSERT_TRUE(succeeded(result));
-  EXPECT_NE(result.standard_error.find("warning"), std::string::npos);
+  EXPECT_TRUE(warned(result, {"ball.ply", "normals"}));
   const nlohmann::json results = json_of("mesh.ply.json").at("results");
   EXPECT_GT(results.at("opposing_normals"), 0.4);
   EXPECT_EQ(results.at("normals_oriented_by"), "a minimum spanning tree");
@@ -162,9 +163,10 @@ TEST(Mesh, BadOptions) {
                          .field = "extension",
                          .value = ".pcd",
                          .bound = ".ply, .obj, .stl, .off, .glb or .vtp"}));
-  EXPECT_TRUE(
-      bad_input(graspmap({"mesh", "ball.ply", "-o", "ball.ply", "--force"}), {.file = "ball.ply"}));
-  EXPECT_TRUE(bad_input(graspmap({"mesh", "none.ply", "-o", "mesh.ply"}), {.file = "none.ply"}));
+  EXPECT_TRUE(bad_input(graspmap({"mesh", "ball.ply", "-o", "ball.ply", "--force"}),
+                        {.file = "ball.ply", .about = "is the input"}));
+  EXPECT_TRUE(bad_input(graspmap({"mesh", "none.ply", "-o", "mesh.ply"}),
+                        {.file = "none.ply", .about = "no such"}));
   EXPECT_TRUE(bad_input(graspmap({"mesh", "ball.ply", "-o", "mesh.ply", "--cell-size", "-1"}),
                         {.field = "--cell-size", .value = "-1", .bound = ">= 0"}));
   EXPECT_TRUE(bad_input(graspmap({"mesh", "ball.ply", "-o", "mesh.ply", "--cell-size", "1e-6"}),

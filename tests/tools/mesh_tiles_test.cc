@@ -80,7 +80,7 @@ TEST(Pieces, FoldersAreReplacedWholeAndForeignOnesAreNot) {
   EXPECT_TRUE(bad_input(graspmap(larger), {.file = "surface", .about = ".txt"}));
   EXPECT_EQ(files_in("surface"), 4U);
   EXPECT_TRUE(bad_input(graspmap({"mesh", "terrain", "-o", "terrain", "--cell-size", "0.03"}),
-                        {.file = "terrain"}));
+                        {.file = "terrain", .about = "is the input"}));
   EXPECT_TRUE(bad_input(graspmap({"mesh", "terrain", "-o", "other"}),
                         {.field = "cell_size_m", .value = "0", .bound = "> 0"}));
   EXPECT_TRUE(

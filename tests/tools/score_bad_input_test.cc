@@ -53,7 +53,7 @@ TEST_F(ScoreBadInput, NoSuchFile) {
 
 TEST_F(ScoreBadInput, EmptyFileAndFolder) {
   write_text(scratch("empty.pcd"), "");
-  EXPECT_TRUE(bad_input(score({"empty.pcd"}), {.file = "empty.pcd"}));
+  EXPECT_TRUE(bad_input(score({"empty.pcd"}), {.file = "empty.pcd", .about = "empty"}));
   std::filesystem::create_directory(scratch("folder.pcd"));
   EXPECT_TRUE(bad_input(score({"folder.pcd"}), {.file = "folder.pcd", .about = ".pcd"}));
 }
@@ -69,10 +69,14 @@ TEST_F(ScoreBadInput, OnePointTwoPointsOnePlace) {
     EXPECT_TRUE(bad_input(score({cloud_of({{1, 2, 3}}), "--method", method}),
                           {.file = "cloud.pcd", .field = "points", .value = "1", .bound = ">= 3"}));
     EXPECT_TRUE(bad_input(score({cloud_of({{1, 2, 3}, {2, 2, 3}}), "--method", method}),
-                          {.file = "cloud.pcd"}));
-    EXPECT_TRUE(bad_input(
-        score({cloud_of(std::vector<Eigen::Vector3d>(50, {1, 2, 3})), "--method", method}),
-        {.file = "cloud.pcd"}));
+                          {.file = "cloud.pcd", .field = "points", .value = "2", .bound = ">= 3"}));
+    const auto in_one_place =
+        score({cloud_of(std::vector<Eigen::Vector3d>(50, {1, 2, 3})), "--method", method});
+    EXPECT_TRUE(bad_input(in_one_place, {.file = "cloud.pcd"}));
+    if (std::string(method) == "thesis")
+      EXPECT_TRUE(bad_input(in_one_place, {.field = "points", .value = "1", .bound = ">= 3"}));
+    else
+      EXPECT_TRUE(bad_input(in_one_place, {.about = "one place"}));
   }
 }
 
@@ -103,7 +107,7 @@ TEST_F(ScoreBadInput, HeaderPromisesMoreThanFollows) {
 
 TEST_F(ScoreBadInput, CloudWithoutZ) {
   write_text(scratch("flat.csv"), "x,y\n1,2\n");
-  EXPECT_TRUE(bad_input(score({"flat.csv"}), {.file = "flat.csv"}));
+  EXPECT_TRUE(bad_input(score({"flat.csv"}), {.file = "flat.csv", .about = "x, y and z"}));
 }
 
 TEST_F(ScoreBadInput, Grippers) {
@@ -218,7 +222,8 @@ TEST_F(ScoreBadInput, Scenarios) {
   EXPECT_TRUE(bad_input(with_scenario("method: thesis\nmethod: corrected\n"),
                         {.file = "scenario.yaml", .field = "method"}));
   EXPECT_TRUE(bad_input(with_scenario("a: b: c\n"), {.file = "scenario.yaml", .field = "line 1"}));
-  EXPECT_TRUE(bad_input(score({"terrain.pcd", "--config", "none.yaml"}), {.file = "none.yaml"}));
+  EXPECT_TRUE(bad_input(score({"terrain.pcd", "--config", "none.yaml"}),
+                        {.file = "none.yaml", .about = "no such"}));
   EXPECT_TRUE(bad_input(score({"terrain.pcd", "--config", "artificial_rocks_prescam"}),
                         {.field = "scenario",
                          .value = "artificial_rocks_prescam",
@@ -298,7 +303,7 @@ TEST_F(ScoreBadInput, OutputsThatCannotBe) {
                                     .value = "missing",
                                     .bound = ".pcd, .ply, .csv or .vtp"}));
   std::filesystem::create_directory(scratch("folder.pcd"));
-  EXPECT_TRUE(bad_input(to("folder.pcd"), {.file = "folder.pcd"}));
+  EXPECT_TRUE(bad_input(to("folder.pcd"), {.file = "folder.pcd", .about = "a folder"}));
 }
 
 }  // namespace score_bad_input_test

@@ -154,7 +154,7 @@ TEST(MergeOfShares, AcrossTheBoundOfSinglePrecisionIsTheWholeMap) {
 
 TEST_F(Merge, MissingShare) {
   EXPECT_TRUE(bad_input(merge({"a.pcd"}), {.field = "tile"}));
-  EXPECT_TRUE(bad_input(merge({"a.pcd", "none.pcd"}), {.file = "none.pcd"}));
+  EXPECT_TRUE(bad_input(merge({"a.pcd", "none.pcd"}), {.file = "none.pcd", .about = "manifest"}));
 }
 
 TEST_F(Merge, ShareTwice) {
@@ -215,7 +215,7 @@ TEST_F(Merge, CloudsThatAreNoShares) {
   EXPECT_TRUE(
       bad_input(merge({"a.pcd", "terrain.pcd"}), {.file = "terrain.pcd", .about = "no manifest"}));
   graspmap_test::write_text(scratch("b.pcd.json"), "{");
-  EXPECT_TRUE(bad_input(merge({"a.pcd", "b.pcd"}), {.file = "b.pcd.json"}));
+  EXPECT_TRUE(bad_input(merge({"a.pcd", "b.pcd"}), {.file = "b.pcd.json", .about = "manifest"}));
   EXPECT_TRUE(bad_input(graspmap({"convert", "a.pcd", "-o", "merged.xyz"}),
                         {.file = "merged.xyz",
                          .field = "extension",

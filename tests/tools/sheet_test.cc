@@ -40,19 +40,21 @@ TEST(Sheet, MapsAndImagesInOne) {
 TEST(Sheet, BadInputIsOneLine) {
   write_map("a.pcd", "corrected");
   graspmap_test::write_text(scratch("broken.png"), "\x89PNG and no more");
-  EXPECT_TRUE(bad_input(graspmap({"render", "none.pcd", "-o", "s.png"}), {.file = "none.pcd"}));
+  EXPECT_TRUE(bad_input(graspmap({"render", "none.pcd", "-o", "s.png"}),
+                        {.file = "none.pcd", .about = "no such"}));
   EXPECT_TRUE(bad_input(graspmap({"render", "broken.png", "-o", "s.png"}),
                         {.file = "broken.png", .field = "extension", .value = ".png"}));
   graspmap_test::write_text(scratch("empty.csv"), "x,y,z\n");
-  EXPECT_TRUE(
-      bad_input(graspmap({"render", "a.pcd", "empty.csv", "-o", "s.png"}), {.file = "empty.csv"}));
+  EXPECT_TRUE(bad_input(graspmap({"render", "a.pcd", "empty.csv", "-o", "s.png"}),
+                        {.file = "empty.csv", .about = "nothing to draw"}));
   EXPECT_TRUE(
       bad_input(graspmap({"render", "a.pcd", "-o", "s.jpg"}), {.file = "s.jpg", .about = ".png"}));
   EXPECT_TRUE(bad_input(graspmap({"render", "a.pcd", "-o", "s.png", "--captions", "a|b"}),
                         {.field = "--captions", .value = "2", .bound = "<= 1"}));
   EXPECT_TRUE(bad_input(graspmap({"render", "a.pcd", "-o", "s.png", "--row-titles", "a|b"}),
                         {.field = "row_titles", .value = "2", .bound = "<= 1"}));
-  EXPECT_TRUE(bad_input(graspmap({"render", "a.pcd", "-o", "a.pcd"}), {.file = "a.pcd"}));
+  EXPECT_TRUE(
+      bad_input(graspmap({"render", "a.pcd", "-o", "a.pcd"}), {.file = "a.pcd", .about = ".png"}));
   for (const auto& [flag, name] :
        {std::pair{"--no-legend", "--legend"}, std::pair{"--no-axes", "--axes"},
         std::pair{"--width=300", "--width"}, std::pair{"--camera-target=1,2,3", "--camera-target"}})
@@ -91,7 +93,7 @@ TEST(Summarize, BadInputIsOneLine) {
   EXPECT_TRUE(bad_input(graspmap({"analyze", "terrain.pcd", "-o", "sum"}),
                         {.file = "terrain.pcd", .field = "score"}));
   EXPECT_TRUE(bad_input(graspmap({"analyze", "a.pcd", "-o", "sum", "--expected", "e.csv"}),
-                        {.file = "e.csv"}));
+                        {.file = "e.csv", .about = "verdict"}));
   EXPECT_TRUE(bad_input(graspmap({"analyze", "a.pcd", "a.pcd", "-o", "sum", "--cutoff", "high"}),
                         {.file = "a.pcd", .field = "--cutoff", .value = "high"}));
   EXPECT_TRUE(bad_input(graspmap({"analyze", "a.pcd", "a.pcd", "-o", "sum", "--names", "a|b|c"}),
@@ -194,7 +196,8 @@ TEST(Mask, SectionsShowTheMask) {
 }
 
 TEST(Mask, SectionsBadInput) {
-  EXPECT_TRUE(bad_input(graspmap({"mask", "--sections", "-o", "m.txt"}), {.file = "m.txt"}));
+  EXPECT_TRUE(bad_input(graspmap({"mask", "--sections", "-o", "m.txt"}),
+                        {.file = "m.txt", .about = ".png"}));
   EXPECT_TRUE(bad_input(graspmap({"mask", "--sections", "--section-layer", "99", "-o", "m.png"}),
                         {.field = "section_layer", .value = "99", .bound = ">= 0 and <= 9"}));
 }

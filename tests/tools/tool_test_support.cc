@@ -1,6 +1,8 @@
 #include "tests/tools/tool_test_support.h"
 
+#include <algorithm>
 #include <cmath>
+#include <sstream>
 
 #include "libmap/io/cloud_io.h"
 #include "tests/support/file_names.h"
@@ -76,6 +78,21 @@ testing::AssertionResult wrong_usage(const ProgramResult& result,
     if (error.find(name) == std::string::npos)
       return testing::AssertionFailure() << "does not name '" << name << "': " << error;
   return testing::AssertionSuccess();
+}
+
+testing::AssertionResult warned(const ProgramResult& result,
+                                const std::vector<std::string>& names) {
+  std::istringstream lines(result.standard_error);
+  for (std::string line; std::getline(lines, line);) {
+    const bool has_all = std::all_of(names.begin(), names.end(), [&](const std::string& name) {
+      return line.find(name) != std::string::npos;
+    });
+    if (has_all && line.find(": warning: ") != std::string::npos)
+      return testing::AssertionSuccess() << line;
+  }
+  std::string list;
+  for (const std::string& name : names) list += " '" + name + "'";
+  return testing::AssertionFailure() << "no warning with" << list << ": " << told(result);
 }
 
 fs::path scratch(const std::string& name) { return scratch_folder() / name; }

@@ -36,6 +36,10 @@ testing::AssertionResult ended_with(const ProgramResult& result, const ExpectedE
 testing::AssertionResult wrong_usage(const ProgramResult& result,
                                      const std::vector<std::string>& names);
 
+// Success if one warning on stderr contains these names of files, fields, options or quantities,
+// and these numbers. Without names: any warning.
+testing::AssertionResult warned(const ProgramResult& result, const std::vector<std::string>& names);
+
 // A file in the scratch folder.
 std::filesystem::path scratch(const std::string& name);
 std::vector<std::string> names_in_scratch();

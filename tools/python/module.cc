@@ -11,10 +11,8 @@ const graspmap_python::Stage& stage_of(const std::string& name) {
     if (stage.name == name) return stage;
     names.push_back(stage.name);
   }
-  std::string known;
-  for (const std::string& other : names) known += (known.empty() ? "" : ", ") + other;
   throw libmap::Error("no stage with options has this name" + libmap::did_you_mean(name, names),
-                      {.field = "stage", .value = name, .bound = "one of " + known});
+                      {.field = "stage", .value = name, .bound = graspmap_python::one_of(names)});
 }
 
 pybind11::list options(const std::string& stage) { return stage_of(stage).options(); }
@@ -32,6 +30,7 @@ PYBIND11_MODULE(_core, module) {
   graspmap_python::add_images(module);
   graspmap_python::define(module, "options", &options, {"stage"});
   graspmap_python::define(module, "results", &results, {"stage"});
+  module.def("check_names", &graspmap_python::check_names);
   module.def("stages", [] {
     std::vector<std::string> names;
     for (const graspmap_python::Stage& stage : graspmap_python::stages())

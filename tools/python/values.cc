@@ -96,6 +96,20 @@ libmap::Error wrong_value(py::handle given, const std::string& name, const std::
                        {.field = name, .value = outline(given), .bound = bound});
 }
 
+std::string one_of(const std::vector<std::string>& names) {
+  std::string text = "one of";
+  for (const std::string& name : names) text += " " + name;
+  return text;
+}
+
+void check_names(const std::vector<std::string>& parameters, const std::vector<std::string>& others,
+                 const std::vector<std::string>& missing) {
+  if (!others.empty())
+    throw libmap::Error("unknown parameter" + libmap::did_you_mean(others.front(), parameters),
+                        {.field = others.front(), .bound = one_of(parameters)});
+  if (!missing.empty()) throw libmap::Error("is missing", {.field = missing.front()});
+}
+
 py::array checked_array(const py::object& given, const std::string& name, const Numbers& numbers,
                         const Shape& shape, const std::string& bound) {
   py::array array = py::array::ensure(given);

@@ -69,6 +69,14 @@ inline Shape rows(std::size_t count, py::ssize_t width) {
 // Error of a parameter whose value has a wrong type or shape.
 libmap::Error wrong_value(py::handle given, const std::string& name, const std::string& bound);
 
+// Throws Error for the first of `others`, keywords that no parameter has, or else for the first of
+// `missing`, parameters without a value.
+void check_names(const std::vector<std::string>& parameters, const std::vector<std::string>& others,
+                 const std::vector<std::string>& missing);
+
+// Bound of a name, as in "one of a b".
+std::string one_of(const std::vector<std::string>& names);
+
 // Types of numbers: NumPy's letters, and their size (0: any).
 struct Numbers {
   std::string_view kinds;
@@ -345,10 +353,29 @@ decltype(auto) call(const Function& function, const std::array<py::object, sizeo
 template <typename>
 using Given = const py::object&;
 
+// The value of a required parameter that the call does not give.
+inline py::object missing_value() { return py::reinterpret_borrow<py::object>(Py_NotImplemented); }
+inline py::arg_v with_default(const py::arg& required) {
+  return {required.name, missing_value(), "..."};
+}
+inline py::arg_v with_default(const py::arg_v& optional) { return optional; }
+
+template <std::size_t count>
+void check_given(const std::array<const char*, count>& names,
+                 const std::array<py::object, count>& given, const py::kwargs& others) {
+  std::vector<std::string> unknown;
+  for (const auto& other : others) unknown.push_back(other.first.cast<std::string>());
+  std::vector<std::string> missing;
+  for (std::size_t n = 0; n < count; ++n)
+    if (given[n].is(missing_value())) missing.emplace_back(names[n]);
+  check_names({names.begin(), names.end()}, unknown, missing);
+}
+
 // Returns the function with checked arguments, for pybind.
 template <typename Result, typename... Types>
 auto checked(Result (*function)(Types...), std::array<const char*, sizeof...(Types)> names) {
-  return [=](Given<Types>... given) -> Result {
+  return [=](Given<Types>... given, const py::kwargs& others) -> Result {
+    check_given<sizeof...(Types)>(names, {given...}, others);
     return call<std::remove_cvref_t<Types>...>(function, {given...}, names,
                                                std::index_sequence_for<Types...>{});
   };
@@ -358,7 +385,8 @@ auto checked(Result (*function)(Types...), std::array<const char*, sizeof...(Typ
 template <typename Result, typename Self, typename... Types>
 auto checked(Result (*method)(const Self&, Types...),
              std::array<const char*, sizeof...(Types)> names) {
-  return [=](const Self& self, Given<Types>... given) -> Result {
+  return [=](const Self& self, Given<Types>... given, const py::kwargs& others) -> Result {
+    check_given<sizeof...(Types)>(names, {given...}, others);
     const auto bound = [&](const auto&... arguments) { return method(self, arguments...); };
     return call<std::remove_cvref_t<Types>...>(bound, {given...}, names,
                                                std::index_sequence_for<Types...>{});
@@ -371,18 +399,18 @@ void define(py::module_& module, const char* name, Result (*function)(Types...),
   module.def(name, checked(function, parameters));
 }
 
-// Parameters are py::arg, with default values.
+// Parameters are py::arg; those without a default value are required.
 template <typename Class, typename Method, typename... Parameters>
 void define_method(Class& type, const char* name, Method method, const char* documentation,
                    const Parameters&... parameters) {
   const std::array<const char*, sizeof...(Parameters)> names{parameters.name...};
-  type.def(name, checked(method, names), documentation, parameters...);
+  type.def(name, checked(method, names), documentation, with_default(parameters)...);
 }
 
 template <typename Class, typename Function, typename... Parameters>
 void define_constructor(Class& type, Function make, const Parameters&... parameters) {
   const std::array<const char*, sizeof...(Parameters)> names{parameters.name...};
-  type.def(py::init(checked(make, names)), parameters...);
+  type.def(py::init(checked(make, names)), with_default(parameters)...);
 }
 
 }  // namespace graspmap_python

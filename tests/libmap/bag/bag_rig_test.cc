@@ -15,6 +15,7 @@ namespace rm = graspmap_test::rm;
 using graspmap_test::bytes_of;
 using graspmap_test::error_of;
 using graspmap_test::is_error;
+using graspmap_test::is_error_text;
 using graspmap_test::sample_depth;
 using graspmap_test::sample_header;
 using graspmap_test::sample_image;
@@ -152,7 +153,7 @@ TEST(BagRig, CompressedDepth) {
   EXPECT_EQ(images[1][0], 2250);  // mm
   EXPECT_EQ(images[1][1], 0);
   EXPECT_THAT(libmap::export_bag_rig(bag_path(), result, {}).warnings,
-              ElementsAre(HasSubstr("only PNG is supported")));
+              ElementsAre(HasSubstr("PNG")));
   // Compressed images are redundant if there are raw ones.
   SampleBag bag(bag_path());
   bag.transform("base_link", "a_optical", Pose::Identity()).camera("/a", {2.0});
@@ -261,6 +262,8 @@ TEST(BagRig, OddStampsAndCalibrationsAreLeftOut) {
   EXPECT_THAT(result.warnings, ElementsAre(HasSubstr("1 images are dropped because an earlier"),
                                            HasSubstr("1 images are dropped because their cal"),
                                            HasSubstr("no stamp")));
+  for (const std::string& warning : result.warnings)
+    EXPECT_TRUE(is_error_text(warning, {.field = "/a/image_raw"}));
 }
 
 TEST(BagRig, BrokenImagesAreCountedAndLeftOut) {
@@ -284,7 +287,7 @@ TEST(BagRig, BrokenImagesAreCountedAndLeftOut) {
   EXPECT_EQ(result.images, 1U);
   EXPECT_EQ(result.broken, 8U);
   ASSERT_EQ(result.warnings.size(), 1U);
-  EXPECT_THAT(result.warnings[0], HasSubstr("/a/image_raw: 8 images"));
+  EXPECT_TRUE(is_error_text(result.warnings[0], {.field = "/a/image_raw", .about = "8 images"}));
   EXPECT_THAT(result.warnings[0], HasSubstr("23 bytes"));
   // A set without usable images is dropped.
   ASSERT_EQ(result.sets.size(), 1U);

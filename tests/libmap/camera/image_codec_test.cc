@@ -117,7 +117,7 @@ TEST(ImageCodec, EveryTruncationIsAnError) {
        {encode_png(sample_color(1)), libmap::encode_jpeg(sample_color(1))}) {
     ASSERT_NO_THROW(libmap::decode_color(whole));
     for (std::size_t size = 0; size < whole.size(); ++size)
-      EXPECT_THROW(libmap::decode_color(whole.substr(0, size)), libmap::Error)
+      EXPECT_TRUE(is_error(error_of([&] { libmap::decode_color(whole.substr(0, size)); }), {}))
           << size << " of " << whole.size();
   }
 }
@@ -127,7 +127,7 @@ TEST(ImageCodec, FlippedBytesOfAPngAreNoticed) {
   for (std::size_t at = 0; at < whole.size(); ++at) {
     std::string broken = whole;
     broken[at] = static_cast<char>(broken[at] ^ 0x10);
-    EXPECT_THROW(libmap::decode_color(broken), libmap::Error) << at;
+    EXPECT_TRUE(is_error(error_of([&] { libmap::decode_color(broken); }), {})) << at;
   }
 }
 

@@ -76,9 +76,14 @@ TEST_F(OutputFolderTest, KeepsForeignContent) {
 TEST_F(OutputFolderTest, RefusesPathsOfNoUse) {
   graspmap_test::write_text(scratch_ / "file", "");
   fs::create_directory_symlink(scratch_, scratch_ / "link");
-  for (const char* name : {"file", "link", "missing/out", ".", ".."}) {
-    SCOPED_TRACE(name);
-    EXPECT_THROW(OutputFolder(scratch_ / name, names), libmap::Error);
+  for (const auto& [name, fault] : {std::pair{"file", "a folder"},
+                                    {"link", "a folder"},
+                                    {"missing/out", "no such"},
+                                    {".", "a name"},
+                                    {"..", "a name"}}) {
+    const fs::path path = scratch_ / name;
+    EXPECT_TRUE(graspmap_test::is_error(graspmap_test::error_of([&] { OutputFolder(path, names); }),
+                                        {.file = path, .about = fault}));
   }
 }
 

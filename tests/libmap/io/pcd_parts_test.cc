@@ -68,8 +68,8 @@ TEST(PcdParts, KeepTheirPromise) {
                          writer.append(other);
                        }),
                        {.about = "different fields"}));
-  EXPECT_EQ(error_of([] { PcdPartsWriter("/no/such/folder/a.pcd", {}); }).kind(),
-            ErrorKind::failed);
+  EXPECT_TRUE(is_error(error_of([] { PcdPartsWriter("/no/such/folder/a.pcd", {}); }),
+                       {.file = "/no/such/folder/a.pcd", .kind = ErrorKind::failed}));
 }
 
 }  // namespace pcd_parts_test

@@ -166,12 +166,24 @@ TEST(AssignNodes, TakesPosesWithoutNodesAndStampsInTheirOrder) {
 }
 
 TEST(AssignNodes, RefusesPosesOfNoUse) {
-  EXPECT_THROW(libmap::assign_nodes({{9, 0, random_pose()}}, graph_of_nodes()), libmap::Error);
-  EXPECT_THROW(libmap::assign_nodes({{0, 7.0, random_pose()}}, graph_of_nodes()), libmap::Error);
-  EXPECT_THROW(
-      libmap::assign_nodes({{2, 0, random_pose()}, {2, 1, random_pose()}}, graph_of_nodes()),
-      libmap::Error);
-  EXPECT_THROW(libmap::assign_nodes({}, graph_of_nodes()), libmap::Error);
+  EXPECT_TRUE(
+      graspmap_test::is_error(graspmap_test::error_of([&] {
+                                libmap::assign_nodes({{9, 0, random_pose()}}, graph_of_nodes());
+                              }),
+                              {.about = "none of the poses"}));
+  EXPECT_TRUE(
+      graspmap_test::is_error(graspmap_test::error_of([&] {
+                                libmap::assign_nodes({{0, 7.0, random_pose()}}, graph_of_nodes());
+                              }),
+                              {.about = "20 ms"}));
+  EXPECT_TRUE(graspmap_test::is_error(
+      graspmap_test::error_of([&] {
+        libmap::assign_nodes({{2, 0, random_pose()}, {2, 1, random_pose()}}, graph_of_nodes());
+      }),
+      {.field = "node", .value = "2"}));
+  EXPECT_TRUE(graspmap_test::is_error(
+      graspmap_test::error_of([&] { libmap::assign_nodes({}, graph_of_nodes()); }),
+      {.about = "none of the poses"}));
 }
 
 }  // namespace trajectory_io_test

@@ -168,8 +168,9 @@ TEST(MapRaster, BadInput) {
       error_of([&] { write_map_raster(scratch_folder() / "map.tif", raster); }).context().field,
       "georeference.crs_wkt");
   raster.georeference.crs_wkt.clear();
-  EXPECT_EQ(error_of([&] { write_map_raster(scratch_folder() / "no/map.tif", raster); }).kind(),
-            libmap::ErrorKind::failed);
+  const auto nowhere = scratch_folder() / "no/map.tif";
+  EXPECT_TRUE(is_error(error_of([&] { write_map_raster(nowhere, raster); }),
+                       {.file = nowhere, .kind = libmap::ErrorKind::failed}));
 }
 
 }  // namespace map_raster_test

@@ -282,8 +282,12 @@ TEST(InitialPoses, LinksAloneGiveParts) {
   const libmap::InitialPoses none = libmap::initial_poses(graph, StartPoses::visual);
   EXPECT_TRUE(none.map_from_base.empty());
   EXPECT_EQ(none.without_pose.size(), 6U);
-  EXPECT_THROW(libmap::initial_poses(graph, StartPoses::odometry), libmap::Error);
-  EXPECT_THROW(libmap::initial_poses(graph, StartPoses::stored), libmap::Error);
+  EXPECT_TRUE(graspmap_test::is_error(
+      graspmap_test::error_of([&] { libmap::initial_poses(graph, StartPoses::odometry); }),
+      {.field = "poses", .value = "odometry"}));
+  EXPECT_TRUE(graspmap_test::is_error(
+      graspmap_test::error_of([&] { libmap::initial_poses(graph, StartPoses::stored); }),
+      {.field = "poses", .value = "stored"}));
 }
 
 }  // namespace refinement_without_poses_test

@@ -193,9 +193,9 @@ TEST_F(TumFolder, PairsListsOfImagesByTime) {
   EXPECT_EQ(read.graph().nodes[0].id, 1);
   EXPECT_EQ(read.graph().nodes[0].stamp_s, 1305031102.160407);
   EXPECT_EQ(read.graph().nodes[1].stamp_s, 1305031102.226738);
-  EXPECT_EQ(read.warnings(),
-            (std::vector<std::string>{"1 depth image without a color image within 0.02 s",
-                                      "1 color image without a depth image within 0.02 s"}));
+  ASSERT_EQ(read.warnings().size(), 2U);
+  EXPECT_TRUE(read.warnings()[0].starts_with("1 depth image "));
+  EXPECT_TRUE(read.warnings()[1].starts_with("1 color image "));
   EXPECT_NEAR(read.read_frame(1).depth_later_s, 1102.160407 - 1102.175304, 1e-6);
   const libmap::RgbdFrame frame = read.read_frame(2);
   EXPECT_NEAR(frame.depth_later_s, 1102.226738 - 1102.211214, 1e-6);
@@ -289,7 +289,8 @@ TEST_F(TumFolder, InterpolatesBetweenPosesThatAreNear) {
 TEST_F(TumFolder, FollowsItsOptions) {
   write_pair();
   write_text(folder_ / "associations.txt", "3.5 rgb/1.png 3.9 depth/1.png\n");
-  EXPECT_THROW(FrameFolder read(folder_), libmap::Error);
+  EXPECT_TRUE(graspmap_test::is_error(graspmap_test::error_of([&] { FrameFolder read(folder_); }),
+                                      {.file = folder_, .about = "0.02 s"}));
   fs::rename(folder_ / "calibration.yaml", folder_ / "kinect.yaml");
   write_text(folder_ / "scan.yaml",
              "depth_unit_m: 0.001\ncalibration: kinect.yaml\npairing_tolerance_s: 0.4\n");
@@ -417,7 +418,9 @@ TEST_F(TumFolder, DropsLinksOfMissingNodes) {
   write_text(folder_ / "scan.yaml", "pose_frame: base\n");
   const FrameFolder read(folder_);
   EXPECT_EQ(read.graph().links.size(), 1U);
-  EXPECT_EQ(read.warnings(), std::vector<std::string>{"links.g2o: 1 link of missing nodes"});
+  ASSERT_EQ(read.warnings().size(), 1U);
+  EXPECT_TRUE(
+      graspmap_test::is_error_text(read.warnings()[0], {.file = "links.g2o", .about = "missing"}));
 }
 
 TEST_F(TumFolder, DropsLinksOfANodeToItself) {
@@ -428,7 +431,9 @@ TEST_F(TumFolder, DropsLinksOfANodeToItself) {
   write_text(folder_ / "scan.yaml", "pose_frame: base\n");
   const FrameFolder read(folder_);
   EXPECT_EQ(read.graph().links.size(), 1U);
-  EXPECT_EQ(read.warnings(), std::vector<std::string>{"links.g2o: 1 link of a node to itself"});
+  ASSERT_EQ(read.warnings().size(), 1U);
+  EXPECT_TRUE(
+      graspmap_test::is_error_text(read.warnings()[0], {.file = "links.g2o", .about = "itself"}));
 }
 
 TEST(FrameFolderError, OfFoldersThatAreNoScan) {
@@ -436,7 +441,9 @@ TEST(FrameFolderError, OfFoldersThatAreNoScan) {
   const libmap::Error error = graspmap_test::error_of([&] { libmap::open_scan(folder); });
   EXPECT_EQ(error.context().file, folder.string());
   EXPECT_TRUE(graspmap_test::is_error(error, {.about = ".txt"}));
-  EXPECT_THROW(FrameFolder(folder / "missing"), libmap::Error);
+  EXPECT_TRUE(
+      graspmap_test::is_error(graspmap_test::error_of([&] { FrameFolder(folder / "missing"); }),
+                              {.file = folder / "missing", .about = "no such"}));
 }
 
 TEST(FrameFolderError, OfNodesThatAreNotThere) {

@@ -68,8 +68,8 @@ TEST(RtabmapReader, LinksThatCannotBeUsedAreNamed) {
   const RtabmapDatabase scan(file);
   EXPECT_EQ(scan.graph().links.size(), 2U);
   ASSERT_EQ(scan.warnings().size(), 7U);
-  EXPECT_EQ(scan.warnings()[0], "link 1 -> 77: dropped: node 77 is missing");
-  EXPECT_NE(scan.warnings()[2].find("not finite"), std::string::npos);
+  EXPECT_TRUE(is_error_text(scan.warnings()[0], {.field = "link 1 -> 77", .about = "node 77"}));
+  EXPECT_TRUE(is_error_text(scan.warnings()[2], {.field = "link 2 -> 3", .about = "finite"}));
 }
 
 // Before 0.13, a link has variances instead of a matrix.
@@ -80,12 +80,12 @@ TEST(RtabmapReader, LinksWithoutAVarianceAreNamed) {
   execute(file, "UPDATE Link SET trans_variance = 9e999 WHERE from_id = 2 AND to_id = 1");
   const RtabmapDatabase scan(file);
   EXPECT_EQ(scan.graph().links.size(), links - 1);
-  EXPECT_EQ(scan.warnings(), (std::vector<std::string>{
-                                 "link 1 -> 2: dropped: variance is not finite and positive",
-                                 "link 2 -> 1: dropped: variance is not finite and positive"}));
+  ASSERT_EQ(scan.warnings().size(), 2U);
+  EXPECT_TRUE(is_error_text(scan.warnings()[0], {.field = "link 1 -> 2", .about = "variance"}));
+  EXPECT_TRUE(is_error_text(scan.warnings()[1], {.field = "link 2 -> 1", .about = "variance"}));
   execute(file, "UPDATE Link SET rot_variance = 1e-310 WHERE from_id = 1 AND to_id = 2");
-  EXPECT_EQ(RtabmapDatabase(file).warnings().front(),
-            "link 1 -> 2: dropped: reciprocal of the variance exceeds 1e300");
+  EXPECT_TRUE(is_error_text(RtabmapDatabase(file).warnings().front(),
+                            {.field = "link 1 -> 2", .about = "1e300"}));
 }
 
 TEST(RtabmapReader, NodesThatCannotBeUsedAreNamed) {
@@ -116,7 +116,7 @@ TEST(RtabmapReader, NodesThatAreThereTwice) {
   ASSERT_EQ(scan.graph().nodes.size(), 2U);
   EXPECT_EQ(scan.graph().nodes[0].id, 1);
   EXPECT_EQ(scan.graph().nodes[1].weight, 5);
-  EXPECT_NE(scan.warnings()[0].find("more than once"), std::string::npos);
+  EXPECT_TRUE(is_error_text(scan.warnings()[0], {.field = "node 3"}));
 }
 
 // SQLite sorts texts alphabetically: 1, 10, 2.
@@ -161,7 +161,7 @@ TEST(RtabmapReader, WarningsAreBounded) {
           "INTO Link SELECT i, 1, 0, zeroblob(288), zeroblob(48), NULL FROM n");
   const RtabmapDatabase scan(file);
   ASSERT_EQ(scan.warnings().size(), 101U);
-  EXPECT_EQ(scan.warnings().back(), "... and 391 more");
+  EXPECT_NE(scan.warnings().back().find("391"), std::string::npos);
 }
 
 TEST(RtabmapReader, RotationsAreMadeProper) {
@@ -181,27 +181,26 @@ TEST(RtabmapReader, BrokenOptimizedPosesAreLeftOut) {
   const RtabmapDatabase scan(file);
   EXPECT_TRUE(scan.graph().optimized_map_from_base.empty());
   ASSERT_EQ(scan.warnings().size(), 1U);
-  EXPECT_TRUE(scan.warnings()[0].starts_with("Admin.opt_poses: "));
+  EXPECT_TRUE(is_error_text(scan.warnings()[0], {.field = "Admin.opt_poses"}));
   execute(file, "UPDATE Admin SET opt_poses = NULL");
   EXPECT_TRUE(RtabmapDatabase(file).warnings().empty());
 }
 
 TEST(RtabmapReader, OptimizedPosesThatDoNotFitTheirIdsAreLeftOut) {
   const fs::path file = sample_file();
-  const auto warnings_with = [&](libmap::MatrixElement element, int count) {
+  const auto warning_with = [&](libmap::MatrixElement element, int count) {
     const std::string ids = bytes_of(std::vector<std::int32_t>(static_cast<std::size_t>(count), 1));
     execute(file, "UPDATE Admin SET opt_ids = ?",
             {encode_matrix(libmap::StoredMatrix{1, count, 1, element, ids})});
     const RtabmapDatabase scan(file);
     EXPECT_TRUE(scan.graph().optimized_map_from_base.empty());
-    return scan.warnings();
+    EXPECT_EQ(scan.warnings().size(), 1U);
+    return scan.warnings().front();
   };
-  EXPECT_EQ(warnings_with(libmap::MatrixElement::float32, 3),
-            std::vector<std::string>{
-                "Admin.opt_poses: ids and poses are not matrices of int32 and float32"});
-  EXPECT_EQ(
-      warnings_with(libmap::MatrixElement::int32, 2),
-      std::vector<std::string>{"Admin.opt_poses: '2 and 3': the numbers of ids and poses differ"});
+  EXPECT_TRUE(is_error_text(warning_with(libmap::MatrixElement::float32, 3),
+                            {.field = "Admin.opt_poses", .about = "int32 and float32"}));
+  EXPECT_TRUE(is_error_text(warning_with(libmap::MatrixElement::int32, 2),
+                            {.field = "Admin.opt_poses", .about = "'2 and 3'"}));
 }
 
 // ----------------------------------------------------------------------------------------- frames
@@ -345,15 +344,13 @@ TEST(RtabmapReader, OptimizedPosesAreCountedBeforeTheyAreInflated) {
     return std::string(40, '\x78') + bytes_of(std::vector<std::int32_t>{1, columns, type});
   };
   for (const auto& [ids, poses, reason] :
-       {std::tuple{claims(1000, 4), claims(11999, 5),
-                   "'1000 and 999': the numbers of ids and poses differ"},
-        {claims(1000, 4), claims(12001, 5), "'1000 and 1000': the numbers of ids and poses differ"},
-        {claims(1000, 5), claims(12000, 5),
-         "ids and poses are not matrices of int32 and float32"}}) {
+       {std::tuple{claims(1000, 4), claims(11999, 5), "'1000 and 999'"},
+        {claims(1000, 4), claims(12001, 5), "'1000 and 1000'"},
+        {claims(1000, 5), claims(12000, 5), "int32 and float32"}}) {
     execute(file, "UPDATE Admin SET opt_ids = ?, opt_poses = ?", {ids, poses});
     const RtabmapDatabase scan(file);
-    EXPECT_EQ(scan.warnings(),
-              (std::vector<std::string>{std::string("Admin.opt_poses: ") + reason}));
+    ASSERT_EQ(scan.warnings().size(), 1U);
+    EXPECT_TRUE(is_error_text(scan.warnings()[0], {.field = "Admin.opt_poses", .about = reason}));
   }
 }
 

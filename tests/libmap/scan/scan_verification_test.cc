@@ -110,7 +110,10 @@ TEST(ScanVerification, TextWhereABlobBelongs) {
   const ScanVerificationResult result = verify(file);
   EXPECT_THAT(parts_of(result), testing::IsSupersetOf({std::string("2 Node.velocity"),
                                                        std::string("2 Link.information_matrix")}));
-  EXPECT_THAT(lines_of(result), testing::HasSubstr("node 2: Node.velocity: is text, not a blob"));
+  const auto fault = std::find_if(result.faults.begin(), result.faults.end(),
+                                  [](const auto& one) { return one.part == "Node.velocity"; });
+  ASSERT_NE(fault, result.faults.end());
+  EXPECT_NE(fault->reason.find("blob"), std::string::npos) << fault->reason;
   // An empty text is not a value.
   write_sample(scratch_folder() / "b.db");
   execute(scratch_folder() / "b.db", "UPDATE Node SET velocity = '' WHERE id = 2");
@@ -122,7 +125,7 @@ TEST(ScanVerification, NodesWithoutARowInData) {
   write_sample(file);
   execute(file, "DELETE FROM Data WHERE id = 2");
   const ScanVerificationResult result = verify(file);
-  EXPECT_EQ(lines_of(result), "node 2: Data: the node has no row\n");
+  EXPECT_EQ(parts_of(result), std::vector<std::string>{"2 Data"});
   EXPECT_EQ(result.nodes, 2U);
 }
 
@@ -137,9 +140,9 @@ TEST(ScanVerification, WhatTheGraphLeavesOut) {
   EXPECT_EQ(lines_of(result), "graph: " + scan.warnings().front() + "\n");
   // A damaged pose is listed once, by its blob.
   execute(file, "UPDATE Node SET pose = x'01' WHERE id = 1");
-  const std::string lines = lines_of(verify(file));
-  EXPECT_THAT(lines, testing::HasSubstr("node 1: Node.pose"));
-  EXPECT_EQ(std::count(lines.begin(), lines.end(), '\n'), 2) << lines;
+  const std::vector<std::string> parts = parts_of(verify(file));
+  EXPECT_THAT(parts, testing::Contains("1 Node.pose"));
+  EXPECT_EQ(parts.size(), 2U);
 }
 
 // RTAB-Map's next version can have them, so they are not faults.

@@ -108,12 +108,24 @@ TEST(SceneYaml, wrong_values_are_errors_that_name_key_value_and_bound) {
 }
 
 TEST(SceneYaml, documents_of_another_form_are_errors) {
-  for (const std::string text :
-       {"", "shapes", "[]", "shapes: []", "shapes:", "shapes: 3", "shapes: {a: 1}", "shapes: [3]",
-        "shapes: [[1]]", "shapes: [~]", "{}", "shapes: [", "shapes: &a [*a]", "? [1]\n: 2",
-        "shapes: [{? [1] : 2}]", "shapes: []\nshapes: []", "\t- a", "\xff\xfe", "*x"}) {
-    EXPECT_TRUE(is_error(message_of(text), {.file = "scene.yaml"})) << text;
-  }
+  for (const auto& [text, field] : {std::pair{"shapes: []", "shapes"},
+                                    {"shapes:", "shapes"},
+                                    {"shapes: 3", "shapes"},
+                                    {"shapes: {a: 1}", "shapes"},
+                                    {"shapes: [3]", "shapes[0] (line 1)"},
+                                    {"shapes: [[1]]", "shapes[0] (line 1)"},
+                                    {"shapes: [~]", "shapes[0] (line 1)"},
+                                    {"{}", "shapes"},
+                                    {"shapes: [", "line 1"},
+                                    {"shapes: [{? [1] : 2}]", "shapes[0].shape (line 1)"},
+                                    {"shapes: []\nshapes: []", "shapes"},
+                                    {"\t- a", "line 1"},
+                                    {"*x", "line 1"}})
+    EXPECT_TRUE(is_error(message_of(text), {.file = "scene.yaml", .field = field})) << text;
+  for (const std::string text : {"", "shapes", "[]", "\xff\xfe"})
+    EXPECT_TRUE(is_error(message_of(text), {.file = "scene.yaml", .about = "'shapes'"})) << text;
+  EXPECT_TRUE(is_error(message_of("shapes: &a [*a]"), {.file = "scene.yaml", .about = "500000"}));
+  EXPECT_TRUE(is_error(message_of("? [1]\n: 2"), {.file = "scene.yaml", .about = "scalar"}));
   EXPECT_TRUE(is_error(message_of(std::string(100'000, '[')),
                        {.file = "scene.yaml", .field = "line 1", .about = "YAML"}));
   EXPECT_TRUE(is_error(message_of("shapes:\n  - {shape: sphere\n"),

@@ -239,7 +239,8 @@ TEST(Serpentine, GroundNarrowerThanALane) {
     EXPECT_NEAR(pose.world_from_base.translation().y(), 0.25, 1e-9);
     EXPECT_TRUE(pose.world_from_base.matrix().allFinite());
   }
-  EXPECT_THROW(libmap::serpentine_motion({}, options, 1), libmap::Error);
+  EXPECT_TRUE(is_error(error_of([&] { libmap::serpentine_motion({}, options, 1); }),
+                       {.about = "no points"}));
 }
 
 TEST(MotionThrough, GivenPosesAndScrewsBetweenThem) {

@@ -358,7 +358,8 @@ TEST(DepthCamera, SameImagesForAnyThreadCountAndOthersForAnotherSeed) {
 }
 
 TEST(DepthCamera, RefusesWhatCannotBe) {
-  EXPECT_THROW(VisibleSurface{libmap::TriangleMesh{}}, libmap::Error);
+  EXPECT_TRUE(is_error(error_of([&] { VisibleSurface{libmap::TriangleMesh{}}; }),
+                       {.about = "no triangles"}));
   DepthSensorOptions options;
   options.far_m = options.near_m;
   EXPECT_EQ(error_of([&] { options.check(); }).context().field, "far_m");

@@ -212,7 +212,8 @@ TEST(MeshCleaning, OptionsOutOfRange) {
   MeshCleaningOptions options;
   libmap::ParameterTable table;
   libmap::bind(table, options);
-  EXPECT_THROW(table.set("min_island_share", "2"), libmap::Error);
+  EXPECT_TRUE(is_error(error_of([&] { table.set("min_island_share", "2"); }),
+                       {.field = "min_island_share", .value = "2", .bound = ">= 0 and <= 1"}));
   table.set("max_hole_m", "0.3");
   EXPECT_EQ(options.max_hole_m, 0.3);
 }

@@ -282,7 +282,8 @@ TEST(TextureModel, OneTriangleAndLargeOnes) {
   // The whole ground is in no photograph as two pairs of triangles, but it is in pieces.
   TextureOptions whole;
   whole.max_side_m = 0.0;
-  EXPECT_THROW(libmap::texture_mesh(ground, scan, scan.poses(), whole), libmap::Error);
+  EXPECT_TRUE(is_error(error_of([&] { libmap::texture_mesh(ground, scan, scan.poses(), whole); }),
+                       {.about = "4 photographs"}));
   EXPECT_GT(libmap::texture_mesh(ground, scan, scan.poses()).seen_m2, 0.9);
 }
 
@@ -346,11 +347,13 @@ TEST(TextureModel, FramesThatCannotBeUsed) {
   EXPECT_TRUE(is_error(result.skipped[1].second, {.about = "node 3"}));
   TextureOptions strict;
   strict.strict = true;
-  EXPECT_THROW(libmap::texture_mesh(mesh, scan, poses, strict), libmap::Error);
+  EXPECT_TRUE(is_error(error_of([&] { libmap::texture_mesh(mesh, scan, poses, strict); }),
+                       {.file = "painted", .field = "node 2"}));
   scan.without_color = true;
   EXPECT_TRUE(is_error(error_of([&] { libmap::texture_mesh(mesh, scan, scan.poses()); }),
                        {.file = "painted", .about = "4 frames"}));
-  EXPECT_THROW(libmap::texture_mesh(mesh, scan, {}), libmap::Error);
+  EXPECT_TRUE(is_error(error_of([&] { libmap::texture_mesh(mesh, scan, {}); }),
+                       {.file = "painted", .about = "no poses"}));
 }
 
 TEST(TextureModel, MeshesThatCannotBeTextured) {
@@ -360,10 +363,12 @@ TEST(TextureModel, MeshesThatCannotBeTextured) {
   for (Eigen::Vector3d& vertex : far.vertices) vertex += Eigen::Vector3d(1000, 0, 0);
   EXPECT_TRUE(is_error(error_of([&] { libmap::texture_mesh(far, scan, scan.poses()); }),
                        {.about = "3 photographs"}));
-  EXPECT_THROW(libmap::texture_mesh({}, scan, scan.poses()), libmap::Error);
+  EXPECT_TRUE(is_error(error_of([&] { libmap::texture_mesh({}, scan, scan.poses()); }),
+                       {.about = "no triangles"}));
   TriangleMesh broken = mesh;
   broken.vertices[3].z() = std::nan("");
-  EXPECT_THROW(libmap::texture_mesh(broken, scan, scan.poses()), libmap::Error);
+  EXPECT_TRUE(is_error(error_of([&] { libmap::texture_mesh(broken, scan, scan.poses()); }),
+                       {.about = "not finite"}));
   // Triangles without area, and triangles with a repeated vertex, are not seen.
   TriangleMesh slivers = mesh;
   slivers.triangles.push_back({0, 0, 5});

@@ -52,7 +52,9 @@ TEST(PointTileStore, PointsOfARectangleInTheirOrder) {
 }
 
 TEST(PointTileStore, FolderThatIsNotThere) {
-  EXPECT_THROW(PointTileStore(scratch_folder() / "none", {}), libmap::Error);
+  EXPECT_TRUE(graspmap_test::is_error(
+      graspmap_test::error_of([&] { PointTileStore(scratch_folder() / "none", {}); }),
+      {.file = scratch_folder() / "none", .kind = libmap::ErrorKind::failed}));
 }
 
 }  // namespace point_tile_store_test

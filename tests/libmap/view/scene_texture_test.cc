@@ -126,7 +126,9 @@ TEST(SceneTexture, WhatHasNone) {
   model = two_pages();
   model.page_of_triangle[0] = 5;
   layer.shape = model;
-  EXPECT_THROW(prepare_layers(layer, Pose::Identity()), Error);
+  EXPECT_TRUE(
+      graspmap_test::is_error(error_of([&] { prepare_layers(layer, Pose::Identity()); }),
+                              {.field = "triangle 0", .value = "5", .bound = "0 to 2 - 1"}));
 }
 
 }  // namespace scene_texture_test

@@ -7,7 +7,7 @@ stronger. ``options("score")`` lists them.
 
 Lengths are meters. Where a cloud is expected, an array (N, 3) of positions is accepted; where a mesh
 is expected, a pair of vertices (V, 3) and triangles (T, 3). An argument of a wrong type, shape or
-value is an `Error` whose `field` names it.
+value, an unknown and a missing one is an `Error` whose `field` names it.
 
 Arrays of clouds, meshes, frames and poses are read-only views of their memory and keep it alive.
 Results do not depend on the number of threads, and are those of the command line to the bit.
@@ -20,7 +20,9 @@ Examples in docstrings assume ``import graspmap`` and ``import numpy as np``; th
 the manual.
 """
 
-from . import _documentation, _files, _results, _stages
+from inspect import isfunction as _isfunction
+
+from . import _arguments, _documentation, _files, _results, _stages
 from ._core import Camera, Cloud, Frame, Mesh, Poses, Scan
 from ._error import Error
 from ._files import (open_scan, read_cloud, read_manifest, read_mesh, read_poses, write_cloud,
@@ -46,4 +48,6 @@ def __dir__() -> list[str]:
 
 _documentation.complete(_files, _stages, _results)
 for _name in __all__:
+    if _isfunction(globals()[_name]):
+        globals()[_name] = _arguments.checked(globals()[_name])
     globals()[_name].__module__ = __name__
