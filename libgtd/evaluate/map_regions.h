@@ -23,7 +23,7 @@ void bind(libmap::ParameterTable& table, MapRegionOptions& options);
 struct MapRegion {
   std::vector<std::uint32_t> voxels;  // indices of map voxels, ascending
   double area_m2 = 0.0;               // surface area
-  double plan_area_m2 = 0.0;          // surface area in plan view
+  double plan_area_m2 = 0.0;          // area projected to the horizontal plane
   // Mean of the voxel centers, weighted by area, and their bounding box, in the terrain frame.
   Eigen::Vector3d centroid = Eigen::Vector3d::Zero();
   Eigen::Vector3d min = Eigen::Vector3d::Zero();

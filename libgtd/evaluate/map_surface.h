@@ -21,7 +21,7 @@ struct MapSurface {
   std::vector<float> slope_deg;  // angle of the surface to the horizontal, 0..90; NaN: unknown
   std::vector<float> area_m2;    // area of the surface
 
-  // Returns the area in plan view, or the whole area if the slope is unknown.
+  // Returns the area projected to the horizontal plane; the whole area if the slope is unknown.
   double plan_area_m2(std::size_t n) const;
 };
 

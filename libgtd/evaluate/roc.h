@@ -105,7 +105,7 @@ struct RocResult {
 };
 
 // Evaluates one label and one score per location. A location without one of them, or with a score
-// of NaN, is left out. The result does not depend on the number of threads. Throws Error if the
+// of NaN, is skipped. The result does not depend on the number of threads. Throws Error if the
 // lengths differ.
 RocResult evaluate_roc(const std::vector<std::optional<bool>>& labels,
                        const std::vector<std::optional<double>>& scores,

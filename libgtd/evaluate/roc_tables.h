@@ -48,7 +48,7 @@ std::vector<std::string> default_score_columns(const libmap::Table& table,
                                                std::string_view label_column);
 
 // Evaluates the score columns of a table. Rows with an empty cell (unknown label, or location that
-// is not visible) are left out of that column. Throws Error naming file, row and column for a
+// is not visible) are omitted from that column. Throws Error naming file, row and column for a
 // missing column, a cell that is no label or number, and a table without score columns.
 TableEvaluation evaluate_table(const libmap::Table& table, const TableEvaluationOptions& options);
 

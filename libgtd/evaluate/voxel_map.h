@@ -53,7 +53,7 @@ struct VoxelMap {
 
 // Converts a map with the fields "score" and "graspable" and voxel indices: the fields i, j and k,
 // or a known lattice. With the fields only, the lattice is fitted to the points in the terrain
-// frame. Points without a position are left out. Throws Error for a map without points, a missing
+// frame. Points without a position are skipped. Throws Error for a map without points, a missing
 // or invalid field, points that are not at voxel centers, and two points in one voxel.
 VoxelMap voxel_map_of(const libmap::PointCloud& map, const MapInfo& facts = {});
 

@@ -91,7 +91,7 @@ class BearingContact {
 };
 
 // Draws at random which spines of a closed gripper's contacts engage, and their facets. Contacts
-// without an engaged spine are left out. Law `adhesion` draws no random numbers.
+// without an engaged spine are skipped. Law `adhesion` draws no random numbers.
 std::vector<BearingContact> draw_bearing(const std::vector<GripContact>& contacts,
                                          const Gripper& gripper, const EngagementOptions& options,
                                          libmap::RandomStream& random);

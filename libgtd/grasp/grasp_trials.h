@@ -52,8 +52,8 @@ void bind(libmap::ParameterTable& table, GraspOptions& options);
 
 // Outcome of a trial. Causes of failure: approach: no ground below, or the approach starts inside
 // the ground. contact: fewer than two contacts. engagement: in some direction, the contacts balance
-// no pull at all. load: they balance a smaller pull than the load. unseen: any of these, with too
-// much unseen ground below a finger.
+// no pull at all. load: they balance a smaller pull than the load. unseen: a failure of any kind
+// but approach while too much of the ground below a finger is unseen.
 enum class TrialEnd { holds, approach, contact, engagement, load, unseen };
 const std::vector<std::pair<std::string, TrialEnd>>& trial_end_names();
 
@@ -77,9 +77,11 @@ struct LocationResult {
   std::vector<double> more_probabilities;  // for extra_loads_n
   std::array<double, 3> force_n{};         // equal sharing: quantiles 0.1, 0.5, 0.9
   std::array<double, 3> best_force_n{};    // best sharing: quantiles 0.1, 0.5, 0.9
-  std::size_t limiting_direction = 0;      // most frequent weakest direction, trials with a force
-  bool has_force = false;                  // at least one trial has a force
-  std::array<double, 2> force_range_n{};   // quantiles 0.05 and 0.95
+  // Direction that most often has the minimum force (trials with a force only); index in
+  // pull_directions().
+  std::size_t limiting_direction = 0;
+  bool has_force = false;                 // at least one trial has a force
+  std::array<double, 2> force_range_n{};  // equal sharing: quantiles 0.05 and 0.95
   // Standard deviations of ln(force) over trials with a force (analysis of variance): between
   // trials of one parameter set, and between the sets.
   double trial_spread = 0.0;

@@ -17,7 +17,7 @@
 
 namespace libmap::ros_message {
 
-// time; builtin_interfaces/Time.
+// ROS 1: time; ROS 2: builtin_interfaces/Time.
 struct Time {
   std::int64_t nanoseconds = 0;
 };
@@ -431,7 +431,7 @@ struct GridMap {
   }
 };
 
-// Returns one line of ASCII, like ROS's names; other characters become '?'.
+// Replaces all characters except printable ASCII by '?'.
 inline std::string printable(std::string line) {
   for (char& c : line)
     if (c < ' ' || c > '~') c = '?';

@@ -37,8 +37,8 @@ struct StereoCalibrationRecord {
   std::array<std::int32_t, 3> version{};
   std::vector<double> r{};  // 3 x 3 or empty: right_from_left
   std::vector<double> t{};  // 3 or empty
-  std::vector<double> e{};  // 3 x 3 or empty
-  std::vector<double> f{};  // 3 x 3 or empty
+  std::vector<double> e{};  // 3 x 3 or empty: essential matrix
+  std::vector<double> f{};  // 3 x 3 or empty: fundamental matrix
   CalibrationRecord left{};
   CalibrationRecord right{};  // k, d, r and p are empty in the float layouts
   float baseline_m = 0;       // only in the float layouts

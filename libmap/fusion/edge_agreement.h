@@ -33,8 +33,8 @@ struct EdgeAgreement {
   std::string sentence() const;
 };
 
-// Compares up to 24 frames of a scan with one camera and color. Frames that cannot be read are left
-// out.
+// Compares up to 24 frames of a scan with one camera and color. Frames that cannot be read are
+// skipped.
 EdgeAgreement check_edge_agreement(const ScanSource& scan);
 
 }  // namespace libmap

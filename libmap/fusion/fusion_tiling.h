@@ -14,7 +14,8 @@
 
 namespace libmap {
 
-// Distance in voxels within which other voxels affect an element.
+// Distance in voxels within which other voxels affect a SurfaceElement (surface_voxels.h), from
+// which a point is made.
 inline constexpr int element_neighborhood = 3;
 
 // Tiles of whole voxels in the x-y plane of the world, with the margins that affect their points.
@@ -33,7 +34,8 @@ class FusionTiling {
         frame_margin_(element_margin_ + element_neighborhood + 1 +
                       static_cast<int>(std::ceil((shift_m + disc_m) / voxel_m))) {}
 
-  // Calls use(tile) for each tile that a frame with this reach, in the grid, m, affects.
+  // Calls use(tile) for each tile that is affected by a frame whose measurements are inside `reach`
+  // (m, grid frame).
   template <typename Use>
   void each_tile(const Eigen::AlignedBox3d& reach, const Use& use) const {
     const auto tile_of = [&](const Eigen::Vector3d& position, int margin) -> Cell {
@@ -54,7 +56,7 @@ class FusionTiling {
     return {low.max(-limit).min(limit).cast<int>(),
             (low + side_).max(-limit).min(limit).cast<int>(), 0};
   }
-  // Margin in voxels around a tile whose elements affect its points.
+  // Width in voxels of the margin around a tile. Elements in the margin affect the tile's points.
   int element_margin() const { return element_margin_; }
 
  private:

@@ -44,7 +44,7 @@ struct LeastSquaresSummary {
 //   void linearize();              normal equations at the state
 //   double propose(double damping) solves them; cost of the state after the step, infinite if there
 //                                  is none
-//   void accept();                 makes the proposed state the state
+//   void accept();                 replaces the current state by the proposed one
 template <typename Problem>
 LeastSquaresSummary levenberg_marquardt(Problem& problem, double cost,
                                         const LevenbergMarquardtOptions& options) {

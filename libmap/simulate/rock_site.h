@@ -90,13 +90,13 @@ ParameterTable field_point_parameters(FieldPointOptions& options);
 // A rock of given shape and height; all other dimensions are drawn from `seed`.
 SiteRock draw_rock(RockShape shape, double height_m, std::uint64_t seed);
 
-// Draws positions, and yaw unless it is kept, for these rocks, widest first, such that footprints
-// satisfy the layout. Holds have a yaw of at most 25 degrees. Throws Error naming the first rock
-// that cannot be placed.
 struct RockToPlace {
   std::size_t rock = 0;  // index in the site
   bool keeps_yaw = false;
 };
+// Draws positions, and yaw unless it is kept, for these rocks, widest first, such that footprints
+// satisfy the layout. Holds have a yaw of at most 25 degrees. Throws Error naming the first rock
+// that cannot be placed.
 void place_rocks(RockSite& site, std::vector<RockToPlace> rocks);
 
 // Height of the ground above its plane, in the ground frame: bumps and random relief.
@@ -107,14 +107,14 @@ class GroundRelief {
 
  private:
   std::optional<SceneGeometry> bumps_;
-  double unevenness_m_;
+  double relief_m_;
   std::uint64_t seed_;
 };
 
 // Sites as YAML:
 //
 //   seed: 1
-//   ground: {size_x_m: 4, size_y_m: 4, unevenness_m: 0.02}
+//   ground: {size_x_m: 4, size_y_m: 4, relief_m: 0.02}
 //   layout: {site_size_m: 3, free_square_m: 1.5}
 //   field_points: {count: 30}
 //   bumps:

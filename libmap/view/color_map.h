@@ -15,7 +15,7 @@
 namespace libmap {
 
 // automatic: the texture if there is one; else the given field; else "hold_probability" or "score"
-//   as in mode score; else own colors if they differ; else height.
+//   as in mode score; else own colors unless all are equal; else height.
 // own:    colors stored in the data.
 // score:  the seven classes of the graspability map's legend.
 // field:  any scalar field, or "x", "y", "z", on a color scale.

@@ -12,7 +12,7 @@ namespace libmap {
 
 struct HeightFieldOptions {
   double cell_size_m = 0.005;      // > 0
-  double max_deviation_m = 0.002;  // > 0: cells with a larger deviation are left out
+  double max_deviation_m = 0.002;  // > 0: cells with a larger deviation are skipped
 };
 
 // The nodes are at multiples of the cell size. The diagonal of each cell runs from its lowest to
@@ -43,7 +43,7 @@ struct HeightField {
 // The lowest surface that faces up. Throws Error: no triangle faces up, or more than 2^26 nodes.
 HeightField make_height_field(const TriangleMesh& mesh, const HeightFieldOptions& options);
 
-// Returns true if a triangle is above or below a cell that is left out.
+// Returns true if a triangle is above or below a cell that is skipped.
 bool is_above_left_out(const HeightField& field, const TriangleMesh& mesh,
                        const Triangle& triangle);
 

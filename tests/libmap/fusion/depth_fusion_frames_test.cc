@@ -113,7 +113,7 @@ TEST(DepthFusionFrames, FramesThatCannotBeUsedAreSkippedAndNamed) {
   std::map<int, std::string> faults;
   for (const auto& [node, fault] : result.skipped) faults[node] = fault.what();
   EXPECT_THAT(faults.at(2), HasSubstr("ends too early"));
-  EXPECT_THAT(faults.at(3), HasSubstr("node 3: it has no depth"));
+  EXPECT_THAT(faults.at(3), HasSubstr("node 3: the frame has no depth"));
   EXPECT_THAT(faults.at(4), HasSubstr("stereo"));
   EXPECT_THAT(faults.at(5), HasSubstr("calibration"));
   EXPECT_THAT(faults.at(6), HasSubstr("not finite"));

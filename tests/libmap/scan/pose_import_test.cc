@@ -137,7 +137,7 @@ TEST(PoseImport, CamerasThatTheRigHasNotAreLeftOut) {
   const libmap::ImportedPoses imported = libmap::import_poses(folder, scan);
   EXPECT_THAT(nodes_of(imported), ElementsAre(3));
   EXPECT_THAT(imported.warnings, ElementsAre("scan: node 4 is camera 2: no such camera (must "
-                                             "be < 2); its pose is dropped"));
+                                             "be < 2); the pose is dropped"));
 }
 
 TEST(PoseImport, CamerasOfOneNodeGiveTheMean) {

@@ -201,7 +201,7 @@ TEST(RtabmapReader, OptimizedPosesThatDoNotFitTheirIdsAreLeftOut) {
                 "Admin.opt_poses: ids and poses are not matrices of int32 and float32"});
   EXPECT_EQ(
       warnings_with(libmap::MatrixElement::int32, 2),
-      std::vector<std::string>{"Admin.opt_poses: '2 and 3': the numbers of ids and poses differ"});
+      std::vector<std::string>{"Admin.opt_poses: numbers of ids and poses is 2 and 3: not equal"});
 }
 
 // ----------------------------------------------------------------------------------------- frames
@@ -346,8 +346,8 @@ TEST(RtabmapReader, OptimizedPosesAreCountedBeforeTheyAreInflated) {
   };
   for (const auto& [ids, poses, reason] :
        {std::tuple{claims(1000, 4), claims(11999, 5),
-                   "'1000 and 999': the numbers of ids and poses differ"},
-        {claims(1000, 4), claims(12001, 5), "'1000 and 1000': the numbers of ids and poses differ"},
+                   "numbers of ids and poses is 1000 and 999: not equal"},
+        {claims(1000, 4), claims(12001, 5), "numbers of ids and poses is 1000 and 1000: not equal"},
         {claims(1000, 5), claims(12000, 5),
          "ids and poses are not matrices of int32 and float32"}}) {
     execute(file, "UPDATE Admin SET opt_ids = ?, opt_poses = ?", {ids, poses});
