@@ -11,7 +11,7 @@
 
 namespace libgtd {
 
-// Bins of equal width whose edges are multiples of the width.
+// Bins of equal width; edges are multiples of the width.
 struct ValueBins {
   double first_edge = 0.0;
   double width = 1.0;

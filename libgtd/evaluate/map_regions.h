@@ -64,7 +64,7 @@ struct RegionLink {
 
 // Reachability of a region from the start of the robot.
 struct RegionAccess {
-  std::uint32_t group = 0;  // connected regions; numbered by their first region
+  std::uint32_t group = 0;  // connected regions; numbered by the first region of the group
   bool reachable = false;
   std::optional<std::size_t> steps;  // minimum number of steps between regions, including that
                                      // from the start; nullopt: unreachable

@@ -23,7 +23,7 @@ namespace libgtd {
 enum class ApproachDirection { up, normal };
 
 struct GraspOptions {
-  double load_n = 5.0;  // a trial holds if its force is >= load_n * safety in all directions
+  double load_n = 5.0;  // a trial holds if the force is >= load_n * safety in all directions
   double safety = 1.0;
   std::vector<double> extra_loads_n;  // further loads with computed probabilities
   ApproachDirection approach = ApproachDirection::up;
@@ -33,7 +33,8 @@ struct GraspOptions {
   int best_draws = 2;
   // Computes LocationResult::pull_limits_n. Not bound to a key.
   bool pull_limits = false;
-  // Ends a test when its verdict is certain, see sequential_rounds. Not bound to a key.
+  // Ends the test of a location when the verdict is certain, see sequential_rounds. Not bound to a
+  // key.
   bool sequential = false;
   std::uint64_t seed = 1;
   double offset_m = 0.005;       // standard deviation of the palm position in x and y
@@ -45,7 +46,7 @@ struct GraspOptions {
   EngagementOptions engagement;
   SurfaceErrorOptions surface;  // ground with errors: random surface for each pose
 
-  // Throws Error naming the field, its value and its bound.
+  // Throws Error naming field, value and bound.
   void check() const;
 };
 void bind(libmap::ParameterTable& table, GraspOptions& options);
@@ -119,12 +120,12 @@ std::vector<SequentialRound> sequential_rounds(const GraspOptions& options);
 // Tests all locations (m, in the mesh frame). The result of a location depends on its coordinates
 // and the seed, not on other locations, their order or the number of threads. Throws Error for
 // options out of range, a gripper without `fingers`, and a location farther from the ground than
-// `max_distance_m` (the field is its number from 1).
+// `max_distance_m` (the field is the number of the location, from 1).
 std::vector<LocationResult> test_grasps(const Ground& ground, const Gripper& gripper,
                                         const std::vector<Eigen::Vector3d>& locations,
                                         const GraspOptions& options, libmap::Progress& progress);
 
-// Repeats one trial of a location, for an image of it.
+// Repeats one trial of a location, to draw the trial.
 Trial repeat_trial(const Ground& ground, const Gripper& gripper, const Eigen::Vector3d& location,
                    const GraspOptions& options, int pose, int draw);
 

@@ -45,8 +45,8 @@ std::size_t solid_chunks(const GripperMask& mask);
 // divides in double precision and is at least 0. `climblab` has no reduction.
 double score_percent(const VoxelCounts& counts, Method method, int solid_voxel_threshold);
 
-// Returns true if a voxel is graspable by its counts: its score (0..1) reaches the threshold or,
-// with `climblab`, all solid voxels of the window are inside the mask and their number exceeds TSV.
+// Returns true if a voxel is graspable by the counts: the score (0..1) is >= the threshold or, with
+// `climblab`, all solid voxels of the window are inside the mask and ssv exceeds TSV.
 bool meets_threshold(const VoxelCounts& counts, double score, Method method,
                      int solid_voxel_threshold, double graspability_threshold);
 

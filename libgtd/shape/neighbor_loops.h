@@ -23,8 +23,8 @@ struct NeighborLoops {
   };
 
   // Writes the candidates within `radius` of `center` to `neighbors`, relative to `center` and in
-  // units of the radius; zeros follow up to a full set of lanes. Returns their number. Candidates
-  // beyond `count` must be infinite.
+  // units of the radius; zeros follow up to a full set of lanes. Returns the number of neighbors.
+  // Candidates beyond `count` must be infinite.
   std::size_t (*select)(const Coordinates& candidates, std::size_t count, const double* center,
                         double radius, const Coordinates& neighbors);
   // Moments for the quadric fit: sums of x, y, z, xx, xy, xz, yy, yz, zz.
@@ -36,9 +36,9 @@ struct NeighborLoops {
   static constexpr std::size_t moments = 9;
   static constexpr std::size_t quadric_sums = 20;
 
-  // Writes a sort key for each candidate whose squared distance to `center` is below `limit`, in
-  // the order of the candidates, and returns the number of keys. The high 32 bits are those of the
-  // squared distance in single precision, which sort like the distances; the low 32 bits are the
+  // Writes a sort key for each candidate with a squared distance to `center` below `limit`, in the
+  // order of the candidates, and returns the number of keys. The high 32 bits are the squared
+  // distance in single precision, of which the bits sort like the values; the low 32 bits are the
   // index. Candidates beyond `count` must be infinite. x, y, z and keys need room for
   // `rank_lanes` more values.
   std::size_t (*rank)(const float* x, const float* y, const float* z, std::size_t count,

@@ -32,7 +32,7 @@ struct SurfaceNormal {
 double side_of(const Eigen::Vector3d& normal, const Eigen::Vector3d& outside);
 
 // Returns true if points with these eigenvalues of their covariance (ascending) determine a plane.
-// They do not if they are on a line or distributed evenly in all directions.
+// Points on a line or distributed evenly in all directions do not.
 inline bool determines_plane(const Eigen::Vector3d& variances) {
   constexpr double min_width_ratio = 1e-6;
   constexpr double max_lump_ratio = 0.8;
