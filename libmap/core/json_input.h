@@ -1,5 +1,5 @@
-// Checked parsing of untrusted JSON. nlohmann's library (`Json` is one of its types) casts between
-// all number types and does not limit the nesting depth.
+// Checked parsing of untrusted JSON. The library of `Json` (nlohmann) casts between all number
+// types and does not limit the nesting depth.
 #pragma once
 
 #include <cstddef>

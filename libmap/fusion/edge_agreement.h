@@ -9,7 +9,7 @@
 
 namespace libmap {
 
-// Agreement of the edges of depth images with those of the color images.
+// Agreement of the edges of depth images with the edges of color images.
 struct EdgeAgreement {
   std::size_t frames = 0;
   std::size_t edges = 0;  // pixels

@@ -1,5 +1,5 @@
-// Divides the x-y plane into tiles for fusion, each with the margin of voxels that affects its
-// points. Private to depth_fusion.
+// Divides the x-y plane into tiles for fusion, each with the margin of voxels that affects the
+// tile's points. Private to depth_fusion.
 #pragma once
 
 #include <Eigen/Core>
@@ -18,7 +18,8 @@ namespace libmap {
 // which a point is made.
 inline constexpr int element_neighborhood = 3;
 
-// Tiles of whole voxels in the x-y plane of the world, with the margins that affect their points.
+// Tiles of whole voxels in the x-y plane of the world, with the margins that affect the points of
+// the tiles.
 class FusionTiling {
  public:
   using Cell = Eigen::Array<std::int64_t, 2, 1>;
@@ -49,7 +50,7 @@ class FusionTiling {
       for (std::int64_t j = first.y(); j <= last.y(); ++j) use(XyTile{i, j});
   }
 
-  // Returns the columns of the grid whose points are in the tile.
+  // Returns the columns of the grid with points in the tile.
   TileMask points(const XyTile& tile) const {
     const Cell low = Cell(tile.i, tile.j) * side_ - origin_;
     constexpr std::int64_t limit = voxel_cell_limit;

@@ -1,4 +1,4 @@
-// Selects columns of voxels by their position in the x-y plane. Private to depth_fusion.
+// Selects columns of voxels by position in the x-y plane. Private to depth_fusion.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,5 +1,5 @@
 // Solvers for nonlinear least squares: Levenberg-Marquardt and Gauss-Newton iterations. The problem
-// provides its normal equations and their solution, dense, sparse or of fixed size.
+// provides normal equations and a solver, dense, sparse or of fixed size.
 #pragma once
 
 #include <Eigen/Core>
@@ -81,9 +81,9 @@ struct GaussNewtonSummary {
   StepState state = StepState::moving;
 };
 
-// Gauss-Newton for problems whose weights or correspondences change in each step (ICP, iteratively
-// reweighted least squares), so that costs cannot be compared. `step()` linearizes, moves the state
-// and returns a StepState; it is called until that is not `moving`.
+// Gauss-Newton for problems with weights or correspondences that change in each step (ICP,
+// iteratively reweighted least squares), so that costs cannot be compared. `step()` linearizes,
+// moves the state and returns a StepState; it is called until that is not `moving`.
 template <typename Step>
 GaussNewtonSummary gauss_newton(int max_iterations, const Step& step) {
   GaussNewtonSummary summary;

@@ -15,7 +15,7 @@ namespace libmap {
 // (without the file's name) with assimp's reason.
 TriangleMesh decode_by_assimp(const std::string& bytes, const std::string& format);
 
-// Texture image of a model: its bytes if it is embedded, else its path as stored in the file.
+// Texture image of a model: bytes of an embedded image, else the path as stored in the file.
 struct TextureImage {
   std::string bytes;
   std::string path;
@@ -27,7 +27,7 @@ struct DecodedModel {
   std::vector<TextureImage> images;
 };
 
-// Reads the .obj (with its materials) or .glb at `path`. Throws as decode_by_assimp does.
+// Reads the .obj (with materials) or .glb at `path`. Throws as decode_by_assimp does.
 DecodedModel decode_model_by_assimp(const std::filesystem::path& path, const std::string& format);
 
 // Encodes a mesh; `format` is "stl" or "glb". Throws Error if the mesh has no triangles, or if

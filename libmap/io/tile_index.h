@@ -1,5 +1,5 @@
-// Access to the points of a terrain in one or many cloud files by rectangle, with their normals,
-// colors and fields. Memory depends on the size of a file and of the result.
+// Access to the points of a terrain in one or many cloud files by rectangle, with normals, colors
+// and fields. Memory depends on the size of a file and of the result.
 #pragma once
 
 #include <cstddef>

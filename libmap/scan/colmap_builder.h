@@ -1,4 +1,4 @@
-// Converts a scan to a COLMAP model; the points are from its depth images.
+// Converts a scan to a COLMAP model; the points are from the scan's depth images.
 #pragma once
 
 #include <cstddef>
