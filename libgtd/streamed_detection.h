@@ -1,7 +1,6 @@
 // Detection of graspable targets for terrains larger than memory, in tiles. A first pass over all
-// points determines the terrain frame and the box of voxels; then each tile is scored from the
-// points in the tile and in a margin around it (the halo). The voxels equal those of detect() to
-// the bit.
+// points determines the terrain frame and the box of voxels. Each tile is scored from the points in
+// the tile and a margin (the halo). The voxels equal those of detect() to the bit.
 #pragma once
 
 #include <Eigen/Core>

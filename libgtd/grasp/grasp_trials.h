@@ -33,8 +33,7 @@ struct GraspOptions {
   int best_draws = 2;
   // Computes LocationResult::pull_limits_n. Not bound to a key.
   bool pull_limits = false;
-  // Ends the test of a location when the verdict is certain, see sequential_rounds. Not bound to a
-  // key.
+  // Ends a location's test when the verdict is certain, see sequential_rounds. Not bound to a key.
   bool sequential = false;
   std::uint64_t seed = 1;
   double offset_m = 0.005;       // standard deviation of the palm position in x and y

@@ -8,7 +8,7 @@
 //   groundtruth.txt         true poses as TUM lines, or poses_ground_truth.tum
 //   poses.tum               odometry, or poses_odometry.tum
 //   poses_stored.tum        optimized poses
-//   links.g2o links between nodes; vertices are not used
+//   links.g2o               links between nodes; vertices are not used
 //   nodes.csv               instead of associations.txt: node, session, weight, stamp_s, label,
 //                           color, depth, right, calibration, baseline_m, velocity, gps; files
 //                           relative to the folder; several calibrations separated by spaces, and

@@ -13,7 +13,7 @@
 //     - name: left
 //       calibration: left.yaml            # ... or a file, relative to this one
 //       position_m: [0.1, 0.17, 0.1]      # robot_from_camera by the camera's housing: x forward,
-//       roll_pitch_yaw_deg: [0, 0, 60] # z up (REP-103), not by the optical frame
+//       roll_pitch_yaw_deg: [0, 0, 60]    # z up (REP-103), not by the optical frame
 //       far_m: 2.0                        # overrides the rig's; so do depth_scale_m and near_m
 //
 // robot_from_camera refers to the optical frame (z forward). A camera without any of these poses

@@ -73,8 +73,7 @@ class RtabmapDatabase : public ScanSource {
   // Converts grayscale to color. An image in the depth column that is not depth becomes `right`.
   RgbdFrame read_frame(int node, FrameParts parts = {}) const override;
 
-  // Version stored in the file (Admin.version; empty if missing), and version according to the
-  // columns.
+  // Version stored in the file (Admin.version; empty if missing), and version by columns.
   const std::string& version() const { return version_; }
   std::string recognized_version() const { return columns_.recognized_version(); }
   // Reports dropped nodes, links and poses, and unknown tables and columns.

@@ -2,8 +2,8 @@
 //
 // .obj: MODEL.obj, MODEL.mtl and one image per page, MODEL_0.png ...; coordinates are written as
 // doubles and read as float32.
-// .glb: glTF 2.0 in one file with its images, unlit (KHR_materials_unlit), float32. glTF is y-up
-// and this project z-up: writing and reading rotate the mesh about x.
+// .glb: glTF 2.0 in one file with images, unlit (KHR_materials_unlit), float32. glTF is y-up and
+// this project z-up: writing and reading rotate the mesh about x.
 //
 // Vertex normals are kept; vertex colors and fields are not. float32 has 24 bits of precision; for
 // meshes far from the origin see mesh_io.h.
@@ -50,10 +50,10 @@ std::vector<ModelFile> textured_mesh_files(const std::filesystem::path& path,
 void require_textured_format(const std::filesystem::path& path);
 bool is_textured_format(const std::filesystem::path& path);
 
-// Reads an .obj or .glb from any program with its textures (PNG or JPEG, embedded or beside it).
-// The result has no pages if the file has no textures. Corners of equal position and normal are
-// merged into one vertex. Throws Error naming the file: it cannot be read or parsed, contains no
-// triangle, or references an unreadable image.
+// Reads an .obj or .glb from any program with textures (PNG or JPEG, embedded or in separate
+// files). The result has no pages if the file has no textures. Corners of equal position and normal
+// are merged into one vertex. Throws Error naming the file: it cannot be read or parsed, contains
+// no triangle, or references an unreadable image.
 TexturedMesh read_textured_mesh(const std::filesystem::path& path);
 
 }  // namespace libmap

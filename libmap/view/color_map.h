@@ -30,7 +30,7 @@ enum class ColorMode { automatic, own, score, field, flags, height, single, text
 // values.
 enum class ColorScale { viridis, diverging };
 
-// A color of a legend and its meaning.
+// A color of a legend and the meaning of the color.
 struct LegendEntry {
   Color color{};
   std::string text;

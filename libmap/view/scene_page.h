@@ -32,13 +32,13 @@ ScenePage plan_page(const SceneViewOptions& options, const std::vector<Legend>& 
 
 // Largest length of 1, 2 or 5 times a power of ten meters that is at most `longest_m`.
 double round_length_m(double longest_m);
-// A length with its unit, e.g. "50 m", "2 cm", "5 mm".
+// A length with unit, e.g. "50 m", "2 cm", "5 mm".
 std::string length_text(double length_m);
 
 // Width and height in pixels of legends in one column.
 Eigen::Vector2d legends_size(const std::vector<Legend>& legends, int font_px);
 
-// Draw title, legends and axes into their rectangles, if the page has them.
+// Draw title, legends and axes into the page's rectangles, if the page has these.
 void draw_title(const ScenePage& page, const std::string& title, Canvas& canvas);
 void draw_legends(const ScenePage& page, const std::vector<Legend>& legends, Canvas& canvas);
 void draw_axes(const ScenePage& page, const SceneCamera& camera, Canvas& canvas);
@@ -59,7 +59,7 @@ struct LabelRequest {
 std::vector<PixelRect> place_labels(const std::vector<LabelRequest>& requests,
                                     double point_radius_px, const PixelRect& bounds);
 
-// Draws markers in the terrain frame. Labels are omitted if the plot is too small for all of them.
+// Draws markers in the terrain frame. Labels are omitted if the plot is too small for all labels.
 // If there are more than 5000 markers, those with drawn labels are drawn, and one per verdict and
 // pixel square (side: the disc's radius).
 void draw_markers(const ScenePage& page, const SceneCamera& camera,

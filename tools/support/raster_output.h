@@ -8,10 +8,10 @@
 
 namespace graspmap_tools {
 
-// Returns the raster of a map or cloud, whose points `parts` visits.
+// Returns the raster of a map or cloud with the points that `parts` visits.
 //
 // The raster is in the CRS of the manifest's georeference, else in the frame of the points. Pixels
-// are columns of voxels: their axes are the lattice's x and y axes, projected to the horizontal
+// are columns of voxels: pixel axes are the lattice's x and y axes, projected to the horizontal
 // plane. pixel_size_m 0: the map's voxel size. Throws Error if the manifest has no voxel size, and
 // the errors of make_map_raster.
 libmap::MapRaster raster_of(const libmap::CloudParts& parts, const libmap::Manifest& manifest,

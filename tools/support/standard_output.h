@@ -5,7 +5,7 @@
 
 namespace graspmap_tools {
 
-// Flushes standard output. Throws Error (failed) if not all of it was written.
+// Flushes standard output. Throws Error (failed) if not all output was written.
 void require_printed();
 
 // Flushes standard output. Returns 0, or 1 with an error line on stderr if it was not all written.
