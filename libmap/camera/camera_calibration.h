@@ -88,9 +88,9 @@ struct CameraCalibrationResult {
   double relative_focal_deviation() const;
 };
 
-// Calibrates the camera. Images whose corners are within 1 px (RMS) of an earlier image are
-// ignored, because their errors are not independent. Throws Error: fewer than 3 images remain, or
-// the images do not determine the camera (for example if all boards are seen frontally).
+// Calibrates the camera. Images with corners within 1 px (RMS) of an earlier image are ignored,
+// because the errors are not independent. Throws Error: fewer than 3 images remain, or the images
+// do not determine the camera (for example if all boards are seen frontally).
 CameraCalibrationResult calibrate_camera(const std::vector<BoardImage>& images, int width,
                                          int height, const CameraCalibrationOptions& options = {});
 

@@ -17,7 +17,7 @@ class XMLPrinter;
 
 namespace libmap {
 
-// Numbers with spaces between them.
+// Numbers separated by spaces.
 std::string number_text(const Eigen::Ref<const Eigen::VectorXd>& numbers);
 
 class XmlWriter {
