@@ -147,8 +147,8 @@ std::size_t evaluate_obstacles(const ObstacleOptions& options, GraspabilityMap& 
 void bind(libmap::ParameterTable& table, DetectionOptions& options) {
   bind(table, options.scenario);
   table.add("plane", options.plane, {{"fit", PlaneSource::fit}, {"none", PlaneSource::none}},
-            "source of the terrain frame; fit: the regression plane of the points; none: the cloud "
-            "is in the terrain frame already");
+            "source of the terrain frame; fit: regression plane of the points; none: frame of "
+            "the cloud");
 }
 
 Gripper gripper_of(const DetectionOptions& options) {

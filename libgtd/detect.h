@@ -21,7 +21,8 @@
 namespace libgtd {
 
 // Source of the terrain frame. fit: downsamples the cloud (`thesis` only), fits the regression
-// plane and transforms the cloud into its frame. none: the cloud is in the terrain frame already.
+// plane and transforms the cloud into the frame of the plane. none: the cloud is in the terrain
+// frame.
 enum class PlaneSource { fit, none };
 
 struct DetectionOptions {
@@ -49,7 +50,7 @@ struct DetectionResult {
   Voxel grid_max;
   std::size_t tiles = 0;             // scored tiles
   std::size_t curvature_points = 0;  // points with a measured curvature
-  std::size_t convex_points = 0;     // among them
+  std::size_t convex_points = 0;     // among the curvature points
   std::size_t graspable_voxels = 0;
   std::size_t border_voxels = 0;
   std::size_t unoriented_voxels = 0;      // orientation surface: no normal, scored upright
@@ -60,7 +61,7 @@ struct DetectionResult {
 // Names each result for manifests and tables (libmap/core/result_table.h).
 void describe(libmap::ResultTable& table, const DetectionResult& result);
 
-// Returns options.gripper, or else the gripper of the scenario with its overrides. Throws like
+// Returns options.gripper, or else the gripper and overrides of the scenario. Throws like
 // find_gripper.
 Gripper gripper_of(const DetectionOptions& options);
 

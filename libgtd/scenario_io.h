@@ -7,7 +7,7 @@
 
 namespace libgtd {
 
-// Returns the parameters of a scenario and its gripper. `name` is a scenario in data/scenarios or a
+// Returns the parameters and the gripper of a scenario. `name` is a scenario in data/scenarios or a
 // file. Throws Error naming the file and the field for an unknown key or a value out of range.
 DetectionOptions read_scenario(const std::string& name);
 

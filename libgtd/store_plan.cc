@@ -103,7 +103,7 @@ void require_appendable(const TilePlan& earlier, const TilePlan& plan,
   if (before.parameters != now.parameters || before.version != now.version)
     refuse("contains tiles of other parameters; use --force to start again");
   if (before.georeference != now.georeference)
-    refuse("was started with another first file: names of new files must sort after it");
+    refuse("was started with another first file; names of new files must sort after its name");
   auto at = plan.terrain.begin();
   for (const TerrainFile& file : earlier.terrain) {
     at = std::find_if(at, plan.terrain.end(),
@@ -119,11 +119,12 @@ void require_appendable(const TilePlan& earlier, const TilePlan& plan,
            std::to_string(plan.terrain.size()) +
            " files; use --append to add the others or --force to start again");
   if (detection.plane != PlaneSource::none)
-    refuse("--append requires --plane none: a new point changes the fitted plane and all tiles");
+    refuse("--append requires --plane none; a new point changes the fitted plane and all tiles");
   const Method method = detection.scenario.method;
   if (method != Method::corrected && method != Method::calibrated)
     refuse(
-        "--append requires --method corrected or calibrated: others leave out the border of the "
+        "--append requires --method corrected or calibrated; other methods do not score the border "
+        "of the "
         "terrain");
 }
 

@@ -24,10 +24,10 @@ struct StoreTiling {
   int halo_voxels = 0;
 };
 
-// Stores the frame in the plan: lattice, box, plane, and transform and results of its manifest.
+// Stores the frame in the plan: lattice, box, plane, and the manifest's transform and results.
 void set_frame(const TerrainFrame& frame, const StoreTiling& tiling, TilePlan& plan);
 
-// Returns the frame of an earlier plan. Throws Error naming `plan_file` if its tiles differ.
+// Returns the frame of an earlier plan. Throws Error naming `plan_file` if the tiles differ.
 TerrainFrame frame_of(const TilePlan& plan, const DetectionOptions& detection,
                       const std::filesystem::path& plan_file);
 
@@ -52,7 +52,7 @@ PointsRectangle points_for(const std::vector<TileNumber>& tiles, const TerrainFr
 bool may_intersect(const TerrainFile& file, const PointsRectangle& wanted,
                    const TerrainFrame& frame);
 
-// Returns the index entry of a scored tile: its box and counts, without file name, size and hash.
+// Returns the index entry of a scored tile: box and counts, without file name, size and hash.
 StoredTile stored_tile(const StreamedTile& tile);
 
 }  // namespace libgtd

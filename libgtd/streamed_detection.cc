@@ -245,11 +245,10 @@ std::vector<TileNumber> tiles_of(const TerrainFrame& frame, int tile_voxels,
   const std::vector<TileBounds> all = make_tiles(box, tile_voxels);
   // A tile is a line of a journal, and a file if it has voxels.
   if (all.size() > max_stored_tiles)
-    throw libmap::Error(
-        "too small: the tile store would have " + std::to_string(all.size()) + " tiles",
-        {.field = "tile_size_m",
-         .value = libmap::to_text(tile_voxels * frame.lattice.voxel_size_m),
-         .bound = "at most " + std::to_string(max_stored_tiles) + " tiles"});
+    throw libmap::Error("too small: the tile store would have " + std::to_string(all.size()) +
+                            " tiles, more than " + std::to_string(max_stored_tiles),
+                        {.field = "tile_size_m",
+                         .value = libmap::to_text(tile_voxels * frame.lattice.voxel_size_m)});
   const std::vector<TileBounds> tiles = share_of(all, share);
   numbers.reserve(tiles.size());
   for (const TileBounds& tile : tiles)

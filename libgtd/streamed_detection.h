@@ -1,6 +1,6 @@
 // Detection of graspable targets for terrains larger than memory, in tiles. A first pass over all
-// points determines the terrain frame and the box of voxels; then each tile is scored from the
-// points in it and in a margin around it (the halo). The voxels equal those of detect() to the bit.
+// points determines the terrain frame and the box of voxels. Each tile is scored from the points in
+// the tile and a margin (the halo). The voxels equal those of detect() to the bit.
 #pragma once
 
 #include <Eigen/Core>
@@ -38,8 +38,8 @@ TerrainFrame frame_terrain(const libmap::PointStream& points, const DetectionOpt
 // Transforms a block of points into the terrain frame; normals with random sides are dropped.
 libmap::PointCloud to_terrain(const libmap::PointCloud& block, const TerrainFrame& frame);
 
-// Returns the tiles of the box, ascending; of several runs that divide the tiles, those of one run
-// (`share`). Throws Error naming tile_size_m if the box has more than 2^20 tiles.
+// Returns the tiles of the box, ascending; if several runs divide the tiles, only the tiles of one
+// run (`share`). Throws Error naming tile_size_m if the box has more than 2^20 tiles.
 std::vector<TileNumber> tiles_of(const TerrainFrame& frame, int tile_voxels,
                                  const libmap::TileShare& share = {});
 
@@ -50,8 +50,8 @@ struct StreamedTile {
 };
 
 struct StreamingOptions {
-  // Maximum number of points processed at once. Neighboring tiles are combined while they and their
-  // halo have fewer points; a tile with more points is split, down to the width of its halo.
+  // Maximum number of points processed at once. Neighboring tiles are combined while tiles and halo
+  // have fewer points; a tile with more points is split, down to the width of the halo.
   std::size_t max_points = 1'000'000;
 };
 
@@ -63,7 +63,7 @@ struct PointsRectangle {
 // Returns the rectangle with all points that the result in `columns` depends on.
 PointsRectangle points_for(const TileBounds& columns, const TerrainFrame& frame, int halo_voxels);
 
-// Scores the tiles `wanted` from `points` in the terrain frame, which must cover their halo. Calls
+// Scores the tiles `wanted` from `points` in the terrain frame, which must cover the halo. Calls
 // `visit` with a few tiles at a time, each tile once, from one thread.
 void detect_streamed(const TerrainFrame& frame, const libmap::PointTileStore& points,
                      const std::vector<TileNumber>& wanted, const DetectionOptions& options,

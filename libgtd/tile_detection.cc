@@ -193,7 +193,7 @@ int tile_voxels(const Scenario& scenario) {
   if (voxels >= 1.0 && voxels <= 0x1p20) return static_cast<int>(voxels);
   throw libmap::Error("out of range", {.field = "tile_size_m",
                                        .value = libmap::to_text(scenario.tile_size_m),
-                                       .bound = "1 to 2^20 voxels"});
+                                       .bound = "1 to 2^20 times voxel_size_m"});
 }
 
 int halo_voxels(const GripperMask& mask, const Scenario& scenario) {

@@ -1,6 +1,6 @@
 // Scores single tiles of a terrain, for detect() and detect_streamed(): computes the voxels of the
-// map from points in the terrain frame and their voxel grid. A tile depends only on the data inside
-// it and in a margin around it (the halo); other data do not affect it.
+// map from points in the terrain frame and a voxel grid. A tile depends only on the data in the
+// tile and in a margin around the tile (the halo); other data do not affect it.
 #pragma once
 
 #include <cstddef>
@@ -24,16 +24,17 @@ namespace libgtd {
 bool follows_thesis(Method method);
 
 // Returns the plane fit of a method: `thesis` and `envelope` as in the author's program, `climblab`
-// by least squares as in its source, the others robust.
+// by least squares as in the source of ClimbLab, the others robust.
 PlaneMethod plane_method(Method method);
 
 // Returns the width of a tile in voxels. Throws Error naming tile_size_m if it is out of range.
 int tile_voxels(const Scenario& scenario);
 
-// Returns the width of the halo in voxels: the columns around a tile on which its voxels depend. It
-// covers the mask window, the closing of the scanned area, the points that decide convexity with
-// all their neighbors, and the points of surface normals, but not interpolation and obstacles,
-// which use the whole terrain. Throws Error naming a radius that is too large for the voxel size.
+// Returns the width of the halo in voxels: the columns around a tile that affect the voxels of the
+// tile. The halo covers the mask window, the closing of the scanned area, the points that decide
+// convexity with all neighbors, and the points of surface normals, but not interpolation and
+// obstacles, which use the whole terrain. Throws Error naming a radius that is too large for the
+// voxel size.
 int halo_voxels(const GripperMask& mask, const Scenario& scenario);
 
 // Returns the radius of the surface normal fits of a scenario, m.
@@ -68,7 +69,7 @@ struct TileDetectionOptions {
 };
 TileDetectionOptions tile_detection_options(const GripperMask& mask, const Scenario& scenario);
 
-// Data of the terrain, at least inside the tiles and their halo, in the terrain frame.
+// Data of the terrain, at least inside the tiles and the halo, in the terrain frame.
 struct TileSurroundings {
   const libmap::PointCloud& terrain;  // measured points, for the curvature
   const libmap::PointCloud& surface;  // points from which the voxels were made

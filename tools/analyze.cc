@@ -55,9 +55,8 @@ void bind_one(libmap::ParameterTable& table, AnalyzeOptions& options) {
 void bind(libmap::ParameterTable& table, AnalyzeOptions& options) {
   bind_one(table, options);
   table.add("points_frame", options.points_frame, point_frame_names(),
-            "frame of the start or of the expected regions: of the scored cloud, the terrain, or "
-            "frame of the start position and of the expected regions: that of the scored cloud, of "
-            "the terrain, or of the map before it was cropped");
+            "frame of the start position and of the expected regions; input: scored cloud; "
+            "terrain: terrain frame; map: map before cropping");
   table.add("images", options.images, "draw images and charts");
   bind(table, options.table);
 }
@@ -82,10 +81,11 @@ ReadMap read_map(const std::string& file, Run& run) {
   });
   if (!map.manifest)
     run.warn(file +
-             ": has no manifest; its points are assumed to be in the terrain frame, all above the "
+             ": has no manifest; points are assumed to be in the terrain frame, all above the "
              "zero plane");
   else if (map.manifest->find_parameter("zero_plane_m") == nullptr)
-    run.warn(file + ": its manifest has no zero plane; all its points are assumed to be above it");
+    run.warn(file +
+             ": the manifest has no zero plane; all points are assumed to be above the zero plane");
   run.add_input(file);
   return map;
 }

@@ -118,7 +118,7 @@ std::vector<BoardPhoto> read_photos(const std::vector<std::string>& files,
   };
   for (const BoardPhoto& photo : photos) {
     if (photo.fault)
-      run.warn(std::string(photo.fault->what()) + "; the image is left out");
+      run.warn(std::string(photo.fault->what()) + "; the image is skipped");
     else if (size(photo) != size(first))
       throw libmap::Error("all images must have the same size",
                           {.file = photo.name,
@@ -248,9 +248,9 @@ void note_results(const std::vector<BoardPhoto>& photos, const CameraCalibration
 
 void warn_of_weaknesses(const CameraCalibrationResult& result, Run& run) {
   for (const std::string& name : result.repeated)
-    run.warn(name + ": left out because an earlier image shows the board in the same pose");
+    run.warn(name + ": skipped because an earlier image shows the board in the same pose");
   for (const std::string& name : result.rejected)
-    run.warn(name + ": left out because of its reprojection error");
+    run.warn(name + ": skipped because of the reprojection error");
   for (const CalibratedImage& photo : result.images)
     if (photo.rms_px > good_error_px)
       run.warn("{}: reprojection error {:.2f} px, above {} px", photo.name, photo.rms_px,

@@ -43,7 +43,7 @@ struct CompareOptions {
 
 void bind(libmap::ParameterTable& table, CompareOptions& options) {
   table.add("within_m", options.within_m, libmap::positive,
-            "maximum distance at which a point of one surface is covered by the other, m");
+            "maximum distance of a matched point, for precision and completeness, m");
   table.add("samples_per_m2", options.samples_per_m2, libmap::positive,
             "density of the samples of a mesh's surface, per m2");
   table.add("seed", options.seed, {}, "random seed of the samples");
@@ -58,7 +58,7 @@ void bind(libmap::ParameterTable& table, CompareOptions& options) {
              {"oblique", libmap::Viewpoint::oblique},
              {"front", libmap::Viewpoint::front},
              {"side", libmap::Viewpoint::side}},
-            "viewpoint of the image");
+            "viewpoint of the image, as in render --view");
 }
 
 // A cloud, or a mesh with samples of its surface.
@@ -92,7 +92,7 @@ void require_nearness(const libmap::ReferenceSurface& surface, const libmap::Poi
   if (size == 0.0) return;  // the time does not depend on the distance to a point
   const double apart = ((a.max + a.min) / 2 - (b.max + b.min) / 2).norm();
   if (!(apart <= max_sizes * size))
-    throw libmap::Error("A is too far from B to be compared: check the frames and --transform",
+    throw libmap::Error("A is too far from B to be compared; check the frames and --transform",
                         {.file = options.a,
                          .field = "distance of the centers",
                          .value = libmap::to_text(static_cast<float>(apart)) + " m",
@@ -113,7 +113,7 @@ libmap::Pose b_from_a_of(const CompareOptions& options) {
   const auto a_from_map = site_from_map_of(options.a);
   const auto b_from_map = site_from_map_of(options.b);
   if (!a_from_map && !b_from_map)
-    throw libmap::Error("neither A nor B was cropped, so their manifests contain no transform",
+    throw libmap::Error("neither A nor B was cropped, so the manifests contain no transform",
                         {.file = options.a,
                          .field = "--transform",
                          .value = options.transform,
@@ -447,7 +447,7 @@ int compare_surfaces(int argc, char** argv) {
                  "A's points in B's frame with the fields distance and signed_distance", false);
   command.renamed_flag("--picture", "--image");
   command.option("--image", "FILE.png", options.image,
-                 "image of A's points, colored by their signed distance");
+                 "image of A's points, colored by signed distance");
   command.option("--transform", "X,Y,Z,ROLL,PITCH,YAW|FILE|crop", options.transform,
                  "transform from A to B: meters and degrees about the fixed axes, roll first; a "
                  "file of four rows of four numbers, as crop writes; crop: from the manifests of "

@@ -128,7 +128,7 @@ libmap::TexturedMesh read_model(const std::string& file, Run& run) {
   } catch (const libmap::Error& error) {
     libmap::TexturedMesh model;
     model.mesh = libmap::read_mesh(file).mesh;
-    run.warn("the texture is left out: {}", error.what());
+    run.warn("the texture is not written: {}", error.what());
     return model;
   }
 }
@@ -139,7 +139,7 @@ bool convert_textured(const ConvertOptions& options, Run& run) {
   const libmap::TexturedMesh model = read_model(options.input, run);
   if (model.pages.empty()) return false;
   if (!libmap::is_textured_format(options.output)) {
-    run.warn("the texture is left out: only .obj and .glb can store it");
+    run.warn("the texture is not written; only .obj and .glb can store it");
     return false;
   }
   const libmap::TexturedMeshWriteOptions writing;

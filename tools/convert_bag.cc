@@ -49,10 +49,10 @@ struct BagCommandOptions {
 };
 
 void bind(libmap::ParameterTable& table, BagCommandOptions& options) {
-  table.add(
-      "stamp_s", options.stamp,
-      "time stamp, s; from a bag: of the image set or cloud to read (auto: all sets, or the cloud "
-      "with most points); from a map to a bag: of all messages (auto: that of the inputs)");
+  table.add("stamp_s", options.stamp,
+            "time stamp, s; from a bag: image set or cloud to read (auto: all sets, or the cloud "
+            "with most points); from a map to a bag: stamp of all messages (auto: stamp of the "
+            "inputs)");
   table.add("strict", options.strict, "fail if an image cannot be used");
   bind(table, options.depth);
   table.add("frame", options.frame,
@@ -68,7 +68,8 @@ void bind(libmap::ParameterTable& table, BagCommandOptions& options) {
              {"bz2", libmap::BagCompression::bz2},
              {"lz4", libmap::BagCompression::lz4},
              {"zstd", libmap::BagCompression::zstd}},
-            "compression of the written bag: bz2 or lz4 in .bag, lz4 or zstd in .mcap");
+            "compression of the written bag; bz2: only .bag; lz4: .bag and .mcap; zstd: only "
+            ".mcap; none: no compression");
 }
 
 // Parses --stamp; returns nullopt for auto. Throws Error for another text.
@@ -97,7 +98,7 @@ void report(const libmap::BagRigPlan& plan, const libmap::BagRigExport& result,
     run.warn(options.input + ": " + warning);
   }
   if (result.overflow_pixels > 0)
-    run.warn("{}: {} pixels exceed the 16-bit depth range and are left out (--depth-scale)",
+    run.warn("{}: {} pixels exceed the 16-bit depth range and are skipped (--depth-scale)",
              options.input, result.overflow_pixels);
   std::size_t fullest = 0;
   for (const libmap::SynchronizedSet& set : result.sets) fullest = std::max(fullest, set.seen());
@@ -113,7 +114,7 @@ void report(const libmap::BagRigPlan& plan, const libmap::BagRigExport& result,
     run.add_results({{camera.name + ".topic", plan.topics[n]}});
     run.manifest().transforms.emplace_back("robot_from_" + camera.name,
                                            camera.camera.base_from_camera);
-    if (plan.topics[n].empty()) run.warn(camera.name + ": no topic contains its images");
+    if (plan.topics[n].empty()) run.warn(camera.name + ": no topic contains images of this camera");
   }
   run.info("{} images of {} cameras, {} of {} image sets, at most {} cameras per set",
            result.images, plan.rig.cameras.size(), result.sets.size(), plan.all_sets, fullest);
@@ -138,7 +139,7 @@ void read_bag_into_folder(const BagCommandOptions& options, Run& run) {
 
 void read_bag_into_cloud(const BagCommandOptions& options, Run& run) {
   if (options.topics.size() > 1)
-    throw libmap::Error("a cloud is read from a single topic", {.field = "--topic"});
+    throw libmap::Error("only one topic can be read as a cloud", {.field = "--topic"});
   run.claim_output(options.output, {options.input});
   const libmap::BagCloudResult result = run.timed("read", [&] {
     return libmap::read_bag_cloud(options.input,
@@ -263,10 +264,9 @@ libmap::BagGrid grid_of(const CloudFile& map, double cell_m) {
   const Eigen::Array2d cells = (bounds.max - bounds.min).head<2>().array() / cell_m + 1.5;
   constexpr double max_cells = 1 << 26;
   if (!(cells.prod() <= max_cells))
-    throw libmap::Error("too many cells for a message", {.file = map.path,
-                                                         .field = "cell_size_m",
-                                                         .value = libmap::to_text(cell_m),
-                                                         .bound = "<= 2^26 cells"});
+    throw libmap::Error(
+        "the grid would have more than 2^26 cells; use a larger cell size",
+        {.file = map.path, .field = "cell_size_m", .value = libmap::to_text(cell_m)});
   grid.columns = static_cast<std::size_t>(cells.x());
   grid.rows = static_cast<std::size_t>(cells.y());
   std::vector<std::size_t> top(grid.columns * grid.rows, points.size());
@@ -415,7 +415,7 @@ void write_bag(const BagCommandOptions& options, Run& run) {
     reject_given({{"--stamp", options.stamp != "auto"}},
                  "cannot be used with a rig's folder: use --stamp-offset");
     if (options.rig.empty() && !fs::exists(fs::path(options.input) / libmap::rig_file_name))
-      throw libmap::Error("is neither a map's file nor a folder with rig.yaml (--rig)",
+      throw libmap::Error("is neither a map file nor a folder with rig.yaml (--rig)",
                           {.file = options.input});
   } else {
     reject_given({{"--rig", !options.rig.empty()}}, "cannot be used with a map");
@@ -435,7 +435,7 @@ void require_no_scan(const fs::path& input) {
   for (const char* name : {files::nodes, files::associations, files::depth_list})
     if (fs::exists(input / name))
       throw libmap::Error(
-          fmt::format("contains {} of a scan, and also files of a rig or a bag", name),
+          fmt::format("ambiguous input: contains {} (a scan) and files of a rig or bag", name),
           {.file = input.string()});
 }
 

@@ -92,7 +92,7 @@ std::vector<ScanImage> find_images(const libmap::ScanSource& scan, const libmap:
     });
     for (const FrameResult& result : batch) {
       if (result.error && strict) throw libmap::Error(*result.error);
-      if (result.error) run.warn(std::string(result.error->what()) + "; its image is left out");
+      if (result.error) run.warn(std::string(result.error->what()) + "; the image is skipped");
       images.insert(images.end(), result.images.begin(), result.images.end());
     }
     run.progress().advance(batch.size());
@@ -217,7 +217,7 @@ void claim_image_folders(const ImageOptions& options, const std::string& scan, R
 }
 
 // Writes, for Bundler, bundle.out, list.txt and resampled images of selected views; for COLMAP,
-// sparse/cameras.txt, images.txt, points3D.txt and all images as stored. Broken frames are left out
+// sparse/cameras.txt, images.txt, points3D.txt and all images as stored. Broken frames are skipped
 // with a warning. Throws Error for them if `strict`.
 void write_image_folders(ImageOptions& options, const libmap::ScanSource& scan, bool strict,
                          Run& run) {
@@ -319,7 +319,7 @@ Counts extract_frames(const libmap::ScanSource& scan, libmap::FrameFolderWriter*
       max_pixels = std::max(max_pixels, libmap::image_pixels(images.frame));
       if (images.error && options.strict) throw libmap::Error(*images.error);
       if (images.error) {
-        run.warn(std::string(images.error->what()) + "; its images are left out");
+        run.warn(std::string(images.error->what()) + "; images of this node are skipped");
         ++counts.broken_frames;
       } else {
         if (images.is_rounded) ++counts.rounded_depth_images;
@@ -369,7 +369,7 @@ void write_folder(const ExtractOptions& options, const libmap::ScanSource& scan,
     if (counts.rounded_depth_images > 0)
       run.info("{} depth images were rounded to millimeters", counts.rounded_depth_images);
     if (counts.lost_depth_pixels > 0)
-      run.warn("{} depth pixels beyond 65.5 m are left out", counts.lost_depth_pixels);
+      run.warn("{} depth pixels beyond 65.5 m are skipped", counts.lost_depth_pixels);
   };
   run.write_output_tree(options.output, libmap::frame_folder_names(), work);
 }
@@ -419,7 +419,8 @@ int graspmap_tools::convert_scan(int argc, char** argv) {
       "With a scan: the scan as plain files, for MeshLab (--bundler) or COLMAP (--colmap).");
   command.input("SCAN", options.scan, "RTAB-Map database, or a folder of frames");
   command.output(options.output, "folder for the whole scan; replaced if it exists", false);
-  command.flag("--strict", options.strict, "fail if a frame is broken, instead of leaving it out");
+  command.flag("--strict", options.strict,
+               "fail if a frame is broken, instead of skipping the frame");
   add_calibration_option(command, options.calibration);
   add_options(command, options.images);
   return command.run(argc, argv, [&](Run& run) { extract(options, run); });

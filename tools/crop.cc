@@ -34,13 +34,14 @@ struct CropCommandOptions {
 };
 
 void bind(libmap::ParameterTable& table, CropCommandOptions& options) {
-  table.add(
-      "level", options.level, {{"auto", true}, {"none", false}},
-      "levelling of the site; auto: the ground becomes z = 0; none: the map's z is unchanged");
+  table.add("level", options.level, {{"auto", true}, {"none", false}},
+            "levelling of the site; auto: the ground becomes z = 0; none: z of the map is "
+            "unchanged");
   table.add("up", options.up, "up direction: auto, or X,Y,Z in the input map's frame");
   table.add("frame", options.crop.frame,
             {{"level", libmap::CropFrame::level}, {"map", libmap::CropFrame::map}},
-            "frame of --box and --polygon: levelled and rotated, or that of the input map");
+            "frame of --box and --polygon; level: levelled and rotated; map: frame of the input "
+            "map");
   table.add("yaw_deg", options.yaw,
             "rotation of the site about z, degrees; auto: with --size or --border, such that the "
             "sides are parallel to x and y, else none");
@@ -83,8 +84,7 @@ void read_region(CropCommandOptions& options) {
   if (is_given(options.box) + is_given(options.polygon) + is_given(options.size) +
           (options.border ? 1 : 0) >
       1)
-    throw libmap::Error("only one region can be cropped",
-                        {.bound = "one of --box, --polygon, --size and --border"});
+    throw libmap::Error("--box, --polygon, --size and --border exclude each other");
   if (!options.box.empty()) {
     crop.region = CropRegion::box;
     crop.box = box_of(options.box);
@@ -99,9 +99,8 @@ void read_region(CropCommandOptions& options) {
   }
   if (!options.border_size.empty()) {
     if (!options.border)
-      throw libmap::Error(
-          "requires --border",
-          {.field = "--border-size", .value = options.border_size, .bound = "only with --border"});
+      throw libmap::Error("requires --border",
+                          {.field = "--border-size", .value = options.border_size});
     crop.border_size_m = size_of(options.border_size, "--border-size");
   }
   crop.level = options.level;
@@ -313,10 +312,11 @@ int main(int argc, char** argv) {
   command.option("--polygon", "FILE.csv", options.polygon,
                  "area to keep: corners in order, columns x, y; convex or not");
   command.option("--size", "WIDTHxHEIGHT", options.size,
-                 "size of the rectangle to keep, m; it is centered in the data");
+                 "size of the rectangle to keep, centered in the data, m");
   command.flag("--border", options.border, "keep the area inside a white band on the ground");
-  command.option("--border-size", "WIDTHxHEIGHT", options.border_size,
-                 "true size of the area inside the white band, m; it determines the map's scale");
+  command.option(
+      "--border-size", "WIDTHxHEIGHT", options.border_size,
+      "true size of the area inside the white band, which determines the scale of the map, m");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { crop(options, run); });
 }

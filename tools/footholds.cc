@@ -68,7 +68,7 @@ std::vector<Eigen::Vector3d> positions_on(const libgtd::Ground& ground,
 void bind(libmap::ParameterTable& table, FootholdTrialsOptions& options) {
   table.add("gripper", options.gripper,
             "gripper of the test on --mesh: scar-e, hubrobo, limbero or a gripper file; default: "
-            "that of the map");
+            "gripper of the map");
   table.add("min_probability", options.min_probability, libmap::zero_to_one,
             "minimum hold_probability of a foothold in the test on --mesh");
   bind(table, options.grasp);
@@ -97,7 +97,7 @@ std::vector<libgtd::LocationResult> test_footholds(const FootholdTrialsOptions& 
   if (positions.empty() && found > 0)
     throw libmap::Error("none of the map's footholds is on the mesh", {.file = options.mesh});
   if (positions.size() < found)
-    run.warn("{}: {} of {} footholds are not on the mesh and are left out", options.mesh,
+    run.warn("{}: {} of {} footholds are not on the mesh and are skipped", options.mesh,
              found - positions.size(), found);
   const std::vector<libgtd::LocationResult> trials = run.timed("grasp", [&] {
     return libgtd::test_grasps(ground, gripper, positions, options.grasp, run.progress());
@@ -207,7 +207,7 @@ void find_footholds(const FootholdsCommandOptions& options, Run& run) {
     run.warn("{}: no voxel is a candidate{}", options.map,
              result.at_border == 0
                  ? ""
-                 : fmt::format("; {} at the border of the scan are left out (--border)",
+                 : fmt::format("; {} at the border of the scan are skipped (--border)",
                                result.at_border));
   libmap::PointCloud cloud = libgtd::to_cloud(result, map);
   add_trial_fields(trials, cloud);

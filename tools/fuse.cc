@@ -75,8 +75,7 @@ void tell_registration(const libmap::DepthFusionResult& result, Run& run) {
     run.info("poses not corrected: registration does not improve held-out {}, {:.4f} -> {:.4f}",
              color.count > 0 ? "color" : "depth", shown.before, shown.after);
   else if (result.registration_rejected)
-    run.info(
-        "poses not corrected: they are refined, and there is no color to validate registration");
+    run.info("poses not corrected: poses are refined, and no color can validate registration");
 }
 
 void tell_results(const libmap::DepthFusionResult& result, const FuseOptions& options, Run& run) {
@@ -237,14 +236,14 @@ void check_registration(const libmap::ScanSource& scan, const FuseOptions& optio
   if (!options.fusion.color) return;
   const libmap::EdgeAgreement edges =
       run.timed("registration of depth", [&] { return libmap::check_edge_agreement(scan); });
-  run.detail("edges of depth are {:.1f} px off those of {} images", edges.displacement_px,
+  run.detail("edges of depth are {:.1f} px off the edges of {} images", edges.displacement_px,
              edges.frames);
   if (!edges.is_displaced()) return;
   if (edges.is_scaled())
-    throw libmap::Error(edges.sentence(), {.file = options.scan,
-                                           .field = "depth_calibration",
-                                           .bound = "a depth camera in scan.yaml (of convert SCAN "
-                                                    "-o FOLDER), or --no-color"});
+    throw libmap::Error(edges.sentence() +
+                            "; set depth_calibration in scan.yaml (of convert SCAN -o FOLDER) or "
+                            "use --no-color",
+                        {.file = options.scan, .field = "depth_calibration"});
   run.warn("{}: {}; refine --write-calibration estimates the registration for --calibration",
            options.scan, edges.sentence());
 }
@@ -302,7 +301,8 @@ int fuse_scan(int argc, char** argv) {
   command.parameters().add(
       "frame", options.frame,
       {{"poses", CloudFrame::poses}, {"ground-truth", CloudFrame::ground_truth}},
-      "frame of the cloud; poses: that of the poses; ground-truth: that of the scan's true poses, "
+      "frame of the cloud; poses: frame of the poses; ground-truth: frame of the scan's true "
+      "poses, "
       "to which the poses are aligned");
   command.parameters().add("tile_size_m", options.tile_m, libmap::positive,
                            "side of a tile if the output is a folder, m");

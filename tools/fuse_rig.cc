@@ -38,7 +38,7 @@ void bind(libmap::ParameterTable& table, PanoramaCommandOptions& options) {
 // Message about a camera without an image in the set.
 std::string absence(const std::string& name, const SynchronizedSet::Camera& camera) {
   if (camera.state == State::missing) return name + ": has no image";
-  return fmt::format("{}: its nearest image is {:.1f} ms {}", name, std::abs(camera.offset_s) * 1e3,
+  return fmt::format("{}: the nearest image is {:.1f} ms {}", name, std::abs(camera.offset_s) * 1e3,
                      camera.offset_s > 0 ? "late" : "early");
 }
 
@@ -96,9 +96,9 @@ std::vector<libmap::PanoramaView> read_views(const libmap::CameraRig& rig,
     try {
       depth = libmap::read_rig_depth(image, camera);
     } catch (const libmap::Error& error) {
-      // Only the camera of a broken image is left out.
+      // Only the camera of a broken image is skipped.
       if (strict) throw;
-      run.warn(std::string(error.what()) + "; camera " + camera.name + " is left out");
+      run.warn(std::string(error.what()) + "; camera " + camera.name + " is skipped");
       continue;
     }
     run.add_input(image.file);
@@ -133,7 +133,7 @@ void panorama(PanoramaCommandOptions& options, Run& run) {
       run.timed("project", [&] { return libmap::make_panorama(views, options.panorama); });
   if (views.empty())
     throw libmap::Error("no image of this time can be read", {.file = options.folder});
-  if (result.cloud.empty()) run.warn("no camera has measurements within its limits");
+  if (result.cloud.empty()) run.warn("no camera has measurements within the depth limits");
   add_rig_results(rig, set, result, views, run);
   carry_transforms(options.folder, run);
   run.info("{} points from {} of {} cameras at {} s", result.cloud.size(), views.size(), cameras,

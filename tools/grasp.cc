@@ -193,13 +193,14 @@ void bind(libmap::ParameterTable& table, GraspCommandOptions& options) {
   table.add_overrides("gripper", options.overrides);
   bind(table, options.grasp);
   table.add("surface_error", options.surface_error,
-            "error of the mesh that the trials simulate; none; mesh: the vertex field "
-            "expected_error; or a standard deviation, m");
+            "error of the mesh that the trials simulate; none: no error; mesh: vertex field "
+            "expected_error; a number: standard deviation, m");
   table.add("sequential", options.sequential,
             {{"auto", SequentialTest::automatic},
              {"on", SequentialTest::on},
              {"off", SequentialTest::off}},
-            "end the test of a location as soon as its verdict is certain; auto: with --map");
+            "end of the test of a location as soon as its verdict is certain; on: always; off: "
+            "never; auto: only with --map");
   table.add("map_draws", options.map_draws, {1, 100000},
             "with --map: number of random draws per pose, instead of --draws");
   table.add("more_loads", options.more_loads,
@@ -320,7 +321,8 @@ void grasp_places(GraspCommandOptions& options, Run& run) {
   for (const std::string& text : libmap::split_list(options.more_loads)) {
     const auto load = libmap::parse_double(text);
     if (!load || !(*load > 0.0))
-      throw libmap::Error("not a load", {.field = "--more-loads", .value = text, .bound = "> 0"});
+      throw libmap::Error("not a force, N",
+                          {.field = "--more-loads", .value = text, .bound = "> 0"});
     options.grasp.extra_loads_n.push_back(*load);
   }
   claim_scenes(options.scenes, run);
@@ -381,14 +383,14 @@ void say_fit(const libgtd::PullFit& fit, std::size_t tests, Run& run) {
     rows += (rows.empty() ? "" : ", ") + std::to_string(row);
   if (!fit.explains_tests())
     run.warn(
-        "the model does not explain the tests: their mean squared score is {:.2f} instead of 1, "
+        "the model does not explain the tests: the mean squared score is {:.2f} instead of 1, "
         "each predicted from the others (probability {:.1g}){}; the ranges are too narrow",
         fit.mean_squared_score, fit.chance, rows.empty() ? "" : ", worst rows " + rows);
   else if (!rows.empty())
     run.warn("the other tests do not predict the tests of rows {}", rows);
   constexpr double few_sets = 8.0;
   if (fit.effective_sets < few_sets)
-    run.warn("the fit has only {:.1f} effective parameter sets: its ranges are too narrow",
+    run.warn("the fit has only {:.1f} effective parameter sets; the fitted ranges are too narrow",
              fit.effective_sets);
   for (const auto& [name, force] :
        {std::pair{"level_before", &fit.level_before}, {"level_after", &fit.level_after}})

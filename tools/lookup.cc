@@ -27,8 +27,8 @@ struct LookupCommandOptions {
 void bind(libmap::ParameterTable& table, LookupCommandOptions& options) {
   bind(table, options.lookup);
   table.add("points_frame", options.points_frame, listed_point_frame_names(),
-            "frame of the points: input: the scored cloud; terrain; map: the map before it was "
-            "cropped, or that of a simulated robot; auto: by the manifest of POINTS, else input");
+            "frame of the points; input: scored cloud; terrain: terrain frame; map: map before "
+            "cropping or map of a simulated robot; auto: from the manifest of POINTS, else input");
   table.add("column", options.columns,
             "columns to add, separated by commas: NAME=FIELD, or NAME=FIELD>=VALUE for 1 or 0; "
             "none: found, distance_m and every field of the map");

@@ -41,13 +41,12 @@ struct MeshOptions {
 };
 
 void bind(libmap::ParameterTable& table, MeshOptions& options) {
-  table.add(
-      "normals", options.normals,
-      {{"auto", NormalSource::automatic},
-       {"cloud", NormalSource::cloud},
-       {"estimate", NormalSource::estimate}},
-      "source of normals; auto: the cloud's, estimated if it has none, reoriented if neighbors "
-      "face opposite sides; cloud: the cloud's, unchanged; estimate: always estimated");
+  table.add("normals", options.normals,
+            {{"auto", NormalSource::automatic},
+             {"cloud", NormalSource::cloud},
+             {"estimate", NormalSource::estimate}},
+            "source of normals; cloud: normals of the cloud; estimate: estimated normals; auto: "
+            "cloud if it has normals, reoriented if neighbors face opposite sides, else estimate");
   libmap::bind(table, options.estimation);
   libmap::bind(table, options.surface.reconstruction);
   libmap::bind(table, options.surface.cleaning);
@@ -56,7 +55,7 @@ void bind(libmap::ParameterTable& table, MeshOptions& options) {
 }
 
 void check_points(const std::string& input, std::size_t points, std::size_t dropped, Run& run) {
-  if (dropped > 0) run.warn("{}: {} points without a finite position are left out", input, dropped);
+  if (dropped > 0) run.warn("{}: {} points without a finite position are skipped", input, dropped);
   if (points == 0) throw libmap::Error("the cloud has no points", {.file = input});
 }
 
@@ -118,7 +117,7 @@ libmap::TriangleMesh reconstructed(const MeshOptions& options, const libmap::Poi
       libmap::reconstruct_surface(cloud, options.surface.reconstruction, run.progress(),
                                   [&](const libmap::SurfaceWork& work) { announce(work, run); });
   if (made.dropped_points > 0)
-    run.warn("{} of {} points have no normal and are left out", made.dropped_points, cloud.size());
+    run.warn("{} of {} points have no normal and are skipped", made.dropped_points, cloud.size());
   run.add_results({{"points", cloud.size()}});
   run.add_results(libmap::described(made));
   run.add_timings(made.timings_s, "reconstruction");
@@ -277,7 +276,7 @@ void make_tiles(const MeshOptions& options, TileFolder& output, Run& run) {
   });
   check_points(options.cloud, index.points(), index.dropped_points(), run);
   if (survey.dropped_points() > 0)
-    run.warn("{} of {} points have no normal and are left out", survey.dropped_points(),
+    run.warn("{} of {} points have no normal and are skipped", survey.dropped_points(),
              index.points());
   run.add_results({{"points", index.points()},
                    {"dropped_points", survey.dropped_points()},

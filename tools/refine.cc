@@ -84,7 +84,7 @@ libmap::ColmapModel model_of(const libmap::Trajectory& poses, const libmap::Scan
         builder.add_image(libmap::image_file_of(scan, pose.node, views, c).name, views[c],
                           pose.world_from_base * views[c].color_camera.base_from_camera);
     } catch (const libmap::Error& error) {
-      run.warn(std::string(error.what()) + "; its pose is not in the model of COLMAP");
+      run.warn(std::string(error.what()) + "; the pose is not in the model of COLMAP");
     }
   }
   return builder.model();
@@ -114,7 +114,7 @@ void claim_poses_output(const std::string& path, const std::vector<std::string>&
 }
 
 // Writes the poses. A model of COLMAP has the scan's calibrations and the image names of `convert
-// --colmap`; frames without an image or a calibration are left out with a warning.
+// --colmap`; frames without an image or a calibration are skipped with a warning.
 void write_poses_output(const std::string& path, const libmap::TrajectoryFile& poses,
                         const libmap::ScanSource& scan, bool nodes, Run& run) {
   if (is_model(path))

@@ -178,7 +178,8 @@ MapWindow read_window(const MapTiles& tiles, const std::optional<Eigen::AlignedB
       parts[n] = libgtd::downsample_map(parts[n], window.columns_per_point);
   });
   if (!parts.empty()) window.cloud = libgtd::merge_map_clouds(parts);
-  if (window.cloud.empty()) throw libmap::Error("no part of the map is in it", {.field = "--box"});
+  if (window.cloud.empty())
+    throw libmap::Error("the box contains no part of the map", {.field = "--box"});
   if (window.columns_per_point > 1) {
     window.cloud = libgtd::downsample_map(window.cloud, window.columns_per_point);
     libgtd::snap_to_squares(tiles.index(), window.columns_per_point, window.cloud);
@@ -252,22 +253,23 @@ SceneFile scene_of(const std::string& file, const SceneFileOptions& options, Run
 // Options of marked locations only.
 void bind_points(libmap::ParameterTable& table, SceneFileOptions& options) {
   table.add("label", options.label,
-            "column of the marked locations' names; auto: the first column, unless it is x, y or "
-            "z; none: no names");
+            "column of the names of marked locations; auto: the first column, unless it is x, y "
+            "or z; none: no names");
   table.add("verdict", options.verdict,
-            "column of the marked locations' verdicts: 1 green, 0 red, empty neutral");
+            "column of the verdicts of marked locations; 1: green; 0: red; empty: neutral");
   table.add("points_frame", options.points_frame, listed_point_frame_names(),
-            "frame of the marked locations; input: of the scored cloud; terrain; map: of the map "
-            "before it was cropped; auto: by their manifest, else input");
+            "frame of the marked locations; input: scored cloud; terrain: terrain frame; map: map "
+            "before cropping; auto: from the manifest of the locations' file, else input");
 }
 
 // Binds all options except `points`, which is a separate option.
 void bind(libmap::ParameterTable& table, SceneFileOptions& options) {
   bind(table, options.layer);
-  table.add(
-      "zero_plane", options.zero_plane,
-      "height in the terrain frame below which ground is white, m; auto: the map's own, none");
-  table.add("box", options.box, "shown rectangle of a cloud or map: X0,Y0,X1,Y1 in its frame, m");
+  table.add("zero_plane", options.zero_plane,
+            "height in the terrain frame below which ground is white, m; auto: zero plane of the "
+            "map; none: no zero plane");
+  table.add("box", options.box,
+            "shown rectangle of a cloud or map: X0,Y0,X1,Y1 in the frame of the file, m");
   table.add("max_points", options.max_points, libmap::Range{1'000.0, 1e9},
             "approximate maximum number of drawn points of a tile store; more are downsampled");
   bind_points(table, options);
@@ -275,7 +277,8 @@ void bind(libmap::ParameterTable& table, SceneFileOptions& options) {
             {{"auto", MapHeading::automatic},
              {"terrain", MapHeading::terrain},
              {"input", MapHeading::input}},
-            "horizontal axes of a map's image: those of the terrain frame, or of the map's input");
+            "horizontal axes of a map's image; terrain: terrain frame; input: scored cloud; "
+            "auto: terrain for one file, input for several");
 }
 
 // Reads a cloud, mesh, graspability map or tile store. Throws Error naming the file.
@@ -319,11 +322,11 @@ void bind_one(libmap::ParameterTable& table, RenderOptions& options) {
 void bind_page(libmap::ParameterTable& table, RenderOptions& options) {
   libmap::ImageGridOptions& sheet = options.sheet;
   table.add("columns", sheet.columns, libmap::Range{0, 1000},
-            "for several files: number of columns; 0: for an approximately square sheet");
+            "number of columns on a page of several files; 0: for an approximately square page");
   table.add("cell_width_px", sheet.cell_width_px, libmap::Range{16, 16384},
-            "for several files: width of a cell, pixels");
+            "width of each image cell on a page of several files, pixels");
   table.add("cell_height_px", sheet.cell_height_px, libmap::Range{0, 16384},
-            "for several files: height of a cell, pixels; 0: by the content of the cells");
+            "height of each image cell on a page of several files, pixels; 0: by the content");
   table.add("captions", options.captions,
             "for several files: texts below the cells, separated by |; default: the files' names "
             "without extension");
@@ -333,7 +336,8 @@ void bind_page(libmap::ParameterTable& table, RenderOptions& options) {
             "for several files: titles of the rows, separated by |");
   table.add("shared_view", sheet.shared_view,
             {{"sheet", libmap::SharedView::sheet}, {"row", libmap::SharedView::row}},
-            "for several files: maps with common scale and extent: all, or those of each row");
+            "maps with common scale and extent on a page of several files; sheet: all; row: maps "
+            "of each row");
 }
 
 void bind(libmap::ParameterTable& table, RenderOptions& options) {

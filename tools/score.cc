@@ -53,7 +53,7 @@ void report_plane(const libgtd::RegressionPlane& plane, const std::string& terra
                                    : plane.up_source == libgtd::UpSource::frame_z;
   if (doubtful && plane.relief_skewness < upside_down_skewness)
     run.warn(
-        "{}: its relief is below the plane: if it is upside down, set --up (--up=0,0,-1 for a "
+        "{}: the relief is below the plane; if it is upside down, set --up (--up=0,0,-1 for a "
         "cloud in a camera's frame)",
         terrain);
 }
@@ -140,7 +140,7 @@ class StoreScoring {
         tiling_(options.detection) {
     if (fs::is_directory(options.store) && fs::is_directory(options.terrain) &&
         fs::equivalent(options.store, options.terrain))
-      throw libmap::Error("is the input: choose another output name", {.file = options.store});
+      throw libmap::Error("is the input; choose another output name", {.file = options.store});
   }
 
   void score() {
@@ -339,7 +339,8 @@ void bind(libmap::ParameterTable& table, ScoreOptions& options) {
   table.add(
       "up", options.up,
       "direction toward the outer side of the fitted plane: auto, or X,Y,Z in the cloud's frame");
-  table.add("frame", options.frame, libgtd::map_frame_names(), "frame of the map's points");
+  table.add("frame", options.frame, libgtd::map_frame_names(),
+            "frame of the map's points; terrain: terrain frame; input: frame of the scored cloud");
 }
 
 std::size_t parse_max_points(const std::string& text) {

@@ -62,7 +62,7 @@ libmap::CameraRig load_rig(const SimulateCamerasOptions& options, Run& run) {
                           {.file = options.depth_scale_m > 0 ? "" : file.string(),
                            .field = "depth_scale_m",
                            .value = libmap::to_text(camera.depth_scale_m),
-                           .bound = ">= far_m / 65534, " +
+                           .bound = ">= far_m / 65534 = " +
                                     libmap::to_text(static_cast<float>(camera.far_m / largest))});
   }
   return rig;
@@ -105,7 +105,7 @@ void add_results(const libmap::CameraRig& rig, const std::vector<libmap::RobotCa
     pixels += images[i].depth.pixels.size();
     measured += images[i].measurement.measured;
     if (images[i].measurement.measured == 0)
-      run.warn("{}: has no measurements within its range", rig.cameras[i].name);
+      run.warn("{}: has no measurements within the depth range", rig.cameras[i].name);
   }
   run.add_results({{"cameras", images.size()}, {"pixels", pixels}, {"measured_pixels", measured}});
   run.info("{} cameras, {:.0f} % of the pixels measured", images.size(),

@@ -51,8 +51,8 @@ void bind(libmap::ParameterTable& table, SimulateScanOptions& options) {
             {{"auto", libmap::TextureSource::automatic},
              {"mesh", libmap::TextureSource::mesh},
              {"rock", libmap::TextureSource::rock}},
-            "source of the colors; mesh: the mesh's own; rock: a generated rock texture; auto: "
-            "rock for a mesh of a single color");
+            "source of the colors; mesh: colors of the mesh; rock: generated rock texture; auto: "
+            "rock if the mesh has a single color, else mesh");
   bind(table, simulation.photo);
   bind(table, simulation.faults);
   bind(table, simulation.events);
@@ -62,14 +62,14 @@ void bind(libmap::ParameterTable& table, SimulateScanOptions& options) {
             {{"rvl", libmap::DepthFormat::rvl},
              {"png", libmap::DepthFormat::png16},
              {"float", libmap::DepthFormat::float_png}},
-            "format of depth images; float keeps fractions of a millimeter");
+            "format of depth images; rvl, png: whole millimeters, RVL or 16-bit PNG; float: PNG "
+            "with fractions of a millimeter");
   table.add("color_format", options.writer.color,
             {{"jpeg", libmap::ImageFormat::jpeg}, {"png", libmap::ImageFormat::png}},
-            "format of color images");
+            "format of color images; jpeg: lossy; png: lossless");
   table.add("seed", simulation.seed, libmap::not_negative, "random seed");
-  table.add(
-      "rock_seed", simulation.rock_seed, libmap::not_negative,
-      "random seed of the rock's colors, equal in all scans of one ground; 0: that of --seed");
+  table.add("rock_seed", simulation.rock_seed, libmap::not_negative,
+            "random seed of the rock's colors, equal in all scans of one ground; 0: as --seed");
 }
 
 void add_results(const libmap::ScanSimulationResult& result, Run& run) {

@@ -28,7 +28,7 @@ using libmap::positive;
 void bind_cloud(libmap::ParameterTable& table, SimulateOptions& options) {
   table.add("spacing_m", options.sampling.spacing_m, positive, "mean distance between samples, m");
   table.add("count", options.sampling.count, not_negative,
-            "number of samples (within 2 %), instead of a spacing; 0: by spacing");
+            "approximate number of samples (2 %); replaces --spacing; 0: use --spacing");
   table.add("jitter", options.sampling.jitter, libmap::zero_to_one,
             "random offset of the samples from their grid, as a share of a cell");
   table.add("noise_m", options.sampling.noise_m, not_negative,

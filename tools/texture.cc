@@ -49,14 +49,15 @@ void bind(libmap::ParameterTable& table, TextureCommandOptions& options) {
             {{"auto", MeshFrame::automatic},
              {"poses", MeshFrame::poses},
              {"ground-truth", MeshFrame::ground_truth}},
-            "frame of the mesh; poses: that of the poses; ground-truth: that of the scan's true "
-            "poses, to which the poses are aligned; auto: by the mesh's manifest, else poses");
+            "frame of the mesh; poses: frame of the poses; ground-truth: frame of the scan's "
+            "true poses, to which the poses are aligned; auto: from the mesh's manifest, else "
+            "poses");
   libmap::bind(table, options.texture);
   table.add("margin_m", options.margin_m, libmap::not_negative,
             "for an output folder: maximum distance of occluding surfaces from a tile, m");
   table.add("image_format", options.writing.image_format,
             {{"png", libmap::ImageFormat::png}, {"jpeg", libmap::ImageFormat::jpeg}},
-            "image format of the texture's pages");
+            "format of the texture pages; png: lossless; jpeg: lossy");
   table.add("jpeg_quality", options.writing.jpeg_quality, {1.0, 100.0},
             "JPEG quality of texture pages");
 }

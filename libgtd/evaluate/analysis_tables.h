@@ -16,7 +16,7 @@ namespace libgtd {
 // finer bins.
 libmap::Table histogram_table(const MapAnalysis& analysis);
 
-// Returns one row per bin; `unit` is the unit of its bounds, "m" or "deg".
+// Returns one row per bin; `unit` is the unit of the bounds, "m" or "deg".
 libmap::Table ground_table(const std::vector<GroundBin>& bins, const std::string& unit);
 
 // Returns one row per region; positions are in the frame of the map's points.
@@ -35,7 +35,7 @@ std::string analysis_json(const MapAnalysis& analysis, const MapSurface& surface
                           const MapRegionResult& regions, const RegionReachOptions& reach_options,
                           const RegionReach& reach, const MapChange* change);
 
-// Returns the points of `cloud`, the map, in their order with the fields region (0: none),
+// Returns the points of `cloud`, the map, in the same order with the fields region (0: none),
 // reachable, slope_deg and area_m2. Of the other fields, only score and graspable are kept.
 libmap::PointCloud regions_cloud(const libmap::PointCloud& cloud, const VoxelMap& map,
                                  const MapSurface& surface, const MapRegionResult& regions,

@@ -44,7 +44,7 @@ void check_region(const ExpectedRegion& region) {
         "out of range",
         {.field = field + ", radius", .value = libmap::to_text(region.radius_m), .bound = "> 0"});
   if (!region.from.allFinite() || !region.to.allFinite())
-    throw libmap::Error("is not finite", {.field = field, .bound = "finite coordinates"});
+    throw libmap::Error("coordinates are not finite", {.field = field});
 }
 
 void check_columns(const libmap::Table& table) {
@@ -80,7 +80,7 @@ Eigen::Vector3d read_to(const libmap::Table& table, std::size_t row, const Eigen
     throw libmap::Error("the end of the segment is incomplete",
                         {.file = table.file,
                          .field = "row " + std::to_string(row + 1) + ", columns to_x, to_y, to_z",
-                         .bound = "all three, or none for a ball"});
+                         .bound = "all set, or all empty for a ball"});
   return to;
 }
 
@@ -117,7 +117,8 @@ void set_scores(std::vector<double> scores, RegionResult& region) {
 const libmap::ScalarField& scores_of(const libmap::PointCloud& map) {
   if (map.empty()) throw libmap::Error("the map has no points");
   const libmap::ScalarField* score = map.find_field("score");
-  if (score == nullptr) throw libmap::Error("not a graspability map", {.field = "score"});
+  if (score == nullptr)
+    throw libmap::Error("no such field; a graspability map is required", {.field = "score"});
   return *score;
 }
 
@@ -144,7 +145,7 @@ void ExpectedMap::check() const {
       const ExpectedRegion& other = regions[j];
       if (!region.graspable || !other.graspable || *region.graspable == *other.graspable) continue;
       if (distance(region, other) <= region.radius_m + other.radius_m)
-        throw libmap::Error("overlap, but only one is expected to be graspable: shrink or move one",
+        throw libmap::Error("overlap, but only one is expected to be graspable; shrink or move one",
                             {.field = "regions '" + other.name + "' and '" + region.name + "'"});
     }
   }

@@ -1,5 +1,5 @@
-// Evaluates a map against regions whose graspability is known by reasoning, such as "the top of a
-// ball can be held", instead of a field test. Every voxel in a region counts.
+// Evaluates a map against regions of known graspability, for example "the top of a ball is
+// graspable", instead of a field test. Every voxel in a region counts.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,7 +15,8 @@
 
 namespace libgtd {
 
-// Region of all points at most `radius_m` from a segment in 3D; a ball if its ends coincide.
+// Region of all points at most `radius_m` from a segment in 3D; a ball if the ends of the segment
+// coincide.
 struct ExpectedRegion {
   std::string name;
   Eigen::Vector3d from = Eigen::Vector3d::Zero();  // meters
@@ -48,7 +49,7 @@ ExpectedMap transformed(const ExpectedMap& expected, const libmap::Pose& map_fro
 
 struct RegionResult {
   std::size_t voxels = 0;            // in the region and, if it is decided, in no undecided region
-  std::size_t reached = 0;           // voxels whose score reaches the cutoff
+  std::size_t reached = 0;           // voxels with score >= cutoff
   std::size_t graspable = 0;         // voxels with the flag of the map
   std::optional<double> mean_score;  // nullopt without voxels
   std::optional<double> median_score;
@@ -61,10 +62,10 @@ struct ExpectedMapResult {
   std::size_t undecided_voxels = 0;   // ignored voxels in undecided regions
   std::size_t unlisted_voxels = 0;    // ignored voxels in no region or without a score
   // Confusion matrix of all voxels with a score, including voxels below the zero plane and at the
-  // border. A voxel is predicted graspable if its score reaches the cutoff (voxels_by_score), or if
-  // it has the flag of the map and is no obstacle (voxels_by_flag). A voxel in several regions
-  // counts once. Neighboring voxels are not independent, so that Wilson intervals of voxel rates
-  // are too narrow; those of regions are valid.
+  // border. A voxel is predicted graspable if score >= cutoff (voxels_by_score), or if the map's
+  // flag `graspable` is set and the voxel is no obstacle (voxels_by_flag). A voxel in several
+  // regions counts once. Neighboring voxels are not independent, so that Wilson intervals of voxel
+  // rates are too narrow; intervals of region rates are valid.
   Confusion voxels_by_score;
   std::optional<Confusion> voxels_by_flag;  // nullopt if the map has no field "graspable"
   Confusion region_confusion;               // each region with voxels counts once

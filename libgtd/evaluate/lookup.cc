@@ -278,9 +278,9 @@ std::vector<std::pair<std::string, LookupMode>> lookup_mode_names() {
 }
 
 void bind(libmap::ParameterTable& table, LookupOptions& options) {
-  table.add(
-      "mode", options.mode, lookup_mode_names(),
-      "map points used for a location: the closest, the best within a radius, or all within it");
+  table.add("mode", options.mode, lookup_mode_names(),
+            "map points used for a location; nearest: closest point; maximum: point with the "
+            "highest score within the radius; mean: all points within the radius");
   table.add("radius_m", options.radius_m, libmap::positive, "radius of modes maximum and mean, m");
   table.add("max_distance_m", options.max_distance_m, libmap::positive,
             "maximum distance of the map point used by mode nearest, m");

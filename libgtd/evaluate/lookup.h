@@ -1,5 +1,5 @@
-// Looks up the values of a map at given locations, such as those of a field test, for a map in
-// memory or in tiles that are loaded one by one.
+// Looks up the values of a map at given locations, such as tested locations, for a map in memory or
+// in tiles that are loaded one by one.
 #pragma once
 
 #include <Eigen/Core>

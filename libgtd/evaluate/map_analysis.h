@@ -11,7 +11,7 @@
 
 namespace libgtd {
 
-// Bins of equal width whose edges are multiples of the width.
+// Bins of equal width; edges are multiples of the width.
 struct ValueBins {
   double first_edge = 0.0;
   double width = 1.0;
@@ -24,7 +24,7 @@ struct ValueBins {
   std::size_t bin_of(double value) const;
 };
 
-// Returns bins from the one that contains `low` to the one that contains `high` or ends there.
+// Returns bins from the one that contains `low` to the one that contains `high` or ends at it.
 // Throws Error naming `field` for more than 100,000 bins.
 ValueBins bins_over(double low, double high, double width, const char* field);
 
@@ -77,11 +77,12 @@ struct MapAnalysis {
   // its voxels is.
   std::size_t columns = 0;
   std::size_t graspable_columns = 0;
-  double plan_area_m2 = 0.0;  // surface area in plan view
+  // Area projected to the horizontal plane; the whole area where the slope is unknown.
+  double plan_area_m2 = 0.0;
   double graspable_plan_area_m2 = 0.0;
   GroundBin ground;  // all evaluated voxels; low, high: range of heights
-  // Fraction of occupied columns among these and the empty columns between them (at most six in a
-  // row along y), over the whole map. It is below 1 if the cloud has fewer points than columns.
+  // occupied / (occupied + empty) columns of the whole map. Only gaps of at most six empty columns
+  // along y count as empty. It is below 1 if the cloud has fewer points than columns.
   double column_coverage = 1.0;
   std::vector<ScoreBin> classes;     // bins of the legend, best first
   std::vector<ScoreBin> score_bins;  // from min(0, lowest score) to max(1, highest)

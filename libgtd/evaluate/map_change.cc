@@ -143,7 +143,7 @@ ChangeSummary summarize(const VoxelMap& map, const MapSurface& surface, const Vo
   return summary;
 }
 
-// Statistics of pairs in bins of `value` of the voxel of MAP; pairs with NaN are left out.
+// Statistics of pairs in bins of `value` of the voxel of MAP; pairs with NaN are skipped.
 template <typename Value>
 std::vector<ChangeSummary> summarize_bins(const VoxelMap& map, const MapSurface& surface,
                                           const VoxelMap& other,
@@ -235,7 +235,8 @@ MapChange compare_maps(const VoxelMap& map, const MapSurface& surface, const Vox
                                      options.match_distance_voxels * size_m);
   }
   if (change.pairs.empty())
-    throw libmap::Error("the maps have no voxel in common: check their area and their frames");
+    throw libmap::Error(
+        "the maps have no voxel in common; check the areas and frames of both maps");
   find_unpaired(map, other, change);
   change.common = summarize(map, surface, other, change.pairs);
   summarize_evaluated(map, surface, other, options, change);

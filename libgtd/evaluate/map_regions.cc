@@ -147,7 +147,7 @@ class NearestPairs {
       smaller[s] = smaller_neighbors(s);
       pairs += smaller[s].size();
       if (pairs > max_links)
-        throw libmap::Error("too large: it links more than 10 million pairs of regions",
+        throw libmap::Error("too large: more than 10 million pairs of regions would be linked",
                             {.field = "stride_m", .value = libmap::to_text(given_reach_m_)});
     }
     libmap::parallel_each(sets_.size(), 8, [&](std::size_t s) {
@@ -284,7 +284,7 @@ std::vector<RegionLink> spanning_tree(const VoxelMap& map, const MapRegionResult
     const Components components = components_of(graph);
     if (components.count == sets.size() && !(reach_m < farthest_m))
       throw libmap::Error(
-          "the regions are too far apart: their distances are not finite",
+          "the distances between the regions are not finite",
           {.field = "voxel_size_m", .value = libmap::to_text(map.lattice.voxel_size_m)});
     if (components.count < sets.size()) sets = joined(map, sets, components);
     reach_m = std::max(2.0 * reach_m, map.lattice.voxel_size_m);

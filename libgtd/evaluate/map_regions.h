@@ -23,7 +23,7 @@ void bind(libmap::ParameterTable& table, MapRegionOptions& options);
 struct MapRegion {
   std::vector<std::uint32_t> voxels;  // indices of map voxels, ascending
   double area_m2 = 0.0;               // surface area
-  double plan_area_m2 = 0.0;          // surface area in plan view
+  double plan_area_m2 = 0.0;          // area projected to the horizontal plane
   // Mean of the voxel centers, weighted by area, and their bounding box, in the terrain frame.
   Eigen::Vector3d centroid = Eigen::Vector3d::Zero();
   Eigen::Vector3d min = Eigen::Vector3d::Zero();
@@ -64,7 +64,7 @@ struct RegionLink {
 
 // Reachability of a region from the start of the robot.
 struct RegionAccess {
-  std::uint32_t group = 0;  // connected regions; numbered by their first region
+  std::uint32_t group = 0;  // connected regions; numbered by the first region of the group
   bool reachable = false;
   std::optional<std::size_t> steps;  // minimum number of steps between regions, including that
                                      // from the start; nullopt: unreachable

@@ -25,7 +25,7 @@ inline constexpr std::array<double, 5> summary_quantiles{0.05, 0.25, 0.5, 0.75, 
 struct MapSummary {
   std::size_t voxels = 0;  // all voxels of the map
   std::size_t evaluated = 0;
-  std::size_t reached = 0;    // voxels whose score reaches the threshold
+  std::size_t reached = 0;    // voxels with score >= threshold
   std::size_t graspable = 0;  // voxels with the flag of the map
   // Voxels with fewer solid voxels in the mask (SSV) than TSV. nullopt if one of them is unknown.
   std::optional<std::size_t> few_solid;
@@ -76,7 +76,7 @@ struct MapPair {
 };
 
 // Compares maps scored from one cloud; `first_terrain_from_second_terrain` is the transform between
-// their frames. Throws like compare_maps.
+// the terrain frames. Throws like compare_maps.
 MapPair compare_pair(const VoxelMap& first, const VoxelMap& second,
                      const libmap::Pose& first_terrain_from_second_terrain);
 

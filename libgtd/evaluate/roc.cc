@@ -209,9 +209,10 @@ void RocOptions::check() const {
   if (cutoffs.empty()) throw libmap::Error("at least one cutoff is required", {.field = "cutoffs"});
   for (std::size_t k = 0; k < cutoffs.size(); ++k) {
     if (!std::isfinite(cutoffs[k]) || (k > 0 && !(cutoffs[k] > cutoffs[k - 1])))
-      throw libmap::Error("cutoffs do not ascend", {.field = "cutoffs",
-                                                    .value = libmap::to_text(cutoffs[k]),
-                                                    .bound = "finite and ascending"});
+      throw libmap::Error("not finite or not greater than the previous cutoff",
+                          {.field = "cutoffs",
+                           .value = libmap::to_text(cutoffs[k]),
+                           .bound = "finite and ascending"});
   }
   if (!std::isfinite(rate_cutoff))
     throw libmap::Error("not finite", {.field = "rate_cutoff",

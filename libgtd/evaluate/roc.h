@@ -1,10 +1,10 @@
-// Evaluates scores against the results of a field test: ROC curve, rates at a cutoff with their
-// intervals, and the area under the curve.
+// Evaluates scores against the results of a field test: ROC curve, rates at a cutoff with
+// confidence intervals, and the area under the curve.
 //
 // A location is predicted positive if score >= cutoff. A tolerance absorbs rounding: a score at
-// most one part in 2^24 below a given cutoff (the largest rounding of single precision) reaches it,
-// so that 0.8 reaches 0.8 in any representation. Scores are compared with each other exactly, as in
-// the curve at every distinct score and in the trapezoid area.
+// most one part in 2^24 below a given cutoff (the largest rounding of single precision) reaches the
+// cutoff, so that 0.8 reaches 0.8 in any representation. Scores are compared with each other
+// exactly, as in the curve at every distinct score and in the trapezoid area.
 #pragma once
 
 #include <cstddef>
@@ -16,8 +16,8 @@
 namespace libgtd {
 
 struct RocOptions {
-  // Cutoffs of the ROC table and the upper sum, finite and ascending; the default is that of tab.
-  // 5-1 to 5-3 of the thesis.
+  // Cutoffs of the ROC table and the upper sum, finite and ascending; the default is from tab. 5-1
+  // to 5-3 of the thesis.
   std::vector<double> cutoffs = {0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0};
   double rate_cutoff = 0.8;          // cutoff of the rates
   int bootstrap_replicates = 10000;  // 0: no interval
@@ -77,8 +77,8 @@ struct RocPoint {
 struct AreaUnderCurve {
   // Area under the curve through every distinct score: the Mann-Whitney statistic, ties count 1/2.
   double trapezoid = 0.0;
-  // Area of the thesis: sum over its cutoffs of (FPR_k - FPR_k+1) * TPR_k, without the last cutoff.
-  // It is at least the trapezoid area over the same cutoffs, and at least `trapezoid` if
+  // Area of the thesis: sum over the cutoffs of (FPR_k - FPR_k+1) * TPR_k, without the last cutoff.
+  // This sum is at least the trapezoid area over the same cutoffs, and at least `trapezoid` if
   // `upper_sum_width` is 1. Negatives below the first cutoff or at the last do not contribute.
   double upper_sum = 0.0;
   std::vector<double> upper_sum_shares;  // terms of the sum, one per cutoff
@@ -98,14 +98,14 @@ struct RocResult {
   // Precision at the cutoff where recall reaches 1/2; ties count in full.
   std::optional<double> precision_at_half_recall;
   // Expected calibration error (Naeini et al. 2015), if all scores are in 0..1: mean over the
-  // locations of |fraction of positives - mean score| of their bin of width 0.1.
+  // locations of |fraction of positives - mean score| of the location's bin (width 0.1).
   std::optional<double> calibration_error;
   std::size_t left_out_unscored = 0;   // locations without a score: not visible
   std::size_t left_out_unlabeled = 0;  // locations with a score but no label
 };
 
 // Evaluates one label and one score per location. A location without one of them, or with a score
-// of NaN, is left out. The result does not depend on the number of threads. Throws Error if the
+// of NaN, is skipped. The result does not depend on the number of threads. Throws Error if the
 // lengths differ.
 RocResult evaluate_roc(const std::vector<std::optional<bool>>& labels,
                        const std::vector<std::optional<double>>& scores,

@@ -183,7 +183,7 @@ std::string notes_markdown(const TableEvaluation& evaluation) {
     if (!result.area) text += "- " + markdown_cell(column.name) + ": " + result.area_note + ".\n";
     if (result.left_out_unlabeled > 0)
       text += "- " + markdown_cell(column.name) + ": " + std::to_string(result.left_out_unlabeled) +
-              " locations have a score and no label and are left out.\n";
+              " locations have a score and no label and are skipped.\n";
     if (result.area && result.area->upper_sum_width < 1.0)
       text += "- " + markdown_cell(column.name) +
               ": some locations that are not graspable score below the first cutoff or reach the "
@@ -274,7 +274,7 @@ TableEvaluation evaluate_table(const Table& table, const TableEvaluationOptions&
   std::vector<std::string>& names = evaluation.options.score_columns;
   if (names.empty()) names = default_score_columns(table, options.label_column);
   if (names.empty())
-    throw libmap::Error("the table has no score column: name one with --score",
+    throw libmap::Error("the table has no score column; name one with --score",
                         {.file = table.file});
   for (std::size_t n = 0; n < names.size(); ++n) {
     if (std::find(names.begin(), names.begin() + static_cast<std::ptrdiff_t>(n), names[n]) !=

@@ -41,19 +41,19 @@ std::optional<bool> parse_label(std::string_view text);
 // if the cell contains another text.
 std::optional<bool> label_at(const libmap::Table& table, std::size_t row, std::size_t column);
 
-// Returns the columns evaluated by default: those with numbers and empty cells only, and at least
+// Returns the columns evaluated by default: columns with only numbers and empty cells, and at least
 // one number, except the label, ids (id, point, hold, i, j, k), positions and distances (x, y, z,
 // or a name that ends with a unit of length such as "_m"), and the look-up flags found and edge.
 std::vector<std::string> default_score_columns(const libmap::Table& table,
                                                std::string_view label_column);
 
 // Evaluates the score columns of a table. Rows with an empty cell (unknown label, or location that
-// is not visible) are left out of that column. Throws Error naming file, row and column for a
+// is not visible) are omitted from that column. Throws Error naming file, row and column for a
 // missing column, a cell that is no label or number, and a table without score columns.
 TableEvaluation evaluate_table(const libmap::Table& table, const TableEvaluationOptions& options);
 
-// Returns one row per score column and cutoff. `at` is "cutoff" for given cutoffs, with their terms
-// of the upper sum, or "score" for distinct scores. Undefined rates are empty cells.
+// Returns one row per score column and cutoff. `at` is "cutoff" for given cutoffs, with terms of
+// the upper sum, or "score" for distinct scores. Undefined rates are empty cells.
 libmap::Table roc_table(const TableEvaluation& evaluation);
 
 // Returns one row per score column and rate: count, total, value, and the Wilson 95 % interval.

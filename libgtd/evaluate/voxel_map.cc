@@ -58,7 +58,7 @@ VoxelLattice fitted_lattice(const PointCloud& map, const libmap::Pose& terrain_f
     squares += offset.squaredNorm();
   }
   if (!(products > 0.0))
-    throw libmap::Error("is unknown: the map has neither a manifest nor the fields i, j and k",
+    throw libmap::Error("is unknown; the map has neither a manifest nor the fields i, j and k",
                         {.field = "voxel_size_m"});
   const double size_m = products / squares;
   return {mean_point - size_m * (mean_voxel.array() + 0.5).matrix(), size_m};
@@ -88,10 +88,10 @@ void require_on_lattice(const PointCloud& map, const VoxelMap& result,
     const Eigen::Vector3d point = result.terrain_from_map * map.positions[kept[n]];
     if (!((point - center).cwiseAbs().array() <= bound_m).all())
       throw libmap::Error(
-          "not at the center of a voxel of the map",
-          {.field = "point " + std::to_string(kept[n] + 1),
-           .value = libmap::to_text(static_cast<float>((point - center).cwiseAbs().maxCoeff())) +
-                    " m off",
+          "too large for the lattice of the map",
+          {.field = "distance of point " + std::to_string(kept[n] + 1) + " from a voxel center",
+           .value =
+               libmap::to_text(static_cast<float>((point - center).cwiseAbs().maxCoeff())) + " m",
            .bound = "<= " + libmap::to_text(static_cast<float>(bound_m)) + " m"});
   }
 }
@@ -166,8 +166,9 @@ MapInfo map_info(const libmap::Manifest& manifest) {
 VoxelMap voxel_map_of(const PointCloud& map, const MapInfo& facts) {
   map.check();
   if (map.size() > std::numeric_limits<std::uint32_t>::max())
-    throw libmap::Error("the map has too many points",
-                        {.value = std::to_string(map.size()), .bound = "< 2^32"});
+    throw libmap::Error(
+        "too many",
+        {.field = "number of points", .value = std::to_string(map.size()), .bound = "< 2^32"});
   values_of(map, "score");
   values_of(map, "graspable");
   VoxelMap result;

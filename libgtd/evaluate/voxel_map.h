@@ -16,7 +16,7 @@
 
 namespace libgtd {
 
-// Properties of a map that are in its manifest, not in its points.
+// Properties of a map that are stored in the manifest, not in the points.
 struct MapInfo {
   std::optional<VoxelLattice> lattice{};  // in the terrain frame; nullopt: unknown
   libmap::Pose terrain_from_map = libmap::Pose::Identity();        // from the frame of the points
@@ -45,7 +45,7 @@ struct VoxelMap {
     return !(lattice.center_of(voxels[n]).z() < zero_plane_m);
   }
   // Returns true if the voxel has a score, is above the zero plane and, unless `with_border`, the
-  // window of its mask is inside the scanned area.
+  // window of the mask is inside the scanned area.
   bool evaluated(std::size_t n, bool with_border) const {
     return scores[n] == scores[n] && above_zero_plane(n) && (with_border || border[n] == 0);
   }
@@ -53,7 +53,7 @@ struct VoxelMap {
 
 // Converts a map with the fields "score" and "graspable" and voxel indices: the fields i, j and k,
 // or a known lattice. With the fields only, the lattice is fitted to the points in the terrain
-// frame. Points without a position are left out. Throws Error for a map without points, a missing
+// frame. Points without a position are skipped. Throws Error for a map without points, a missing
 // or invalid field, points that are not at voxel centers, and two points in one voxel.
 VoxelMap voxel_map_of(const libmap::PointCloud& map, const MapInfo& facts = {});
 

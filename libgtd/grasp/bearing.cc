@@ -87,7 +87,9 @@ const std::vector<std::pair<std::string, EngagementLaw>>& engagement_law_names()
 void bind(libmap::ParameterTable& table, EngagementOptions& options) {
   using libmap::positive;
   constexpr libmap::Range cone{0.0, 89.0};
-  table.add("law", options.law, engagement_law_names(), "law of the force a spine bears");
+  table.add("law", options.law, engagement_law_names(),
+            "force that a contact bears; asperities: random facets; adhesion: limited tension "
+            "(LORIS)");
   table.add("adhesion_limit_n", options.adhesion_limit_n, positive,
             "law adhesion: maximum total tension of all fingers, N");
   table.add("adhesion_lateral_deg", options.adhesion_lateral_deg, cone,

@@ -28,14 +28,15 @@ struct EngagementOptions {
 };
 void bind(libmap::ParameterTable& table, EngagementOptions& options);
 
-// Distribution of a contact's force over its spines. best: the distribution with the largest force.
-// equally: equal parts; if a spine slips, spines on steeper facets take over its part.
+// Distribution of a contact's force over the spines of the contact. best: the distribution with the
+// largest force. equally: equal parts; if a spine slips, spines on steeper facets bear the part of
+// this spine.
 enum class SpineSharing { best, equally };
 
 // Convex set of forces that a contact can exert on the gripper; it contains 0. A spine touches both
-// the ground and its facet. Its force is the sum of one force from each of these two planes, both
-// at most `limit_n` and inside a pyramid with eight edges that approximates Coulomb's friction
-// cone. Forces in N, directions in the frame of the contacts.
+// the ground and a facet. The force is the sum of one force from the ground plane and one from the
+// facet, both at most `limit_n` and inside a pyramid with eight edges that approximates Coulomb's
+// friction cone. Forces in N, directions in the frame of the contacts.
 class BearingContact {
  public:
   // Law `asperities`: `leans_rad` are the inclinations of the engaged facets, or one 0 for a link.
@@ -90,8 +91,8 @@ class BearingContact {
   std::vector<Eigen::Vector3d> adhesion_;  // edges for `limit_n_`; empty for asperities
 };
 
-// Draws at random which spines of a closed gripper's contacts engage, and their facets. Contacts
-// without an engaged spine are left out. Law `adhesion` draws no random numbers.
+// Draws at random which spines of a closed gripper's contacts engage, and the facets. Contacts
+// without an engaged spine are skipped. Law `adhesion` draws no random numbers.
 std::vector<BearingContact> draw_bearing(const std::vector<GripContact>& contacts,
                                          const Gripper& gripper, const EngagementOptions& options,
                                          libmap::RandomStream& random);

@@ -42,8 +42,8 @@ struct GroundSegment {
   bool faces_palm = true;  // the triangle's front faces the palm
 };
 
-// Result of closing. spines: the outer half of the distal link or its tip is in contact. link: only
-// another part is in contact. end_stop: no part is.
+// Result of closing. spines: the outer half of the distal link or the tip is in contact. link: only
+// another part is in contact. end_stop: no contact.
 enum class FingerEnd { spines, link, end_stop };
 
 struct FingerClosing {
@@ -56,7 +56,7 @@ struct FingerClosing {
 };
 
 // Closes a finger that is open and does not touch the profile. The proximal link turns inward, with
-// the distal link at its curl without contact (curl_rad). When the ground stops the proximal link,
+// the distal link at the curl without contact (curl_rad). When the ground stops the proximal link,
 // the distal link curls further, up to curl_limit_rad.
 FingerClosing close_finger(const FingerGeometry& finger, std::span<const GroundSegment> profile);
 

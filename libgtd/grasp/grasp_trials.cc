@@ -375,7 +375,7 @@ void require_ground(const Ground& ground, const std::vector<Eigen::Vector3d>& lo
           {.field = "location " + std::to_string(n + 1),
            .value = libmap::to_text(locations[n].x()) + "," + libmap::to_text(locations[n].y()) +
                     "," + libmap::to_text(locations[n].z()),
-           .bound = "within " + libmap::to_text(max_distance_m) + " m of it"});
+           .bound = "within " + libmap::to_text(max_distance_m) + " m of the mesh"});
 }
 
 }  // namespace
@@ -396,12 +396,11 @@ void bind(libmap::ParameterTable& table, GraspOptions& options) {
   table.add("safety", options.safety, positive, "safety factor by which the load is multiplied");
   table.add("approach", options.approach,
             {{"up", ApproachDirection::up}, {"normal", ApproachDirection::normal}},
-            "approach direction: from above, along z (up), or along the ground's normal");
+            "approach direction; up: from above along z; normal: along the normal of the ground");
   table.add("trials", options.poses, {1, 100000}, "number of gripper poses at each location");
   table.add("draws", options.draws, {1, 100000}, "number of draws of asperities at each pose");
   table.add("best_draws", options.best_draws, {0, 100000},
-            "number of draws per pose for which the holding force with optimal load sharing is "
-            "also computed");
+            "number of asperity draws per pose that are also evaluated with optimal load sharing");
   table.add("seed", options.seed, not_negative, "random seed");
   table.add("offset_m", options.offset_m, {0.0, 1.0},
             "standard deviation of the random palm position in x and in y, m");

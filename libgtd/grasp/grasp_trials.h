@@ -23,7 +23,7 @@ namespace libgtd {
 enum class ApproachDirection { up, normal };
 
 struct GraspOptions {
-  double load_n = 5.0;  // a trial holds if its force is >= load_n * safety in all directions
+  double load_n = 5.0;  // a trial holds if the force is >= load_n * safety in all directions
   double safety = 1.0;
   std::vector<double> extra_loads_n;  // further loads with computed probabilities
   ApproachDirection approach = ApproachDirection::up;
@@ -33,7 +33,7 @@ struct GraspOptions {
   int best_draws = 2;
   // Computes LocationResult::pull_limits_n. Not bound to a key.
   bool pull_limits = false;
-  // Ends a test when its verdict is certain, see sequential_rounds. Not bound to a key.
+  // Ends a location's test when the verdict is certain, see sequential_rounds. Not bound to a key.
   bool sequential = false;
   std::uint64_t seed = 1;
   double offset_m = 0.005;       // standard deviation of the palm position in x and y
@@ -45,15 +45,15 @@ struct GraspOptions {
   EngagementOptions engagement;
   SurfaceErrorOptions surface;  // ground with errors: random surface for each pose
 
-  // Throws Error naming the field, its value and its bound.
+  // Throws Error naming field, value and bound.
   void check() const;
 };
 void bind(libmap::ParameterTable& table, GraspOptions& options);
 
 // Outcome of a trial. Causes of failure: approach: no ground below, or the approach starts inside
 // the ground. contact: fewer than two contacts. engagement: in some direction, the contacts balance
-// no pull at all. load: they balance a smaller pull than the load. unseen: any of these, with too
-// much unseen ground below a finger.
+// no pull at all. load: they balance a smaller pull than the load. unseen: a failure of any kind
+// but approach while too much of the ground below a finger is unseen.
 enum class TrialEnd { holds, approach, contact, engagement, load, unseen };
 const std::vector<std::pair<std::string, TrialEnd>>& trial_end_names();
 
@@ -77,9 +77,11 @@ struct LocationResult {
   std::vector<double> more_probabilities;  // for extra_loads_n
   std::array<double, 3> force_n{};         // equal sharing: quantiles 0.1, 0.5, 0.9
   std::array<double, 3> best_force_n{};    // best sharing: quantiles 0.1, 0.5, 0.9
-  std::size_t limiting_direction = 0;      // most frequent weakest direction, trials with a force
-  bool has_force = false;                  // at least one trial has a force
-  std::array<double, 2> force_range_n{};   // quantiles 0.05 and 0.95
+  // Direction that most often has the minimum force (trials with a force only); index in
+  // pull_directions().
+  std::size_t limiting_direction = 0;
+  bool has_force = false;                 // at least one trial has a force
+  std::array<double, 2> force_range_n{};  // equal sharing: quantiles 0.05 and 0.95
   // Standard deviations of ln(force) over trials with a force (analysis of variance): between
   // trials of one parameter set, and between the sets.
   double trial_spread = 0.0;
@@ -117,12 +119,12 @@ std::vector<SequentialRound> sequential_rounds(const GraspOptions& options);
 // Tests all locations (m, in the mesh frame). The result of a location depends on its coordinates
 // and the seed, not on other locations, their order or the number of threads. Throws Error for
 // options out of range, a gripper without `fingers`, and a location farther from the ground than
-// `max_distance_m` (the field is its number from 1).
+// `max_distance_m` (the field is the number of the location, from 1).
 std::vector<LocationResult> test_grasps(const Ground& ground, const Gripper& gripper,
                                         const std::vector<Eigen::Vector3d>& locations,
                                         const GraspOptions& options, libmap::Progress& progress);
 
-// Repeats one trial of a location, for an image of it.
+// Repeats one trial of a location, to draw the trial.
 Trial repeat_trial(const Ground& ground, const Gripper& gripper, const Eigen::Vector3d& location,
                    const GraspOptions& options, int pose, int draw);
 

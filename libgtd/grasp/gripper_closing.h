@@ -50,7 +50,7 @@ struct ClosedGripper {
   bool palm_touches = false;                      // else an open finger rests on the ground
   Eigen::Isometry3d patch_from_gripper = Eigen::Isometry3d::Identity();  // palm at z = 0, axis z
   std::vector<ClosedFinger> fingers;
-  std::vector<GripContact> contacts;  // by finger, its link before its spines
+  std::vector<GripContact> contacts;  // by finger; contact of the link before contacts of spines
   double unseen = 0.0;                // mean over the fingers; 1 without ground
 };
 

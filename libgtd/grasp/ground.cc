@@ -240,7 +240,7 @@ Ground::Ground(const libmap::TriangleMesh& mesh, GroundErrors errors)
   if (index_->errors.vertex_errors_m.empty()) return;
   if (index_->errors.vertex_errors_m.size() != mesh.vertices.size() ||
       index_->errors.is_unsure.size() != mesh.triangles.size())
-    throw libmap::Error("number of errors differs from number of vertices or triangles");
+    throw libmap::Error("the number of errors differs from the number of vertices or triangles");
   index_->find_vertex_normals();
 }
 

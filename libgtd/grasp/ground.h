@@ -1,4 +1,4 @@
-// Ground of the virtual field test: a triangle mesh, and the patch of it around a location.
+// Ground of the virtual field test: a triangle mesh, and a patch of the mesh around a location.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,7 +13,7 @@
 namespace libgtd {
 
 // Triangles near a location, in the frame of the patch, m: location at the origin, z opposite to
-// the approach, x as near as possible to the x axis of the mesh (else its y axis).
+// the approach, x as near as possible to the x axis of the mesh (else the y axis).
 struct GroundPatch {
   Eigen::Isometry3d mesh_from_patch = Eigen::Isometry3d::Identity();
   std::vector<Eigen::Vector3d> vertices;

@@ -1,4 +1,4 @@
-// Holding force of a closed gripper: the largest pull in a direction that its contacts balance.
+// Holding force of a closed gripper: the largest pull in a direction that the contacts balance.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,15 +14,15 @@ struct HoldingOptions {
   // Point at which the pull acts (m), without a moment.
   Eigen::Vector3d load_point{0.0, 0.0, 0.0};
   // Maximum force of a finger toward the palm's axis. If the drives resist opening, a finger is
-  // rigid and converts its part of the pull into such a force; see holding_force.
+  // rigid and converts part of the pull into such a force; see holding_force.
   double closing_force_n = 10.0;
   bool holds_when_closed = true;
   Eigen::Vector3d axis{0.0, 0.0, 1.0};  // axis of the palm, away from the ground
   SpineSharing sharing = SpineSharing::best;
 };
 
-// Returns the maximum F (N) for which forces f_i of the contacts, each in its set, balance the pull
-// F w:
+// Returns the maximum F (N) for which forces f_i of the contacts, each in the contact's force set,
+// balance the pull F w:
 //   sum f_i + F w = 0,  sum (p_i - p) x f_i = 0,  sum over finger k of r_k . f_i <= P + c_k F / m
 // (Kumar and Waldron 1988), with r_k outward and m fingers with contacts. c_k is 0, or, if the
 // drives resist opening, sin g cos g / (1 + sin^2 g) of the finger's steepest contact on ground

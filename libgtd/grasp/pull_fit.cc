@@ -259,16 +259,16 @@ class PullFitting {
       const std::string row = "row " + std::to_string(test.row);
       const Ground* under = test.on_level_ground ? &level_ : ground;
       if (under == nullptr)
-        throw libmap::Error("the test is at a location on the ground: give a mesh",
-                            {.field = row, .bound = "ground = level"});
+        throw libmap::Error("the test is at a location on the ground and requires a mesh",
+                            {.field = row});
       const Eigen::Vector3d at = test.on_level_ground ? Eigen::Vector3d::Zero() : test.location;
       if (!under->distance(at, options.grasp.max_distance_m))
-        throw libmap::Error(
-            "not on the mesh",
-            {.field = row,
-             .value = libmap::to_text(at.x()) + "," + libmap::to_text(at.y()) + "," +
-                      libmap::to_text(at.z()),
-             .bound = "within " + libmap::to_text(options.grasp.max_distance_m) + " m of it"});
+        throw libmap::Error("not on the mesh",
+                            {.field = row,
+                             .value = libmap::to_text(at.x()) + "," + libmap::to_text(at.y()) +
+                                      "," + libmap::to_text(at.z()),
+                             .bound = "within " + libmap::to_text(options.grasp.max_distance_m) +
+                                      " m of the mesh"});
       tests_.push_back({&test, ClosedPoses(*under, gripper, at, options.grasp)});
       if (!tests_.back().poses.touch_ground())
         throw libmap::Error("the closed gripper has fewer than two contacts and cannot be pulled",
@@ -488,7 +488,9 @@ PlannedPull informative_pull(const std::vector<std::vector<double>>& forces_of_s
 
 std::vector<PullTest> pull_tests_of(const libmap::Table& table) {
   if (table.rows.empty())
-    throw libmap::Error("no pull tests", {.file = table.file, .field = "rows", .bound = ">= 1"});
+    throw libmap::Error(
+        "too few",
+        {.file = table.file, .field = "number of pull tests", .value = "0", .bound = ">= 1"});
   const PullReader reader(table);
   std::vector<PullTest> tests;
   for (std::size_t row = 0; row < table.rows.size(); ++row) tests.push_back(reader.read(row));

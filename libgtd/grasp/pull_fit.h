@@ -15,8 +15,8 @@
 
 namespace libgtd {
 
-// Pull of a closed gripper. The direction is that of PullDirection: tilt 0 is away from the ground
-// along the palm's axis.
+// Pull of a closed gripper. The direction is defined as in PullDirection: tilt 0 is away from the
+// ground along the palm's axis.
 struct PullTest {
   std::size_t row = 0;  // row of the table, from 1
   Eigen::Vector3d location = Eigen::Vector3d::Zero();
@@ -35,7 +35,7 @@ struct PullTest {
 std::vector<PullTest> pull_tests_of(const libmap::Table& table);
 
 struct PullFitOptions {
-  GraspOptions grasp;           // its `poses` and `draws` apply to each pull
+  GraspOptions grasp;           // `poses` and `draws` apply to each pull
   double force_noise = 0.15;    // standard deviation of the logarithm of a measured force
   double outlier_share = 0.05;  // prior fraction of uninformative tests
   int sets = 256;               // per round
@@ -84,7 +84,7 @@ PullFit fit_pulls(const Ground* ground, const Gripper& gripper, const std::vecto
 // Returns level ground: a square around the origin with this half side.
 libmap::TriangleMesh level_ground(double half_m = 0.4);
 
-// Pull whose outcome differs between the parameter sets.
+// Pull with an outcome that differs between the parameter sets.
 struct PlannedPull {
   std::size_t location = 0;  // index in the candidates
   PullDirection direction;

@@ -43,7 +43,7 @@ void bind(libmap::ParameterTable& table, SurfaceErrorOptions& options) {
   table.add("surface_correlation_m", options.correlation_m, {1e-4, 10.0},
             "distance at which simulated mesh errors of two points correlate by 0.29, m");
   table.add("max_surface_error_m", options.max_error_m, {0.0, 0.1, true, false},
-            "maximum standard deviation of the mesh error of seen ground, m");
+            "standard deviation of the mesh error above which ground counts as unseen, m");
 }
 
 GroundErrors errors_of(const libmap::TriangleMesh& mesh, const SurfaceErrorOptions& options) {

@@ -51,8 +51,8 @@ class RandomField {
   std::vector<double> nodes_;  // nodes in the box; NaN: not drawn yet
 };
 
-// Returns the patch with its vertices displaced along their normals by their errors times a random
-// field. A patch without errors is returned unchanged.
+// Returns the patch with vertices displaced along the vertex normals by the vertex errors times a
+// random field. A patch without errors is returned unchanged.
 GroundPatch displace_vertices(const GroundPatch& patch, double correlation_m, std::uint64_t seed,
                               std::uint64_t key);
 

@@ -13,8 +13,9 @@
 namespace libgtd {
 
 // Part of the scene, stored in the vertex field `scene_part`. engaged, link: contacts that bear a
-// force. idle: a finger that bears no force. cone: forces that a contact can bear on its steepest
-// facet. pull: the direction with the least holding force.
+// force. idle: a finger that bears no force. cone: forces that a contact can bear on the steepest
+// facet. pull: the direction with the minimum holding force. load: arrow of `load_n` with a disc at
+// its end.
 enum class ScenePart { ground, gripper, engaged, link, idle, cone, pull, load };
 
 struct ScenePartStyle {
@@ -29,8 +30,8 @@ const std::vector<ScenePartStyle>& scene_parts();
 // Returns the scene in the frame of the mesh, with vertex colors and the vertex field `scene_part`.
 // There is a sphere at each contact that bears a force and at the tip of each finger that does not,
 // or one at the location if the gripper does not reach the ground. The arrow of the pull starts at
-// the middle of the palm. Its length is proportional to the force, up to three times that of
-// `load_n`, which a disc marks.
+// the middle of the palm. The length is proportional to the force, up to three times the length of
+// the arrow of `load_n`, which ends with a disc.
 libmap::TriangleMesh trial_scene(const libmap::TriangleMesh& mesh, const Gripper& gripper,
                                  const Trial& trial, double load_n);
 

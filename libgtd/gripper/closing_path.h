@@ -1,5 +1,5 @@
 // Gripper model of method `calibrated`: the path of a closing finger over the voxel columns of a
-// map, and the pull that its spines bear as a function of the slope of the ground.
+// map, and the pull that the spines bear as a function of the slope of the ground.
 #pragma once
 
 #include <cstddef>
@@ -10,18 +10,18 @@
 namespace libgtd {
 
 // Largest force away from the ground that a finger bears, in units of the closing force P, for each
-// parameter set and for ground that falls outward by g = -90 .. 90 degrees; mean over draws of its
-// spines' facets. Spines share the force in equal parts. With its k steepest facets a finger bears
+// parameter set and for ground that falls outward by g = -90 .. 90 degrees; mean over draws of the
+// facets of the finger's spines. Spines share the force in equal parts. With the k steepest facets
+// a finger bears
 //   min(P tan b / (1 - c tan b), k L sin b),  b = g + psi_k + atan(friction) - 90 deg,
 // where psi_k is the inclination of the k-th facet, L the force limit of a spine and c = sin g cos
 // g / (1 + sin^2 g) if the drive resists opening (else 0), as in holding_force.h. The maximum over
 // k counts.
 struct FingerPulls {
   std::size_t sets = 0;
-  std::vector<float> pulls;   // at (fall + 90) * sets + set
-  std::vector<float> pushes;  // per set: force that all engaged spines bear
-  std::vector<float>
-      spreads;  // per set: standard deviation of a pull on level ground over its mean
+  std::vector<float> pulls;         // at (fall + 90) * sets + set
+  std::vector<float> pushes;        // per set: force that all engaged spines bear
+  std::vector<float> spreads;       // per set: standard deviation / mean of a pull on level ground
   std::vector<double> all_fingers;  // per set: closing force of all fingers, N
 
   const float* at(int fall_deg) const {
@@ -34,7 +34,7 @@ struct FingerPulls {
 FingerPulls finger_pulls(const Gripper& gripper, const std::vector<ParameterSet>& sets);
 
 // Path of a closing finger over voxel columns for method `calibrated`: positions of finger parts
-// relative to the palm. The finger turns from open to closed in steps that move its tip by at most
+// relative to the palm. The finger turns from open to closed in steps that move the tip by at most
 // half a voxel. Each step has three positions: tip, middle of the distal link, knuckle.
 struct ClosingPath {
   struct PathPoint {

@@ -28,10 +28,11 @@ double between(double low, double high, double share, bool logarithmic) {
 void Engagement::check() const {
   libmap::check_parameters(*this);
   if (asperity_min_deg > asperity_max_deg)
-    throw libmap::Error("exceeds the maximum inclination",
-                        {.field = "engagement.asperity_min_deg",
-                         .value = libmap::to_text(asperity_min_deg),
-                         .bound = "<= asperity_max_deg, " + libmap::to_text(asperity_max_deg)});
+    throw libmap::Error(
+        "exceeds the maximum inclination",
+        {.field = "engagement.asperity_min_deg",
+         .value = libmap::to_text(asperity_min_deg),
+         .bound = "<= engagement.asperity_max_deg = " + libmap::to_text(asperity_max_deg)});
 }
 
 void bind(libmap::ParameterTable& table, Engagement& engagement) {
@@ -39,9 +40,9 @@ void bind(libmap::ParameterTable& table, Engagement& engagement) {
   table.add("engagement.friction", engagement.friction, libmap::not_negative,
             "coefficient of Coulomb friction of spines and links on the ground");
   table.add("engagement.asperity_min_deg", engagement.asperity_min_deg, lean,
-            "minimum inclination of an asperity's facet against the drag direction, degrees");
+            "minimum inclination of an asperity's facet to the ground, against the drag, degrees");
   table.add("engagement.asperity_max_deg", engagement.asperity_max_deg, lean,
-            "maximum inclination of an asperity's facet against the drag direction, degrees");
+            "maximum inclination of an asperity's facet to the ground, against the drag, degrees");
   table.add("engagement.engagement_rate", engagement.engagement_rate, libmap::not_negative,
             "mean number of facets that a dragged spine meets, 1/mm");
   table.add("engagement.drag_mm", engagement.drag_mm, libmap::not_negative,

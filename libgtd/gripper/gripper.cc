@@ -47,10 +47,10 @@ void Gripper::check() const {
   if (fingers) fingers->check();
   engagement.check();
   if (closing_angle_deg >= opening_angle_deg)
-    throw libmap::Error("fingers must close inward",
+    throw libmap::Error("fingers would not close inward",
                         {.field = "closing_angle_deg",
                          .value = libmap::to_text(closing_angle_deg),
-                         .bound = "< opening_angle_deg, " + libmap::to_text(opening_angle_deg)});
+                         .bound = "< opening_angle_deg = " + libmap::to_text(opening_angle_deg)});
 }
 
 void bind(libmap::ParameterTable& table, GripperFingers& fingers) {
@@ -79,7 +79,7 @@ void GripperFingers::check() const {
     throw libmap::Error("less than the curl of a finger without contact",
                         {.field = "fingers.curl_limit_deg",
                          .value = libmap::to_text(curl_limit_deg),
-                         .bound = ">= fingers.curl_deg, " + libmap::to_text(curl_deg)});
+                         .bound = ">= fingers.curl_deg = " + libmap::to_text(curl_deg)});
 }
 
 void require_fingers(const Gripper& gripper) {

@@ -24,14 +24,14 @@ struct GripperFingers {
   double closing_force_n = 0.0;      // force of one finger toward the palm's axis
   bool holds_when_closed = false;    // drive resists any opening force, e.g. a ball screw
 
-  // Throws Error naming the key, its value and its bound.
+  // Throws Error naming key, value and bound.
   void check() const;
 };
 
 // Binds the keys "fingers.KEY" of a gripper file.
 void bind(libmap::ParameterTable& table, GripperFingers& fingers);
 
-// Section `engagement` of a gripper file. Each spine meets a facet that is inclined against its
+// Section `engagement` of a gripper file. Each spine meets a facet that is inclined against the
 // drag by a random angle psi, with Coulomb friction (Asbeck et al. 2006; Chen et al. 2024, arXiv
 // 2407.00973).
 struct Engagement {
@@ -41,7 +41,7 @@ struct Engagement {
   double engagement_rate = 0.6;    // 1/mm; P(spine meets a facet) = 1 - exp(-rate * drag)
   double drag_mm = 5.0;            // path of a spine along the ground
 
-  // Throws Error naming the key, its value and its bound.
+  // Throws Error naming key, value and bound.
   void check() const;
 };
 // Binds the keys "engagement.KEY" of a gripper file.
@@ -58,7 +58,7 @@ constexpr std::size_t uncertain_parameters = 6;
 using ParameterValues = std::array<double, uncertain_parameters>;
 const std::array<std::string, uncertain_parameters>& uncertain_parameter_names();
 
-// Bounds of a parameter's prior. Half of its probability is between `low` and the value in the
+// Bounds of a parameter's prior. Half of the probability is between `low` and the value in the
 // gripper file, half between this value and `high`, uniform in the logarithm of forces, friction
 // and rate, and uniform in angles. If the value equals a bound, the prior is uniform from bound to
 // bound.
@@ -83,10 +83,10 @@ struct ParameterSet {
 std::vector<ParameterValues> low_discrepancy_quantiles(std::size_t count, std::uint64_t seed);
 
 // Returns the index of the set at `share` (0 .. 1) of the cumulative weights. With evenly spaced
-// shares, sets are drawn in proportion to their weights.
+// shares, sets are drawn in proportion to the weights.
 std::size_t parameter_set_at(const std::vector<ParameterSet>& ensemble, double share);
 
-// Dimensions of a gripper in millimeters and degrees, and its force parameters.
+// Dimensions (mm, degrees) and force parameters of a gripper.
 struct Gripper {
   std::string name;
   double palm_diameter_mm = 0.0;
@@ -106,12 +106,12 @@ struct Gripper {
   ParameterRanges ranges;              // prior of the uncertain parameters
   std::vector<ParameterSet> ensemble;  // fitted to pull tests; empty: the prior is used
 
-  // Throws Error naming the field, its value and its bound. Relations between fields are checked,
+  // Throws Error naming field, value and bound. Relations between fields are checked,
   // too, for example a closing angle below the opening angle.
   void check() const;
 };
 
-// Binds the keys of a gripper file except those of its sections.
+// Binds the keys of a gripper file that are outside sections.
 void bind(libmap::ParameterTable& table, Gripper& gripper);
 
 // Throws Error if the gripper has no `fingers`, which are required for forces.

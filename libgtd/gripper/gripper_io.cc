@@ -60,8 +60,8 @@ std::optional<ParameterRange> parse_range(const std::string& name, const std::st
     return ParameterRange{*low, *high};
   throw libmap::Error("not a range", {.field = "ranges." + name,
                                       .value = text,
-                                      .bound = is_angle ? "LOW, HIGH within 0 and 90 degrees"
-                                                        : "LOW, HIGH above 0"});
+                                      .bound = is_angle ? "0 <= LOW <= HIGH <= 90"
+                                                        : "LOW, HIGH with 0 < LOW <= HIGH"});
 }
 
 std::vector<ParameterSet> parse_sets(const std::string& text) {
@@ -77,13 +77,15 @@ std::vector<ParameterSet> parse_sets(const std::string& text) {
     if (!is_whole || !(set.weight >= 0.0))
       throw libmap::Error(
           "not a parameter set",
-          {.field = "ensemble.sets", .value = line, .bound = "a weight >= 0 and six values"});
+          {.field = "ensemble.sets",
+           .value = line,
+           .bound = "a weight >= 0, then spine_force_limit_n, closing_force_n, friction, "
+                    "asperity_min_deg, asperity_max_deg, engagement_rate"});
     sum += set.weight;
     sets.push_back(set);
   }
   if (!sets.empty() && !(sum > 0.0))
-    throw libmap::Error("contains no set with a positive weight",
-                        {.field = "ensemble.sets", .bound = "> 0 in sum"});
+    throw libmap::Error("contains no set with a positive weight", {.field = "ensemble.sets"});
   for (ParameterSet& set : sets) set.weight /= sum;
   return sets;
 }

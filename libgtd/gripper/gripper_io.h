@@ -11,14 +11,14 @@
 
 namespace libgtd {
 
-// Reads and checks a gripper; `overrides` (key, value) replace values of the file. Values missing
-// in the file are taken from its URDF, if it names one (gripper_urdf.h). Throws Error naming the
-// file and the field for a key that is unknown or missing, and for a value out of range.
+// Reads and checks a gripper; `overrides` (key, value) replace values of the file. Missing values
+// are taken from the URDF that the file names (gripper_urdf.h). Throws Error naming the file and
+// the field for a key that is unknown or missing, and for a value out of range.
 Gripper read_gripper(const std::filesystem::path& path,
                      const std::vector<std::pair<std::string, std::string>>& overrides = {});
 
-// Parses the text of a gripper file, called `file` in errors. A URDF path is relative to its
-// folder. Throws like read_gripper.
+// Parses the text of a gripper file, called `file` in errors. A URDF path is relative to the folder
+// of `file`. Throws like read_gripper.
 Gripper parse_gripper(const std::string& yaml, const std::string& file,
                       const std::vector<std::pair<std::string, std::string>>& overrides = {});
 

@@ -24,7 +24,7 @@ constexpr double max_mask_voxels = 0x1p28;
 
 libmap::Error too_small(double voxel_size_m, double mask_voxels) {
   const double gigabytes = 2.0 * mask_voxels / 0x1p30;
-  return libmap::Error("too small for this gripper: its mask would take " +
+  return libmap::Error("too small for this gripper: the mask would take " +
                            libmap::to_text(static_cast<float>(gigabytes)) + " GiB, more than " +
                            libmap::to_text(2.0 * max_mask_voxels / 0x1p30) + " GiB",
                        {.field = "voxel_size_m", .value = libmap::to_text(voxel_size_m)});
@@ -41,7 +41,7 @@ int whole_voxels(double voxels, const GripperMaskOptions& options) {
 void allocate(GripperMask& mask) {
   const double voxels = static_cast<double>(mask.side) * mask.side * mask.layers;
   if (mask.side < 3 || mask.solid_layers < 2)
-    throw libmap::Error("too large for this gripper: its mask would have " +
+    throw libmap::Error("too large for this gripper: the mask would have " +
                             std::to_string(mask.side) + " voxels per side and " +
                             std::to_string(mask.solid_layers) + " layers",
                         {.field = "voxel_size_m", .value = libmap::to_text(mask.voxel_size_m)});

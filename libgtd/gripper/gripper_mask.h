@@ -16,11 +16,11 @@ namespace libgtd {
 
 struct ClosingPath;  // closing_path.h
 
-// thesis: the author's program (eq. 3-6..3-16). envelope: its alternative design (5.1), which does
-// not count voxels outside the reach of the fingers. climblab: the common base of both. corrected:
-// as thesis, with an odd side centered on the pivot voxel and radii that are not rounded.
-// calibrated: the mask of `corrected`; the score is the probability of holding the load
-// (closing_force.h).
+// thesis: the author's program (eq. 3-6..3-16). envelope: the alternative design of the thesis
+// (5.1), which does not count voxels outside the reach of the fingers. climblab: mask of ClimbLab
+// v3, without void layers. corrected: as thesis, with an odd side centered on the pivot voxel and
+// exact radii. calibrated: the mask of `corrected`; the score is the probability of holding the
+// load (closing_force.h).
 enum class Method { thesis, envelope, climblab, corrected, calibrated };
 
 const std::vector<std::pair<std::string, Method>>& method_names();
@@ -37,12 +37,12 @@ struct GripperMaskOptions {
 // with z >= solid_layers are the extra void layers on top. The pivot is at (pivot_xy, pivot_xy,
 // pivot_z).
 struct GripperMask {
-  Method method = Method::corrected;           // never calibrated
-  std::shared_ptr<const ClosingPath> closing;  // calibrated only, else null
-  // corrected only: ground that the spines hold falls outward by more than this between the two
-  // circles.
-  double closed_radius_m = 0.0;  // circle of the closed spines
-  double open_radius_m = 0.0;    // circle of the open fingers
+  Method method = Method::corrected;           // mask layout; `corrected` also if calibrated
+  std::shared_ptr<const ClosingPath> closing;  // set for Method::calibrated, else null
+  double closed_radius_m = 0.0;                // corrected only: circle of the closed spines
+  double open_radius_m = 0.0;                  // corrected only: circle of the open fingers
+  // corrected only: the ground drops outward by more than this from the circle closed_radius_m to
+  // the circle open_radius_m where spines can hold.
   double min_fall_m = 0.0;
   double voxel_size_m = 0.01;
   double palm_diameter_m = 0.0;  // diameter of the gripper's palm
@@ -65,8 +65,7 @@ struct GripperMask {
 };
 
 // Makes the mask of a gripper. Throws Error for a gripper value out of range, and for a voxel size
-// whose mask has no layer, no ring around its center or more than 2^28 voxels; the message then
-// contains its memory.
+// with which the mask has no layer, no ring around the center or more than 2^28 voxels.
 GripperMask make_gripper_mask(const Gripper& gripper, const GripperMaskOptions& options);
 
 // Returns the mask as text, from the lowest layer: "z 0", then `side` lines (x) of `side`

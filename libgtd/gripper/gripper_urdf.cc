@@ -84,7 +84,7 @@ class Robot {
     for (const auto& [name, joint] : model_->joints_) {
       const auto [other, is_new] = parent_of_.emplace(joint->child_link_name, joint.get());
       if (!is_new)
-        throw wrong_joint(name, "its child " + joint->child_link_name +
+        throw wrong_joint(name, "child link " + joint->child_link_name +
                                     " is also the child of joint " + other->second->name);
     }
   }
@@ -181,7 +181,7 @@ std::vector<FingerNames> matching_fingers(const UrdfMapping& mapping, const Robo
       fingers.push_back(finger);
   }
   if (fingers.empty())
-    throw Error("no joint of the URDF matches this name and has a matching spine joint or tip link",
+    throw Error("no joint matches this pattern together with urdf.spine_joint or urdf.tip_link",
                 {.field = "urdf.finger_joint", .value = pattern});
   return fingers;
 }
@@ -194,7 +194,7 @@ std::vector<FingerNames> finger_names(const UrdfMapping& mapping, const Robot& r
   const auto spines = libmap::split_list(mapping.spine_joint);
   const auto tips = libmap::split_list(mapping.tip_link);
   if (joints.empty() || joints.size() != spines.size() || joints.size() != tips.size())
-    throw Error("urdf.finger_joint, urdf.spine_joint and urdf.tip_link differ in number of names",
+    throw Error("lists of urdf.finger_joint, urdf.spine_joint and urdf.tip_link differ in length",
                 {.field = "urdf.finger_joint", .value = pattern});
   for (std::size_t n = 0; n < joints.size(); ++n)
     fingers.push_back({joints[n], spines[n], tips[n]});
@@ -255,7 +255,7 @@ class Finger {
  private:
   static void require_limits(const urdf::Joint& joint) {
     if (joint.type != urdf::Joint::REVOLUTE || !joint.limits)
-      throw wrong_joint(joint.name, "is not revolute with limits (open and closed finger)");
+      throw wrong_joint(joint.name, "must be revolute with limits (angles open and closed)");
     for (const double limit : {joint.limits->lower, joint.limits->upper})
       if (!(std::abs(limit) <= 2.0 * std::numbers::pi))
         throw Error("not an angle in radians", {.field = "limit of joint " + joint.name,
@@ -301,7 +301,7 @@ class Finger {
   Eigen::Vector2d in_plane(const Eigen::Vector3d& vector) const {
     const double beside_m = std::abs(vector.dot(tangent()));
     if (beside_m > max_beside_share * vector.norm())
-      throw wrong_joint(joint_.name, "its finger is " +
+      throw wrong_joint(joint_.name, "the finger of this joint is " +
                                          libmap::to_fixed_text(1000.0 * beside_m, 1) +
                                          " mm outside the plane of the palm's axis");
     return {vector.head<2>().dot(outward_), vector.z()};
@@ -383,7 +383,7 @@ void require_even(const std::vector<Finger>& fingers) {
   azimuths.push_back(azimuths.front() + 360.0);
   for (std::size_t n = 1; n < azimuths.size(); ++n)
     if (!(std::abs(azimuths[n] - azimuths[n - 1] - step) <= max_spacing_error_deg))
-      throw Error("fingers must be evenly spaced around the palm",
+      throw Error("fingers are not evenly spaced",
                   {.field = "angle between finger joints",
                    .value = libmap::to_fixed_text(azimuths[n] - azimuths[n - 1], 1) + " deg",
                    .bound = libmap::to_fixed_text(step, 1) + " +- 1 deg"});
@@ -400,8 +400,9 @@ Measures derive(const Robot& robot, const UrdfMapping& mapping) {
     for (const auto& [key, value] : fingers[n].measures())
       if (!(std::abs(value - values.at(key)) <= tolerance))
         throw wrong_joint(names[n].finger_joint,
-                          "its finger differs from that of joint " + names.front().finger_joint +
-                              " in " + key + ": " + libmap::to_fixed_text(value, 2) + ", not " +
+                          "the finger of this joint differs from the finger of joint " +
+                              names.front().finger_joint + " in " + key + ": " +
+                              libmap::to_fixed_text(value, 2) + ", not " +
                               libmap::to_fixed_text(values.at(key), 2));
   require_even(fingers);
   values["fingers.count"] = static_cast<double>(fingers.size());
@@ -417,14 +418,18 @@ Measures derive(const Robot& robot, const UrdfMapping& mapping) {
 }  // namespace
 
 void bind(libmap::ParameterTable& table, UrdfMapping& mapping) {
-  table.add("urdf.file", mapping.file, "URDF, relative to the gripper file");
+  table.add("urdf.file", mapping.file, "path of the URDF, relative to the gripper file");
   table.add("urdf.palm_link", mapping.palm_link,
-            "link with its origin at the center of the palm's face");
+            "link with the origin at the center of the palm's face");
   table.add("urdf.palm_axis", mapping.palm_axis,
             "direction X,Y,Z from the palm toward the ground, in the frame of the palm link");
-  table.add("urdf.finger_joint", mapping.finger_joint, "revolute joint between palm and finger");
-  table.add("urdf.spine_joint", mapping.spine_joint, "joint between finger and spine carrier");
-  table.add("urdf.tip_link", mapping.tip_link, "link with its origin at the spine tip");
+  table.add("urdf.finger_joint", mapping.finger_joint,
+            "revolute joints between palm and finger: a list with commas, or a name with '*'");
+  table.add(
+      "urdf.spine_joint", mapping.spine_joint,
+      "joints between finger and spine carrier: a list or a name with '*' as in finger_joint");
+  table.add("urdf.tip_link", mapping.tip_link,
+            "links with the origin at the spine tip: a list or a name with '*' as in finger_joint");
 }
 
 Measures read_urdf_dimensions(const std::string& xml, const UrdfMapping& mapping) {

@@ -15,11 +15,11 @@ namespace libgtd {
 // each key.
 struct UrdfMapping {
   std::string file;          // path of the URDF, relative to the gripper file
-  std::string palm_link;     // link with its origin at the center of the palm's face
+  std::string palm_link;     // link with the origin at the center of the palm's face
   std::string palm_axis;     // X,Y,Z in the frame of this link, toward the ground
   std::string finger_joint;  // revolute, palm to finger; limits: open and closed
   std::string spine_joint;   // finger to spine carrier; revolute or fixed
-  std::string tip_link;      // link with its origin at the spine tip
+  std::string tip_link;      // link with the origin at the spine tip
 };
 
 // Binds the keys "urdf.KEY" of a gripper file.
@@ -33,9 +33,9 @@ void bind(libmap::ParameterTable& table, UrdfMapping& mapping);
 //   fingers.curl_deg          with the spine joint at rest: 0, or the limit nearest to 0
 //   fingers.curl_limit_deg    if the spine joint has limits
 // urdfdom runs in a separate process. Throws Error naming the joint or link that is missing, is
-// movable inside the chain or is part of a cycle, a finger joint that is not revolute or whose axis
-// is not tangential to the circle of joints, fingers that are not evenly spaced or differ by more
-// than 0.1 mm or 0.1 degrees, lengths above 1 m, and angles above 2 pi.
+// movable inside the chain or is part of a cycle, a finger joint that is not revolute or has an
+// axis that is not tangential to the circle of joints, fingers that are not evenly spaced or differ
+// by more than 0.1 mm or 0.1 degrees, lengths above 1 m, and angles above 2 pi.
 std::vector<std::pair<std::string, std::string>> read_urdf_dimensions(const std::string& xml,
                                                                       const UrdfMapping& mapping);
 

@@ -1,5 +1,5 @@
 // Macros for speed-critical functions: GCC compiles them also for AVX2, and the program selects a
-// version at its start. Results are the same, because no operations are fused (-ffp-contract=off).
+// version at startup. Results are the same, because no operations are fused (-ffp-contract=off).
 #pragma once
 
 #if defined(GRASPMAP_X86_LOOPS) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)

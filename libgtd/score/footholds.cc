@@ -203,7 +203,7 @@ void bind(libmap::ParameterTable& table, FootholdOptions& options) {
   table.add("min_score", options.min_score, libmap::zero_to_one, "minimum score of a foothold");
   table.add("graspable_only", options.graspable_only,
             "consider only voxels that are graspable or have a hold_probability of at least 0.5");
-  table.add("border", options.border, "include voxels whose mask extends beyond the scan");
+  table.add("border", options.border, "include voxels with a mask that extends beyond the scan");
   table.add("surface_radius_m", options.surface_radius_m, libmap::positive,
             "radius of the normal and curvature fits, m");
   table.add("max_count", options.max_count, libmap::not_negative,
@@ -243,7 +243,7 @@ PointCloud to_cloud(const FootholdResult& result, const PointCloud& map) {
 void describe(libmap::ResultTable& table, const FootholdResult& result) {
   table.add("candidates", result.candidates, "number of map points that meet the options");
   table.add("candidates_at_border", result.at_border,
-            "number of candidates left out at the border of the scan");
+            "number of candidates skipped at the border of the scan");
 }
 
 }  // namespace libgtd

@@ -33,7 +33,7 @@ struct Foothold {
   double score = 0.0;         // hold_probability if the map has this field, else the score
   double force_n = 0.0;  // holding_force_n of the map, else 0; first criterion for equal scores
   // Mean score of the map points within half of the separation, weighted by the Epanechnikov
-  // kernel. Second criterion for equal scores: the middle of a plateau precedes its border.
+  // kernel. Second criterion for equal scores: the middle of a plateau precedes the border.
   double mean_score = 0.0;
   std::size_t graspable_points = 0;  // graspable points within half of the separation
   // Unit surface normal, outward (on the side of the map's normals, or else up); principal
@@ -65,7 +65,7 @@ FootholdResult find_footholds(const libmap::PointCloud& map, const FootholdOptio
 
 // Returns one point per foothold with position, normal, color and the fields of the map, followed
 // by mean_score, graspable_points, approach_x, approach_y, approach_z, slope_deg, k1, k2. slope_deg
-// is that of the fitted normal and replaces the map's field.
+// is computed from the fitted normal and replaces the map's field.
 libmap::PointCloud to_cloud(const FootholdResult& result, const libmap::PointCloud& map);
 
 }  // namespace libgtd

@@ -16,10 +16,12 @@ struct MapVoxel {
   double score = 0.0;      // 0..1; can be negative with `thesis`
   bool convex = false;     // a convex point is near the center of the voxel
   bool graspable = false;  // by score, zero plane and convexity, if evaluated
-  bool border = false;     // the window of the mask leaves the scanned area
+  bool border = false;     // the window of the mask extends beyond the scanned area
   Obstacle obstacle = Obstacle::none;
-  ForceEstimate force{};                              // calibrated only
-  double outward_fall_fraction = 1.0;                 // corrected only, upright masks
+  ForceEstimate force{};  // calibrated only
+  // Fraction of 16 azimuths in which the ground drops outward by more than GripperMask::min_fall_m;
+  // `corrected` with upright masks only.
+  double outward_fall_fraction = 1.0;
   float slope_deg = 0.0F;                             // see SurfaceNormal
   Eigen::Vector3f normal = Eigen::Vector3f::UnitZ();  // axis of the mask, in the terrain frame
 };
@@ -29,7 +31,7 @@ struct MapContent {
   bool normals = false;         // the mask was tilted
   bool slopes = false;          // obstacles are evaluated
   bool forces = false;          // the method is calibrated
-  bool falling_shares = false;  // the method is corrected, with upright masks
+  bool falling_shares = false;  // outward_fall_fraction is evaluated
   bool obstacles = false;       // evaluated, which requires the whole map
 };
 
@@ -49,10 +51,10 @@ const std::vector<std::pair<std::string, MapFrame>>& map_frame_names();
 // Returns one point per voxel at its center, colored by score (white below the zero plane), with
 // the fields score, ssv, gsv, convex, graspable, border and the voxel index i, j, k. Depending on
 // the content, the point has the axis of the mask as normal, which points to the gripper, and the
-// fields slope_deg; obstacle (value of Obstacle); falling_share, a factor of the score of method
-// `corrected`; and hold_probability (equal to the score), holding_force_n (median),
-// holding_force_low_n, holding_force_high_n, trial_spread and parameter_spread of the
-// ForceEstimate.
+// fields slope_deg; obstacle (value of Obstacle); falling_share, the outward_fall_fraction, a
+// factor of the score of method `corrected`; and hold_probability (equal to the score),
+// holding_force_n (median), holding_force_low_n, holding_force_high_n, trial_spread and
+// parameter_spread of the ForceEstimate.
 libmap::PointCloud to_cloud(const GraspabilityMap& map, MapFrame frame);
 
 // Evaluates the obstacles of a complete map with slopes, sets the field `obstacle` and returns the

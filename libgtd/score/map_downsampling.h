@@ -7,18 +7,17 @@
 
 namespace libgtd {
 
-// Keeps one point for each square of `width` x `width` columns that contains any: the uppermost
-// point of the column nearest to the middle of the square. Its values are unchanged, so that the
-// distribution of each value is about that of all points. Ascending by square. Downsampling parts
-// and then their union gives the same result as downsampling the union.
+// Keeps one point per block of `width` x `width` columns with points: the uppermost point of the
+// column nearest to the middle of the block. Values are unchanged, so that the distribution of each
+// value is about the distribution over all points. Ascending by block. Downsampling parts and then
+// their union gives the same result as downsampling the union.
 libmap::PointCloud downsample_map(const libmap::PointCloud& map, int width);
 
-// Keeps one point for each cube of `width`^3 voxels that contains any: the voxel nearest to the
-// middle of the cube, and the uppermost of equally near ones. Steep faces keep their points.
-// Ascending by cube.
+// Keeps one point per cube of `width`^3 voxels with points: the voxel nearest to the middle of the
+// cube, and the uppermost of equally near voxels. Steep faces keep their points. Ascending by cube.
 libmap::PointCloud voxel_downsample_map(const libmap::PointCloud& map, int width);
 
-// Moves each point horizontally to the middle of its square, so that the points form a lattice.
+// Moves each point horizontally to the middle of the block, so that the points form a lattice.
 void snap_to_squares(const TileStoreIndex& index, int width, libmap::PointCloud& map);
 
 }  // namespace libgtd

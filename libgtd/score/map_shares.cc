@@ -32,14 +32,15 @@ void require_same_map(const Manifest& first, const Manifest& other, const std::s
         {.file = name, .field = "version", .value = other.version, .bound = first.version});
   std::optional<std::string> key = differing_parameter(first, other);
   if (!key) key = differing_parameter(other, first);  // parameters that only the other has
-  if (key) throw libmap::Error("differs from that of " + first_name, {.file = name, .field = *key});
+  if (key)
+    throw libmap::Error("differs from the value in " + first_name, {.file = name, .field = *key});
   // Inputs are the terrain and the gripper file.
   const auto same = [](const libmap::ManifestInput& a, const libmap::ManifestInput& b) {
     return a.sha256 == b.sha256;
   };
   if (first.inputs.empty() || !std::equal(first.inputs.begin(), first.inputs.end(),
                                           other.inputs.begin(), other.inputs.end(), same))
-    throw libmap::Error("was scored from other inputs than " + first_name, {.file = name});
+    throw libmap::Error("inputs differ from the inputs of " + first_name, {.file = name});
 }
 
 // Returns "K/N", or an empty text if the manifest is not that of a share.
@@ -57,7 +58,7 @@ void require_all_shares(const std::vector<Manifest>& manifests,
     const std::string share = share_text(manifests[n]);
     const std::string of = share.substr(std::min(share.find('/') + 1, share.size()));
     if (n > 0 && of != count)
-      throw libmap::Error("not a share of the same tiles as the first file's",
+      throw libmap::Error("not a share of the tiles of the first file",
                           {.file = files[n], .field = "tile", .value = share});
     count = of;
     if (!shares.insert(share).second)

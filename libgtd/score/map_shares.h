@@ -18,15 +18,15 @@ bool is_map_share(const libmap::Manifest& manifest);
 void require_shares_of_one_map(const std::vector<libmap::Manifest>& manifests,
                                const std::vector<std::string>& files);
 
-// Copies to the manifest of the whole map what is equal in all shares: parameters, frame,
-// transforms, and results such as those of the plane.
+// Copies common content of all shares to the manifest of the whole map: parameters, frame,
+// transforms, and results such as the plane's.
 void copy_common_facts(const libmap::Manifest& part, libmap::Manifest& whole);
 
 // Adds obstacles to the merged map `whole` with the parameters of a share, and returns the number
 // of obstacle points. Throws like add_obstacles.
 std::size_t add_obstacles_of(const libmap::Manifest& part, libmap::PointCloud& whole);
 
-// Returns the number of points whose field `flag` is 1; 0 if the map has no such field.
+// Returns the number of points with field `flag` equal to 1; 0 if the map has no such field.
 std::int64_t count_set(const libmap::PointCloud& map, const char* flag);
 
 }  // namespace libgtd

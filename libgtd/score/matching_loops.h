@@ -16,15 +16,15 @@ struct MaskChunk {
   alignas(64) std::uint16_t bits[columns];
 };
 
-// Transform from the lattice of the terrain, in voxels, to the lattice of a pivot, whose cell (0,
-// 0, 0) contains the pivot.
+// Transform from the lattice of the terrain, in voxels, to the lattice of a pivot; cell (0, 0, 0)
+// contains the pivot.
 struct TiltedLattice {
   double origin[3];   // center of cell (0, 0, 0)
   double axes[3][3];  // axes[n] is axis n
 };
 
-// Box of tilted voxels that starts at `low`, and the strides of their numbers. A stride of 0 for
-// layers gives all voxels of a column the same number.
+// Box of tilted voxels that starts at `low`, and the strides of the voxel numbers. A stride of 0
+// for layers gives all voxels of a column the same number.
 struct TiltedBox {
   int low[3];
   int size[3];
@@ -36,7 +36,7 @@ struct MatchingLoops {
   static constexpr std::size_t lanes = 8;
 
   // For each origin, computes the sum over all chunks of popcount(window[origin + offset ...] &
-  // chunk). Origins and offsets are in 16-bit words. Reads 64 bytes at each of them.
+  // chunk). Origins and offsets are in 16-bit words. Reads 64 bytes at each offset.
   void (*count)(const std::uint16_t* window, const std::uint32_t* origins, std::size_t origin_count,
                 const MaskChunk* chunks, const std::uint32_t* offsets, std::size_t chunk_count,
                 std::uint32_t* counts);

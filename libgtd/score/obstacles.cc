@@ -40,13 +40,13 @@ struct Rise {
 
 void check(const std::vector<Voxel>& voxels, const std::vector<float>& slopes_deg) {
   if (voxels.size() != slopes_deg.size())
-    throw libmap::Error("number of slopes differs from number of voxels",
+    throw libmap::Error("the number of slopes differs from the number of voxels",
                         {.field = "slopes_deg",
                          .value = std::to_string(slopes_deg.size()),
                          .bound = std::to_string(voxels.size())});
   for (std::size_t n = 1; n < voxels.size(); ++n)
     if (!(voxels[n - 1] < voxels[n]))
-      throw libmap::Error("the voxels are not sorted", {.field = "i, j, k"});
+      throw libmap::Error("voxels are not strictly ascending", {.field = "i, j, k"});
 }
 
 void check(double voxel_size_m, const ObstacleOptions& options) {

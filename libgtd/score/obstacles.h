@@ -17,8 +17,8 @@ enum class Obstacle : std::uint8_t { none = 0, face = 1, unreachable = 2 };
 struct ObstacleOptions {
   double slope_deg = 60.0;  // minimum slope of a steep voxel
   double height_m = 0.3;    // maximum rise of a face that is no obstacle
-  // Radius of the slope fits. A fit mixes a face with the ground at its foot and top; the rise of a
-  // face is therefore measured up to this distance from its steep voxels.
+  // Radius of the slope fits. A fit mixes a face with the ground at the foot and top of the face;
+  // the rise is therefore measured up to this distance from the steep voxels.
   double normal_radius_m = 0.07;
 };
 

@@ -36,7 +36,7 @@ class ColumnSums {
   std::vector<std::uint32_t> sums_;
 };
 
-// Returns the rectangle extended by `below` columns at its low sides and `above` at its high sides.
+// Returns the rectangle extended by `below` columns at the low sides and `above` at the high sides.
 TileBounds expanded(const TileBounds& bounds, int below, int above);
 // Returns the columns from i - below to i + above, and the same range around j.
 TileBounds columns_around(int i, int j, int below, int above);

@@ -16,8 +16,8 @@ void bind(libmap::ParameterTable& table, Scenario& scenario) {
   using libmap::not_negative;
   using libmap::positive;
   table.add("method", scenario.method, method_names(),
-            "scoring method; calibrated: hold probability; corrected: shape only; others: earlier "
-            "programs");
+            "scoring method; calibrated: hold probability; corrected: shape only; thesis, "
+            "envelope: program of the thesis and its alternative; climblab: ClimbLab v3");
   table.add("gripper", scenario.gripper, "gripper: scar-e, hubrobo, limbero, or a gripper file");
   table.add("voxel_size_m", scenario.voxel_size_m, positive, "edge of a voxel, m");
   table.add("extra_void_layers", scenario.extra_void_layers, {0, 10000},
@@ -41,7 +41,8 @@ void bind(libmap::ParameterTable& table, Scenario& scenario) {
   table.add("intersection_distance_m", scenario.intersection_distance_m, positive,
             "maximum distance of a convex voxel from a convex point, m");
   table.add("orientation", scenario.orientation, orientation_names(),
-            "mask axis: normal of the regression plane, or of the surface at each voxel");
+            "axis of the mask; plane: normal of the regression plane; surface: normal of the "
+            "surface at each voxel");
   table.add("normal_radius_m", scenario.normal_radius_m, not_negative,
             "radius of the surface normal fits, m; 0: palm diameter of the gripper");
   table.add("obstacle_height_m", scenario.obstacle_height_m, not_negative,
@@ -81,7 +82,7 @@ void Scenario::check() const {
     throw libmap::Error("not supported by method " + name_of(method),
                         {.field = "orientation",
                          .value = "surface",
-                         .bound = "plane, or method corrected or climblab"});
+                         .bound = "plane; surface requires method corrected or climblab"});
 }
 
 }  // namespace libgtd

@@ -50,8 +50,8 @@ struct Scenario {
   bool evaluates_obstacles() const { return obstacle_height_m > 0.0 && obstacle_slope_deg > 0.0; }
   bool fits_normals() const { return orientation == Orientation::surface || evaluates_obstacles(); }
 
-  // Throws Error naming the field, its value and its bound, also for orientation `surface` with the
-  // methods thesis, envelope and calibrated.
+  // Throws Error naming field, value and bound, also for orientation `surface` with the methods
+  // thesis, envelope and calibrated.
   void check() const;
 };
 

@@ -13,8 +13,8 @@
 
 namespace libgtd {
 
-// Index of a tile on the lattice of tiles: i and j are those of its voxels, divided by the tile
-// width and rounded down.
+// Index of a tile on the lattice of tiles: i and j of the tile's voxels, divided by the tile width
+// and rounded down.
 struct TileNumber {
   int i = 0;
   int j = 0;

@@ -137,7 +137,7 @@ TileStoreIndex index_from(const Json& json, const std::string& file) {
         "not the format of a tile store",
         {.field = "format", .value = json.at("format").dump(), .bound = format_name});
   if (json.at("version") != format_version)
-    throw libmap::Error("this graspmap cannot read this version",
+    throw libmap::Error("unsupported version of a tile store",
                         {.field = "version",
                          .value = json.at("version").dump(),
                          .bound = std::to_string(format_version)});
@@ -161,7 +161,8 @@ TileStoreIndex index_from(const Json& json, const std::string& file) {
   for (const Json& one : json.at("tiles")) {
     const StoredTile tile = tile_from(one, index);
     if (!index.tiles.empty() && !(index.tiles.back().number < tile.number))
-      throw libmap::Error("the tiles are not sorted", {.field = "tiles", .value = tile.file});
+      throw libmap::Error("not in ascending order of i and j",
+                          {.field = "tiles", .value = tile.file});
     index.tiles.push_back(tile);
   }
   return index;
@@ -199,8 +200,7 @@ fs::path require_store(const fs::path& store) {
 libmap::Error not_complete(const fs::path& folder) {
   const MapTileStore store(folder);
   const auto plan = store.plan();
-  if (!plan)
-    return libmap::Error("is not a tile store: it has no index.json", {.file = folder.string()});
+  if (!plan) return libmap::Error("is not a tile store: no index.json", {.file = folder.string()});
   const MapTileStore::Completion completion = store.complete(*plan);
   if (completion.index)
     return libmap::Error("has all tiles but no index.json; score again to write it",
@@ -216,7 +216,7 @@ TileStoreIndex listed(TileStoreIndex index) {
   for (const StoredTile& tile : index.tiles)
     if (tile.voxels == 0)
       throw libmap::Error(
-          "lists a tile without voxels",
+          "contains a tile without voxels",
           {.field = "tiles",
            .value = std::to_string(tile.number.i) + ", " + std::to_string(tile.number.j)});
   return index;
@@ -247,7 +247,7 @@ TerrainFile terrain_file_from(const Json& json) {
   file.box.max = vector_from(json.at("max"));
   if (file.points > 0 && !(file.box.min.array() <= file.box.max.array()).all())
     throw libmap::Error("not a box",
-                        {.field = "min and max of piece " + file.input.path,
+                        {.field = "min, max of cloud " + file.input.path,
                          .value = Json(json.at("min")).dump() + ", " + Json(json.at("max")).dump(),
                          .bound = "min <= max"});
   return file;
@@ -255,8 +255,8 @@ TerrainFile terrain_file_from(const Json& json) {
 
 TilePlan plan_from(const Json& json, const std::string& file) {
   if (json.at("format") != plan_format || json.at("version") != plan_version)
-    throw libmap::Error("not the format and version of a plan that this graspmap reads",
-                        {.field = "format and version",
+    throw libmap::Error("unsupported tile store plan",
+                        {.field = "format, version",
                          .value = json.at("format").dump() + ", " + json.at("version").dump(),
                          .bound = Json(plan_format).dump() + ", " + std::to_string(plan_version)});
   TilePlan plan;

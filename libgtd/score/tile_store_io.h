@@ -51,7 +51,7 @@ struct TerrainFile {
 
 struct TilePlan {
   std::string key;                                     // hash of parameters and inputs: key_of
-  TileStoreIndex index;                                // without tiles and their counts
+  TileStoreIndex index;                                // without tiles and counts of tiles
   Eigen::Vector3d centroid = Eigen::Vector3d::Zero();  // centroid of the fitted plane
   bool has_plane = false;
   std::vector<TerrainFile> terrain;
@@ -68,7 +68,7 @@ class MapTileStore : public libmap::TileStore {
 
   // Returns the finished tiles of all shares.
   std::map<TileNumber, StoredTile> done(const TilePlan& plan) const;
-  // Returns the tiles that are not finished or whose file has changed since.
+  // Returns the tiles that are not finished or have a changed file.
   std::vector<TileNumber> missing(const TilePlan& plan, const std::vector<TileNumber>& tiles) const;
 
   struct Completion {
@@ -78,12 +78,12 @@ class MapTileStore : public libmap::TileStore {
   };
   // Counts the finished tiles of the plan; if all are finished, makes the index.
   Completion complete(const TilePlan& plan) const;
-  // Writes the index and, before it, a manifest beside the store: that of the index with times and
-  // threads of `run`. Does nothing if the index exists.
+  // Writes the index and, before it, a manifest beside the store: the manifest of the index with
+  // times and threads of `run`. Does nothing if the index exists.
   void write_index(const TileStoreIndex& index, const libmap::Manifest& run = {}) const;
 };
 
-// Adds tiles whose files exist to the journal of finished tiles.
+// Adds tiles with existing files to the journal of finished tiles.
 void add_tiles(const std::vector<StoredTile>& tiles, const std::string& key,
                libmap::TileJournal& journal);
 

@@ -1,6 +1,6 @@
-// Scores the voxels of a terrain with an upright gripper mask, tile by tile. A tile reads its own
-// voxels and those in a margin around it. The result does not depend on the tile size, the order of
-// the tiles or the number of threads.
+// Scores the voxels of a terrain with an upright gripper mask, tile by tile. A tile depends on the
+// voxels of the tile and of a margin around the tile. The result does not depend on the tile size,
+// the order of the tiles or the number of threads.
 #pragma once
 
 #include <cstddef>
@@ -48,7 +48,8 @@ std::vector<ScoredVoxel> score_tiles(const VoxelGrid& grid, const GripperMask& m
                                      const ScoringOptions& options,
                                      libmap::Progress& progress = libmap::no_progress());
 
-// Returns 1 for each pivot whose mask window contains a column outside the scanned area, else 0.
+// Returns 1 for each pivot with a mask window that contains a column outside the scanned area, else
+// 0.
 std::vector<std::uint8_t> find_edges(const VoxelGrid& grid, const GripperMask& mask,
                                      const TileBounds& tile,
                                      const std::vector<std::size_t>& pivots);

@@ -1,6 +1,6 @@
 // Scores voxels with the gripper mask tilted to the surface normal (orientation `surface`), for
 // walls. Around each pivot voxel, the points of the terrain are voxelized on a separate lattice
-// whose third axis is the surface normal.
+// with the surface normal as third axis.
 #pragma once
 
 #include <Eigen/Core>
@@ -37,15 +37,15 @@ class TiltedTerrain {
 
   // Returns the counts of each pivot. A tilted voxel is occupied if it contains a point, so that a
   // surface counts the same in any orientation. Counts depend only on the points within reach, not
-  // on their order.
+  // on the order of the points.
   std::vector<VoxelCounts> match(const std::vector<TiltedPivot>& pivots,
                                  libmap::Progress& progress = libmap::no_progress()) const;
 
-  // Returns 1 for each pivot whose mask leaves the scanned area, else 0: a position of its square
-  // on the tangent plane has no points above or below it along the axis of the mask (within half
-  // the square plus the closed gaps, and closed over gaps like scanned columns) and is over a
-  // column that was not scanned. Empty space beside a rock is therefore not an edge. `unscanned`
-  // must contain the columns within tilted_reach_voxels.
+  // Returns 1 for each pivot with a mask that extends beyond the scanned area, else 0: a position
+  // of the mask's square on the tangent plane has no points above or below along the axis of the
+  // mask (within half the square plus the closed gaps, and closed over gaps like scanned columns)
+  // and is over a column that was not scanned. Empty space beside a rock is therefore not an edge.
+  // `unscanned` must contain the columns within tilted_reach_voxels.
   std::vector<std::uint8_t> find_edges(const std::vector<TiltedPivot>& pivots,
                                        const ColumnSums& unscanned) const;
 
@@ -63,7 +63,7 @@ std::vector<Voxel> pivots_of(const VoxelGrid& grid, const GripperMask& mask,
                              const std::vector<TileBounds>& tiles);
 
 // Returns the surface normal at the center of each voxel, on the side of the normals of the points
-// in the voxel, or of +z if they have none.
+// in the voxel, or of +z if the points have no normals.
 std::vector<SurfaceNormal> normals_at(const std::vector<Voxel>& voxels,
                                       const libmap::PointCloud& surface,
                                       const VoxelLattice& lattice, double radius_m);

@@ -10,7 +10,7 @@ namespace libgtd {
 
 namespace {
 
-// Counted bits of a window in chunks of 32 columns by 16 layers. Chunks without bits are left out,
+// Counted bits of a window in chunks of 32 columns by 16 layers. Chunks without bits are skipped,
 // and rows are clipped to columns with bits.
 struct ChunkedMask {
   struct FirstBit {

@@ -13,22 +13,23 @@
 
 namespace libgtd {
 
-// Sums of V * O (ssv) and V * M * O (gsv) over the window of a pivot.
+// Numbers of occupied terrain voxels in the window of the mask around a pivot.
 struct VoxelCounts {
-  std::uint32_t ssv = 0;  // solid voxels in the window
-  std::uint32_t gsv = 0;  // solid voxels that match the mask
+  std::uint32_t ssv = 0;  // in the counted volume of the mask (GripperMask::counted)
+  std::uint32_t gsv = 0;  // also solid in the mask
   bool operator==(const VoxelCounts&) const = default;
 };
 
 // Returns the pivots of `grid` in `tile` as ascending indices in grid.voxels. Methods other than
-// `corrected` exclude a border of half a mask: pivots have h+1 <= i <= NX-h-2, and the same for j.
+// `corrected` exclude a border of half a mask: with h = mask.pivot_xy and NX columns along i,
+// pivots have h+1 <= i <= NX-h-2 (i relative to the first column), and j likewise.
 std::vector<std::size_t> pivots_in(const VoxelGrid& grid, const GripperMask& mask,
                                    const TileBounds& tile);
 
-// Returns the counts of each pivot, by population counts over bits of the terrain around blocks of
-// pivots, in parallel. The counts do not depend on the other pivots, the number of threads or
-// `instructions`, which the processor must support. Memory is proportional to the number of voxels
-// and the size of the mask, not to the bounding box.
+// Returns the counts of each pivot. Terrain around a block of pivots is stored as bits, and matches
+// are counted by popcount, in parallel. The counts do not depend on the other pivots, the number of
+// threads or `instructions`, which the processor must support. Memory is proportional to the number
+// of voxels and the size of the mask, not to the bounding box.
 std::vector<VoxelCounts> match_voxels(
     const VoxelGrid& grid, const GripperMask& mask, const std::vector<std::size_t>& pivots,
     libmap::InstructionSet instructions = libmap::best_instruction_set(),
@@ -37,14 +38,15 @@ std::vector<VoxelCounts> match_voxels(
 // Returns the number of 64-byte chunks of the mask that are compared at each pivot.
 std::size_t solid_chunks(const GripperMask& mask);
 
-// Returns the score in percent (eq. 3-17, 3-18): GSV / SSV, reduced by (TSV - SSV) / TSV * 100 if
-// SSV <= TSV and the quotient is at least 60. `thesis` and `envelope` divide in single precision as
+// Returns the score in percent (eq. 3-17, 3-18): 100 GSV / SSV; minus 100 (TSV - SSV) / TSV if
+// SSV <= TSV and the quotient is >= 60, where TSV is `solid_voxel_threshold`. `thesis` and
+// `envelope` divide in single precision as
 // the author's program does (which then truncates to an integer), and can be negative. `corrected`
 // divides in double precision and is at least 0. `climblab` has no reduction.
 double score_percent(const VoxelCounts& counts, Method method, int solid_voxel_threshold);
 
-// Returns true if a voxel is graspable by its counts: its score (0..1) reaches the threshold or,
-// with `climblab`, all solid voxels of the window are inside the mask and their number exceeds TSV.
+// Returns true if a voxel is graspable by the counts: the score (0..1) is >= the threshold or, with
+// `climblab`, all solid voxels of the window are inside the mask and ssv exceeds TSV.
 bool meets_threshold(const VoxelCounts& counts, double score, Method method,
                      int solid_voxel_threshold, double graspability_threshold);
 

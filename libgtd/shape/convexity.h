@@ -1,4 +1,4 @@
-// Finds convex points of a terrain, where spines can engage, and the positions near them
+// Finds convex points of a terrain, where spines can engage, and the positions near convex points
 // ("Graspable Target Detection for Hexapod Robots", 2023, listings 3.2 and 3.3).
 #pragma once
 
@@ -26,8 +26,9 @@ struct ConvexityOptions {
 };
 
 // Returns 1 for each convex point of `curvature`, else 0, by the rule of the method that estimated
-// it. `positions` are those of curvature.points in the terrain frame. Points without a curvature
-// are not convex. Throws Error for arrays of different length and for bounds that are NaN.
+// it. `positions` are the positions of curvature.points in the terrain frame. Points without a
+// curvature are not convex. Throws Error for arrays of different length and for bounds that are
+// NaN.
 std::vector<std::uint8_t> find_convex(const CurvatureResult& curvature,
                                       const std::vector<Eigen::Vector3d>& positions,
                                       const ConvexityOptions& options = {});

@@ -1,4 +1,4 @@
-// Principal curvatures of a terrain at its points, estimated within a radius ("Graspable Target
+// Principal curvatures at the points of a terrain, estimated within a radius ("Graspable Target
 // Detection for Hexapod Robots", 2023, eq. 3-19).
 #pragma once
 
@@ -28,7 +28,7 @@ struct CurvatureOptions {
 
 // Curvature at one point. If `valid` is false, all numbers are NaN: there are too few neighbors,
 // the neighbors do not determine a quadric (on one or two lines, coincident), or the surface is
-// along `up` and has no normal of its own to define the outside.
+// along `up` and no normal defines the outside.
 struct Curvature {
   static constexpr float nan = std::numeric_limits<float>::quiet_NaN();
 
@@ -47,7 +47,7 @@ struct CurvatureResult {
   std::size_t valid_count = 0;
 };
 
-// Estimates the curvature at all points of the cloud, or at those with the indices `queries`. A
+// Estimates the curvature at all points of the cloud, or at the points with indices `queries`. A
 // value does not depend on the other queries or the number of threads. Points that are not finite
 // are not used as neighbors. Throws Error for a radius that is not positive, an `up` of length
 // zero, and an index out of range.

@@ -1,8 +1,7 @@
 // Inner loops of the curvature and normal fits over the neighbors of a point, compiled for several
 // instruction sets with identical results: sums run in eight lanes, whatever the width of the
-// registers, and are joined in a fixed order. The interface uses plain pointers only: sources
-// compiled for larger instruction sets must not contain types with inline functions of other
-// sources.
+// registers, and are joined in a fixed order. The interface uses plain pointers only, so that the
+// loops use no inline functions of other sources: the linker could keep the AVX copy for all.
 #pragma once
 
 #include <cstddef>
@@ -15,8 +14,8 @@ namespace libgtd {
 struct NeighborLoops {
   static constexpr std::size_t lanes = 8;
 
-  // Coordinates of points, one array per axis. Candidates are read, and neighbors written, up to a
-  // full set of lanes beyond their number.
+  // Coordinates of points, one array per axis. Arrays of candidates and neighbors must have room
+  // for `lanes` more values than points.
   struct Coordinates {
     double* x = nullptr;
     double* y = nullptr;
@@ -24,8 +23,8 @@ struct NeighborLoops {
   };
 
   // Writes the candidates within `radius` of `center` to `neighbors`, relative to `center` and in
-  // units of the radius; zeros follow up to a full set of lanes. Returns their number. Candidates
-  // beyond `count` must be infinite.
+  // units of the radius; zeros follow up to a full set of lanes. Returns the number of neighbors.
+  // Candidates beyond `count` must be infinite.
   std::size_t (*select)(const Coordinates& candidates, std::size_t count, const double* center,
                         double radius, const Coordinates& neighbors);
   // Moments for the quadric fit: sums of x, y, z, xx, xy, xz, yy, yz, zz.
@@ -37,11 +36,11 @@ struct NeighborLoops {
   static constexpr std::size_t moments = 9;
   static constexpr std::size_t quadric_sums = 20;
 
-  // Writes a sort key for each candidate whose squared distance to `center` is below `limit`, in
-  // the order of the candidates, and returns the number of keys. The high 32 bits are those of the
-  // squared distance in single precision, which sort like the distances; the low 32 bits are the
-  // index. Candidates beyond `count` must be infinite; up to 16 beyond the last are read and
-  // written.
+  // Writes a sort key for each candidate with a squared distance to `center` below `limit`, in the
+  // order of the candidates, and returns the number of keys. The high 32 bits are the squared
+  // distance in single precision, of which the bits sort like the values; the low 32 bits are the
+  // index. Candidates beyond `count` must be infinite. x, y, z and keys need room for
+  // `rank_lanes` more values.
   std::size_t (*rank)(const float* x, const float* y, const float* z, std::size_t count,
                       const float* center, float limit, std::uint64_t* keys);
   static constexpr std::size_t rank_lanes = 16;

@@ -15,8 +15,9 @@ namespace libgtd {
 PointGrid::PointGrid(const std::vector<Eigen::Vector3d>& points, double cell_size_m)
     : cell_size_m_(cell_size_m) {
   if (!(cell_size_m > 0) || std::isinf(cell_size_m))
-    throw libmap::Error("out of range",
-                        {.value = libmap::to_text(cell_size_m), .bound = "> 0 and finite"});
+    throw libmap::Error("out of range", {.field = "cell size, m",
+                                         .value = libmap::to_text(cell_size_m),
+                                         .bound = "> 0 and finite"});
   if (points.size() > std::numeric_limits<std::uint32_t>::max())
     throw libmap::Error("the cloud has too many points (limit: 2^32)");
   high_ = Eigen::Vector3d::Constant(-std::numeric_limits<double>::infinity());
@@ -30,9 +31,9 @@ PointGrid::PointGrid(const std::vector<Eigen::Vector3d>& points, double cell_siz
   if (order_.empty()) return;
   const double extent = low_.cwiseAbs().cwiseMax(high_.cwiseAbs()).maxCoeff();
   if (!(extent / cell_size_m <= 0x1.0p40))
-    throw libmap::Error("the search radius is too small for points this far from the origin",
-                        {.value = libmap::to_text(cell_size_m) + " m cells up to " +
-                                  libmap::to_text(extent) + " m from the origin"});
+    throw libmap::Error(
+        "too small for points up to " + libmap::to_text(extent) + " m from the origin",
+        {.field = "search radius, m", .value = libmap::to_text(cell_size_m)});
 
   sort_by_cell(points);
 }

@@ -38,7 +38,7 @@ class PointGrid {
   // Sets `runs` to the ranges of order() with the points of all cells at most `reach` cells away
   // along each axis, ascending and not empty. A column of cells is one run.
   void find_near(const Cell& cell, std::int64_t reach, std::vector<Range>& runs) const;
-  // The cells that contain points, and their ranges, in the sequence of order().
+  // The cells that contain points, with ranges in the sequence of order().
   const std::vector<Cell>& cells() const { return cells_; }
   const std::vector<Range>& ranges() const { return ranges_; }
 
@@ -98,7 +98,7 @@ class CoordinateRows {
 std::vector<Eigen::Vector3d> sorted_by_cell(const PointGrid& grid,
                                             const std::vector<Eigen::Vector3d>& points);
 
-// Returns the covariance of `count` neighbors, in the squared unit of their coordinates.
+// Returns the covariance of `count` neighbors, in the squared unit of the coordinates.
 Eigen::Matrix3d covariance_of(const NeighborLoops& loops,
                               const NeighborLoops::Coordinates& neighbors, std::size_t count);
 

@@ -11,7 +11,8 @@ namespace libgtd {
 
 struct SurfaceNormalOptions {
   double radius_m = 0.07;  // radius of the ball of points for the plane fit
-  // Outside direction for positions without one of their own, and reference direction of slopes.
+  // Reference direction of slopes; replaces an outside direction that is missing, zero, not finite
+  // or parallel to the surface.
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
 };
 
@@ -19,10 +20,10 @@ struct SurfaceNormal {
   static constexpr float nan = std::numeric_limits<float>::quiet_NaN();
 
   // Unit normal, outward. NaN if fewer than three points are within the radius, if they do not
-  // determine a plane, or if the surface is along `up` and has no outside of its own.
+  // determine a plane, or if neither the outside direction nor `up` determines the sign.
   Eigen::Vector3f normal = Eigen::Vector3f::Constant(nan);
-  // Angle between the normal and `up`: 0 level, 90 a wall, above 90 an overhang. At most 90 for
-  // positions without an outside of their own. NaN if no plane can be fitted.
+  // Angle between the normal and `up`: 0 level, 90 a wall, above 90 an overhang. At most 90 if `up`
+  // replaces the outside direction. NaN if the normal is.
   float slope_deg = nan;
 };
 
@@ -31,7 +32,7 @@ struct SurfaceNormal {
 double side_of(const Eigen::Vector3d& normal, const Eigen::Vector3d& outside);
 
 // Returns true if points with these eigenvalues of their covariance (ascending) determine a plane.
-// They do not if they are on a line or distributed evenly in all directions.
+// Points on a line or distributed evenly in all directions do not.
 inline bool determines_plane(const Eigen::Vector3d& variances) {
   constexpr double min_width_ratio = 1e-6;
   constexpr double max_lump_ratio = 0.8;

@@ -124,10 +124,9 @@ void check_grid(const Box& box, double spacing, std::size_t max_nodes) {
   const double rows = (box.max_y - box.min_y) / spacing + 1;
   if (!(columns * rows <= static_cast<double>(max_nodes)))
     throw libmap::Error(
-        "too small: the interpolation grid would have too many nodes",
-        {.field = "grid spacing",
-         .value = libmap::to_text(spacing) + " m",
-         .bound = "at most " + std::to_string(max_nodes) + " nodes over the points' x and y"});
+        "too small: the interpolation grid over the points' x and y would have more than " +
+            std::to_string(max_nodes) + " nodes",
+        {.field = "grid spacing", .value = libmap::to_text(spacing) + " m"});
   const double farthest = std::max(
       {std::abs(box.min_x), std::abs(box.max_x), std::abs(box.min_y), std::abs(box.max_y)});
   if (!(spacing > farthest * 0x1.0p-50))

@@ -11,7 +11,8 @@ namespace libgtd {
 
 // thesis: the grid starts at the minimum x and y of the points, has the pitch of the author's
 // program, drops nodes of height exactly 0 and rounds coordinates to single precision. corrected:
-// the pitch follows eq. 3-5 as printed, and nodes are whole multiples of it in the input frame.
+// the pitch follows eq. 3-5 as printed, and nodes are at whole multiples of the pitch in the input
+// frame.
 enum class InterpolationMethod { thesis, corrected };
 
 struct InterpolationOptions {
@@ -24,8 +25,8 @@ struct InterpolationOptions {
   // Maximum pitch from eq. 3-5 for `corrected`; 0: no limit. If nodes are farther apart than the
   // voxels to be filled, rows of voxels remain empty.
   double max_grid_spacing_m = 0;
-  // Side of the square cells whose count measures the area A of eq. 3-5 for `corrected`. 0: 4 times
-  // the mean spacing of as many points in the bounding box, whose area then bounds A.
+  // Side of square cells; the number of occupied cells measures the area A of eq. 3-5 for
+  // `corrected`. 0: 4 times the mean spacing of as many points in the bounding box.
   double area_cell_m = 0;
   // Maximum number of nodes. More nodes indicate a wrong pitch or a stray point.
   std::size_t max_nodes = 100'000'000;
@@ -39,7 +40,7 @@ struct InterpolationResult {
   double grid_spacing_m = 0;
   double area_m2 = 0;                 // thesis: bounding box; corrected: occupied cells
   std::size_t triangles = 0;          // of the triangulation
-  std::size_t refused_triangles = 0;  // those with an edge longer than max_edge_m
+  std::size_t refused_triangles = 0;  // triangles with an edge longer than max_edge_m
   std::size_t nodes = 0;              // grid nodes
   std::size_t outside_nodes = 0;      // outside the hull or inside refused triangles
   std::size_t zero_nodes = 0;         // `thesis`: dropped because of a height of exactly 0

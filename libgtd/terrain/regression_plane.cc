@@ -340,8 +340,9 @@ double choose_up(const Facts& facts, const RegressionPlaneOptions& options, cons
     const double side = side_of(fit.normal, *options.up);
     if (side == 0)
       throw libmap::Error(
-          "does not determine which side of the plane is up: its length is zero or it is parallel "
-          "to the plane",
+          "the direction is zero or parallel to the plane, so it does not determine the upper side "
+          "of "
+          "the plane",
           {.field = "up"});
     const double tilt_deg = std::acos(std::min(1.0, std::abs(side))) * 180.0 / std::numbers::pi;
     if (tilt_deg > options.max_tilt_deg)

@@ -219,7 +219,7 @@ VoxelFields::VoxelFields(const libmap::PointCloud& map) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const libmap::ScalarField* field = map.find_field(names[axis]);
     if (field == nullptr)
-      throw libmap::Error("not a graspability map: it has no such field", {.field = names[axis]});
+      throw libmap::Error("no such field; a graspability map is required", {.field = names[axis]});
     values_[axis] = &field->values;
   }
 }
@@ -255,12 +255,12 @@ void require_dense(std::size_t lone, std::size_t voxels, double voxel_size_m,
   throw libmap::Error(
       "the points are too sparse for this voxel size: interpolate (--interpolation), use larger "
       "voxels (--voxel-size), or sample the surface of a mesh (graspmap resample)",
-      {.field = "spacing of the points with voxels of " + libmap::to_text(voxel_size_m) + " m",
-       .value = libmap::to_fixed_text(1000.0 * libmap::median_spacing(points), 1) + " mm; " +
-                libmap::to_fixed_text(
+      {.field = "share of voxels without a neighbor",
+       .value = libmap::to_fixed_text(
                     100.0 * static_cast<double>(lone) / static_cast<double>(voxels), 1) +
-                " % of the voxels have no neighbor",
-       .bound = "<= 60 % of the voxels"});
+                " % (voxels of " + libmap::to_text(voxel_size_m) + " m, median point spacing " +
+                libmap::to_fixed_text(1000.0 * libmap::median_spacing(points), 1) + " mm)",
+       .bound = "<= 60 %"});
 }
 
 }  // namespace libgtd

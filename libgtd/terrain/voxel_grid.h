@@ -30,8 +30,8 @@ struct TileBounds {
   int j_end = 0;
 };
 
-// Returns the first iterator in at..end whose voxel is not below `voxel` (exponential search, fast
-// if the result is near `at`).
+// Returns the first iterator in at..end with a voxel not below `voxel` (exponential search, fast if
+// the result is near `at`).
 template <typename Iterator>
 Iterator first_not_below(Iterator at, Iterator end, const Voxel& voxel) {
   auto step = typename std::iterator_traits<Iterator>::difference_type{1};
@@ -65,13 +65,13 @@ void visit_pairs(const std::vector<Voxel>& voxels, int reach, const Visit& visit
   }
 }
 
-// Returns the number of voxels without an occupied one among their 26 neighbors.
+// Returns the number of voxels without an occupied voxel among the 26 neighbors.
 std::size_t count_isolated(const std::vector<Voxel>& voxels);
 
-// Throws Error naming the spacing of the points if more than 60 % of the voxels are lone (have no
-// neighbor): such points do not form a surface at this voxel size. A regular grid with a spacing of
-// more than two voxels has 100 %, one of 1.5 voxels less than half. The published pre-scanned cloud
-// of scenario 2 has 54 % at its published voxel size and must be accepted.
+// Throws Error naming the share of lone voxels (without a neighbor) if it exceeds 60 %: such points
+// do not form a surface at this voxel size. A regular grid with a spacing of more than two voxels
+// has 100 %, one of 1.5 voxels less than half. The published pre-scanned cloud of scenario 2 has 54
+// % at the published voxel size and must be accepted.
 void require_dense(std::size_t lone, std::size_t voxels, double voxel_size_m,
                    const std::vector<Eigen::Vector3d>& points);
 
@@ -107,12 +107,13 @@ void visit_columns(const VoxelGrid& grid, const TileBounds& columns, const Visit
 VoxelGrid voxelize(const std::vector<Eigen::Vector3d>& points_in_terrain, double voxel_size_m);
 
 // Returns the mean of the points in each voxel of that lattice, in ascending order, with the sum of
-// their normals if the cloud has normals. This removes the effect of scan density. Throws like
+// the normals if the cloud has normals. This removes the effect of scan density. Throws like
 // voxelize.
 libmap::PointCloud voxel_means(const libmap::PointCloud& terrain, double voxel_size_m);
 
 // Voxelizes points for `thesis` (listing A.4), in single precision: the centroids of the cells of
-// one lattice are put into the cells of a second lattice that starts at their minimum coordinates.
+// one lattice are put into the cells of a second lattice that starts at the minimum coordinates of
+// the centroids.
 VoxelGrid voxelize_thesis(const std::vector<Eigen::Vector3f>& points_in_terrain,
                           double voxel_size_m);
 
@@ -127,7 +128,7 @@ const std::vector<double>& values_of(const libmap::PointCloud& map, const char* 
 // Voxel indices of map points, from the fields i, j and k.
 class VoxelFields {
  public:
-  // Throws Error naming a missing field. The map and its fields must outlive this object.
+  // Throws Error naming a missing field. The map must outlive this object.
   explicit VoxelFields(const libmap::PointCloud& map);
 
   // Returns the voxel of point n. Throws Error naming the field if a value is not an integer within

@@ -13,10 +13,10 @@ constexpr Integer floor_to(Real value) {
   return static_cast<Real>(whole) > value ? whole - 1 : whole;
 }
 
-// Bound of voxel indices (+-2^29), so that windows around them and differences fit an int.
+// Bound of voxel indices (+-2^29), so that differences of indices and windows fit an int.
 inline constexpr double max_voxel_index = 0x1p29;
 
-// Voxel index. The order by i, then j, then k is that of all lists of voxels and all maps.
+// Voxel index. All lists of voxels and all maps are ordered by i, then j, then k.
 struct Voxel {
   int i = 0;
   int j = 0;

@@ -136,7 +136,7 @@ PointCloud2 encode_cloud(const PointCloud& cloud) {
   }
   constexpr std::uint64_t most = 0xFFFF0000;
   if (set.rows > most / std::max<std::size_t>(offset, 1))
-    throw Error("a ROS message can contain at most 4 GiB",
+    throw Error("too many for a ROS message, which can contain at most 4 GiB",
                 {.field = "points", .value = std::to_string(set.rows)});
   std::string records;
   append_records(set.columns, 0, set.rows, false, records);

@@ -17,14 +17,14 @@ struct CloudMessage {
   std::int64_t stamp_ns = 0;
   std::string frame{};
   PointCloud cloud{};
-  std::size_t dropped_points = 0;  // points whose position is NaN or infinite
+  std::size_t dropped_points = 0;  // points with a NaN or infinite position
 };
 
 // Decodes a PointCloud2 in either byte order, with or without padding; organized clouds in
 // row-major order. Positions are x, y, z; normals are normal_x, normal_y, normal_z or nx, ny, nz;
 // colors are rgb or rgba (PCL's packing), or r, g, b or red, green, blue of one byte. Others become
 // scalar fields, with several numbers per point NAME_0, NAME_1, ... Throws Error naming the field
-// if x, y or z is missing, a field is a duplicate, outside its point or of unknown type, a point
+// if x, y or z is missing, a field is a duplicate, outside the point or of unknown type, a point
 // has more than 1024 numbers, or rows or data are too short.
 CloudMessage decode_cloud(MessageEncoding encoding, std::string_view bytes);
 

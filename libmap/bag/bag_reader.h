@@ -16,7 +16,7 @@ namespace libmap {
 // Encoding of messages (message_codec.h); other: not supported.
 enum class MessageEncoding { ros1, cdr, other };
 
-// Message type with the md5sum of its definition in ROS 1.
+// Message type with the md5sum of the definition in ROS 1.
 struct MessageType {
   const char* name = "";  // name in ROS 1, e.g. "sensor_msgs/PointCloud2"
   const char* md5sum = "";
@@ -57,7 +57,7 @@ std::vector<std::filesystem::path> files_of_bag(const std::filesystem::path& pat
 
 // Lists the topics of a bag. Throws Error naming the file if it cannot be read, is not a bag, has
 // no index, or is damaged or encrypted. Builds without ROS 1's libraries throw Error (failed) with
-// the missing packages for its bags.
+// the missing packages for bags of ROS 1.
 BagListing list_bag(const std::filesystem::path& path);
 
 struct BagRequest {
@@ -78,7 +78,7 @@ void read_bag(const std::filesystem::path& path, const std::vector<BagRequest>& 
               const std::function<void(const BagMessage&)>& take);
 
 // Returns the topic of that name. Throws Error if there is none (with the nearest name, or all
-// topics of `type`), or if its messages have another type or definition.
+// topics of `type`), or if the messages have another type or definition.
 const BagTopic& require_topic(const BagListing& listing, const std::string& name,
                               const MessageType& type);
 

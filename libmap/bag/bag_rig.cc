@@ -336,7 +336,7 @@ void add_images(const SurveyedImages& images, std::size_t camera, bool calibrate
       plan.warnings.push_back(images.topic + ": " + std::to_string(count) + " images " + text);
   };
   warn(twice, "are dropped because an earlier image has the same stamp");
-  warn(otherwise, "are dropped because their calibration differs from the first");
+  warn(otherwise, "are dropped because the calibration differs from the first message");
   if (images.unstamped)
     plan.warnings.push_back(images.topic + ": images have no stamp; the recording times are used");
 }

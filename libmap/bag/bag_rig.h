@@ -1,4 +1,5 @@
-// Exports depth images of a robot's cameras from a ROS bag to a rig and its images (rig_io.h).
+// Exports depth images of a robot's cameras from a ROS bag to a rig and images of the rig
+// (rig_io.h).
 #pragma once
 
 #include <cstddef>
@@ -19,8 +20,8 @@ struct BagRigOptions {
   // "TOPIC" or "NAME=TOPIC"; empty: all topics of depth images, compressed ones only if there is no
   // raw one.
   std::vector<std::string> topics{};
-  // Replaces camera infos and transforms. A topic belongs to the camera of its given name, or whose
-  // name is a part of the topic between slashes.
+  // Replaces camera infos and transforms. A topic belongs to the camera that is given for the
+  // topic, or that is named by a part of the topic between slashes.
   std::optional<CameraRig> rig{};
   std::string base_frame = "auto";  // robot frame; auto: base_link, or the root of all transforms
   std::string transform_topic = "/tf_static";
@@ -29,7 +30,7 @@ struct BagRigOptions {
                                 // bag, 0.1 mm for 32FC1
   double near_m = 0.0;          // depth range of the rig; 0 and infinity: the given rig's own
   double far_m = std::numeric_limits<double>::infinity();
-  double tolerance_s = 0.02;  // maximum time between an image and the stamp of its set
+  double tolerance_s = 0.02;  // maximum time between an image and the stamp of the set
   int every = 1;              // >= 1; only every N-th set is exported
 };
 void bind(ParameterTable& table, BagRigOptions& options);
@@ -54,10 +55,10 @@ struct BagRigPlan {
 };
 
 // Selects the images: all synchronized sets, every N-th one, or the one nearest to `stamp_s`. The
-// stamp of an image is its header's, or its time of recording if that is empty. Each image has the
-// calibration of the camera info nearest in time. Images whose calibration differs from the first
-// of their camera are dropped with a warning. Throws Error for a damaged bag, no depth images, or
-// missing topics, infos, frames or transforms.
+// stamp of an image is in the header, or is the time of recording if the header has none. Each
+// image has the calibration of the camera info nearest in time. Images with a calibration other
+// than the first of the camera are dropped with a warning. Throws Error for a damaged bag, no depth
+// images, or missing topics, infos, frames or transforms.
 BagRigPlan plan_bag_rig(const std::filesystem::path& bag, const BagRigOptions& options,
                         const std::optional<double>& stamp_s = std::nullopt);
 
@@ -71,7 +72,7 @@ struct BagRigExport {
   std::size_t images = 0;
   std::vector<SynchronizedSet> sets{};  // sets of the plan without unusable images
   std::size_t overflow_pixels =
-      0;  // pixels whose depth exceeds 16 bits at the camera's depth scale
+      0;  // pixels with a depth beyond 16 bits at the camera's depth scale
   // Number of unusable images, and the reason for the first one of each camera.
   std::size_t broken = 0;
   std::vector<std::string> warnings{};

@@ -22,7 +22,7 @@
 
 namespace libmap {
 
-// Topics of a bag, accumulated over its files.
+// Topics of a bag, accumulated over all files.
 struct RecordedTopics {
   std::vector<BagTopic> topics{};
   std::int64_t first_ns = std::numeric_limits<std::int64_t>::max();
@@ -37,7 +37,7 @@ struct RecordedTopics {
 
 using TakeMessage = std::function<void(const BagMessage&)>;
 
-// Functions of a storage. They throw Error naming the file; ROS 1's, in builds without its
+// Functions of a storage throw Error naming the file; functions of ROS 1, in builds without ROS 1's
 // libraries, throw Error (failed) with the missing packages.
 struct BagStorage {
   const char* name = "";
@@ -92,9 +92,9 @@ std::unique_ptr<BagSink> new_sqlite_bag(const std::filesystem::path& folder);
 std::unique_ptr<BagSink> new_mcap(const std::filesystem::path& path, BagCompression compression);
 
 // Compressed chunks of MCAP (https://mcap.dev/spec/registry#well-known-compression-formats): frames
-// of LZ4 and Zstandard, by their libraries; "": no compression. `size` is the declared decompressed
-// size; memory is proportional to the actual one. Throws Error for an unknown compression, damaged
-// data, a wrong size, or more than 1 GiB.
+// of LZ4 and Zstandard, by the official libraries; "": no compression. `size` is the declared
+// decompressed size; memory is proportional to the actual one. Throws Error for an unknown
+// compression, damaged data, a wrong size, or more than 1 GiB.
 std::string decompress_chunk(const std::string& compression, std::string_view bytes,
                              std::uint64_t size);
 std::string compress_chunk(const std::string& compression, const std::string& bytes);

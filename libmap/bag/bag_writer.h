@@ -32,13 +32,13 @@ struct BagTarget {
 // geometry_msgs/PoseArray, best first.
 //
 // The x axis of a pose is the direction, along which RViz draws the arrows of a PoseArray. The
-// rotation about it is arbitrary: the y axis is the frame's y (its z if the direction is along y),
-// made perpendicular to the direction.
+// rotation about it is arbitrary: the y axis is the frame's y (z if the direction is along y), made
+// perpendicular to the direction.
 struct BagTargets {
   std::string marker_topic{};
   std::string pose_topic{};
   std::string frame{};
-  double arrow_m = 0.08;  // length of an arrow; a ball's radius is an eighth of it
+  double arrow_m = 0.08;  // length of an arrow; a ball's radius is an eighth of this length
   std::vector<BagTarget> targets{};
 };
 
@@ -58,7 +58,7 @@ struct BagGrid {
     std::string name{};
     std::vector<float> values{};
   };
-  std::vector<Layer> layers{};     // GridMap; a cell is valid if its value in the first layer is
+  std::vector<Layer> layers{};     // GridMap; a cell is valid if the value in the first layer is
   std::vector<float> occupancy{};  // OccupancyGrid, 0 to 1
 };
 
@@ -101,7 +101,7 @@ struct RigBagOptions {
   BagCompression compression = BagCompression::none;
 };
 
-// Writes the images of a rig in the topics of a camera driver, in the order of their stamps:
+// Writes the images of a rig in the topics of a camera driver, in the order of stamps:
 // /NAME/depth/image_raw and /NAME/depth/camera_info in the frame NAME_depth_optical_frame, which
 // /tf_static connects to the base frame. One image is in memory at a time. Throws Error as
 // write_bag does, and for damaged images.

@@ -82,9 +82,10 @@ DepthMessageImage decode_raw(const ros_message::Image& message, const DepthUnits
                  .value = std::to_string(message.step),
                  .bound = ">= " + std::to_string(row)});
   if (message.data.size() < message.step * (height - 1) + row)
-    throw Error("truncated", {.field = "data",
-                              .value = std::to_string(message.data.size()) + " bytes",
-                              .bound = std::to_string(message.step * height) + " for " + size});
+    throw Error("truncated",
+                {.field = "data",
+                 .value = std::to_string(message.data.size()) + " bytes",
+                 .bound = std::to_string(message.step * height) + " bytes for " + size});
   const bool swapped = (message.is_bigendian != 0) != (std::endian::native == std::endian::big);
   UnitImage image(static_cast<int>(width), static_cast<int>(height), units.image_unit_m);
   for (std::uint64_t y = 0; y < height; ++y) {

@@ -17,7 +17,7 @@ namespace libmap {
 struct DepthMessageHead {
   std::int64_t stamp_ns = 0;
   std::string frame{};     // optical frame of the camera
-  std::string encoding{};  // Image: "16UC1"; CompressedImage: its format
+  std::string encoding{};  // Image: "16UC1"; CompressedImage: format
 };
 
 // Decodes the metadata; 1 KiB of the message is enough. Throws Error if `bytes` ends before the end

@@ -122,7 +122,7 @@ class McapReader {
     left_ = fs::file_size(path);
     file_.seekg(-static_cast<std::streamoff>(magic.size()), std::ios::end);
     if (read_bytes(magic.size()) != magic)
-      throw Error("is truncated: its recording was not ended; repair it with `mcap recover`",
+      throw Error("is truncated: the recording was not ended; use `mcap recover`",
                   {.file = path_.string()});
     file_.seekg(static_cast<std::streamoff>(magic.size()));
     left_ -= std::min<std::uint64_t>(left_, magic.size());
@@ -170,7 +170,7 @@ class McapReader {
     // 0: not calculated.
     if (checksum != 0 &&
         checksum != crc32_z(0, reinterpret_cast<const Bytef*>(records.data()), records.size()))
-      throw Error("does not match its checksum", {.field = "chunk"});
+      throw Error("does not match the checksum", {.field = "chunk"});
     ByteReader rest(records);
     while (!rest.empty()) {
       const auto opcode = rest.number<Opcode>();
@@ -252,7 +252,7 @@ constexpr std::size_t chunk_bytes = std::size_t{4} << 20;
 
 std::string compression_name(BagCompression compression) {
   if (compression == BagCompression::bz2)
-    throw Error("MCAP does not support it",
+    throw Error("not supported by MCAP",
                 {.field = "compression", .value = "bz2", .bound = "none, lz4 or zstd"});
   return compression == BagCompression::lz4    ? "lz4"
          : compression == BagCompression::zstd ? "zstd"
@@ -457,9 +457,9 @@ std::string decompress_chunk(const std::string& compression, std::string_view by
         "not supported",
         {.field = "compression of a chunk", .value = compression, .bound = "lz4, zstd or none"});
   if (result.size() != size)
-    throw Error("has a wrong size", {.field = "chunk",
-                                     .value = std::to_string(result.size()) + " bytes",
-                                     .bound = std::to_string(size)});
+    throw Error("wrong size", {.field = "decompressed chunk",
+                               .value = std::to_string(result.size()) + " bytes",
+                               .bound = std::to_string(size) + " bytes"});
   return result;
 }
 

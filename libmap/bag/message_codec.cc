@@ -301,7 +301,7 @@ Message decode(MessageEncoding encoding, std::string_view bytes) {
   } catch (const std::length_error&) {
   } catch (const eprosima::fastcdr::exception::Exception&) {
   }
-  throw Error("a message declares more than its " + std::to_string(bytes.size()) +
+  throw Error("a message declares more than the available " + std::to_string(bytes.size()) +
               " bytes contain");
 }
 

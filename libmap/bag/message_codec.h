@@ -1,8 +1,8 @@
 // Codec of messages in the encodings of bags. Private to libmap/bag.
 //
 // ROS 1 (http://wiki.ros.org/msg#Fields): little-endian, without padding; a text or an array begins
-// with its length as uint32. ROS 2: CDR, version 1 (DDS-XTypes 7.4.1): 4 bytes with the byte order,
-// then each number at a multiple of its size; a text ends with a zero.
+// with the length as uint32. ROS 2: CDR, version 1 (DDS-XTypes 7.4.1): 4 bytes with the byte order,
+// then each number at a multiple of the number's size; a text ends with a zero.
 #pragma once
 
 #include <string>
@@ -14,7 +14,7 @@
 namespace libmap::ros_message {
 
 // Decodes a message; ignores bytes after it. Texts become one line of ASCII, like ROS's names.
-// Throws Error for a truncated message, declared lengths beyond its end, or another encoding.
+// Throws Error for a truncated message, declared lengths beyond the end, or another encoding.
 template <typename Message>
 Message decode(MessageEncoding encoding, std::string_view bytes);
 
@@ -22,7 +22,7 @@ Message decode(MessageEncoding encoding, std::string_view bytes);
 template <typename Message>
 std::string encode(MessageEncoding encoding, const Message& message);
 
-// Returns the message's definition of ROS 2 with the definitions of its parts, in MCAP's format
+// Returns the message's definition of ROS 2 with the definitions of all parts, in MCAP's format
 // "ros2msg" (https://mcap.dev/spec/registry), without comments and constants.
 template <typename Message>
 std::string definition_of();

@@ -1,4 +1,4 @@
-// Conversion of plain data to messages, most without their headers. Private to libmap/bag.
+// Conversion of plain data to messages, most without headers. Private to libmap/bag.
 #pragma once
 
 #include <cstdint>
@@ -14,8 +14,8 @@
 namespace libmap {
 
 // Encodes a cloud for RViz and PCL: float32 x, y, z, then normal_x, normal_y, normal_z, rgb (PCL's
-// packing, as float32) and the cloud's fields in their own types; little-endian, no padding. Throws
-// Error for more than 4 GiB.
+// packing, as float32) and the cloud's fields in the fields' types; little-endian, no padding.
+// Throws Error for more than 4 GiB.
 ros_message::PointCloud2 encode_cloud(const PointCloud& cloud);
 
 // Encodes depth in meters (REP-118's 32FC1, 0: not measured) or millimeters (16UC1), whichever
@@ -26,10 +26,10 @@ ros_message::CameraInfo encode_camera_info(const Camera& camera);
 
 ros_message::TransformStamped encode_transform(const BagTransform& transform);
 
-// Encodes poses whose x axis is the direction.
+// Encodes poses with the direction as x axis.
 ros_message::PoseArray encode_poses(const std::vector<BagTarget>& targets);
 
-// Encodes, for each position, an arrow that ends there and its text, and one list of balls for all.
+// Encodes, for each position, an arrow that ends there and a text, and one list of balls for all.
 ros_message::MarkerArray encode_markers(const BagTargets& targets,
                                         const ros_message::Header& header);
 

@@ -129,7 +129,7 @@ void serve(const fs::path& path, const SandboxedProcess::Write& write, const Wor
     work(bag, sender);
     sender.send({.kind = Parcel::Kind::end}, {});
   } catch (const rosbag::BagUnindexedException&) {
-    sender.send_error("has no index: its recording was not ended; repair it with `rosbag reindex`");
+    sender.send_error("has no index: the recording was not ended; use `rosbag reindex`");
   } catch (const rosbag::BagException& error) {
     sender.send_error("is damaged or truncated: " + printable(error.what()));
   } catch (const std::bad_alloc&) {
@@ -322,7 +322,7 @@ rosbag::CompressionType to_rosbag(BagCompression compression) {
     case BagCompression::zstd:
       break;
   }
-  throw Error("bags of ROS 1 do not support it",
+  throw Error("not supported by bags of ROS 1",
               {.field = "compression", .value = "zstd", .bound = "none, bz2 or lz4"});
 }
 

@@ -1,7 +1,6 @@
-// ROS messages in bags as plain data, without their encoding (message_codec.h). Private to
-// libmap/bag.
+// ROS messages in bags as plain data, without encoding (message_codec.h). Private to libmap/bag.
 //
-// fields(message, visit) calls visit(name, field) for each field in the order of its definition;
+// fields(message, visit) calls visit(name, field) for each field in the order of the definition;
 // visit.ros2 is true for ROS 2. Definitions of ROS 1 (Noetic):
 // http://docs.ros.org/en/noetic; of ROS 2 (Humble to Jazzy):
 // https://docs.ros.org/en/humble/p/sensor_msgs and the like,
@@ -17,7 +16,7 @@
 
 namespace libmap::ros_message {
 
-// time; builtin_interfaces/Time.
+// ROS 1: time; ROS 2: builtin_interfaces/Time.
 struct Time {
   std::int64_t nanoseconds = 0;
 };
@@ -176,7 +175,7 @@ struct CompressedImage {
   }
 };
 
-// First fields of a message, for decoding without the rest of its bytes.
+// First fields of a message, for decoding without the rest of the bytes.
 template <typename Message>
 struct Head : Message {
   static void fields(auto& m, auto& visit) { Message::head(m, visit); }
@@ -431,7 +430,7 @@ struct GridMap {
   }
 };
 
-// Returns one line of ASCII, like ROS's names; other characters become '?'.
+// Replaces all characters except printable ASCII by '?'.
 inline std::string printable(std::string line) {
   for (char& c : line)
     if (c < ' ' || c > '~') c = '?';

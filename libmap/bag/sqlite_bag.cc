@@ -62,7 +62,7 @@ std::string lines_of_times(const RecordedTopics& topics, const std::string& inde
 std::vector<std::string> read_rosbag2_metadata(const fs::path& path) {
   if (!fs::exists(path))
     throw Error(
-        "no such file: the folder is not a bag, or its recording was not ended (`ros2 bag reindex` "
+        "no such file: the folder is not a bag, or the recording was not ended (`ros2 bag reindex` "
         "repairs it)",
         {.file = path.string()});
   std::vector<std::string> names;
@@ -121,12 +121,12 @@ constexpr const char* db3_name = "bag_0.db3";
 void require_columns(const SqliteFile& file, const std::string& table,
                      const std::vector<std::string>& names) {
   if (!file.tables().contains(table))
-    throw Error("not a bag of ROS 2: no such table",
+    throw Error("no such table; a bag of ROS 2 is required",
                 {.file = file.path().string(), .field = "table", .value = table});
   const std::set<std::string> columns = file.columns(table);
   for (const std::string& name : names)
     if (!columns.contains(name))
-      throw Error("not a bag of ROS 2: no such column",
+      throw Error("no such column; a bag of ROS 2 is required",
                   {.file = file.path().string(), .field = "table " + table, .value = name});
 }
 
@@ -135,7 +135,7 @@ std::map<std::int64_t, BagTopic> stored_topics(const SqliteFile& file) {
   // SQLite reads missing bytes of the last page as zeros.
   file.each_row("PRAGMA page_size", {}, [&](const SqliteRow& row) {
     if (fs::file_size(file.path()) % static_cast<std::uint64_t>(row.integer(0)) != 0)
-      throw Error("is truncated: its size is not a multiple of the page size",
+      throw Error("is truncated: the size is not a multiple of the page size",
                   {.file = file.path().string()});
   });
   require_columns(file, "topics", {"id", "name", "type", "serialization_format"});

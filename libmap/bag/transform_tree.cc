@@ -28,7 +28,7 @@ void TransformTree::add(const std::string& parent, const std::string& child,
     throw Error("a transform must connect two different frames",
                 {.field = "frames", .value = above + " and " + frame});
   if (!parent_from_child.matrix().allFinite())
-    throw Error("a transform is not finite", {.field = "frame", .value = frame});
+    throw Error("the transform of this frame is not finite", {.field = "frame", .value = frame});
   const auto found = links_.find(frame);
   if (found == links_.end()) {
     links_[frame] = {above, parent_from_child};
@@ -39,7 +39,7 @@ void TransformTree::add(const std::string& parent, const std::string& child,
   const double change =
       (link.parent_from_child.matrix() - parent_from_child.matrix()).cwiseAbs().maxCoeff();
   if (link.parent != above || change > same_pose)
-    throw Error("the frame is not static: its transform changes",
+    throw Error("the transform of this frame changes; a static frame is required",
                 {.field = "frame", .value = frame});
 }
 
@@ -84,7 +84,7 @@ Pose TransformTree::target_from_source(const std::string& target, const std::str
     if (const auto link = links_.find(frame); link != links_.end())
       common_from_source = link->second.parent_from_child * common_from_source;
   }
-  throw Error("no transforms connect it to " + plain_frame(target),
+  throw Error("no transforms connect this frame to " + plain_frame(target),
               {.field = "frame", .value = plain_frame(source)});
 }
 

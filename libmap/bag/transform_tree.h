@@ -17,7 +17,7 @@ class TransformTree {
  public:
   // Adds a transform. Throws Error for empty names, a frame that is its own parent, a pose that is
   // not finite, and a known frame with another parent or a pose that differs by more than 1e-5 (m,
-  // or in the entries of the rotation): then it is not static.
+  // or in the entries of the rotation): the frame is then not static.
   void add(const std::string& parent, const std::string& child, const Pose& parent_from_child);
 
   bool empty() const { return frames_.empty(); }
@@ -36,7 +36,7 @@ class TransformTree {
     std::string parent;
     Pose parent_from_child = Pose::Identity();
   };
-  // Returns `frame` and all its ancestors.
+  // Returns `frame` and all ancestors of `frame`.
   std::vector<std::string> chain_of(const std::string& frame) const;
 
   std::map<std::string, Link> links_;  // by child
@@ -46,8 +46,8 @@ class TransformTree {
 // Removes a leading '/': "/base_link" -> "base_link".
 std::string plain_frame(const std::string& name);
 
-// Adds a message's transforms to `tree`. Throws Error for a truncated message, a quaternion whose
-// norm differs from 1 by 0.01 or more, and as TransformTree::add does.
+// Adds a message's transforms to `tree`. Throws Error for a truncated message, a quaternion with a
+// norm that differs from 1 by 0.01 or more, and as TransformTree::add does.
 void add_transforms(MessageEncoding encoding, std::string_view bytes, TransformTree& tree);
 
 }  // namespace libmap

@@ -31,7 +31,8 @@ double squared_error(const BoardFit& fit, const BoardCorners& corners);
 double adjust_boards(BoardFit& fit, const BoardCorners& corners);
 
 // Covariance of the intrinsics (fx fy cx cy and distortion terms) for a noise of 1 px in each
-// coordinate, with the board poses marginalized. Empty if the images do not determine them.
+// coordinate, with the board poses marginalized. Empty if the images do not determine the
+// intrinsics.
 Eigen::MatrixXd unit_covariance(const BoardFit& fit, const BoardCorners& corners);
 
 }  // namespace libmap

@@ -18,9 +18,9 @@ constexpr std::size_t local_transform_numbers = 12;
 
 void require_count(const char* field, std::int32_t count, std::int32_t full) {
   if (count != 0 && count != full)
-    throw Error("calibration cannot be read", {.field = std::string("numbers of ") + field,
-                                               .value = std::to_string(count),
-                                               .bound = "0 or " + std::to_string(full)});
+    throw Error("wrong", {.field = std::string("number of elements of ") + field,
+                          .value = std::to_string(count),
+                          .bound = "0 or " + std::to_string(full)});
 }
 
 // ---------------------------------------------------------------------------------------- records
@@ -32,7 +32,8 @@ CalibrationRecord read_record(ByteReader& reader) {
   record.version = reader.number<std::array<std::int32_t, 3>>();
   const auto kind = reader.number<std::int32_t>();
   if (kind != 0)
-    throw Error("calibration of an unknown kind", {.value = std::to_string(kind), .bound = "0"});
+    throw Error("unknown",
+                {.field = "kind of calibration", .value = std::to_string(kind), .bound = "0"});
   record.width = reader.number<std::int32_t>();
   record.height = reader.number<std::int32_t>();
   const auto counts = reader.number<std::array<std::int32_t, 5>>();
@@ -83,8 +84,8 @@ StereoCalibrationRecord read_stereo_record(ByteReader& reader) {
     const std::size_t before = reader.rest().size();
     *side = read_record(reader);
     if (static_cast<std::int64_t>(before - reader.rest().size()) != size)
-      throw Error("calibration of a stereo camera has a wrong length",
-                  {.value = std::to_string(size)});
+      throw Error("wrong", {.field = "length of a calibration in a stereo calibration",
+                            .value = std::to_string(size)});
   }
   return stereo;
 }
@@ -143,7 +144,8 @@ bool is_size(float number) { return number >= 0 && number < 1e6F && number == st
 
 std::int32_t size_of(float number) {
   if (!is_size(number))
-    throw Error("calibration contains no valid image size", {.value = to_text(number)});
+    throw Error("not an image size",
+                {.field = "width or height of a calibration", .value = to_text(number)});
   return static_cast<std::int32_t>(number);
 }
 

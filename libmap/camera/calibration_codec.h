@@ -37,8 +37,8 @@ struct StereoCalibrationRecord {
   std::array<std::int32_t, 3> version{};
   std::vector<double> r{};  // 3 x 3 or empty: right_from_left
   std::vector<double> t{};  // 3 or empty
-  std::vector<double> e{};  // 3 x 3 or empty
-  std::vector<double> f{};  // 3 x 3 or empty
+  std::vector<double> e{};  // 3 x 3 or empty: essential matrix
+  std::vector<double> f{};  // 3 x 3 or empty: fundamental matrix
   CalibrationRecord left{};
   CalibrationRecord right{};  // k, d, r and p are empty in the float layouts
   float baseline_m = 0;       // only in the float layouts
@@ -62,9 +62,9 @@ Calibration decode_calibration(std::string_view bytes);
 std::string encode_calibration(const Calibration& calibration);
 
 // Cameras of the stored images: from P if it is stored (images are rectified), else from K and D.
-// A camera without a stored size has its share of an image of `image_width` x `image_height`. D of
-// 6 terms is equidistant: k1 k2 0 0 k3 k4. Throws Error naming the field, for example without K and
-// P.
+// A camera without a stored size has an equal share of an image of `image_width` x `image_height`.
+// D of 6 terms is equidistant: k1 k2 0 0 k3 k4. Throws Error naming the field, for example without
+// K and P.
 std::vector<Camera> cameras_of(const Calibration& calibration, int image_width, int image_height);
 std::vector<StereoCamera> stereo_cameras_of(const Calibration& calibration, int image_width,
                                             int image_height);

@@ -356,8 +356,8 @@ std::vector<std::pair<std::string, LensModel>> lens_model_names() {
 void bind(ParameterTable& table, CameraCalibrationOptions& options) {
   table.add("square_mm", options.board.square_mm, positive, "side of the board's squares, mm");
   table.add("lens", options.lens, lens_model_names(),
-            "distortion model; plumb_bob: k1 k2 p1 p2 k3; rational: k1 k2 p1 p2 k3 k4 k5 k6; "
-            "equidistant: k1 k2 k3 k4 of a fisheye lens");
+            "distortion model; none; plumb_bob: k1 k2 p1 p2 k3; rational: k1 k2 p1 p2 k3 k4 k5 "
+            "k6; equidistant: k1 k2 k3 k4 of a fisheye lens");
   table.add_former_key("max_picture_error_px", "max_image_error_px");
   table.add("max_image_error_px", options.max_image_error_px, not_negative,
             "maximum RMS reprojection error of an accepted image, pixels; 0: no limit");

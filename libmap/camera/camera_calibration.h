@@ -29,7 +29,8 @@ enum class LensModel { none, plumb_bob, rational, equidistant };
 std::vector<std::pair<std::string, LensModel>> lens_model_names();
 
 // Detects the corners with subpixel accuracy, row by row; pixel centers have integer coordinates.
-// Returns nullopt unless the complete board is visible. The first corner may be at either end.
+// Returns nullopt unless the complete board is visible. The board's orientation is
+// ambiguous: the first detected corner can be at the other end of the board.
 std::optional<std::vector<Eigen::Vector2d>> find_chessboard(const GrayImage& image,
                                                             const Chessboard& board);
 
@@ -63,7 +64,7 @@ void bind(ParameterTable& table, CameraCalibrationOptions& options);
 struct CalibratedImage {
   std::string name{};
   Pose camera_from_board = Pose::Identity();  // board frame: as in corners_on_board
-  double rms_px = 0.0;                        // of the distances in the image
+  double rms_px = 0.0;                        // RMS of the residuals' lengths
   double max_px = 0.0;
   double tilt_deg = 0.0;  // between the board's normal and the optical axis
   std::vector<Eigen::Vector2d> corners{};
@@ -75,7 +76,7 @@ struct CameraCalibrationResult {
   // Standard deviations of fx fy cx cy and the terms of `camera.distortion`, for the noise
   // estimated from the residuals.
   std::vector<double> deviations{};
-  double rms_px = 0.0;               // over all corners
+  double rms_px = 0.0;               // RMS distance between detected and projected corners
   double sigma_px = 0.0;             // noise of one coordinate of a corner
   double corners_width_share = 0.0;  // share of the image's width and height spanned by the corners
   double corners_height_share = 0.0;
@@ -87,9 +88,9 @@ struct CameraCalibrationResult {
   double relative_focal_deviation() const;
 };
 
-// Calibrates the camera. Images whose corners are within 1 px (RMS) of an earlier image are
-// ignored, because their errors are not independent. Throws Error: fewer than 3 images remain, or
-// the images do not determine the camera (for example if all boards are seen frontally).
+// Calibrates the camera. Images with corners within 1 px (RMS) of an earlier image are ignored,
+// because the errors are not independent. Throws Error: fewer than 3 images remain, or the images
+// do not determine the camera (for example if all boards are seen frontally).
 CameraCalibrationResult calibrate_camera(const std::vector<BoardImage>& images, int width,
                                          int height, const CameraCalibrationOptions& options = {});
 

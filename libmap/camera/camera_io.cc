@@ -118,7 +118,7 @@ void read_distortion(const YAML::Node& root, Camera& camera) {
   const bool all_zero = std::all_of(terms.begin(), terms.end(), [](double k) { return k == 0; });
   if (all_zero && model != "equidistant" && model != "fisheye") return;
   if (model == "none")
-    throw Error("contradicts distortion_model none: remove one of them", {.field = field});
+    throw Error("contradicts distortion_model none; remove one of them", {.field = field});
   if (model == "equidistant" || model == "fisheye") {
     camera.distortion_model = DistortionModel::equidistant;
     if (terms.size() == 6 && terms[2] == 0 && terms[3] == 0)
@@ -261,14 +261,15 @@ Pose pose_from_yaml(const YAML::Node& node, const std::string& field) {
   const Eigen::Matrix3d rotation = nearest_rotation(written);
   const double deviation = (rotation - written).cwiseAbs().maxCoeff();
   if (!(deviation <= 1e-3))
-    refuse(field, "off by " + to_text(deviation), "the 3 x 3 part is not a rotation", "<= 0.001");
+    refuse("error of the rotation in " + field, to_text(deviation),
+           "the 3 x 3 part is not a rotation", "<= 0.001");
   // Exact rotations are not modified.
   if (deviation > 1e-9) pose.linear() = rotation;
   return pose;
 }
 
 CameraFile camera_from_yaml(const YAML::Node& root) {
-  if (!root.IsMap()) throw Error("not a camera: must be a map of keys and values");
+  if (!root.IsMap()) throw Error("not a YAML mapping; a camera file is required");
   CameraFile file;
   if (root["camera_name"] && root["camera_name"].IsScalar())
     file.name = root["camera_name"].Scalar();

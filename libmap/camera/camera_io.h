@@ -60,12 +60,12 @@ struct CameraFile {
   std::string name{};  // may be empty
   Camera camera{};
   // Correction of depth that is registered to the camera: pose of the depth camera
-  // (depth_registration, 3 x 4, optional), and correction of its values.
+  // (depth_registration, 3 x 4, optional), and correction of the depth values.
   Pose color_from_depth = Pose::Identity();
   DepthCorrection depth{};
-  // Delay of depth after the middle row of the color image, in addition to the difference of their
-  // stamps, and time from the first to the last row of the color image. `motions` are those of the
-  // scan from which the delays were estimated.
+  // Delay of depth after the middle row of the color image, in addition to the difference of the
+  // stamps, and time from the first to the last row of the color image. `motions`: camera motions
+  // of the scan from which the delays were estimated.
   double depth_delay_s = 0.0;
   double rolling_shutter_s = 0.0;
   std::vector<FrameMotion> motions{};   // by ascending stamp
@@ -80,9 +80,8 @@ struct CameraFile {
   }
 };
 
-// Read a camera. Throw Error naming `file`, the key, its value and its bound: invalid YAML, a
-// missing key, wrong matrix size, skew, a transform without a valid rotation, an unknown distortion
-// model.
+// Read a camera. Throw Error naming `file`, key, value and bound: invalid YAML, a missing key,
+// wrong matrix size, skew, a transform without a valid rotation, an unknown distortion model.
 CameraFile parse_camera(const std::string& text, const std::string& file);
 CameraFile read_camera(const std::filesystem::path& path);
 CameraFile camera_from_yaml(const YAML::Node& root);

@@ -1,4 +1,4 @@
-// Resamples color images to a pinhole camera, and measures their sharpness.
+// Resamples color images to a pinhole camera, and measures the sharpness of images.
 #pragma once
 
 #include "libmap/core/camera.h"
@@ -8,9 +8,9 @@ namespace libmap {
 
 // Camera with square pixels, no distortion and the principal point at the image center, ((width -
 // 1) / 2, (height - 1) / 2), with the largest image around the optical axis that `camera` covers
-// completely. The focal length is the larger one of `camera`. If `camera` differs only in its
-// principal point, at whole or half pixels, pixels are those of `camera` cropped at the border.
-// Throws Error: an invalid camera, or one whose optical axis is outside its image.
+// completely. The focal length is max(fx, fy) of `camera`. If `camera` differs only in the
+// principal point, at whole or half pixels, pixels equal the pixels of `camera`, cropped at the
+// border. Throws Error: an invalid camera, or a camera with the optical axis outside the image.
 Camera centered_pinhole(const Camera& camera);
 
 // Resamples an image of camera `from` to camera `to` with the same pose: bicubic, in steps of 1/32
@@ -18,9 +18,9 @@ Camera centered_pinhole(const Camera& camera);
 // image does not have the size of `from`.
 ColorImage resample_image(const ColorImage& image, const Camera& from, const Camera& to);
 
-// Sharpness of an image: sum of squares of its Laplacian over that of its gradient, both after a
-// blur of one pixel against noise. Comparable among images of one scene and size. 0 for a uniform
-// image, or one smaller than 5 x 5.
+// Sharpness of an image: sum of squared Laplacians over sum of squared gradients, both after a blur
+// of one pixel against noise. Comparable among images of one scene and size. 0 for a uniform image,
+// or one smaller than 5 x 5.
 double image_sharpness(const ColorImage& image);
 
 }  // namespace libmap

@@ -47,7 +47,7 @@ class NibbleReader {
     if (left_ == 0) {
       if (at_ + 4 > words_.size())
         throw Error("RVL ends after " + std::to_string(rvl_header_bytes + words_.size()) +
-                    " bytes, before its last pixel");
+                    " bytes, before the last pixel");
       word_ = uint32_at(words_, at_);
       at_ += 4;
       left_ = 8;
@@ -105,7 +105,7 @@ void check_size(std::uint64_t columns, std::uint64_t rows) {
 }
 
 DepthInfo rvl_info(std::string_view bytes) {
-  if (bytes.size() < rvl_header_bytes) throw Error("RVL ends in its header");
+  if (bytes.size() < rvl_header_bytes) throw Error("RVL ends in the header");
   const std::uint32_t columns = uint32_at(bytes, 8);
   const std::uint32_t rows = uint32_at(bytes, 12);
   check_size(columns, rows);
@@ -113,9 +113,9 @@ DepthInfo rvl_info(std::string_view bytes) {
 }
 
 [[noreturn]] void refuse_run(std::uint64_t count, std::uint64_t left) {
-  throw Error("RVL contains more pixels than its size", {.field = "run of pixels",
-                                                         .value = std::to_string(count),
-                                                         .bound = "<= " + std::to_string(left)});
+  throw Error("longer than the rest of the RVL image", {.field = "run of pixels",
+                                                        .value = std::to_string(count),
+                                                        .bound = "<= " + std::to_string(left)});
 }
 
 }  // namespace

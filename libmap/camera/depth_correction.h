@@ -1,5 +1,5 @@
 // Corrects systematic errors of a depth camera: adds a smooth offset that depends on depth (uniform
-// cubic B-spline) and image radius, and multiplies the sum by a scale. The offset is linear in its
+// cubic B-spline) and image radius, and multiplies the sum by a scale. The offset is linear in the
 // coefficients, which are estimated by least squares. (Teichman et al. 2013 correct each range and
 // pixel, for which a scan has too few data.) Also registers depth images to another camera.
 #pragma once
@@ -44,14 +44,15 @@ struct DepthCorrection {
   bool operator==(const DepthCorrection&) const = default;
 };
 
-// Squared distance of a pixel from the image center, relative to that of the corner pixels.
+// Squared distance of a pixel from the image center, relative to the corner pixels.
 double squared_image_radius(int width, int height, double x_px, double y_px);
 
 // Corrects a depth image, m. Pixels without depth are not changed.
 void correct_depth(DepthImage& depth, const DepthCorrection& correction);
 
 // Registers a depth image of `camera` to the pixels of `target`. Each measurement covers the pixels
-// of `target` inside its projected pixel; the nearest one is kept. Occluded pixels have no depth.
+// of `target` inside the projected pixel; the nearest measurement is kept. Occluded pixels have no
+// depth.
 DepthImage register_depth(const DepthImage& depth, const Camera& camera, const Camera& target,
                           const Pose& target_from_camera);
 

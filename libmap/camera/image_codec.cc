@@ -58,7 +58,7 @@ std::optional<ImageInfo> png_info(std::string_view bytes) {
   const std::uint32_t height = big_endian(bytes, 20, 4);
   constexpr std::uint32_t most = 0x7fffffff;
   if (width == 0 || height == 0 || width > most || height > most)
-    throw Error("PNG has an invalid size", {.value = size_text(width, height)});
+    throw Error("invalid", {.field = "size of the PNG image", .value = size_text(width, height)});
   ImageInfo info{.format = ImageFormat::png,
                  .width = static_cast<int>(width),
                  .height = static_cast<int>(height),
@@ -106,7 +106,8 @@ std::optional<ImageInfo> jpeg_info(std::string_view bytes) {
       info.width = static_cast<int>(big_endian(bytes, at + 7, 2));
       info.channels = static_cast<std::uint8_t>(bytes[at + 9]);
       if (info.width == 0 || info.height == 0)
-        throw Error("JPEG has an invalid size", {.value = size_text(info.width, info.height)});
+        throw Error("invalid", {.field = "size of the JPEG image",
+                                .value = size_text(info.width, info.height)});
       return info;
     }
     at += 2 + length;
@@ -117,7 +118,7 @@ std::optional<ImageInfo> jpeg_info(std::string_view bytes) {
 ImageInfo checked_info(std::string_view bytes, std::int64_t max_pixels = max_frame_pixels) {
   const std::optional<ImageInfo> info = read_image_info(bytes);
   if (!info)
-    throw Error("image is truncated in its header, after " + std::to_string(bytes.size()) +
+    throw Error("image is truncated in the header, after " + std::to_string(bytes.size()) +
                 " bytes");
   check_size(*info, bytes.size(), max_pixels);
   return *info;
@@ -306,7 +307,7 @@ ImageInfo require_png(std::string_view bytes, int channels, int bits) {
   const ImageInfo info = checked_info(bytes);
   if (info.format != ImageFormat::png || info.channels != channels || info.bits != bits)
     throw Error(
-        "is not the required kind of image",
+        "unsupported",
         {.value = to_text(info.format) + " of " + std::to_string(info.channels) + " x " +
                   std::to_string(info.bits) + " bits",
          .bound = "PNG of " + std::to_string(channels) + " x " + std::to_string(bits) + " bits"});

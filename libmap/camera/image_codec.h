@@ -30,8 +30,8 @@ struct ImageInfo {
   int bits = 8;      // per channel
 };
 
-// Reads the header; `bytes` may end after it. Returns nullopt if they end before the size is known.
-// Throws Error if this is not a JPEG or PNG.
+// Reads the header; `bytes` may end after it. Returns nullopt if the bytes end before the size is
+// known. Throws Error if this is not a JPEG or PNG.
 std::optional<ImageInfo> read_image_info(std::string_view bytes);
 
 // Limit for frames of a scan, which several threads decode at once, with up to ten bytes per pixel.

@@ -34,9 +34,9 @@ std::uint64_t checked_bytes(const StoredMatrix& matrix, std::uint64_t stream_byt
   const std::uint64_t cell_bytes =
       static_cast<std::uint64_t>(matrix.channels) * bytes_of(matrix.element);
   if (cells > most / cell_bytes)
-    throw Error("compressed matrix: size exceeds what " + std::to_string(stream_bytes) +
-                    " bytes can contain",
-                {.value = matrix_size_text(matrix)});
+    throw Error(
+        "more than " + std::to_string(stream_bytes) + " bytes of compressed data can contain",
+        {.field = "size of the compressed matrix", .value = matrix_size_text(matrix)});
   return cells * cell_bytes;
 }
 
@@ -96,11 +96,12 @@ void for_each_matrix_chunk(std::string_view blob,
     const std::size_t bytes = piece.size() - stream.avail_out;
     done += bytes;
     if (done > wanted)
-      throw Error("compressed matrix exceeds its size", {.value = matrix_size_text(matrix)});
+      throw Error("compressed matrix exceeds the declared size",
+                  {.value = matrix_size_text(matrix)});
     const bool is_at_end = result == Z_BUF_ERROR || (result == Z_OK && stream.avail_out > 0);
     if (is_at_end || (result == Z_STREAM_END && done < wanted))
-      throw Error("compressed matrix is damaged: it ends after " + std::to_string(done) + " of " +
-                  std::to_string(wanted) + " bytes");
+      throw Error("compressed matrix is damaged: the data end after " + std::to_string(done) +
+                  " of " + std::to_string(wanted) + " bytes");
     if (result != Z_OK && result != Z_STREAM_END)
       throw Error("compressed matrix is damaged: " + std::string(zError(result)));
     if (bytes > 0) use(std::string_view(piece).substr(0, bytes));

@@ -1,4 +1,4 @@
-// RGB-D frame: color and depth images with their cameras, as one node of a scan contains them.
+// RGB-D frame: color and depth images and cameras of one node of a scan.
 #pragma once
 
 #include <cstddef>
@@ -42,8 +42,8 @@ struct CameraView {
   DepthImage depth;
 };
 
-// Splits a frame into its cameras; empty without cameras. Throws Error naming the node if the image
-// width is not a multiple of their number.
+// Splits a frame by camera; empty without cameras. Throws Error naming the node if the image width
+// is not a multiple of the number of cameras.
 std::vector<CameraView> camera_views(const RgbdFrame& frame);
 
 // Returns the number of pixels of the largest of: all cameras, the color image, the depth image.

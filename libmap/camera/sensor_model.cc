@@ -47,7 +47,7 @@ SensorModel read_sensor_model(const std::string& name) {
   bind(table, model);
   const std::string path = sensor_file(name).string();
   read_yaml(read_whole_file(path, max_bytes), path, [&](const YAML::Node& root) {
-    if (!root.IsMap()) throw Error("not a map of keys and values");
+    if (!root.IsMap()) throw Error("not a YAML mapping");
     // All other keys belong to the simulation.
     for (const auto& entry : root)
       if (const auto key = entry.first.as<std::string>();

@@ -8,14 +8,15 @@
 
 namespace libmap {
 
-// Keys are those of `simulate scan`; keys "refine.KEY" are only used for refinement.
+// Keys are those of `simulate scan`; keys "refine.KEY" are only used for refinement. The standard
+// deviation of depth z is noise_m + noise_of_range z + noise_of_square z^2.
 struct SensorModel {
-  double noise_m = 0.0;          // standard deviation along the optical axis: constant term
-  double noise_of_range = 0.0;   // term proportional to range, m per m
-  double noise_of_square = 0.0;  // term proportional to squared range, 1/m
-  double near_m = 0.0;           // useful range
-  double far_m = 0.0;
-  double depth_delay_s = 0.0;            // time of depth after the middle row of the color image
+  double noise_m = 0.0;
+  double noise_of_range = 0.0;           // m per m
+  double noise_of_square = 0.0;          // 1/m
+  double near_m = 0.0;                   // minimum useful depth
+  double far_m = 0.0;                    // maximum useful depth
+  double depth_delay_s = 0.0;            // depth exposure relative to the color image's middle row
   double rolling_shutter_s = 0.0;        // time from the first to the last row of the color image
   double frame_time_s = 0.033;           // time between two frames
   double max_depth_correction_m = 0.01;  // maximum systematic depth error: constant term

@@ -32,8 +32,7 @@ void check(const GrayImage& image, const Camera& camera, const std::string& fiel
     refuse_pair("image and calibration differ in size", field + " image",
                 size_text(image.width, image.height), size_text(camera.width, camera.height));
   if (camera.is_distorted())
-    throw Error("is not rectified: it has lens distortion; rectify the images first",
-                {.field = field + " camera"});
+    throw Error("has lens distortion; rectified images are required", {.field = field + " camera"});
 }
 
 void check(const StereoCamera& cameras) {
@@ -42,7 +41,7 @@ void check(const StereoCamera& cameras) {
   const double ratio = cameras.right.fx / cameras.left.fx;
   if (!(std::abs(ratio - 1) < 1e-3))
     refuse_pair("not rectified: the cameras' focal lengths differ", "right fx",
-                to_text(cameras.right.fx), "fx of the left, " + to_text(cameras.left.fx));
+                to_text(cameras.right.fx), "equal to left fx = " + to_text(cameras.left.fx));
   if (!(cameras.baseline_m > 0) || !std::isfinite(cameras.baseline_m))
     refuse_pair("not a stereo pair", "baseline_m", to_text(cameras.baseline_m), "> 0");
 }

@@ -9,7 +9,7 @@
 
 namespace libmap {
 
-// Agreement of the edges of depth images with those of the color images.
+// Agreement of the edges of depth images with the edges of color images.
 struct EdgeAgreement {
   std::size_t frames = 0;
   std::size_t edges = 0;  // pixels
@@ -33,8 +33,8 @@ struct EdgeAgreement {
   std::string sentence() const;
 };
 
-// Compares up to 24 frames of a scan with one camera and color. Frames that cannot be read are left
-// out.
+// Compares up to 24 frames of a scan with one camera and color. Frames that cannot be read are
+// skipped.
 EdgeAgreement check_edge_agreement(const ScanSource& scan);
 
 }  // namespace libmap

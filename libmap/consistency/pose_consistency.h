@@ -1,5 +1,5 @@
 // Checks that the depth images of a scan agree with given poses, to detect poses in a wrong format.
-// If not, finds the convention of poses or depth with which they agree.
+// If not, finds a convention of poses or depth with which depth images and poses agree.
 #pragma once
 
 #include <cstddef>

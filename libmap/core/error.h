@@ -31,8 +31,8 @@ class Error : public std::runtime_error {
 
   // Returns a copy that names `file`, unless the error names a file already.
   Error in_file(const std::string& file) const;
-  // Returns a copy whose field is `prefix`, then `joint` and the field if there is one: "rig:
-  // width".
+  // Returns a copy with `prefix` as field, followed by `joint` and the old field if there is one:
+  // "rig: width".
   Error in_field(const std::string& prefix, const char* joint = ": ") const;
 
  private:
@@ -51,7 +51,7 @@ auto in_file(const std::filesystem::path& file, const Step& step) {
   }
 }
 
-// Returns step(). Puts `prefix` before the field of its Errors, as Error::in_field does.
+// Returns step(). Puts `prefix` before the field of Errors of `step`, as Error::in_field does.
 template <typename Step>
 auto in_field(const std::string& prefix, const Step& step) {
   try {

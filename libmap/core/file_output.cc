@@ -76,7 +76,7 @@ int lock_temporary(const fs::path& temporary, const fs::path& final_path,
       const int code = errno;
       close(lock);
       if (code != EWOULDBLOCK) throw system_failure(final_path, "cannot be locked", code);
-      throw Error("another process is writing it", {.file = final_path.string()},
+      throw Error("another process is writing this file", {.file = final_path.string()},
                   ErrorKind::failed);
     }
     // Between opening and locking, another process can have committed this file.

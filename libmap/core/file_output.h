@@ -49,7 +49,7 @@ class PendingOutput {
   // `open_temporary` creates and opens the temporary. It returns a descriptor, or -1 with errno.
   PendingOutput(std::filesystem::path final_path, const std::string& temporary_name,
                 int (*open_temporary)(const char* path));
-  // Unlocks the temporary and forgets its name.
+  // Unlocks the temporary and forgets the name.
   void release();
   int lock() const { return lock_; }
 
@@ -75,7 +75,7 @@ class OutputFolder : public PendingOutput {
   // `names` lists the permitted entries: an earlier folder with any other entry is not replaced.
   // Throws Error if the path is not a folder, contains other entries or is not writable.
   OutputFolder(const std::filesystem::path& final_path, const std::vector<std::string>& names);
-  // Syncs the temporary and replaces the final folder with all its content. Throws Error (failed).
+  // Syncs the temporary and replaces the complete final folder. Throws Error (failed).
   void commit();
 };
 
@@ -98,7 +98,7 @@ class CommitGuard {
 // exits.
 void abandon_unfinished_outputs();
 
-// True if the name is that of an uncommitted file or folder, as a killed run leaves behind.
+// True for names of uncommitted files and folders, as a killed run leaves behind.
 bool is_named_unfinished(const std::filesystem::path& path);
 
 // Returns a copy of the error that names `file`.

@@ -1,5 +1,5 @@
-// Georeference of a terrain: relation of its local coordinates to a coordinate reference system
-// (CRS) of the Earth or another body.
+// Georeference of a terrain: relation of local coordinates to a coordinate reference system (CRS)
+// of the Earth or another body.
 #pragma once
 
 #include <Eigen/Core>

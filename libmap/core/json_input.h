@@ -1,5 +1,5 @@
-// Checked parsing of untrusted JSON. nlohmann's library (`Json` is one of its types) casts between
-// all number types and does not limit the nesting depth.
+// Checked parsing of untrusted JSON. The library of `Json` (nlohmann) casts between all number
+// types and does not limit the nesting depth.
 #pragma once
 
 #include <cstddef>
@@ -39,7 +39,7 @@ Integer integer_of(const Json& json, const std::string& field) {
     const auto value = json.template get<std::int64_t>();
     if (std::in_range<Integer>(value)) return static_cast<Integer>(value);
   }
-  throw Error("not a whole number or out of range",
+  throw Error("not a whole number, or out of range",
               {.field = field, .value = json.is_number() ? json.dump() : json.type_name()});
 }
 

@@ -1,4 +1,4 @@
-// Manifest of an output file: OUTPUT.json with the command, its parameters, inputs and results. All
+// Manifest of an output file: OUTPUT.json with command, parameters, inputs and results. All
 // sections but "run" are reproducible for equal input, seed and version.
 #pragma once
 
@@ -38,7 +38,7 @@ struct Manifest {
   std::vector<std::pair<std::string, double>> timings_s;       // in the section "run"
   unsigned threads = 0;                                        // in the section "run"
 
-  void add_parameters(const ParameterTable& table);   // all keys with their current values
+  void add_parameters(const ParameterTable& table);   // all keys with current values
   void add_results(const ResultTable& table);         // skips results without a value
   void add_input(const std::filesystem::path& path);  // reads and hashes the file
   const ManifestValue* find_parameter(std::string_view name) const;  // or nullptr

@@ -1,5 +1,5 @@
-// Parallel loops whose results do not depend on the number of threads: the chunks of a loop depend
-// on count and grain only, and reductions join the chunks in order.
+// Parallel loops with results that do not depend on the number of threads: the chunks of a loop
+// depend on count and grain only, and reductions join the chunks in order.
 #pragma once
 
 #include <cstddef>

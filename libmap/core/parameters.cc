@@ -239,7 +239,7 @@ std::vector<std::string> set_from_yaml(const ParameterTable& table, const std::s
       };
   read_yaml(text, file, [&](const YAML::Node& root) {
     if (root.IsNull()) return;
-    if (!root.IsMap()) throw Error("not a map of keys and values");
+    if (!root.IsMap()) throw Error("not a YAML mapping");
     collect(root, "");
     for (const auto& [key, value] : values) table.set(key, value);
   });

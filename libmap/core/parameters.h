@@ -19,7 +19,7 @@ namespace libmap {
 
 enum class ParameterType { boolean, integer, real, text };  // type of a parameter's value
 
-// Interval of valid numbers. An open end excludes its value.
+// Interval of valid numbers. An open end excludes the end itself.
 struct Range {
   double min = -std::numeric_limits<double>::infinity();
   double max = std::numeric_limits<double>::infinity();
@@ -33,7 +33,7 @@ inline constexpr Range zero_to_one{0.0, 1.0};
 std::string describe(const Range& range);  // e.g. "> 0", ">= 0 and <= 1"
 
 struct Parameter {
-  std::string key;          // as in YAML, with its unit: "voxel_size_m"
+  std::string key;          // as in YAML, with unit: "voxel_size_m"
   std::string description;  // one line
   ParameterType type = ParameterType::text;
   std::vector<std::string> choices{};  // for enumerations
@@ -51,7 +51,7 @@ class ParameterTable {
   void add(std::string key, std::uint64_t& field, Range range, std::string description);
   void add(std::string key, bool& field, std::string description);
   void add(std::string key, std::string& field, std::string description);
-  // Adds an enumeration with the names of its values.
+  // Adds an enumeration with the names of the values.
   template <typename Enum>
   void add(std::string key, Enum& field, const std::vector<std::pair<std::string, Enum>>& names,
            std::string description);
@@ -59,11 +59,12 @@ class ParameterTable {
   // Makes `earlier`, a key of an earlier version, a second name of the key `now`.
   void add_former_key(std::string earlier, std::string now);
   const std::map<std::string, std::string, std::less<>>& former_keys() const {
-    return former_keys_;  // current key by its earlier name
+    return former_keys_;  // current key by former key
   }
 
-  // Collects values of keys "PREFIX.KEY" as text, e.g. "gripper.opening_angle_deg", to override
-  // those of a file that is read later. The last text of a key counts; the caller checks the names.
+  // Collects values of keys "PREFIX.KEY" as text, e.g. "gripper.opening_angle_deg", to override the
+  // values of a file that is read later. The last text of a key counts; the caller checks the
+  // names.
   void add_overrides(std::string prefix, std::vector<std::pair<std::string, std::string>>& texts);
 
   const std::vector<Parameter>& parameters() const { return parameters_; }
@@ -104,7 +105,8 @@ void check_parameters(Options options) {
   table.check();
 }
 
-// Returns the key of the first bound field that differs from its default; nullopt if none does.
+// Returns the key of the first bound field that differs from the default; nullopt if all are
+// default.
 template <typename Options>
 std::optional<std::string> changed_key(Options options, void (*bind)(ParameterTable&, Options&)) {
   Options unset;
@@ -115,7 +117,7 @@ std::optional<std::string> changed_key(Options options, void (*bind)(ParameterTa
   return table.first_difference(defaults);
 }
 
-// Returns the flag of a key without its unit: "voxel_size_m" -> "--voxel-size".
+// Returns the flag of a key, without unit: "voxel_size_m" -> "--voxel-size".
 std::string flag_of(std::string_view key);
 
 // Sets the table from YAML `text`, a map of scalars; a section "a: {b: 1}" contains the key "a.b".

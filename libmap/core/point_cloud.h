@@ -55,7 +55,7 @@ struct PointCloud {
   // Adds a field of size() zeros, or resets the existing field of that name to zeros of `type`.
   ScalarField& add_field(std::string_view name, ScalarType type);
 
-  // Throws Error naming the first array whose length is not size().
+  // Throws Error naming the first array with a length other than size().
   void check() const;
 };
 
@@ -75,7 +75,7 @@ void append_values(const std::vector<T>& more, std::vector<T>& values) {
 void append_fields(const std::vector<ScalarField>& more, std::vector<ScalarField>& fields);
 
 // Returns the transformed cloud: positions, a known viewpoint and the fields vp_x, vp_y, vp_z by
-// `target_from_source`; normals and the fields approach_x, approach_y, approach_z by its rotation.
+// `target_from_source`; normals and the fields approach_x, approach_y, approach_z by the rotation.
 PointCloud transform_cloud(const PointCloud& cloud, const Pose& target_from_source);
 
 struct Bounds3d {

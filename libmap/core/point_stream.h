@@ -11,8 +11,8 @@ namespace libmap {
 class PointStream {
  public:
   virtual ~PointStream() = default;
-  // Number of points in each block but the last. Fixed blocks make sums independent of how the
-  // points are distributed over files.
+  // Block size of streams from files; the last block can be smaller. Fixed blocks make sums
+  // independent of how the points are distributed over files.
   static constexpr std::size_t block_points = 65536;
   // Attributes that the visitor uses; the stream can omit normals if they are not needed.
   enum class Need { positions, positions_and_normals };

@@ -66,14 +66,14 @@ struct GraphNode {
   double stamp_s = 0.0;
   std::string label{};
   std::optional<Pose> odometry_from_base{};
-  std::optional<Pose> truth_from_base{};            // ground truth, in its own frame
+  std::optional<Pose> truth_from_base{};            // ground truth, in a separate frame
   std::optional<std::array<double, 6>> velocity{};  // m/s and rad/s: x y z roll pitch yaw
   std::optional<GpsFix> gps{};
 };
 
 struct PoseGraph {
   std::vector<GraphNode> nodes;                 // by ascending id
-  std::vector<PoseLink> links;                  // each once, whatever its direction
+  std::vector<PoseLink> links;                  // each once, in either direction
   std::map<int, Pose> optimized_map_from_base;  // poses stored with the scan; can be empty
 
   // Returns nullptr if there is no such node.

@@ -1,5 +1,5 @@
 // Table of the named results of a stage, the counterpart of ParameterTable for outputs.
-// describe(table, result) next to a result struct binds each field to its key and description. The
+// describe(table, result) next to a result struct binds each field to a key and a description. The
 // manifest, --json, printed lists, the merging of tiles and the Python module use it.
 #pragma once
 
@@ -32,7 +32,7 @@ struct NamedResult {
       value = held(found);
   }
 
-  std::string key;                     // with its unit: "radius_m"
+  std::string key;                     // with unit: "radius_m"
   std::string description;             // one line
   ManifestValue type;                  // a default value of the type of `value`
   bool may_be_absent;                  // true for optionals
@@ -108,7 +108,7 @@ class ResultTable {
     tile_fields_.push_back({std::move(key), &field, merge});
   }
 
-  // Adds the results of another table with `prefix` before their keys.
+  // Adds the results of another table; keys begin with `prefix`.
   void append(const std::string& prefix, ResultTable table);
 
   const std::vector<NamedResult>& results() const { return results_; }
@@ -130,7 +130,7 @@ ResultTable described(const Result& result) {
   return table;
 }
 
-// Merges the fields of a tile into `whole` by their Merge rules.
+// Merges the fields of a tile into `whole` by the Merge rule of each field.
 template <typename Result>
 void merge_into(Result& whole, const Result& tile) {
   described(whole).merge(described(tile));

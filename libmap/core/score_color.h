@@ -28,7 +28,7 @@ inline constexpr Color below_plane_color{255, 255, 255};
 inline constexpr Color no_value_color{128, 128, 128};
 
 // Returns the color of a score's class; gray for NaN. Class limits have a tolerance of 1e-6, so
-// that a score stored in single precision keeps its class.
+// that storage in single precision does not change the class.
 constexpr Color score_color(double score) {
   for (const ScoreClass& one : score_classes)
     if (score >= one.min_score - 1e-6) return one.color;

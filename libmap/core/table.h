@@ -1,4 +1,4 @@
-// Table of text cells with named columns, and its CSV format (RFC 4180).
+// Table of text cells with named columns, and CSV as file format (RFC 4180).
 #pragma once
 
 #include <cstddef>
@@ -30,7 +30,7 @@ struct Table {
 Table parse_csv(std::string_view text, const std::string& file);
 Table read_csv(const std::filesystem::path& path);
 std::string to_csv(const Table& table);
-// Returns one row of CSV text with its end of line.
+// Returns one row of CSV text with the end of line.
 std::string csv_line(const std::vector<std::string>& cells);
 
 }  // namespace libmap

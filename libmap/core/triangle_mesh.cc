@@ -30,8 +30,8 @@ void TriangleMesh::check() const {
   for (std::size_t i = 0; i < triangles.size(); ++i)
     for (const std::uint32_t index : triangles[i])
       if (index >= vertices.size())
-        throw Error("no such vertex", {.field = "triangle " + std::to_string(i),
-                                       .value = "vertex " + std::to_string(index),
+        throw Error("does not exist", {.field = "vertex of triangle " + std::to_string(i),
+                                       .value = std::to_string(index),
                                        .bound = "< " + std::to_string(vertices.size())});
 }
 
@@ -107,10 +107,9 @@ void TexturedMesh::check() const {
   for (std::size_t t = 0; t < page_of_triangle.size(); ++t) {
     const std::int32_t page = page_of_triangle[t];
     if (page != no_page && (page < 0 || static_cast<std::size_t>(page) >= pages.size()))
-      throw Error("no such texture page",
-                  {.field = "triangle " + std::to_string(t),
-                   .value = std::to_string(page),
-                   .bound = "0 to " + std::to_string(pages.size()) + " - 1"});
+      throw Error("does not exist", {.field = "texture page of triangle " + std::to_string(t),
+                                     .value = std::to_string(page),
+                                     .bound = "< " + std::to_string(pages.size())});
     for (const Eigen::Vector2f& corner : texture_coordinates[t])
       if (!corner.allFinite())
         throw Error("texture coordinate is not finite", {.field = "triangle " + std::to_string(t)});

@@ -31,7 +31,7 @@ struct TriangleMesh {
 // have; keeps everything if one mesh has no vertices. Throws Error for more than 2^32 - 1 vertices.
 void append_mesh(const TriangleMesh& more, TriangleMesh& mesh);
 
-// Normal of a triangle with twice its area as length, m2.
+// Normal of a triangle; the length is twice the triangle's area, m2.
 Eigen::Vector3d area_normal(const TriangleMesh& mesh, const Triangle& triangle);
 
 // Surface area in m2.
@@ -43,7 +43,7 @@ double signed_volume(const TriangleMesh& mesh);
 // Unit vertex normals, area-weighted means of the adjacent triangles' normals; 0 without triangles.
 std::vector<Eigen::Vector3f> estimate_vertex_normals(const TriangleMesh& mesh);
 
-// Texture coordinates of a triangle's corners: 0 to 1 over the width and height of its texture
+// Texture coordinates of a triangle's corners: 0 to 1 over the width and height of the texture
 // page, from the top left (as in glTF; OBJ counts from the bottom). The center of texel (column,
 // row) is ((column + 0.5) / width, (row + 0.5) / height).
 using TextureCorners = std::array<Eigen::Vector2f, 3>;

@@ -28,7 +28,7 @@ void read_yaml(const std::string& text, const std::string& file,
 Error unknown_key(std::string_view key, const std::vector<std::string>& known,
                   const std::string& whose = "");
 
-// Throws Error if a key of the map is unknown ("unknown key" + `whose`) or a duplicate. YAML
+// Throws Error if a key of the mapping is unknown ("unknown key" + `whose`) or a duplicate. YAML
 // libraries accept duplicates silently.
 void check_keys(const YAML::Node& map, const std::vector<std::string>& known,
                 const std::string& whose = "");

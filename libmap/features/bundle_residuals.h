@@ -1,4 +1,4 @@
-// Residuals of bundle adjustment, and their derivatives by poses, points and camera parameters.
+// Residuals of bundle adjustment, and derivatives by poses, points and camera parameters.
 #pragma once
 
 #include <Eigen/Core>
@@ -35,14 +35,15 @@ struct CalibratedObservation {
 };
 
 // Indices of a camera's parameters: step of the intrinsics (4), step of the registration (6),
-// timing (2), radial terms of the depth correction (3), coefficients of its spline.
+// timing (2), radial terms of the depth correction (3), coefficients of the depth correction's
+// spline.
 inline constexpr Eigen::Index intrinsics_at = 0;
 inline constexpr Eigen::Index registration_at = 4;
 inline constexpr Eigen::Index timing_at = 10;
 inline constexpr Eigen::Index radial_at = 12;
 inline constexpr Eigen::Index spline_at = 15;
 
-// Residual (image x, image y, depth) in standard deviations, and its derivatives.
+// Residual (image x, image y, depth) in standard deviations, and derivatives.
 struct CalibratedResidual {
   Eigen::Vector3d residual = Eigen::Vector3d::Zero();
   Eigen::Matrix<double, 3, 6> by_pose;    // by a step of the pose (rigid_motion.h)

@@ -42,12 +42,12 @@ class DepthSurface {
   // quarter of the pixels of a full disc, for example at edges.
   DepthSurface(const DepthPlanes& planes, const Camera& depth_camera, const DepthNoise& noise,
                double surface_noise_m, int step_px);
-  // Restores a stored surface. Throws Error if the number of cells is not that of every step_px-th
-  // pixel of the camera.
+  // Restores a stored surface. Throws Error unless there is one cell per step_px-th pixel in both
+  // directions.
   DepthSurface(const Camera& depth_camera, int step_px, std::vector<Cell> cells);
 
   const Camera& camera() const { return camera_; }
-  // Replaces the camera by one of the same size and distortion. Each pixel keeps its depth, and
+  // Replaces the camera by a camera of the same size and distortion. Depths of pixels are kept, and
   // normals are recomputed.
   void set_camera(const Camera& depth_camera);
   // Rescales the noise from the depth noise model `before` to `after`.

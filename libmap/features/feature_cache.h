@@ -1,5 +1,5 @@
-// Cache of image features on disk, so that later runs need not compute them: one file per frame in
-// a folder, named by a hash of the inputs.
+// Cache of image features on disk, so that later runs need not compute features again: one file per
+// frame in a folder, named by a hash of the inputs.
 #pragma once
 
 #include <filesystem>
@@ -21,7 +21,7 @@ std::string feature_key(const RgbdFrame& frame, const FeatureOptions& options);
 class FeatureCache {
  public:
   FeatureCache() = default;  // disabled
-  // The folder is created when the first frame is stored; its parent must exist then.
+  // The folder is created when the first frame is stored; the parent folder must exist.
   explicit FeatureCache(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
   bool enabled() const { return !folder_.empty(); }

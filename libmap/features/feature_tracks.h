@@ -40,7 +40,7 @@ struct RejectionCounts {
   std::size_t too_few_inliers = 0;
   std::size_t narrow = 0;  // inliers in one spot or on one line of the image
   std::size_t not_converged = 0;
-  std::size_t against_graph = 0;  // not consistent with the graph's estimate and its covariance
+  std::size_t against_graph = 0;  // not consistent with the graph's estimate and covariance
   std::size_t unconfirmed = 0;    // the only link between two components of the graph
   std::size_t accepted = 0;
 };
@@ -55,7 +55,7 @@ using KnownMatches = std::map<FramePair, std::vector<FeatureMatch>>;
 
 // Matches the features of each pair and estimates the relative pose. The result does not depend on
 // the number of threads. Pairs in `known` are not matched again; matches of other pairs are added.
-// Throws Error if descriptors cannot be read from their temporary file.
+// Throws Error if descriptors cannot be read from the temporary file.
 PairVerification verify_pairs(const std::vector<FrameFeatures>& frames,
                               const std::vector<FramePair>& pairs, const MatchingOptions& options,
                               std::uint64_t seed, Progress& progress = no_progress(),
@@ -66,7 +66,7 @@ PairVerification verify_pairs(const std::vector<FrameFeatures>& frames,
 std::optional<Pose> guess_motion(const std::vector<FrameFeatures>& frames, const FramePair& pair,
                                  const MatchingOptions& options, std::uint64_t seed);
 
-// Indices of a frame and of one of its features.
+// Indices of a frame and of a feature of the frame.
 struct Observation {
   std::uint32_t frame = 0;
   std::uint32_t feature = 0;

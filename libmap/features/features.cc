@@ -220,17 +220,18 @@ void keep_descriptors(const std::shared_ptr<TempFile>& file, FrameFeatures& fram
 
 void bind(ParameterTable& table, FeatureOptions& options) {
   table.add("features", options.type, {{"sift", FeatureType::sift}, {"orb", FeatureType::orb}},
-            "type of image features");
+            "type of image features; sift: SIFT; orb: ORB, binary");
   table.add("max_features", options.max_features, {1, 100000},
             "maximum number of features per image");
   table.add("min_contrast", options.min_contrast, positive,
             "minimum contrast of a SIFT feature, for image values from 0 to 1");
   table.add("pixel_noise_px", options.pixel_noise_px, positive,
             "standard deviation of a feature's image position at the finest scale, pixels");
-  table.add("scale_noise", options.scale_noise, not_negative,
-            "standard deviation of a feature's image position per pixel of its size, px/px");
+  table.add(
+      "scale_noise", options.scale_noise, not_negative,
+      "standard deviation of a feature's image position per pixel of the feature's size, px/px");
   table.add("surface_noise_m", options.surface_noise_m, not_negative,
-            "constant term of the standard deviation of depth fitted to many pixels, m");
+            "standard deviation of fitted depth that more pixels do not reduce, m");
   table.add("surface_step_px", options.surface_step_px, {1, 32},
             "step of the grid to which depth images are downsampled, pixels");
   table.add("min_depth_m", options.planes.min_depth_m, positive, "minimum used depth, m");

@@ -70,7 +70,7 @@ struct FrameFeatures {
   std::vector<DepthSurface> surfaces;               // one per camera
   std::size_t without_depth = 0;                    // features dropped for lack of depth
 
-  // Position of feature n from its ray and depth, in the camera's optical frame or the base frame.
+  // Position of feature n from ray and depth, in the camera's optical frame or the base frame.
   Eigen::Vector3d point_in_camera(std::size_t n) const;
   Eigen::Vector3d point_in_base(std::size_t n) const;
 };
@@ -85,17 +85,17 @@ class FeatureCache;
 
 // Finds the features of `nodes`. The result does not depend on the number of threads or the cache.
 // Frames that cannot be read or have no depth are in `skipped`. A frame without color has surfaces
-// only. Throws Error: options out of their ranges.
+// only. Throws Error: options out of range.
 FeatureResult find_features(const ScanSource& scan, const std::vector<int>& nodes,
                             const FeatureOptions& options = {}, Progress& progress = no_progress(),
                             const FeatureCache* cache = nullptr);
 
-// Appends the features of one image to `frame`; their camera is the last one of frame.cameras.
+// Appends the features of one image to `frame`; the camera is the last one of frame.cameras.
 void add_features(const CameraView& view, const DepthPlanes& planes, const FeatureOptions& options,
                   FrameFeatures& frame);
 
-// Descriptors as unit vectors, one column per feature; their products measure similarity. Throws
-// Error if the descriptor file cannot be read.
+// Descriptors as unit vectors, one column per feature; products of columns measure similarity.
+// Throws Error if the descriptor file cannot be read.
 Eigen::MatrixXf descriptor_vectors(const FrameFeatures& frame);
 
 }  // namespace libmap

@@ -61,16 +61,16 @@ double squared_radius_of(const Feature& feature, const Camera& camera);
 // CameraTiming::rolling_shutter_s after the middle row.
 double row_fraction(const Feature& feature, const Camera& camera);
 
-// Converts a velocity of the base (base frame) to that of the camera (optical frame).
+// Converts a velocity of the base (base frame) to the velocity of the camera (optical frame).
 Vector6d motion_in_camera(const Camera& camera, const Vector6d& base_motion);
 // Pose of the depth camera relative to the color camera at the exposure of the feature.
 Pose color_from_depth_of(const FrameFeatures& frame, const Feature& feature,
                          const SensorCalibration& calibration);
 
 // Change of a feature's depth if the depth camera is at `color_from_depth` instead of the stored
-// registration, and its derivative by the step s in moved(Pose::Identity(), s) * color_from_depth
-// (rigid_motion.h). Unknown, with zeros, if there is no plane at the feature, whose depth is then
-// that of another surface.
+// registration, and the derivative by the step s in moved(Pose::Identity(), s) * color_from_depth
+// (rigid_motion.h). Unknown, with zeros, if there is no plane at the feature: the depth is then
+// measured on another surface.
 struct RegisteredDepth {
   bool known = false;
   double added_m = 0.0;

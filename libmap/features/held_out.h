@@ -1,5 +1,5 @@
 // Evaluates refinement stages by held-out observations, which are never used to estimate poses:
-// their residuals before and after a stage.
+// residuals before and after a stage.
 #pragma once
 
 #include <cstddef>

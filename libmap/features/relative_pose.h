@@ -1,4 +1,4 @@
-// Relative pose of two frames, estimated from their features.
+// Relative pose of two frames, estimated from features.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,13 +16,13 @@ struct FeatureMatch {
   bool operator==(const FeatureMatch&) const = default;
 };
 
-// Mutual nearest neighbors whose descriptor distance is less than `max_ratio` times that of the
+// Mutual nearest neighbors with a descriptor distance below `max_ratio` times the distance of the
 // second nearest (Lowe 2004), by ascending a. `a` and `b` are descriptor_vectors.
 std::vector<FeatureMatch> match_features(const Eigen::MatrixXf& a, const Eigen::MatrixXf& b,
                                          double max_ratio);
 
-// Residual of a feature of b, transformed to a by `a_from_b`, against its match: x and y (px),
-// depth (m), and their covariance from the noise of both features.
+// Residual of a feature of b, transformed to a by `a_from_b`, against the match: x and y (px),
+// depth (m), and the covariance from the noise of both features.
 struct MatchResidual {
   bool in_front = false;  // of the camera in a; if false, the residual is not set
   Eigen::Vector3d residual = Eigen::Vector3d::Zero();

@@ -127,7 +127,7 @@ class Fusion {
     std::vector<FusionFrame> frames;
     for (const TrajectoryPose& pose : world_from_base_) {
       if (!pose.world_from_base.matrix().allFinite()) {
-        skip(pose.node, Error("its pose is not finite", {.field = node_name(pose.node)}));
+        skip(pose.node, Error("the pose is not finite", {.field = node_name(pose.node)}));
         continue;
       }
       if (frames.empty())

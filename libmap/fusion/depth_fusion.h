@@ -1,10 +1,10 @@
 // Fuses all depth images of a scan into one oriented, colored cloud.
 //
 // Frames are first registered to each other (frame_registration), by surface elements in random
-// squares of the x-y plane. Two passes over the frames follow. The first fits a plane to the pixels
+// blocks of the x-y plane. Two passes over the frames follow. The first fits a plane to the pixels
 // around each pixel (depth_planes) and averages positions and normals in a hashed voxel grid
 // (surface_voxels): a coarse surface, one element per voxel. The second moves each element along
-// its normal to the weighted mean of the measurements of all frames within a disc around it
+// the normal to the weighted mean of the measurements of all frames within a disc around it
 // (surface_refinement). Both passes average the intersections of rays with the surface instead of
 // the noisy points, which makes the means unbiased. Memory is proportional to the occupied voxels
 // of a tile. Up to 256 MB of decoded depth is cached (300 frames of 512 x 424); other frames are
@@ -47,10 +47,10 @@ struct DepthFusionOptions {
   // The poses were already refined with depth and color, so only color can confirm a registration.
   bool refined_poses = false;
   // >= 0: skips frames that add less than 1/enough_views to the information of earlier frames on
-  // nearly all of their surface; 0: all frames are fused.
+  // nearly all of the frame's surface; 0: all frames are fused.
   double enough_views = 10.0;
   SurfacePointOptions points{};
-  // Adds points one voxel beyond measured edges, unless views see through them.
+  // Adds points one voxel beyond measured edges, unless views see through these points.
   bool extend_edges = true;
   bool color = true;
   bool stereo = false;  // compute the depth of stereo pairs (stereo_depth)
@@ -81,7 +81,7 @@ struct PairCosts {
 };
 
 struct RegistrationCheck {
-  PairCosts depth;  // in held-out squares of the x-y plane
+  PairCosts depth;  // in held-out blocks of the x-y plane
   PairCosts color;  // everywhere, because registration uses depth only
 
   // Returns true if neither is clearly worse and both together are better. Refined poses already
@@ -100,7 +100,8 @@ struct FusionSurvey {
   int registration_rounds = 0;                   // rounds that moved frames; 0: poses are unchanged
   bool registration_rejected = false;            // the first round was rejected
   RegistrationCheck registration_check{};        // of the first round
-  // RMS deviation of single frames' surface heights from their mean, with given and final poses.
+  // RMS deviation of surface heights of single frames from the mean height, with given and final
+  // poses.
   double disagreement_before_m = 0.0;
   double disagreement_after_m = 0.0;
   DepthNoise noise{};  // noise of all passes
@@ -109,8 +110,8 @@ struct FusionSurvey {
 struct DepthFusionResult : FusionCounts {
   // World frame; unit normals towards the cameras; colors if any frame has them. Fields: `views`,
   // number of distinct frames; `expected_error`, standard deviation of the position along the
-  // normal, m. It includes the noise, the disagreement of frames, and the difference between both
-  // passes, which is large where the surface is curved within a disc.
+  // normal, m. `expected_error` includes noise, disagreement of frames, and the difference between
+  // both passes, which is large where the surface is curved within a disc.
   PointCloud cloud;
   std::size_t frames = 0;  // used
   std::size_t redundant_frames = 0;
@@ -141,7 +142,7 @@ DepthFusionResult fuse_depth(const ScanSource& scan, const Trajectory& world_fro
 // Side of a tile that contains the whole x-y plane.
 inline constexpr double whole_plan = std::numeric_limits<double>::infinity();
 
-// Fuses in square tiles of the world's x-y plane. Their side is `tile_m`, rounded to whole voxels.
+// Fuses in square tiles of the world's x-y plane with side `tile_m`, rounded to whole voxels.
 // Memory depends on the size of a tile; each frame adds 4 kB. Each point is in one tile only and is
 // identical, bit for bit, to the point without tiles.
 class TileFusion {

@@ -15,13 +15,13 @@ void describe_surface(ResultTable& table, const FusionCounts& counts) {
   table.add("dropped_seen_through", points.seen_through, Merge::sum,
             "number of elements dropped: too many views see through them");
   table.add("dropped_missed", points.missed, Merge::sum,
-            "number of elements dropped: too many views measured nothing there");
+            "number of elements dropped: too many views have no depth there");
   table.add("dropped_beside", points.contradicted, Merge::sum,
             "number of elements dropped: others around them are contradicted");
   table.add("dropped_beyond_edges", points.beyond_edge, Merge::sum,
             "number of points dropped: beyond an edge of the surface");
   table.add("merged", points.merged, Merge::sum,
-            "number of elements merged with another one in their voxel");
+            "number of elements merged with another one in the same voxel");
   table.add("points", counts.points_made, Merge::sum, "number of points of the cloud");
   table.add("points_beyond_edges", points.extended_points, Merge::sum,
             "number of points added beyond measured edges");
@@ -56,8 +56,9 @@ void bind(ParameterTable& table, DepthFusionOptions& options) {
             "minimum share of agreeing pairs of opposite neighbors for fitting a plane to a pixel");
   table.add("disc_radius_voxels", options.disc_radius_voxels, positive,
             "radius of the disc in which measurements are averaged, in voxels");
-  table.add("pose_error_m", options.pose_error_m, not_negative,
-            "standard deviation of a frame's position along the surface normal due to its pose, m");
+  table.add(
+      "pose_error_m", options.pose_error_m, not_negative,
+      "standard deviation of a frame's position along the surface normal due to pose errors, m");
   table.add("registration_rounds", options.registration_rounds, {0, 20},
             "maximum number of rounds in which frames are registered to each other; 0: poses are "
             "unchanged");
@@ -67,10 +68,9 @@ void bind(ParameterTable& table, DepthFusionOptions& options) {
   table.add("min_views", options.points.min_views, {1},
             "minimum number of frames that measure a point of the cloud");
   table.add("max_seen_through", options.points.max_seen_through, not_negative,
-            "maximum ratio of views that see through a point to views that see it");
+            "maximum ratio of views that see through a point to views that see the point");
   table.add("max_missed", options.points.max_missed, not_negative,
-            "maximum ratio of views that should measure a point and measure nothing to views that "
-            "see it");
+            "maximum ratio of views without depth at a point to views that see the point");
   table.add("extend_edges", options.extend_edges,
             "add points one voxel beyond measured edges of the surface");
   table.add("color", options.color, "add colors, with larger weights for near and frontal views");
@@ -86,7 +86,7 @@ void describe(ResultTable& table, const FusionCounts& counts) {
 void describe(ResultTable& table, const DepthFusionResult& result) {
   table.add("frames", result.frames, "number of fused frames");
   table.add("redundant_frames", result.redundant_frames,
-            "number of frames left out because earlier frames measured their surface");
+            "number of frames skipped because earlier frames measured their surface");
   table.add("skipped_frames", result.skipped.size(), "number of frames that could not be used");
   describe(table, result.pixels);
   table.add("axial_noise_m", result.noise.axial_m, "assumed standard deviation of depth: constant term, m");

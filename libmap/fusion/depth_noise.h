@@ -5,9 +5,8 @@ namespace libmap {
 
 // Noise model of the form of Nguyen, Izadi and Lovell 2012 ("Modeling Kinect sensor noise for
 // improved 3D reconstruction and tracking"): axial noise that grows with range, and lateral noise,
-// whose effect grows with obliqueness. The axial defaults are those of the time-of-flight camera of
-// the project's scans (2 mm + 0.5 % of range). The lateral default includes the footprint of a
-// pixel.
+// whose effect grows with obliqueness. The axial defaults describe the time-of-flight camera of the
+// project's scans (2 mm + 0.5 % of range). The lateral default includes the footprint of a pixel.
 struct DepthNoise {
   double axial_m = 0.002;         // > 0: standard deviation at range 0
   double axial_of_range = 0.005;  // >= 0: added per meter of range, m/m
@@ -28,7 +27,7 @@ struct DepthSensor {
 };
 
 struct SensorModel;
-// Sets the range and noise of `sensor` that have their defaults to those of the model.
+// Replaces default values of range and noise in `sensor` by the values of the model.
 void apply(const SensorModel& model, DepthSensor& sensor);
 
 }  // namespace libmap

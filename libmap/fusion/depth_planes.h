@@ -48,19 +48,20 @@ struct DepthPlanes {
   DepthPixelCounts counts;
 };
 
-// Fits each pixel's plane to those pairs of opposite neighbors whose mean agrees with the pixel
+// Fits each pixel's plane to the pairs of opposite neighbors with a mean that agrees with the pixel
 // within the noise, by mean inverse depth and least-squares slopes. A pixel with too few such
-// pairs, at the edge of a surface, takes an adjacent plane that predicts its depth within the
-// noise; without one, it is a flying pixel. Image (depth in m) and rays must have the same size.
+// pairs, at the edge of a surface, takes an adjacent plane that predicts the pixel's depth within
+// the noise; without one, it is a flying pixel. Image (depth in m) and rays must have the same
+// size.
 DepthPlanes fit_depth_planes(const DepthImage& depth, const PixelRays& rays,
                              const DepthPlaneOptions& options = {});
 
-// Pixels that planes are fitted to. all: the counts are those of the image. in_cells: only pixels
-// that may be in the cells; the counts are meaningless.
+// Pixels that planes are fitted to. all: all pixels of the image. in_cells: only pixels that may be
+// in the cells; the counts are meaningless.
 enum class FittedPixels { all, in_cells };
 
-// Fits planes to the pixels of one depth image (m) and adds those in `cells` to the voxels of the
-// grid, weighted by cosine, support and depth noise. Both values of `fitted` result in the same
+// Fits planes to the pixels of one depth image (m) and adds the planes in `cells` to the voxels of
+// the grid, weighted by cosine, support and depth noise. Both values of `fitted` result in the same
 // voxels, except at the edges of downsampled cells. Returns the numbers of pixels by outcome.
 DepthPixelCounts add_depth_planes(const DepthImage& depth, const PixelRays& rays,
                                   const Pose& grid_from_camera, const DepthPlaneOptions& options,

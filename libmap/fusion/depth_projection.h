@@ -21,7 +21,7 @@ struct PixelRays {
   int height = 0;
   std::vector<float> x;
   std::vector<float> y;
-  std::vector<std::size_t> blind;  // pixels without a ray; their x and y are 0
+  std::vector<std::size_t> blind;  // pixels without a ray; x and y are 0
   // Bounds of all rays.
   Eigen::Vector2d min = Eigen::Vector2d::Zero();
   Eigen::Vector2d max = Eigen::Vector2d::Zero();

@@ -37,7 +37,7 @@ FusionFrame frame_at(const TrajectoryPose& pose, const Eigen::Vector3d& grid_ori
                  .value = to_text(voxel_size_m),
                  .bound = "> " + to_text(static_cast<float>(voxel_size_m * needed / bound))});
   if (needed > bound)
-    throw Error("the pose is too far from the first for this voxel size",
+    throw Error("the pose is too far from the first pose for this voxel size",
                 {.field = "node " + std::to_string(pose.node),
                  .value = to_text(static_cast<float>(reach)) + " m from the first",
                  .bound = "< " + to_text(static_cast<float>(bound)) + " m"});
@@ -62,14 +62,14 @@ std::shared_ptr<const RgbdFrame> FusionFrames::depth_of(int node) {
       std::make_shared<RgbdFrame>(scan_.read_frame(node, {.color = false, .depth = true}));
   const std::string name = "node " + std::to_string(node);
   if (frame->depth.empty()) {
-    if (frame->right.empty()) throw Error("it has no depth image", {.field = name});
+    if (frame->right.empty()) throw Error("the frame has no depth image", {.field = name});
     if (!options_.stereo)
-      throw Error("it has a stereo pair but no depth; --stereo computes the depth",
+      throw Error("the frame has a stereo pair but no depth; use --stereo to compute depth",
                   {.field = name});
     *frame = scan_.read_frame(node);
     frame->depth = stereo_depth(*frame);
   }
-  if (frame->cameras.empty()) throw Error("it has no calibration", {.field = name});
+  if (frame->cameras.empty()) throw Error("the frame has no calibration", {.field = name});
   frame->color = {};
   frame->right = {};
   // All passes visit the frames in the same order, so the first frames are cached.

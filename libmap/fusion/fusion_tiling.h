@@ -1,5 +1,5 @@
-// Divides the x-y plane into tiles for fusion, each with the margin of voxels that affects its
-// points. Private to depth_fusion.
+// Divides the x-y plane into tiles for fusion, each with the margin of voxels that affects the
+// tile's points. Private to depth_fusion.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,10 +14,12 @@
 
 namespace libmap {
 
-// Distance in voxels within which other voxels affect an element.
+// Distance in voxels within which other voxels affect a SurfaceElement (surface_voxels.h), from
+// which a point is made.
 inline constexpr int element_neighborhood = 3;
 
-// Tiles of whole voxels in the x-y plane of the world, with the margins that affect their points.
+// Tiles of whole voxels in the x-y plane of the world, with the margins that affect the points of
+// the tiles.
 class FusionTiling {
  public:
   using Cell = Eigen::Array<std::int64_t, 2, 1>;
@@ -33,7 +35,8 @@ class FusionTiling {
         frame_margin_(element_margin_ + element_neighborhood + 1 +
                       static_cast<int>(std::ceil((shift_m + disc_m) / voxel_m))) {}
 
-  // Calls use(tile) for each tile that a frame with this reach, in the grid, m, affects.
+  // Calls use(tile) for each tile that is affected by a frame whose measurements are inside `reach`
+  // (m, grid frame).
   template <typename Use>
   void each_tile(const Eigen::AlignedBox3d& reach, const Use& use) const {
     const auto tile_of = [&](const Eigen::Vector3d& position, int margin) -> Cell {
@@ -47,14 +50,14 @@ class FusionTiling {
       for (std::int64_t j = first.y(); j <= last.y(); ++j) use(XyTile{i, j});
   }
 
-  // Returns the columns of the grid whose points are in the tile.
+  // Returns the columns of the grid with points in the tile.
   TileMask points(const XyTile& tile) const {
     const Cell low = Cell(tile.i, tile.j) * side_ - origin_;
     constexpr std::int64_t limit = voxel_cell_limit;
     return {low.max(-limit).min(limit).cast<int>(),
             (low + side_).max(-limit).min(limit).cast<int>(), 0};
   }
-  // Margin in voxels around a tile whose elements affect its points.
+  // Width in voxels of the margin around a tile. Elements in the margin affect the tile's points.
   int element_margin() const { return element_margin_; }
 
  private:

@@ -36,14 +36,14 @@ struct NormalEstimationResult {
 
 // Fits planes by total least squares (Hoppe et al. 1992, section 3.2). Without views, orientations
 // are propagated along the minimum spanning tree of the graph of neighbors, weighted by the angle
-// between normals (section 3.3). Each component is then oriented away from its center or up,
-// whichever is more distinct. The result does not depend on the number of threads. Throws Error if
-// an option is out of range or the cloud is inconsistent.
+// between normals (section 3.3). Each component is then oriented away from the component's center
+// or up, whichever is more distinct. The result does not depend on the number of threads. Throws
+// Error if an option is out of range or the cloud is inconsistent.
 NormalEstimationResult estimate_normals(const PointCloud& cloud,
                                         const NormalEstimationOptions& options = {});
 
-// Normalizes the cloud's own normals and orients them like estimate_normals; NaN becomes zero.
-// Throws Error if the cloud is inconsistent.
+// Normalizes the stored normals of the cloud and orients the normals like estimate_normals; NaN
+// becomes zero. Throws Error if the cloud is inconsistent.
 NormalEstimationResult orient_normals(const PointCloud& cloud);
 
 }  // namespace libmap

@@ -120,7 +120,7 @@ void bind(ParameterTable& table, PanoramaOptions& options) {
   table.add("stride_px", options.stride_px, Range{1, 1e6},
             "step between used rows and columns, pixels");
   table.add("flying_pixel_jump_m", options.flying_pixel_jump_m, not_negative,
-            "maximum depth difference between a pixel and both its neighbors in a row or column, "
+            "maximum depth difference between a pixel and both neighbors in a row or column, "
             "m; 0: no limit");
   table.add("normals", options.normals, "add normals from neighboring pixels");
   table.add("normal_jump_m", options.normal_jump_m, positive,

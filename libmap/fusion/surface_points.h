@@ -11,8 +11,8 @@
 
 namespace libmap {
 
-// Side, in voxels, of the squares of the x-y plane in which points that only one or two frames
-// measured are kept or dropped together, each square with its eight neighbors.
+// Side, in voxels, of blocks of the x-y plane. Points of a block that only one or two frames
+// measured are kept or dropped together, by the block and its eight neighbors.
 inline constexpr int contradiction_block = 16;
 
 struct SurfacePointOptions {
@@ -28,7 +28,7 @@ struct SurfacePointOptions {
 struct SurfacePointCounts {
   std::size_t unconfirmed = 0;      // dropped: measured by too few frames
   std::size_t max_views = 0;        // maximum number of frames that measured one element
-  std::size_t seen_through = 0;     // dropped: views see through them
+  std::size_t seen_through = 0;     // dropped: views see through the points
   std::size_t missed = 0;           // dropped: views measured nothing there
   std::size_t contradicted = 0;     // dropped: measured by one or two frames, in a square where
                                     // others contradict most measurements of such frames
@@ -47,10 +47,10 @@ struct SurfacePoints {
 SurfacePoints make_surface_points(const RefinedSurface& surface, double voxel_size_m,
                                   const TileMask& cells, const SurfacePointOptions& options);
 
-// Replaces each unit normal of `cloud` by that of a plane fitted by weighted total least squares to
-// the points within `radius_m` whose normals differ by less than 45 degrees (Hoppe et al. 1992).
-// `deviations_m` has one standard deviation per point. Orientations do not change. A point whose
-// neighbors do not determine a plane keeps its normal.
+// Replaces each unit normal of `cloud` by the normal of a plane, fitted by weighted total least
+// squares to the points within `radius_m` with normals that differ by less than 45 degrees (Hoppe
+// et al. 1992). `deviations_m` has one standard deviation per point. Orientations do not change.
+// The normal is kept if the neighbors do not determine a plane.
 void fit_normals(PointCloud& cloud, double radius_m, const std::vector<double>& deviations_m);
 
 }  // namespace libmap

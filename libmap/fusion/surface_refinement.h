@@ -1,4 +1,4 @@
-// Second pass of fusion: moves surface elements along their normals to the mean of all views.
+// Second pass of fusion: moves surface elements along the normals to the mean of all views.
 #pragma once
 
 #include <Eigen/Core>
@@ -22,7 +22,7 @@ namespace libmap {
 // Region around an element from which measurements are used.
 struct SurfaceSearch {
   double disc_radius_m = 0.015;  // > 0: radius of the disc in which measurements are averaged
-  double search_m = 0.01;        // >= 0: maximum error of an element along its normal
+  double search_m = 0.01;        // >= 0: maximum error of an element along the normal
 };
 
 // Maximum difference of a depth from an element's plane, over all ranges, m. Other depths have no
@@ -50,8 +50,8 @@ struct RefinedElement {
   float shift_m = 0.0F;  // along the normal
   float expected_error_m = 0.0F;
   std::uint32_t frames = 0;  // number of frames that measured it
-  // Sums of the cosines of incidence of views whose depth at the element's pixel agrees with it,
-  // is behind it, or is missing around it, although it is in range.
+  // Sums of the cosines of incidence of views with a depth at the element's pixel that agrees with
+  // the element, is behind the element, or is missing although the element is in range.
   float seen = 0.0F;
   float seen_through = 0.0F;
   float missed = 0.0F;
@@ -66,8 +66,8 @@ struct RefinedSurface {
 
 // Refines the elements, in meters, with all views. `pose_error_m` >= 0 is the standard deviation of
 // a whole frame along the normal. `each_group(add)` must call add(views) for all views, by frame.
-// The result depends on their order by rounding only, and not on their grouping or the number of
-// threads.
+// The order of views affects the result by rounding only; grouping and the number of threads do
+// not.
 using AddViews = std::function<void(std::span<const RefinementView>)>;
 RefinedSurface refine_surface(std::vector<SurfaceElement> elements, const DepthSensor& sensor,
                               const SurfaceSearch& search, double pose_error_m,
@@ -77,7 +77,7 @@ RefinedSurface refine_surface(std::vector<SurfaceElement> elements, const DepthS
 struct SurfaceObservation {
   std::uint32_t element = 0;
   std::uint32_t frame = 0;
-  float height_m = 0.0F;     // above the element, along its normal
+  float height_m = 0.0F;     // above the element, along the normal
   float variance_m2 = 0.0F;  // due to noise
 };
 

@@ -1,5 +1,5 @@
 // First pass of fusion: a hashed voxel grid of the weighted means of measured positions and
-// normals, and the surface elements made of it. Only voxels with measurements are stored.
+// normals, and the surface elements made from the grid. Only voxels with measurements are stored.
 #pragma once
 
 #include <Eigen/Core>
@@ -59,7 +59,7 @@ struct SurfaceElement {
 // Returns one element per column of voxels and surface in it. Columns are parallel to the axis
 // nearest to the normal; elements are on their center lines. If noise spreads a surface over two
 // voxels of a column, the voxel with more weight is used. With `extend`, adjacent empty columns get
-// an element too. Their order depends on the voxels only; neighbors are near in memory.
+// an element too. The order of elements depends on the voxels only; neighbors are near in memory.
 std::vector<SurfaceElement> surface_elements(const SurfaceVoxels& voxels, bool extend);
 
 }  // namespace libmap

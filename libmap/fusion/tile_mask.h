@@ -1,4 +1,4 @@
-// Selects columns of voxels by their position in the x-y plane. Private to depth_fusion.
+// Selects columns of voxels by position in the x-y plane. Private to depth_fusion.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,7 +13,8 @@ namespace libmap {
 struct TileMask {
   Eigen::Array2i low = Eigen::Array2i::Constant(-voxel_cell_limit);
   Eigen::Array2i high = Eigen::Array2i::Constant(voxel_cell_limit);  // excluded
-  // Selects one in 2^thinning squares of 4 x 4 columns at random. A larger value selects a subset.
+  // Selects one in 2^subsampling_level blocks of 4 x 4 columns at random. A larger value selects a
+  // subset.
   unsigned subsampling_level = 0;
 
   bool has_cell(const Eigen::Array2i& cell) const {
@@ -22,7 +23,7 @@ struct TileMask {
     const auto square = [&](int axis) { return static_cast<std::uint64_t>(cell[axis] >> 2); };
     return mix_bits(square(0), square(1)) >> (64U - subsampling_level) == 0;
   }
-  // Returns true in one of ten squares of 4 x 4 columns, which validate a registration and are not
+  // Returns true in one of ten blocks of 4 x 4 columns, which validate a registration and are not
   // used by it. The position is in voxels.
   static bool is_held_out(const Eigen::Vector2f& position) {
     const Eigen::Array2i square = (position.array() / 4.0F).floor().cast<int>();

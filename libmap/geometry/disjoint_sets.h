@@ -9,7 +9,7 @@
 namespace libmap {
 
 // Disjoint sets of the numbers 0..count-1, initially one per number. find() returns the smallest
-// number of a set as its name; join() merges two sets.
+// number of a set as the set's name; join() merges two sets.
 template <typename Index>
 class DisjointSets {
  public:

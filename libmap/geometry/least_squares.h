@@ -1,5 +1,5 @@
 // Solvers for nonlinear least squares: Levenberg-Marquardt and Gauss-Newton iterations. The problem
-// provides its normal equations and their solution, dense, sparse or of fixed size.
+// provides normal equations and a solver, dense, sparse or of fixed size.
 #pragma once
 
 #include <Eigen/Core>
@@ -44,7 +44,7 @@ struct LeastSquaresSummary {
 //   void linearize();              normal equations at the state
 //   double propose(double damping) solves them; cost of the state after the step, infinite if there
 //                                  is none
-//   void accept();                 makes the proposed state the state
+//   void accept();                 replaces the current state by the proposed one
 template <typename Problem>
 LeastSquaresSummary levenberg_marquardt(Problem& problem, double cost,
                                         const LevenbergMarquardtOptions& options) {
@@ -81,9 +81,9 @@ struct GaussNewtonSummary {
   StepState state = StepState::moving;
 };
 
-// Gauss-Newton for problems whose weights or correspondences change in each step (ICP, iteratively
-// reweighted least squares), so that costs cannot be compared. `step()` linearizes, moves the state
-// and returns a StepState; it is called until that is not `moving`.
+// Gauss-Newton for problems with weights or correspondences that change in each step (ICP,
+// iteratively reweighted least squares), so that costs cannot be compared. `step()` linearizes,
+// moves the state and returns a StepState; it is called until that is not `moving`.
 template <typename Step>
 GaussNewtonSummary gauss_newton(int max_iterations, const Step& step) {
   GaussNewtonSummary summary;

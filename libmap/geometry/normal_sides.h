@@ -1,4 +1,4 @@
-// Determines the up direction of a surface from normals, and whether they are consistent.
+// Determines the up direction of a surface from normals, and the consistency of the normals.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,8 +9,8 @@
 
 namespace libmap {
 
-// Minimum share of normals on one side that decides the upper side. Rocks on their ground, seen
-// from all sides, have 0.92; unoriented eigenvectors have up to 0.82 (with opposing neighbors).
+// Minimum share of normals on one side that decides the upper side. Rocks on the ground, seen from
+// all sides, have 0.92; unoriented eigenvectors have up to 0.82 (with opposing neighbors).
 inline constexpr double min_agreeing_share = 0.8;
 // Maximum share of opposing neighbors of an oriented surface; only thin parts have such neighbors.
 inline constexpr double max_opposing_share = 0.1;
@@ -38,7 +38,7 @@ struct NormalVotes {
   bool agree() const { return share() >= min_agreeing_share; }
 };
 
-// Returns the share of neighboring points whose normals face opposite sides, among the first 65536
+// Returns the share of neighboring points with normals on opposite sides, among the first 65536
 // points; 0.5 for random sides, 0 for too few points. Ignores neighbors across a crease, and NaN.
 double opposing_share(const std::vector<Eigen::Vector3d>& positions,
                       const std::vector<Eigen::Vector3f>& normals);
@@ -53,9 +53,9 @@ struct UpOfNormals {
   bool decided = false;   // true if the normals agree; else `direction` is +z
 };
 
-// Returns the up direction of a surface: the mean of its normals, repeatedly restricted to normals
-// near the mean, so that walls and rocks do not tilt it. Returns +z if the mean is within 20
-// degrees of it or the normals do not agree. Normals can have any length; zeros and NaN are
+// Returns the up direction of a surface: the mean of the normals, repeatedly restricted to normals
+// near the mean, so that walls and rocks do not tilt the result. Returns +z if the mean is within
+// 20 degrees of +z or the normals do not agree. Normals can have any length; zeros and NaN are
 // skipped.
 UpOfNormals up_of_normals(const std::vector<Eigen::Vector3d>& positions,
                           const std::vector<Eigen::Vector3f>& normals);

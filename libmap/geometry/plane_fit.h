@@ -1,4 +1,4 @@
-// Fits planes to weighted points by their principal axes; the inner step of robust plane fits.
+// Fits planes to weighted points by principal axes; the inner step of robust plane fits.
 #pragma once
 
 #include <Eigen/Core>
@@ -34,8 +34,8 @@ struct PlaneSpread {
   Eigen::Vector3d variances = Eigen::Vector3d::Zero();  // ascending
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
 
-  // False for points in one place and for points whose second variance is at most `min_ratio` of
-  // the largest: on one line they have no plane.
+  // False for coincident points and for points with a second variance of at most `min_ratio` of the
+  // largest: points on a line have no plane.
   bool is_plane(double min_ratio) const {
     return variances[1] > min_ratio * variances[2] && variances[2] > 0.0;
   }

@@ -1,5 +1,5 @@
-// Small rigid motions and their derivatives, for least squares over poses. A step e = (x y z,
-// rotation vector), m and rad, moves a pose T in its own frame: moved(T, e) = T * [exp(rotation) |
+// Small rigid motions and derivatives, for least squares over poses. A step e = (x y z, rotation
+// vector), m and rad, moves a pose T in the frame of T: moved(T, e) = T * [exp(rotation) |
 // translation]. Covariances and information matrices refer to such steps, ordered as in PoseLink.
 #pragma once
 
@@ -25,12 +25,13 @@ Eigen::Quaterniond rotation_of(const Eigen::Vector3d& rotation_vector);
 Eigen::Vector3d rotation_vector_of(const Eigen::Matrix3d& rotation);
 
 // Derivative of rotation_vector_of(R * exp(r)) by r at 0, for R = exp(rotation_vector): the inverse
-// right Jacobian of SO(3). The derivative of rotation_vector_of(exp(r) * R) is its transpose.
+// right Jacobian of SO(3). The derivative of rotation_vector_of(exp(r) * R) is the transpose of
+// this matrix.
 Eigen::Matrix3d rotation_vector_derivative(const Eigen::Vector3d& rotation_vector);
 
 Pose moved(const Pose& pose, const Vector6d& step);
 
-// Step from `from` to `to`, and its derivative with respect to a step of `to`.
+// Step from `from` to `to`, and the derivative of this step with respect to a step of `to`.
 Vector6d step_between(const Pose& from, const Pose& to);
 Matrix6d step_derivative(const Pose& from, const Pose& to);
 

@@ -14,7 +14,7 @@ inline double tukey_width_of(double median_deviation) {
   return tukey_width * sigma_per_median_deviation * median_deviation;
 }
 
-// Tukey's biweight (Beaton and Tukey 1974) of a residual in units of its width.
+// Tukey's biweight (Beaton and Tukey 1974) of a residual in units of the weight function's width.
 inline double tukey_weight(double ratio) {
   const double rest = 1.0 - ratio * ratio;
   return rest > 0.0 ? rest * rest : 0.0;

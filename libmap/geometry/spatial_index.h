@@ -1,6 +1,6 @@
 // Neighbor search among points: PointTree for a fixed set of points, GrowingGrid for points added
 // between searches. Other structures exist only where these are measurably slower or where sums
-// depend on the order of the neighbors; each states its measurement:
+// depend on the order of the neighbors; each states a measurement:
 // libgtd/shape/point_grid.h (8 times as fast for 27 neighbors), libmap/fusion/surface_points.cc (3
 // times), libmap/surface/self_intersections.cc (boxes of triangles), Embree for rays and distances.
 #pragma once

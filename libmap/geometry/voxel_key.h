@@ -11,7 +11,7 @@
 
 namespace libmap {
 
-// Index of a voxel in its grid, and the side of a thin sheet that it represents.
+// Index of a voxel in the grid, and the side of a thin sheet that it represents.
 struct VoxelSide {
   Eigen::Vector3i cell = Eigen::Vector3i::Zero();
   int side = 0;  // 0 or 1
@@ -24,7 +24,7 @@ inline constexpr int voxel_cell_limit = 1 << 20;
 namespace voxel_key {
 
 inline constexpr std::uint64_t axis_mask = (std::uint64_t{1} << 21U) - 1;
-// Bits of the voxel's position in its block of 4 x 4 x 2 voxels.
+// Bits of the voxel's position in a block of 4 x 4 x 2 voxels.
 inline constexpr std::uint64_t block_bits =
     std::uint64_t{3} << 43U | std::uint64_t{3} << 22U | std::uint64_t{1} << 1U;
 
@@ -108,7 +108,7 @@ class VoxelIndex {
   std::vector<std::uint64_t> take_keys() && { return std::move(keys_); }
 
  private:
-  using Block = std::array<std::uint32_t, 32>;  // numbers of its keys
+  using Block = std::array<std::uint32_t, 32>;  // numbers of the block's keys
   struct Slot {
     std::uint64_t key = 0;  // of a block
     std::uint32_t block = none;

@@ -15,7 +15,7 @@ namespace libmap {
 // (without the file's name) with assimp's reason.
 TriangleMesh decode_by_assimp(const std::string& bytes, const std::string& format);
 
-// Texture image of a model: its bytes if it is embedded, else its path as stored in the file.
+// Texture image of a model: bytes of an embedded image, else the path as stored in the file.
 struct TextureImage {
   std::string bytes;
   std::string path;

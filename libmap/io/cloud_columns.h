@@ -19,7 +19,7 @@ enum class NotFinite { drop, refuse };  // treatment of positions that are not f
 
 struct CloudFromColumns {
   PointCloud cloud;
-  std::size_t dropped_points = 0;  // points whose position is not finite
+  std::size_t dropped_points = 0;  // points with a position that is not finite
 };
 
 // Throws Error if x, y or z is missing, two fields have equal names, or a position is not finite
@@ -32,9 +32,9 @@ std::vector<Column> geometry_columns(const std::vector<Column>& columns, bool wi
 // Names of the normals' columns: nx ny nz (PLY, CSV) or normal_x normal_y normal_z (PCD).
 enum class NormalNames { short_names, long_names };
 
-// Returns views on `cloud`, which must outlive them. Positions are declared float32, or float64 if
-// float32 would move a coordinate by more than 1e-5 m. Throws Error if a reader would take fields
-// for positions, normals or colors by their names.
+// Returns views on `cloud`, which must outlive the views. Positions are declared float32, or
+// float64 if float32 would move a coordinate by more than 1e-5 m. Throws Error if a reader would
+// take fields for positions, normals or colors because of the names.
 ColumnSet columns_of_cloud(const PointCloud& cloud, NormalNames names);
 
 // Appends columns that view the given arrays, which must outlive `set`.
@@ -47,8 +47,8 @@ void add_field_columns(const std::vector<ScalarField>& fields, ColumnSet& set);
 // Returns the columns as scalar fields. Throws Error if two columns have equal names.
 std::vector<ScalarField> fields_of_columns(const ColumnSet& columns);
 
-// Unpacks PCL's packed color 0xAARRGGBB, whose bytes begin at `first`, into columns red, green,
-// blue; with_packed_color packs these columns, if all three exist, into a column `rgb`.
+// Unpacks PCL's packed color 0xAARRGGBB (bytes from `first`) into columns red, green, blue;
+// with_packed_color packs these columns, if all three exist, into a column `rgb`.
 void add_packed_color_columns(const std::byte* first, std::size_t stride, bool big_endian,
                               ColumnSet& set);
 ColumnSet with_packed_color(const ColumnSet& columns);

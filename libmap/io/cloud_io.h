@@ -11,8 +11,8 @@
 // move a coordinate by more than 1e-5 m; normals as float32, colors as three bytes, integers as
 // their type. CSV has a header line and columns x y z, optionally nx ny nz and red green blue.
 // Columns of integers are read as int32, others as float64, empty cells as NaN. CSV numbers have
-// the fewest digits that parse to the same float32; parsed as doubles, they can differ from it by
-// half a unit of the last digit.
+// the fewest digits that parse to the same float32; parsed as doubles, they can differ from the
+// float32 by half a unit of the last digit.
 #pragma once
 
 #include <cstddef>
@@ -32,12 +32,12 @@ namespace libmap {
 
 struct CloudReadResult {
   PointCloud cloud;
-  std::size_t dropped_points = 0;  // points whose position is NaN or infinite
+  std::size_t dropped_points = 0;  // points with a NaN or infinite position
   GeometryFileInfo info;
 };
 
-// Returns the file itself, or the cloud files of a folder in the order of their names, without
-// hidden files. Throws Error if the path does not exist or the folder contains no cloud file.
+// Returns the file itself, or the cloud files of a folder in the order of names, without hidden
+// files. Throws Error if the path does not exist or the folder contains no cloud file.
 std::vector<std::filesystem::path> cloud_tiles(const std::filesystem::path& file_or_folder);
 
 // Reads a file, or all files of a folder into one cloud with the info of the last file. A file
@@ -90,8 +90,8 @@ class PcdPartsWriter {
   // Opens `path`, to which it writes directly, as write_cloud does. Throws Error (failed).
   PcdPartsWriter(std::filesystem::path path, const PcdPartsOptions& options);
 
-  // Appends a part; empty parts are skipped. Throws Error if its fields, normals or colors differ
-  // from the first part's, the total exceeds `points`, or the write fails (ErrorKind::failed).
+  // Appends a part; empty parts are skipped. Throws Error if fields, normals or colors differ from
+  // the first part, the total exceeds `points`, or the write fails (ErrorKind::failed).
   void append(const PointCloud& part);
   // Call it after the last part. Throws Error if the total is below `points` or the write fails.
   void finish();

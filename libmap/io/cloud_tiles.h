@@ -1,7 +1,7 @@
 // Reads a terrain that is stored in one or many cloud files, in blocks. For binary PCD and binary
-// PLY without lists at its vertices, memory is proportional to the size of a block. Files of other
-// encodings are read completely, one at a time. Only positions and normals are read. All DEMs
-// (.tif) are in the local frame of the first DEM.
+// PLY without vertex lists, memory is proportional to the size of a block. Files of other encodings
+// are read completely, one at a time. Only positions and normals are read. All DEMs (.tif) are in
+// the local frame of the first DEM.
 #pragma once
 
 #include <cstddef>
@@ -46,7 +46,7 @@ struct TileInfo {
   std::size_t dropped_points = 0;
   Bounds3d box;
 };
-// Reads a file and returns its number of points and its bounding box. `georeference` is the
+// Reads a file and returns the number and bounding box of the points. `georeference` is the
 // TileStream's. Throws Error naming the file if it cannot be read.
 TileInfo survey_tile(const std::filesystem::path& tile,
                      const std::optional<Georeference>& georeference = std::nullopt);

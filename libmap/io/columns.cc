@@ -117,10 +117,9 @@ double number_of(const TextLine& line, std::size_t word, const std::string& fiel
                  ScalarType type) {
   const std::string_view text = line.words[word];
   const std::optional<double> value = parse_double(text);
-  const char* const fault = !value ? " contains no number in this field"
-                            : !fits_type(*value, type)
-                                ? " contains a number that its type cannot represent"
-                                : nullptr;
+  const char* const fault = !value                     ? ": not a number"
+                            : !fits_type(*value, type) ? ": not representable in the field's type"
+                                                       : nullptr;
   if (fault == nullptr) return *value;
   throw Error(name_of(line) + fault, {.field = field,
                                       .value = std::string(text.substr(0, 40)),

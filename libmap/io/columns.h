@@ -60,7 +60,8 @@ struct ColumnSet {
   std::vector<std::shared_ptr<const void>> storage;  // owners of the viewed memory
 
   const Column* find(std::string_view name) const;  // nullptr if there is no such column
-  // Adds a column of `rows` numbers, owned by the set, and returns a pointer for filling them.
+  // Adds a column of `rows` numbers, owned by the set, and returns a pointer for filling the
+  // column.
   double* add_numbers(std::string name, ScalarType type);
 };
 
@@ -98,7 +99,7 @@ void for_each_value(const Column& column, std::size_t rows, const Body& body);
 template <typename Body>
 void for_each_value_in_parallel(const Column& column, std::size_t rows, const Body& body);
 
-// Appends rows begin..end-1 as packed records, each column as its `type`.
+// Appends rows begin..end-1 as packed records, each column as Column::type.
 void append_records(const std::vector<Column>& columns, std::size_t begin, std::size_t end,
                     bool swap_bytes, std::string& out);
 std::size_t record_size(const std::vector<Column>& columns);

@@ -14,7 +14,7 @@
 // if float32 would move a coordinate by more than 1e-5 m.
 //
 // assimp returns corners, not vertices. Equal corners are merged into one vertex, in the order of
-// first use; vertices without triangles are lost. GLB has y up by its standard, this project z up:
+// first use; vertices without triangles are lost. GLB has y up by definition, this project z up:
 // writing and reading rotate about x.
 #pragma once
 
@@ -39,8 +39,8 @@ enum class FileKind { cloud, mesh };  // content of a file: points only, or face
 // truncated, or contains no triangle, an index out of range or a vertex that is not finite.
 MeshReadResult read_mesh(const std::filesystem::path& path);
 
-// Returns the file itself, or the mesh files of a folder in the order of their names, without
-// hidden files. Throws Error if the folder contains no mesh file.
+// Returns the file itself, or the mesh files of a folder in the order of names, without hidden
+// files. Throws Error if the folder contains no mesh file.
 std::vector<std::filesystem::path> mesh_tiles(const std::filesystem::path& file_or_folder);
 
 // Writes directly to `path`; for atomic output, pass the temporary path of an OutputFile. Omits

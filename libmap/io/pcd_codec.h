@@ -1,5 +1,5 @@
 // In-memory codec of PCD, the Point Cloud Library's format, versions 0.5 to 0.7: ascii, binary and
-// binary_compressed (LZF). Values are little-endian. Column names are those of cloud_columns.h.
+// binary_compressed (LZF). Values are little-endian. Column names are defined in cloud_columns.h.
 // Packed `rgb` or `rgba` (one 4-byte number, U or F) is read as red, green, blue without alpha. A
 // field of COUNT n > 1 becomes n columns NAME_0 .. NAME_n-1; fields named `_` are padding.
 #pragma once

@@ -1,6 +1,6 @@
 // In-memory codec of PLY (Turk 1994), ascii and binary little- and big-endian, for clouds and
-// meshes. All scalar properties of `vertex` and `face` are kept with their types. The faces are the
-// list `vertex_indices` or `vertex_index`; other lists and elements are listed in info.skipped.
+// meshes. All scalar properties of `vertex` and `face` are kept, with types. The faces are the list
+// `vertex_indices` or `vertex_index`; other lists and elements are listed in info.skipped.
 #pragma once
 
 #include <cstddef>

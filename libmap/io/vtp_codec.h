@@ -1,6 +1,6 @@
 // In-memory encoder of VTP, ParaView's polygonal data, by VTK. Points of a cloud are vertex cells,
 // so that ParaView shows them. Normals are point normals, colors a uint8 x 3 array "rgb", scalar
-// fields arrays of their own type. The viewpoint is a field array "viewpoint" (tx ty tz qw qx qy
+// fields arrays of the field's type. The viewpoint is a field array "viewpoint" (tx ty tz qw qx qy
 // qz).
 #pragma once
 
@@ -11,7 +11,7 @@
 namespace libmap {
 
 // Without triangles, every point is a vertex cell. VTK cannot parse NaN and infinity: arrays that
-// contain them are written as binary. Throws Error (failed) if VTK fails.
+// contain such values are written as binary. Throws Error (failed) if VTK fails.
 void encode_vtp(const GeometryContent& content, FileEncoding encoding, std::ostream& out);
 
 }  // namespace libmap

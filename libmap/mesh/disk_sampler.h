@@ -20,7 +20,7 @@ struct Fragment {
   std::array<Eigen::Vector2d, 3> corners;
 };
 
-// Fragment with the positions of its corners (m).
+// Fragment with the positions of the corners (m).
 struct PlacedFragment {
   Fragment fragment;
   std::array<Eigen::Vector3d, 3> corners;
@@ -36,7 +36,7 @@ PlacedFragment placed(const TriangleMesh& mesh, const Fragment& fragment);
 // Maps two random numbers from 0 to 1 to a uniformly distributed point of the fragment.
 TrianglePoint point_of(const Fragment& fragment, double first, double second);
 
-// Range of consecutive fragments of a surface, with its bounds.
+// Range of consecutive fragments of a surface, with the bounding box.
 struct SurfaceBlock {
   std::size_t begin = 0;
   std::size_t end = 0;
@@ -57,7 +57,7 @@ class SurfaceFragments {
 
   const std::vector<SurfaceBlock>& blocks() const { return blocks_; }
   double area_m2() const;  // of all fragments
-  // Fragment with this index and the positions of its corners.
+  // Fragment with this index and the positions of the corners.
   PlacedFragment piece(std::size_t number) const;
 
  private:

@@ -29,8 +29,8 @@ inline bool has_repeated_vertex(const Triangle& t) {
 }
 
 // Half-edges by undirected edge: edge e has half_edges[first[e]] to half_edges[first[e + 1] - 1],
-// ascending. Edges are sorted by their lower, then by their higher vertex. Triangles with a
-// repeated vertex have no edges.
+// ascending. Edges are sorted by the lower, then by the higher vertex. Triangles with a repeated
+// vertex have no edges.
 struct MeshEdges {
   std::vector<HalfEdge> half_edges;
   std::vector<std::uint32_t> first;
@@ -62,13 +62,13 @@ struct VertexTriangles {
 };
 VertexTriangles triangles_at_vertices(const std::vector<Triangle>& triangles, std::size_t vertices);
 
-// Fan of each corner (numbered as half-edges), by its lowest corner. A fan contains the corners
-// around a vertex that are joined over `opposite`; a manifold vertex has one fan.
+// Fan of each corner (numbered as half-edges), named by the fan's lowest corner. A fan contains the
+// corners around a vertex that are joined over `opposite`; a manifold vertex has one fan.
 std::vector<HalfEdge> corner_fans(const std::vector<Triangle>& triangles,
                                   const std::vector<HalfEdge>& opposite);
 
-// Chains of open half-edges, each starting with its lowest one. For an oriented manifold they are
-// closed boundary loops, opposite to the direction of the triangles (from target to source). If
+// Chains of open half-edges, each starting with the lowest half-edge. For an oriented manifold they
+// are closed boundary loops, opposite to the direction of the triangles (from target to source). If
 // several chains contain a vertex, each follows its own fan of triangles.
 std::vector<std::vector<HalfEdge>> boundary_loops(const std::vector<Triangle>& triangles,
                                                   const std::vector<HalfEdge>& opposite);

@@ -14,11 +14,11 @@ namespace libmap {
 // Number of marks that are set.
 std::size_t count_of(const std::vector<bool>& marks);
 
-// Returns the triangles with a set mark and the vertices that they use, in the original order.
+// Returns the triangles with a set mark and the vertices of these triangles, in the original order.
 // Throws Error unless there is one mark per triangle.
 TriangleMesh select_triangles(const TriangleMesh& mesh, const std::vector<bool>& keep_triangle);
 
-// Components connected by shared edges, numbered in the order of their first triangles.
+// Components connected by shared edges, numbered in the order of the first triangle of each.
 struct MeshComponents {
   std::vector<std::uint32_t> of_triangle;
   std::vector<double> areas_m2;  // by component
@@ -32,7 +32,7 @@ inline bool is_integer(ScalarType type) {
   return type != ScalarType::float32 && type != ScalarType::float64;
 }
 
-// Appends a vertex on the segment from a (t = 0) to b (t = 1) and returns its index. Its values are
+// Appends a vertex on the segment from a (t = 0) to b (t = 1) and returns its index. Values are
 // interpolated linearly, normals are normalized, and integer fields take the nearer end's value.
 std::uint32_t append_vertex_between(TriangleMesh& mesh, std::uint32_t a, std::uint32_t b, double t);
 
@@ -52,8 +52,8 @@ struct TrianglePoint {
 Eigen::Vector3d position_on(const TriangleMesh& mesh, const TrianglePoint& point);
 
 // Returns the surface at `points` as a cloud. Vertex normals, colors and vertex fields are
-// interpolated; integer fields take the value of the nearest vertex. Without vertex normals, those
-// of the triangles are used. Face fields are those of the triangle.
+// interpolated; integer fields take the value of the nearest vertex. Without vertex normals,
+// triangle normals are used. Face fields are copied from the triangle.
 PointCloud points_on_surface(const TriangleMesh& mesh, const std::vector<TrianglePoint>& points);
 
 }  // namespace libmap

@@ -16,7 +16,7 @@ namespace libmap {
 // A mesh followed by the surface around it.
 struct MeshWithMargin {
   TriangleMesh mesh;
-  std::size_t triangles = 0;  // number of triangles before those of the margin
+  std::size_t triangles = 0;  // number of triangles before the triangles of the margin
 };
 
 // Appends the triangles of `other` with a corner in `box` (x and y, borders included). Vertices of
@@ -30,14 +30,15 @@ class MeshTileIndex {
   // Reads each tile once. Throws Error naming the file that cannot be read.
   explicit MeshTileIndex(std::vector<std::filesystem::path> tiles);
 
-  // Number of tiles; indices are those of the given paths.
+  // Number of tiles; indices refer to the given paths.
   std::size_t size() const { return tiles_.size(); }
   const std::filesystem::path& path(std::size_t tile) const { return tiles_[tile].path; }
   // Bounding box in x and y.
   const Eigen::AlignedBox2d& box(std::size_t tile) const { return tiles_[tile].box; }
 
-  // Returns the tile, and the triangles of other tiles with a corner within `margin_m` of its box.
-  // Caches recently used tiles, up to 1 million triangles. Throws Error if a file cannot be read.
+  // Returns the tile, and the triangles of other tiles with a corner within `margin_m` of the
+  // tile's box. Caches recently used tiles, up to 1 million triangles. Throws Error if a file
+  // cannot be read.
   MeshWithMargin with_margin(std::size_t tile, double margin_m);
 
  private:

@@ -163,7 +163,7 @@ void bind(ParameterTable& table, PoissonDiskOptions& options) {
   table.add("radius_m", options.radius_m, positive,
             "minimum distance between samples, and maximum distance of the surface to one, m");
   table.add("count", options.count, {0.0, max_samples},
-            "number of samples (within 1 %), instead of a radius; 0: by radius");
+            "approximate number of samples (1 %); replaces radius_m; 0: use radius_m");
   table.add("seed", options.seed, {}, "random seed of the samples");
 }
 
@@ -176,7 +176,7 @@ TileSampler::TileSampler(std::vector<Bounds3d> boxes, const PoissonDiskOptions& 
     : boxes_(std::move(boxes)), options_(options), near_(boxes_.size()) {
   check_parameters(options);
   if (options.count > 0)
-    throw Error("a number of samples requires the whole surface, not pieces; use a radius",
+    throw Error("a number of samples requires the whole surface, not tiles; use a radius",
                 {.field = "count", .value = std::to_string(options.count), .bound = "0"});
 }
 

@@ -39,13 +39,13 @@ struct PoissonDiskResult {
 };
 void describe(ResultTable& table, const PoissonDiskResult& result);
 
-// Samples a mesh. Distances are Euclidean, so both sheets of a thin plate share their samples.
-// Every point of the surface is within 1.001 radii (plus rounding) of a sample. Darts are thrown
-// evenly over the surface, then into the gaps, which are divided until each is covered by a disc
-// (after Ebeida et al. 2012). The result does not depend on the number of threads. A `count` below
-// 100 is met exactly if some radius yields it. Throws Error: options out of their ranges, a mesh
-// without area, a vertex that is not finite, a count of more than 10^8, or a radius that yields
-// more than 100 samples per triangle (limit at least 2.5 million and at most 10^8 samples).
+// Samples a mesh. Distances are Euclidean, so both sheets of a thin plate share samples. Every
+// point of the surface is within 1.001 radii (plus rounding) of a sample. Darts are thrown evenly
+// over the surface, then into the gaps, which are divided until each is covered by a disc (after
+// Ebeida et al. 2012). The result does not depend on the number of threads. A `count` below 100 is
+// met exactly if some radius yields it. Throws Error: options out of range, a mesh without area, a
+// vertex that is not finite, a count of more than 10^8, or a radius that yields more than 100
+// samples per triangle (limit at least 2.5 million and at most 10^8 samples).
 PoissonDiskResult sample_poisson_disk(const TriangleMesh& mesh, const PoissonDiskOptions& options,
                                       Progress& progress = no_progress());
 

@@ -42,7 +42,7 @@ class RayCaster {
 
  private:
   EmbreeMesh mesh_;
-  Eigen::AlignedBox3d box_;  // slightly larger than the mesh, relative to its center
+  Eigen::AlignedBox3d box_;  // slightly larger than the mesh, relative to the mesh center
 };
 
 }  // namespace libmap

@@ -65,7 +65,7 @@ std::vector<Pair> pairs_of(const std::vector<Eigen::Vector3d>& points, const Pos
   });
   const double share = static_cast<double>(pairs.size()) / static_cast<double>(points.size());
   if (pairs.size() < 6 || share < options.min_overlap)
-    throw Error("too few points are near the surface to align them with it",
+    throw Error("too few points are near the surface for an alignment",
                 {.field = "points within " + to_text(static_cast<float>(options.max_distance_m)) +
                           " m of the surface",
                  .value = to_fixed_text(100.0 * share, 1) + " %",

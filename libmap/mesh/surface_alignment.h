@@ -36,11 +36,11 @@ struct SurfaceAlignmentResult {
   double rmse_m = 0.0;      // of the inliers' distances
 };
 
-// Finds the rigid motion of `points` that minimizes the weighted squares of their distances along
-// the surface's normals. Points whose nearest point is on the border are ignored. The scale of the
-// weights is 1.4826 times the median distance in each step, so that up to half of the overlapping
-// points may be outliers. The result does not depend on the number of threads. Throws Error:
-// options out of their ranges, fewer than six points, one that is not finite, a surface without
+// Finds the rigid motion of `points` that minimizes the weighted squares of the points' distances
+// along the surface normals. Points with a nearest point on the border are ignored. The scale of
+// the weights is 1.4826 times the median distance in each step, so that up to half of the
+// overlapping points may be outliers. The result does not depend on the number of threads. Throws
+// Error: options out of range, fewer than six points, one that is not finite, a surface without
 // orientation, too little overlap in some step.
 SurfaceAlignmentResult align_to_surface(const std::vector<Eigen::Vector3d>& points,
                                         const ReferenceSurface& surface,

@@ -151,12 +151,11 @@ std::vector<TrianglePoint> sample_triangles(const TriangleMesh& mesh, double per
   if (!(area > 0.0) || !std::isfinite(area)) throw Error("the mesh has no area");
   const double wanted = std::ceil(per_m2 * area);
   if (!(wanted >= 0.0 && wanted <= most))
-    throw Error(
-        "too many samples of the surface",
-        {.field = "samples",
-         .value = to_text(per_m2) + " per m2 on " + to_text(static_cast<float>(area)) + " m2",
-         .bound = "<= " + std::to_string(static_cast<std::size_t>(most)) + " in all for " +
-                  std::to_string(mesh.triangles.size()) + " triangles"});
+    throw Error("too many for the surface",
+                {.field = "number of samples",
+                 .value = to_text(wanted) + " (" + to_text(per_m2) + " per m2)",
+                 .bound = "<= " + std::to_string(static_cast<std::size_t>(most)) + " for " +
+                          std::to_string(mesh.triangles.size()) + " triangles"});
   const auto count = static_cast<std::size_t>(wanted);
   RandomStream random(seed, 0);
   std::vector<TrianglePoint> samples(count);

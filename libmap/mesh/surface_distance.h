@@ -1,4 +1,4 @@
-// Distances of points from a mesh, random samples of a mesh, and their coverage by points.
+// Distances of points from a mesh, random samples of a mesh, and coverage of samples by points.
 #pragma once
 
 #include <Eigen/Core>

@@ -16,10 +16,10 @@ class BlockSystem {
   explicit BlockSystem(std::size_t blocks);  // number of poses; all entries are zero
   std::size_t size() const { return size_; }
 
-  // Adds to block (row, column) of the information matrix and to its transpose at (column, row).
+  // Adds to block (row, column) of the information matrix and adds the transpose at (column, row).
   void add(std::size_t row, std::size_t column, const Matrix6d& block);
   void add_rhs(std::size_t row, const Vector6d& rhs);
-  // Adds a residual with derivatives by two blocks, its information and its right-hand side.
+  // Adds a residual with derivatives by two blocks, information and right-hand side.
   void add_pair(std::size_t a, std::size_t b, const Matrix6d& by_a, const Matrix6d& by_b,
                 const Matrix6d& information, const Vector6d& rhs);
   void add(const BlockSystem& other);                         // of equal size

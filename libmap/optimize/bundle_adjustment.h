@@ -18,12 +18,12 @@
 
 namespace libmap {
 
-// Bounds of physically possible calibrations. Estimates beyond them compensate other errors.
+// Bounds of physically possible calibrations. Estimates beyond the bounds compensate other errors.
 struct CalibrationBounds {
   double frame_time_s = 0.033;               // > 0: maximum depth delay and rolling shutter time
   double max_depth_correction_m = 0.01;      // >= 0: maximum depth correction: constant term
   double max_depth_correction_per_m = 0.02;  // >= 0: term proportional to range, m/m
-  double deviations = 4.0;  // not bound; other parameters, in deviations of their prior
+  double deviations = 4.0;  // not bound; other parameters, in deviations of the prior
 };
 
 struct BundleAdjustmentOptions {
@@ -43,7 +43,7 @@ struct BundleAdjustmentOptions {
   CalibrationBounds bounds{};
   // Not bound.
   DepthNoise depth_noise{};
-  CameraTiming timing_mean{};    // mean of the prior; its deviation is frame_time_s
+  CameraTiming timing_mean{};    // mean of the prior; the deviation is frame_time_s
   double tolerance = 1e-6;       // converged if a step reduces the cost by less than this share
   bool fixes_cameras = false;    // cameras stay at the start's calibration; velocities are free
   bool fixes_poses = false;      // poses are fixed
@@ -56,7 +56,7 @@ struct BundleAdjustmentOptions {
 };
 void bind(ParameterTable& table, BundleAdjustmentOptions& options);
 
-// Describes the first parameter of a calibration that is outside its bounds, with value and bound.
+// Describes the first parameter of a calibration that is outside the bounds, with value and bound.
 // Returns nullopt if the calibration is physically possible.
 std::optional<std::string> exceeded_bound(const SensorCalibration& calibration,
                                           const BundleAdjustmentOptions& options);
@@ -69,8 +69,8 @@ struct BundleAdjustmentResult {
   std::map<int, Pose> map_from_base;
   std::vector<Eigen::Vector3d> points;  // in the map, one per track
   SensorCalibration calibration;        // of the free parameters
-  // Calibrations at one standard deviation along independent directions, those that change the
-  // positions of the poses most.
+  // Calibrations at one standard deviation along the independent directions that change positions
+  // of poses most.
   std::vector<SensorCalibration> alternatives;
   SensorCalibration deviations;  // of intrinsics and timing; set if alternatives are requested
   // Information of steps of the poses (rigid_motion.h) at the optimum, in the order of
@@ -90,11 +90,12 @@ struct BundleAdjustmentResult {
 };
 
 // Adjusts poses, points and free camera parameters. The resulting poses fit frames with the
-// resulting calibration (calibrate()). `links` are those of the graph at its optimum (odometry,
+// resulting calibration (calibrate()). `links` are the links of the graph at the optimum (odometry,
 // other closures, priors). The gauge node of each component is fixed. The information is computed
-// from `system_tracks` if there are any: with TrackFrames::linked tracks it is sparse and slightly
-// smaller. `start` is the initial calibration; by default the stored cameras and the motion between
-// poses. Memory grows with the square of the number of poses. Throws Error: options out of range.
+// from `system_tracks` if there are any: with TrackFrames::linked tracks the information is sparse
+// and slightly smaller. `start` is the initial calibration; by default the stored cameras and the
+// motion between poses. Memory is proportional to the square of the number of poses. Throws Error:
+// options out of range.
 BundleAdjustmentResult adjust_bundle(
     const std::vector<FrameFeatures>& frames, const std::vector<FeatureTrack>& tracks,
     const std::map<int, Pose>& map_from_base, const std::vector<GraphLinkResult>& links,
@@ -109,8 +110,8 @@ BundleAdjustmentResult adjust_bundle(
     const std::vector<GraphComponent>& components, const BundleAdjustmentOptions& options = {},
     const SensorCalibration& start = {}, Progress& progress = no_progress());
 
-// Sets the information, the counts and the residuals of a result. `points` are those of `tracks`
-// (map frame); if empty, they are estimated at the result's poses.
+// Sets the information, the counts and the residuals of a result. `points` are the points of
+// `tracks` (map frame); if empty, points are estimated at the result's poses.
 void add_information(const std::vector<FrameFeatures>& frames,
                      const std::vector<FeatureTrack>& tracks,
                      const std::vector<GraphLinkResult>& links,

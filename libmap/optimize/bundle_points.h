@@ -1,5 +1,5 @@
-// Optimization of bundle adjustment points at given poses and cameras, and their elimination from
-// the normal equations (Schur complement). Private to libmap/optimize.
+// Optimization of bundle adjustment points at given poses and cameras, and elimination of points
+// from the normal equations (Schur complement). Private to libmap/optimize.
 #pragma once
 
 #include <Eigen/Cholesky>

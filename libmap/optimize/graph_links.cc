@@ -59,7 +59,7 @@ void require_usable(const PoseLink& link) {
     throw Error("is not finite", {.field = field});
   const Vector6d values = symmetric_eigen(information).values;
   if (values[5] <= 0.0 || values[0] < -1e-9 * values[5])
-    throw Error("its information matrix is not positive", {.field = field});
+    throw Error("the information matrix is not positive", {.field = field});
 }
 
 std::vector<GraphLink> stored_links(const PoseGraph& graph) {
@@ -85,7 +85,7 @@ void drop_invalid(std::vector<GraphLink>& links, std::vector<std::string>& warni
     }
   });
   if (dropped > 0)
-    warnings.push_back(std::to_string(dropped) + " stored links are left out, the first: " + first);
+    warnings.push_back(std::to_string(dropped) + " stored links are skipped, the first: " + first);
 }
 
 std::vector<GraphLink> odometry_links(const PoseGraph& graph) {

@@ -1,4 +1,4 @@
-// Links of a pose graph and their residuals, for all optimizations of poses and covariances.
+// Links of a pose graph and residuals of links, for all optimizations of poses and covariances.
 #pragma once
 
 #include <map>
@@ -10,7 +10,7 @@
 
 namespace libmap {
 
-// A link with its group. Links of one group share the scales of their covariances.
+// A link with its group. Links of one group have a common scale of covariances.
 struct GraphLink {
   PoseLink link{};
   std::string group{};
@@ -35,7 +35,7 @@ std::vector<GraphLink> stored_links(const PoseGraph& graph);
 void drop_invalid(std::vector<GraphLink>& links, std::vector<std::string>& warnings);
 
 // Links between consecutive odometry poses of each session, for scans with poses but without links,
-// such as a folder of images. Recalibration estimates their standard deviations.
+// such as a folder of images. Recalibration estimates standard deviations of these links.
 std::vector<GraphLink> odometry_links(const PoseGraph& graph);
 
 // Step (rigid_motion.h) from the measured to the actual relative pose; for a pose prior, from the

@@ -412,14 +412,14 @@ double agreement_of(const FrameFeatures& a, const FrameFeatures& b, const Pose& 
 void bind(ParameterTable& table, IcpOptions& options) {
   table.add("icp", options.mode,
             {{"off", IcpMode::off}, {"links", IcpMode::links}, {"global", IcpMode::global}},
-            "ICP between depth images: of frames joined by links, or of all that overlap");
+            "frame pairs aligned by ICP; off: none; links: joined by a link; global: overlapping");
   table.add("icp_iterations", options.iterations, {1, 1000}, "maximum number of ICP iterations");
   table.add("icp_pairs", options.pairs_per_frame, {1, 1000},
             "maximum number of other frames to which ICP aligns a frame");
   table.add("icp_samples", options.samples, {1, 1000000},
             "approximate number of ICP samples per frame");
   table.add("icp_distance_m", options.max_distance_m, positive,
-            "maximum distance between an ICP sample and its surface in the first iteration, m");
+            "maximum distance between an ICP sample and the surface in the first iteration, m");
   table.add("icp_degenerate", options.degenerate, zero_to_one,
             "share of the largest eigenvalue of the ICP information matrix below which a direction "
             "is ignored");

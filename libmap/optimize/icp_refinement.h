@@ -40,7 +40,7 @@ struct IcpResult {
   std::map<int, Pose> map_from_base;
   // Information of prior and surfaces in the order of the poses, divided by deviation_scale^2.
   BlockSystem information{0};
-  double deviation_scale = 1.0;  // >= 1: ratio of the errors to those of independent noise
+  double deviation_scale = 1.0;  // >= 1: ratio of the errors to errors by independent noise
   std::size_t pairs = 0;
   std::size_t samples = 0;                // matched samples in the last iteration
   std::size_t degenerate_directions = 0;  // of all pairs

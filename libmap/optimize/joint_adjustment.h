@@ -40,8 +40,8 @@ struct JointState {
   std::vector<Eigen::Vector3d> points;
 };
 
-// Normal equations. The unknowns are steps (rigid_motion.h) of poses, each followed by its motion
-// if motions are unknown, then the camera parameters.
+// Normal equations. The unknowns are steps (rigid_motion.h) of poses, each followed by the pose's
+// motion if motions are unknown, then the camera parameters.
 struct JointSystem {
   Eigen::MatrixXd matrix;  // lower triangle
   Eigen::VectorXd rhs;     // negative gradient

@@ -466,7 +466,7 @@ PoseGraphResult Optimization::run() {
 
 void bind(ParameterTable& table, PoseGraphOptions& options) {
   table.add("recalibrate", options.recalibrate,
-            "scale the covariances of each group of links to match its residuals");
+            "scale the covariances of each group of links to match the residuals of the group");
   table.add("recalibrations", options.recalibrations, {1},
             "maximum number of recalibration rounds of link covariances");
   table.add("robust_scale", options.robust_scale, not_negative,
@@ -474,7 +474,7 @@ void bind(ParameterTable& table, PoseGraphOptions& options) {
   table.add("max_chi_square", options.max_chi_square, positive,
             "maximum chi-square of a loop closure's residuals; closures above are rejected");
   table.add("gauge_node", options.gauge_node, not_negative,
-            "id of the node whose pose is fixed; 0: the first node");
+            "id of the node with a fixed pose; 0: the first node");
 }
 
 PoseGraphResult optimize_pose_graph(const std::map<int, Pose>& map_from_base,

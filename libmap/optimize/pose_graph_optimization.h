@@ -37,8 +37,8 @@ struct LinkGroupResult {
   double rotation_rms_deg = 0.0;
 };
 
-// Nodes that are connected by links. The gauge node is fixed; with gravity links, its tilt is free,
-// and with priors, its whole pose.
+// Nodes that are connected by links. The gauge node is fixed; with gravity links, the tilt of the
+// gauge node is free, and with priors, the whole pose.
 struct GraphComponent {
   std::vector<int> nodes;
   int gauge_node = 0;
@@ -57,9 +57,9 @@ struct PoseGraphResult {
 };
 
 // Optimizes the poses from the initial `map_from_base`; links to nodes without a pose are ignored.
-// A prior constrains a node's pose in the map frame. Gravity aligns its up direction with the map's
-// z axis. Landmarks are points or poses observed from several nodes. Throws Error: a link that
-// require_usable rejects, options out of their ranges.
+// A prior constrains a node's pose in the map frame. Gravity aligns a node's up direction with the
+// map's z axis. Landmarks are points or poses observed from several nodes. Throws Error: a link
+// that require_usable rejects, options out of range.
 PoseGraphResult optimize_pose_graph(const std::map<int, Pose>& map_from_base,
                                     const std::vector<GraphLink>& links,
                                     const PoseGraphOptions& options = {});

@@ -1,5 +1,4 @@
-// Velocities of the base at its poses, estimated from neighboring poses. Private to
-// bundle_adjustment.
+// Velocities of the base at poses, estimated from neighboring poses. Private to bundle_adjustment.
 #pragma once
 
 #include <map>
@@ -11,8 +10,8 @@
 
 namespace libmap {
 
-// Velocity in the base frame (m/s, rad/s). The default standard deviation is that of a hand-held
-// camera's velocity from the mean between poses a third of a second or more apart.
+// Velocity in the base frame (m/s, rad/s). The default standard deviation describes the deviation
+// of a hand-held camera's velocity from the mean between poses a third of a second or more apart.
 struct KnownMotion {
   Vector6d mean = Vector6d::Zero();
   Vector6d deviation = (Vector6d() << 0.15, 0.15, 0.15, 0.25, 0.25, 0.25).finished();

@@ -1,5 +1,5 @@
 // Bundle adjustment of long scans with fixed cameras: a sparse system of poses, with each point at
-// its optimum for the poses (variable projection). Memory and time are proportional to the number
+// the optimum for the poses (variable projection). Memory and time are proportional to the number
 // of observations, plus the fill-in of the links' graph.
 #pragma once
 
@@ -20,7 +20,7 @@ class TrackSystem {
 
   // Points of the tracks (map frame): the mean of the measurements, then optimized.
   std::vector<Eigen::Vector3d> points_at(const std::map<int, Pose>& map_from_base) const;
-  // Optimizes the points at the given poses, from their current positions.
+  // Optimizes the points at the given poses, from the current positions.
   void optimize_points(const std::map<int, Pose>& map_from_base,
                        std::vector<Eigen::Vector3d>& points) const;
 

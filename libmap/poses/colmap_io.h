@@ -36,10 +36,11 @@ ColmapCamera to_colmap(const Camera& camera);
 // A feature of an image.
 struct ColmapObservation {
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  // COLMAP's: centers at halves
-  std::int64_t point = -1;                          // its POINT3D_ID; -1: no point
+  std::int64_t point = -1;                          // POINT3D_ID; -1: no point
 };
 
-// Two lines of images.txt: "IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME" and its features.
+// Two lines of images.txt: "IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME" and the features of the
+// image.
 struct ColmapImage {
   int camera = 0;                             // CAMERA_ID
   std::string name{};                         // relative to the folder of the images

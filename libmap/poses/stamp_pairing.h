@@ -10,7 +10,7 @@ namespace libmap {
 // Default tolerance between the images of a camera, s.
 inline constexpr double pairing_tolerance_s = 0.02;
 
-// Returns pairs (index in `a`, index in `b`) whose stamps differ by at most `tolerance_s`, by
+// Returns pairs (index in `a`, index in `b`) with stamps that differ by at most `tolerance_s`, by
 // ascending index in `a`. Each stamp of `a` selects the nearest of `b`; if several select the same
 // one, the nearest gets it, or the earlier one in `a` for equal distances. Stamps need no order.
 std::vector<std::pair<std::size_t, std::size_t>> pair_by_stamp(const std::vector<double>& a,

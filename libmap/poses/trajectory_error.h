@@ -25,10 +25,10 @@ struct AbsoluteTrajectoryError : TrajectoryError {
 };
 
 // Errors after a least-squares rigid alignment of positions and rotations (Umeyama 1991, without
-// scale; chordal distance of rotations), whose weights are estimated from the residuals. Paths
-// wider than 0.5 m (root mean square distance from the longest axis) are aligned by positions
-// only. Poses are paired by node, or by time (within 20 ms) if nodes are unknown. Throws Error for
-// fewer than 3 pairs.
+// scale; chordal distance of rotations). The relative weight of rotations is estimated from the
+// residuals. If the RMS distance of the positions from the principal axis is >= 0.5 m, only
+// positions are aligned. Poses are paired by node, or by time (within 20 ms) if nodes are unknown.
+// Throws Error for fewer than 3 pairs.
 AbsoluteTrajectoryError absolute_trajectory_error(const Trajectory& estimate,
                                                   const Trajectory& truth);
 

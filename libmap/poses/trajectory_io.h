@@ -13,8 +13,8 @@
 namespace libmap {
 
 // Formats, with RTAB-Map's numbers. `automatic` recognizes the extensions .tum, .kitti, .g2o,
-// .toro; a folder or images.txt as a COLMAP model; other files (.txt, .graph, .csv) by their
-// content. Formats 1 and 2, which have other axes, cannot be recognized and must be given.
+// .toro; a folder or images.txt as a COLMAP model; other files (.txt, .graph, .csv) by content.
+// Formats 1 and 2, which have other axes, cannot be recognized and must be given.
 enum class TrajectoryFormat {
   automatic,
   tum,                 // 10, 11
@@ -65,7 +65,7 @@ struct NodeTrajectory {
 };
 
 // Assigns poses to nodes: by node if all poses have one, else by stamp within 20 ms, else by order.
-// By order, the number of poses must equal that of the valid nodes or of the nodes with a stored
+// By order, the number of poses must equal the number of valid nodes or of nodes with a stored
 // pose. Throws Error (without the file's name) if no pose matches or a node has two poses.
 NodeTrajectory assign_nodes(const Trajectory& trajectory, const PoseGraph& graph);
 

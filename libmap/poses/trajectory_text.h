@@ -17,7 +17,7 @@ namespace libmap {
 std::string stamp_text(double stamp_s);
 
 // TUM RGB-D benchmark: "stamp x y z qx qy qz qw", s and m, RTAB-Map's formats 1 and 10; with
-// `nodes` and the node as a ninth column, its format 11. The parser accepts both, and commas.
+// `nodes` and the node as a ninth column, format 11. The parser accepts both, and commas.
 Trajectory parse_tum(std::string_view text, const std::string& file);
 std::string to_tum(const Trajectory& trajectory, bool nodes = false);
 
@@ -47,14 +47,15 @@ struct PoseGraphText {
 //
 // In g2o, the rotation error is the vector part of a quaternion, half the rotation vector: for
 // small angles q = (roll, pitch, yaw) / 2. A PoseLink's information refers to the angles, so rows
-// and columns of the rotation are multiplied by 2 in the file (its 3 x 3 block by 4) and divided by
-// 2 on reading. (RTAB-Map writes its matrix unchanged, so its exports underestimate the information
-// of rotations.)
+// and columns of the rotation are multiplied by 2 in the file (the 3 x 3 block by 4) and divided by
+// 2 on reading. (RTAB-Map writes the matrix unchanged, so exports underestimate the information of
+// rotations.)
 //
-// g2o has no types of links. They are written as comments, "# graspmap:type 1 global closure", that
-// apply to the following edges; without them, edges to the next vertex are neighbors, others global
-// closures. Links other than edges between two poses (priors, gravity, landmarks) are written as
-// comments "# graspmap:edge from to ...". Other records are ignored; planar ones are an Error.
+// g2o has no types of links. Types are written as comments, "# graspmap:type 1 global closure",
+// that apply to the following edges; without them, edges to the next vertex are neighbors, others
+// global closures. Links other than edges between two poses (priors, gravity, landmarks) are
+// written as comments "# graspmap:edge from to ...". Other records are ignored; planar ones are an
+// Error.
 PoseGraphText parse_g2o(std::string_view text, const std::string& file);
 std::string to_g2o(const Trajectory& poses, const std::vector<PoseLink>& links);
 
@@ -67,8 +68,8 @@ std::string to_g2o(const Trajectory& poses, const std::vector<PoseLink>& links);
 PoseGraphText parse_toro(std::string_view text, const std::string& file);
 std::string to_toro(const Trajectory& poses, const std::vector<PoseLink>& links);
 
-// Axes of a file's poses. RTAB-Map rotates the axes in its formats 1 and 2; the file does not
-// indicate it.
+// Axes of a file's poses. RTAB-Map rotates the axes in formats 1 and 2; the file does not indicate
+// this rotation.
 enum class PoseAxes {
   map,            // axes of the scan: x forward, z up
   optical,        // format 2: z forward, x right, y down, for the world and the moving body
@@ -77,9 +78,9 @@ enum class PoseAxes {
 Pose from_axes(PoseAxes axes, const Pose& pose_in_file);
 Pose to_axes(PoseAxes axes, const Pose& world_from_base);
 
-// Recognizes the format of a text by the tag or the number of columns of its first line that is not
-// a comment. Returns its extension: ".tum", ".kitti", ".toro", ".g2o", ".log" (Open3D), ".json"
-// (nerfstudio) or ".euroc". Throws Error for other formats.
+// Recognizes the format of a text by the tag or the number of columns of the first line that is not
+// a comment. Returns the extension of the format: ".tum", ".kitti", ".toro", ".g2o", ".log"
+// (Open3D), ".json" (nerfstudio) or ".euroc". Throws Error for other formats.
 std::string recognize_poses(std::string_view text, const std::string& file);
 
 }  // namespace libmap

@@ -44,10 +44,10 @@ struct DemBlock {
 // Reads a file sequentially in blocks (a tile, or strips of at least 65536 pixels), which determine
 // the memory. GDAL runs in a child process.
 //
-// The height band is the band named height, elevation, dem, dsm, dtm or z, else the only band. Its
-// scale, offset, unit (m or ft), nodata value and mask are applied. The local origin is that of
-// `frame`, else the center of the raster rounded to km, and the first height rounded to 100 m (0
-// for small coordinates). Files next to the DEM (.tfw, .aux.xml) are ignored.
+// The height band is the band named height, elevation, dem, dsm, dtm or z, else the only band.
+// Scale, offset, unit (m or ft), nodata value and mask of the band are applied. The local origin is
+// the origin of `frame`, else the center of the raster rounded to km, and the first height rounded
+// to 100 m (0 for small coordinates). Files next to the DEM (.tfw, .aux.xml) are ignored.
 //
 // Throws Error naming the file if it is not a GeoTIFF or damaged; has no affine transform, or a
 // geographic CRS (degrees); has no height band, or one of 8 bits or complex numbers; has more than
@@ -61,7 +61,7 @@ class DemReader {
   ~DemReader();
   DemReader(DemReader&&) noexcept;
 
-  // Properties of the whole raster by its header.
+  // Properties of the whole raster by the header.
   const DemInfo& info() const;
   // Reads the next block. Returns false after the last one.
   bool next(DemBlock& block);
@@ -71,7 +71,7 @@ class DemReader {
   std::unique_ptr<Process> process_;
 };
 
-// Returns the local position, m, of the center of a pixel, given by its index in the block.
+// Returns the local position, m, of the center of a pixel, given by the index in the block.
 Eigen::Vector3d point_of(const DemInfo& info, const DemBlock& block, std::size_t pixel);
 
 // Reads a DEM as a cloud of the centers of pixels with a height, in the order of blocks. Adds the
@@ -80,7 +80,7 @@ Eigen::Vector3d point_of(const DemInfo& info, const DemBlock& block, std::size_t
 PointCloud read_dem_cloud(const std::filesystem::path& path, std::size_t* undeclared = nullptr);
 
 // Returns the georeference of a DEM, of the first DEM in a folder (in the order of names), or of
-// another output by its manifest; nullopt if there is none.
+// another output by the manifest; nullopt if there is none.
 std::optional<Georeference> read_georeference(const std::filesystem::path& path);
 
 // Reads a DEM as a mesh. Vertices are the centers of pixels with a height, in row-major order. Four

@@ -14,7 +14,7 @@
 
 namespace libmap {
 
-// Grid of square pixels on the horizontal plane of a frame whose z is up.
+// Grid of square pixels on the horizontal plane of a frame with z up.
 struct RasterGrid {
   double pixel_size_m = 0.0;
   Pose frame_from_points = Pose::Identity();
@@ -42,7 +42,7 @@ struct MapRaster {
 // Calls the visitor with each part of a cloud. make_map_raster calls it twice.
 using CloudParts = std::function<void(const std::function<void(const PointCloud&)>& visit)>;
 
-// Returns a raster in which each pixel has the height and fields of its topmost point, the first
+// Returns a raster in which each pixel has the height and fields of the topmost point, the first
 // one for equal heights. Bands are the scalar fields of the first part except i, j and k. Throws
 // Error if there are no points or the raster needs more than half of the machine's memory.
 MapRaster make_map_raster(const CloudParts& parts, const RasterGrid& grid);

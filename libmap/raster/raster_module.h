@@ -1,5 +1,5 @@
-// Interface of libgraspmap_raster_gdal.so, the only library that links GDAL and its 140
-// dependencies. It is loaded on the first access to a GeoTIFF.
+// Interface of libgraspmap_raster_gdal.so, the only library that links GDAL with 140 dependencies.
+// This library is loaded on the first access to a GeoTIFF.
 #pragma once
 
 #include <filesystem>

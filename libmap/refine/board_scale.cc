@@ -53,12 +53,10 @@ struct PlacedBoard {
   double size = 1.0;  // lengths in the map divided by true lengths
 };
 
-[[noreturn]] void refuse_board(const Chessboard& board, const std::string& reason,
-                               const std::string& bound) {
+[[noreturn]] void refuse_board(const Chessboard& board, const std::string& reason) {
   throw Error(reason, {.field = "board",
                        .value = std::to_string(board.columns) + "x" + std::to_string(board.rows) +
-                                ":" + to_text(1e-3 * board.square_mm),
-                       .bound = bound});
+                                ":" + to_text(1e-3 * board.square_mm)});
 }
 
 // Returns nullopt if the frame has no pose or a corner has no ray.
@@ -322,8 +320,9 @@ std::vector<BoardView> find_boards(const ScanSource& scan, const std::vector<Fra
       nodes.insert(view.node);
     }
   if (nodes.size() < 2)
-    refuse_board(board, "images of " + std::to_string(nodes.size()) + " nodes show the whole board",
-                 ">= 2 nodes; COLUMNSxROWS counts inner corners, one less than squares");
+    refuse_board(board, "images of only " + std::to_string(nodes.size()) +
+                            " nodes, of the required 2, show the whole board; COLUMNSxROWS counts "
+                            "inner corners, one less than squares");
   return views;
 }
 
@@ -353,7 +352,8 @@ ScaleEstimate scale_by_board(const std::vector<FrameFeatures>& frames,
     best.observations.erase(best.observations.begin() + (worst - disagreements.begin()));
     found.reset();
   }
-  if (!found) refuse_board(board, "no two images agree on its pose", "one static board");
+  if (!found)
+    refuse_board(board, "no two images agree on the board's pose; the board must not move");
   ScaleEstimate scale;
   scale.factor = 1.0 / found->board.size;
   scale.lengths = best.observations.size();
@@ -363,10 +363,10 @@ ScaleEstimate scale_by_board(const std::vector<FrameFeatures>& frames,
   const double share = std::sqrt(found->size_variance * std::max(1.0, scale.chi_square));
   scale.deviation = scale.factor * share;
   if (!(share <= max_deviation))
-    refuse_board(board,
-                 "the images determine the scale only to " + to_fixed_text(100.0 * share, 1) +
-                     " %: show the board from locations farther apart",
-                 "<= " + to_text(100.0 * max_deviation) + " %");
+    refuse_board(board, "the images determine the scale only to " +
+                            to_fixed_text(100.0 * share, 1) + " %, not to " +
+                            to_text(100.0 * max_deviation) +
+                            " %; show the board from locations farther apart");
   return scale;
 }
 

@@ -31,13 +31,15 @@ struct BoardView {
 std::vector<BoardView> find_boards(const ScanSource& scan, const std::vector<FrameFeatures>& frames,
                                    const Chessboard& board, Progress& progress = no_progress());
 
-// Estimates the pose and size of the board by generalized least squares of its corners' pixels.
-// Each view has the noise of its own corners and the uncertainty of its pose: `covariance` is that
-// of steps of the poses (rigid_motion.h), in units of the map; poses without an entry are exact.
-// Views of another or a moved board are left out. `frames` have the stored calibration;
+// Estimates the pose and size of the board by generalized least squares of the corners' pixels.
+// Each view has the noise of the corners and the uncertainty of the view's pose. `covariance`: 6x6
+// per node, of a pose step (rigid_motion.h) in map units and rad; poses without an entry are exact.
+// Views of another or a moved board are skipped. `frames` have the stored calibration;
 // `calibration` is applied to them. In the result, `lengths` is the number of views used,
-// `chi_square` that of their poses, and `deviation` grows with a chi_square above 1. Throws Error
-// if the views do not determine the scale to 3 %, for example if all are from one location.
+// `chi_square` is per degree of freedom, of the views' poses against the board. If `chi_square` is
+// above 1, `deviation` is multiplied by sqrt(chi_square). Throws Error if no two images agree on
+// the board's pose, or if the views do not determine the scale to 3 %, for example if all are from
+// one location.
 ScaleEstimate scale_by_board(const std::vector<FrameFeatures>& frames,
                              const SensorCalibration& calibration,
                              const std::map<int, Pose>& map_from_base,

@@ -42,9 +42,10 @@ CoarseRegistration register_coarsely(const ScanSource& scan, bool may_register) 
   registration.finding = edges.sentence();
   if (!may_register) return registration;
   if (edges.is_scaled())
-    throw Error(edges.sentence(), {.field = "depth_calibration",
-                                   .bound = "a depth camera in scan.yaml (of convert SCAN -o "
-                                            "FOLDER), or --no-register-depth"});
+    throw Error(edges.sentence() +
+                    "; set depth_calibration in scan.yaml (of convert SCAN -o FOLDER) or use "
+                    "--no-register-depth",
+                {.field = "depth_calibration"});
   registration.finding += ": registered by edges before refinement";
   registration.color_from_depth = edges.color_from_depth;
   registration.scan = std::make_unique<RegisteredScan>(scan, edges.color_from_depth);

@@ -17,7 +17,7 @@ struct CoarseRegistration {
   std::string finding{};                     // empty if depth is registered
 };
 
-// Registers the depth of all frames where its edges are displaced (check_edge_agreement). Without
+// Registers the depth of all frames if edges of depth are displaced (check_edge_agreement). Without
 // `may_register`, only states the displacement. The scan must outlive the result. Throws Error: the
 // depth camera has another focal length than the color camera.
 CoarseRegistration register_coarsely(const ScanSource& scan, bool may_register);

@@ -229,7 +229,7 @@ InitialPoses initial_poses(const PoseGraph& graph, StartPoses start) {
   for (auto& [number, nodes] : parts) result.parts.push_back(std::move(nodes));
   if (result.map_from_base.empty()) {
     if (start != StartPoses::automatic)
-      throw Error("the scan has no initial poses from this source",
+      throw Error("the scan has no poses from this source",
                   {.field = "poses", .value = result.source});
     result.parts = begin_by_links(graph, wanted, result.map_from_base);
     result.source = result.parts.empty() ? "visual" : "links";

@@ -14,7 +14,7 @@ enum class StartPoses { automatic, odometry, stored, visual };
 
 struct InitialPoses {
   std::map<int, Pose> map_from_base;
-  // Groups of nodes whose poses are in one frame: the sessions, joined by links between them.
+  // Groups of nodes with poses in one frame: the sessions, joined by links between sessions.
   std::vector<std::vector<int>> parts;
   std::vector<int> without_pose;  // valid nodes with neither a pose nor links to one
   std::string source;             // "odometry", "stored", "links", "visual"

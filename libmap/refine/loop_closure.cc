@@ -96,7 +96,8 @@ void bind(ParameterTable& table, LoopClosureDetectionOptions& options) {
   table.add("neighbors", options.neighbors, not_negative,
             "number of following frames with which a frame is matched");
   table.add("max_ratio", options.max_ratio, {0.0, 1.0, true, false},
-            "maximum ratio of the descriptor distances of the best and second-best match");
+            "maximum ratio of the descriptor distances of the best and second-best match of a "
+            "feature");
   table.add("min_inliers", options.estimate.min_inliers, {6, 100000},
             "minimum number of matches that agree with the relative pose of two frames");
   table.add("min_spread", options.estimate.min_spread, not_negative,

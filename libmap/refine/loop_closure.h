@@ -16,7 +16,7 @@ namespace libmap {
 
 struct LoopClosureDetectionOptions : MatchingOptions {
   double radius_m = 1.0;       // >= 0: maximum distance of near candidates
-  double angle_deg = 60.0;     // >= 0: maximum angle between their viewing directions
+  double angle_deg = 60.0;     // >= 0: maximum angle between viewing directions
   int near_candidates = 10;    // >= 0: maximum number of near candidates per frame
   int similar_candidates = 4;  // >= 0: maximum number of candidates by appearance per frame
   int neighbors = 2;           // >= 0: number of following frames with which a frame is matched
@@ -34,16 +34,16 @@ std::set<FramePair> consecutive_pairs(const std::vector<FrameFeatures>& frames, 
 std::set<FramePair> similar_pairs(const std::vector<FrameFeatures>& frames,
                                   const std::vector<GraphComponent>& components,
                                   const LoopClosureDetectionOptions& options, std::uint64_t seed);
-// Returns pairs that are near by their poses, within a component of the graph. Frames without a
-// pose have no pairs.
+// Returns pairs with near poses, within a component of the graph. Frames without a pose have no
+// pairs.
 std::set<FramePair> near_pairs(const std::vector<FrameFeatures>& frames,
                                const std::map<int, Pose>& map_from_base,
                                const std::vector<GraphComponent>& components,
                                const LoopClosureDetectionOptions& options);
 
 // Drops links that contradict the graph and counts them in `counts`. If the graph connects both
-// nodes, the test is chi-square against the covariance of their relative pose. Otherwise another
-// link between the same two components must agree.
+// nodes, the test is chi-square against the covariance of the relative pose. Otherwise another link
+// between the same two components must agree.
 void check_against_graph(std::vector<FeatureLink>& links, const PoseGraphResult& graph,
                          const LoopClosureDetectionOptions& options, RejectionCounts& counts);
 

@@ -18,7 +18,7 @@ struct NoiseEstimate {
   std::size_t residuals = 0;  // number of residuals used
   double nearest_m = 0.0;     // minimum range of the residuals
   double farthest_m = 0.0;
-  double largest_ratio = 1.0;  // >= 1: maximum of estimated / assumed noise or its inverse
+  double largest_ratio = 1.0;  // >= 1: maximum of estimated / assumed noise or assumed / estimated
 };
 
 // Fits non-negative constant, linear and quadratic terms to the robust spread of the residuals in

@@ -185,7 +185,7 @@ void start(Run& run) {
     run.result.without_pose = std::move(initial.without_pose);
     if (!run.result.without_pose.empty())
       state.warnings.push_back(std::to_string(run.result.without_pose.size()) +
-                               " nodes have no pose from odometry or links and are left out");
+                               " nodes have no pose from odometry or links and are skipped");
   }
   warn_of_contradictions(run);
   run.report({.name = "start: " + initial.source});
@@ -193,11 +193,11 @@ void start(Run& run) {
 
 void require_one_scale(const RefinementOptions& options) {
   if (options.board && !options.known_lengths.empty())
-    throw Error("cannot be combined with known lengths: both determine the scale",
+    throw Error("cannot be combined with known lengths; both determine the scale",
                 {.field = "board"});
   if (options.scale != 1.0 && (options.board || !options.known_lengths.empty() ||
                                options.scale_from == ScaleSource::odometry))
-    throw Error("the scale is also determined by another option: use one of them",
+    throw Error("another option also determines the scale; use one of them",
                 {.field = "scale",
                  .value = to_text(options.scale),
                  .bound = "1 with known lengths, a board or the scale from odometry"});
@@ -375,7 +375,8 @@ void keep_start_if_better(const RefinementInput& input, RefinementState& state) 
     state.poses = input.start;
     state.calibration = {};
     state.warnings.push_back(
-        "held-out observations fit the initial poses better: these and the stored camera are kept");
+        "held-out observations fit the initial poses better; initial poses and stored camera are "
+        "kept");
   } else if (whole.matches.after > explained_cost) {
     state.warnings.push_back(
         "residuals of held-out matches exceed the noise: the sensor has errors that the "
@@ -416,7 +417,7 @@ void drop_unjoined(const RefinementInput& input, const RefinementState& state,
   if (kept > 1)
     result.warnings.push_back(
         "the scan has " + std::to_string(kept) +
-        " parts without links between them: their relative poses are unknown");
+        " parts of the scan are not connected by links; relative poses between parts are unknown");
   if (input.tracked.empty() && !input.options.one_map) return;
   for (const int node : left) result.covariance.erase(node);
   std::sort(left.begin(), left.end());
@@ -430,7 +431,7 @@ void drop_unjoined(const RefinementInput& input, const RefinementState& state,
     if (input.tracked.contains(node)) left.push_back(node);
   std::sort(left.begin(), left.end());
   if (!left.empty())
-    result.warnings.push_back("no link connects these nodes to the others, so they are left out: " +
+    result.warnings.push_back("nodes are skipped, because no link connects them to the others: " +
                               join_numbers(left));
   result.without_pose = std::move(left);
 }
@@ -505,8 +506,8 @@ void bind(ParameterTable& table, RefinementOptions& options) {
              {"odometry", StartPoses::odometry},
              {"stored", StartPoses::stored},
              {"visual", StartPoses::visual}},
-            "source of the initial poses; visual: images only; auto: visual for nodes without "
-            "poses and links");
+            "source of the initial poses; odometry, stored: poses of the scan; visual: images "
+            "only; auto: odometry if complete, else stored poses, links or images");
   table.add("rounds", options.rounds, not_negative,
             "maximum number of rounds in which loop closures are searched");
   bind(table, options.features);
@@ -521,8 +522,8 @@ void bind(ParameterTable& table, RefinementOptions& options) {
             {{"fixed", IntrinsicsMode::fixed},
              {"refined", IntrinsicsMode::refined},
              {"auto", IntrinsicsMode::automatic}},
-            "focal length and principal point: as stored, or estimated; auto: estimated if "
-            "held-out matches then fit better");
+            "focal length and principal point; fixed: as stored; refined: estimated; auto: "
+            "estimated if held-out matches then fit better");
   table.add("correct_depth", options.correct_depth,
             "estimate a correction of depth by range and radius if the held-out data fit better "
             "with it");
@@ -534,7 +535,8 @@ void bind(ParameterTable& table, RefinementOptions& options) {
             "with them");
   table.add("scale_from", options.scale_from,
             {{"depth", ScaleSource::depth}, {"odometry", ScaleSource::odometry}},
-            "source of the scale if no factor, known length or board is given");
+            "source of the scale without a factor, known length or board; depth: depth images; "
+            "odometry: odometry links");
   table.add("scale", options.scale, {0.5, 2.0},
             "known scale factor of the scan, e.g. as printed by crop --border-size; 1: no factor "
             "is known");

@@ -31,8 +31,8 @@
 
 namespace libmap {
 
-// Treatment of focal lengths and principal points in bundle adjustment. automatic: they are
-// estimated if the held-out observations then fit significantly better.
+// Treatment of focal lengths and principal points in bundle adjustment. automatic: estimated if the
+// held-out observations then fit significantly better.
 enum class IntrinsicsMode { fixed, refined, automatic };
 
 // Source of the scale if no factor, lengths or board are given.
@@ -43,10 +43,10 @@ struct RefinementOptions {
   int rounds = 5;  // >= 0: maximum number of rounds of loop closures
   bool bundle = true;
   IntrinsicsMode intrinsics = IntrinsicsMode::automatic;
-  // Name in data/sensors or a path. Its noise, useful range, timing and bounds replace options that
-  // have their default values. "auto": the noise is estimated.
+  // Name in data/sensors or a path. Noise, useful range, timing and bounds of the sensor replace
+  // options with default values. "auto": the noise is estimated.
   std::string sensor = "auto";
-  // Parts of a calibration that are estimated if the held-out data fit better with them.
+  // Parts of a calibration that are estimated if the held-out data then fit better.
   bool correct_depth = true;    // bend of depth by range and radius
   bool register_depth = true;   // registration of depth to color
   bool estimate_timing = true;  // delay of depth, and time of the rows of an image
@@ -58,14 +58,14 @@ struct RefinementOptions {
   IcpOptions icp{};
   ScaleSource scale_from = ScaleSource::depth;
   double scale = 1.0;  // 0.5..2: known factor of poses and depth; 1: none is known
-  std::vector<KnownLength> known_lengths{};  // not bound; they determine the scale
+  std::vector<KnownLength> known_lengths{};  // not bound; determine the scale
   std::optional<Chessboard> board{};         // not bound; a static board determines the scale
   bool one_map = false;  // not bound: no poses for parts without links to the largest part
   std::uint64_t seed = 1;
 };
 void bind(ParameterTable& table, RefinementOptions& options);
 
-// Errors against true poses, if the scan contains them; for reports only.
+// Errors against true poses, if stored in the scan; for reports only.
 struct StageError {
   AbsoluteTrajectoryError absolute;
   TrajectoryError relative;  // between consecutive poses
@@ -89,7 +89,7 @@ struct RefinementResult {
   Trajectory poses;                // map from base, by ascending node
   std::vector<PoseLink> links;     // accepted: stored links as recalibrated, then found links
   std::vector<PoseLink> closures;  // found links among `links`
-  // Covariance of a step of each pose relative to its component's gauge node, in units of the depth
+  // Covariance of a step of each pose relative to the component's gauge node, in units of the depth
   // camera. Includes the uncertainty of the calibration, but not the depth camera's scale error.
   std::map<int, Matrix6d> covariance;
   std::vector<GraphComponent> components;
@@ -104,7 +104,7 @@ struct RefinementResult {
   SensorCalibration deviations;       // BundleAdjustmentResult::deviations
   std::vector<Camera> cameras;        // of the images, as stored
   std::vector<std::string> findings;  // about the sensor, one sentence each
-  std::string noise;                  // sentence: depth noise and its source
+  std::string noise;                  // sentence: depth noise and source of the noise
   std::string scale;                  // sentence: source and uncertainty of the scale
   std::vector<std::string> warnings;
 };

@@ -1,6 +1,6 @@
 // Stages of a refinement: functions of the scan and a state that return the next state and a
-// report. refinement.cc accepts or rejects their results. Private to libmap/refine. Stages throw
-// Error for an option that is out of range.
+// report. refinement.cc accepts or rejects results. Private to libmap/refine. Stages throw Error
+// for an option that is out of range.
 #pragma once
 
 #include <cstddef>
@@ -21,8 +21,8 @@ struct RefinementInput {
   const RefinementOptions& options;
   Progress& progress;
   std::map<int, Pose> start{};                  // initial poses
-  std::vector<std::vector<int>> start_parts{};  // nodes whose initial poses are in one frame
-  std::set<int> tracked{};                      // nodes whose poses come from visual odometry
+  std::vector<std::vector<int>> start_parts{};  // nodes with initial poses in one frame
+  std::set<int> tracked{};                      // nodes with poses from visual odometry
   std::vector<BoardView> board_views{};
   // Matches of pairs of frames, cached for matching with another calibration.
   KnownMatches* known_matches = nullptr;
@@ -35,17 +35,17 @@ using SharedFrames = std::shared_ptr<std::vector<FrameFeatures>>;
 // State that stages change.
 struct RefinementState {
   std::map<int, Pose> poses{};            // of nodes and, below 0, of landmarks
-  std::vector<std::vector<int>> parts{};  // nodes whose poses are in one frame
+  std::vector<std::vector<int>> parts{};  // nodes with poses in one frame
   SharedFrames frames{};                  // with the calibration applied
   SharedFrames stored_frames{};           // with the stored cameras
   SensorCalibration calibration{};
   std::vector<GraphLink> other_links{};  // of the scan, and from alignment of depth images
   std::vector<FeatureLink> feature_links{};
-  std::set<FramePair> tried{};             // pairs of frames that have been compared
-  PoseGraphResult graph{};                 // its links: other_links, then feature_links
-  std::vector<TrackingLoss> losses{};      // of visual odometry
-  BlockSystem information{0};              // information of steps of the poses, in their order
-  bool by_observations = false;            // the information is from a bundle adjustment
+  std::set<FramePair> tried{};         // pairs of frames that have been compared
+  PoseGraphResult graph{};             // links: other_links, then feature_links
+  std::vector<TrackingLoss> losses{};  // of visual odometry
+  BlockSystem information{0};          // information of steps of the poses, in the order of poses
+  bool by_observations = false;        // the information is from a bundle adjustment
   std::vector<FramePair> surface_pairs{};  // pairs of frames that ICP has aligned
   double surface_distance_m = 0.0;         // IcpResult::max_distance_m
   double deviation_scale = 1.0;            // IcpResult::deviation_scale
@@ -65,7 +65,7 @@ inline constexpr const char* depth_link_group = "depth odometry";
 CalibrationInput calibration_input(const RefinementInput& input, const RefinementState& state,
                                    const std::vector<GraphLinkResult>& other_links);
 
-// Returns the frames as if they had been recorded with the calibration.
+// Returns the frames as if recorded with the calibration.
 SharedFrames calibrated(const std::vector<FrameFeatures>& stored,
                         const SensorCalibration& calibration);
 
@@ -85,21 +85,21 @@ PoseGraphResult graph_as_stored(const RefinementInput& input, const RefinementSt
 // odometry is estimated. Round 1: similar and near frames. Later rounds: frames with near poses.
 std::set<FramePair> candidate_pairs(const RefinementInput& input, const RefinementState& state,
                                     int round);
-// Links pairs of frames by their features and optimizes the pose graph.
+// Links pairs of frames by features and optimizes the pose graph.
 StageResult link_stage(const RefinementInput& input, const RefinementState& state, int round,
                        const std::vector<FramePair>& pairs);
-// Links frames without feature links to consecutive and near frames by aligning their depth, from
-// the present poses. The links have no matches.
+// Links frames without feature links to consecutive and near frames by aligning depth, from the
+// present poses. The links have no matches.
 StageResult depth_link_stage(const RefinementInput& input, const RefinementState& state);
-// Drops feature links that the pose graph has rejected. Returns their number.
+// Drops feature links that the pose graph has rejected. Returns the number of dropped links.
 std::size_t drop_rejected_links(RefinementState& state);
 
 // Bundle adjustment with the stored cameras.
 StageResult bundle_stage(const RefinementInput& input, const RefinementState& state);
 
 // Bundle adjustment with free intrinsics, depth correction, registration and timing. The frames of
-// `state` have stored cameras. The search begins at its calibration, if any, and estimates only
-// the parts that this has.
+// `state` have stored cameras. The search begins at the calibration of `state`, if any, and
+// estimates only the parts of that calibration.
 StageResult calibrate_stage(const RefinementInput& input, const RefinementState& state);
 // Matches linked frames again, because a false calibration causes missed and false matches.
 // Returns the former links if fewer than 90 % of the pairs match.

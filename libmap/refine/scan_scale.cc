@@ -47,7 +47,7 @@ MeasuredEnd measured_end(const KnownLength::End& length_end,
   });
   const auto pose = map_from_base.find(length_end.node);
   if (found == frames.end() || found->cameras.empty() || pose == map_from_base.end())
-    refuse(length_end, "its node has no frame with a pose", "a node of the scan");
+    refuse(length_end, "the node has no frame with a pose", "a node with a pose");
   FrameFeatures frame;
   frame.node = found->node;
   frame.cameras = found->cameras;
@@ -56,7 +56,7 @@ MeasuredEnd measured_end(const KnownLength::End& length_end,
   const auto ray = pixel_to_ray(camera, length_end.pixel);
   if (!ray || length_end.pixel.x() < 0.0 || length_end.pixel.y() < 0.0 ||
       length_end.pixel.x() > camera.width - 1.0 || length_end.pixel.y() > camera.height - 1.0)
-    refuse(length_end, "its pixel is outside the image",
+    refuse(length_end, "the pixel is outside the image",
            "0:0 to " + std::to_string(camera.width - 1) + ":" + std::to_string(camera.height - 1));
   SurfacePatch element;
   if (frame.surfaces.empty() ||

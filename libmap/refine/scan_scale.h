@@ -37,13 +37,13 @@ struct ScaleEstimate {
   double chi_square = 0.0;  // of the measurements, per degree of freedom; 0 for a single one
 };
 
-// Checks the ends of known lengths before poses are estimated. Throws Error naming an end whose
-// node has no frame, or whose pixel is outside the image or without depth.
+// Checks the ends of known lengths before poses are estimated. Throws Error naming an end with a
+// node without frame, or with a pixel outside the image or without depth.
 void check_known_lengths(const std::vector<FrameFeatures>& frames,
                          const std::vector<KnownLength>& lengths);
 
 // Estimates the scale by least squares of the ratios of true and estimated lengths. Each end has
-// the noise of its depth plane and of half a pixel; errors of the poses are neglected. `frames`
+// the noise of the depth plane and of half a pixel; errors of the poses are neglected. `frames`
 // have the stored calibration; `calibration` is applied to them. Throws the errors of
 // check_known_lengths, and Error if a length is not longer than three standard deviations.
 ScaleEstimate scale_by_lengths(const std::vector<FrameFeatures>& frames,
@@ -51,13 +51,14 @@ ScaleEstimate scale_by_lengths(const std::vector<FrameFeatures>& frames,
                                const std::map<int, Pose>& map_from_base,
                                const std::vector<KnownLength>& lengths);
 
-// Estimates the scale from links of odometry and their covariances. Returns nullopt without such
+// Estimates the scale from links of odometry and covariances of links. Returns nullopt without such
 // links.
 std::optional<ScaleEstimate> scale_by_odometry(const std::vector<GraphLinkResult>& links,
                                                const std::map<int, Pose>& map_from_base);
 
-// Scales positions about that of `fixed_node`, and the calibration so that depth after registration
-// and correction is multiplied by `factor`. `cameras` is their number in the rig.
+// Scales positions about the position of `fixed_node`, and the calibration so that depth after
+// registration and correction is multiplied by `factor`. `cameras` is the number of cameras in the
+// rig.
 void apply_scale(double factor, int fixed_node, std::size_t cameras,
                  std::map<int, Pose>& map_from_base, SensorCalibration& calibration);
 

@@ -25,7 +25,7 @@ struct CalibrationInput {
   BundleAdjustmentOptions options;
 };
 
-// Parts of a calibration, true for those that are estimated.
+// Parts of a calibration, true for estimated parts.
 struct CalibrationParts {
   bool intrinsics = false;
   bool depth = false;
@@ -52,7 +52,7 @@ struct CalibrationEstimate {
   BundleAdjustmentResult adjustment;  // of these frames, best model; without information
   HeldOutEvaluation held_out;         // of these frames: stored calibration against best model
   std::vector<std::pair<std::string, HeldOutEvaluation>> tried;  // held_out of each model
-  std::vector<std::pair<std::string, std::string>> impossible;   // models, and their exceeded bound
+  std::vector<std::pair<std::string, std::string>> impossible;   // models, and exceeded bounds
 };
 
 // Selects a calibration by bundle adjustments. Timing alone is tried first; it is the result if the
@@ -68,8 +68,8 @@ CalibrationEstimate estimate_calibration(const CalibrationInput& input,
 BundleAdjustmentResult vary_calibration(const CalibrationInput& input,
                                         const SensorCalibration& known, std::size_t count);
 
-// Replaces the motions in `calibration` by motions of all frames with a pose, estimated at its
-// timing. `fixes_poses` fixes the poses during the estimate. The estimate begins at the motions of
+// Replaces the motions in `calibration` by motions of all frames with a pose, estimated at the
+// timing of `calibration`. `fixes_poses` fixes the poses during the estimate. The estimate begins at the motions of
 // `known`, if any. The rest of `calibration` is unchanged.
 void estimate_motions(const CalibrationInput& input, bool fixes_poses,
                       SensorCalibration& calibration, const SensorCalibration& known = {});
@@ -78,8 +78,8 @@ void estimate_motions(const CalibrationInput& input, bool fixes_poses,
 bool is_similar_registration(const SensorCalibration& a, const SensorCalibration& b, double shift_m,
                              double turn_rad, double time_s);
 
-// Returns the first camera with the calibration applied, for a file. `image` is the camera of its
-// images; `graph` contains the time stamps of the nodes.
+// Returns the first camera with the calibration applied, for a file. `image` is the camera of the
+// stored images; `graph` contains the time stamps of the nodes.
 CameraFile calibrated_camera(const Camera& stored, const Camera& image,
                              const SensorCalibration& calibration, const PoseGraph& graph);
 

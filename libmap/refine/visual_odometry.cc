@@ -33,8 +33,8 @@ struct Trial {
 std::string reason_of(const RejectionCounts& counts) {
   if (counts.too_few_matches > 0) return "too few matches";
   if (counts.too_few_inliers > 0) return "too few matches agree on a motion";
-  if (counts.narrow > 0) return "its matches cover too little of the image";
-  return "its motion did not converge";
+  if (counts.narrow > 0) return "matches cover too little of the image";
+  return "motion did not converge";
 }
 
 // Scales the link's covariance by the a posteriori variance factor of its matches: the sum of
@@ -411,8 +411,7 @@ VisualOdometryResult Tracker::run(Progress& progress) {
     if (!begins) {
       loss_of_part_[none] = result_.losses.size();  // until the frame is in a part
       lose(f, key_,
-           f - last_ > longest_gap ? "no tracked frame before it"
-                                   : reason_of(trial(key_, f).counts));
+           f - last_ > longest_gap ? "no earlier tracked frame" : reason_of(trial(key_, f).counts));
     }
     if (!relocalize(f)) {
       if (earlier_ == none && !begins) earlier_ = last_;
@@ -434,9 +433,9 @@ void bind(ParameterTable& table, VisualOdometryOptions& options) {
             "visual odometry: number of matches with the key frame below which a frame becomes the "
             "next key frame");
   table.add("keyframe_distance_m", options.keyframe_distance_m, positive,
-            "visual odometry: maximum distance of a frame from its key frame, m");
+            "visual odometry: maximum distance between a frame and the key frame, m");
   table.add("keyframe_angle_deg", options.keyframe_angle_deg, positive,
-            "visual odometry: maximum rotation of a frame from its key frame, degrees");
+            "visual odometry: maximum rotation between a frame and the key frame, degrees");
   table.add("relocalization_candidates", options.relocalization_candidates, not_negative,
             "number of similar earlier frames with which a lost frame is compared");
 }

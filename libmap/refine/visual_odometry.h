@@ -1,5 +1,5 @@
-// RGB-D visual odometry: tracks each frame against the last key frame by its features and their
-// depth. After a tracking loss, it relocalizes against similar earlier frames.
+// RGB-D visual odometry: tracks each frame against the last key frame by features and depth of
+// features. After a tracking loss, relocalizes against similar earlier frames.
 #pragma once
 
 #include <cstddef>
@@ -26,7 +26,7 @@ void bind(ParameterTable& table, VisualOdometryOptions& options);
 
 // Known sessions and poses.
 struct TrackingStart {
-  std::map<int, int> session;           // by node, 0 by default; tracks end with their session
+  std::map<int, int> session;           // by node, 0 by default; tracks end with the session
   std::map<int, Pose> map_from_base;    // known poses, which are not changed
   std::vector<std::vector<int>> parts;  // disjoint groups of nodes with known poses in one frame
   std::map<int, Pose> first;            // pose of a new part's first node; the identity by default
@@ -42,7 +42,7 @@ struct TrackingLoss {
   int node = 0;
   int key_frame = 0;  // node that it was compared with; 0: none
   std::string reason{};
-  int found_node = 0;  // relocalized node: this one or a later one of its part; 0: none
+  int found_node = 0;  // relocalized node: this one or a later one of the part; 0: none
   int found_at = 0;    // earlier node that found_node was relocalized at
 };
 
@@ -61,11 +61,11 @@ struct VisualOdometryResult {
   std::size_t relocalized = 0;  // parts joined to others, and frames found again
 };
 
-// Tracks frames in the order of the list. A frame that matches neither its key frame nor the last
-// frame (verify_pairs) is tracked by its depth (align_pair), from the pose that constant motion or
-// a few matches (guess_motion) predict. If this fails too, the frame is lost. It is relocalized if
+// Tracks frames in the order of the list. A frame that matches neither the key frame nor the last
+// frame (verify_pairs) is tracked by depth (align_pair), from the pose that constant motion or a
+// few matches (guess_motion) predict. If this fails too, the frame is lost. It is relocalized if
 // the motions to two earlier frames agree, else it begins a part, which a later key frame may join
-// to another. Covariances of motions (estimate_relative_pose) are scaled by their residuals. The
+// to another. Covariances of motions (estimate_relative_pose) are scaled by the residuals. The
 // result does not depend on the number of threads. Throws Error if an option is out of range.
 VisualOdometryResult track_frames(const std::vector<FrameFeatures>& frames,
                                   const TrackingStart& start,
@@ -77,8 +77,9 @@ VisualOdometryResult track_frames(const std::vector<FrameFeatures>& frames,
 // calls it last. Frames of parts of up to four frames are aligned by depth (align_pair) with the
 // nearest frames of larger parts before and after them. The initial pose is from constant motion,
 // interpolated between both sides or extrapolated from one, else from a few matches (guess_motion).
-// Alignments with both sides must agree. In `result` the frame's part is then joined to theirs, and
-// the links are added to depth_links. `start` has the sessions and the nodes with known poses.
+// Alignments with both sides must agree. In `result` the frame's part is then joined to the larger
+// parts, and the links are added to depth_links. `start` has the sessions and the nodes with known
+// poses.
 void place_lost_frames(const std::vector<FrameFeatures>& frames, const TrackingStart& start,
                        const LoopClosureDetectionOptions& matching, std::uint64_t seed,
                        VisualOdometryResult& result);

@@ -20,8 +20,8 @@ std::string breakable_html(std::string_view name);
 // Escapes JSON for a <script> element: every '<' becomes \u003c.
 std::string escape_json_in_script(std::string json);
 
-// Escapes a script or style sheet for its element: "</script", "</style" and "<!--" are escaped.
-// Removes carriage returns, so that the bytes are those that a browser hashes.
+// Escapes a script or style sheet for inclusion in an element: "</script", "</style" and "<!--" are
+// escaped. Removes carriage returns, so that the bytes equal the bytes that a browser hashes.
 std::string escape_code(std::string_view code);
 
 // Base64 by RFC 4648, section 4. Throws Error for 1 GiB or more.
@@ -40,8 +40,8 @@ struct NumberStyle {
   bool as_given = false;  // show cells unchanged: integers only
 };
 
-// Format of a column: the maximum number of decimals of its cells, at most three. Columns whose
-// largest value is smaller than 0.01 or at least 1e9 have three significant digits.
+// Format of a column: the maximum number of decimals of the cells, at most three. Columns with a
+// largest value smaller than 0.01 or at least 1e9 have three significant digits.
 NumberStyle number_style(const std::vector<std::string>& cells);
 
 // Formats a cell, e.g. "0.98214889" as "0.982".
@@ -59,7 +59,7 @@ struct CellText {
 std::string cell_html(const CellText& cell, bool numeric);
 
 // <table> element; the first column contains the row headers. Rows after the first 40 are folded
-// unless `row_attribute` is set: each row then has an attribute of that name with its index.
+// unless `row_attribute` is set: each row then has an attribute of that name with the row index.
 std::string table_html(const ReportTable& table, const std::string& row_attribute = {});
 
 // A scrollable box, named for screen readers.

@@ -1,4 +1,4 @@
-// Reads the images of a report and reduces their size in bytes.
+// Reads the images of a report and reduces the size in bytes.
 #pragma once
 
 #include <string>
@@ -8,8 +8,8 @@
 
 namespace libmap {
 
-// Reads a PNG, JPEG or SVG, recognized by its content. Decodes PNG and JPEG once to check them.
-// Throws Error: another format, a damaged image, or an SVG above 4 MiB.
+// Reads a PNG, JPEG or SVG, recognized by content. Decodes PNG and JPEG once to check them. Throws
+// Error: another format, a damaged image, or an SVG above 4 MiB.
 ReportImage read_image_bytes(std::string bytes);
 
 // Highest level of reduction; level 0 changes nothing.

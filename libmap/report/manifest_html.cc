@@ -160,7 +160,7 @@ std::string thread_row(const TimingTable& table) {
 std::string source_html(const ReportSource& source) {
   if (!source.error.empty())
     return "<p class=\"gap\">" + escape_html(source.output) +
-           ": its manifest cannot be read: " + escape_html(source.error) + "</p>\n";
+           ": the manifest cannot be read: " + escape_html(source.error) + "</p>\n";
   double seconds = 0.0;
   for (const auto& [step, taken] : source.manifest.timings_s) seconds += taken;
   return "<details><summary><code>" + escape_html(source.output) + "</code> <span>graspmap " +

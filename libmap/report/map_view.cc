@@ -17,7 +17,7 @@ using Field = const std::vector<double>*;
 Field field_of(const PointCloud& map, const char* name) {
   const ScalarField* field = map.find_field(name);
   if (field == nullptr)
-    throw Error("not a graspability map: it has no such field", {.field = name});
+    throw Error("no such field; a graspability map is required", {.field = name});
   return &field->values;
 }
 

@@ -31,7 +31,7 @@ struct MapCell {
   std::uint8_t colors_and_flags = 0;     // color class in the lower four bits, flags above
 };
 
-// Color classes that follow those of core/score_color.h, and flags.
+// Color classes after the classes of core/score_color.h, and flags.
 inline constexpr std::uint8_t no_value_class = 7;
 inline constexpr std::uint8_t below_plane_class = 8;
 inline constexpr std::uint8_t convex_flag = 16;

@@ -27,7 +27,7 @@ struct ReportImage {
   std::string change{};  // difference from the file, e.g. "JPEG, quality 90"; empty: none
 };
 
-// Columns of a table to be shown, with their headings; empty: all.
+// Shown columns of a table, with headings; empty: all.
 using TableColumns = std::vector<std::pair<std::string, std::string>>;
 
 struct ReportTable {
@@ -42,7 +42,7 @@ struct ReportMap {
   std::optional<ReportImage> still{};
 };
 
-// A colored mesh and the meaning of its colors.
+// A colored mesh and the meaning of the colors.
 struct ReportScene {
   TriangleMesh mesh{};
   std::vector<std::pair<Color, std::string>> legend{};
@@ -96,7 +96,7 @@ struct ReportSection {
   std::vector<ReportSection> sections{};
 };
 
-// An output of the run with its manifest, or the error if the manifest cannot be read.
+// An output of the run with manifest, or the error if the manifest cannot be read.
 struct ReportSource {
   std::string output{};
   Manifest manifest{};

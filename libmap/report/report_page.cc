@@ -134,7 +134,7 @@ class PageWriter {
     const std::string caption = item.caption.empty() ? "Graspability map." : item.caption;
     const std::string still =
         map.still ? "<div class=\"still\">" + image_html(*map.still, caption) + "</div>"
-                  : "<p class=\"still\">No picture of this map was made.</p>";
+                  : "<p class=\"still\">No image of this map was made.</p>";
     return figure("map", number, item, map_html(map, still, view), "Graspability map.");
   }
 
@@ -167,7 +167,7 @@ class PageWriter {
         "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Text\"><pre>" +
         escape_html(listing.text) + "</pre></div>\n";
     if (listing.left_out_lines > 0)
-      html += fmt::format("<p class=\"changed\">{} more lines are left out.</p>\n",
+      html += fmt::format("<p class=\"changed\">{} more lines are omitted.</p>\n",
                           listing.left_out_lines);
     return figure("listing", "", item, html, "");
   }

@@ -1,4 +1,4 @@
-// Finds the content of a report in the folder of a run: sections and their files.
+// Finds the content of a report in the folder of a run: sections and files of sections.
 #pragma once
 
 #include <filesystem>
@@ -18,7 +18,7 @@ struct PlannedItem {
   std::vector<std::filesystem::path> files{};  // parameters: outputs
   std::vector<std::string> labels{};           // empty, or one per file
   std::string caption{};
-  // Maps: table of look-ups, its shown columns with headings, image of the map.
+  // Maps: table of look-ups, shown columns with headings, image of the map.
   std::filesystem::path lookup{};
   TableColumns columns{};
   std::filesystem::path image{};
@@ -41,7 +41,7 @@ struct PlannedSection {
 // Throws Error if the folder does not exist or contains nothing to show.
 PlannedSection plan_report(const std::filesystem::path& folder);
 
-// Outputs with a manifest in `folder` and its subfolders (12 levels), in natural order. Folders of
+// Outputs with a manifest in `folder` and subfolders (12 levels), in natural order. Folders of
 // tiles are included only with `tiles`, tile stores never.
 std::vector<ReportSource> manifests_below(const std::filesystem::path& folder, bool tiles);
 

@@ -1,4 +1,4 @@
-// Converts a scan to a COLMAP model; the points are from its depth images.
+// Converts a scan to a COLMAP model; the points are from the scan's depth images.
 #pragma once
 
 #include <cstddef>
@@ -20,9 +20,9 @@ struct ColmapBuilderOptions {
 };
 void bind(ParameterTable& table, ColmapBuilderOptions& options);
 
-// Each image adds points on a pixel grid, where depth is smooth and no earlier point is. Later
-// images observe a point at its projection if their depth agrees, so that reprojection errors are 0
-// by construction (ERROR is -1: unknown). Images with equal cameras share a camera.
+// Each image adds points on a pixel grid, in cells with smooth depth that observe no earlier point.
+// Later images observe a point at its projection if their depth agrees, so that reprojection errors
+// are 0 by construction (ERROR is -1: unknown). Images with equal cameras share a camera.
 class ColmapBuilder {
  public:
   explicit ColmapBuilder(const ColmapBuilderOptions& options = {});  // an empty model

@@ -144,11 +144,14 @@ DepthImage read_depth(const std::string& bytes, double depth_unit_m) {
 // Registers depth to the color camera, at the size of the depth image.
 void register_to_color(RgbdFrame& frame, const Camera& depth_camera) {
   if (frame.cameras.size() != 1 || !frame.stereo.empty())
-    throw Error("depth_calibration requires frames with one color camera",
-                {.value = std::to_string(frame.cameras.size()) + " cameras"});
+    throw Error("depth_calibration requires one camera per frame",
+                {.field = "cameras",
+                 .value = std::to_string(frame.cameras.size() + 2 * frame.stereo.size()),
+                 .bound = "1"});
   if (frame.depth.width != depth_camera.width || frame.depth.height != depth_camera.height)
-    throw Error("the depth image's size differs from the calibration's",
-                {.value = size_text(frame.depth.width, frame.depth.height),
+    throw Error("differs from the calibration",
+                {.field = "size of the depth image",
+                 .value = size_text(frame.depth.width, frame.depth.height),
                  .bound = size_text(depth_camera.width, depth_camera.height)});
   RgbdFrame only_depth;
   only_depth.cameras = frame.cameras;
@@ -173,10 +176,13 @@ void require_aspect_of_color(const RgbdFrame& frame) {
   const double ratio = frame.depth.width * height / (frame.depth.height * width);
   if (width > 0.0 && std::abs(std::log(ratio)) > max_difference)
     throw Error(
-        "aspect ratio differs from color; the image is rotated or of a separate depth camera",
-        {.value = size_text(frame.depth.width, frame.depth.height),
-         .bound = "as " + size_text(static_cast<int>(width), static_cast<int>(height)) +
-                  ", or depth_calibration in " + frame_folder_files::options});
+        "the aspect ratio differs from the color image; the depth image is rotated or requires "
+        "depth_calibration in " +
+            std::string(frame_folder_files::options),
+        {.field = "size of the depth image",
+         .value = size_text(frame.depth.width, frame.depth.height),
+         .bound =
+             "proportional to " + size_text(static_cast<int>(width), static_cast<int>(height))});
 }
 
 std::string count_of(std::size_t count, const std::string& what) {
@@ -216,9 +222,9 @@ void bind(ParameterTable& table, FrameFolderOptions& options) {
   table.add("calibration", options.calibration, "camera file with the intrinsics");
   table.add("depth_calibration", options.depth_calibration,
             "camera file of a separate depth camera; empty: depth is already registered to color");
-  table.add(
-      "pose_frame", options.pose_frame, pose_frame_names(),
-      "frame of the poses in the pose files: the camera's optical frame, or the robot's base");
+  table.add("pose_frame", options.pose_frame, pose_frame_names(),
+            "frame of the poses in the pose files; camera: optical frame; base: frame of the "
+            "robot's base");
   table.add("pairing_tolerance_s", options.pairing_tolerance_s, not_negative,
             "maximum time difference between paired color, depth and poses, s");
 }
@@ -246,10 +252,10 @@ fs::path FrameFolder::calibration_file(const std::string& name) const {
   fs::path file = path_ / name;
   std::error_code code;  // lists can contain invalid file names
   if (!fs::exists(file, code))
-    throw Error(
-        "no such file: the scan needs the camera's intrinsics in this file; set "
-        "calibration in scan.yaml to use another file",
-        {.file = file.string()});
+    throw Error(name == options_.calibration
+                    ? "no such calibration file; set the key 'calibration' in scan.yaml"
+                    : "no such calibration file",
+                {.file = file.string()});
   return file;
 }
 
@@ -365,10 +371,10 @@ void FrameFolder::add_images(const Listing& color, const Listing& depth) {
     throw Error("no color image is within " + tolerance + " of a depth image",
                 {.file = path_.string()});
   if (order.size() < depth.names.size())
-    warnings_.push_back(count_of(depth.names.size() - order.size(), "depth image") +
+    warnings_.push_back("skipped " + count_of(depth.names.size() - order.size(), "depth image") +
                         " without a color image within " + tolerance);
   if (pairs.size() < color.names.size())
-    warnings_.push_back(count_of(color.names.size() - pairs.size(), "color image") +
+    warnings_.push_back("skipped " + count_of(color.names.size() - pairs.size(), "color image") +
                         " without a depth image within " + tolerance);
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return depth.stamps[a] < depth.stamps[b]; });
@@ -453,11 +459,11 @@ void FrameFolder::read_links() {
       graph_.links.push_back(std::move(link));
   }
   if (dangling > 0)
-    warnings_.push_back(std::string(files::links) + ": " + count_of(dangling, "link") +
-                        " of missing nodes");
+    warnings_.push_back(std::string(files::links) + ": ignored " + count_of(dangling, "link") +
+                        " to or from nodes that do not exist");
   if (to_itself > 0)
-    warnings_.push_back(std::string(files::links) + ": " + count_of(to_itself, "link") +
-                        " of a node to itself");
+    warnings_.push_back(std::string(files::links) + ": ignored " + count_of(to_itself, "link") +
+                        " from a node to itself");
 }
 
 std::string FrameFolder::image_name(int node) const {

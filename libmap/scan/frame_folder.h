@@ -8,16 +8,16 @@
 //   groundtruth.txt         true poses as TUM lines, or poses_ground_truth.tum
 //   poses.tum               odometry, or poses_odometry.tum
 //   poses_stored.tum        optimized poses
-//   links.g2o               links between nodes; its vertices are not used
+//   links.g2o               links between nodes; vertices are not used
 //   nodes.csv               instead of associations.txt: node, session, weight, stamp_s, label,
 //                           color, depth, right, calibration, baseline_m, velocity, gps; files
 //                           relative to the folder; several calibrations separated by spaces, and
 //                           one baseline per stereo pair
 //   color/ depth/ right/ calibration/
 //
-// Without nodes.csv, nodes are numbered from 1 in the order of time and have the stamp of their
-// depth image. Poses are assigned by node or, without nodes, by stamp: a pose is interpolated
-// between two poses within the tolerance, else the nearest pose within the tolerance is used.
+// Without nodes.csv, nodes are numbered from 1 in the order of time and have the stamp of the depth
+// image. Poses are assigned by node or, without nodes, by stamp: a pose is interpolated between two
+// poses within the tolerance, else the nearest pose within the tolerance is used.
 #pragma once
 
 #include <filesystem>
@@ -58,11 +58,11 @@ inline constexpr const char* calibration_folder = "calibration";
 enum class PoseFrame { camera, base };
 std::vector<std::pair<std::string, PoseFrame>> pose_frame_names();
 
-// Defaults are those of the TUM benchmark.
+// Defaults of the TUM benchmark.
 struct FrameFolderOptions {
   double depth_unit_m = 0.0002;  // meters per unit of the 16-bit depth images
   std::string calibration = "calibration.yaml";
-  // Calibration of a separate depth camera, whose images are registered to color on reading; its
+  // Calibration of a separate depth camera; images are registered to color on reading, and
   // local_transform is base_from_depth. Empty: the images are registered already.
   std::string depth_calibration{};
   PoseFrame pose_frame = PoseFrame::camera;  // frame of the poses in the files

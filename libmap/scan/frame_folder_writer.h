@@ -33,15 +33,16 @@ struct FrameFolderCounts {
 
 class FrameFolderWriter {
  public:
-  // Writes to `folder`, which must exist and contain no scan. Throws Error (failed), as all calls
-  // do if a file cannot be written.
+  // Writes to `folder`, which must exist and contain no scan. All members throw Error of kind
+  // `failed` if a file or folder cannot be written.
   explicit FrameFolderWriter(std::filesystem::path folder);
 
   // Writes the images and calibrations of a frame, e.g. color/000012.jpg for node 12. Depth is
   // rounded to whole millimeters; 0 beyond 65.534 m.
   void add_frame(const RgbdFrame& frame, const StoredImages& stored = {});
 
-  // Writes nodes, poses, links and scan.yaml, and returns the numbers of files.
+  // Writes nodes, poses, links and scan.yaml. Returns the numbers of images and calibrations, and
+  // of nodes with color and depth.
   FrameFolderCounts finish(const PoseGraph& graph);
 
  private:

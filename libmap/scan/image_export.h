@@ -36,17 +36,18 @@ struct ViewSelectionOptions {
 void bind(ParameterTable& table, ViewSelectionOptions& options);
 
 // Selects views greedily by descending quality and returns their indices in ascending order. Two
-// views are similar if they are closer than the radius and their axes are within the angle. No two
-// selected views are similar; each other view is similar to a better selected view. `qualities` has
-// one value per view; the first of equal views is better. Poses are of optical frames.
+// views are similar if the distance is below the radius and the angle between the axes is below the
+// limit. No two selected views are similar; each other view is similar to a better selected view.
+// `qualities` has one value per view; the first of equal views is better. Poses are of optical
+// frames.
 std::vector<std::size_t> select_views(const std::vector<Pose>& world_from_camera,
                                       const std::vector<double>& qualities,
                                       const ViewSelectionOptions& options = {});
 
-// Image with its camera for Bundler v0.3 (Snavely, Seitz and Szeliski 2006). MeshLab imports
+// Image with camera for Bundler v0.3 (Snavely, Seitz and Szeliski 2006). MeshLab imports
 // bundle.out, list.txt and the images as "registered rasters".
 struct BundlerView {
-  std::string image{};  // name in list.txt, relative to its folder
+  std::string image{};  // name in list.txt, relative to the folder of list.txt
   Camera camera{};      // centered pinhole without distortion; base_from_camera is not used
   Pose world_from_camera = Pose::Identity();  // optical frame: z forward, x right, y down
 };
@@ -54,8 +55,8 @@ struct BundlerView {
 // Returns bundle.out: "# Bundle file v0.3", the numbers of cameras and points, then for each camera
 // f k1 k2, three rows of R and t. Bundler's camera looks along -z with x right and y up:
 //   P = R * X + t,  p = -P.xy / P.z,  pixel = f * (1 + k1 |p|^2 + k2 |p|^4) * p
-// from the center of the image, x right, y up. k1 = k2 = 0, because readers interpret them
-// differently. There are no points, because registered images do not need them.
+// from the center of the image, x right, y up. k1 = k2 = 0, because readers interpret k1 and k2
+// differently. There are no points, because registered images need no points.
 std::string to_bundle_text(const std::vector<BundlerView>& views);
 
 // Returns list.txt: one image per line.

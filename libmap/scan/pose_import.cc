@@ -108,7 +108,7 @@ void add_camera(const ScanSource& scan, CameraPose pose, std::vector<CameraPose>
     pose.base_from_camera = base_from_camera(scan, pose.node, pose.camera);
     poses.push_back(pose);
   } catch (const Error& error) {
-    warnings.push_back(std::string(error.what()) + "; its pose is dropped");
+    warnings.push_back(std::string(error.what()) + "; the pose is dropped");
   }
 }
 
@@ -184,10 +184,13 @@ double fitting_scale(const std::vector<CameraPose>& poses, const std::map<int, P
     const Eigen::Matrix4d similarity = align_points(matrix_of(given), matrix_of(wanted), true);
     scale = std::cbrt(similarity.topLeftCorner<3, 3>().determinant());
   }
+  if (given.size() < 3)
+    throw Error("too few to determine the scale; set poses_scale",
+                {.field = "number of common positions",
+                 .value = std::to_string(given.size()),
+                 .bound = ">= 3"});
   if (!(scale > 0.0) || !std::isfinite(scale))
-    throw Error(
-        "the scale is undetermined: too few positions of the scan match; set poses_scale",
-        {.field = "common positions", .value = std::to_string(given.size()), .bound = ">= 3"});
+    throw Error("common positions do not determine the scale, e.g. all coincide; set poses_scale");
   return scale;
 }
 
@@ -273,13 +276,13 @@ Pose with_quaternion_order(const Pose& read, QuaternionOrder order) {
 void bind(ParameterTable& table, PoseImportOptions& options) {
   table.add("poses_format", options.format, trajectory_format_names(),
             "format of the pose file; auto: by extension, else by content; tum-motion-capture and "
-            "kitti-optical: RTAB-Map's export formats 1 and 2 with their own axes");
+            "kitti-optical: RTAB-Map's export formats 1 and 2 with special axes");
   table.add("poses_quaternion", options.quaternion,
             {{"xyzw", QuaternionOrder::xyzw}, {"wxyz", QuaternionOrder::wxyz}},
-            "order of the quaternions in the pose file (TUM, g2o)");
+            "order of the quaternions in the pose file (TUM, g2o); xyzw: w last; wxyz: w first");
   table.add("poses_of", options.frame, pose_frame_names(),
-            "frame of the poses in the pose file: the robot's base, or the first camera's optical "
-            "frame; COLMAP, nerfstudio and Open3D files always use the camera's");
+            "frame of the poses in the pose file; base: robot's base; camera: optical frame of "
+            "the first camera, always used for COLMAP, nerfstudio and Open3D");
   table.add("poses_scale", options.scale, not_negative,
             "meters per unit of the positions in the pose file (arbitrary for COLMAP); 0: "
             "determined by the best fit to the scan's odometry");

@@ -94,7 +94,7 @@ void read_pose(const YAML::Node& map, Camera& camera) {
 }
 
 RigCamera camera_of(const YAML::Node& map, const RigCamera& defaults, const fs::path& folder) {
-  if (!map.IsMap()) throw Error("a camera must be a map of keys and values");
+  if (!map.IsMap()) throw Error("not a YAML mapping");
   check_keys(map, camera_keys);
   RigCamera camera = defaults;
   if (!map["name"] || !map["name"].IsScalar()) throw Error("is missing", {.field = "name"});
@@ -113,7 +113,7 @@ Error at_camera(const Error& error, std::size_t index, const YAML::Node& map) {
 }
 
 CameraRig rig_of(const YAML::Node& root, const fs::path& folder) {
-  if (!root.IsMap()) throw Error("a rig must be a map with the key 'cameras'");
+  if (!root.IsMap()) throw Error("not a YAML mapping; a rig file requires the key 'cameras'");
   std::vector<std::string> known = limit_keys;
   known.emplace_back("cameras");
   check_keys(root, known);
@@ -149,7 +149,7 @@ void check_camera(const RigCamera& camera) {
   if (!(camera.near_m >= 0) || !std::isfinite(camera.near_m))
     refuse("near_m", camera.near_m, ">= 0");
   if (!(camera.far_m > camera.near_m))
-    refuse("far_m", camera.far_m, "> near_m, " + to_text(camera.near_m));
+    refuse("far_m", camera.far_m, "> near_m = " + to_text(camera.near_m));
   camera.camera.check();
 }
 

@@ -1,5 +1,5 @@
-// Rigs of several depth cameras on one robot, their images, and sets of synchronized images. A rig
-// is YAML:
+// Rigs of several depth cameras on one robot, images of rigs, and sets of synchronized images. A
+// rig is YAML:
 //
 //   depth_scale_m: 0.001       # meters per unit of the depth images
 //   near_m: 0.28               # measurements outside near..far are dropped
@@ -13,11 +13,11 @@
 //     - name: left
 //       calibration: left.yaml            # ... or a file, relative to this one
 //       position_m: [0.1, 0.17, 0.1]      # robot_from_camera by the camera's housing: x forward,
-//       roll_pitch_yaw_deg: [0, 0, 60]    # z up (REP-103), not by its optical frame
+//       roll_pitch_yaw_deg: [0, 0, 60]    # z up (REP-103), not by the optical frame
 //       far_m: 2.0                        # overrides the rig's; so do depth_scale_m and near_m
 //
 // robot_from_camera refers to the optical frame (z forward). A camera without any of these poses
-// has the local_transform of its calibration.
+// has the local_transform of the calibration.
 //
 // The images are in a folder:
 //
@@ -40,17 +40,17 @@
 namespace libmap {
 
 struct RigCamera {
-  std::string name{};            // name of its folder: no '/', unique in the rig
-  Camera camera{};               // base_from_camera is robot_from_camera
-  double depth_scale_m = 0.001;  // > 0
-  double near_m = 0.0;           // >= 0
+  std::string name{};                                      // folder name: no '/', unique in the rig
+  Camera camera{};                                         // base_from_camera is robot_from_camera
+  double depth_scale_m = 0.001;                            // > 0
+  double near_m = 0.0;                                     // >= 0
   double far_m = std::numeric_limits<double>::infinity();  // > near_m
 };
 
 struct CameraRig {
   std::vector<RigCamera> cameras{};
 
-  // Throws Error naming the camera, the field, its value and its bound.
+  // Throws Error naming camera, field, value and bound.
   void check() const;
 };
 
@@ -82,7 +82,7 @@ std::string rig_image_name(const std::string& camera, double stamp_s);
 std::vector<RigImage> list_rig_images(const std::filesystem::path& folder, const CameraRig& rig);
 
 // Reads an image in units of the camera's depth scale. Throws Error naming the file if it is not a
-// 16-bit gray PNG or its size differs from the camera's calibration.
+// 16-bit gray PNG or the size differs from the camera's calibration.
 Image<std::uint16_t> read_rig_units(const RigImage& image, const RigCamera& camera);
 
 // Reads an image in meters; 0 for the units 0 and 65535 (saturated). Throws as read_rig_units does.
@@ -95,7 +95,7 @@ struct SynchronizedSet {
     enum class State { seen, late, missing };  // state of the camera's image in the set
     State state = State::missing;  // late: the nearest image is outside the tolerance; missing: the
                                    // camera has no image at all
-    std::size_t image = 0;         // index of its image nearest to stamp_s, unless missing
+    std::size_t image = 0;         // index of the image nearest to stamp_s, unless missing
     double offset_s = 0.0;         // stamp of the image minus stamp_s
   };
   std::vector<Camera> cameras{};  // one per camera of the rig
@@ -114,9 +114,9 @@ SynchronizedSet fullest_synchronized_set(const std::vector<RigImage>& images,
                                          std::size_t camera_count, double tolerance_s);
 
 // Splits a recording into sets in ascending order; each image is in exactly one. The earliest
-// unassigned image begins a set. The stamp of the set is that of an image at most `tolerance_s`
-// later with the most cameras among unassigned images; ties are resolved as above. A camera without
-// an image in a set is `missing`.
+// unassigned image begins a set. The stamp of the set is the stamp of an image at most
+// `tolerance_s` later, with the most cameras among unassigned images; ties are resolved as above. A
+// camera without an image in a set is `missing`.
 std::vector<SynchronizedSet> synchronized_sets(const std::vector<RigImage>& images,
                                                std::size_t camera_count, double tolerance_s);
 

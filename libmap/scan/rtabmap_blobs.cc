@@ -27,9 +27,9 @@ template <typename T, std::size_t N>
 std::array<T, N> numbers_of(std::string_view bytes, const char* what) {
   std::array<T, N> numbers{};
   if (bytes.size() != sizeof numbers)
-    throw Error(std::string(what) + " has a wrong length",
-                {.value = std::to_string(bytes.size()) + " bytes",
-                 .bound = std::to_string(sizeof numbers)});
+    throw Error("wrong", {.field = std::string("length of ") + what,
+                          .value = std::to_string(bytes.size()) + " bytes",
+                          .bound = std::to_string(sizeof numbers) + " bytes"});
   std::memcpy(numbers.data(), bytes.data(), sizeof numbers);
   return numbers;
 }
@@ -93,9 +93,9 @@ void require_optimized_poses(const std::string& ids_blob, const std::string& pos
   constexpr std::uint64_t pose_numbers = pose_bytes / sizeof(float);
   if (elements_of(poses) % pose_numbers != 0 ||
       elements_of(poses) / pose_numbers != elements_of(ids))
-    throw Error("the numbers of ids and poses differ",
-                {.value = std::to_string(elements_of(ids)) + " and " +
-                          std::to_string(elements_of(poses) / pose_numbers)});
+    throw Error("not equal", {.field = "numbers of ids and poses",
+                              .value = std::to_string(elements_of(ids)) + " and " +
+                                       std::to_string(elements_of(poses) / pose_numbers)});
 }
 
 std::optional<Pose> decode_pose(std::string_view bytes) {

@@ -98,15 +98,14 @@ void require_scan(const fs::path& path, const RtabmapColumns& columns) {
   const auto refuse = [&](const std::string& why) {
     throw Error("is an SQLite file but not an RTAB-Map database: " + why, {.file = path.string()});
   };
-  if (!columns.has_table("Node")) refuse("it has no table Node");
-  if (!columns.has("Node", "id")) refuse("its table Node has no column id");
+  if (!columns.has_table("Node")) refuse("no table Node");
+  if (!columns.has("Node", "id")) refuse("table Node has no column id");
   if (columns.has_table("Link"))
     for (const char* column : {"from_id", "to_id", "type", "transform"})
-      if (!columns.has("Link", column))
-        refuse(std::string("its table Link has no column ") + column);
+      if (!columns.has("Link", column)) refuse(std::string("table Link has no column ") + column);
   for (const char* table : {"Data", "Image", "Depth"})
     if (columns.has_table(table) && !columns.has(table, "id"))
-      refuse(std::string("its table ") + table + " has no column id");
+      refuse(std::string("table ") + table + " has no column id");
 }
 
 }  // namespace

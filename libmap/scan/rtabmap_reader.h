@@ -1,9 +1,9 @@
 // Reader of RTAB-Map databases of all schemas from 0.10 to 0.23 (and images of older ones), without
 // RTAB-Map.
 //
-// The schema is recognized by its columns, not by its version. The reader does not write to the
-// file or its folder, and another program can have the file open (see SqliteFile). Nodes, links and
-// poses are read on opening, images one node at a time.
+// The schema is recognized by columns, not by version. The reader does not write to the file or the
+// folder, and another program can have the file open (see SqliteFile). Nodes, links and poses are
+// read on opening, images one node at a time.
 #pragma once
 
 #include <cstddef>
@@ -27,7 +27,7 @@ namespace libmap {
 
 class SqliteFile;
 
-// Data that a node contains, according to the headers of its images.
+// Data that a node contains, according to the image headers.
 struct NodeContent {
   int node = 0;
   std::optional<ImageInfo> color{};
@@ -59,7 +59,7 @@ struct FrameBlobs {
   std::string depth;
   std::string calibration;
 };
-// Decodes a frame; its node and stamp are 0. Throws Error naming "image", "depth" or "calibration".
+// Decodes a frame; node and stamp are 0. Throws Error naming "image", "depth" or "calibration".
 RgbdFrame decode_frame(const FrameBlobs& blobs, FrameParts parts = {});
 
 class RtabmapDatabase : public ScanSource {
@@ -73,13 +73,13 @@ class RtabmapDatabase : public ScanSource {
   // Converts grayscale to color. An image in the depth column that is not depth becomes `right`.
   RgbdFrame read_frame(int node, FrameParts parts = {}) const override;
 
-  // Version stored in the file (Admin.version; empty if missing), and version by its columns.
+  // Version stored in the file (Admin.version; empty if missing), and version by columns.
   const std::string& version() const { return version_; }
   std::string recognized_version() const { return columns_.recognized_version(); }
   // Reports dropped nodes, links and poses, and unknown tables and columns.
   const std::vector<std::string>& warnings() const override { return warnings_; }
 
-  // Returns RTAB-Map's parameters of its last write.
+  // Returns RTAB-Map's parameters at the last write.
   std::map<std::string, std::string> parameters() const;
   std::size_t word_count() const;
   std::size_t feature_count() const;

@@ -270,10 +270,9 @@ void apply(RgbdFrame& frame, const CameraFile& calibration, LensRays& rays) {
   Camera& camera = frame.cameras.front();
   const Camera& known = calibration.camera;
   if (camera.width != known.width || camera.height != known.height)
-    throw Error("the image size differs from the calibration's",
-                {.field = "camera",
-                 .value = size_text(camera.width, camera.height),
-                 .bound = size_text(known.width, known.height)});
+    throw Error("differs from the calibration", {.field = "size of the camera's image",
+                                                 .value = size_text(camera.width, camera.height),
+                                                 .bound = size_text(known.width, known.height)});
   const Pose base_from_camera = camera.base_from_camera;
   // Uses the stored camera, for which the transform was estimated.
   const Pose color_from_depth = calibration.color_from_depth_at(frame.stamp_s, frame.depth_later_s);

@@ -18,7 +18,7 @@ struct FrameParts {
   bool depth = true;
 };
 
-// File of a node and its number in that file.
+// File of a node and the node's number in the file.
 struct SourceNode {
   std::filesystem::path path;
   int node = 0;
@@ -39,8 +39,7 @@ class ScanSource {
   }
   // Returns the file and original number of a node of joined scans.
   virtual SourceNode source_of(int node) const { return {path(), node}; }
-  // Returns the file name of the node's color image without its folder; empty if images are not
-  // files.
+  // Returns the file name of the node's color image without folder; empty if images are not files.
   virtual std::string image_name([[maybe_unused]] int node) const { return {}; }
   // Reads a frame; images that are not stored are empty. Thread-safe. Throws Error naming file,
   // node and part if a part is damaged or there is no such node.
@@ -48,13 +47,13 @@ class ScanSource {
 };
 
 // Opens an RTAB-Map database, a folder in the layout of the TUM RGB-D benchmark, or a folder of
-// databases, joined in the order of their names (join_scans). Throws Error for other paths.
+// databases, joined in the order of names (join_scans). Throws Error for other paths.
 std::unique_ptr<ScanSource> open_scan(const std::filesystem::path& path);
 
-// Joins several scans, for example of different days; each session keeps its own frame. Node
+// Joins several scans, for example of different days; each session keeps a separate frame. Node
 // numbers of scan n (from 0) increase by n * step, where step is the smallest power of ten above
 // all numbers: node 12 of the second of two small scans becomes 112. Sessions and landmarks are
-// renumbered likewise. Optimized poses are dropped, because their frames differ. A single scan is
+// renumbered likewise. Optimized poses are dropped, because the frames differ. A single scan is
 // returned unchanged. Throws Error for no scan, too large numbers, or a file given twice.
 std::unique_ptr<ScanSource> join_scans(std::vector<std::unique_ptr<ScanSource>> scans);
 
@@ -62,8 +61,9 @@ std::unique_ptr<ScanSource> join_scans(std::vector<std::unique_ptr<ScanSource>> 
 std::unique_ptr<ScanSource> open_scans(const std::vector<std::filesystem::path>& paths);
 
 // Replaces the focal lengths, principal point and distortion of the frame's camera, and corrects
-// and registers its depth. The mounting pose and the rolling shutter are unchanged. Throws Error
-// for a frame of several cameras or a stereo pair, or if its size differs from the calibration.
+// and registers the depth. The mounting pose and the rolling shutter are unchanged. Throws Error
+// for a frame of several cameras or a stereo pair, or if the image size differs from the
+// calibration.
 void apply_calibration(RgbdFrame& frame, const CameraFile& calibration);
 
 // Returns `scan` with the calibration applied to each frame; read_frame throws Error naming the

@@ -48,7 +48,7 @@ constexpr std::array<LaserFormat, 13> laser_formats{{{"unknown", 0},
 
 std::size_t format_of(float number) {
   if (!(number >= 0) || number > 12 || number != std::floor(number))
-    throw Error("laser scan has an unknown format", {.value = to_text(number)});
+    throw Error("unknown", {.field = "format of the laser scan", .value = to_text(number)});
   return static_cast<std::size_t>(number);
 }
 
@@ -56,8 +56,9 @@ std::size_t format_of(float number) {
 std::size_t format_of_info(std::string_view info) {
   if (info.empty()) return unknown_format;
   if (info.size() != 76 && info.size() != 60 && info.size() != 56)
-    throw Error("scan_info has an unknown length",
-                {.value = std::to_string(info.size()) + " bytes", .bound = "56, 60 or 76"});
+    throw Error("unknown", {.field = "length of scan_info",
+                            .value = std::to_string(info.size()) + " bytes",
+                            .bound = "56, 60 or 76 bytes"});
   std::vector<float> numbers(info.size() / sizeof(float));
   std::memcpy(numbers.data(), info.data(), info.size());
   const std::size_t format = info.size() == 76   ? format_of(numbers[0])
@@ -65,7 +66,9 @@ std::size_t format_of_info(std::string_view info) {
                                                  : unknown_format;
   const float points = numbers[info.size() == 76 ? 6 : 0];
   if (!(points >= 0 && points <= 2e9F))
-    throw Error("invalid number of points in scan_info", {.value = to_text(points)});
+    throw Error("out of range", {.field = "number of points in scan_info",
+                                 .value = to_text(points),
+                                 .bound = ">= 0 and <= 2e9"});
   decode_pose(info.substr(info.size() - pose_bytes));
   return format;
 }
@@ -79,13 +82,13 @@ void check_laser_scan(std::string_view scan, std::string_view info) {
     throw Error("laser scan does not consist of float32 numbers");
   // Versions before 0.16.1 do not store the format; they used 2 to 7 channels.
   if (format == unknown_format && (matrix.channels < 2 || matrix.channels > 7))
-    throw Error("laser scan has an unknown number of channels",
-                {.value = std::to_string(matrix.channels)});
+    throw Error("unknown", {.field = "number of channels of the laser scan",
+                            .value = std::to_string(matrix.channels)});
   if (format != unknown_format && matrix.channels != laser_formats[format].channels)
-    throw Error(
-        "laser scan has a wrong number of channels for " + std::string(laser_formats[format].name),
-        {.value = std::to_string(matrix.channels),
-         .bound = std::to_string(laser_formats[format].channels)});
+    throw Error("wrong for format " + std::string(laser_formats[format].name),
+                {.field = "number of channels of the laser scan",
+                 .value = std::to_string(matrix.channels),
+                 .bound = std::to_string(laser_formats[format].channels)});
 }
 
 namespace {
@@ -112,8 +115,9 @@ void check_depth(const std::string& blob) {
 // Checks the length: three float64 per sensor.
 void check_sensors(const std::string& blob) {
   if (blob.size() % 24 != 0)
-    throw Error("env_sensors has a wrong length",
-                {.value = std::to_string(blob.size()) + " bytes", .bound = "a multiple of 24"});
+    throw Error("wrong", {.field = "length of env_sensors",
+                          .value = std::to_string(blob.size()) + " bytes",
+                          .bound = "a multiple of 24 bytes"});
 }
 
 struct BlobColumn {
@@ -283,7 +287,7 @@ class DatabaseVerification {
       result_.bytes += static_cast<std::uint64_t>(bytes);
       if (size > 0 && (bytes == size || (bytes % 4 == 0 && bytes / 4 == size))) return;
       findings_.add(node_in(row, 0), part_of(table, "descriptor"),
-                    Error("the number of bytes does not match descriptor_size",
+                    Error("does not match descriptor_size",
                           {.value = std::to_string(bytes) + " bytes",
                            .bound = std::to_string(size) + ", or 4 times as many"}));
     };

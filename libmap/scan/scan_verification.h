@@ -14,8 +14,8 @@ namespace libmap {
 
 // Checks a laser scan. `scan` is a compressed matrix of float32 with one column per point; `info`
 // is 76, 60 or 56 bytes of float32 (from 0.18.0, 0.16.1 to 0.17, 0.11.10 to 0.16.0), or empty
-// before. If the format is not stored, the number of channels determines it. Throws Error if they
-// are truncated or inconsistent.
+// before. If the format is not stored, the number of channels determines it. Throws Error if `scan`
+// and `info` are truncated or inconsistent.
 void check_laser_scan(std::string_view scan, std::string_view info);
 
 struct ScanFault {

@@ -70,7 +70,7 @@ OpenMode open_mode(const fs::path& path, std::string_view header) {
 Error read_error(const fs::path& path, const SQLite::Exception& error) {
   std::string reason = std::string("cannot be read as SQLite: ") + error.what();
   if (error.getErrorCode() == SQLITE_BUSY)
-    reason = "another program has locked it for more than " +
+    reason = "another program has locked the file for more than " +
              std::to_string(busy_timeout_ms / 1000) + " s";
   const int code = error.getExtendedErrorCode();
   if (code == SQLITE_READONLY_ROLLBACK || code == SQLITE_READONLY_RECOVERY)

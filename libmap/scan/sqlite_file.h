@@ -35,9 +35,9 @@ class SqliteRow {
 // Opens a file read-only and creates no files next to it (no journal, -wal or -shm). In rollback
 // mode, the file is read with SQLite's locks, after waiting up to 10 s for a writer. In WAL mode
 // with a -wal and a -shm, both are used, so that data committed by another program are visible;
-// with a -wal only (its program crashed), the -wal is read into memory; with neither, no program
-// has the file open, and it is read as an unchanging file. A journal of an interrupted write is an
-// Error: only a program with write access can roll it back.
+// with a -wal only (after a crash), the -wal is read into memory; with neither, no program has the
+// file open, and it is read as an unchanging file. A journal of an interrupted write is an Error:
+// only a program with write access can roll it back.
 class SqliteFile {
  public:
   // Throws Error if the file is not an SQLite file, damaged or not readable.
@@ -48,8 +48,8 @@ class SqliteFile {
 
   const std::filesystem::path& path() const { return path_; }
 
-  // Calls `use` for each row of a query with `arguments` for its '?'. Thread-safe; one query runs
-  // at a time. Throws Error naming the file.
+  // Calls `use` for each row of a query with `arguments` for '?'. Thread-safe; one query runs at a
+  // time. Throws Error naming the file.
   void each_row(const std::string& query, const std::vector<std::int64_t>& arguments,
                 const std::function<void(const SqliteRow&)>& use) const;
 

@@ -150,7 +150,7 @@ std::string scalar_text(const YAML::Node& node, const std::string& field) {
 }
 
 SceneShape parse_shape(const YAML::Node& node) {
-  if (!node.IsMap()) throw Error("not a map of keys and values");
+  if (!node.IsMap()) throw Error("not a YAML mapping");
   if (!node["shape"]) throw Error("is missing", {.field = "shape"});
   SceneShape shape;
   shape.geometry = make_shape_geometry(scalar_text(node["shape"], "shape"));
@@ -169,7 +169,7 @@ SceneShape parse_shape(const YAML::Node& node) {
 }
 
 PrimitiveScene parse_root(const YAML::Node& root) {
-  if (!root.IsMap()) throw Error("not a scene: must be a map with the key 'shapes'");
+  if (!root.IsMap()) throw Error("not a YAML mapping; a scene file requires the key 'shapes'");
   check_keys(root, {"shapes"});
   const YAML::Node list = root["shapes"];
   if (!list) throw Error("is missing", {.field = "shapes"});

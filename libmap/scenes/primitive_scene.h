@@ -16,7 +16,7 @@ struct Sphere {
   double radius_m = 0.0;
   bool operator==(const Sphere&) const = default;
 };
-// Centered on the shape's origin, along its x axis; `length_m` includes the round ends.
+// Centered on the shape's origin, along the shape's x axis; `length_m` includes the round ends.
 struct Capsule {
   double radius_m = 0.0;
   double length_m = 0.0;
@@ -102,7 +102,7 @@ struct SurfaceTruth {
   double curvature_min = 0.0;                          // signed principal curvatures, 1/m
   double curvature_max = 0.0;
   double height =
-      0.0;        // m above the first plane without bumps, along its normal; z without a plane
+      0.0;  // m above the first plane without bumps, along the plane's normal; z without a plane
   int shape = 0;  // index in the scene; on the ground within the radius of bumps, the bump
                   // with the largest displacement
 };
@@ -113,7 +113,7 @@ struct SurfaceTruth {
 //     - {shape: plane, size_x_m: 3, size_y_m: 3}
 //     - {shape: sphere, name: a hemisphere, radius_m: 0.25, x_m: -1, y_m: -1}
 //
-// Each entry requires `shape` and all sizes of its kind. Optional are `name`, x_m, y_m, z_m,
+// Each entry requires `shape` and all sizes of the kind. Optional are `name`, x_m, y_m, z_m,
 // roll_deg, pitch_deg, yaw_deg (0) and a bump's `profile` (cosine). Throws Error naming `file`, the
 // entry, the key, the value and the bound, and the nearest known name for unknown keys and shapes.
 PrimitiveScene parse_scene(const std::string& text, const std::string& file);

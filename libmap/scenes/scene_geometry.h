@@ -11,12 +11,12 @@
 namespace libmap {
 
 // A segment of a profile in coordinates (rho, a): distance from the axis, and along it. Segments
-// are ordered from the top (large a) down, so that the outside is on their left.
+// are ordered from the top (large a) down, so that the outside is on the left of a segment.
 struct ProfileSegment {
   bool is_arc = false;
   Eigen::Vector2d start = Eigen::Vector2d::Zero();  // line
   Eigen::Vector2d end = Eigen::Vector2d::Zero();
-  double center_a = 0.0;  // arc; its center is on the axis
+  double center_a = 0.0;  // arc; the center is on the axis
   double radius = 0.0;
   double angle_start = 0.0;  // from the +a direction, radians
   double angle_end = 0.0;
@@ -40,7 +40,7 @@ struct ProfileSegment {
   // Unsigned distance in the half-plane.
   double distance(const Eigen::Vector2d& point) const;
   // Returns true if a point of the half-plane is on the outer side of the line, or in the arc's
-  // sector outside of its circle.
+  // sector outside of the circle.
   bool is_beyond(const Eigen::Vector2d& point) const;
 };
 
@@ -62,14 +62,14 @@ struct SceneSolid {
   Pose solid_from_scene = Pose::Identity();
   Profile profile;                                      // solids of revolution; else empty
   std::vector<FlatFace> faces;                          // box (six) or plane (one)
-  Eigen::Vector3d half_size = Eigen::Vector3d::Zero();  // box, around its center
+  Eigen::Vector3d half_size = Eigen::Vector3d::Zero();  // box, around the center
   bool is_plane = false;
   bool is_ground = false;  // the first plane, which has the bumps
   Eigen::Vector3d bound_center = Eigen::Vector3d::Zero();
   double bound_radius = 0.0;  // bounding sphere; infinite for a plane
 };
 
-// Height of the ground above its plane, with first and second derivatives.
+// Height of the ground above the ground plane, with first and second derivatives.
 struct GroundHeight {
   double value = 0.0;
   Eigen::Vector2d gradient = Eigen::Vector2d::Zero();
@@ -103,8 +103,8 @@ class SceneGeometry {
   SurfaceTruth on_face(const SceneSolid& solid, const FlatFace& face, double x, double y) const;
 
   // Returns true if a surface point of `solid` is visible from outside the union; the second
-  // function tests occlusion by one other solid. Of coincident faces with the same normal, that of
-  // the first solid in the scene is visible.
+  // function tests occlusion by one other solid. Of coincident faces with the same normal, the face
+  // of the first solid in the scene is visible.
   bool is_visible(const SceneSolid& solid, const Eigen::Vector3d& position,
                   const Eigen::Vector3d& normal) const;
   bool is_hidden_by(const SceneSolid& solid, const SceneSolid& other,

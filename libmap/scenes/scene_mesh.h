@@ -19,8 +19,8 @@ struct SceneMeshOptions {
 // Meshes the visible surface with the face field "shape". Triangles are oriented outward; vertices
 // are on the exact surface. Triangles that intersect another solid are cut, with the new vertices
 // on both surfaces. Solids share these vertices with the ground: the only border of the thesis's
-// scene is the outline of its plane. Where two solids, or a solid and a second plane, overlap,
-// their cut edges agree to within the sag of a chord of edge_length_m but share no vertices; parts
+// scene is the outline of the plane. Where two solids, or a solid and a second plane, overlap,
+// cut edges agree to within the sag of a chord of edge_length_m but share no vertices; parts
 // thinner than edge_length_m may be missed. Where a solid extends beyond the outline of the ground,
 // border triangles of the ground are kept or dropped as a whole. Throws Error: an invalid scene, or
 // more than max_triangles.

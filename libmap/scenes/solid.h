@@ -1,4 +1,4 @@
-// Solids as closed triangle surfaces, and Boolean operations on them, for building test sites.
+// Solids as closed triangle surfaces, and Boolean operations on solids, for building test sites.
 #pragma once
 
 #include <Eigen/Core>
@@ -22,8 +22,9 @@ struct HalfSpace {
   double offset_m = 0.0;
 };
 
-// Intersection of half-spaces; the label of a face is the index of its half-space. Throws Error if
-// it is empty, degenerate or extends farther than `bound_m` from the origin along an axis.
+// Intersection of half-spaces; the label of a face is the index of the face's half-space. Throws
+// Error if the solid is empty, degenerate or extends farther than `bound_m` from the origin along
+// an axis.
 Solid convex_solid(const std::vector<HalfSpace>& half_spaces, double bound_m);
 
 // An ellipsoid around the origin with edges of about `edge_length_m` and label 0.
@@ -41,11 +42,11 @@ struct HeightGrid {
 // A block below a height grid with a flat base at z = base_m. Label 0 on top, -1 on sides and base.
 Solid block_solid(const HeightGrid& top, double base_m);
 
-// Removes vertices that no triangle uses; the others are in the order of their first use.
+// Removes vertices that no triangle uses; the others are in the order of first use.
 void drop_unused_vertices(std::vector<Eigen::Vector3d>& vertices, std::vector<Triangle>& triangles);
 
-// Sorts vertices by x, y, z and triangles by their vertices. The order of CGAL's results depends on
-// memory addresses; sorting them makes equal input give equal bytes.
+// Sorts vertices by x, y, z and triangles by vertex indices. The order of CGAL's results depends on
+// memory addresses; after sorting, equal input gives equal bytes.
 Solid sort_solid(const Solid& solid);
 
 // Remeshes each flat region of one label with edges of about `edge_length_m`. The outlines of the

@@ -255,7 +255,8 @@ void bind(ParameterTable& table, CameraTrajectoryOptions& options) {
             {{"auto", CameraPath::automatic},
              {"loops", CameraPath::loops},
              {"serpentine", CameraPath::serpentine}},
-            "camera path; auto: loops around a mesh, a serpentine over a folder of clouds");
+            "camera path; loops: around the site; serpentine: lanes over the terrain; auto: "
+            "loops for a mesh, serpentine for a folder of clouds");
   bind(table, options.serpentine);
   table.add("frames", options.frames, {1.0, 1e6}, "number of poses");
   table.add("loops", options.loops, {1.0, 1000.0}, "number of loops around the site");
@@ -264,7 +265,8 @@ void bind(ParameterTable& table, CameraTrajectoryOptions& options) {
   table.add("last_radius_m", options.last_radius_m, not_negative,
             "radius of the last loop, m; 0: 0.7 times the first radius");
   table.add("height_m", options.height_m, not_negative,
-            "camera height above the ground on the first loop, m; 0: 0.6 times its radius");
+            "camera height above the ground on the first loop, m; 0: 0.6 times the radius of the "
+            "loop");
   table.add("last_height_m", options.last_height_m, not_negative,
             "camera height on the last loop, m; 0: 0.8 times the first radius");
   table.add("start_deg", options.start_deg, any_number,
@@ -276,7 +278,7 @@ void bind(ParameterTable& table, CameraTrajectoryOptions& options) {
   table.add("gaze_deg", options.gaze_deg, {0.0, 45.0},
             "standard deviation of the angle between view direction and target, degrees");
   table.add("sway_m", options.sway_m, not_negative,
-            "standard deviation of the camera position from its path, per axis, m");
+            "standard deviation of the camera position about the path, per axis, m");
   table.add("tremor_deg", options.tremor_deg, not_negative,
             "standard deviation of the camera rotation about each axis, degrees");
   table.add("frame_interval_s", options.frame_interval_s, positive, "time between two poses, s");

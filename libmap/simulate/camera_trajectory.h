@@ -37,7 +37,7 @@ struct CameraTrajectoryOptions {
   double radius_m = 0.0;       // of the first loop; 0: 4/3 of half the mesh's smaller side (wall:
                                // larger side), 0.8 to 2 m
   double last_radius_m = 0.0;  // of the last loop; 0: 0.7 times the first
-  double height_m = 0.0;       // above the ground on the first loop; 0: 0.6 times its radius.
+  double height_m = 0.0;       // above the ground on the first loop; 0: 0.6 times the loop radius
                                // Serpentine: above the local mean ground; 0: 1.4 m
   double last_height_m = 0.0;  // on the last loop; 0: 0.8 times the first radius
   double start_deg = 0.0;      // direction of the first loop's start, counter-clockwise from x;
@@ -66,7 +66,7 @@ CameraMotion camera_motion(const TriangleMesh& mesh, const CameraTrajectoryOptio
 // A serpentine over the ground. Throws Error if `ground` is empty.
 CameraMotion serpentine_motion(const GroundHeights& ground, const CameraTrajectoryOptions& options,
                                std::uint64_t seed);
-// Interpolates given poses at constant velocity and angular velocity between their stamps.
+// Interpolates given poses at constant velocity and angular velocity between stamps.
 CameraMotion motion_through(Trajectory poses);
 
 // Poses at all frames. Nodes begin at 1, stamps at 1,700,000,000 s.

@@ -215,7 +215,7 @@ void bind_noise(ParameterTable& table, DepthSensorOptions& options) {
   table.add("edge_gap_m", options.edge_gap_m, positive,
             "minimum depth discontinuity inside an edge pixel, m");
   table.add("flying_pixels", options.flying_pixels, zero_to_one,
-            "share of edge pixels whose depth is measured between foreground and background");
+            "share of edge pixels with a depth between foreground and background");
   table.add("edge_dropouts", options.edge_dropouts, zero_to_one,
             "share of edge pixels without depth");
 }

@@ -1,6 +1,6 @@
 // Simulates a time-of-flight depth camera with a registered color camera that observes a mesh.
 //
-// An ideal view is rendered first, then sensor errors are applied. Each pixel has its own random
+// An ideal view is rendered first, then sensor errors are applied. Each pixel has separate random
 // numbers, so that the same seed gives the same image for any number of threads.
 #pragma once
 
@@ -40,15 +40,15 @@ struct SurfaceView {
   Image<Eigen::Vector3f> color;  // 0 to 1; weights: 1/2 for the center, 1/8 for each corner
 };
 
-// Source of colors: the vertex colors, or rock_color(). automatic: vertex colors if there are any
-// and they differ.
+// Source of colors: the vertex colors, or rock_color(). automatic: vertex colors unless missing or
+// all equal.
 enum class TextureSource { automatic, mesh, rock };
 
-// Source of the normals for shading: estimated from the mesh, or its vertex normals.
+// Source of the normals for shading: estimated from the mesh, or vertex normals of the mesh.
 enum class ShadingNormals { estimated, per_vertex };
 
-// One or several meshes prepared for rendering; copies share them. Light is diffuse from above with
-// a directional part.
+// One or several meshes prepared for rendering; copies share the meshes. Light is diffuse from
+// above with a directional part.
 class VisibleSurface {
  public:
   // Copies the mesh. Throws Error as RayCaster does, and if `texture` or `normals` require vertex

@@ -228,7 +228,7 @@ std::vector<FieldPoint> choose_field_points(const RockSite& site, const Triangle
       throw Error("too few suitable locations on the rocks",
                   {.field = "field_points.count",
                    .value = std::to_string(site.field_points.count),
-                   .bound = "at most " + std::to_string(n) + " here"});
+                   .bound = "<= " + std::to_string(n) + " for this site"});
   }
   return std::move(chooser).chosen();
 }

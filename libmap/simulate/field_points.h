@@ -1,4 +1,4 @@
-// Chooses locations for a field test on the rocks of a site, by their shape alone.
+// Chooses locations for a field test on the rocks of a site, by shape alone.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,8 +11,8 @@
 
 namespace libmap {
 
-// Shape of the surface within the radius, by its area-weighted normals (normal voting: Medioni et
-// al. 2000; Page et al. 2002). flat: equal normals. edge: normals vary in one direction, around a
+// Shape of the surface within the radius, by area-weighted normals (normal voting: Medioni et al.
+// 2000; Page et al. 2002). flat: equal normals. edge: normals vary in one direction, around a
 // ridge. corner: normals vary in both directions, around a tip. irregular: partly concave, such as
 // clefts, steps and feet of rocks.
 enum class LocationKind { flat, edge, corner, irregular };
@@ -24,7 +24,7 @@ struct FieldPoint {
   LocationKind kind = LocationKind::flat;
   bool is_hard = false;    // difficult to reach: steeper than 60 degrees
   int rock = 0;            // index in the site
-  double height_m = 0.0;   // above the ground, along its normal
+  double height_m = 0.0;   // above the ground, along the ground normal
   double slope_deg = 0.0;  // between surface and ground: 0 parallel, 90 a wall, above 90 an
                            // overhang
 };

@@ -1,5 +1,5 @@
 // Coarse grid of ground heights, computed from points, for camera paths over terrain and for the
-// extent and density of its parts. Lengths are in meters.
+// extent and density of terrain parts. Lengths are in meters.
 #pragma once
 
 #include <Eigen/Geometry>

@@ -81,7 +81,9 @@ bool is_hold(RockShape shape) {
 ParameterTable rock_parameters(SiteRock& rock) {
   ParameterTable table;
   table.add("name", rock.name, "name of the rock");
-  table.add("shape", rock.shape, rock_shape_names(), "shape of the rock");
+  table.add("shape", rock.shape, rock_shape_names(),
+            "shape of the rock; block: flat top and walls; cobble: rounded stone; dome: rounded "
+            "hump; jug, sloper, crimp, pinch: climbing holds");
   table.add("x_m", rock.x_m, Range{-100.0, 100.0}, "x of the rock's center on the ground, m");
   table.add("y_m", rock.y_m, Range{-100.0, 100.0}, "y of the rock's center on the ground, m");
   table.add("height_m", rock.height_m, rock_size_range, "height of the top above the ground, m");
@@ -104,14 +106,15 @@ ParameterTable ground_parameters(SiteGround& ground) {
   ParameterTable table;
   table.add("size_x_m", ground.size_x_m, ground_size_range, "length of the ground along x, m");
   table.add("size_y_m", ground.size_y_m, ground_size_range, "length of the ground along y, m");
-  table.add("unevenness_m", ground.relief_m, Range{0.0, 1.0}, "maximum height of random relief, m");
+  table.add_former_key("unevenness_m", "relief_m");
+  table.add("relief_m", ground.relief_m, Range{0.0, 1.0}, "maximum height of random relief, m");
   table.add("tilt_deg", ground.tilt_deg, Range{0.0, 135.0},
             "tilt of the ground, degrees; 90: a wall");
   table.add("texture", ground.texture,
             {{"soil", GroundTexture::soil},
              {"rock", GroundTexture::rock},
              {"panel", GroundTexture::panel}},
-            "texture of the ground's surface");
+            "colors of the ground; soil; rock; panel: climbing wall");
   return table;
 }
 
@@ -229,7 +232,7 @@ void place_rocks(RockSite& site, std::vector<RockToPlace> rocks) {
 }
 
 GroundRelief::GroundRelief(const RockSite& site)
-    : unevenness_m_(site.ground.relief_m), seed_(mix_bits(site.seed, 3)) {
+    : relief_m_(site.ground.relief_m), seed_(mix_bits(site.seed, 3)) {
   if (site.bumps.empty()) return;
   PrimitiveScene scene;
   scene.shapes.push_back({Plane{site.ground.size_x_m, site.ground.size_y_m}, {}, "ground"});
@@ -243,7 +246,7 @@ double GroundRelief::height(double x_m, double y_m) const {
                         0.25 * gradient_noise(at / 0.25, seed_ + 1) +
                         0.15 * gradient_noise(at / 0.07, seed_ + 2);
   const double bumps = bumps_ ? bumps_->ground_height(x_m, y_m).value : 0.0;
-  return bumps + unevenness_m_ * relief;
+  return bumps + relief_m_ * relief;
 }
 
 namespace {
@@ -252,7 +255,7 @@ constexpr std::size_t max_entries = 10'000;
 
 // Sets the table from the node and returns the keys that were set.
 std::vector<std::string> set_from_node(const ParameterTable& table, const YAML::Node& node) {
-  if (!node.IsMap()) throw Error("not a map of keys and values");
+  if (!node.IsMap()) throw Error("not a YAML mapping");
   return set_from_yaml(table, YAML::Dump(node), {});
 }
 
@@ -322,7 +325,7 @@ void parse_part(const YAML::Node& root, const std::string& key, const ParameterT
 }
 
 RockSite parse_root(const YAML::Node& root, std::optional<std::uint64_t> seed) {
-  if (!root.IsMap()) throw Error("not a site: must be a map with keys such as 'rocks'");
+  if (!root.IsMap()) throw Error("not a YAML mapping; a site file has keys such as 'rocks'");
   check_keys(root, {"seed", "ground", "layout", "field_points", "bumps", "rocks"});
   RockSite site;
   ParameterTable own;

@@ -1,9 +1,9 @@
 // Test sites: uneven ground with rocks, or a wall with climbing holds.
 //
-// The ground is a rectangle centered on the origin of the ground frame, whose z axis is the
-// ground's normal. Rocks are defined in that frame. `tilt_deg` is the rotation about x into the
-// site frame: 0 is level ground, 90 a wall that faces -y, more an overhanging wall. The lower edge
-// of the ground stays at z = 0.
+// The ground is a rectangle centered on the origin of the ground frame, with the ground's normal as
+// z axis. Rocks are defined in the ground frame. `tilt_deg` is the rotation about x into the site
+// frame: 0 is level ground, 90 a wall that faces -y, more an overhanging wall. The lower edge of
+// the ground stays at z = 0.
 #pragma once
 
 #include <cstddef>
@@ -81,7 +81,7 @@ struct RockSite {
   Pose site_from_ground() const;
 };
 
-// Parameters of each part by key. The tables refer to their argument.
+// Parameters of each part by key. A table refers to the argument.
 ParameterTable rock_parameters(SiteRock& rock);
 ParameterTable ground_parameters(SiteGround& ground);
 ParameterTable layout_parameters(SiteLayout& layout);
@@ -90,16 +90,16 @@ ParameterTable field_point_parameters(FieldPointOptions& options);
 // A rock of given shape and height; all other dimensions are drawn from `seed`.
 SiteRock draw_rock(RockShape shape, double height_m, std::uint64_t seed);
 
-// Draws positions, and yaw unless it is kept, for these rocks, widest first, such that footprints
-// satisfy the layout. Holds have a yaw of at most 25 degrees. Throws Error naming the first rock
-// that cannot be placed.
 struct RockToPlace {
   std::size_t rock = 0;  // index in the site
   bool keeps_yaw = false;
 };
+// Draws positions, and yaw unless it is kept, for these rocks, widest first, such that footprints
+// satisfy the layout. Holds have a yaw of at most 25 degrees. Throws Error naming the first rock
+// that cannot be placed.
 void place_rocks(RockSite& site, std::vector<RockToPlace> rocks);
 
-// Height of the ground above its plane, in the ground frame: bumps and random relief.
+// Height of the ground above z = 0 of the ground frame: bumps and random relief.
 class GroundRelief {
  public:
   explicit GroundRelief(const RockSite& site);  // relief is drawn from the site's seed
@@ -107,14 +107,14 @@ class GroundRelief {
 
  private:
   std::optional<SceneGeometry> bumps_;
-  double unevenness_m_;
+  double relief_m_;
   std::uint64_t seed_;
 };
 
 // Sites as YAML:
 //
 //   seed: 1
-//   ground: {size_x_m: 4, size_y_m: 4, unevenness_m: 0.02}
+//   ground: {size_x_m: 4, size_y_m: 4, relief_m: 0.02}
 //   layout: {site_size_m: 3, free_square_m: 1.5}
 //   field_points: {count: 30}
 //   bumps:
@@ -123,10 +123,10 @@ class GroundRelief {
 //     - {name: R01, height_m: 0.67, overhang_deg: 15}
 //     - {name: C01, shape: cobble, height_m: 0.15, x_m: 1, y_m: 0.2}
 //
-// All parts are optional. A rock requires its height; missing values are drawn from its seed, and a
-// missing seed from the site's. Rocks without x_m and y_m are placed within the layout. `seed`
-// replaces the file's seed. Throws Error naming `file`, the entry, the key, the value and the
-// bound, and the nearest known key for an unknown one.
+// All parts are optional. A rock requires its height; missing values are drawn from the rock's
+// seed, and a missing seed from the site's seed. Rocks without x_m and y_m are placed within the
+// layout. `seed` replaces the file's seed. Throws Error naming `file`, the entry, the key, the
+// value and the bound, and the nearest known key for an unknown one.
 RockSite parse_site(const std::string& text, const std::string& file,
                     std::optional<std::uint64_t> seed = std::nullopt);
 

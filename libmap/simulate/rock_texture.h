@@ -18,7 +18,7 @@ Color soil_color(const Eigen::Vector3d& point, std::uint64_t seed);
 // A painted wooden panel with scuff marks; `point` in the panel's frame, z out of the wall.
 Color panel_color(const Eigen::Vector3d& point, std::uint64_t seed);
 
-// A speckled climbing hold of cast resin; the seed determines its color.
+// A speckled climbing hold of cast resin; the seed determines the color.
 Color hold_color(const Eigen::Vector3d& point, std::uint64_t seed);
 
 }  // namespace libmap

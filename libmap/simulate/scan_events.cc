@@ -59,7 +59,7 @@ TriangleMesh ceiling() {
 void bind(ParameterTable& table, ScanEvents& events) {
   table.add("walker_first_frame", events.walker_first_frame, not_negative,
             "first frame of a person walking across the site; 0: no person");
-  table.add("walker_frames", events.walker_frames, {1}, "number of frames with the person");
+  table.add("walker_frames", events.walker_frames, {1}, "number of frames with the walking person");
   table.add("stone_moved_frame", events.stone_moved_frame, not_negative,
             "first frame after a loose stone has moved; 0: no stone");
   table.add("sun_first_frame", events.sun_first_frame, not_negative,

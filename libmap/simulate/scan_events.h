@@ -1,5 +1,5 @@
 // Events during a simulated scan: moving objects, sunlight, a view of the ceiling. All are disabled
-// by default. Options number frames from 1, like nodes; functions number them from 0.
+// by default. Options number frames from 1, like nodes; functions number frames from 0.
 #pragma once
 
 #include <cstddef>
@@ -33,7 +33,7 @@ struct ScanEvents {
 };
 void bind(ParameterTable& table, ScanEvents& events);
 
-// An object that is not part of the site, with its pose in each frame; nullopt if it is absent.
+// An object that is not part of the site, with a pose in each frame; nullopt if absent.
 struct ExtraBody {
   std::shared_ptr<const VisibleSurface> surface;
   std::function<std::optional<Pose>(std::size_t frame)> world_from_body;

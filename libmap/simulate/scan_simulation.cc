@@ -231,11 +231,13 @@ DepthMeasurement ScanCamera::take(std::size_t n, const VisibleSurface& surface,
 
 void bind(ParameterTable& table, OdometryOptions& options) {
   table.add("odometry_error_of_distance", options.error_of_distance, not_negative,
-            "standard deviation of odometry along each axis, m per m of distance");
+            "standard deviation of the error of an odometry step along an axis, m per m of "
+            "length");
   table.add("odometry_error_of_turn", options.error_of_turn, not_negative,
-            "standard deviation of odometry about each axis, degrees per degree of turn");
+            "standard deviation of the error of an odometry step about an axis, degrees per "
+            "degree");
   table.add("odometry_turn_of_distance_deg", options.turn_of_distance_deg, not_negative,
-            "standard deviation of odometry about each axis, degrees per m of distance");
+            "standard deviation of the error of an odometry step about an axis, degrees per m");
 }
 
 void bind(ParameterTable& table, LoopClosureOptions& options) {
@@ -247,7 +249,7 @@ void bind(ParameterTable& table, LoopClosureOptions& options) {
   table.add("closure_node_gap", options.node_gap, {2.0, 1e6},
             "minimum difference between the indices of the two nodes of a closure");
   table.add("closures_per_node", options.closures_per_node, {1.0, 1e6},
-            "maximum number of loop closures from each node to its nearest earlier nodes");
+            "maximum number of loop closures from each node to the nearest earlier nodes");
   table.add("closure_shift_error_m", options.shift_error_m, positive,
             "standard deviation of a closure along each axis, m");
   table.add("closure_turn_error_deg", options.turn_error_deg, positive,
@@ -361,7 +363,7 @@ ScanSimulationResult simulate_scan(const ScanScene& scene, const ScanSimulationO
   }
   progress.end();
   if (result.measured_pixels == 0)
-    throw Error("no frame sees the mesh within the depth range; check poses and far_m");
+    throw Error("no frame sees the mesh within the depth range; check poses, near_m and far_m");
   return result;
 }
 

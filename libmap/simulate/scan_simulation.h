@@ -95,8 +95,8 @@ ScanScene scene_of(const TriangleMesh& mesh, const ScanSimulationOptions& option
 ScanScene scene_of(TerrainSurface& terrain, const GroundHeights& ground,
                    const ScanSimulationOptions& options, const Trajectory& poses = {});
 
-// Renders all frames and passes them to `sink` in the order of their nodes; at most 8 are in
-// memory. Ground truth poses are those of the camera's body in the mesh's frame at the time of the
+// Renders all frames and passes them to `sink` in the order of nodes; at most 8 frames are in
+// memory. Ground truth poses are poses of the camera's body in the mesh's frame at the time of the
 // middle image row. Throws Error if no frame has any depth.
 using FrameSink = std::function<void(const GraphNode& node, const RgbdFrame& frame)>;
 ScanSimulationResult simulate_scan(const ScanScene& scene, const ScanSimulationOptions& options,

@@ -203,7 +203,7 @@ void bind(ParameterTable& table, PhotoFaults& faults) {
   table.add("blurred_frames", faults.blurred_frames, zero_to_one,
             "share of frames with motion blur if an exposure time is set");
   table.add("jpeg_quality", faults.jpeg_quality, {0, 100},
-            "fault: JPEG quality of a compression of color images before storing; 0: none");
+            "fault: JPEG quality of the stored color images; 0: no compression");
 }
 
 void bind(ParameterTable& table, CalibrationFaults& faults) {

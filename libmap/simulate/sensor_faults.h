@@ -17,7 +17,7 @@
 namespace libmap {
 
 // Depth errors as functions of depth and pixel. Time-of-flight cameras: a periodic error over
-// range, because their modulation is not sinusoidal (Lindner and Kolb 2006; Kinect v2: Wasenmueller
+// range, because the modulation is not sinusoidal (Lindner and Kolb 2006; Kinect v2: Wasenmueller
 // and Stricker 2016, a few millimeters). Stereo and structured light: an error proportional to
 // depth, and one that increases towards the corners (Teichman et al. 2013; D415: Carfagni et al.
 // 2019).
@@ -88,7 +88,7 @@ Camera stored_camera(Camera camera, const CalibrationFaults& faults);
 Pose color_from_depth(const CalibrationFaults& faults, std::uint64_t seed);
 Pose stored_color_from_depth(const CalibrationFaults& faults);
 
-// A stored frame: its index (from 0) and the index of the frame that its images are taken from.
+// A stored frame: index of the frame (from 0) and index of the frame that provides the images.
 struct RecordedFrame {
   std::size_t frame = 0;
   std::size_t images_of = 0;
@@ -102,10 +102,10 @@ void distort_depth(SurfaceView& view, const DepthFaults& faults);
 
 // Adds the multipath interference of diffuse surfaces of this reflectance (0 to 1) to the depths of
 // a view. Light that reaches a surface via another one travels farther than direct light. The
-// camera measures the mean of both, weighted by their strength (the limit of path differences that
-// are small against the modulation wavelength: Fuchs 2010). Concave edges appear rounded and
-// farther away; flat and convex surfaces do not change. Computes one reflection on a grid of pixels
-// and interpolates.
+// camera measures the mean of both, weighted by intensity (the limit of path differences that are
+// small against the modulation wavelength: Fuchs 2010). Concave edges appear rounded and farther
+// away; flat and convex surfaces do not change. Computes one reflection on a grid of pixels and
+// interpolates.
 void add_multipath(SurfaceView& view, const VisibleSurface& surface, const ViewRays& rays,
                    const Pose& world_from_camera, double reflectance);
 
@@ -114,7 +114,7 @@ std::size_t punch_holes(DepthImage& depth, const DepthFaults& faults, std::uint6
 
 // Averages the view's colors over the exposure, along the motion of each surface point in the
 // image. `now_from_later(time_s)` is the camera's pose at `time_s` after the middle of the
-// exposure, relative to its pose at the middle.
+// exposure, relative to the pose at the middle.
 void blur_by_motion(SurfaceView& view, const Camera& camera,
                     const std::function<Pose(double time_s)>& now_from_later, double exposure_s);
 // Draws whether a frame is blurred; applies brightness and white balance (`frame` from 0);

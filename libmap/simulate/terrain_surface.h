@@ -1,5 +1,5 @@
-// Surface of a large terrain for simulated scans: a height field of points, triangulated in squares
-// of the x-y plane (Delaunay). Only squares in view and a cache of earlier ones are in memory.
+// Surface of a large terrain for simulated scans: a height field of points, triangulated in square
+// tiles of the x-y plane (Delaunay). Only tiles in view and a cache of earlier tiles are in memory.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -27,7 +27,7 @@ ViewRange view_range(const ViewRays& rays, double far_m);
 // Returns a Delaunay triangulation in the x-y plane with vertex normals: the triangles that
 // intersect the rectangle and have a circumradius of at most `max_radius_m`, so that wider gaps
 // stay open. The result is the same for any point set that contains all points within 4
-// `max_radius_m` of the rectangle, except for the diagonals of squares.
+// `max_radius_m` of the rectangle, except for the diagonals of squares of four points.
 TriangleMesh triangulate_plan(const std::vector<Eigen::Vector3d>& points,
                               const Eigen::AlignedBox2d& rectangle, double max_radius_m);
 
@@ -45,8 +45,8 @@ class TerrainSurface {
   TerrainSurface(const PointTileStore& points, const GroundHeights& heights,
                  const TerrainSurfaceOptions& options = {});
 
-  // Returns the surface in view of each of several cameras from all its poses. The result does not
-  // depend on earlier calls and stays valid after later ones.
+  // Returns, for each of several cameras, the surface in view from all poses of the camera. The
+  // result does not depend on earlier calls and stays valid after later ones.
   std::vector<VisibleSurface> seen_from(const std::vector<std::vector<Pose>>& world_from_camera,
                                         const ViewRange& range);
 

@@ -55,9 +55,10 @@ void bind(ParameterTable& table, RockyTerrainOptions& options) {
 
 void RockyTerrainOptions::check() const {
   if (max_rock_m < min_rock_m)
-    throw Error("less than the minimum height", {.field = "max_rock_m",
-                                                 .value = to_text(max_rock_m),
-                                                 .bound = ">= min_rock_m, " + to_text(min_rock_m)});
+    throw Error("less than the minimum height",
+                {.field = "max_rock_m",
+                 .value = to_text(max_rock_m),
+                 .bound = ">= min_rock_m = " + to_text(min_rock_m)});
 }
 
 RockyTerrain::RockyTerrain(const RockyTerrainOptions& options,
@@ -278,7 +279,7 @@ class CellSampler {
 void bind(ParameterTable& table, TerrainTilesOptions& options) {
   table.add("spacing_m", options.spacing_m, Range{1e-4, 10.0}, "mean point spacing, m");
   table.add("piece_m", options.tile_m, Range{1e-3, 1000.0},
-            "side of a tile, one file of the output, m");
+            "side of a tile, m; each tile is one file of the output");
   bind(table, options.terrain);
 }
 

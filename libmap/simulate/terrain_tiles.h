@@ -1,5 +1,5 @@
-// Unbounded procedural rocky terrain (a height field as a function of position and seed), and its
-// points in square tiles indexed from the origin.
+// Unbounded procedural rocky terrain (a height field as a function of position and seed), and
+// points of the terrain in square tiles indexed from the origin.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -22,15 +22,15 @@ struct RockyTerrainOptions {
   double min_rock_m = 0.15;  // minimum and maximum height of the rocks
   double max_rock_m = 0.7;
 
-  // Throws Error naming the field, its value and its bound.
+  // Throws Error naming field, value and bound.
   void check() const;
 };
 void bind(ParameterTable& table, RockyTerrainOptions& options);
 
 // The terrain over a rectangle. Relief and roughness are fractal noise. Rocks are faceted blocks
-// and rounded cobbles without overhangs at random positions; they may overlap. Their heights follow
-// a power law with a cumulative index of -2.65, as of the boulders on Ryugu (Michikami et al.
-// 2019).
+// and rounded cobbles without overhangs at random positions; they may overlap. Heights of rocks
+// follow a power law with a cumulative index of -2.65, as of the boulders on Ryugu (Michikami et
+// al. 2019).
 class RockyTerrain {
  public:
   // Draws all rocks that intersect the rectangle.
@@ -42,7 +42,7 @@ class RockyTerrain {
   std::size_t rocks() const { return rocks_.size(); }
 
  private:
-  // Height above the rock's foot: c - a x - b y relative to its center.
+  // Height above the rock's foot: c - a x - b y relative to the rock's center.
   struct Facet {
     double a = 0.0;
     double b = 0.0;
@@ -51,7 +51,7 @@ class RockyTerrain {
   struct Rock {
     Eigen::Vector2d center = Eigen::Vector2d::Zero();
     double foot_m = 0.0;          // height of the ground at the center
-    double reach_m = 0.0;         // maximum distance of the rock from its center
+    double reach_m = 0.0;         // maximum distance of the rock surface from the center
     std::vector<Facet> facets{};  // empty for a cobble
     // Cobbles only.
     double height_m = 0.0;
@@ -89,10 +89,10 @@ void bind(ParameterTable& table, TerrainTilesOptions& options);
 std::vector<XyTile> terrain_tiles(const TerrainTilesOptions& options);
 
 // Returns the points of one tile with normals, m, z up. Each square cell of the x-y plane with side
-// `spacing_m` contains one point per spacing_m^2 of its surface, randomly rounded up or down, at
-// least one. A tile depends only on its index, the seed, the spacing and the terrain; a tile
-// cropped by the terrain's size is a subset of the complete one. Sizes are rounded to multiples of
-// the spacing. Throws Error as TerrainTilesOptions::check does.
+// `spacing_m` contains one point per spacing_m^2 of surface, randomly rounded up or down, at least
+// one. A tile depends only on the tile index, the seed, the spacing and the terrain; a tile cropped
+// by the terrain's size is a subset of the complete one. Sizes are rounded to multiples of the
+// spacing. Throws Error as TerrainTilesOptions::check does.
 PointCloud sample_tile(const TerrainTilesOptions& options, const XyTile& tile);
 
 }  // namespace libmap

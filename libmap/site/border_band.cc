@@ -71,7 +71,7 @@ TopView make_top_view(const PointCloud& cloud, const BorderBandOptions& options)
   }
   if (used.empty())
     throw Error("no points are at the heights at which the border band is searched",
-                {.field = "height",
+                {.field = "heights of the points",
                  .bound = to_text(options.min_z_m) + " to " + to_text(options.max_z_m) + " m"});
   TopView view;
   const Vector2d size = high - low;
@@ -241,7 +241,7 @@ Frame find_frame(const TopView& view, double white_level, const BorderBandOption
                                  [](const Frame& a, const Frame& b) { return a.score < b.score; });
   if (!(best.score > 0.0))
     throw Error("no white band with four visible sides was found on the ground",
-                {.field = "share of white along each side",
+                {.field = "white share of each side",
                  .bound = ">= " + to_text(100.0 * options.min_seen) + " %"});
   return best;
 }
@@ -327,7 +327,7 @@ void move_to_inner_edge(Side& side, const TopView& view, double white_level,
   side.seen = static_cast<double>(edges.size()) / std::max(slices, 1);
   if (edges.size() < 5 || side.seen < options.min_seen)
     throw Error("the inner edge of the white band is not visible along enough of a side",
-                {.field = "share of the side",
+                {.field = "visible share of the side",
                  .value = to_fixed_text(100.0 * side.seen, 0) + " %",
                  .bound = ">= " + to_text(100.0 * options.min_seen) + " %"});
   const Vector2d line = fit_line(edges);

@@ -31,9 +31,9 @@ struct BorderBand {
 };
 
 // Finds the quadrilateral inside the band. A first search over all directions and pairs of white
-// lines finds the rectangle with the most white along its four sides. Then the inner edge of each
-// side is detected slice by slice, and a line is fitted to it robustly, so that gaps in the band
-// and white rocks that touch it are tolerated. Sides need not be parallel. `level_cloud` contains
+// lines finds the rectangle with the most white along the four sides. Then the inner edge of each
+// side is detected slice by slice, and a line is fitted robustly, so that gaps in the band and
+// white rocks that touch it are tolerated. Sides need not be parallel. `level_cloud` contains
 // colored points with the ground at z = 0 and a spacing below cell_m. `corners` are `margin_m`
 // inside the detected edges. Throws Error: no colors, no point at the band's heights, no band.
 BorderBand find_border_band(const PointCloud& level_cloud, double margin_m = 0.0,
@@ -48,7 +48,7 @@ struct BorderScale {
 };
 
 // Estimates the scale by least squares from the true side lengths of the band's inner edge, in
-// either order. Throws Error if a side differs from its true length by more than 5 %.
+// either order. Throws Error if a side differs from the true length by more than 5 %.
 BorderScale scale_by_border(const BorderBand& band, const Eigen::Vector2d& inner_size_m);
 
 }  // namespace libmap

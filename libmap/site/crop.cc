@@ -215,8 +215,8 @@ Error nothing_inside(const Eigen::AlignedBox3d& bounds, const char* what) {
     return to_fixed_text(p.x(), 2) + ", " + to_fixed_text(p.y(), 2) + ", " +
            to_fixed_text(p.z(), 2);
   };
-  return Error(std::string("nothing of the ") + what +
-               " is inside the crop region; it extends from " + text(bounds.min()) + " to " +
+  return Error(std::string("no part of the ") + what +
+               " is inside the crop region; the points extend from " + text(bounds.min()) + " to " +
                text(bounds.max()));
 }
 

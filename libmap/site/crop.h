@@ -21,7 +21,7 @@ namespace libmap {
 // of a given size (site_rectangle). border: the area inside a white band (border_band).
 enum class CropRegion { whole, box, polygon, size, border };
 
-// Frame of a box or polygon. level: ground at z = 0, x and y near those of the map, rotated by
+// Frame of a box or polygon. level: ground at z = 0, x and y near the axes of the map, rotated by
 // yaw_deg. map: the frame of the input.
 enum class CropFrame { level, map };
 
@@ -68,7 +68,7 @@ struct CropMeshResult {
 
 // Finds the ground among the points of a cloud, or among even samples of a mesh. Keeps the points
 // inside and on the border, or cuts the mesh along the outline (mesh_cutting.h). Throws Error:
-// options out of their ranges, nothing to crop, no ground, no site, nothing inside.
+// options out of range, nothing to crop, no ground, no site, nothing inside.
 CropCloudResult crop_cloud(const PointCloud& cloud, const CropOptions& options);
 CropMeshResult crop_mesh(const TriangleMesh& mesh, const CropOptions& options);
 

@@ -150,10 +150,11 @@ void check(const EdgeCheckOptions& options, const SiteCorners& site) {
   const double least = std::min((site.corners[1] - site.corners[0]).norm(),
                                 (site.corners[2] - site.corners[1]).norm());
   if (!(2.0 * options.inset_m < least))
-    throw Error("the positions would not be inside the site",
-                {.field = "inset_m",
-                 .value = to_text(options.inset_m),
-                 .bound = "< " + to_text(static_cast<float>(least / 2)) + ", half a side"});
+    throw Error(
+        "the positions would not be inside the site",
+        {.field = "inset_m",
+         .value = to_text(options.inset_m),
+         .bound = "< " + to_text(static_cast<float>(least / 2)) + " (half the shorter side)"});
 }
 
 void summarize(EdgeCheckResult& result) {

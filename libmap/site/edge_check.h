@@ -68,7 +68,7 @@ struct EdgeCheckResult {
 };
 
 // Compares `surface` with `ground` at positions along the site's edges. Throws Error: options out
-// of their ranges, an inset of half a side or more, no position where both have a height.
+// of range, an inset of half a side or more, no position where both have a height.
 EdgeCheckResult check_edges(const SiteCorners& site, const HeightFunction& surface,
                             const HeightFunction& ground, const EdgeCheckOptions& options = {});
 

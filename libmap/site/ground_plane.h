@@ -37,11 +37,11 @@ struct GroundPlane {
 };
 
 // Finds the lowest large plane within max_tilt_deg of up. Planes are extracted one after the other
-// by RANSAC (Fischler and Bolles 1981). The ground is the plane below the others. It is refined by
-// iterated least squares with Tukey's weights, so that the feet of rocks do not lift it. Points
-// must be finite and evenly distributed over the surface, because all have equal weight. The result
-// does not depend on the number of threads. Throws Error: options out of their ranges, fewer than
-// three points, all points on a line, no plane.
+// by RANSAC (Fischler and Bolles 1981). The ground is the lowest plane, refined by iterated least
+// squares with Tukey's weights, so that the feet of rocks do not lift the plane. Points must be
+// finite and evenly distributed over the surface, because all points have equal weight. The result
+// does not depend on the number of threads. Throws Error: options out of range, fewer than three
+// points, all points on a line, no plane.
 GroundPlane find_ground_plane(const std::vector<Eigen::Vector3d>& points,
                               const GroundPlaneOptions& options = {});
 

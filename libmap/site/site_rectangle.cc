@@ -259,7 +259,8 @@ void bind(ParameterTable& table, SiteRectangleOptions& options) {
   table.add("site_cell_m", options.cell_m, positive,
             "cell size for finding the site in the data, m");
   table.add("max_gap_m", options.max_gap_m, not_negative,
-            "side of a square, m; holes of the data into which it does not fit are ignored");
+            "side of a square, m; holes of the data that are too small for the square are "
+            "ignored");
   table.add("margin_m", options.margin_m, not_negative,
             "minimum distance of the site from holes, data borders and the border band, m");
 }

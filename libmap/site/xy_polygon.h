@@ -31,7 +31,8 @@ class XyPolygon {
   // True for points inside or within 1e-9 m of the border.
   bool contains(const Eigen::Vector2d& point) const;
 
-  // Candidates for edges that intersect the box, by the index of their first corner, ascending.
+  // Candidates for edges that intersect the box, by the index of the edge's first corner,
+  // ascending.
   std::vector<std::uint32_t> edges_near(const Eigen::Vector2d& box_min,
                                         const Eigen::Vector2d& box_max) const;
 
@@ -50,7 +51,8 @@ class XyPolygon {
 // The rectangle from min to max.
 XyPolygon make_rectangle(const Eigen::Vector2d& min, const Eigen::Vector2d& max);
 
-// Polygon extruded between two heights. Without a polygon, it contains all points between them.
+// Polygon extruded between two heights. Without a polygon, all points between the heights are
+// inside.
 struct ExtrudedPolygon {
   std::optional<XyPolygon> polygon{};
   double min_z = -std::numeric_limits<double>::infinity();
@@ -62,7 +64,7 @@ struct ExtrudedPolygon {
   }
 };
 
-// Returns the points inside and on the border, with their normals, colors and fields.
+// Returns the points inside and on the border, with normals, colors and fields.
 PointCloud clip_cloud(const PointCloud& cloud, const ExtrudedPolygon& prism);
 
 }  // namespace libmap

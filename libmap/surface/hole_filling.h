@@ -19,10 +19,10 @@ inline constexpr const char* filled_field = "filled";
 using BoundaryLoop = std::vector<HalfEdge>;  // as boundary_loops()
 
 // Returns the boundaries of an oriented manifold with a diameter (largest distance between two
-// vertices) of at most `max_hole_m`. The longest boundary of a component is its outer boundary and
+// vertices) of at most `max_hole_m`. The longest boundary of a component is the outer boundary and
 // not returned, unless its radius is less than half of the component's radius about the same point.
 // If the mesh is part of a larger one that is complete only within the box `known` in x and y,
-// boundaries beyond the box are not holes, and components that extend beyond it have no outer
+// boundaries beyond the box are not holes, and components that extend beyond the box have no outer
 // boundary inside.
 using XyBox = Eigen::AlignedBox2d;
 std::vector<BoundaryLoop> find_holes(const TriangleMesh& mesh, double max_hole_m,
@@ -46,10 +46,10 @@ struct HoleFilling {
 
 // Fills each hole. Tries a faired patch, then a refined one, then a plain triangulation of the
 // boundary; a hole stays open if `check` rejects all. New vertices and triangles are appended.
-// Colors and fields of new vertices are those of the boundary, weighted by the inverse squared
-// distance (integer fields: of the nearest vertex). Face fields are those of the triangle at the
-// nearest edge of the boundary; `filled` is 1 and is created if missing. The mesh must be an
-// oriented manifold. The result does not depend on the number of threads.
+// Colors and fields of new vertices are interpolated from the boundary, weighted by the inverse
+// squared distance (integer fields: of the nearest vertex). Face fields are copied from the
+// triangle at the nearest edge of the boundary; `filled` is 1 and is created if missing. The mesh
+// must be an oriented manifold. The result does not depend on the number of threads.
 HoleFilling fill_holes(TriangleMesh& mesh, const std::vector<BoundaryLoop>& holes,
                        PatchCheck check = PatchCheck::intersection,
                        Progress& progress = no_progress());

@@ -1,5 +1,5 @@
 // Cleans any set of triangles to an oriented manifold without degenerate, duplicate or intersecting
-// triangles, without small components and holes. Optionally smooths and decimates it.
+// triangles, without small components and holes. Optionally smooths and decimates the mesh.
 //
 // Steps; each keeps the order of vertices and triangles:
 //  1. merge vertices within a tolerance into the first one; drop triangles without area and
@@ -7,7 +7,7 @@
 //  2. cut at edges of more than two triangles, at vertices of more than one fan and where no
 //     consistent orientation exists (make_manifold); keep the orientation of most of the area
 //  3. drop islands
-//  4. remove intersecting triangles with those around them and close the resulting holes, if
+//  4. remove intersecting triangles with the triangles around and close the resulting holes, if
 //     possible (self_intersections, hole_filling)
 //  5. fill holes (hole_filling)
 //  6. smooth, decimate, then step 4 again
@@ -33,8 +33,8 @@ struct MeshCleaningOptions {
   double min_island_area_m2 = 0.01;  // >= 0: smaller components are dropped
   double min_island_share = 0.0;     // 0 to 1: minimum area relative to the largest component
   // >= 0: maximum diameter (largest distance between two boundary vertices) of filled holes. The
-  // longest boundary of a component is its outer boundary and is not filled, unless its radius is
-  // less than half of the component's (the hole of a ball).
+  // longest boundary of a component is the outer boundary and is not filled, unless the boundary
+  // radius is less than half of the component's radius (the hole of a ball).
   double max_hole_m = 0.1;
   int smoothing_iterations = 0;  // >= 0
   // >= 0: maximum distance between the decimated and the original surface; 0: no decimation.
@@ -52,7 +52,7 @@ struct MeshDecimation {
 
 struct MeshCleaningResult {
   // Has unit vertex normals and the face field `filled` (uint8), 1 on triangles that fill holes.
-  // Colors and fields are kept; new vertices take them from the hole's boundary.
+  // Colors and fields are kept; new vertices take both from the hole's boundary.
   TriangleMesh mesh;
 
   std::size_t merged_vertices = 0;
@@ -64,7 +64,7 @@ struct MeshCleaningResult {
   std::size_t turned_triangles = 0;
   std::size_t islands = 0;
   double island_area_m2 = 0.0;
-  // Removed because they intersected others or were degenerate, without triangles around them.
+  // Removed because of intersection or degeneracy, without the triangles around.
   std::size_t intersecting_triangles = 0;
   std::size_t closing_triangles = 0;  // new triangles in the resulting holes
   std::size_t unclosed_holes = 0;     // resulting holes that stay open
@@ -76,14 +76,14 @@ struct MeshCleaningResult {
 void describe(ResultTable& table, const MeshCleaningResult& result);
 
 // Cleans a mesh. A clean mesh is returned unchanged except for `filled` and normals. The result
-// does not depend on the number of threads. Throws Error: an option out of its range, arrays of
+// does not depend on the number of threads. Throws Error: an option out of range, arrays of
 // inconsistent sizes, an index out of range, a vertex that is not finite, no triangle in the input
 // or the result, filling or decimation without repair of a mesh that is not an oriented manifold.
 MeshCleaningResult clean_mesh(const TriangleMesh& mesh, const MeshCleaningOptions& options = {},
                               Progress& progress = no_progress());
 
-// Collapses edges into one of their ends by quadric error (OpenMesh). Removed vertices stay within
-// a tolerance of the triangles that replace theirs, normals turn by at most 30 degrees, and needles
+// Collapses edges into one of the two ends by quadric error (OpenMesh). Removed vertices stay
+// within a tolerance of the replacing triangles, normals turn by at most 30 degrees, and needles
 // are avoided. Then the distance between both surfaces is bounded in both directions: triangles are
 // divided until all corners of a part are within the bound of one triangle, and so, by convexity,
 // is the whole part. Vertices where it exceeds `max_error_m` are locked, and decimation is
@@ -92,8 +92,8 @@ MeshCleaningResult clean_mesh(const TriangleMesh& mesh, const MeshCleaningOption
 MeshDecimation decimate_mesh(TriangleMesh& mesh, double max_error_m,
                              Progress& progress = no_progress());
 
-// Decimates with the same bound in one round: original triangles replace those that exceed it, and
-// overlap their neighbors. Takes a quarter of the time. The result is not a manifold.
+// Decimates with the same bound in one round: original triangles replace the triangles that exceed
+// the bound, and overlap neighbors. Takes a quarter of the time. The result is not a manifold.
 MeshDecimation decimate_triangles(TriangleMesh& mesh, double max_error_m);
 
 }  // namespace libmap

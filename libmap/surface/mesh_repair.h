@@ -33,14 +33,14 @@ std::vector<bool> repeated_triangles(const std::vector<Triangle>& triangles);
 
 // Removes caps, degenerate triangles with a corner on the opposite edge, from an oriented manifold.
 // Flips that edge, or drops the triangle if the edge is open. Returns the number of caps removed.
-// Caps are kept if their new edge exists already, or if they depend on other caps.
+// Caps are kept if the new edge exists already, or if they depend on other caps.
 std::size_t flip_caps(TriangleMesh& mesh);
 
 struct ManifoldCuts {
   std::size_t edges = 0;     // cut edges: more than two triangles, or a one-sided surface
   std::size_t vertices = 0;  // copies of vertices
   std::size_t turned = 0;    // triangles with reversed orientation
-  std::size_t dropped = 0;   // triangles that fold back on their own edge, removed
+  std::size_t dropped = 0;   // removed triangles that fold back on an edge
 };
 
 // Cuts a set of triangles into an oriented manifold (Gueziec, Taubin, Lazarus, Horn 2001, "Cutting
@@ -48,11 +48,11 @@ struct ManifoldCuts {
 //
 // At an edge of more than two triangles, triangles of opposite directions stay joined in pairs, the
 // straightest pair first; the others are cut off. Each component takes the orientation of most of
-// its area and is cut where it has none (Moebius strip). Then each fan of triangles at a vertex
-// gets its own vertex. The largest fan keeps the original. The copies for the others are appended
-// and moved towards the center of their fan by 1 % of the distance or `min_gap_m`, at most by half
-// of it, so that the sheets do not touch. Triangles keep their order. No triangle may have a
-// repeated vertex.
+// the component's area and is cut where no orientation exists (Moebius strip). Then each fan of
+// triangles at a vertex gets a separate vertex. The largest fan keeps the original. The copies for
+// the other fans are appended and moved towards the center of the fan by 1 % of the distance or
+// `min_gap_m`, at most by half of it, so that the sheets do not touch. The order of triangles is
+// kept. No triangle may have a repeated vertex.
 ManifoldCuts make_manifold(TriangleMesh& mesh, double min_gap_m = 0.0);
 
 }  // namespace libmap

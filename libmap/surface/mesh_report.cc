@@ -130,7 +130,7 @@ void describe(ResultTable& table, const MeshReport& report) {
   for (const MeshBoundary& boundary : report.boundaries) lengths_m.push_back(boundary.length_m);
   table.add("watertight", report.is_watertight(), "closed, manifold, oriented, not intersecting");
   table.add("manifold", report.is_manifold(),
-            "every edge has at most two triangles, every vertex one fan of them");
+            "every edge has at most two triangles, every vertex one fan of triangles");
   table.add("oriented", report.is_oriented(), "neighboring triangles have the same orientation");
   table.add("components", report.components, "number of components connected by edges");
   table.add("genus", report.genus, "handles of a manifold and oriented mesh, otherwise -1");

@@ -45,7 +45,7 @@ struct MeshReport {
   std::size_t misoriented_edges = 0;      // with two triangles of the same direction
   std::size_t boundary_edges = 0;
   std::vector<MeshBoundary> boundaries;  // longest first
-  // Pairs of triangles that intersect in more than their common corners or edge; 0 if not counted.
+  // Pairs of triangles that intersect in more than common corners or edges; 0 if not counted.
   std::size_t self_intersections = 0;
   bool self_intersections_counted = false;
 

@@ -12,10 +12,9 @@ namespace libmap {
 using TrianglePair = std::pair<std::uint32_t, std::uint32_t>;
 
 // Pairs (lower, higher), ascending, of triangles that intersect in more than the corners or the
-// edge that they share by index. Excludes pairs with three common corners and triangles with
-// exactly collinear corners. If `only` is not empty, at least one triangle of each pair is marked.
-// Indices must be in range and vertices finite. The result does not depend on the number of
-// threads.
+// edge with common indices. Excludes pairs with three common corners and triangles with exactly
+// collinear corners. If `only` is not empty, at least one triangle of each pair is marked. Indices
+// must be in range and vertices finite. The result does not depend on the number of threads.
 std::vector<TrianglePair> find_self_intersections(const TriangleMesh& mesh,
                                                   const std::vector<bool>& only = {});
 

@@ -33,7 +33,7 @@ constexpr double max_grid_cells = voxel_cell_limit;
 // Minimum ratio of the second to the first standard deviation of the positions.
 constexpr double min_width = 1e-4;
 
-// Maximum share of neighbors whose normals face opposite sides.
+// Maximum share of share of neighbors with normals on opposite sides.
 constexpr double max_mixed_sides = 0.4;
 
 constexpr std::size_t value_neighbors = 4;
@@ -196,7 +196,7 @@ void Reconstruction::choose_points() {
   const double opposing = opposing_share(cloud_.positions, cloud_.normals);
   if (opposing > max_mixed_sides)
     throw Error("the normals are not consistently oriented; use --normals estimate",
-                {.field = "neighbors whose normals face opposite sides",
+                {.field = "share of neighbors with normals on opposite sides",
                  .value = to_fixed_text(100.0 * opposing, 1) + " %",
                  .bound = "<= " + to_text(100.0 * max_mixed_sides) + " %"});
   // Sorted, so that the result does not depend on the order of the points.
@@ -221,7 +221,7 @@ void Reconstruction::choose_cell_size() {
       distinct.push_back(cloud_.positions[n]);
   const auto too_thin = [&](const char* reason) {
     return Error(reason,
-                 {.field = "points", .value = std::to_string(distinct.size()) + " positions"});
+                 {.field = "number of distinct points", .value = std::to_string(distinct.size())});
   };
   if (distinct.size() < 3) throw too_thin("too few points for a surface");
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
@@ -426,10 +426,10 @@ double CloudStatistics::median_error_m() const {
 }
 
 void bind(ParameterTable& table, SurfaceReconstructionOptions& options) {
-  table.add(
-      "method", options.method,
-      {{"implicit", SurfaceMethod::implicit}, {"poisson", SurfaceMethod::poisson}},
-      "method; implicit: algebraic point set surface; poisson: screened Poisson reconstruction");
+  table.add("method", options.method,
+            {{"implicit", SurfaceMethod::implicit}, {"poisson", SurfaceMethod::poisson}},
+            "reconstruction method; implicit: algebraic point set surface; poisson: screened "
+            "Poisson reconstruction");
   table.add(
       "support_cells", options.support_cells, {1.5, 10.0},
       "method implicit: radius of influence of a point, in cells or, if larger, point spacings");
@@ -438,7 +438,7 @@ void bind(ParameterTable& table, SurfaceReconstructionOptions& options) {
   table.add("screening", options.screening, not_negative,
             "method poisson: weight of the points relative to the smoothness of the surface");
   table.add("weigh_by_error", options.weigh_by_error,
-            "weight each point by the inverse square of its field expected_error (m)");
+            "weight each point by the inverse square of the field expected_error (m)");
   table.add("samples_per_cell", options.samples_per_cell, positive,
             "method poisson: minimum number of points per cell; cells with fewer are enlarged");
   table.add(
@@ -466,7 +466,7 @@ double surface_margin_m(const SurfaceReconstructionOptions& options) {
     throw Error("this method cannot reconstruct a surface in tiles",
                 {.field = "method", .value = "poisson", .bound = "implicit"});
   if (!(options.cell_size_m > 0.0))
-    throw Error("reconstruction in parts requires a cell size",
+    throw Error("reconstruction in tiles requires a cell size",
                 {.field = "cell_size_m", .value = to_text(options.cell_size_m), .bound = "> 0"});
   // A vertex depends on the samples that reach its cube. Each sample depends on its neighbors and
   // on the points of its cell.

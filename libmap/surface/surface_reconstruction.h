@@ -25,10 +25,10 @@ struct SurfaceReconstructionOptions {
   double support_cells =
       2.5;  // >= 1.5: implicit: radius of influence of a point; surface_solvers.h
   // >= 0: size of the grid's or the octree's finest cells, and about the length of the mesh's
-  // edges. 0: the median distance of points to their nearest neighbors (median_spacing).
+  // edges. 0: the median distance between nearest neighbors (median_spacing).
   double cell_size_m = 0.0;
   double screening = 4.0;  // >= 0: poisson: weight of the points relative to smoothness
-  // Weights points by the inverse square of their field `expected_error` (m), if it exists; points
+  // Weights points by the inverse square of the field `expected_error` (m), if that exists; points
   // with less than the median error have equal weights.
   bool weigh_by_error = true;
   // > 0: poisson: minimum number (or weight) of points per cell; with fewer, cells are larger.
@@ -39,8 +39,8 @@ struct SurfaceReconstructionOptions {
 };
 void bind(ParameterTable& table, SurfaceReconstructionOptions& options);
 
-// Maximum depth of the octree of poisson: 2^12 cells along the longest side, a tenth of them
-// margin. The memory of PCL's tables grows with the square of that number.
+// Maximum depth of the octree of poisson: 2^12 cells along the longest side, of which a tenth is
+// margin. The memory of PCL's tables is proportional to the square of the number of cells.
 inline constexpr int max_octree_depth = 12;
 
 // Statistics of a whole cloud for reconstruct_part. Parts of the cloud may be added in any order.
@@ -69,7 +69,7 @@ struct SurfaceReconstructionResult {
   TriangleMesh mesh;
   double cell_size_m = 0.0;
   double spacing_m = 0.0;          // median distance to the nearest neighbor
-  std::size_t dropped_points = 0;  // points whose normal is zero or not finite
+  std::size_t dropped_points = 0;  // points with a normal that is zero or not finite
   std::size_t samples = 0;         // one per cell and side of the surface
   int octree_depth = 0;            // of poisson
   std::size_t trimmed_triangles = 0;
@@ -87,21 +87,22 @@ using AnnounceWork = std::function<void(const SurfaceWork& work)>;
 
 // Reconstructs an oriented surface that is open at the border of the points. It may have
 // non-manifold parts, and with poisson holes of single faces, which clean_mesh repairs. PCL runs on
-// one thread, because its result depends on the number of threads; during this time, standard
-// output and error of the process are discarded. The result does not depend on the number of
-// threads and the order of the points, except for different values at equal position and normal. A
-// shift of the cloud shifts the mesh, except for rounding. `announce` is called with the estimated
-// work before it begins. Throws Error: no normals, no point with a normal, inconsistent normals,
-// fewer than 3 positions, positions on a line, options out of their ranges, cells larger than the
-// cloud or too small for its point spacing, an octree deeper than max_octree_depth, PCL failed.
+// one thread, because the result of PCL depends on the number of threads; during this time,
+// standard output and error of the process are discarded. The result does not depend on the number
+// of threads and the order of the points, except for different values at equal position and normal.
+// A shift of the cloud shifts the mesh, except for rounding. `announce` is called with the
+// estimated work before the work begins. Throws Error: no normals, no point with a normal,
+// inconsistent normals, fewer than 3 positions, positions on a line, options out of range, cells
+// larger than the cloud or too small for the point spacing, an octree deeper than max_octree_depth,
+// PCL failed.
 SurfaceReconstructionResult reconstruct_surface(const PointCloud& cloud,
                                                 const SurfaceReconstructionOptions& options = {},
                                                 Progress& progress = no_progress(),
                                                 const AnnounceWork& announce = {});
 
 // Reconstructs the surface of a part of a cloud; `survey` are the statistics of the whole cloud. At
-// a distance of surface_margin_m() from missing points, the surface equals that of the whole cloud,
-// except for the order. Returns an empty mesh for too few points. Throws Error as
+// a distance of surface_margin_m() from missing points, the surface equals the surface of the whole
+// cloud, except for the order. Returns an empty mesh for too few points. Throws Error as
 // reconstruct_surface and surface_margin_m.
 SurfaceReconstructionResult reconstruct_part(const PointCloud& part, const CloudStatistics& survey,
                                              const SurfaceReconstructionOptions& options,

@@ -16,18 +16,19 @@ struct SurfaceSample {
   float spacing_m = 0.0F;                              // local distance between samples
 };
 
-// Maximum of spacing_m in cells, which callers must apply. The work grows with its cube.
+// Maximum of spacing_m in cells, which callers must apply. Work is proportional to the cube of
+// spacing_m.
 inline constexpr double max_spacing_cells = 4.0;
 
 // Algebraic point set surface (Guennebaud and Gross 2007). At x, an algebraic sphere is fitted to
 // positions and normals of the samples around, with weights weight_i (c / r_i)^2 (1 - |x - p_i|^2 /
 // r_i^2)^3 within r_i = support_cells * max(c, spacing_i), c = cell_m. The function is the sphere's
-// value at x. Its zero set is computed by marching cubes (Lorensen and Cline 1987) on a grid of
+// value at x. The zero set is computed by marching cubes (Lorensen and Cline 1987) on a grid of
 // multiples of c and oriented along the normals. Cubes are dropped, so that the surface is open at
 // the border of the samples, if the distance of a corner to the samples' weighted mean,
 // perpendicular to the mean normal, exceeds 0.4 r (Adamson and Alexa 2004). A part of the surface
-// depends only on the samples whose support reaches it. The result does not depend on the number of
-// threads and has positions only.
+// depends only on the samples with a support that reaches the part. The result does not depend on
+// the number of threads and has positions only.
 TriangleMesh implicit_surface(const std::vector<SurfaceSample>& samples, double cell_m,
                               double support_cells);
 

@@ -1,5 +1,6 @@
 // Reconstructs and cleans the surface of a large cloud in tiles of the x-y plane, so that memory
-// does not depend on its area. Adjacent tiles have the same vertices on their border (seam).
+// does not depend on the cloud's area. Adjacent tiles have the same vertices on the common border
+// (seam).
 #pragma once
 
 #include <Eigen/Geometry>
@@ -25,7 +26,7 @@ struct SurfaceTileOptions {
   // Throws Error for an option that requires the whole surface (Poisson reconstruction, automatic
   // cell size, decimation), or for tile_size_m if margin_m() is more than 16 times as large.
   void check() const;
-  // Distance from a tile up to which points influence its surface, m.
+  // Maximum distance from a tile at which points affect the surface of the tile, m.
   double margin_m() const;
 };
 
@@ -38,8 +39,8 @@ void add_surface_tiles(const PointCloud& cloud, const SurfaceTileOptions& option
                        std::map<XyTile, std::size_t>& points_in_tiles);
 
 struct SurfaceTile {
-  // Triangles whose centers are in the tile. Positions are rounded to single precision, as in
-  // files, if this changes them by at most 1e-5 m.
+  // Triangles with centers in the tile. Positions are rounded to single precision, as in files, if
+  // this changes them by at most 1e-5 m.
   TriangleMesh mesh;
   std::vector<double> component_areas_m2;  // of connected_components(mesh)
   // Edges to triangles of other tiles: positions of the ends, and the component in `mesh`.
@@ -50,10 +51,10 @@ struct SurfaceTile {
 };
 
 // Reconstructs the surface of one tile from the `points` within margin_m() of it; `survey` are the
-// statistics of the whole cloud. The surface equals that of reconstruct_surface() and clean_mesh()
-// for the whole cloud, except that small components (islands) at the margin are kept, for
-// SurfaceIslands. If they are narrower than min_island_area_m2 / margin_m(), holes beside them may
-// stay open. Throws Error as options.check(), reconstruct_part and clean_mesh.
+// statistics of the whole cloud. The surface equals the result of reconstruct_surface() and
+// clean_mesh() for the whole cloud, except that small components (islands) at the margin are kept,
+// for SurfaceIslands. Holes beside islands narrower than min_island_area_m2 / margin_m() may stay
+// open. Throws Error as options.check(), reconstruct_part and clean_mesh.
 SurfaceTile make_surface_tile(const PointCloud& points, const CloudStatistics& survey,
                               const XyTile& tile, const SurfaceTileOptions& options,
                               Progress& progress = no_progress());

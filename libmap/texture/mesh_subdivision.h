@@ -1,4 +1,4 @@
-// Subdivides long triangles of a mesh without changing its surface. Private to libmap/texture.
+// Subdivides long triangles of a mesh without changing the surface. Private to libmap/texture.
 #pragma once
 
 #include <cstdint>
@@ -19,9 +19,9 @@ struct SubdivisionResult {
 using NeedsCutting = std::function<bool(const TriangleMesh& mesh, const Triangle& triangle)>;
 
 // Halves sides longer than `max_side_m`, in all adjacent triangles, until no triangle that needs
-// cutting has such a side. Existing vertices keep their index and position. If the result would
+// cutting has such a side. Indices and positions of existing vertices are kept. If the result would
 // exceed both `max_triangles` and twice the input's triangles, a larger side length is used. Vertex
-// values are interpolated; the parts of a triangle inherit its face fields.
+// values are interpolated; parts of a triangle inherit the face fields.
 SubdivisionResult split_long_sides(
     TriangleMesh mesh, double max_side_m, std::uint64_t max_triangles,
     const NeedsCutting& needs_cutting = [](const TriangleMesh&, const Triangle&) { return true; });

@@ -1,8 +1,8 @@
 // Packs the charts of a mesh onto texture pages. Private to libmap/texture.
 //
-// A chart is a connected set of triangles that take their texture from one photograph. Its texture
-// coordinates are the triangles' projection into that photograph, shifted by whole pixels, so that
-// texels coincide with pixels at a scale of 1.
+// A chart is a connected set of triangles with texture from one photograph. Texture coordinates are
+// the triangles' projection into the photograph, shifted by whole pixels, so that texels coincide
+// with pixels at a scale of 1.
 #pragma once
 
 #include <Eigen/Core>
@@ -47,7 +47,7 @@ struct PageSize {
 struct TextureAtlas {
   std::vector<TextureChart> charts;
   std::vector<PageSize> pages;  // cropped to the used area
-  // A square of one color, neutral_size texels wide, for triangles without a photograph.
+  // Block of one color, neutral_size texels wide, for triangles without a photograph.
   std::int32_t neutral_page = 0;
   Eigen::Vector2i neutral_corner = Eigen::Vector2i::Zero();
   int neutral_size = 0;
@@ -60,7 +60,7 @@ struct TextureAtlas {
 };
 
 // Builds and packs the charts. `label` is one photograph index per triangle, or no_photo;
-// `opposite` is one per half-edge. Charts are split or scaled down if they do not fit.
+// `opposite` is one per half-edge. Charts that do not fit are split or scaled down.
 TextureAtlas make_texture_atlas(const TriangleMesh& mesh, const std::vector<HalfEdge>& opposite,
                                 const std::vector<std::uint32_t>& label,
                                 const TexturePhotos& photos, const TextureAtlasOptions& options);
@@ -79,7 +79,7 @@ struct PackedRectangle {
 // is larger than a page.
 std::size_t pack_rectangles(std::vector<PackedRectangle>& rectangles, int page_size);
 
-// Returns the texel of a world point on its chart's page; (0, 0) is the center of the first texel.
+// Returns the texel of a world point on the chart's page; (0, 0) is the center of the first texel.
 Eigen::Vector2d texel_of(const TextureChart& chart, const PhotoProjector& projector,
                          const Eigen::Vector3d& point);
 

@@ -1,5 +1,5 @@
 // Estimates the exposure of photographs and the vignetting of the lens from common surface points.
-// Colors are divided by both before they are blended. Private to libmap/texture.
+// Colors are divided by both before blending. Private to libmap/texture.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,7 +13,7 @@
 namespace libmap {
 
 struct TextureExposure {
-  std::vector<Eigen::Vector3f> gains;         // per photograph and channel, relative to their mean
+  std::vector<Eigen::Vector3f> gains;         // per photograph and channel, relative to the mean
   std::array<double, 3> vignetting{0, 0, 0};  // log of brightness: a r^2 + b r^4 + c r^6
   std::size_t observations = 0;
   // Standard deviation of ln(color) of one surface point between photographs, before and after.

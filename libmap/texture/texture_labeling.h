@@ -2,10 +2,11 @@
 // between photographs short. Private to libmap/texture.
 //
 // The energy is that of Lempitsky and Ivanov 2007 (equation 1): the loss of view quality against
-// the best view of each triangle, plus the length of the seams. It is minimized by exact dynamic
-// programming over forests of triangles, alternating with forests of regions of one photograph,
-// while all other triangles keep their photograph (block coordinate descent as in Thuerck et al.
-// 2016, "A Fast, Massively Parallel Solver for Large, Irregular Pairwise Markov Random Fields").
+// the best view of each triangle, plus the length of the seams. The energy is minimized by exact
+// dynamic programming over forests of triangles, alternating with forests of regions of one
+// photograph, while the photographs of all other triangles are fixed (block coordinate descent as
+// in Thuerck et al. 2016, "A Fast, Massively Parallel Solver for Large, Irregular Pairwise Markov
+// Random Fields").
 #pragma once
 
 #include <cstdint>
@@ -20,7 +21,7 @@ namespace libmap {
 constexpr std::uint32_t no_photo = 0xffffffff;
 
 struct LabelingOptions {
-  // Cost of a seam of 1 m: equal to that of this area (m2) of triangles with half the best quality.
+  // Cost of a seam of 1 m: equal to the cost of this area (m2) at half the best quality.
   double seam_cost_m = 0.1;
 };
 

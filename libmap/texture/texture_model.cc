@@ -232,7 +232,7 @@ void bind(ParameterTable& table, TextureOptions& options) {
   table.add("max_incidence_deg", options.views.max_incidence_deg, {0, 90, true, true},
             "maximum angle between viewing ray and surface normal, degrees");
   table.add("max_depth_m", options.views.max_depth_m, not_negative,
-            "maximum depth of a surface in a photograph used for it, m; 0: no limit");
+            "maximum depth at which a photograph is used for a surface, m; 0: no limit");
   table.add("occlusion_tolerance_m", options.views.occlusion_tolerance_m, not_negative,
             "depth behind another surface beyond which a surface counts as occluded, m");
   table.add(
@@ -243,7 +243,7 @@ void bind(ParameterTable& table, TextureOptions& options) {
   table.add("seam_cost_m", options.labeling.seam_cost_m, not_negative,
             "cost per meter of seam; larger values give fewer seams but lower view quality");
   table.add("blend_views", options.blend_views, {1, 16},
-            "maximum number of photographs blended at a point; 1: one per triangle");
+            "maximum number of photographs blended at a point; 1: one photograph per triangle");
   table.add("blend_exponent", options.blend_exponent, not_negative,
             "exponent of the view quality in the blending weights");
   table.add("exposure", options.exposure.gains, "equalize the brightness of the photographs");

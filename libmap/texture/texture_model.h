@@ -38,7 +38,7 @@ struct TextureOptions {
   double blend_exponent = 1.0;
   // Triangles with longer sides are subdivided if a photograph may show them, so that photographs
   // see most triangles completely or not at all; 0: never. Longer sides remain if the result would
-  // exceed both 2.5 million triangles and twice those of the mesh.
+  // exceed both 2.5 million triangles and twice the triangles of the mesh.
   double max_side_m = 0.05;
   Color unseen_color{128, 128, 128};
   bool strict = false;  // throw Error for an unusable frame instead of skipping it

@@ -20,7 +20,7 @@ struct BlendingWeight {
 };
 
 // Blending weights of all vertices: vertex v has shares[first[v]] .. [first[v + 1] - 1], which sum
-// up to 1. A vertex without weights uses the photograph of its triangle.
+// up to 1. A vertex without weights uses the photograph of the triangle.
 struct BlendingWeights {
   std::vector<BlendingWeight> shares;
   std::vector<std::uint32_t> first;
@@ -39,7 +39,7 @@ struct TexturePaint {
 };
 
 // Paints all charts of `atlas` into the pages of `model`, the result of atlas.make_model. Texels
-// outside all triangles get the color of the nearest triangle of their chart. Independent of the
+// outside all triangles get the color of the nearest triangle of the chart. Independent of the
 // number of threads.
 void paint_texture(const TextureAtlas& atlas, const TexturePaint& paint, TexturedMesh& model,
                    Progress& progress);

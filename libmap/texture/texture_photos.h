@@ -62,12 +62,12 @@ class OccluderCells {
 
   // Clears all cells and begins a new photograph.
   void begin(const PhotoProjector& projector);
-  // Adds a surface point by its pixel and z (m) in the camera's frame. Ignored if z is not positive
-  // or the pixel is outside the photograph.
+  // Adds a surface point by pixel and z (m) in the camera's frame. Ignored if z is not positive or
+  // the pixel is outside the photograph.
   void add(float x, float y, float z);
-  // Returns true if a point in the pixel's cell or its eight neighbors is more than `gap_m` above
-  // the plane normal . (point - camera) = height_m. The normal is in world axes and faces the
-  // camera. The pixel must be inside the photograph.
+  // Returns true if a point in the pixel's cell or the eight neighbors of the cell is more than
+  // `gap_m` above the plane normal . (point - camera) = height_m. The normal is in world axes and
+  // faces the camera. The pixel must be inside the photograph.
   bool has_any_above(float x, float y, const Eigen::Vector3d& normal, double height_m,
                      double gap_m) const;
 
@@ -94,7 +94,7 @@ class TexturePhotos {
  public:
   // Reads each frame of `world_from_base` once, by ascending node. Skips and lists frames that have
   // no color image, no calibration or a pose that is not finite, or that cannot be decoded; with
-  // `strict` it throws Error for them. Throws Error if no photograph is left. At most
+  // `strict`, throws Error for such frames. Throws Error if no photograph is left. At most
   // `max_kept_bytes` of decoded images are cached. `scan` must outlive this object.
   TexturePhotos(const ScanSource& scan, const Trajectory& world_from_base, bool strict,
                 Progress& progress, std::size_t max_kept_bytes);

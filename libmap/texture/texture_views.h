@@ -65,8 +65,8 @@ struct ColorObservation {
 
 // Part of the mesh and number of views to find.
 struct TextureViewRequest {
-  // Views of the first `triangles` triangles and their vertices are found. The other triangles are
-  // occluders, and contribute to the quality of common vertices.
+  // Views of the first `triangles` triangles and of the vertices of these triangles are found. The
+  // other triangles are occluders, and contribute to the quality of common vertices.
   std::size_t triangles = 0;
   // Maximum number of views; both 0: no views, which takes much less time.
   std::size_t views_per_triangle = 0;
@@ -77,8 +77,9 @@ struct TextureViewRequest {
 struct TextureViews {
   // One row per triangle: photographs that see it completely.
   ViewTable of_triangles;
-  // One row per vertex up to the last one of the part: photographs that see all its triangles, with
-  // the minimum of their qualities. Empty for vertices of other triangles only.
+  // One row per vertex up to the last one of the part: photographs that see all triangles of the
+  // vertex, with the minimum quality over the triangles. Empty for vertices of other triangles
+  // only.
   ViewTable of_vertices;
   // All views of a subset of vertices, spread over the part. Colors are not set yet.
   std::vector<ColorObservation> observations;

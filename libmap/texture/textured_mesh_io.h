@@ -49,10 +49,10 @@ std::vector<ModelFile> textured_mesh_files(const std::filesystem::path& path,
 void require_textured_format(const std::filesystem::path& path);
 bool is_textured_format(const std::filesystem::path& path);
 
-// Reads an .obj or .glb from any program with its textures (PNG or JPEG, embedded or beside it).
-// The result has no pages if the file has no textures. Corners of equal position and normal are
-// merged into one vertex. Throws Error naming the file: it cannot be read or parsed, contains no
-// triangle, or references an unreadable image.
+// Reads an .obj or .glb from any program with textures (PNG or JPEG, embedded or in separate
+// files). The result has no pages if the file has no textures. Corners of equal position and normal
+// are merged into one vertex. Throws Error naming the file: it cannot be read or parsed, contains
+// no triangle, or references an unreadable image.
 TexturedMesh read_textured_mesh(const std::filesystem::path& path);
 
 }  // namespace libmap

@@ -158,7 +158,8 @@ FileLock TileStore::lock() const { return FileLock(progress() / "lock"); }
 void TileStore::require_idle() const {
   for (const fs::path& path : journals())
     if (!FileLock::try_lock(path))
-      throw Error("another process is writing it", {.file = folder_.string()}, ErrorKind::failed);
+      throw Error("another process is writing this tile store", {.file = folder_.string()},
+                  ErrorKind::failed);
 }
 
 void TileStore::clear() const {

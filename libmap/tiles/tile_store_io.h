@@ -6,7 +6,7 @@
 //   STORE/progress/K_of_N.jsonl journal of share K/N: one line per finished tile
 //   STORE/progress/lock         held while the plan is made and the store is completed
 //
-// A tile is done if a line with the plan's key lists it; its file is complete then. Truncated lines
+// A tile is done if a line with the plan's key lists it; the file is then complete. Truncated lines
 // of a killed run are ignored.
 #pragma once
 
@@ -23,7 +23,7 @@
 
 namespace libmap {
 
-// Returns the SHA-256 of the manifest's version, its parameters and its inputs' hashes.
+// Returns the SHA-256 of version, parameters and input hashes of the manifest.
 std::string key_of(const Manifest& manifest);
 
 // Journal of one share, locked by one process at a time.
@@ -34,7 +34,7 @@ class TileJournal {
   ~TileJournal();
   TileJournal(TileJournal&& other) noexcept;
   TileJournal& operator=(TileJournal&&) = delete;
-  // Appends one line of JSON per finished tile, whose file must exist. Throws Error (failed).
+  // Appends one line of JSON per finished tile; the tile's file must exist. Throws Error (failed).
   void add(const std::vector<std::string>& lines);
 
  private:
@@ -49,7 +49,7 @@ class TileStore {
   // Does not access the disk.
   explicit TileStore(std::filesystem::path folder);
 
-  // Paths of the folder and its content.
+  // Paths of the folder and of its content.
   const std::filesystem::path& folder() const { return folder_; }
   std::filesystem::path tiles() const { return folder_ / "tiles"; }
   std::filesystem::path index_path() const { return folder_ / "index.json"; }  // of finished stores

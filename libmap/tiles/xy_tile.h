@@ -10,7 +10,7 @@
 
 namespace libmap {
 
-// Index of a tile: x and y of its lower corner in units of its side.
+// Index of a tile: x and y of the lower corner in units of the tile side.
 struct XyTile {
   std::int64_t i = 0;
   std::int64_t j = 0;

@@ -31,7 +31,7 @@ struct ChartHistogram {
 };
 
 struct ChartAxis {
-  std::string title;                               // with its unit
+  std::string title;                               // with unit
   std::optional<std::pair<double, double>> range;  // default: round numbers around the data
 };
 

@@ -15,7 +15,7 @@
 namespace libmap {
 
 // automatic: the texture if there is one; else the given field; else "hold_probability" or "score"
-//   as in mode score; else own colors if they differ; else height.
+//   as in mode score; else own colors unless all are equal; else height.
 // own:    colors stored in the data.
 // score:  the seven classes of the graspability map's legend.
 // field:  any scalar field, or "x", "y", "z", on a color scale.
@@ -30,7 +30,7 @@ enum class ColorMode { automatic, own, score, field, flags, height, single, text
 // values.
 enum class ColorScale { viridis, diverging };
 
-// A color of a legend and its meaning.
+// A color of a legend and the meaning of the color.
 struct LegendEntry {
   Color color{};
   std::string text;

@@ -54,9 +54,9 @@ struct SheetLayout {
   std::vector<PixelRect> scale_bars;  // one per row, or one, or none
 };
 
-// Plans the layout. `aspect` is the height of a cell over its width, used if the options do not set
-// the height. Throws Error: no cell, columns, a size or the sheet out of bounds, an invalid
-// background, more titles than rows or columns.
+// Plans the layout. `aspect` is height / width of a cell, used if the options do not set the
+// height. Throws Error: no cell, columns, a size or the sheet out of bounds, an invalid background,
+// more titles than rows or columns.
 SheetLayout plan_sheet(const std::vector<SheetCell>& cells, const ImageGridOptions& options,
                        const std::vector<Legend>& legends, double aspect);
 

@@ -24,7 +24,7 @@ void check(const ColorImage& image) {
     throw Error("too large for PNG",
                 {.field = "size",
                  .value = size_text(image.width, image.height),
-                 .bound = "at most " + std::to_string(largest_side) + " per side"});
+                 .bound = "<= " + std::to_string(largest_side) + " pixels per side"});
   const std::size_t pixels =
       static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
   if (image.pixels.size() != pixels)

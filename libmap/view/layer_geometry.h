@@ -56,9 +56,9 @@ struct ColoredTriangles {
 };
 
 // Triangles of a layer: a mesh unchanged, a cloud as squares or visible cube sides of at least 1.3
-// pixels. Fillers are larger squares behind the points, as seen from the camera; they show the
-// color of a neighboring point in gaps. Seen from above, they are below the whole layer, so that
-// each column shows its highest point. In other views they cover only surfaces far behind.
+// pixels. Fillers are larger squares behind the points, as seen from the camera; fillers show the
+// color of a neighboring point in gaps. Seen from above, fillers are below the whole layer, so that
+// each column shows the highest point. In other views, fillers cover only surfaces far behind.
 ColoredTriangles triangles_of(const PreparedLayer& layer, const SceneCamera& camera,
                               const Eigen::Vector3d& origin);
 

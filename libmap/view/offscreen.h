@@ -13,9 +13,9 @@ class vtkRenderWindow;
 
 namespace libmap {
 
-// Ensures an X server with OpenGL during its lifetime. If the server in DISPLAY does not answer, it
-// starts an Xvfb (Debian package xvfb) with Mesa's software renderer (libgl1-mesa-dri), so that
-// images do not depend on the machine, and sets DISPLAY. The destructor stops that Xvfb and
+// Ensures an X server with OpenGL during the lifetime of this object. If the server in DISPLAY does
+// not answer, starts an Xvfb (Debian package xvfb) with Mesa's software renderer (libgl1-mesa-dri),
+// so that images do not depend on the machine, and sets DISPLAY. The destructor stops that Xvfb and
 // restores the environment; all X connections must be closed before. Xvfb also stops if the process
 // or the thread that started it is killed.
 class VirtualDisplay {
@@ -26,7 +26,7 @@ class VirtualDisplay {
   VirtualDisplay(const VirtualDisplay&) = delete;
   VirtualDisplay& operator=(const VirtualDisplay&) = delete;
 
-  // Returns true if an Xvfb was started, and its process id (0 if not).
+  // Returns true if an Xvfb was started; returns the process id of the Xvfb (0 if none).
   bool started() const { return server_ > 0; }
   int process_id() const { return server_; }
 

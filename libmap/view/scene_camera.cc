@@ -109,7 +109,7 @@ void place(SceneCamera& camera, const CameraPlacement& placement) {
     throw Error("the camera is at its focal point or is not finite", {.field = "camera"});
   const double sine = view.normalized().cross(placement.up.normalized()).norm();
   if (!(sine > 1e-6))
-    throw Error("the camera's up direction is parallel to its view, or zero",
+    throw Error("the up direction is parallel to the view direction, or zero",
                 {.field = "camera up"});
   const double angle = placement.field_of_view_deg;
   if (!(angle > 0.0 && angle < 180.0))

@@ -32,13 +32,13 @@ ScenePage plan_page(const SceneViewOptions& options, const std::vector<Legend>& 
 
 // Largest length of 1, 2 or 5 times a power of ten meters that is at most `longest_m`.
 double round_length_m(double longest_m);
-// A length with its unit, e.g. "50 m", "2 cm", "5 mm".
+// A length with unit, e.g. "50 m", "2 cm", "5 mm".
 std::string length_text(double length_m);
 
 // Width and height in pixels of legends in one column.
 Eigen::Vector2d legends_size(const std::vector<Legend>& legends, int font_px);
 
-// Draw title, legends and axes into their rectangles, if the page has them.
+// Draw title, legends and axes into the page's rectangles, if the page has these.
 void draw_title(const ScenePage& page, const std::string& title, Canvas& canvas);
 void draw_legends(const ScenePage& page, const std::vector<Legend>& legends, Canvas& canvas);
 void draw_axes(const ScenePage& page, const SceneCamera& camera, Canvas& canvas);
@@ -52,15 +52,16 @@ struct LabelRequest {
   double height_px = 0.0;
 };
 
-// Returns one box per request, in their order: beside its point, or farther away if there is no
-// room. Boxes avoid the points (of radius `point_radius_px`), each other and the outside of
-// `bounds`; if that is impossible, the covered area is minimized.
+// Returns one box per request, in the order of the requests: beside the point, or farther away if
+// there is no room. Boxes do not overlap the points (of radius `point_radius_px`) or each other and
+// are inside `bounds`; else the area that overlaps points and other boxes or is outside `bounds` is
+// minimized.
 std::vector<PixelRect> place_labels(const std::vector<LabelRequest>& requests,
                                     double point_radius_px, const PixelRect& bounds);
 
-// Draws markers in the terrain frame. Labels are omitted if the plot is too small for all of them.
-// More than 5000 markers are downsampled to one per verdict and square with a disc's radius as
-// side.
+// Draws markers in the terrain frame. Labels are omitted if the plot is too small for all labels.
+// If there are more than 5000 markers, those with drawn labels are drawn, and one per verdict and
+// pixel square (side: the disc's radius).
 void draw_markers(const ScenePage& page, const SceneCamera& camera,
                   const std::vector<Marker>& markers, Canvas& canvas);
 

@@ -43,7 +43,7 @@ void check(const SceneViewOptions& options) {
   check_side("height", options.height);
   parse_color(options.background, "background");
   if (options.extent && !((options.extent->max - options.extent->min).minCoeff() >= 0.0))
-    throw Error("the box contains nothing", {.field = "extent"});
+    throw Error("the box contains no point", {.field = "extent"});
 }
 
 // A scene ready to be drawn, in the terrain frame.
@@ -250,14 +250,15 @@ void bind(ParameterTable& table, SceneLayer& layer) {
              {"height", ColorMode::height},
              {"single", ColorMode::single},
              {"texture", ColorMode::texture}},
-            "quantity that the colors show; automatic: chosen by the content of the file");
+            "quantity shown by colors; own: stored colors; field: --field; flags: convex, "
+            "graspable, obstacles; single: one color; automatic: by the content of the file");
   table.add("field", coloring.field,
             "name of the scalar field shown by color modes field and automatic");
   table.add("load_n", coloring.load_n, positive,
             "load shown in the legend of hold_probability, N; auto: the load stored with the map");
   table.add("color_scale", coloring.scale,
             {{"viridis", ColorScale::viridis}, {"diverging", ColorScale::diverging}},
-            "color scale of continuous values; diverging: blue below and red above 0");
+            "color scale; viridis: dark to bright; diverging: blue below and red above 0");
   table.add("range_min", coloring.range_min, any_number,
             "value at the lower end of the color scale");
   table.add("range_max", coloring.range_max, any_number,
@@ -272,11 +273,14 @@ void bind(ParameterTable& table, SceneLayer& layer) {
             "side length of points, m; 0: from the point spacing");
   table.add("shading", layer.shading,
             {{"automatic", Shading::automatic}, {"none", Shading::none}, {"full", Shading::full}},
-            "shading of surfaces");
+            "shading; none: exact colors; automatic: meshes, cubes, and clouds of one color with "
+            "normals; full: also other clouds with normals and textured meshes");
 }
 
 void bind(ParameterTable& table, SceneViewOptions& options) {
-  table.add("view", options.view, viewpoint_names(), "viewpoint of the image");
+  table.add("view", options.view, viewpoint_names(),
+            "viewpoint; top, front, side: orthographic along -z, +y, -x; oblique: perspective "
+            "from the front left above; camera: perspective from a given position");
   table.add("title", options.title, "title above the scene");
   table.add("scale_bar", options.scale_bar, "show the scale bar");
   table.add("background", options.background, "background color, #rrggbb or a name");

@@ -51,7 +51,7 @@ struct Marker {
   Verdict verdict = Verdict::none;
 };
 
-// A dimension as in technical drawings: a line with arrow heads at both ends and a text beside its
+// A dimension as in technical drawings: a line with arrow heads at both ends and a text beside the
 // center, drawn over the scene.
 struct DimensionLine {
   Eigen::Vector3d from = Eigen::Vector3d::Zero();  // scene frame, meters
@@ -89,14 +89,14 @@ void bind(ParameterTable& table, SceneViewOptions& options);
 void bind_single(ParameterTable& table, SceneViewOptions& options);
 
 // Renders `scene`; equal scenes and options give equal bytes on one machine. Clouds and meshes are
-// freed as soon as they are prepared. Each call starts a VirtualDisplay if no display answers;
-// create one before several calls to start it once. Calls from several threads are serialized.
-// Throws Error: nothing to draw, an invalid size, color or camera, a layer with inconsistent
-// arrays, and as color_points does; (failed) if rendering is not possible.
+// freed after preparation. Each call starts a VirtualDisplay if no display answers; create one
+// before several calls to start it once. Calls from several threads are serialized. Throws Error:
+// nothing to draw, an invalid size, color or camera, a layer with inconsistent arrays, and as
+// color_points does; (failed) if rendering is not possible.
 ColorImage render_scene(Scene scene, const SceneViewOptions& options);
 
-// Bounding box of a scene in the terrain frame, including the size of its points, and the distinct
-// legends of its layers. Throws Error as render_scene does.
+// Bounding box of a scene in the terrain frame, including the size of points, and the distinct
+// legends of the layers. Throws Error as render_scene does.
 struct SceneContents {
   Bounds3d extent;
   std::vector<Legend> legends;

@@ -69,8 +69,8 @@ HeightField make_grid(const TriangleMesh& mesh, double cell_size_m) {
   const Eigen::Array2d high = (bounds.max.head<2>() / cell_size_m).array().ceil() + 1;
   const Eigen::Array2d nodes = high - low + 1;
   if (!(nodes.prod() <= max_nodes))
-    throw Error("too small: the height field would have too many nodes",
-                {.field = "cell_size_m", .value = to_text(cell_size_m), .bound = "<= 2^26 nodes"});
+    throw Error("too small: the height field would have more than 2^26 nodes",
+                {.field = "cell_size_m", .value = to_text(cell_size_m)});
   field.corner_m = low * cell_size_m;
   field.base_m = bounds.min.z();
   field.columns = static_cast<std::size_t>(nodes.x());
@@ -185,7 +185,7 @@ std::vector<float> deviations(const TriangleMesh& mesh, const HeightField& field
 }
 
 // Cells with too large a deviation and those around them, so that the nodes between a cell and one
-// that is left out are on the surface.
+// that is skipped are on the surface.
 void leave_out(const std::vector<float>& deviation, double max_deviation_m, HeightField& field) {
   const std::size_t columns = field.columns - 1;
   const std::size_t rows = field.rows - 1;

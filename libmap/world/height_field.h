@@ -1,4 +1,4 @@
-// Height field of a site for MuJoCo, which collides meshes only by their convex hulls.
+// Height field of a site for MuJoCo, which collides meshes only by convex hulls.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,11 +12,11 @@ namespace libmap {
 
 struct HeightFieldOptions {
   double cell_size_m = 0.005;      // > 0
-  double max_deviation_m = 0.002;  // > 0: cells with a larger deviation are left out
+  double max_deviation_m = 0.002;  // > 0: cells with a larger deviation are skipped
 };
 
-// The nodes are at multiples of the cell size. The diagonal of each cell runs from its lowest to
-// its highest indices.
+// The nodes are at multiples of the cell size. The diagonal of each cell runs from the lowest to
+// the highest indices.
 struct HeightField {
   double cell_size_m = 0.0;
   Eigen::Vector2d corner_m = Eigen::Vector2d::Zero();  // node (0, 0)
@@ -43,7 +43,7 @@ struct HeightField {
 // The lowest surface that faces up. Throws Error: no triangle faces up, or more than 2^26 nodes.
 HeightField make_height_field(const TriangleMesh& mesh, const HeightFieldOptions& options);
 
-// Returns true if a triangle is above or below a cell that is left out.
+// Returns true if a triangle is above or below a cell that is skipped.
 bool is_above_left_out(const HeightField& field, const TriangleMesh& mesh,
                        const Triangle& triangle);
 

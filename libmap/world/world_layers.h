@@ -1,4 +1,4 @@
-// Visible shapes of a simulator world: a mesh by its texture pages, and squares of map scores.
+// Visible shapes of a simulator world: a mesh by texture pages, and squares of map scores.
 #pragma once
 
 #include <cstddef>
@@ -10,12 +10,12 @@
 
 namespace libmap {
 
-// Returns the mesh with its vertex colors as a texture: 2 x 2 texels per triangle, whose bilinear
-// interpolation equals that of the colors. Without colors, there are no pages.
+// Returns the mesh with vertex colors as a texture: 2 x 2 texels per triangle; bilinear
+// interpolation of texels equals interpolation of the colors. Without colors, there are no pages.
 TexturedMesh bake_vertex_colors(TriangleMesh mesh);
 
-// Returns the triangles of one page (no_page: without texture), with this page only. No two of them
-// have a common edge in the same direction.
+// Returns the triangles of one page (no_page: without texture), with this page only. No two
+// triangles have a common edge in the same direction.
 TexturedMesh page_of(const TexturedMesh& model, std::int32_t page);
 
 struct ColoredMesh {

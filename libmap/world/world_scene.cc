@@ -33,7 +33,7 @@ void bind(ParameterTable& table, WorldOptions& options) {
   table.add("restitution", options.restitution, zero_to_one,
             "coefficient of restitution of the ground");
   table.add("sensor_noise_m", options.sensor_noise_m, not_negative,
-            "standard deviation of the depth that the rig's simulated cameras measure, m");
+            "standard deviation of the depth noise of the rig's simulated cameras, m");
 }
 
 double gravity_of(const std::string& text) {

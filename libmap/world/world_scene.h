@@ -42,7 +42,7 @@ struct WorldVisual {
   Color color{160, 160, 160};
 };
 
-// A site, or one tile of it.
+// A site, or one tile of a site.
 struct WorldModel {
   std::string name;
   std::vector<WorldVisual> visuals;
@@ -80,8 +80,8 @@ inline constexpr double foothold_radius_m = 0.01;
 std::string mesh_path(const std::string& file);
 std::string gravity_text(const WorldOptions& options);
 
-// Return the descriptions of the world; mesh paths are relative to their folder. Gazebo and
-// CoppeliaSim read SDF; MuJoCo MJCF; Bullet, PyBullet and Isaac URDF.
+// Return the descriptions of the world; mesh paths are relative to the folder of the description.
+// Gazebo and CoppeliaSim read SDF; MuJoCo MJCF; Bullet, PyBullet and Isaac URDF.
 std::string to_sdf(const WorldScene& scene);
 std::string to_mjcf(const WorldScene& scene);
 std::string to_urdf(const WorldScene& scene);

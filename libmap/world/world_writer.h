@@ -39,7 +39,7 @@ struct WorldReport {
 };
 void describe(ResultTable& table, const WorldReport& report);
 
-// The points of a map and their colors.
+// The points of a map and colors of the points.
 struct WorldScores {
   std::vector<Eigen::Vector3d> points;
   std::vector<Color> colors;
@@ -49,11 +49,11 @@ struct WorldScores {
 struct WorldModelInput {
   std::string name;
   TexturedMesh visual;
-  // The surface below the height field: that of `visual` and around it.
+  // The surface below the height field: the surface of `visual` and the surroundings.
   TriangleMesh surface;
 };
 
-// Makes the collision shapes of a model, and writes its meshes to `folder`, unless that is empty.
+// Makes the collision shapes of a model, and writes the meshes to `folder`, unless that is empty.
 // Output bytes do not depend on the number of threads. Throws Error: no triangle, or none that
 // faces up.
 WorldModel write_world_model(const std::filesystem::path& folder, const WorldModelInput& input,

@@ -1,4 +1,4 @@
-// Writes XML by TinyXML-2, and converts values to its texts. Private to libmap/world.
+// Writes XML by TinyXML-2, and converts values to XML text. Private to libmap/world.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,7 +17,7 @@ class XMLPrinter;
 
 namespace libmap {
 
-// Numbers with spaces between them.
+// Numbers separated by spaces.
 std::string number_text(const Eigen::Ref<const Eigen::VectorXd>& numbers);
 
 class XmlWriter {
@@ -30,7 +30,7 @@ class XmlWriter {
   XmlWriter(const XmlWriter&) = delete;
   XmlWriter& operator=(const XmlWriter&) = delete;
 
-  // Opens an element, which `content` fills.
+  // Writes an element; content() writes its children.
   template <typename Content>
   void element(const char* name, Attributes attributes, const Content& content) {
     open(name, attributes);

@@ -11,7 +11,7 @@ SCENE = """shapes:
   - {shape: sphere, name: hemisphere, radius_m: 0.1, x_m: 0.1, y_m: -0.1}
 """
 SITE = """seed: 1
-ground: {size_x_m: 2, size_y_m: 2, unevenness_m: 0.01, texture: soil}
+ground: {size_x_m: 2, size_y_m: 2, relief_m: 0.01, texture: soil}
 layout: {site_size_m: 1.5, free_square_m: 0, gap_m: 0.01}
 field_points: {count: 3, min_height_m: 0.05, radius_m: 0.04}
 rocks:

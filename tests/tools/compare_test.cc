@@ -311,9 +311,9 @@ TEST(Compare, ExtremesAreOneShortLine) {
   write_square_and_points();
   const std::vector<std::pair<Words, graspmap_test::ExpectedError>> extremes = {
       {{"--samples-per-m2", "1e300"},
-       {.file = "square.ply", .field = "samples", .value = "1e+300 per m2 on 1 m2"}},
+       {.file = "square.ply", .field = "number of samples", .value = "1e+300 (1e+300 per m2)"}},
       {{"--samples-per-m2", "1e12"},
-       {.file = "square.ply", .field = "samples", .value = "1e+12 per m2 on 1 m2"}},
+       {.file = "square.ply", .field = "number of samples", .value = "1e+12 (1e+12 per m2)"}},
       {{"--within", "nan"}, {.field = "--within", .value = "nan", .bound = "> 0"}},
       {{"--transform", "0,0,1e308,0,0,0"},
        {.file = "points.ply", .field = "distance of the centers", .value = "inf m"}},

@@ -208,11 +208,11 @@ TEST(Crop, BadInput) {
                         {.file = "map.ply", .field = "size", .value = "3.00 x 3.00 m"}));
   EXPECT_TRUE(bad_input(with({"--size", "0x3"}), {.field = "--size", .value = "0x3"}));
   EXPECT_TRUE(bad_input(with({"--size", "1xtwo"}), {.field = "--size", .value = "1xtwo"}));
-  EXPECT_TRUE(bad_input(with({"--size", "1x1", "--border"}),
-                        {.bound = "one of --box, --polygon, --size and --border"}));
-  EXPECT_TRUE(bad_input(
-      with({"--border"}),
-      {.file = "map.ply", .field = "share of the side", .value = "0 %", .bound = ">= 40 %"}));
+  EXPECT_TRUE(bad_input(with({"--size", "1x1", "--border"}), {.about = "--border"}));
+  EXPECT_TRUE(bad_input(with({"--border"}), {.file = "map.ply",
+                                             .field = "visible share of the side",
+                                             .value = "0 %",
+                                             .bound = ">= 40 %"}));
   EXPECT_TRUE(bad_input(with({"--level", "none"}), {.field = "--level", .value = "none"}));
   EXPECT_TRUE(bad_input(with({"--level", "some"}),
                         {.field = "--level", .value = "some", .bound = "one of auto none"}));

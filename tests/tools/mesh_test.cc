@@ -97,7 +97,7 @@ TEST(Mesh, NormalsWithoutSidesAreOriented) {
   EXPECT_EQ(results.at("normals_oriented_by"), "a minimum spanning tree");
   EXPECT_TRUE(bad_input(graspmap({"mesh", "ball.ply", "-o", "as_is.ply", "--normals", "cloud"}),
                         {.file = "ball.ply",
-                         .field = "neighbors whose normals face opposite sides",
+                         .field = "share of neighbors with normals on opposite sides",
                          .value = "83.7 %",
                          .bound = "<= 40 %",
                          .about = "--normals"}));

@@ -275,9 +275,9 @@ TEST_F(ScoreBadInput, PointsTooFarApartForTheVoxels) {
   const std::string cloud = cloud_of(points);
   const graspmap_test::ExpectedError named = {
       .file = cloud,
-      .field = "spacing of the points with voxels of 0.01 m",
-      .value = "25.0 mm; 100.0 % of the voxels have no neighbor",
-      .bound = "<= 60 % of the voxels"};
+      .field = "share of voxels without a neighbor",
+      .value = "100.0 % (voxels of 0.01 m, median point spacing 25.0 mm)",
+      .bound = "<= 60 %"};
   EXPECT_TRUE(bad_input(score({cloud, "--voxel-size", "0.01"}), named));
   EXPECT_TRUE(bad_input(
       graspmap({"score", cloud, "--voxel-size", "0.01", "--quiet", "-o", "map.tiles"}), named));

@@ -120,8 +120,9 @@ TEST(WorldCommand, BadInputWritesNothing) {
   };
   EXPECT_TRUE(bad_input(convert({"empty.ply", "-o", "x.world"}),
                         {.file = "empty.ply", .about = "triangle"}));
-  EXPECT_TRUE(bad_input(convert({"site.ply", "-o", "x.world", "--map", "other.ply"}),
-                        {.file = "other.ply", .field = "points on the surface", .value = "0"}));
+  EXPECT_TRUE(
+      bad_input(convert({"site.ply", "-o", "x.world", "--map", "other.ply"}),
+                {.file = "other.ply", .field = "number of points on the surface", .value = "0"}));
   EXPECT_TRUE(bad_input(convert({"site.ply", "-o", "x.world", "--rig", "none.yaml"}),
                         {.file = "none.yaml", .about = "camera"}));
   EXPECT_TRUE(bad_input(convert({"site.ply", "-o", "x.world", "--rig", "name.yaml"}),

@@ -24,7 +24,8 @@ struct ScoreOptions {
 
 void bind(libmap::ParameterTable& table, ScoreOptions& options) {
   libgtd::bind(table, options.detection);
-  table.add("frame", options.frame, libgtd::map_frame_names(), "frame of the map's points");
+  table.add("frame", options.frame, libgtd::map_frame_names(),
+            "frame of the map's points; terrain: terrain frame; input: frame of the scored cloud");
 }
 
 ScoreOptions score_options(const std::optional<std::string>& scenario,

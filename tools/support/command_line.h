@@ -21,27 +21,27 @@ class UsageError : public libmap::Error {
   using Error::Error;
 };
 
-// Throws Error with the flag of the first parameter of `bind` that differs from its default.
+// Throws Error with the flag of the first parameter of `bind` that differs from the default.
 template <typename Options>
 void reject_changed(const Options& options, void (*bind)(libmap::ParameterTable&, Options&),
                     const std::string& reason) {
   if (const auto key = libmap::changed_key(options, bind))
     throw libmap::Error(reason, {.field = libmap::flag_of(*key)});
 }
-// Throws Error with the first flag whose value is true, which marks it as given; for options that
-// are not parameters.
+// Throws Error with the first flag with value true, which means that the user gave the flag; for
+// options that are not parameters.
 void reject_given(const std::vector<std::pair<const char*, bool>>& flags,
                   const std::string& reason);
 
 class Command {
  public:
-  // The default description is that of commands.h; commands with several usages set their own.
+  // The default description is in commands.h; commands with several usages pass a description.
   explicit Command(const std::string& name, const std::string& description = {});
   ~Command();
   Command(const Command&) = delete;
   Command& operator=(const Command&) = delete;
 
-  // Positional arguments, in the order in which they are added.
+  // Positional arguments, in the order of the calls.
   void input(const std::string& name, std::string& path, const std::string& description);
   void inputs(const std::string& name, std::vector<std::string>& paths,
               const std::string& description);
@@ -51,7 +51,7 @@ class Command {
   void flag(const std::string& name, bool& value, const std::string& description);
   void option(const std::string& name, const std::string& value_name, std::string& value,
               const std::string& description, bool required = false);
-  // Declares a flag of earlier versions; its use is an error that names `now` instead.
+  // Declares a flag of earlier versions; the use of this flag is an error that names `now`.
   void former_flag(const std::string& name, const std::string& now);
   // Declares the earlier name of a flag. It is still read, but not shown by --help.
   void renamed_flag(const std::string& earlier, const std::string& now);
@@ -62,7 +62,7 @@ class Command {
   // and a KEY of --set KEY=VALUE.
   libmap::ParameterTable& parameters();
 
-  // Declares a parameter, such as a sensor's name, whose value names a file with further
+  // Declares a parameter, such as a sensor's name, with a value that names a file with further
   // parameters. Flags and --config override that file; "auto" names no file.
   void preset(const std::string& key,
               std::function<std::filesystem::path(const std::string&)> resolver);
@@ -79,7 +79,7 @@ class Command {
   std::unique_ptr<Parts> parts_;
 };
 
-// Runs the chosen usage of a command with several usages, each with its own Command and options.
+// Runs the chosen usage of a command with several usages, each with a separate Command and options.
 // --help of the first usage shows all. Returns the exit code.
 using Subcommand = int(int argc, char** argv);
 int run_subcommand(int argc, char** argv, std::initializer_list<Subcommand*> subcommands,

@@ -16,7 +16,7 @@ struct FootholdMark {
 };
 
 // Returns the footholds in a cloud (frame of the map, m). Throws Error naming `file` if the cloud
-// does not have their fields, and for an approach direction of length zero.
+// does not have the fields of footholds, and for an approach direction of length zero.
 std::vector<FootholdMark> foothold_marks(const libmap::PointCloud& cloud, const std::string& file);
 
 }  // namespace graspmap_tools

@@ -140,7 +140,8 @@ class MapGrasping {
     carry_facts(map_.index().manifest, run);
     in_file(input.map_file, [&] { require_usable(); });
     if (!map_.has_manifest())
-      run.warn(input.map_file + ": has no manifest; its frame is assumed to be that of the mesh");
+      run.warn(input.map_file +
+               ": has no manifest; the map is assumed to be in the frame of the mesh");
   }
 
   void grasp() {
@@ -179,11 +180,13 @@ class MapGrasping {
                   : 0;
     }
     if (on_mesh == 0)
-      throw libmap::Error("no voxel of the map is on the mesh: check the frames of map and mesh",
-                          {.bound = "within " + libmap::to_text(options_.max_distance_m) + " m"});
+      throw libmap::Error("no voxel of the map is within " +
+                          libmap::to_text(options_.max_distance_m) +
+                          " m of the mesh; check the frames of map and mesh");
     if (2 * on_mesh < voxels)
-      run_.warn("only {} of {} voxels are within {} m of the mesh: is the map in its frame?",
-                on_mesh, voxels, options_.max_distance_m);
+      run_.warn(
+          "only {} of {} voxels are within {} m of the mesh; check the frames of map and mesh",
+          on_mesh, voxels, options_.max_distance_m);
   }
 
   // Resumes the store's plan if it is of the same mesh, map and parameters, else writes a new one.
@@ -202,7 +205,7 @@ class MapGrasping {
     if (earlier && earlier->key == plan_.key) return;
     if (earlier && is_store())
       throw libmap::Error(
-          "contains tiles of another mesh, map or gripper or of other parameters: --force "
+          "contains tiles of another mesh, map or gripper or of other parameters; use --force to "
           "replaces them",
           {.file = input_.output});
     if (!earlier && !is_forced) require_no_index(store_);
@@ -407,7 +410,7 @@ void require_map_output(const GraspMapInput& input, Run& run) {
   }
   if (fs::exists(input.output) && fs::exists(input.map_file) &&
       fs::equivalent(input.output, input.map_file))
-    throw libmap::Error("is the input: choose another output name", {.file = input.output});
+    throw libmap::Error("is the input; choose another output name", {.file = input.output});
   if (run.options().force && input.share.count > 1)
     throw libmap::Error("deletes the tiles of all shares and cannot be combined with --tile",
                         {.field = "--force"});

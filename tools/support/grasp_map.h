@@ -19,11 +19,11 @@
 
 namespace graspmap_tools {
 
-// Ground of the virtual field test: a mesh in one file, or in a folder of tiles, with few of them
+// Ground of the virtual field test: a mesh in one file, or in a folder of tiles, of which few are
 // in memory.
 class GroundTiles {
  public:
-  // Mesh of one tile and of its surroundings within reach of a gripper.
+  // Mesh of one tile and of the surroundings within reach of a gripper.
   struct Piece {
     const libmap::TriangleMesh mesh;
     const libgtd::Ground ground;  // ground of `mesh`
@@ -74,7 +74,7 @@ void require_map_output(const GraspMapInput& input, Run& run);
 // Writes the map with the added fields. Tiles are processed in a tile store, so that a killed run
 // can be resumed: in the output or in OUTPUT.progress, which is removed once the map in one file is
 // written. The run's manifest must have the inputs. Throws Error if the map is empty or already has
-// a field, none of its voxels is on the mesh, or the store is of other inputs.
+// a field, no voxel is on the mesh, or the store is of other inputs.
 void grasp_map(const GraspMapInput& input, GroundTiles& ground, const libgtd::Gripper& gripper,
                const libgtd::GraspOptions& options, Run& run);
 

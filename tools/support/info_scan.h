@@ -9,7 +9,7 @@
 
 namespace graspmap_tools {
 
-// Returns true if the path can only be a scan: *.db, a folder, or an SQLite file.
+// Returns true for *.db, a folder or an SQLite file: kinds of paths that can be scans.
 bool may_be_scan(const std::string& path);
 
 struct ScanInfo {

@@ -152,14 +152,14 @@ libmap::Pose map_from_points(const std::string& map, PointFrame points_frame, Ru
   if (points_frame == PointFrame::map) {
     if (!manifest || manifest->find_transform(site_from_map_name) == nullptr)
       throw libmap::Error(
-          manifest ? "its manifest has no transform site_from_map: it was not made from outputs of "
-                     "`graspmap crop` or `graspmap simulate cameras`"
+          manifest ? "the manifest has no transform site_from_map, which `graspmap crop` and "
+                     "`graspmap simulate cameras` write"
                    : "has no manifest with the transform site_from_map",
           {.file = map, .field = "--points-frame", .value = "map", .bound = "input or terrain"});
     return *site_from_map_of(map);
   }
   if (!manifest) {
-    run.warn(map + ": has no manifest; listed points are assumed to be in its frame");
+    run.warn(map + ": has no manifest; listed points are assumed to be in the frame of the map");
     return libmap::Pose::Identity();
   }
   // Clouds and meshes that were not scored have one frame only.

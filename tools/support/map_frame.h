@@ -33,8 +33,8 @@ std::vector<Eigen::Vector3d> positions_of(const libmap::Table& table);
 inline constexpr const char* terrain_from_input_name = "terrain_from_input";
 const libmap::Pose* terrain_from_input_of(const std::optional<libmap::Manifest>& manifest);
 
-// Name of the transform that `crop` and `simulate cameras` write and later commands copy. It always
-// starts from the map before the first of them.
+// Name of the transform that `crop` and `simulate cameras` write and later commands copy. The
+// source is always the map before the first of these commands.
 inline constexpr const char* site_from_map_name = "site_from_map";
 
 // Returns the transform from the map before `crop`, or the map of a simulated robot, to the points
@@ -45,7 +45,7 @@ std::optional<libmap::Pose> site_from_map_of(const libmap::Manifest& manifest);
 // Name of the transform to the frame of a scan's true poses.
 inline constexpr const char* truth_from_poses_name = "ground_truth_from_poses";
 
-// Returns true if, by its manifest, `file` or its source is in the frame of true poses.
+// Returns true if, by the manifest, `file` or the source of `file` is in the frame of true poses.
 bool is_from_true_frame(const std::string& file);
 
 // Copies site_from_map, ground_truth_from_poses and georeference from the manifest of `input` to
@@ -64,9 +64,9 @@ void carry_georeference(const std::string& input, Run& run);
 // frame of `map`.
 void carry_terrain_transform(const std::string& map, Run& run);
 
-// Returns the transform from the frame of listed points to that of the points in `map`, from its
-// manifest; the identity, with a warning, if it has none. Throws Error if `points_frame` is map and
-// the manifest has no site_from_map.
+// Returns the transform from the frame of listed points to the frame of the points in `map`, from
+// the manifest of `map`; the identity, with a warning, without a manifest. Throws Error if
+// `points_frame` is map and the manifest has no site_from_map.
 libmap::Pose map_from_points(const std::string& map, PointFrame points_frame, Run& run);
 
 // Return the transforms from the scored cloud to the points of a map, and from these to the terrain

@@ -48,7 +48,7 @@ void write_tile(const std::filesystem::path& store, const libmap::PointCloud& po
 
 void require_no_index(const libgtd::MapTileStore& store) {
   if (std::filesystem::exists(store.index_path()))
-    throw libmap::Error("is complete, but has no folder `progress`: --force replaces it",
+    throw libmap::Error("is complete, but has no folder `progress`; use --force to replace it",
                         {.file = store.folder().string()});
 }
 
@@ -111,7 +111,7 @@ namespace {
 libmap::Manifest manifest_of(const std::string& tile) {
   const auto manifest = libmap::read_manifest_of(tile);
   if (!manifest)
-    throw libmap::Error("has no manifest: it is not a tile that `graspmap score` wrote",
+    throw libmap::Error("has no manifest, so `graspmap score` did not write this tile",
                         {.file = tile});
   return *manifest;
 }

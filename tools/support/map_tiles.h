@@ -17,7 +17,7 @@
 
 namespace graspmap_tools {
 
-// Returns true if the path is that of a tile store: its name ends with .tiles.
+// Returns true for paths of tile stores: names that end with .tiles.
 bool is_tile_store(const std::string& path);
 
 std::filesystem::path store_index_path(const std::string& store);
@@ -26,18 +26,18 @@ std::filesystem::path store_index_path(const std::string& store);
 // no tiles. Returns nullopt if the manifest has no lattice.
 std::optional<libgtd::TileStoreIndex> index_of(const libmap::Manifest& manifest);
 
-// Writes the file of one tile of the store, and adds its hash and size to `tile`.
+// Writes the file of one tile of the store, and adds hash and size of the file to `tile`.
 void write_tile(const std::filesystem::path& store, const libmap::PointCloud& points,
                 libgtd::StoredTile& tile);
 
-// Throws Error if a store has an index but no plan, so that its run cannot be resumed.
+// Throws Error if a store has an index but no plan, so that the run cannot be resumed.
 void require_no_index(const libgtd::MapTileStore& store);
 
 class MapTiles {
  public:
-  // Throws Error naming the store or its index if it is missing, incomplete, damaged or empty.
+  // Throws Error naming the store or the index if either is missing, incomplete, damaged or empty.
   explicit MapTiles(const std::string& store);
-  // Opens a store whose index is not written yet.
+  // Opens a store without an index.
   MapTiles(std::filesystem::path store, libgtd::TileStoreIndex index);
 
   const libgtd::TileStoreIndex& index() const { return index_; }
@@ -62,7 +62,7 @@ class MapTiles {
   bool float64_positions_ = false;
 };
 
-// Returns true for a tile store, or if the manifest of `file` is that of one of several shares.
+// Returns true for a tile store, or if the manifest of `file` describes one of several shares.
 bool is_part_of_map(const std::string& file);
 
 // Writes the tiles of a store as one map. PCD files are written by rows of tiles; other formats

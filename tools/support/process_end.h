@@ -8,10 +8,10 @@ namespace graspmap_tools {
 
 // Installs handlers for SIGHUP, SIGINT and SIGTERM. They remove uncommitted outputs
 // (libmap/core/file_output.h), then end the process by the default action of the same signal, so
-// that its parent sees the signal: $? of a shell is 129, 130 or 143, and make stops. Signals that
-// are ignored at the start (nohup) remain ignored. A write beyond the limit on file size (ulimit
-// -f) fails like one on a full disk instead of ending the process. Throws Error (failed) if no pipe
-// can be created.
+// that the parent process sees the signal: $? of a shell is 129, 130 or 143, and make stops.
+// Signals that are ignored at the start (nohup) remain ignored. A write beyond the limit on file
+// size (ulimit -f) fails like one on a full disk instead of ending the process. Throws Error
+// (failed) if no pipe can be created.
 void end_cleanly_on_signals();
 
 // Does not return if such a signal was received, because later errors are caused by it.

@@ -1,4 +1,4 @@
-// Converts the results of stages to JSON for output, and stores those of finished tiles as JSON.
+// Converts the results of stages to JSON for output, and stores results of finished tiles as JSON.
 #pragma once
 
 #include <nlohmann/json.hpp>

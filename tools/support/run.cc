@@ -33,14 +33,14 @@ bool written_by_this_toolkit(const fs::path& output) { return own_manifest_of(ou
 void require_no_foreign_manifest(const fs::path& output) {
   const fs::path manifest = libmap::manifest_path(output);
   if (fs::exists(manifest) && !written_by_this_toolkit(output))
-    throw libmap::Error("exists and is not a manifest of graspmap: --force overwrites it",
+    throw libmap::Error("exists and is not a manifest of graspmap; use --force to overwrite it",
                         {.file = manifest.string()});
 }
 
 void require_other_than_inputs(const fs::path& output, const std::vector<std::string>& inputs) {
   for (const std::string& input : inputs)
     if (fs::exists(output) && fs::exists(input) && fs::equivalent(output, input))
-      throw libmap::Error("is the input: choose another output name", {.file = output.string()});
+      throw libmap::Error("is the input; choose another output name", {.file = output.string()});
 }
 
 void write_named(const libmap::OutputFile& output, const Run::Writer& writer) {
@@ -179,7 +179,7 @@ void Run::claim_output(const fs::path& path, const std::vector<std::string>& inp
   if (fs::is_directory(path))
     throw libmap::Error("is a folder, not a file", {.file = path.string()});
   if (fs::exists(path) && !options_.force && !written_by_this_toolkit(path))
-    throw libmap::Error("exists and was not written by graspmap: --force overwrites it",
+    throw libmap::Error("exists and was not written by graspmap; use --force to overwrite it",
                         {.file = path.string()});
   if (!options_.force) require_no_foreign_manifest(path);
   // Reports a missing or read-only folder before the work.
@@ -237,7 +237,7 @@ void Run::require_own_companions(const fs::path& path, const std::vector<fs::pat
   for (const fs::path& file : others)
     if (file != path && fs::exists(file))
       throw libmap::Error(
-          "exists and was not written with " + path.string() + ": --force overwrites it",
+          "exists and was not written with " + path.string() + "; use --force to overwrite it",
           {.file = file.string()});
 }
 
@@ -250,7 +250,7 @@ void Run::write_outputs(const fs::path& path, const Files& files) {
 }
 
 void Run::claim_output_folder(const fs::path& given) {
-  require_own_folder(given, ": --force writes into it");
+  require_own_folder(given, "; use --force to write into it");
   const fs::path folder = without_trailing_slash(given.string());
   const fs::path folder_path = folder.has_parent_path() ? folder.parent_path() : ".";
   if (options_.dry_run && !fs::exists(folder_path)) return;

@@ -1,5 +1,5 @@
-// One run of a command: its messages, timings and outputs with manifests. Also includes the headers
-// of the standard library, fmt and libmap/core that nearly all commands need.
+// One run of a command: messages, timings and outputs with manifests. Also includes the headers of
+// the standard library, fmt and libmap/core that nearly all commands need.
 #pragma once
 
 #include <fmt/format.h>
@@ -52,8 +52,8 @@ class Run {
 
   void add_results(const libmap::ResultTable& table) { manifest_.add_results(table); }
 
-  // Adds an input with its hash to the manifest; for a folder, each of its files. Paths of the
-  // toolkit's own data are relative, so that the manifest does not depend on the installation.
+  // Adds an input with hash to the manifest; for a folder, each file. Paths of the toolkit's data
+  // are relative, so that the manifest does not depend on the installation.
   void add_input(const std::filesystem::path& path);
 
   // Print to stderr: `info` without --quiet, `warn` always, `detail` with --verbose.
@@ -73,7 +73,7 @@ class Run {
     detail(fmt::format(text, std::forward<Values>(values)...));
   }
 
-  // Runs `step` and adds its wall time to the manifest.
+  // Runs `step` and adds the wall time to the manifest.
   template <typename Step>
   auto timed(const std::string& name, const Step& step) {
     const Timing timing(*this, name);
@@ -88,24 +88,24 @@ class Run {
   // --force), cannot be written, or is reserved by another process.
   void claim_output(const std::filesystem::path& path, const std::vector<std::string>& inputs = {});
 
-  // Calls writer(temporary), which writes the file, then moves it to `path` together with its
+  // Calls writer(temporary), which writes the file, then moves the file to `path` together with the
   // manifest. With --dry-run nothing is written.
   using Writer = std::function<void(const std::filesystem::path& temporary)>;
   static Writer text_writer(std::string text);
   void write_output(const std::filesystem::path& path, const Writer& writer);
   void write_text(const std::filesystem::path& path, const std::string& text);
 
-  // write_outputs writes an output of several files, `path` the last of them. All are written
-  // before they are moved in order, so that all others exist if `path` does. require_own_companions
-  // throws Error if one of the others exists and no earlier run of this command wrote `path`
-  // (unless --force). write_outputs calls it too.
+  // write_outputs writes an output of several files, of which `path` is the last. All files are
+  // written before they are moved in order, so that all others exist if `path` does.
+  // require_own_companions throws Error if one of the others exists and no earlier run of this
+  // command wrote `path` (unless --force). write_outputs calls it too.
   void require_own_companions(const std::filesystem::path& path,
                               const std::vector<std::filesystem::path>& others);
   using Files = std::vector<std::pair<std::filesystem::path, Writer>>;
   void write_outputs(const std::filesystem::path& path, const Files& files);
 
   // Claim and write a folder of outputs, which is created if it is missing. All files are written
-  // before the first is moved into the folder; its manifest is FOLDER.json. With --dry-run nothing
+  // before the first is moved into the folder; the manifest is FOLDER.json. With --dry-run nothing
   // is written.
   void claim_output_folder(const std::filesystem::path& folder);
   void write_output_folder(const std::filesystem::path& folder, const Files& files);
@@ -136,11 +136,11 @@ class Run {
   // Throws Error if the folder contains files that this command did not write; `remedy` is appended
   // to the message.
   void require_own_folder(const std::filesystem::path& folder, const std::string& remedy);
-  // claim_manifest claims an output by creating its temporary manifest. begin_manifest returns this
+  // claim_manifest claims an output by creating the temporary manifest. begin_manifest returns this
   // for writing, and creates it if the output was not claimed.
   void claim_manifest(const std::filesystem::path& output);
   libmap::OutputFile begin_manifest(const std::filesystem::path& output);
-  // Writes the files and the manifest, then moves them to their paths.
+  // Writes the files and the manifest, then moves all to the final paths.
   void write_together(const std::filesystem::path& output, const Files& files, bool is_timed);
 
   std::string command_;

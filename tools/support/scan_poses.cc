@@ -92,9 +92,9 @@ void report_nodes_without_pose(const std::string& scan, const std::string& wante
   const std::size_t nodes = count_valid_nodes(graph);
   if (poses.size() >= nodes) return;
   const std::string text =
-      fmt::format("{} of {} nodes have no pose there", nodes - poses.size(), nodes);
+      fmt::format("{} of {} nodes have no pose in this source", nodes - poses.size(), nodes);
   if (strict) throw libmap::Error(text, {.file = scan, .field = "--poses", .value = wanted});
-  run.warn(scan + ": " + text + ": their frames are left out");
+  run.warn(scan + ": " + text + "; frames without a pose are skipped");
 }
 
 // Warns about odometry of several sessions, each of which has its own frame.
@@ -105,7 +105,7 @@ void report_sessions(const std::string& scan, const libmap::PoseGraph& graph,
     if (const libmap::GraphNode* node = graph.find_node(pose.node)) sessions.insert(node->session);
   if (sessions.size() < 2) return;
   const std::string text = fmt::format(
-      "odometry of {} sessions, each in its own frame: join them with refine", sessions.size());
+      "odometry of {} sessions, each in a separate frame; refine joins sessions", sessions.size());
   run.warn(scan + ": " + text);
 }
 
@@ -155,7 +155,7 @@ std::optional<libmap::CameraFile> known_camera(const CalibrationOption& calibrat
     const auto* text = made ? std::get_if<std::string>(made->find_result(camera_result)) : nullptr;
     if (text == nullptr) return std::nullopt;
     if (fs::is_regular_file(scan) && !is_input_of(*made, scan)) {
-      run.info("camera of {}: not applied, because it is from another scan", name);
+      run.info("camera of {}: not applied, because the file is from another scan", name);
       return std::nullopt;
     }
     camera = libmap::parse_camera(*text, libmap::manifest_path(name).string());

@@ -1,4 +1,4 @@
-// Opens a scan and selects its poses and its camera by the options --poses and --calibration.
+// Opens a scan and selects poses and camera by the options --poses and --calibration.
 #pragma once
 
 #include <optional>
@@ -32,7 +32,7 @@ struct CalibrationOption {
 };
 void add_calibration_option(Command& command, CalibrationOption& calibration);
 
-// Returns the camera that the option selects, and reports its calibration findings; nullopt for the
+// Returns the camera that the option selects, and reports calibration findings; nullopt for the
 // stored camera. Throws Error if the file cannot be read.
 std::optional<libmap::CameraFile> known_camera(const CalibrationOption& calibration,
                                                const std::string& scan, const PosesOption& poses,
@@ -40,8 +40,8 @@ std::optional<libmap::CameraFile> known_camera(const CalibrationOption& calibrat
 // Adds the camera to the run's manifest, for poses that were estimated with it.
 void add_camera(const libmap::CameraFile& camera, Run& run);
 
-// Opens a scan, with `camera` applied to its frames. Parts that cannot be read are reported as
-// warnings. Throws Error for them if `strict`, and for a scan without nodes.
+// Opens a scan, with `camera` applied to the frames. Parts that cannot be read are reported as
+// warnings. Throws Error for such parts if `strict`, and for a scan without nodes.
 std::unique_ptr<libmap::ScanSource> open_scan(const std::string& scan, bool strict, Run& run,
                                               const std::optional<libmap::CameraFile>& camera = {});
 // Opens and joins several scans (join_scans).
@@ -56,7 +56,7 @@ std::unique_ptr<libmap::ScanSource> open_scan(const std::vector<std::string>& sc
 libmap::Trajectory find_poses(const libmap::ScanSource& scan, PosesOption& poses, bool strict,
                               Run& run);
 
-// Returns true if, by its manifest, `refine` wrote the file of poses.
+// Returns true if, by the manifest, `refine` wrote the file of poses.
 bool are_refined(const PosesOption& poses);
 
 // Returns the scan's true poses. Throws Error if it has none.

@@ -1,4 +1,4 @@
-// Entry points of subcommands with their own source files. argv begins at the command.
+// Entry points of subcommands with separate source files. argv begins at the command.
 #pragma once
 
 #include <string>
@@ -18,7 +18,7 @@ int simulate_scene(int argc, char** argv);
 int simulate_site(int argc, char** argv);
 int simulate_terrain(int argc, char** argv);
 
-// Returns true for a path that convert_world writes: its name ends in .world.
+// Returns true for a path that convert_world writes: a name that ends in .world.
 bool is_world_path(const std::string& path);
 
 // Returns true for a scan that convert_scan accepts: a database or a folder of frames.

@@ -24,7 +24,7 @@ namespace graspmap_tools {
 // Last part of an output's option text.
 inline constexpr const char* or_tile_folder = ", or a folder of tiles (no extension)";
 
-// Returns true if the output is a folder of tiles: its name has no extension.
+// Returns true if the output is a folder of tiles: a name without extension.
 inline bool is_tile_folder(const std::string& output) {
   return std::filesystem::path(without_trailing_slash(output)).extension().empty();
 }
@@ -49,7 +49,7 @@ class TileFolder {
   using TileData = nlohmann::json;
 
   // Claims the folder `output` unless the run makes one of several shares. `names` and `inputs` are
-  // those of Run::claim_output_tree. The manifest of `run` must have its parameters and inputs.
+  // defined by Run::claim_output_tree. The manifest of `run` must have parameters and inputs.
   // Throws Error for a share with --force, which deletes all tiles, and for a share with other
   // parameters or inputs than the earlier shares.
   TileFolder(const std::string& output, const std::vector<std::string>& names,
@@ -66,15 +66,15 @@ class TileFolder {
 
   struct Work {
     std::vector<std::string> tiles;  // names of the tiles of all shares, without extension
-    std::string extension;           // of their files
+    std::string extension;           // of the files of tiles
     // Computes the n-th tile, writes it to `to` unless empty, and returns its data, a JSON object.
     std::function<TileData(std::size_t n, const std::filesystem::path& to)> make;
     // Fills the output with the finished tiles.
     std::function<void(const std::filesystem::path& folder)> finish;
   };
   // Calls begin() if it was not called, makes the missing tiles of the share, and creates the
-  // folder if all tiles are complete; otherwise reports their number. With --dry-run nothing is
-  // made. Throws Error (failed) if another process works on this share.
+  // folder if all tiles are complete; otherwise reports the number of tiles. With --dry-run nothing
+  // is made. Throws Error (failed) if another process works on this share.
   void make(const Work& work);
 
   // Data and file of a finished tile, for Work::finish.

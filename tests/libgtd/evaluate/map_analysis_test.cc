@@ -99,8 +99,8 @@ TEST(VoxelMap, HostileMapsAreSaid) {
   std::erase_if(cloud.fields, [](const auto& field) { return field.name == "i"; });
   cloud.positions[17].x() = 1e9;
   const libmap::Error far = error_of([&] { libgtd::voxel_map_of(cloud, {.lattice = lattice}); });
-  EXPECT_TRUE(is_error(far, {.field = "point 18"}));
-  EXPECT_EQ(far.context().field, "point 18");
+  EXPECT_TRUE(is_error(far, {.field = "distance of point 18 from a voxel center"}));
+  EXPECT_EQ(far.context().field, "distance of point 18 from a voxel center");
   const PointCloud one = map_cloud({{3, 4, 5}}, [](const Voxel&) { return 1.0; });
   EXPECT_EQ(field_of(one), "voxel_size_m");
   EXPECT_EQ(libgtd::voxel_map_of(one, {.lattice = lattice}).size(), 1U);
@@ -131,8 +131,8 @@ TEST(VoxelMap, LatticesThatAreNotFinite) {
                          {.field = "lattice_origin_m or voxel_size_m"}));
     MapInfo facts;
     facts.lattice = libgtd::VoxelLattice{{origin[0], origin[1], origin[2]}, 0.01};
-    EXPECT_TRUE(
-        is_error(error_of([&] { libgtd::voxel_map_of(map, facts); }), {.field = "point 1"}));
+    EXPECT_TRUE(is_error(error_of([&] { libgtd::voxel_map_of(map, facts); }),
+                         {.field = "distance of point 1 from a voxel center"}));
   }
 }
 

@@ -134,7 +134,7 @@ TEST(Detection, LoneVoxelsAreCountedAndRefused) {
   options.scenario.voxel_size_m = 0.01;
   EXPECT_EQ(detect(bumpy_cloud(0.5, 0.008), options).lone_voxels, 0U);
   const libmap::Error error = error_of([&] { detect(bumpy_cloud(0.5, 0.03), options); });
-  EXPECT_EQ(error.context().field, "spacing of the points with voxels of 0.01 m");
+  EXPECT_EQ(error.context().field, "share of voxels without a neighbor");
 }
 
 TEST(DetectionErrors, PointsInOnePlaceOrOnALineAreNoTerrain) {

@@ -153,7 +153,7 @@ TEST(MapTileStore, PlanOfAnotherVersion) {
   write_text(path, text.replace(text.find("\"version\": 1"), 12, "\"version\": 2"));
   const libmap::Error error = error_of([&] { progress.plan(); });
   EXPECT_EQ(error.context().file, path.string());
-  EXPECT_EQ(error.context().field, "format and version");
+  EXPECT_EQ(error.context().field, "format, version");
   EXPECT_EQ(error.context().value, "\"graspmap tile store progress\", 2");
   EXPECT_EQ(error.context().bound, "\"graspmap tile store progress\", 1");
 }
@@ -168,7 +168,7 @@ TEST(MapTileStore, ABoxThatIsNone) {
   plan.terrain[0].box.min.y() = 1.0;
   progress.set_plan(plan);
   const libmap::Error error = error_of([&] { progress.plan(); });
-  EXPECT_EQ(error.context().field, "min and max of piece a b.pcd");
+  EXPECT_EQ(error.context().field, "min, max of cloud a b.pcd");
   EXPECT_EQ(error.context().bound, "min <= max");
 }
 

@@ -112,7 +112,7 @@ TEST(TriangleMeshTest, CheckNamesWhatIsWrong) {
   TriangleMesh mesh = box({1, 1, 1});
   mesh.check();
   mesh.triangles[3][2] = 8;
-  EXPECT_EQ(error_of([&] { mesh.check(); }).context().field, "triangle 3");
+  EXPECT_EQ(error_of([&] { mesh.check(); }).context().field, "vertex of triangle 3");
   EXPECT_EQ(error_of([&] { mesh.check(); }).context().bound, "< 8");
   mesh = box({1, 1, 1});
   mesh.vertex_normals.resize(7);

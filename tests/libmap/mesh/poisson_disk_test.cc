@@ -447,7 +447,7 @@ TEST(PoissonDisk, BadInput) {
   TriangleMesh thread;
   thread.vertices = {{0, 0, 0}, {1e6, 0, 0}, {0, 1e-12, 0}};
   thread.triangles = {{0, 1, 2}};
-  EXPECT_EQ(error_of([&] { by_radius(thread, 1e-3); }).context().field, "piece size");
+  EXPECT_EQ(error_of([&] { by_radius(thread, 1e-3); }).context().field, "fragment size");
 }
 
 TEST(PoissonDisk, RealSite) {

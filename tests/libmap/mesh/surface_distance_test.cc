@@ -149,7 +149,7 @@ TEST(SurfaceDistance, SamplesAreSpreadByArea) {
   EXPECT_NE(sample_surface(mesh, 4000, 8)[0].position, samples[0].position);
   EXPECT_EQ(sample_surface(mesh, 4000, 7)[77].position, samples[77].position);
   EXPECT_TRUE(is_error(error_of([&] { sample_surface(mesh, 1e12, 1); }),
-                       {.field = "samples", .value = "1e+12 per m2 on 2 m2"}));
+                       {.field = "number of samples", .value = "2e+12 (1e+12 per m2)"}));
   mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}};
   EXPECT_TRUE(is_error(error_of([&] { sample_surface(mesh, 10, 1); }), {.about = "no area"}));
 }
@@ -162,12 +162,12 @@ TEST(SurfaceDistance, SamplesOfFewTriangles) {
     return error_of([&] { sample_triangles(mesh, 1e9, 1); }).context().bound;
   };
   EXPECT_TRUE(is_error(error_of([&] { sample_triangles(mesh, 20000, 1); }),
-                       {.field = "samples", .value = "20000 per m2 on 3600 m2"}));
-  EXPECT_EQ(bound_of(), "<= 2500000 in all for 2 triangles");
+                       {.field = "number of samples", .value = "7.2e+07 (20000 per m2)"}));
+  EXPECT_EQ(bound_of(), "<= 2500000 for 2 triangles");
   mesh.triangles.resize(50000, mesh.triangles.front());
-  EXPECT_EQ(bound_of(), "<= 5000000 in all for 50000 triangles");
+  EXPECT_EQ(bound_of(), "<= 5000000 for 50000 triangles");
   mesh.triangles.resize(1500000, mesh.triangles.front());
-  EXPECT_EQ(bound_of(), "<= 100000000 in all for 1500000 triangles");
+  EXPECT_EQ(bound_of(), "<= 100000000 for 1500000 triangles");
 }
 
 TEST(SurfaceDistance, CoverageAgreesWithASearchOfAllPoints) {

@@ -26,7 +26,7 @@ using graspmap_test::topology_of;
 RockSite small_site() {
   return parse_site(
       "seed: 4\n"
-      "ground: {size_x_m: 1.4, size_y_m: 1.2, unevenness_m: 0.02}\n"
+      "ground: {size_x_m: 1.4, size_y_m: 1.2, relief_m: 0.02}\n"
       "layout: {site_size_m: 1.1, free_square_m: 0}\n"
       "rocks:\n"
       "  - {height_m: 0.3, width_m: 0.35, depth_m: 0.3, x_m: -0.2, y_m: 0.1, overhang_deg: 15,"
@@ -194,7 +194,7 @@ TEST(SiteMesh, EverySeedGivesASite) {
 // On the top of a bump that the ground's triangles miss.
 TEST(SiteMesh, ARockInTheAirIsAnError) {
   RockSite site = parse_site(
-      "ground: {unevenness_m: 0}\n"
+      "ground: {relief_m: 0}\n"
       "bumps: [{x_m: 0.4, y_m: 0.4, height_m: 1, radius_m: 0.25}]\n"
       "rocks: [{height_m: 0.1, width_m: 0.1, depth_m: 0.1, x_m: 0.4, y_m: 0.4, ledges: 0,"
       " cleft_m: 0, overhang_deg: 0}]\n",

@@ -213,7 +213,7 @@ TEST(BorderBand, WhatHasNone) {
   o.white = 215;
   o.gaps = 1;
   o.rocks = true;
-  EXPECT_TRUE(is_error(refusal(floor_with_band(o)), {.field = "share of white along each side"}))
+  EXPECT_TRUE(is_error(refusal(floor_with_band(o)), {.field = "white share of each side"}))
       << "rocks alone are no band";
   EXPECT_TRUE(is_error(error_of([&] { find_border_band({}); }), {.about = "no colors"}));
   // Three sides of a band.
@@ -223,7 +223,7 @@ TEST(BorderBand, WhatHasNone) {
       open.positions.push_back(cloud.positions[n]);
       open.colors.push_back(cloud.colors[n]);
     }
-  EXPECT_TRUE(is_error(refusal(open), {.field = "share of white along each side"}));
+  EXPECT_TRUE(is_error(refusal(open), {.field = "white share of each side"}));
 }
 
 TEST(BorderBand, ThreadsMakeNoDifference) {

@@ -412,7 +412,7 @@ TEST_P(Reconstruction, NormalsWithoutSidesAreRefused) {
   for (std::size_t n = 0; n < cloud.size(); ++n)
     if (uniform(0, 1) < 0.5) cloud.normals[n] = -cloud.normals[n];
   const Error error = error_of([&] { reconstruct(cloud); });
-  EXPECT_EQ(error.context().field, "neighbors whose normals face opposite sides");
+  EXPECT_EQ(error.context().field, "share of neighbors with normals on opposite sides");
 }
 
 // First and last returns, 1 mm apart.
