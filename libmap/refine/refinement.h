@@ -55,7 +55,7 @@ struct RefinementOptions {
   LoopClosureDetectionOptions closures{};
   PoseGraphOptions graph{};
   BundleAdjustmentOptions bundle_adjustment{};
-  IcpOptions icp{};
+  IcpOptions icp{.iterations = 8};  // more do not change the results of simulated scans
   ScaleSource scale_from = ScaleSource::depth;
   double scale = 1.0;  // 0.5..2: known factor of poses and depth; 1: none is known
   std::vector<KnownLength> known_lengths{};  // not bound; determine the scale

@@ -120,6 +120,7 @@ BundleAdjustmentOptions with_free(const CalibrationParts& parts, BundleAdjustmen
 }
 
 constexpr int max_rounds = 4;
+constexpr int repeated_rounds = 2;  // of a calibration that begins at an earlier one
 // Motions are estimated in windows of consecutive frames. The time of a dense system grows with the
 // cube of its frames.
 constexpr std::size_t frames_per_window = 24;
@@ -303,8 +304,9 @@ void ModelSearch::leave_out() {
   }
 }
 
+// Later calibrations begin at this one, so one round is enough.
 void ModelSearch::settle_motions() {
-  Candidate settled = attempt_from_best(best_.model, max_rounds - 1);
+  Candidate settled = attempt_from_best(best_.model, 1);
   if (is_good(settled)) best_ = std::move(settled);
 }
 
@@ -325,7 +327,7 @@ bool ModelSearch::is_timing_enough(const CalibrationParts& others) {
   return !is_good(candidate) || !is_needed(timed_->costs, candidate.costs);
 }
 
-// Takes timing alone as the model. Motions need more rounds than a comparison.
+// Takes timing alone as the model.
 void ModelSearch::use_timing_alone() {
   best_ = std::move(*timed_);
   settle_motions();
@@ -349,7 +351,8 @@ CalibrationEstimate ModelSearch::run() {
   if (may_time && is_timing_enough(all)) {
     use_timing_alone();
   } else {
-    best_ = attempt(all, choice_.start, part_.poses, max_rounds);
+    best_ = attempt(all, choice_.start, part_.poses,
+                    choice_.start.empty() ? max_rounds : repeated_rounds);
     // With little data, too many free parameters may fit worse than intrinsics alone.
     if (!is_good(best_) && choice_.leave_out && all.intrinsics && (all.depth || all.registration))
       best_ = attempt({.intrinsics = true}, {}, part_.poses, 1);

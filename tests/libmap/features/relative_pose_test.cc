@@ -103,7 +103,9 @@ TEST(MatchLoops, AllInstructionSetsYieldTheSame) {
   const auto truth = found_with(libmap::InstructionSet::portable);
   EXPECT_EQ(truth.second.back(), -1);
   for (const auto set : {libmap::InstructionSet::avx2, libmap::InstructionSet::avx512})
-    if (libmap::has_instruction_set(set)) EXPECT_EQ(found_with(set), truth);
+    if (libmap::has_instruction_set(set)) {
+      EXPECT_EQ(found_with(set), truth);
+    }
 }
 
 TEST(RelativePose, ExactMatchesGiveTheExactMotionDespiteOutliers) {

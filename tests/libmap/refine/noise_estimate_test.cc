@@ -8,6 +8,7 @@
 #include <string>
 
 #include "libmap/camera/sensor_model.h"
+#include "tests/libmap/refine/textured_scan.h"
 #include "tests/support/test_support.h"
 
 namespace noise_estimate_test {
@@ -53,6 +54,50 @@ TEST(NoiseEstimate, AgreesWithTheAssumedNoiseIfThatIsRight) {
 
 TEST(NoiseEstimate, NeedsResiduals) {
   EXPECT_FALSE(libmap::estimate_noise(residuals_of({}, {}, 500), {}));
+}
+
+graspmap_test::MemoryScan boulders_with(const graspmap_test::DepthNoiseModel& noise, int frames) {
+  graspmap_test::MemoryScan scan;
+  for (int n = 0; n < frames; ++n)
+    scan.see(graspmap_test::boulders(), graspmap_test::around(12.0 * n),
+             graspmap_test::textured_camera(), noise, graspmap_test::random_engine());
+  return scan;
+}
+
+// Held-out depth of near frames that are aligned by the rest of their depth, so that wrong poses do
+// not look like noise.
+TEST(ScanNoise, IsEstimatedIfItDiffersFromTheAssumedNoise) {
+  const libmap::DepthPlaneOptions planes;
+  for (const double pose_error_m : {0.0, 0.01}) {
+    const auto chosen_for = [&](const graspmap_test::DepthNoiseModel& noise) {
+      const auto scan = boulders_with(noise, 20);
+      libmap::Trajectory poses = scan.poses;
+      for (libmap::TrajectoryPose& pose : poses)
+        pose.world_from_base.translation() += pose_error_m * Eigen::Vector3d::Random();
+      return libmap::choose_noise(scan, poses, "auto", planes);
+    };
+    const libmap::ScanNoise same = chosen_for({0.002, 0.005});
+    EXPECT_FALSE(same.is_estimated) << same.sentence;
+    EXPECT_EQ(same.noise, planes.noise);
+    const libmap::ScanNoise low = chosen_for({0.0005, 0.0005});
+    EXPECT_TRUE(low.is_estimated) << low.sentence;
+    EXPECT_LT(low.noise.axial_at(1.5), 0.7 * planes.noise.axial_at(1.5)) << low.sentence;
+    EXPECT_GT(low.noise.axial_at(1.5), 0.0008);
+    EXPECT_EQ(low.noise.lateral_px, planes.noise.lateral_px);
+  }
+}
+
+TEST(ScanNoise, IsKeptIfItIsGivenOrThereIsTooLittleDepth) {
+  const auto scan = boulders_with({0.0005, 0.0005}, 12);
+  libmap::DepthPlaneOptions planes;
+  EXPECT_EQ(libmap::choose_noise(scan, scan.poses, "kinect-v1", planes).noise, planes.noise);
+  planes.noise.axial_of_square = 0.001;
+  const libmap::ScanNoise given = libmap::choose_noise(scan, scan.poses, "auto", planes);
+  EXPECT_FALSE(given.is_estimated);
+  EXPECT_EQ(given.noise, planes.noise);
+  const auto single = boulders_with({0.0005, 0.0005}, 1);
+  EXPECT_FALSE(libmap::choose_noise(single, single.poses, "auto", {}).is_estimated);
+  EXPECT_FALSE(libmap::choose_noise(single, {}, "auto", {}).is_estimated);
 }
 
 TEST(SensorModel, ShippedSensorsAreReadAndUnknownOnesAreNamed) {

@@ -139,6 +139,36 @@ TEST(Refinement, WithoutTextureAndReliefThePosesStayAndItSaysSo) {
 
 // Two identical patches of ground, five meters apart. Their frames match perfectly; only the poses
 // between them distinguish the patches.
+std::string convention_warning(const TexturedScan& scan) {
+  libmap::RefinementOptions options = small_options();
+  options.start = libmap::StartPoses::odometry;
+  options.bundle = false;
+  options.rounds = 0;
+  options.icp.mode = libmap::IcpMode::off;
+  for (const std::string& warning : libmap::refine_poses(scan, options).warnings)
+    if (warning.starts_with("stored poses: ")) return warning;
+  return {};
+}
+
+// Right poses, quaternions as w x y z, and depth in a unit that is five times too small.
+TEST(Refinement, WrongConventionsOfPosesAndDepthAreNamed) {
+  TexturedScan scan;
+  for (int n = 0; n < 8; ++n)
+    scan.see(boulders(), around(15.0 * n, 1.0 + 0.03 * n), libmap::Vector6d::Zero());
+  EXPECT_EQ(convention_warning(scan), "");
+  TexturedScan turned = scan;
+  for (libmap::GraphNode& node : turned.graph_.nodes) {
+    const Eigen::Quaterniond q(node.odometry_from_base->linear());
+    node.odometry_from_base->linear() =
+        Eigen::Quaterniond(q.z(), q.w(), q.x(), q.y()).toRotationMatrix();
+  }
+  EXPECT_NE(convention_warning(turned).find("--poses-quaternion wxyz"), std::string::npos);
+  TexturedScan small = scan;
+  for (auto& [node, frame] : small.frames)
+    for (float& depth : frame.depth.pixels) depth *= 0.2F;
+  EXPECT_NE(convention_warning(small).find("depth times 5"), std::string::npos);
+}
+
 TEST(Refinement, SameLookAtAnotherPlaceIsNotTheSamePlace) {
   TexturedScan scan;
   for (int n = 0; n < 20; ++n)
