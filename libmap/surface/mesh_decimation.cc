@@ -94,8 +94,6 @@ TriangleMesh collapsed(const TriangleMesh& original, const std::vector<bool>& lo
   return select_triangles(result, keep);
 }
 
-using Corners = std::array<Eigen::Vector3d, 3>;
-
 constexpr std::uint32_t none = 0xffffffff;
 
 struct Deviation {
@@ -110,7 +108,7 @@ class DeviationBound {
 
   // `near` is a triangle that may be near, and becomes the nearest one. If it is within the bound,
   // it needs no search.
-  Deviation of(const Corners& part, std::uint32_t& near) const {
+  Deviation of(const TriangleCorners& part, std::uint32_t& near) const {
     const double known = near == none ? HUGE_VAL : farthest_from(near, part);
     if (known <= allowed_) return {.bound_m = known};
     const Eigen::Vector3d middle = (part[0] + part[1] + part[2]) / 3.0;
@@ -126,13 +124,9 @@ class DeviationBound {
   }
 
  private:
-  Deviation of_quarters(const Corners& part, std::uint32_t& near) const {
-    const Eigen::Vector3d ab = (part[0] + part[1]) / 2.0;
-    const Eigen::Vector3d bc = (part[1] + part[2]) / 2.0;
-    const Eigen::Vector3d ca = (part[2] + part[0]) / 2.0;
+  Deviation of_quarters(const TriangleCorners& part, std::uint32_t& near) const {
     Deviation largest;
-    for (const Corners& quarter : {Corners{ab, bc, ca}, Corners{part[0], ab, ca},
-                                   Corners{ab, part[1], bc}, Corners{ca, bc, part[2]}}) {
+    for (const TriangleCorners& quarter : quarters_of(part)) {
       const Deviation here = of(quarter, near);
       if (here.bound_m > largest.bound_m) largest = here;
       if (here.nearest_there != none) break;
@@ -140,7 +134,7 @@ class DeviationBound {
     return largest;
   }
 
-  double farthest_from(std::uint32_t triangle, const Corners& part) const {
+  double farthest_from(std::uint32_t triangle, const TriangleCorners& part) const {
     double largest = 0.0;
     for (const Eigen::Vector3d& corner : part)
       largest = std::max(largest, distance_from(triangle, corner));
@@ -165,10 +159,8 @@ std::vector<Deviation> deviations(const TriangleMesh& from, const TriangleMesh& 
   std::vector<Deviation> result(from.triangles.size());
   parallel_for(result.size(), triangles_grain, [&](std::size_t begin, std::size_t end) {
     std::uint32_t near = none;
-    for (std::size_t n = begin; n < end; ++n) {
-      const Triangle& t = from.triangles[n];
-      result[n] = bound.of({from.vertices[t[0]], from.vertices[t[1]], from.vertices[t[2]]}, near);
-    }
+    for (std::size_t n = begin; n < end; ++n)
+      result[n] = bound.of(corners_of(from, from.triangles[n]), near);
   });
   return result;
 }
