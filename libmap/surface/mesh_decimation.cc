@@ -40,7 +40,34 @@ struct Traits : OpenMesh::DefaultTraits {
   EdgeAttributes(OpenMesh::Attributes::Status);
   HalfedgeAttributes(OpenMesh::Attributes::Status | OpenMesh::Attributes::PrevHalfedge);
 };
-using Mesh = OpenMesh::TriMesh_ArrayKernelT<Traits>;
+
+class Mesh : public OpenMesh::TriMesh_ArrayKernelT<Traits> {
+ public:
+  // The result of TriConnectivity's function, which takes half of the time of a decimation because
+  // Debian's library checks each handle.
+  bool is_collapse_ok(HalfedgeHandle edge) {
+    const VertexHandle from = from_vertex_handle(edge);
+    const VertexHandle to = to_vertex_handle(edge);
+    if (status(edge_handle(edge)).deleted() || status(from).deleted() || status(to).deleted())
+      return false;
+    const bool on_border = is_boundary(edge_handle(edge));
+    if (is_boundary(from) && is_boundary(to) && !on_border) return false;
+    int sides = 0;
+    for (const HalfedgeHandle side : {edge, opposite_halfedge_handle(edge)}) {
+      if (is_boundary(side)) continue;
+      ++sides;
+      const HalfedgeHandle next = opposite_halfedge_handle(next_halfedge_handle(side));
+      const HalfedgeHandle previous = opposite_halfedge_handle(prev_halfedge_handle(side));
+      if (is_boundary(next) && is_boundary(previous)) return false;
+    }
+    // No other vertices than those of the triangles at the edge may be adjacent to both ends.
+    for (const VertexHandle v : vv_range(from)) status(v).set_tagged(false);
+    for (const VertexHandle v : vv_range(to)) status(v).set_tagged(true);
+    int common = 0;
+    for (const VertexHandle v : vv_range(from)) common += status(v).tagged() ? 1 : 0;
+    return sides > 0 && common == sides;
+  }
+};
 
 // Relative to the first vertex, because some of OpenMesh's modules use single precision.
 bool enter(const TriangleMesh& from, const std::vector<bool>& locked, Mesh& mesh) {
