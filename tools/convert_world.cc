@@ -5,9 +5,9 @@
 #include "libmap/io/cloud_io.h"
 #include "libmap/io/mesh_io.h"
 #include "libmap/mesh/mesh_tile_index.h"
-#include "libmap/mesh/ray_caster.h"
+#include "libmap/simulate/robot_cameras.h"
 #include "libmap/texture/textured_mesh_io.h"
-#include "libmap/world/world_writer.h"
+#include "libmap/world/world.h"
 #include "tools/support/command_line.h"
 #include "tools/support/foothold_file.h"
 #include "tools/support/map_frame.h"
@@ -44,8 +44,7 @@ libmap::WorldScores read_scores(const std::string& file, Run& run) {
   const libmap::PointCloud map = read_in_site(file, run);
   const libmap::ScalarField* score = map.find_field("score");
   if (score == nullptr)
-    throw libmap::Error("no such field; a graspability map is required",
-                        {.file = file, .field = "score"});
+    throw libmap::Error("no such field: is this a map?", {.file = file, .field = "score"});
   scores.points = map.positions;
   for (const double one : score->values) scores.colors.push_back(libmap::score_color(one));
   const auto manifest = libmap::read_manifest_of(file);
@@ -64,30 +63,26 @@ std::vector<libmap::WorldFoothold> read_footholds(const std::string& file, Run& 
 }
 
 // Above the middle of the site, as high as `simulate cameras` places the robot.
-libmap::Pose rig_pose(const std::string& text, const libmap::TriangleMesh& mesh) {
+libmap::Pose rig_pose(const std::string& text, const std::string& site) {
   if (text != "auto") return parse_transform(text, "--rig-pose");
   constexpr double height_m = 0.25;
+  const libmap::TriangleMesh mesh = libmap::read_mesh(site).mesh;
   const libmap::Bounds3d bounds = libmap::bounds_of(mesh.vertices);
   Eigen::Vector3d above = 0.5 * (bounds.min + bounds.max);
-  above.z() = bounds.max.z() + 1.0;
-  const auto hit = libmap::RayCaster(mesh).cast(above, -Eigen::Vector3d::UnitZ());
-  if (!hit)
-    throw libmap::Error("no ground below the site's middle; set the pose", {.field = "--rig-pose"});
-  above.z() += height_m - hit->distance;
+  above.z() = height_m + libmap::ground_height(mesh, above.x(), above.y());
   return libmap::make_pose(above, Eigen::Quaterniond::Identity());
 }
 
-libmap::WorldRig read_world_rig(const WorldCommandOptions& options,
-                                const libmap::TriangleMesh& mesh, Run& run) {
+libmap::WorldRig read_world_rig(const WorldCommandOptions& options, Run& run) {
   const fs::path file = libmap::find_data_file("rigs", options.rig);
-  libmap::WorldRig rig{libmap::read_rig(file), rig_pose(options.rig_pose, mesh)};
+  libmap::WorldRig rig{libmap::read_rig(file), rig_pose(options.rig_pose, options.site)};
   run.add_input(file);
   run.manifest().transforms.emplace_back("site_from_robot", rig.world_from_robot);
-  for (const libmap::RigCamera& camera : rig.rig.cameras)
+  for (const libmap::RigCamera& camera : rig.rig.cameras) {
     in_file(file, [&] { libmap::require_world_name(camera.name, "name of a camera"); });
-  for (const libmap::RigCamera& camera : rig.rig.cameras)
     if (camera.camera.is_distorted())
-      run.warn("{}: lens distortion is ignored, because simulators do not support it", camera.name);
+      run.warn("{}: simulators do not know the distortion of its lens", camera.name);
+  }
   return rig;
 }
 
@@ -100,45 +95,35 @@ std::vector<std::string> notes_of(const libmap::Manifest& manifest) {
     notes.push_back(std::string(site_from_map_name) +
                     " (x, y, z, roll, pitch, yaw; m, degrees): " + transform_text(*pose));
   if (const auto& geo = manifest.georeference)
-    notes.push_back(fmt::format(
-        "georeference: offset {} {} {} m, CRS {}", libmap::to_text(geo->origin_m.x()),
-        libmap::to_text(geo->origin_m.y()), libmap::to_text(geo->origin_m.z()), geo->crs_wkt));
+    notes.push_back(fmt::format("georeference: offset {} m, CRS {}", fmt::join(geo->origin_m, " "),
+                                geo->crs_wkt));
   return notes;
 }
 
 libmap::TexturedMesh read_visual(const fs::path& file) {
-  if (libmap::is_textured_format(file)) {
-    libmap::TexturedMesh model = libmap::read_textured_mesh(file);
-    if (model.has_texture()) return model;
-  }
   libmap::TexturedMesh model;
-  model.mesh = libmap::read_mesh(file).mesh;
+  if (libmap::is_textured_format(file)) model = libmap::read_textured_mesh(file);
+  if (!model.has_texture()) model.mesh = libmap::read_mesh(file).mesh;
   return model;
 }
 
-// One model for the site, or one for each of its tiles, with the surface around it.
+// One model for the site, or one for each of its tiles.
 std::vector<libmap::WorldModel> write_models(const fs::path& folder,
                                              const WorldCommandOptions& options,
                                              const libmap::WorldScores& scores,
                                              libmap::WorldReport& report) {
-  const auto write = [&](const libmap::WorldModelInput& input) {
-    return libmap::write_world_model(folder, input, scores, options.world, report);
-  };
-  if (!fs::is_directory(options.site)) {
-    libmap::WorldModelInput input{
-        .name = "site", .visual = read_visual(options.site), .surface = {}};
-    input.surface.vertices = input.visual.mesh.vertices;
-    input.surface.triangles = input.visual.mesh.triangles;
-    return {write(input)};
-  }
-  constexpr double margin_cells = 4.0;
-  libmap::MeshTileIndex pieces(libmap::mesh_tiles(options.site));
+  const std::vector<fs::path> files = libmap::mesh_tiles(options.site);
+  std::optional<libmap::MeshTileIndex> tiles;
+  if (fs::is_directory(options.site)) tiles.emplace(files);
+  const double margin_m = 2 * options.world.ball_radius_m + 4 * options.world.field.cell_size_m;
   std::vector<libmap::WorldModel> models;
-  for (std::size_t n = 0; n < pieces.size(); ++n)
-    models.push_back(write(
-        {.name = pieces.path(n).stem().string(),
-         .visual = read_visual(pieces.path(n)),
-         .surface = pieces.with_margin(n, margin_cells * options.world.field.cell_size_m).mesh}));
+  for (std::size_t n = 0; n < files.size(); ++n) {
+    libmap::WorldModelInput input{.name = tiles ? files[n].stem().string() : "site",
+                                  .visual = read_visual(files[n]),
+                                  .surface = {}};
+    input.surface = tiles ? tiles->with_margin(n, margin_m).mesh : input.visual.mesh;
+    models.push_back(libmap::write_world_model(folder, input, scores, options.world, report));
+  }
   return models;
 }
 
@@ -153,8 +138,7 @@ void write_world(const WorldCommandOptions& options, Run& run) {
   copy_frame(options.site, run);
   const libmap::WorldScores scores = read_scores(options.map, run);
   scene.footholds = read_footholds(options.footholds, run);
-  if (!options.rig.empty())
-    scene.rig = read_world_rig(options, libmap::read_mesh(options.site).mesh, run);
+  if (!options.rig.empty()) scene.rig = read_world_rig(options, run);
   scene.notes = notes_of(run.manifest());
   run.add_input(options.site);
   run.write_output_tree(options.output, names, [&](const fs::path& folder) {
@@ -164,19 +148,18 @@ void write_world(const WorldCommandOptions& options, Run& run) {
       libmap::write_world(folder, scene);
     });
     if (2 * report.score_points < scores.points.size())
-      throw libmap::Error(
-          "most points of the map are not on the surface; map and mesh are of different sites",
-          {.file = options.map,
-           .field = "number of points on the surface",
-           .value = std::to_string(report.score_points),
-           .bound = fmt::format(">= half of {}", scores.points.size())});
+      throw libmap::Error("is the map of another site",
+                          {.file = options.map,
+                           .field = "points on the surface",
+                           .value = std::to_string(report.score_points),
+                           .bound = fmt::format(">= half of {}", scores.points.size())});
     run.add_results({{"models", scene.models.size()}, {"footholds", scene.footholds.size()}});
     run.add_results(libmap::described(report));
     run.info(
-        "{} triangles for collision of {}, within {:.3g} mm; height field within {:.3g} mm, "
-        "{} convex pieces for the rest",
+        "{} triangles for collision of {}, within {:.3g} mm; height field within {:.3g} mm, {} "
+        "balls where it is left out",
         report.collision_triangles, report.visual_triangles, 1e3 * report.collision_deviation_m,
-        1e3 * report.field_deviation_m, report.convex_pieces);
+        1e3 * report.field_deviation_m, report.balls);
   });
 }
 
@@ -192,10 +175,9 @@ int graspmap_tools::convert_world(int argc, char** argv) {
   command.input("SITE", options.site, "mesh of the site (.ply, .obj, .glb ...), or its folder");
   command.output(options.output,
                  "folder OUT.world of SDF (Gazebo, CoppeliaSim), MJCF (MuJoCo) and URDF (Bullet)");
-  command.option("--map", "MAP", options.map, "graspability map of the site as a second visual");
-  command.option("--footholds", "FOOTHOLDS", options.footholds,
-                 "footholds of the map to add as markers");
-  command.option("--rig", "FILE|NAME", options.rig, "camera rig of a robot, as depth sensors");
+  command.option("--map", "MAP", options.map, "graspability map of the site, a second visual");
+  command.option("--footholds", "FOOTHOLDS", options.footholds, "footholds of the map as markers");
+  command.option("--rig", "FILE|NAME", options.rig, "depth cameras of a robot as sensors");
   command.parameters().add(
       "rig_pose", options.rig_pose,
       "pose of the robot's body in the site's frame: X,Y,Z,ROLL,PITCH,YAW in m "

@@ -175,6 +175,14 @@ TriangleMesh transform_mesh(const TriangleMesh& mesh, const Pose& target_from_so
   return moved;
 }
 
+std::array<TriangleCorners, 4> quarters_of(const TriangleCorners& corners) {
+  const auto& [a, b, c] = corners;
+  const Eigen::Vector3d ab = (a + b) / 2.0;
+  const Eigen::Vector3d bc = (b + c) / 2.0;
+  const Eigen::Vector3d ca = (c + a) / 2.0;
+  return {{{ab, bc, ca}, {a, ab, ca}, {ab, b, bc}, {ca, bc, c}}};
+}
+
 Eigen::Vector3d position_on(const TriangleMesh& mesh, const TrianglePoint& point) {
   const Triangle& corners = mesh.triangles[point.triangle];
   return (1.0 - point.u - point.v) * mesh.vertices[corners[0]] +

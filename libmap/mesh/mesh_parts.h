@@ -1,6 +1,7 @@
 // Parts of meshes: selection, connected components, interpolation of normals, colors and fields.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -42,6 +43,13 @@ TriangleMesh transform_mesh(const TriangleMesh& mesh, const Pose& target_from_so
 inline Eigen::Vector3d center_of(const TriangleMesh& mesh, const Triangle& t) {
   return (mesh.vertices[t[0]] + mesh.vertices[t[1]] + mesh.vertices[t[2]]) / 3.0;
 }
+
+using TriangleCorners = std::array<Eigen::Vector3d, 3>;
+inline TriangleCorners corners_of(const TriangleMesh& mesh, const Triangle& t) {
+  return {mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]};
+}
+// The middle one, then one at each corner.
+std::array<TriangleCorners, 4> quarters_of(const TriangleCorners& corners);
 
 // Point on a triangle: (1 - u - v) * a + u * b + v * c.
 struct TrianglePoint {

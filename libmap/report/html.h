@@ -6,13 +6,10 @@
 #include <string_view>
 #include <vector>
 
+#include "libmap/core/markup.h"
 #include "libmap/report/report_content.h"
 
 namespace libmap {
-
-// Escapes text for elements and quoted attributes: & < > " ' are escaped, control characters other
-// than tab and newline are replaced by U+FFFD.
-std::string escape_html(std::string_view text);
 
 // Escapes a name and allows line breaks after '_', '/' and '.'.
 std::string breakable_html(std::string_view name);

@@ -1,12 +1,15 @@
 #include "libmap/world/height_field.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
-#include <string>
+#include <utility>
+#include <vector>
 
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
+#include "libmap/mesh/mesh_parts.h"
 #include "libmap/mesh/surface_distance.h"
 
 namespace libmap {
@@ -15,50 +18,18 @@ namespace {
 
 constexpr double max_nodes = 1 << 26;
 constexpr float missing = std::numeric_limits<float>::infinity();
-// Depth of the nodes below the surface, and tolerance of barycentric coordinates.
-constexpr float sink_m = 0.05F;
+// Depth of height 0 below the surface, and tolerance of barycentric coordinates.
+constexpr double sink_m = 0.05;
 constexpr double edge_tolerance = 1e-9;
-
-using Corners = std::array<Eigen::Vector3d, 3>;
-
-Corners corners_of(const TriangleMesh& mesh, const Triangle& t) {
-  return {mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]};
-}
 
 double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   return a.x() * b.y() - a.y() * b.x();
 }
 
-// A convex polygon in space of few corners.
-struct Polygon {
-  std::array<Eigen::Vector3d, 9> points;
-  std::size_t size = 0;
-};
-
-// The part of the polygon on the left of the line from a to b, in plan (Sutherland and Hodgman
-// 1974).
-Polygon clip(const Polygon& polygon, const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
-  Polygon result;
-  const Eigen::Vector2d along = b - a;
-  const auto side = [&](const Eigen::Vector3d& p) { return cross(along, p.head<2>() - a); };
-  for (std::size_t n = 0; n < polygon.size; ++n) {
-    const Eigen::Vector3d& p = polygon.points[n];
-    const Eigen::Vector3d& q = polygon.points[(n + 1) % polygon.size];
-    const double at_p = side(p);
-    const double at_q = side(q);
-    if (at_p >= 0) result.points[result.size++] = p;
-    if ((at_p > 0 && at_q < 0) || (at_p < 0 && at_q > 0))
-      result.points[result.size++] = p + (q - p) * (at_p / (at_p - at_q));
-  }
-  return result;
-}
-
-template <std::size_t N>
-Polygon clip_to(const Corners& triangle, const std::array<Eigen::Vector3d, N>& outline) {
-  Polygon result{{triangle[0], triangle[1], triangle[2]}, 3};
-  for (std::size_t n = 0; n < N && result.size > 0; ++n)
-    result = clip(result, outline[n].template head<2>(), outline[(n + 1) % N].template head<2>());
-  return result;
+Eigen::Vector3d node(const HeightField& field, std::size_t column, std::size_t row) {
+  return {field.corner_m.x() + static_cast<double>(column) * field.cell_size_m,
+          field.corner_m.y() + static_cast<double>(row) * field.cell_size_m,
+          field.base_m + static_cast<double>(field.heights_m[row * field.columns + column])};
 }
 
 HeightField make_grid(const TriangleMesh& mesh, double cell_size_m) {
@@ -69,40 +40,51 @@ HeightField make_grid(const TriangleMesh& mesh, double cell_size_m) {
   const Eigen::Array2d high = (bounds.max.head<2>() / cell_size_m).array().ceil() + 1;
   const Eigen::Array2d nodes = high - low + 1;
   if (!(nodes.prod() <= max_nodes))
-    throw Error("too small: the height field would have more than 2^26 nodes",
-                {.field = "cell_size_m", .value = to_text(cell_size_m)});
+    throw Error("makes too many nodes",
+                {.field = "cell_size_m", .value = to_text(cell_size_m), .bound = "<= 2^26 nodes"});
   field.corner_m = low * cell_size_m;
-  field.base_m = bounds.min.z();
+  field.base_m = bounds.min.z() - sink_m;
   field.columns = static_cast<std::size_t>(nodes.x());
   field.rows = static_cast<std::size_t>(nodes.y());
   field.heights_m.assign(field.columns * field.rows, missing);
   return field;
 }
 
-Eigen::Vector3d node(const HeightField& field, std::size_t column, std::size_t row) {
-  return {field.corner_m.x() + static_cast<double>(column) * field.cell_size_m,
-          field.corner_m.y() + static_cast<double>(row) * field.cell_size_m,
-          field.base_m + static_cast<double>(field.heights_m[row * field.columns + column])};
+// Calls visit(column, row) for the cells that the box of a triangle touches in plan, or for their
+// nodes, one more in each direction.
+template <typename Visit>
+void for_box(const HeightField& field, const TriangleCorners& corners, std::size_t more,
+             const Visit& visit) {
+  const auto range = [&](int axis, std::size_t nodes) {
+    const auto [low, high] = std::minmax({corners[0][axis], corners[1][axis], corners[2][axis]});
+    const auto cell = [&](double x) {
+      const double whole = std::floor((x - field.corner_m[axis]) / field.cell_size_m);
+      return static_cast<std::size_t>(std::clamp(whole, 0.0, static_cast<double>(nodes - 2)));
+    };
+    return std::pair(cell(low), cell(high) + more);
+  };
+  const auto [first_column, last_column] = range(0, field.columns);
+  const auto [first_row, last_row] = range(1, field.rows);
+  for (std::size_t row = first_row; row <= last_row; ++row)
+    for (std::size_t column = first_column; column <= last_column; ++column) visit(column, row);
 }
 
-// The nodes in the triangle take its height if it is lower.
-void lower_nodes(const Corners& corners, HeightField& field) {
+// Calls visit(column, row, height) for the nodes in a triangle that faces up.
+template <typename Visit>
+void for_nodes(const HeightField& field, const TriangleCorners& corners, const Visit& visit) {
   const Eigen::Vector2d a = corners[0].head<2>();
   const Eigen::Vector2d ab = corners[1].head<2>() - a;
   const Eigen::Vector2d ac = corners[2].head<2>() - a;
   const double area = cross(ab, ac);
   if (!(area > 0)) return;
-  const auto [first_column, last_column, first_row, last_row] = field.cells_of(corners);
-  for (std::size_t row = first_row; row <= last_row + 1; ++row)
-    for (std::size_t column = first_column; column <= last_column + 1; ++column) {
-      const Eigen::Vector2d at = node(field, column, row).head<2>() - a;
-      const double u = cross(at, ac) / area;
-      const double v = cross(ab, at) / area;
-      if (std::min({u, v, 1 - u - v}) < -edge_tolerance) continue;
-      const double height = (1 - u - v) * corners[0].z() + u * corners[1].z() + v * corners[2].z();
-      float& lowest = field.heights_m[row * field.columns + column];
-      lowest = std::min(lowest, static_cast<float>(height - field.base_m));
-    }
+  for_box(field, corners, 1, [&](std::size_t column, std::size_t row) {
+    const Eigen::Vector2d at = node(field, column, row).head<2>() - a;
+    const double u = cross(at, ac) / area;
+    const double v = cross(ab, at) / area;
+    if (std::min({u, v, 1 - u - v}) < -edge_tolerance) return;
+    const double z = (1 - u - v) * corners[0].z() + u * corners[1].z() + v * corners[2].z();
+    visit(column, row, static_cast<float>(z - field.base_m));
+  });
 }
 
 // Missing nodes beside others continue their slopes, so that cells on the border are whole.
@@ -117,155 +99,157 @@ void extend_border(HeightField& field) {
   for (std::ptrdiff_t row = 0; row < rows; ++row)
     for (std::ptrdiff_t column = 0; column < columns; ++column) {
       if (at(column, row) != missing) continue;
-      // Sums and counts of continued slopes, and of heights alone.
-      std::array<float, 2> sums{};
-      std::array<float, 2> counts{};
-      for (std::ptrdiff_t y = -1; y <= 1; ++y)
-        for (std::ptrdiff_t x = -1; x <= 1; ++x) {
-          const float near = at(column + x, row + y);
-          const float far = at(column + 2 * x, row + 2 * y);
-          if (near == missing) continue;
-          const std::size_t kind = far == missing ? 1 : 0;
-          sums[kind] += kind == 1 ? near : 2 * near - far;
-          counts[kind] += 1.0F;
-        }
-      const std::size_t kind = counts[0] > 0 ? 0 : 1;
-      if (counts[kind] > 0)
-        field.heights_m[static_cast<std::size_t>(row * columns + column)] =
-            sums[kind] / counts[kind];
-    }
-}
-
-// The largest distance between two pieces that have the same outline in plan: planes over a convex
-// polygon are farthest apart at its corners.
-double deviation_of(const Polygon& polygon, const Corners& surface, const Corners& cell,
-                    double enough) {
-  const Eigen::Vector3d normal = (cell[1] - cell[0]).cross(cell[2] - cell[0]);
-  double largest = 0.0;
-  for (std::size_t n = 0; n < polygon.size; ++n) {
-    const Eigen::Vector3d& on_surface = polygon.points[n];
-    const double above = normal.dot(on_surface - cell[0]) / normal.z();
-    if (std::abs(above) <= enough) continue;
-    const Eigen::Vector3d on_cell = on_surface - above * Eigen::Vector3d::UnitZ();
-    const auto distance = [](const Eigen::Vector3d& from, const Corners& to) {
-      return (nearest_on_triangle(from, to[0], to[1], to[2]) - from).norm();
-    };
-    largest = std::max({largest, distance(on_cell, surface), distance(on_surface, cell)});
-  }
-  return largest;
-}
-
-// Deviation of each cell: 0 without surface, infinite where it faces down or nodes are missing.
-std::vector<float> deviations(const TriangleMesh& mesh, const HeightField& field) {
-  std::vector<float> result((field.columns - 1) * (field.rows - 1), 0.0F);
-  for (const Triangle& t : mesh.triangles) {
-    const Corners corners = corners_of(mesh, t);
-    const bool faces_down = !(area_normal(mesh, t).z() > 0);
-    const auto [first_column, last_column, first_row, last_row] = field.cells_of(corners);
-    for (std::size_t row = first_row; row <= last_row; ++row)
-      for (std::size_t column = first_column; column <= last_column; ++column) {
-        float& largest = result[row * (field.columns - 1) + column];
-        const Eigen::Vector3d low = node(field, column, row);
-        const Eigen::Vector3d high = node(field, column + 1, row + 1);
-        for (const Eigen::Vector3d& third :
-             {node(field, column + 1, row), node(field, column, row + 1)}) {
-          const bool right = third.y() == low.y();
-          const Corners cell = right ? Corners{low, third, high} : Corners{low, high, third};
-          const Polygon polygon = clip_to(corners, cell);
-          if (polygon.size == 0) continue;
-          if (faces_down || !std::isfinite(low.z() + third.z() + high.z()))
-            largest = missing;
-          else
-            largest = std::max(largest, static_cast<float>(deviation_of(
-                                            polygon, corners, cell, static_cast<double>(largest))));
-        }
+      float sum = 0.0F;
+      float count = 0.0F;
+      for (std::ptrdiff_t k = 0; k < 9; ++k) {
+        const float near = at(column + k % 3 - 1, row + k / 3 - 1);
+        const float far = at(column + 2 * (k % 3 - 1), row + 2 * (k / 3 - 1));
+        if (near == missing || far == missing) continue;
+        sum += 2 * near - far;
+        count += 1.0F;
       }
+      if (count > 0)
+        field.heights_m[static_cast<std::size_t>(row * columns + column)] = sum / count;
+    }
+}
+
+// Where a segment crosses the borders and diagonals of cells, from 0 to 1 with both ends.
+void find_crossings(const Eigen::Vector2d& from, const Eigen::Vector2d& to,
+                    std::vector<double>& crossings) {
+  crossings = {0.0, 1.0};
+  const Eigen::Vector3d begin(from.x(), from.y(), from.x() - from.y());
+  const Eigen::Vector3d end(to.x(), to.y(), to.x() - to.y());
+  for (int k = 0; k < 3; ++k)
+    for (double line = std::floor(std::min(begin[k], end[k])) + 1;
+         line < std::max(begin[k], end[k]); ++line)
+      crossings.push_back((line - begin[k]) / (end[k] - begin[k]));
+  std::sort(crossings.begin(), crossings.end());
+}
+
+// Distances between surface and field, by cell: 0 or above where there is surface, infinite where
+// it faces down or nodes are missing.
+class CellDeviations {
+ public:
+  explicit CellDeviations(const HeightField& field)
+      : field_(field), of_cell_((field.columns - 1) * (field.rows - 1), -1.0F) {}
+
+  // Two planes over a convex polygon in plan are farthest apart at its corners. These are nodes in
+  // the triangle, and positions on its edges where cells begin.
+  void add(const TriangleCorners& surface) {
+    if (!((surface[1] - surface[0]).cross(surface[2] - surface[0]).z() > 0)) {
+      for_box(field_, surface, 0,
+              [&](std::size_t column, std::size_t row) { raise(column, row, missing); });
+      return;
+    }
+    for_nodes(field_, surface, [&](std::size_t column, std::size_t row, float height) {
+      const float deviation = height - field_.heights_m[row * field_.columns + column];
+      for (std::size_t k = 0; k < 4; ++k) raise(column - k % 2, row - k / 2, std::abs(deviation));
+    });
+    for (std::size_t k = 0; k < 3; ++k) add_edge(surface, surface[k], surface[(k + 1) % 3]);
   }
-  return result;
-}
 
-// Cells with too large a deviation and those around them, so that the nodes between a cell and one
-// that is skipped are on the surface.
-void leave_out(const std::vector<float>& deviation, double max_deviation_m, HeightField& field) {
-  const std::size_t columns = field.columns - 1;
-  const std::size_t rows = field.rows - 1;
-  field.left_out.assign(deviation.size(), false);
-  for (std::size_t row = 0; row < rows; ++row)
-    for (std::size_t column = 0; column < columns; ++column) {
-      if (static_cast<double>(deviation[row * columns + column]) <= max_deviation_m) continue;
-      for (std::size_t y = std::max<std::size_t>(row, 1) - 1; y <= std::min(row + 1, rows - 1); ++y)
-        for (std::size_t x = std::max<std::size_t>(column, 1) - 1;
-             x <= std::min(column + 1, columns - 1); ++x)
-          field.left_out[y * columns + x] = true;
+  const std::vector<float>& of_cell() const { return of_cell_; }
+
+ private:
+  void raise(std::size_t column, std::size_t row, float deviation) {
+    float& largest = of_cell_[row * (field_.columns - 1) + column];
+    largest = std::max(largest, deviation);
+  }
+
+  void add_edge(const TriangleCorners& surface, const Eigen::Vector3d& from,
+                const Eigen::Vector3d& to) {
+    const auto in_cells = [&](const Eigen::Vector3d& point) -> Eigen::Vector2d {
+      return (point.head<2>() - field_.corner_m) / field_.cell_size_m;
+    };
+    find_crossings(in_cells(from), in_cells(to), crossings_);
+    for (std::size_t n = 0; n + 1 < crossings_.size(); ++n) {
+      const double middle = (crossings_[n] + crossings_[n + 1]) / 2;
+      const Eigen::Vector2d at = in_cells(from + middle * (to - from));
+      const auto column = static_cast<std::size_t>(at.x());
+      const auto row = static_cast<std::size_t>(at.y());
+      const Eigen::Vector3d low = node(field_, column, row);
+      const Eigen::Vector3d high = node(field_, column + 1, row + 1);
+      const bool right = at.x() - std::floor(at.x()) > at.y() - std::floor(at.y());
+      const Eigen::Vector3d third =
+          right ? node(field_, column + 1, row) : node(field_, column, row + 1);
+      const TriangleCorners cell =
+          right ? TriangleCorners{low, third, high} : TriangleCorners{low, high, third};
+      const bool whole = std::isfinite(low.z() + third.z() + high.z());
+      for (const double t : {crossings_[n], crossings_[n + 1]})
+        raise(column, row, whole ? distance(from + t * (to - from), surface, cell) : missing);
     }
-  for (std::size_t cell = 0; cell < deviation.size(); ++cell)
+  }
+
+  // Distance of a point of the surface from the triangle of a cell, and of the point above or below
+  // it from the surface's triangle.
+  static float distance(const Eigen::Vector3d& on_surface, const TriangleCorners& surface,
+                        const TriangleCorners& cell) {
+    const Eigen::Vector3d normal = (cell[1] - cell[0]).cross(cell[2] - cell[0]);
+    const double above = normal.dot(on_surface - cell[0]) / normal.z();
+    const Eigen::Vector3d on_cell = on_surface - above * Eigen::Vector3d::UnitZ();
+    const auto to = [](const Eigen::Vector3d& point, const TriangleCorners& t) {
+      return (nearest_on_triangle(point, t[0], t[1], t[2]) - point).norm();
+    };
+    return static_cast<float>(std::max(to(on_cell, surface), to(on_surface, cell)));
+  }
+
+  const HeightField& field_;
+  std::vector<float> of_cell_;
+  std::vector<double> crossings_;
+};
+
+// Removes the nodes of cells with too large a deviation. A cell without one of its nodes is left
+// out, so that the field descends within cells that are left out.
+void leave_out(const std::vector<float>& deviations, double max_deviation_m, HeightField& field) {
+  const std::size_t columns = field.columns;
+  const auto nodes_of = [&](std::size_t cell) {
+    const std::size_t first = cell / (columns - 1) * columns + cell % (columns - 1);
+    return std::array{first, first + 1, first + columns, first + columns + 1};
+  };
+  for (std::size_t cell = 0; cell < deviations.size(); ++cell)
+    if (static_cast<double>(deviations[cell]) > max_deviation_m)
+      for (const std::size_t n : nodes_of(cell)) field.heights_m[n] = missing;
+  field.left_out.assign(deviations.size(), false);
+  for (std::size_t cell = 0; cell < deviations.size(); ++cell) {
+    if (deviations[cell] < 0) continue;
+    const auto nodes = nodes_of(cell);
+    field.left_out[cell] = std::any_of(
+        nodes.begin(), nodes.end(), [&](std::size_t n) { return field.heights_m[n] == missing; });
     if (!field.left_out[cell])
-      field.deviation_m = std::max(field.deviation_m, static_cast<double>(deviation[cell]));
-  field.left_out_cells =
-      static_cast<std::size_t>(std::count(field.left_out.begin(), field.left_out.end(), true));
-}
-
-// Nodes that no remaining cell has are put below the surface.
-void sink_nodes(HeightField& field) {
-  std::vector<bool> needed(field.heights_m.size(), false);
-  for (std::size_t row = 0; row + 1 < field.rows; ++row)
-    for (std::size_t column = 0; column + 1 < field.columns; ++column) {
-      if (field.left_out[row * (field.columns - 1) + column]) continue;
-      const std::size_t first = row * field.columns + column;
-      const std::array<std::size_t, 4> nodes = {first, first + 1, first + field.columns,
-                                                first + field.columns + 1};
-      if (std::any_of(nodes.begin(), nodes.end(),
-                      [&](std::size_t n) { return field.heights_m[n] == missing; }))
-        continue;
-      for (const std::size_t n : nodes) needed[n] = true;
-    }
-  const float low = field.min_m() - sink_m;
-  for (std::size_t n = 0; n < needed.size(); ++n)
-    if (!needed[n]) field.heights_m[n] = low;
+      field.deviation_m = std::max(field.deviation_m, static_cast<double>(deviations[cell]));
+  }
+  std::replace(field.heights_m.begin(), field.heights_m.end(), missing, 0.0F);
+  // Simulators subtract the smallest height.
+  const float low = *std::min_element(field.heights_m.begin(), field.heights_m.end());
+  for (float& height : field.heights_m) height -= low;
+  field.base_m += static_cast<double>(low);
 }
 
 }  // namespace
 
-float HeightField::min_m() const { return *std::min_element(heights_m.begin(), heights_m.end()); }
-
-float HeightField::max_m() const { return *std::max_element(heights_m.begin(), heights_m.end()); }
-
-std::array<std::size_t, 4> HeightField::cells_of(
-    const std::array<Eigen::Vector3d, 3>& corners) const {
-  const Eigen::Vector3d low = corners[0].cwiseMin(corners[1]).cwiseMin(corners[2]);
-  const Eigen::Vector3d high = corners[0].cwiseMax(corners[1]).cwiseMax(corners[2]);
-  const auto cell = [&](double x, double corner, std::size_t nodes) {
-    const double whole_cells = std::floor((x - corner) / cell_size_m);
-    return static_cast<std::size_t>(std::clamp(whole_cells, 0.0, static_cast<double>(nodes - 2)));
-  };
-  return {cell(low.x(), corner_m.x(), columns), cell(high.x(), corner_m.x(), columns),
-          cell(low.y(), corner_m.y(), rows), cell(high.y(), corner_m.y(), rows)};
-}
-
 HeightField make_height_field(const TriangleMesh& mesh, const HeightFieldOptions& options) {
   HeightField field = make_grid(mesh, options.cell_size_m);
-  for (const Triangle& t : mesh.triangles) lower_nodes(corners_of(mesh, t), field);
-  if (field.min_m() == missing)
-    throw Error("no triangle of the mesh faces up, so there is no height field");
+  bool faces_up = false;
+  for (const Triangle& t : mesh.triangles)
+    for_nodes(field, corners_of(mesh, t), [&](std::size_t column, std::size_t row, float height) {
+      float& lowest = field.heights_m[row * field.columns + column];
+      lowest = std::min(lowest, height);
+      faces_up = true;
+    });
+  if (!faces_up) throw Error("no triangle faces up");
   extend_border(field);
-  leave_out(deviations(mesh, field), options.max_deviation_m, field);
-  sink_nodes(field);
+  CellDeviations deviations(field);
+  for (const Triangle& t : mesh.triangles) deviations.add(corners_of(mesh, t));
+  leave_out(deviations.of_cell(), options.max_deviation_m, field);
   return field;
 }
 
-bool is_above_left_out(const HeightField& field, const TriangleMesh& mesh,
-                       const Triangle& triangle) {
-  const Corners corners = corners_of(mesh, triangle);
-  const auto [first_column, last_column, first_row, last_row] = field.cells_of(corners);
-  for (std::size_t row = first_row; row <= last_row; ++row)
-    for (std::size_t column = first_column; column <= last_column; ++column) {
-      if (!field.left_out[row * (field.columns - 1) + column]) continue;
-      const std::array<Eigen::Vector3d, 4> cell = {
-          node(field, column, row), node(field, column + 1, row), node(field, column + 1, row + 1),
-          node(field, column, row + 1)};
-      if (clip_to(corners, cell).size > 0) return true;
-    }
-  return false;
+bool may_be_left_out(const HeightField& field, const TriangleMesh& mesh, const Triangle& triangle) {
+  bool found = false;
+  for_box(field, corners_of(mesh, triangle), 0, [&](std::size_t column, std::size_t row) {
+    found = found || field.left_out[row * (field.columns - 1) + column];
+  });
+  return found;
 }
 
 }  // namespace libmap

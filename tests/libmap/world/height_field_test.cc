@@ -4,9 +4,10 @@
 
 #include <algorithm>
 
+#include "libmap/mesh/mesh_parts.h"
 #include "libmap/mesh/surface_distance.h"
-#include "libmap/world/convex_pieces.h"
-#include "libmap/world/world_layers.h"
+#include "libmap/world/collision_balls.h"
+#include "libmap/world/world_visuals.h"
 #include "tests/libmap/world/world_samples.h"
 #include "tests/support/test_support.h"
 
@@ -53,7 +54,7 @@ TEST(HeightField, OfAPlaneIsThePlane) {
   TriangleMesh mesh = square_mesh(0.0, 0.5);
   for (Eigen::Vector3d& v : mesh.vertices) v.z() = 1000.0 + 0.4 * v.x() - 0.7 * v.y();
   const HeightField field = libmap::make_height_field(mesh, {.cell_size_m = 0.03});
-  EXPECT_EQ(field.left_out_cells, 0U);
+  EXPECT_EQ(libmap::count_of(field.left_out), 0U);
   EXPECT_LT(field.deviation_m, 1e-6);
   std::size_t nodes = 0;
   for (std::size_t row = 0; row < field.rows; ++row)
@@ -72,7 +73,7 @@ TEST(HeightField, NoPointIsFartherThanItsDeviation) {
     const TriangleMesh ground = wavy_ground();
     const HeightField field =
         libmap::make_height_field(ground, {.cell_size_m = cell, .max_deviation_m = 1.0});
-    EXPECT_EQ(field.left_out_cells, 0U);
+    EXPECT_EQ(libmap::count_of(field.left_out), 0U);
     EXPECT_GT(field.deviation_m, 1e-6);
     const double there = farthest(mesh_of(field, 0.4), ground);
     const double back = farthest(ground, mesh_of(field, 1.0));
@@ -109,45 +110,68 @@ TEST(HeightField, BadMeshes) {
   EXPECT_EQ(error.context().field, "cell_size_m");
 }
 
-// Pieces of a ball are inside it, reach its surface everywhere and do not overlap much.
-TEST(ConvexPieces, AreBehindTheSurface) {
-  TriangleMesh ball = ball_mesh(16, 32, {1.0, 2.0, 3.0}, 0.2);
-  std::erase_if(ball.triangles, [&](const libmap::Triangle& t) {
-    return libmap::area_normal(ball, t).norm() < 1e-12;
-  });
-  const std::vector<bool> marks(ball.triangles.size(), true);
-  const libmap::ConvexPieces one_by_one =
-      libmap::make_convex_pieces(ball, marks, ball, 0.0, 0.0, 0.02);
-  const libmap::ConvexPieces pairs =
-      libmap::make_convex_pieces(ball, marks, ball, 0.0, 0.001, 0.02);
-  EXPECT_LT(pairs.pieces.size(), 0.7 * static_cast<double>(ball.triangles.size()));
-  EXPECT_LE(pairs.deviation_m, 0.001);
-  for (const libmap::ConvexPieces* pieces : {&one_by_one, &pairs}) {
-    std::size_t triangles = 0;
-    for (const libmap::ConvexPiece& piece : pieces->pieces) {
-      triangles += piece.corners_m.size() - 3;  // of a fan without a corner inside
-      for (const Eigen::Vector3d& corner : piece.corners_m)
-        EXPECT_LE((piece.center + corner - Eigen::Vector3d(1, 2, 3)).norm(), 0.2 + 1e-9);
-      const double depth = piece.corners_m.back().norm();
-      EXPECT_LE(depth, 0.02 + 1e-9);
-      EXPECT_GT(depth, 1e-4);
+// Distance of points outside of all balls from the nearest one, at most.
+double farthest_outside(const std::vector<libmap::CollisionBall>& balls, const TriangleMesh& mesh) {
+  double farthest = 0.0;
+  std::vector<Eigen::Vector3d> points = mesh.vertices;
+  for (const libmap::SurfacePoint& point : libmap::sample_surface(mesh, 2e4, 1))
+    points.push_back(point.position);
+  for (const Eigen::Vector3d& point : points) {
+    double nearest = 1e9;
+    for (const libmap::CollisionBall& ball : balls)
+      nearest = std::min(nearest, (ball.center - point).norm() - ball.radius_m);
+    farthest = std::max(farthest, nearest);
+  }
+  return farthest;
+}
+
+// A sphere is its own balls' closed form: each is inside of it up to the bound.
+TEST(CollisionBalls, CoverASphere) {
+  const Eigen::Vector3d middle(1.0, 2.0, 3.0);
+  const TriangleMesh sphere = ball_mesh(32, 64, middle, 0.2);
+  const std::vector<bool> marks(sphere.triangles.size(), true);
+  for (const double bound_m : {0.002, 0.01}) {
+    const auto balls = libmap::cover_with_balls(sphere, marks, sphere,
+                                                {.max_radius_m = 0.05, .max_deviation_m = bound_m});
+    for (const libmap::CollisionBall& ball : balls) {
+      EXPECT_LE((ball.center - middle).norm() + ball.radius_m, 0.2 + bound_m);
+      EXPECT_LE(ball.radius_m, 0.05 + 2 * bound_m);
     }
-    EXPECT_EQ(triangles, ball.triangles.size());
+    EXPECT_LE(farthest_outside(balls, sphere), bound_m);
+    EXPECT_LE(balls.size(), sphere.triangles.size() / 2);
   }
 }
 
-// Two faces of a thin wall: no piece passes through the other face.
-TEST(ConvexPieces, StayInsideThinWalls) {
+// Large triangles are divided, and only marked ones are covered.
+TEST(CollisionBalls, CoverMarkedTrianglesOnly) {
+  const TriangleMesh square = square_mesh(0.5, 0.3);
+  const libmap::CollisionBallOptions options{.max_radius_m = 0.05, .max_deviation_m = 0.001};
+  EXPECT_TRUE(libmap::cover_with_balls(square, {false, false}, square, options).empty());
+  const auto half = libmap::cover_with_balls(square, {true, false}, square, options);
+  const auto whole = libmap::cover_with_balls(square, {true, true}, square, options);
+  EXPECT_GT(half.size(), 50U);
+  EXPECT_GT(whole.size(), half.size());
+  EXPECT_LE(farthest_outside(whole, square), 0.001);
+  for (const libmap::CollisionBall& ball : whole)
+    EXPECT_LE(ball.center.z() + ball.radius_m, 0.501 + 1e-9);
+}
+
+// Two faces of a thin wall: no ball reaches beyond the other face by more than the bound.
+TEST(CollisionBalls, StayInsideThinWalls) {
   TriangleMesh back = square_mesh(0.0, 0.1);
   for (libmap::Triangle& t : back.triangles) std::swap(t[0], t[1]);
   const TriangleMesh wall = join_meshes(square_mesh(0.004, 0.1), back);
-  for (const libmap::ConvexPiece& piece :
-       libmap::make_convex_pieces(wall, {true, true, true, true}, wall, 0.0, 0.001, 0.02).pieces)
-    EXPECT_NEAR((piece.center + piece.corners_m.back()).z(), 0.002, 1e-5);
+  const auto balls = libmap::cover_with_balls(wall, {true, true, true, true}, wall,
+                                              {.max_radius_m = 0.05, .max_deviation_m = 0.001});
+  EXPECT_LE(farthest_outside(balls, wall), 0.001);
+  for (const libmap::CollisionBall& ball : balls) {
+    EXPECT_LE(ball.center.z() + ball.radius_m, 0.005 + 1e-9);
+    EXPECT_GE(ball.center.z() - ball.radius_m, -0.001 - 1e-9);
+  }
 }
 
 // Bilinear interpolation in the texture is linear interpolation between the vertices.
-TEST(WorldLayers, BakedColorsAreThoseOfTheVertices) {
+TEST(WorldVisuals, BakedColorsAreThoseOfTheVertices) {
   TriangleMesh mesh = wavy_ground(0.1);
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
     mesh.vertex_colors.push_back(

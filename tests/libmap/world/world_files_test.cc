@@ -11,7 +11,7 @@
 #include "libmap/io/mesh_io.h"
 #include "libmap/mesh/surface_distance.h"
 #include "libmap/simulate/robot_cameras.h"
-#include "libmap/world/world_writer.h"
+#include "libmap/world/world.h"
 #include "tests/libmap/world/world_samples.h"
 #include "tests/support/test_support.h"
 

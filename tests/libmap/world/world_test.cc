@@ -2,7 +2,7 @@
 
 #include "libmap/io/mesh_io.h"
 #include "libmap/mesh/mesh_parts.h"
-#include "libmap/world/world_writer.h"
+#include "libmap/world/world.h"
 #include "tests/libmap/world/falling_balls.h"
 #include "tests/libmap/world/world_samples.h"
 #include "tests/support/test_support.h"
@@ -41,10 +41,10 @@ TEST(World, BallsFallOnIt) {
   const fs::path folder = scratch_folder();
   const TriangleMesh mesh = ground_with_boulder();
   const Written written = write(folder, mesh);
-  EXPECT_GT(written.report.convex_pieces, 20U);
+  EXPECT_GT(written.report.balls, 20U);
   const auto places = places_above(mesh, 200, 0.1);
-  const double field_bound =
-      std::max(written.report.field_deviation_m, written.report.piece_deviation_m);
+  const double field_bound = written.scene.options.field.max_deviation_m;
+  EXPECT_LE(written.report.field_deviation_m, field_bound);
   expect_on_surface(drop_in_mujoco(folder, places), mesh, field_bound);
   expect_on_surface(drop_in_bullet(folder, places), mesh, written.report.collision_deviation_m);
 }
@@ -60,10 +60,21 @@ TEST(World, BallsFallOnAScannedSite) {
   const fs::path folder = scratch_folder();
   const Written written = write(folder, mesh);
   const auto places = places_above(mesh, 40, 0.1);
-  const double field_bound =
-      std::max(written.report.field_deviation_m, written.report.piece_deviation_m);
+  const double field_bound = written.scene.options.field.max_deviation_m;
+  EXPECT_LE(written.report.field_deviation_m, field_bound);
   expect_on_surface(drop_in_mujoco(folder, places), mesh, field_bound);
   expect_on_surface(drop_in_bullet(folder, places), mesh, written.report.collision_deviation_m);
+}
+
+// Ground without overhangs needs no balls.
+TEST(World, FlatGroundIsAHeightFieldOnly) {
+  const fs::path folder = scratch_folder();
+  const TriangleMesh mesh = wavy_ground();
+  const Written written = write(folder, mesh);
+  EXPECT_EQ(written.report.balls, 0U);
+  EXPECT_EQ(written.report.left_out_cells, 0U);
+  expect_on_surface(drop_in_mujoco(folder, places_above(mesh, 20, 0.1)), mesh,
+                    written.report.field_deviation_m);
 }
 
 }  // namespace world_test

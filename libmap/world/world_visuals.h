@@ -1,4 +1,4 @@
-// Visible shapes of a simulator world: a mesh by texture pages, and squares of map scores.
+// Meshes that a world shows: a surface by the pages of its texture, and the scores of a map on it.
 #pragma once
 
 #include <cstddef>
@@ -6,16 +6,20 @@
 
 #include "libmap/core/point_cloud.h"
 #include "libmap/core/triangle_mesh.h"
-#include "libmap/mesh/surface_distance.h"
 
 namespace libmap {
 
-// Returns the mesh with vertex colors as a texture: 2 x 2 texels per triangle; bilinear
-// interpolation of texels equals interpolation of the colors. Without colors, there are no pages.
+// Unit of the coordinates in OBJ files, far below float32's resolution at 16 m.
+constexpr double mesh_unit_m = 1e-6;
+// Rounds vertices to this unit, and normals to three decimals, for short files.
+void round_vertices(TriangleMesh& mesh);
+
+// The mesh with its vertex colors as a texture: each triangle has 2 x 2 texels, between whose
+// centers bilinear interpolation is that of the colors. Without colors there is no page.
 TexturedMesh bake_vertex_colors(TriangleMesh mesh);
 
-// Returns the triangles of one page (no_page: without texture), with this page only. No two
-// triangles have a common edge in the same direction.
+// The triangles of one page (no_page: without texture), with this page alone, rounded. No two of
+// them run along an edge in the same sense.
 TexturedMesh page_of(const TexturedMesh& model, std::int32_t page);
 
 struct ColoredMesh {

@@ -1,83 +1,80 @@
-#include "libmap/world/world_layers.h"
+#include "libmap/world/world_visuals.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
-#include <unordered_set>
+#include <set>
 #include <utility>
 
 #include "libmap/core/parallel.h"
 #include "libmap/core/pose.h"
 #include "libmap/mesh/mesh_parts.h"
+#include "libmap/mesh/surface_distance.h"
 
 namespace libmap {
 
 namespace {
 
-constexpr std::size_t blocks_per_side = 2048;
-constexpr std::size_t blocks_per_page = blocks_per_side * blocks_per_side;
 constexpr std::size_t points_grain = 1024;
 // Squares are this far above the surface, so that it does not hide them.
 constexpr double lift_m = 0.001;
 
-// The fourth texel continues the plane of the other three.
-Color fourth(const Color& a, const Color& b, const Color& c) {
-  Color color{};
-  for (std::size_t k = 0; k < 3; ++k)
-    color[k] = static_cast<std::uint8_t>(std::clamp(b[k] + c[k] - a[k], 0, 255));
-  return color;
-}
-
 // MuJoCo rejects meshes in which two triangles run along an edge in the same sense: the later one
 // gets vertices of its own.
 void detach_repeated_edges(TriangleMesh& mesh) {
-  std::unordered_set<std::uint64_t> edges;
-  const auto key = [](const Triangle& t, std::size_t k) {
-    return std::uint64_t{t[k]} << 32U | t[(k + 1) % 3];
-  };
+  std::set<std::pair<std::uint32_t, std::uint32_t>> edges;
   for (Triangle& t : mesh.triangles) {
-    if (edges.contains(key(t, 0)) || edges.contains(key(t, 1)) || edges.contains(key(t, 2)))
+    const auto edge = [&](std::size_t k) { return std::pair(t[k], t[(k + 1) % 3]); };
+    if (edges.contains(edge(0)) || edges.contains(edge(1)) || edges.contains(edge(2)))
       for (std::uint32_t& v : t) v = append_vertex_between(mesh, v, v, 0.0);
-    for (std::size_t k = 0; k < 3; ++k) edges.insert(key(t, k));
+    for (std::size_t k = 0; k < 3; ++k) edges.insert(edge(k));
   }
 }
 
 }  // namespace
 
+void round_vertices(TriangleMesh& mesh) {
+  const double per_m = std::round(1 / mesh_unit_m);
+  for (Eigen::Vector3d& vertex : mesh.vertices) vertex = (vertex * per_m).array().round() / per_m;
+  for (Eigen::Vector3f& normal : mesh.vertex_normals)
+    normal = (normal * 1e3F).array().round() / 1e3F;
+}
+
 TexturedMesh bake_vertex_colors(TriangleMesh mesh) {
   TexturedMesh model;
   model.mesh = std::move(mesh);
   const std::size_t count = model.mesh.triangles.size();
+  const bool has_colors = !model.mesh.vertex_colors.empty();
   model.texture_coordinates.resize(count);
-  model.page_of_triangle.assign(count, no_page);
-  if (model.mesh.vertex_colors.empty()) return model;
-  for (std::size_t first = 0; first < count; first += blocks_per_page) {
-    const std::size_t blocks = std::min(count - first, blocks_per_page);
-    std::size_t side = 1;
-    while (side * side < blocks) ++side;
-    const int size = static_cast<int>(2 * side);
-    ColorImage page(size, size);
-    const auto page_size = static_cast<float>(size);
-    for (std::size_t n = 0; n < blocks; ++n) {
-      const Triangle& t = model.mesh.triangles[first + n];
-      const std::size_t column = 2 * (n % side);
-      const std::size_t row = 2 * (n / side);
-      const std::size_t corner = row * 2 * side + column;
-      const auto color = [&](std::size_t k) { return model.mesh.vertex_colors[t[k]]; };
-      page.pixels[corner] = color(0);
-      page.pixels[corner + 1] = color(1);
-      page.pixels[corner + 2 * side] = color(2);
-      page.pixels[corner + 2 * side + 1] = fourth(color(0), color(1), color(2));
-      const Eigen::Vector2f low(static_cast<float>(column) + 0.5F, static_cast<float>(row) + 0.5F);
-      model.texture_coordinates[first + n] = {low / page_size,
-                                              (low + Eigen::Vector2f::UnitX()) / page_size,
-                                              (low + Eigen::Vector2f::UnitY()) / page_size};
-      model.page_of_triangle[first + n] = static_cast<std::int32_t>(model.pages.size());
+  model.page_of_triangle.assign(count, has_colors ? 0 : no_page);
+  if (!has_colors) return model;
+  const auto side = static_cast<int>(std::ceil(std::sqrt(static_cast<double>(count))));
+  ColorImage page(2 * side, 2 * side);
+  for (std::size_t n = 0; n < count; ++n) {
+    const int column = 2 * (static_cast<int>(n) % side);
+    const int row = 2 * (static_cast<int>(n) / side);
+    std::array<Eigen::Array3i, 4> colors;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Color& color = model.mesh.vertex_colors[model.mesh.triangles[n][k]];
+      colors[k] = {color[0], color[1], color[2]};
     }
-    model.pages.push_back(std::move(page));
+    // The fourth texel continues the plane of the other three.
+    colors[3] = (colors[1] + colors[2] - colors[0]).max(0).min(255);
+    for (int k = 0; k < 4; ++k) {
+      const Eigen::Array3i& color = colors[static_cast<std::size_t>(k)];
+      page.pixels[page.index(column + k % 2, row + k / 2)] = {static_cast<std::uint8_t>(color[0]),
+                                                              static_cast<std::uint8_t>(color[1]),
+                                                              static_cast<std::uint8_t>(color[2])};
+      if (k < 3)
+        model.texture_coordinates[n][static_cast<std::size_t>(k)] =
+            (Eigen::Array2f(static_cast<float>(column + k % 2), static_cast<float>(row + k / 2)) +
+             0.5F) /
+            static_cast<float>(2 * side);
+    }
   }
+  model.pages.push_back(std::move(page));
   return model;
 }
-
 TexturedMesh page_of(const TexturedMesh& model, std::int32_t page) {
   std::vector<bool> keep(model.mesh.triangles.size());
   TexturedMesh result;
@@ -87,6 +84,7 @@ TexturedMesh page_of(const TexturedMesh& model, std::int32_t page) {
   }
   result.mesh = select_triangles(model.mesh, keep);
   detach_repeated_edges(result.mesh);
+  round_vertices(result.mesh);
   result.page_of_triangle.assign(result.mesh.triangles.size(), page == no_page ? no_page : 0);
   if (page != no_page) result.pages.push_back(model.pages[static_cast<std::size_t>(page)]);
   return result;
@@ -117,7 +115,10 @@ ScoreSquares score_squares(const std::vector<Eigen::Vector3d>& points,
     colored.mesh.triangles.push_back({first, first + 1, first + 2});
     colored.mesh.triangles.push_back({first, first + 2, first + 3});
   }
-  for (auto& [key, colored] : by_color) result.meshes.push_back(std::move(colored));
+  for (auto& [key, colored] : by_color) {
+    round_vertices(colored.mesh);
+    result.meshes.push_back(std::move(colored));
+  }
   return result;
 }
 

@@ -1,0 +1,30 @@
+// Balls behind a surface, for simulators that collide meshes only by their convex hulls.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "libmap/core/triangle_mesh.h"
+
+namespace libmap {
+
+struct CollisionBall {
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();
+  double radius_m = 0.0;
+};
+
+struct CollisionBallOptions {
+  double max_radius_m = 0.05;      // > 0
+  double max_deviation_m = 0.002;  // > 0
+};
+
+// Covers the marked triangles with balls inside of `body`, in the order of the triangles. No point
+// of a marked triangle is farther than `max_deviation_m` from a ball, and no point of a ball is
+// farther than that outside of the body. Triangles without area have no balls of their own.
+// Coordinates and radii are whole multiples of 10 micrometers.
+std::vector<CollisionBall> cover_with_balls(const TriangleMesh& mesh,
+                                            const std::vector<bool>& marks,
+                                            const TriangleMesh& body,
+                                            const CollisionBallOptions& options);
+
+}  // namespace libmap

@@ -1,0 +1,128 @@
+// A site as a world for simulators: a folder that they load as it is.
+//
+//   world.sdf                 Gazebo, CoppeliaSim
+//   world.xml                 MuJoCo
+//   world.urdf                Bullet, PyBullet, Isaac
+//   meshes/MODEL.glb          visual mesh, with its texture or its vertex colors
+//   meshes/MODEL_visual_*     the same as OBJ, MTL and PNG, one mesh per page of the texture
+//   meshes/MODEL_score_*.obj  squares of a map, one mesh per color
+//   meshes/MODEL_collision.obj
+//   meshes/MODEL_field.bin    height field: rows and columns (int32), then heights (float32)
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "libmap/core/parameters.h"
+#include "libmap/core/pose.h"
+#include "libmap/core/result_table.h"
+#include "libmap/core/triangle_mesh.h"
+#include "libmap/scan/rig_io.h"
+#include "libmap/world/collision_balls.h"
+#include "libmap/world/height_field.h"
+
+namespace libmap {
+
+struct WorldOptions {
+  double collision_error_m = 0.0014;  // > 0: between the collision mesh and the visual one
+  HeightFieldOptions field{};
+  double ball_radius_m = 0.05;    // > 0: maximum radius of the balls where the field is left out
+  std::string gravity = "earth";  // m/s2 downwards, or earth, moon, mars
+  double friction = 0.8;          // >= 0: Coulomb's coefficient
+  double restitution = 0.0;       // 0 to 1
+  double sensor_noise_m = 0.0;    // >= 0: standard deviation of the rig's depth
+};
+void bind(ParameterTable& table, WorldOptions& options);
+
+// Throws Error for a text that is neither a number >= 0 nor a known body.
+double gravity_of(const std::string& text);
+
+// Throws Error naming `field` for a name that SDF, MJCF or URDF forbids: empty, "world", with
+// "::" or a control character, or between two double underscores.
+void require_world_name(const std::string& name, const std::string& field);
+
+struct WorldReport {
+  std::size_t visual_triangles = 0;
+  std::size_t collision_triangles = 0;
+  // No point of either mesh is farther than this from the other.
+  double collision_deviation_m = 0.0;
+  std::size_t field_nodes = 0;
+  double field_deviation_m = 0.0;  // of HeightField
+  std::size_t left_out_cells = 0;
+  std::size_t balls = 0;
+  std::size_t collision_bytes = 0;  // of collision meshes and height fields
+  std::size_t score_points = 0;     // of the map, on the surface
+};
+void describe(ResultTable& table, const WorldReport& report);
+
+// A mesh to look at.
+struct WorldVisual {
+  std::string file;     // .obj in the folder of meshes
+  std::string texture;  // image beside it; empty: none
+  Color color{160, 160, 160};
+};
+
+// A site, or one tile of it.
+struct WorldModel {
+  std::string name;
+  std::vector<WorldVisual> visuals;  // first the surface, then the scores of a map
+  HeightField field;                 // without the cells
+  std::vector<CollisionBall> balls;
+};
+
+struct WorldFoothold {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  Eigen::Vector3d approach = Eigen::Vector3d::UnitZ();  // unit length, away from the surface
+  Color color{};
+};
+
+struct WorldRig {
+  CameraRig rig;
+  Pose world_from_robot = Pose::Identity();
+};
+
+struct WorldScene {
+  std::string name;
+  std::vector<std::string> notes;  // comments at the head of each file
+  WorldOptions options;
+  std::vector<WorldModel> models;
+  std::optional<WorldRig> rig;
+  std::vector<WorldFoothold> footholds;
+};
+
+// Texts of the descriptions by their file names.
+std::map<std::string, std::string> world_texts(const WorldScene& scene);
+
+// The contents of the folder.
+std::vector<std::string> world_file_names();
+
+// The points of a map and their colors.
+struct WorldScores {
+  std::vector<Eigen::Vector3d> points;
+  std::vector<Color> colors;
+  double size_m = 0.0;  // of a square
+};
+
+struct WorldModelInput {
+  std::string name;
+  TexturedMesh visual;
+  // That of `visual` and around it, up to twice the radius of the balls.
+  TriangleMesh surface;
+};
+
+// Makes the collision shapes of a model, and writes its meshes to `folder`, unless that is empty.
+// Output bytes do not depend on the number of threads. Throws Error: no triangle, or none that
+// faces up.
+WorldModel write_world_model(const std::filesystem::path& folder, const WorldModelInput& input,
+                             const WorldScores& scores, const WorldOptions& options,
+                             WorldReport& report);
+
+// Writes the descriptions. Throws Error for a name that simulators forbid.
+void write_world(const std::filesystem::path& folder, const WorldScene& scene);
+
+}  // namespace libmap
