@@ -17,11 +17,8 @@ struct PlanarTriangulation {
 
 // Triangulates the x and y of the points. Of points with the same x and y, one of maximum z is a
 // vertex. Returns no triangles if the points are collinear. The set of triangles does not depend on
-// the order of the points or on `points_per_strip`, even if four points are cocircular: CGAL
-// decides these cases by symbolic perturbation. Strips of about `points_per_strip` points are
-// triangulated in parallel. Triangles with a circumcircle inside the strip are final; the remaining
-// gaps are triangulated again.
-PlanarTriangulation triangulate_in_plane(const std::vector<Eigen::Vector3d>& points,
-                                         std::size_t points_per_strip = 16384);
+// the order of the points, even if four points are cocircular: CGAL decides these cases by symbolic
+// perturbation.
+PlanarTriangulation triangulate_in_plane(const std::vector<Eigen::Vector3d>& points);
 
 }  // namespace libgtd

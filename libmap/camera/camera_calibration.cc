@@ -75,40 +75,6 @@ Points3 board_points(const std::vector<Eigen::Vector3d>& in_board) {
   return points;
 }
 
-BoardFit fit_by_opencv(const BoardCorners& corners, int width, int height, LensModel lens) {
-  const std::vector<Points3> boards(corners.in_images.size(), board_points(corners.in_board));
-  std::vector<Points2> images;
-  for (const auto& in_image : corners.in_images) {
-    images.emplace_back();
-    for (const Eigen::Vector2d& corner : in_image)
-      images.back().emplace_back(static_cast<float>(corner.x()), static_cast<float>(corner.y()));
-  }
-  int flags = 0;
-  if (lens == LensModel::none)
-    flags = cv::CALIB_ZERO_TANGENT_DIST | cv::CALIB_FIX_K1 | cv::CALIB_FIX_K2 | cv::CALIB_FIX_K3;
-  if (lens == LensModel::rational) flags = cv::CALIB_RATIONAL_MODEL;
-  cv::Mat matrix;
-  cv::Mat terms;
-  std::vector<cv::Mat> rotations;
-  std::vector<cv::Mat> translations;
-  cv::calibrateCamera(boards, images, cv::Size(width, height), matrix, terms, rotations,
-                      translations, flags,
-                      cv::TermCriteria(cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 100, 1e-9));
-  BoardFit fit;
-  fit.camera.width = width;
-  fit.camera.height = height;
-  fit.camera.fx = matrix.at<double>(0, 0);
-  fit.camera.fy = matrix.at<double>(1, 1);
-  fit.camera.cx = matrix.at<double>(0, 2);
-  fit.camera.cy = matrix.at<double>(1, 2);
-  fit.camera.distortion_model = distortion_of(lens);
-  for (std::size_t n = 0; n < lens_terms(lens); ++n)
-    fit.camera.distortion.push_back(terms.at<double>(static_cast<int>(n)));
-  for (std::size_t n = 0; n < images.size(); ++n)
-    fit.camera_from_board.push_back(pose_of(rotations.at(n), translations.at(n)));
-  return fit;
-}
-
 std::optional<Pose> pose_by_rays(const std::vector<Eigen::Vector3d>& in_board,
                                  const std::vector<Eigen::Vector2d>& rays) {
   Points2 points;
@@ -158,8 +124,7 @@ double robust_error(const BoardFit& fit, const BoardCorners& corners) {
   return std::accumulate(errors.begin(), errors.begin() + used, 0.0);
 }
 
-// Tries many initial focal lengths: cv::fisheye::calibrate has only one, and fails if a board is
-// ill-conditioned there.
+// Tries many initial focal lengths of a camera without distortion.
 BoardFit fit_from_many_starts(const BoardCorners& corners, int width, int height, LensModel lens) {
   Camera camera;
   camera.width = width;
@@ -184,10 +149,7 @@ BoardFit fit_from_many_starts(const BoardCorners& corners, int width, int height
 
 BoardFit fit_camera(const BoardCorners& corners, int width, int height, LensModel lens) {
   try {
-    BoardFit fit = lens == LensModel::equidistant
-                       ? fit_from_many_starts(corners, width, height, lens)
-                       : fit_by_opencv(corners, width, height, lens);
-    // OpenCV rounds corners to float32, so its result is refined.
+    BoardFit fit = fit_from_many_starts(corners, width, height, lens);
     const double error = adjust_boards(fit, corners);
     fit.camera.check();
     if (std::isfinite(error)) return fit;
