@@ -37,7 +37,8 @@ Triangulation triangulate(const Points& points) {
     const std::size_t before = triangulation.number_of_vertices();
     const auto vertex = triangulation.insert(plane_points[n], hint);
     const bool added = triangulation.number_of_vertices() > before;
-    if (added || points[n].z() > points[vertex->info()].z()) vertex->info() = static_cast<std::uint32_t>(n);
+    if (added || points[n].z() > points[vertex->info()].z())
+      vertex->info() = static_cast<std::uint32_t>(n);
     hint = vertex->face();
   }
   return triangulation;

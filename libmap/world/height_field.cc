@@ -200,7 +200,8 @@ class CellDeviations {
 
 // Removes the nodes of cells with too large a deviation. A cell without one of its nodes is left
 // out, so that the field descends within cells that are left out.
-void leave_out(const std::vector<float>& deviations, double max_deviation_m, HeightField& field) {
+void mark_missing(const std::vector<float>& deviations, double max_deviation_m,
+                  HeightField& field) {
   const std::size_t columns = field.columns;
   const auto nodes_of = [&](std::size_t cell) {
     const std::size_t first = cell / (columns - 1) * columns + cell % (columns - 1);
@@ -209,13 +210,13 @@ void leave_out(const std::vector<float>& deviations, double max_deviation_m, Hei
   for (std::size_t cell = 0; cell < deviations.size(); ++cell)
     if (static_cast<double>(deviations[cell]) > max_deviation_m)
       for (const std::size_t n : nodes_of(cell)) field.heights_m[n] = missing;
-  field.left_out.assign(deviations.size(), false);
+  field.is_missing.assign(deviations.size(), false);
   for (std::size_t cell = 0; cell < deviations.size(); ++cell) {
     if (deviations[cell] < 0) continue;
     const auto nodes = nodes_of(cell);
-    field.left_out[cell] = std::any_of(
+    field.is_missing[cell] = std::any_of(
         nodes.begin(), nodes.end(), [&](std::size_t n) { return field.heights_m[n] == missing; });
-    if (!field.left_out[cell])
+    if (!field.is_missing[cell])
       field.deviation_m = std::max(field.deviation_m, static_cast<double>(deviations[cell]));
   }
   std::replace(field.heights_m.begin(), field.heights_m.end(), missing, 0.0F);
@@ -240,14 +241,14 @@ HeightField make_height_field(const TriangleMesh& mesh, const HeightFieldOptions
   extend_border(field);
   CellDeviations deviations(field);
   for (const Triangle& t : mesh.triangles) deviations.add(corners_of(mesh, t));
-  leave_out(deviations.of_cell(), options.max_deviation_m, field);
+  mark_missing(deviations.of_cell(), options.max_deviation_m, field);
   return field;
 }
 
 bool may_be_left_out(const HeightField& field, const TriangleMesh& mesh, const Triangle& triangle) {
   bool found = false;
   for_box(field, corners_of(mesh, triangle), 0, [&](std::size_t column, std::size_t row) {
-    found = found || field.left_out[row * (field.columns - 1) + column];
+    found = found || field.is_missing[row * (field.columns - 1) + column];
   });
   return found;
 }

@@ -26,7 +26,7 @@ struct HeightField {
   // Cells, (columns - 1) x (rows - 1), that another shape must cover, because the surface overhangs
   // or the field deviates from it, and the cells around them. Nodes between them are below the
   // surface.
-  std::vector<bool> left_out;
+  std::vector<bool> is_missing;
   // In the other cells no point of the field is farther from the surface, and no point of the
   // surface above these cells farther from the field. The field may exceed the surface's border by
   // one cell.

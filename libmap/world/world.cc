@@ -29,7 +29,7 @@ namespace {
 constexpr std::array<std::pair<const char*, double>, 3> bodies{
     {{"earth", 9.81}, {"moon", 1.62}, {"mars", 3.71}}};
 // Vertices this near to each other, of the mesh's size, are one.
-constexpr double weld_share = 1e-7;
+constexpr double weld_fraction = 1e-7;
 
 struct CollisionMesh {
   TriangleMesh mesh;
@@ -41,7 +41,7 @@ CollisionMesh make_collision_mesh(const TriangleMesh& visual, double max_error_m
   TriangleMesh mesh;
   mesh.vertices = visual.vertices;
   mesh.triangles = visual.triangles;
-  const double weld_m = weld_share * size_of(visual);
+  const double weld_m = weld_fraction * size_of(visual);
   weld_vertices(mesh, weld_m);
   std::vector<bool> keep = repeated_triangles(mesh.triangles);
   for (std::size_t t = 0; t < keep.size(); ++t)
@@ -140,7 +140,7 @@ void describe(ResultTable& table, const WorldReport& report) {
   table.add("field_nodes", report.field_nodes, Merge::sum, "nodes of the height fields");
   table.add("field_deviation_m", report.field_deviation_m, Merge::max,
             "maximum distance between height fields and surface, in both directions, m");
-  table.add("left_out_cells", report.left_out_cells, Merge::sum,
+  table.add("missing_cells", report.missing_cells, Merge::sum,
             "cells of the height fields that balls replace");
   table.add("balls", report.balls, Merge::sum, "balls that replace cells of the height fields");
   table.add("collision_bytes", report.collision_bytes, Merge::sum,
@@ -201,9 +201,9 @@ WorldModel write_world_model(const fs::path& folder, const WorldModelInput& inpu
   report.collision_deviation_m = std::max(report.collision_deviation_m, collision.deviation_m);
   report.field_nodes += model.field.heights_m.size();
   report.field_deviation_m = std::max(report.field_deviation_m, model.field.deviation_m);
-  report.left_out_cells += count_of(model.field.left_out);
+  report.missing_cells += count_of(model.field.is_missing);
   report.balls += model.balls.size();
-  model.field.left_out.clear();
+  model.field.is_missing.clear();
   return model;
 }
 

@@ -24,10 +24,10 @@ std::vector<SurfaceResidual> residuals_of(const DepthNoise& truth, const DepthNo
   std::normal_distribution<double> normal;
   for (int n = 0; n < count; ++n) {
     const double range_m = graspmap_test::uniform(0.6, 4.0);
-    const double share = 1.0 / 6.0;  // a plane averages pixels
-    const double distance_m = share * truth.axial_at(range_m) * normal(engine);
-    residuals.push_back(
-        {n % 10 == 0 ? 5.0 * distance_m : distance_m, share * assumed.axial_at(range_m), range_m});
+    const double fraction = 1.0 / 6.0;  // a plane averages pixels
+    const double distance_m = fraction * truth.axial_at(range_m) * normal(engine);
+    residuals.push_back({n % 10 == 0 ? 5.0 * distance_m : distance_m,
+                         fraction * assumed.axial_at(range_m), range_m});
     residuals.push_back({.distance_m = std::numeric_limits<double>::quiet_NaN()});
   }
   return residuals;
@@ -112,6 +112,15 @@ TEST(SensorModel, ShippedSensorsAreReadAndUnknownOnesAreNamed) {
   EXPECT_TRUE(graspmap_test::is_error(
       graspmap_test::error_of([] { libmap::read_sensor_model("kinect-v3"); }),
       {.field = "sensor", .value = "kinect-v3"}));
+}
+
+TEST(SensorModel, EarlierKeysAreRead) {
+  const std::string path = (graspmap_test::scratch_folder() / "earlier.yaml").string();
+  graspmap_test::write_text(
+      path, "noise_m: 0.001\nrefine.max_bend_m: 0.02\nrefine.bend_of_range: 0.004\n");
+  const libmap::SensorModel model = libmap::read_sensor_model(path);
+  EXPECT_EQ(model.max_depth_correction_m, 0.02);
+  EXPECT_EQ(model.max_depth_correction_of_range, 0.004);
 }
 
 }  // namespace noise_estimate_test

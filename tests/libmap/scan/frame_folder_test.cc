@@ -196,9 +196,9 @@ TEST_F(TumFolder, PairsListsOfImagesByTime) {
   ASSERT_EQ(read.warnings().size(), 2U);
   EXPECT_TRUE(read.warnings()[0].starts_with("skipped 1 depth image "));
   EXPECT_TRUE(read.warnings()[1].starts_with("skipped 1 color image "));
-  EXPECT_NEAR(read.read_frame(1).depth_later_s, 1102.160407 - 1102.175304, 1e-6);
+  EXPECT_NEAR(read.read_frame(1).depth_stamp_offset_s, 1102.160407 - 1102.175304, 1e-6);
   const libmap::RgbdFrame frame = read.read_frame(2);
-  EXPECT_NEAR(frame.depth_later_s, 1102.226738 - 1102.211214, 1e-6);
+  EXPECT_NEAR(frame.depth_stamp_offset_s, 1102.226738 - 1102.211214, 1e-6);
   EXPECT_TRUE(frame.color == libmap::decode_color(graspmap_test::read_text(folder_ / "rgb/b.png")));
   ASSERT_EQ(frame.cameras.size(), 1U);
   graspmap_test::expect_same_camera(frame.cameras[0], camera_);
@@ -224,7 +224,7 @@ TEST_F(TumFolder, SmoothsTheDelayOfDepthByItsStamps) {
   const FrameFolder read(folder_);
   ASSERT_EQ(read.graph().nodes.size(), 40U);
   for (int n = 0; n < 40; ++n)
-    EXPECT_NEAR(read.read_frame(n + 1).depth_later_s, n < 20 ? 0.005 : -0.016, 1e-5) << n;
+    EXPECT_NEAR(read.read_frame(n + 1).depth_stamp_offset_s, n < 20 ? 0.005 : -0.016, 1e-5) << n;
 }
 
 TEST_F(TumFolder, TakesAssociationsInEitherOrder) {
@@ -419,8 +419,8 @@ TEST_F(TumFolder, DropsLinksOfMissingNodes) {
   const FrameFolder read(folder_);
   EXPECT_EQ(read.graph().links.size(), 1U);
   ASSERT_EQ(read.warnings().size(), 1U);
-  EXPECT_TRUE(
-      graspmap_test::is_error_text(read.warnings()[0], {.file = "links.g2o", .about = "1 link to or from"}));
+  EXPECT_TRUE(graspmap_test::is_error_text(read.warnings()[0],
+                                           {.file = "links.g2o", .about = "1 link to or from"}));
 }
 
 TEST_F(TumFolder, DropsLinksOfANodeToItself) {

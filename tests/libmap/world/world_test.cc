@@ -72,7 +72,7 @@ TEST(World, FlatGroundIsAHeightFieldOnly) {
   const TriangleMesh mesh = wavy_ground();
   const Written written = write(folder, mesh);
   EXPECT_EQ(written.report.balls, 0U);
-  EXPECT_EQ(written.report.left_out_cells, 0U);
+  EXPECT_EQ(written.report.missing_cells, 0U);
   expect_on_surface(drop_in_mujoco(folder, places_above(mesh, 20, 0.1)), mesh,
                     written.report.field_deviation_m);
 }
