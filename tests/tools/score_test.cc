@@ -217,7 +217,7 @@ TEST(Score, ReliefBelowThePlaneIsSaid) {
     EXPECT_TRUE(succeeded(result));
     return result.standard_error;
   };
-  const std::string warning = "camera.pcd: its relief";
+  const std::string warning = "camera.pcd: the relief";
   EXPECT_THAT(said({"-o", "a.pcd"}), testing::HasSubstr(warning));
   EXPECT_THAT(said({"-o", "a.tiles"}), testing::HasSubstr(warning));
   EXPECT_THAT(said({"-o", "b.pcd", "--up=0,0,-1"}), testing::Not(testing::HasSubstr("relief")));
