@@ -44,8 +44,7 @@ libmap::WorldScores read_scores(const std::string& file, Run& run) {
   const libmap::PointCloud map = read_in_site(file, run);
   const libmap::ScalarField* score = map.find_field("score");
   if (score == nullptr)
-    throw libmap::Error("no such field; a graspability map is required",
-                        {.file = file, .field = "score"});
+    throw libmap::Error("no such field; not a graspability map", {.file = file, .field = "score"});
   scores.points = map.positions;
   for (const double one : score->values) scores.colors.push_back(libmap::score_color(one));
   const auto manifest = libmap::read_manifest_of(file);
@@ -164,12 +163,11 @@ void write_world(const WorldCommandOptions& options, Run& run) {
       libmap::write_world(folder, scene);
     });
     if (2 * report.score_points < scores.points.size())
-      throw libmap::Error(
-          "most points of the map are not on the surface; map and mesh are of different sites",
-          {.file = options.map,
-           .field = "number of points on the surface",
-           .value = std::to_string(report.score_points),
-           .bound = fmt::format(">= half of {}", scores.points.size())});
+      throw libmap::Error("most points of the map are not on the surface of the site",
+                          {.file = options.map,
+                           .field = "number of points on the surface",
+                           .value = std::to_string(report.score_points),
+                           .bound = fmt::format(">= half of {}", scores.points.size())});
     run.add_results({{"models", scene.models.size()}, {"footholds", scene.footholds.size()}});
     run.add_results(libmap::described(report));
     run.info(

@@ -15,8 +15,8 @@ struct HeightFieldOptions {
   double max_deviation_m = 0.002;  // > 0: cells with a larger deviation are skipped
 };
 
-// The nodes are at multiples of the cell size. The diagonal of each cell runs from the lowest to
-// the highest indices.
+// The nodes are at multiples of the cell size. Diagonals of cells run from the lowest to the
+// highest indices.
 struct HeightField {
   double cell_size_m = 0.0;
   Eigen::Vector2d corner_m = Eigen::Vector2d::Zero();  // node (0, 0)
