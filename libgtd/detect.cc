@@ -83,7 +83,7 @@ PointCloud prepare_terrain(const PointCloud& input, const DetectionStages& stage
                            DetectionResult& result) {
   // Normals with random sides do not indicate the outside of the surface.
   const auto with_sound_normals = [](PointCloud cloud, const RegressionPlane& plane) {
-    if (plane.opposing_normals > libmap::max_opposing_share) cloud.normals.clear();
+    if (plane.opposing_normals > libmap::max_opposing_fraction) cloud.normals.clear();
     return cloud;
   };
   if (!stages.plane)
@@ -180,11 +180,11 @@ DetectionResult detect(const PointCloud& terrain, const DetectionOptions& option
                                  : voxelize(surface.positions, stages.voxel_size_m);
   });
   result.occupied_voxels = grid.voxels.size();
-  result.lone_voxels = count_isolated(grid.voxels);
+  result.isolated_voxels = count_isolated(grid.voxels);
   // The earlier methods score any cloud, as their programs do.
   const Method method = stages.tiles.graspable.method;
   if (method == Method::corrected || method == Method::calibrated)
-    require_dense(result.lone_voxels, result.occupied_voxels, stages.voxel_size_m,
+    require_dense(result.isolated_voxels, result.occupied_voxels, stages.voxel_size_m,
                   surface.positions);
   result.grid_min = grid.min;
   result.grid_max = grid.max;
@@ -243,7 +243,7 @@ void describe(libmap::ResultTable& table, const DetectionResult& result) {
   table.add("interpolation_grid_m", only_if(has_grid, result.grid_spacing_m),
             "spacing of the interpolation grid, m");
   table.add("occupied_voxels", result.occupied_voxels, "number of voxels with points");
-  table.add("lone_voxels", result.lone_voxels,
+  table.add("isolated_voxels", result.isolated_voxels,
             "number of occupied voxels without an occupied neighbor");
   table.add("mask_side_voxels", result.mask.side, "side of the gripper mask, voxels");
   table.add("mask_layers", result.mask.layers, "number of layers of the gripper mask");

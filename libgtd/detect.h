@@ -44,7 +44,7 @@ struct DetectionResult {
   std::size_t interpolated_points = 0;
   double grid_spacing_m = 0.0;  // pitch of the interpolation grid
   std::size_t occupied_voxels = 0;
-  std::size_t lone_voxels = 0;  // occupied voxels without an occupied neighbor of 26
+  std::size_t isolated_voxels = 0;  // occupied voxels without an occupied neighbor of 26
   Voxel grid_min;
   Voxel grid_max;
   std::size_t tiles = 0;             // scored tiles

@@ -76,8 +76,8 @@ TerrainFrame frame_of(const TilePlan& plan, const DetectionOptions& detection,
   frame.plane = RegressionPlane{};
   frame.plane->centroid = plan.centroid;
   frame.plane->terrain_from_input = plan.index.terrain_from_input();
-  if (const auto* share = plan.index.manifest.find_result(opposing_normals))
-    frame.plane->opposing_normals = std::get<double>(*share);
+  if (const auto* opposing = plan.index.manifest.find_result(opposing_normals))
+    frame.plane->opposing_normals = std::get<double>(*opposing);
   return frame;
 }
 

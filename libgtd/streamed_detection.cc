@@ -49,7 +49,7 @@ class StreamedDetection {
   // Like libgtd::require_dense, on a sample of tiles spread over the wanted ones.
   void require_dense(const std::vector<TileNumber>& wanted) const {
     constexpr std::size_t max_tiles = 256, max_points = 1'000'000;
-    std::size_t lone = 0, voxels = 0;
+    std::size_t isolated = 0, voxels = 0;
     std::vector<Eigen::Vector3d> points;
     const std::size_t step = wanted.size() / max_tiles + 1;
     for (std::size_t n = 0; n < wanted.size() && points.size() < max_points; n += step) {
@@ -58,11 +58,11 @@ class StreamedDetection {
       if (count == 0 || count > max_points_) continue;
       const PointCloud cloud = points_.points_in(rectangle.low, rectangle.high);
       const VoxelGrid grid = voxelize(cloud.positions, scenario_.voxel_size_m);
-      lone += count_isolated(grid.voxels);
+      isolated += count_isolated(grid.voxels);
       voxels += grid.voxels.size();
       points.insert(points.end(), cloud.positions.begin(), cloud.positions.end());
     }
-    libgtd::require_dense(lone, voxels, scenario_.voxel_size_m, points);
+    libgtd::require_dense(isolated, voxels, scenario_.voxel_size_m, points);
   }
 
   // Halves a run of tiles until each part has few enough points.
@@ -187,7 +187,7 @@ class StreamedDetection {
 }  // namespace
 
 bool TerrainFrame::drops_normals() const {
-  return plane && plane->opposing_normals > libmap::max_opposing_share;
+  return plane && plane->opposing_normals > libmap::max_opposing_fraction;
 }
 
 void require_streamable(const DetectionOptions& options) {

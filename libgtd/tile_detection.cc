@@ -226,7 +226,7 @@ MapContent content_of(const Scenario& scenario) {
   return {.normals = scenario.orientation == Orientation::surface,
           .slopes = scenario.evaluates_obstacles(),
           .forces = scenario.method == Method::calibrated,
-          .falling_shares =
+          .outward_fall_fractions =
               scenario.method == Method::corrected && scenario.orientation != Orientation::surface};
 }
 

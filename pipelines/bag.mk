@@ -34,9 +34,9 @@ ifdef is_alone
 
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: all moments FORCE
+.PHONY: all sets moments FORCE
 all: $(OUT)/images.json
-	@exec $(MAKE) --no-print-directory -f $(here)bag.mk moments
+	@exec $(MAKE) --no-print-directory -f $(here)bag.mk sets
 
 $(OUT):
 	@mkdir -p $@
@@ -57,7 +57,8 @@ map_bag := $(if $(filter %.bag,$(BAG)),map.bag,$(if $(filter %.mcap,$(BAG)),map.
 
 # The list of sets is known once the images exist.
 stamps := $(shell tail -n +2 $(firstword $(wildcard $(OUT)/images/synchronized_sets.csv $(OUT)/images/moments.csv) /dev/null) | cut -d, -f1)
-moments: $(foreach stamp,$(stamps),$(OUT)/$(stamp)/$(map_bag) $(OUT)/$(stamp)/top.png)
+sets: $(foreach stamp,$(stamps),$(OUT)/$(stamp)/$(map_bag) $(OUT)/$(stamp)/top.png)
+moments: sets  # earlier name
 
 $(OUT)/%/panorama.pcd: $(OUT)/images.json
 	@mkdir -p $(@D)

@@ -156,15 +156,15 @@ Comparison compare(const AnalyzeOptions& options, const ReadMap& map, const Anal
   return comparison;
 }
 
-std::string percent_text(const std::optional<double>& share) {
-  return share ? fmt::format("{:.2f} %", 100.0 * *share) : "none";
+std::string percent_text(const std::optional<double>& fraction) {
+  return fraction ? fmt::format("{:.2f} %", 100.0 * *fraction) : "none";
 }
 
 void say_ground(const Analysis& analysis, const AnalyzeOptions& options, Run& run) {
   const libgtd::MapAnalysis& ground = analysis.ground;
   run.info("{} of {} voxels evaluated: {:.3f} m2 of ground, {:.4f} m2 ({}) graspable",
            ground.ground.voxels, ground.voxels, ground.ground.area_m2,
-           ground.ground.graspable_area_m2, percent_text(ground.ground.graspable_share()));
+           ground.ground.graspable_area_m2, percent_text(ground.ground.graspable_fraction()));
   if (ground.column_coverage < 0.95)
     run.warn(
         "{}: only {:.0f} % of the columns inside the ground have a voxel, which splits regions "

@@ -242,8 +242,8 @@ void note_results(const std::vector<BoardPhoto>& photos, const CameraCalibration
        {"sigma_px", result.sigma_px}});
   for (const Term& term : terms_of(result))
     run.add_results({{term.name, term.value}, {term.name + "_deviation", term.deviation}});
-  run.add_results({{"corners_width_share", result.corners_width_share},
-                   {"corners_height_share", result.corners_height_share}});
+  run.add_results({{"corners_width_share", result.width_coverage},
+                   {"corners_height_share", result.height_coverage}});
 }
 
 void warn_of_weaknesses(const CameraCalibrationResult& result, Run& run) {
@@ -267,11 +267,11 @@ void warn_of_weaknesses(const CameraCalibrationResult& result, Run& run) {
   if (vague != terms.end())
     run.warn("the images do not determine the lens term {}, {}: use a simpler --lens", vague->name,
              with_deviation(*vague));
-  if (std::min(result.corners_width_share, result.corners_height_share) < good_coverage)
+  if (std::min(result.width_coverage, result.height_coverage) < good_coverage)
     run.warn(
         "the corners cover {:.0f} % of the image's width and {:.0f} % of its height; distortion "
         "beyond is extrapolated",
-        100 * result.corners_width_share, 100 * result.corners_height_share);
+        100 * result.width_coverage, 100 * result.height_coverage);
 }
 
 constexpr libmap::Color corner_color = {150, 150, 150};

@@ -142,7 +142,7 @@ auto count_within(const std::vector<double>& distances, double bound_m) {
 }
 
 // About 0.68 and 0.95 for correct deviations and normally distributed errors.
-std::optional<std::array<double, 2>> share_within_deviations(const Comparison& comparison) {
+std::optional<std::array<double, 2>> fractions_within_deviations(const Comparison& comparison) {
   const libmap::ScalarField* stated = comparison.points.find_field("expected_error");
   if (stated == nullptr || stated->values.empty()) return std::nullopt;
   std::array<double, 2> within{};
@@ -152,7 +152,7 @@ std::optional<std::array<double, 2>> share_within_deviations(const Comparison& c
           comparison.distances.distance_m[n] <= static_cast<double>(k + 1) * stated->values[n]
               ? 1.0
               : 0.0;
-  for (double& share : within) share /= static_cast<double>(stated->values.size());
+  for (double& fraction : within) fraction /= static_cast<double>(stated->values.size());
   return within;
 }
 
@@ -167,7 +167,7 @@ void measure_completeness(const Shape& a, const Shape& b, const CompareOptions& 
   comparison.samples = samples.size();
   if (!a.mesh) {
     comparison.completeness =
-        libmap::share_of(libmap::covered(samples, a.points.positions, options.within_m));
+        libmap::fraction_of(libmap::covered(samples, a.points.positions, options.within_m));
     return;
   }
   // Samples outside the mesh's enlarged box are too far; measuring them would be slow.
@@ -261,7 +261,7 @@ Comparison compare_shapes(const Shape& a, const Shape& b, const CompareOptions& 
   const auto count = static_cast<double>(distances.size());
   comparison.precision = static_cast<double>(count_within(distances, options.within_m)) / count;
   if (surface.is_oriented()) comparison.bias_m = sum / count;
-  comparison.within_deviations = share_within_deviations(comparison);
+  comparison.within_deviations = fractions_within_deviations(comparison);
   run.timed("completeness", [&] { measure_completeness(a, b, options, box, comparison); });
   return comparison;
 }
@@ -284,7 +284,7 @@ libmap::ResultTable distance_results(const Comparison& comparison) {
   return table;
 }
 
-libmap::ResultTable share_results(const Comparison& comparison) {
+libmap::ResultTable fraction_results(const Comparison& comparison) {
   libmap::ResultTable table = {{"precision", comparison.precision},
                                {"completeness", comparison.completeness}};
   if (const auto& within = comparison.within_deviations) {
@@ -302,7 +302,7 @@ Json json_of(const Comparison& comparison, const Shape& a, const Shape& b,
                {"b_kind", b.mesh ? "mesh" : "cloud"}};
   json.update(to_json(distance_results(comparison)));
   json["within_m"] = options.within_m;
-  json.update(to_json(share_results(comparison)));
+  json.update(to_json(fraction_results(comparison)));
   json["surface_samples"] = comparison.samples;
   Json rows = Json::array();
   for (int row = 0; row < 4; ++row) {
@@ -362,7 +362,7 @@ void add_results(const Comparison& comparison, Run& run) {
   run.manifest().frame = "b";
   run.manifest().transforms.emplace_back("b_from_a", comparison.b_from_a);
   run.add_results(distance_results(comparison));
-  run.add_results(share_results(comparison));
+  run.add_results(fraction_results(comparison));
   if (!comparison.alignment) return;
   const libmap::SurfaceAlignmentResult& found = *comparison.alignment;
   run.add_results({{"icp_converged", found.converged},

@@ -216,7 +216,7 @@ Json check_json(const Check& check, const SpotCheckCommandOptions& options) {
                                 {"ground_m", edge_point.ground_m},
                                 {"error_m", edge_point.error_m()}}));
     edges.push_back(to_json({{"edge", edge_names[e]}, {"mean_m", result.mean_m[e]}}));
-    edges.back()["places"] = points;
+    edges.back()["positions"] = points;
   }
   Json corners = Json::array();
   for (const Eigen::Vector2d& corner : check.site.corners)

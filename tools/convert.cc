@@ -58,8 +58,9 @@ libmap::PointCloud vertices_of(const libmap::TriangleMesh& mesh) {
 // after reading, so that unreadable files are not hashed.
 void add_input(const ConvertOptions& options, Run& run) {
   run.add_input(options.input);
-  if (const auto source = libmap::read_manifest_of(options.input)) carry_facts(*source, run);
-  carry_georeference(options.input, run);
+  if (const auto source = libmap::read_manifest_of(options.input))
+    copy_missing_entries(*source, run);
+  copy_georeference(options.input, run);
 }
 
 // Throws Error for options that the output's format does not have.

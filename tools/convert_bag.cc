@@ -104,10 +104,10 @@ void report(const libmap::BagRigPlan& plan, const libmap::BagRigExport& result,
   for (const libmap::SynchronizedSet& set : result.sets) fullest = std::max(fullest, set.seen());
   run.add_results({{"cameras", plan.rig.cameras.size()},
                    {"images", result.images},
-                   {"images_broken", result.broken},
-                   {"moments", result.sets.size()},
-                   {"moments_in_bag", plan.all_sets},
-                   {"cameras_of_fullest_moment", fullest},
+                   {"images_broken", result.undecodable_images},
+                   {"synchronized_sets", result.sets.size()},
+                   {"synchronized_sets_in_bag", plan.sets_in_bag},
+                   {"cameras_of_fullest_set", fullest},
                    {"pixels_beyond", result.overflow_pixels}});
   for (std::size_t n = 0; n < plan.rig.cameras.size(); ++n) {
     const libmap::RigCamera& camera = plan.rig.cameras[n];
@@ -117,7 +117,7 @@ void report(const libmap::BagRigPlan& plan, const libmap::BagRigExport& result,
     if (plan.topics[n].empty()) run.warn(camera.name + ": no topic contains images of this camera");
   }
   run.info("{} images of {} cameras, {} of {} image sets, at most {} cameras per set",
-           result.images, plan.rig.cameras.size(), result.sets.size(), plan.all_sets, fullest);
+           result.images, plan.rig.cameras.size(), result.sets.size(), plan.sets_in_bag, fullest);
 }
 
 // Writes a rig's folder from a bag.
@@ -126,7 +126,7 @@ void read_bag_into_folder(const BagCommandOptions& options, Run& run) {
   depth.topics = options.topics;
   if (!options.rig.empty()) depth.rig = read_named_rig(options.rig, run);
   const libmap::BagRigPlan plan = run.timed(
-      "survey", [&] { return libmap::plan_bag_rig(options.input, depth, bag_stamp(options)); });
+      "topics", [&] { return libmap::plan_bag_rig(options.input, depth, bag_stamp(options)); });
   const std::vector<std::string> names = libmap::names_in_rig_folder(plan);
   run.claim_output_tree(options.output, names, {options.input});
   for (const std::string& warning : plan.warnings) run.warn(options.input + ": " + warning);

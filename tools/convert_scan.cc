@@ -84,7 +84,7 @@ std::vector<ScanImage> find_images(const libmap::ScanSource& scan, const libmap:
                                    const libmap::Pose& world_from_map, const ImageOptions& options,
                                    bool strict, Run& run) {
   std::vector<ScanImage> images;
-  run.progress().begin("pictures", poses.size());
+  run.progress().begin("images", poses.size());
   for (std::size_t first = 0; first < poses.size(); first += batch_size) {
     std::vector<FrameResult> batch(std::min(batch_size, poses.size() - first));
     libmap::parallel_each(batch.size(), [&](std::size_t n) {
@@ -134,7 +134,7 @@ void write_bundler(const ImageOptions& options, const std::vector<ScanImage>& al
                    const libmap::ScanSource& scan, Run& run) {
   const std::vector<ScanImage> kept = selected(all, options);
   run.info("{} of {} images kept", kept.size(), all.size());
-  run.add_results({{"kept_pictures", kept.size()}});
+  run.add_results({{"kept_images", kept.size()}});
   run.write_output_tree(options.bundler, bundler_names, [&](const fs::path& folder) {
     if (!folder.empty()) fs::create_directory(folder / "images");
     std::vector<libmap::BundlerView> views(kept.size());
@@ -229,7 +229,7 @@ void write_image_folders(ImageOptions& options, const libmap::ScanSource& scan, 
   manifest.parameters.emplace_back("transform", options.transform);
   manifest.frame = "poses";
   manifest.transforms.emplace_back("world_from_map", world_from_map);
-  run.add_results({{"pictures", images.size()}});
+  run.add_results({{"images", images.size()}});
   const libmap::Manifest start = manifest;
   // COLMAP is first, because it also reads the depth and so finds all broken frames.
   if (!options.colmap.empty()) write_colmap(options, images, scan, run);

@@ -131,13 +131,13 @@ std::vector<libmap::WorldModel> write_models(const fs::path& folder,
     return {write(input)};
   }
   constexpr double margin_cells = 4.0;
-  libmap::MeshTileIndex pieces(libmap::mesh_tiles(options.site));
+  libmap::MeshTileIndex tiles(libmap::mesh_tiles(options.site));
   std::vector<libmap::WorldModel> models;
-  for (std::size_t n = 0; n < pieces.size(); ++n)
+  for (std::size_t n = 0; n < tiles.size(); ++n)
     models.push_back(write(
-        {.name = pieces.path(n).stem().string(),
-         .visual = read_visual(pieces.path(n)),
-         .surface = pieces.with_margin(n, margin_cells * options.world.field.cell_size_m).mesh}));
+        {.name = tiles.path(n).stem().string(),
+         .visual = read_visual(tiles.path(n)),
+         .surface = tiles.with_margin(n, margin_cells * options.world.field.cell_size_m).mesh}));
   return models;
 }
 

@@ -136,16 +136,16 @@ void tell_ground(const std::string& input, const libmap::CropReport& report, Run
       std::atan2(ground.normal.head<2>().norm(), ground.normal.z()) * 180.0 / std::numbers::pi;
   run.add_results({{"ground_tilt_deg", tilt},
                    {"ground_rmse_m", ground.rmse_m},
-                   {"ground_share", ground.share},
+                   {"ground_share", ground.fraction},
                    {"up", report.up}});
   run.info("ground: {:.2f} deg from the map's z, {:.1f} mm RMSE over {:.1f} % of it", tilt,
-           1e3 * ground.rmse_m, 1e2 * ground.share);
+           1e3 * ground.rmse_m, 1e2 * ground.fraction);
   if (!report.up_of_normals) return;
   const libmap::UpOfNormals& by_normals = *report.up_of_normals;
-  if (by_normals.share > 0.0) run.add_results({{"up_normals_share", by_normals.share}});
-  if (by_normals.share > 0.0 && !by_normals.decided)
+  if (by_normals.fraction > 0.0) run.add_results({{"up_normals_share", by_normals.fraction}});
+  if (by_normals.fraction > 0.0 && !by_normals.decided)
     run.warn("{}: {}: up is the map's z; --up X,Y,Z sets it", input,
-             libmap::disagreement_text(by_normals.share, by_normals.opposing));
+             libmap::disagreement_text(by_normals.fraction, by_normals.opposing));
   else if (tilt > 45.0)
     run.warn("up by the normals is {:.0f} deg from the map's z; --up 0,0,1 selects the map's z",
              tilt);
@@ -194,8 +194,8 @@ void report_crop(const CropCommandOptions& options, const libmap::CropReport& re
   // The new site_from_map includes that of an input that was cropped before.
   const libmap::Pose before = site_from_map_of(options.input).value_or(libmap::Pose::Identity());
   run.manifest().transforms.emplace_back(site_from_map_name, report.site_from_map * before);
-  carry_truth_transform(options.input, run);
-  carry_georeference(options.input, run);
+  copy_truth_transform(options.input, run);
+  copy_georeference(options.input, run);
   run.manifest().frame = "site";
   tell_ground(options.input, report, run);
   tell_site(report, bounds, run);
@@ -234,38 +234,38 @@ void crop_mesh(const CropCommandOptions& options, Run& run) {
 }
 
 // Reads, crops and writes the tiles one by one.
-void crop_pieces(const CropCommandOptions& options, const std::vector<fs::path>& pieces,
-                 const fs::path& folder, Run& run) {
+void crop_tiles(const CropCommandOptions& options, const std::vector<fs::path>& tiles,
+                const fs::path& folder, Run& run) {
   std::size_t next = 0;
   std::size_t written = 0, triangles = 0;
   double area_m2 = 0.0;
   Eigen::AlignedBox3d box;
   const auto each = [&](const libmap::UseMesh& use) {
-    for (const fs::path& piece : pieces) use(libmap::read_mesh(piece).mesh);
+    for (const fs::path& tile : tiles) use(libmap::read_mesh(tile).mesh);
   };
   const auto write = [&](const libmap::TriangleMesh& mesh) {
-    const fs::path& piece = pieces[next++];
+    const fs::path& tile = tiles[next++];
     if (mesh.triangles.empty()) return;
     ++written;
     triangles += mesh.triangles.size();
     area_m2 += libmap::surface_area(mesh);
     for (const Eigen::Vector3d& vertex : mesh.vertices) box.extend(vertex);
-    libmap::write_mesh(folder / (piece.stem().string() + ".ply"), mesh);
+    libmap::write_mesh(folder / (tile.stem().string() + ".ply"), mesh);
   };
   const libmap::CropReport report =
       run.timed("crop", [&] { return libmap::crop_mesh_tiles(each, options.crop, write); });
   report_crop(options, report, {box.min(), box.max()}, run);
-  run.add_results({{"pieces", written}, {"surface_area_m2", area_m2}, {"triangles", triangles}});
-  run.info("{} triangles in {} of {} tiles, {:.3f} m2 of surface", triangles, written,
-           pieces.size(), area_m2);
+  run.add_results({{"tiles", written}, {"surface_area_m2", area_m2}, {"triangles", triangles}});
+  run.info("{} triangles in {} of {} tiles, {:.3f} m2 of surface", triangles, written, tiles.size(),
+           area_m2);
 }
 
 void crop_folder(const CropCommandOptions& options, Run& run) {
-  const std::vector<fs::path> pieces = libmap::mesh_tiles(options.input);
-  const std::vector<std::string> names = tile_folder_names(options.output, pieces, ".ply");
+  const std::vector<fs::path> tiles = libmap::mesh_tiles(options.input);
+  const std::vector<std::string> names = tile_folder_names(options.output, tiles, ".ply");
   run.claim_output_tree(options.output, names, {options.input, options.polygon});
   run.write_output_tree(options.output, names, [&](const fs::path& folder) {
-    if (!folder.empty()) crop_pieces(options, pieces, folder, run);
+    if (!folder.empty()) crop_tiles(options, tiles, folder, run);
   });
 }
 

@@ -34,9 +34,9 @@ void bind(libmap::ParameterTable& parameters, EvaluateOptions& options) {
 libmap::Chart chart_of(const TableEvaluation& evaluation, const std::string& title) {
   std::vector<libmap::ChartCurve> curves;
   for (const ColumnEvaluation& column : evaluation.columns) {
-    if (!column.result.area) continue;
+    if (!column.result.auc) continue;
     libmap::ChartCurve& curve = curves.emplace_back();
-    curve.name = column.name + ", AUC " + libmap::to_fixed_text(column.result.area->trapezoid, 3) +
+    curve.name = column.name + ", AUC " + libmap::to_fixed_text(column.result.auc->trapezoid, 3) +
                  " (trapezoid)";
     for (const libgtd::RocPoint& point : column.result.at_scores) {
       curve.x.push_back(*point.counts.false_positive_rate().value());
@@ -58,14 +58,14 @@ void note_results(const TableEvaluation& evaluation, Run& run) {
     const libgtd::RocResult& result = column.result;
     const std::size_t locations = result.at_rate_cutoff.counts.size();
     run.add_results({{column.name + ".locations", locations}});
-    if (!result.area) {
-      run.warn(column.name + ": " + result.area_note);
+    if (!result.auc) {
+      run.warn(column.name + ": " + result.auc_note);
       continue;
     }
-    run.add_results({{column.name + ".auc_trapezoid", result.area->trapezoid},
-                     {column.name + ".auc_upper_sum", result.area->upper_sum}});
+    run.add_results({{column.name + ".auc_trapezoid", result.auc->trapezoid},
+                     {column.name + ".auc_upper_sum", result.auc->upper_sum}});
     run.info("{}: {} locations, AUC {} (trapezoid), {} (upper sum, as in the thesis)", column.name,
-             locations, rounded_text(result.area->trapezoid), rounded_text(result.area->upper_sum));
+             locations, rounded_text(result.auc->trapezoid), rounded_text(result.auc->upper_sum));
   }
 }
 

@@ -14,14 +14,14 @@
 #include "tools/support/subcommands.h"
 #include "tools/support/tile_folder.h"
 
-// JSON of the survey, which shares and resumed runs read bit for bit.
+// JSON of the plan, which shares and resumed runs read bit for bit.
 namespace libmap {
 
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FusionFrame, node, grid_from_base, image_pixels, reach,
                                    max_ray_length, max_pixel_pitch)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(PairCosts, count, before, after, deviation)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(RegistrationCheck, depth, color)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FusionSurvey, grid_origin, frames, skipped, redundant,
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FusionPlan, grid_origin, frames, skipped, redundant,
                                    registration_rounds, registration_rejected, registration_check,
                                    disagreement_before_m, disagreement_after_m)
 
@@ -51,11 +51,11 @@ struct FuseOptions {
 
 // Warns if more points are dropped than the 2 to 4 % at edges of static scans.
 void report_contradictions(const libmap::DepthFusionResult& result, Run& run) {
-  constexpr double usual_share = 0.06;
+  constexpr double usual_fraction = 0.06;
   const libmap::SurfacePointCounts& points = result.points;
   const auto dropped =
       static_cast<double>(points.seen_through + points.missed + points.contradicted);
-  if (dropped < usual_share * (dropped + static_cast<double>(result.points_made))) return;
+  if (dropped < usual_fraction * (dropped + static_cast<double>(result.output_points))) return;
   run.info(
       "{} points dropped because frames contradict each other, for example after a motion: {} seen "
       "through, {} missed, {} connected to those",
@@ -93,8 +93,8 @@ void tell_results(const libmap::DepthFusionResult& result, const FuseOptions& op
     run.info("{} frames skipped: earlier frames measured their surface (enough_views)",
              result.redundant_frames);
   run.info("{} frames, {} measurements -> {} points", result.frames, pixels.used,
-           result.points_made);
-  if (result.points_made > 0) return;
+           result.output_points);
+  if (result.output_points > 0) return;
   if (result.points.unconfirmed > 0)
     run.warn("--min-views {} leaves no points; at most {} frames measured one point",
              options.fusion.points.min_views, result.points.max_views);
@@ -147,15 +147,15 @@ void make_tiles(const FuseOptions& options, const libmap::ScanSource& scan,
                 const libmap::Trajectory& poses, TileFolder* folder, Run& run) {
   std::optional<libmap::TileFusion> fusion;
   const double tile_m = folder == nullptr ? libmap::whole_plan : options.tile_m;
-  const auto survey = [&] {
+  const auto make_plan = [&] {
     fusion.emplace(scan, poses, options.fusion, tile_m, run.progress());
-    return TileFolder::TileData(fusion->survey());
+    return TileFolder::TileData(fusion->plan());
   };
   const TileFolder::TileData found =
-      folder == nullptr ? TileFolder::TileData() : folder->begin(survey);
-  if (!fusion && found.is_null()) survey();
+      folder == nullptr ? TileFolder::TileData() : folder->begin(make_plan);
+  if (!fusion && found.is_null()) make_plan();
   if (!fusion) {
-    const auto known = found.get<libmap::FusionSurvey>();
+    const auto known = found.get<libmap::FusionPlan>();
     fusion.emplace(scan, poses, options.fusion, tile_m, run.progress(), &known);
   }
   libmap::DepthFusionResult result = fusion->report();
@@ -183,19 +183,19 @@ void make_tiles(const FuseOptions& options, const libmap::ScanSource& scan,
   const auto write = [&](std::size_t n, const fs::path& to) {
     const libmap::TileFusion::Tile tile = make(n);
     if (!tile.cloud.empty()) libmap::write_cloud(to, tile.cloud);
-    return facts_of(tile.counts);
+    return tile_json_of(tile.counts);
   };
   const auto finish = [&](const fs::path& to) {
     std::size_t written = 0;
     for (const std::string& name : names) {
-      const auto counts = result_of<libmap::FusionCounts>(folder->facts(name));
+      const auto counts = result_of<libmap::FusionCounts>(folder->tile_data(name));
       add(counts);
-      if (counts.points_made == 0) continue;
+      if (counts.output_points == 0) continue;
       ++written;
       const fs::path file = folder->file(name, ".pcd");
       TileFolder::link_file(file, to / file.filename());
     }
-    run.add_results({{"pieces", written}});
+    run.add_results({{"tiles", written}});
     tell_results(result, options, run);
     write_poses(options, result, run);
   };

@@ -135,7 +135,7 @@ void panorama(PanoramaCommandOptions& options, Run& run) {
     throw libmap::Error("no image of this time can be read", {.file = options.folder});
   if (result.cloud.empty()) run.warn("no camera has measurements within the depth limits");
   add_rig_results(rig, set, result, views, run);
-  carry_transforms(options.folder, run);
+  copy_transforms(options.folder, run);
   run.info("{} points from {} of {} cameras at {} s", result.cloud.size(), views.size(), cameras,
            libmap::to_text(set.stamp_s));
   run.write_output(options.output, [&](const fs::path& temporary) {

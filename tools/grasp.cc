@@ -88,9 +88,9 @@ std::vector<std::size_t> rows_of(const libmap::Table& locations,
   return rows;
 }
 
-std::string name_of(libgtd::TrialEnd end) {
-  for (const auto& [name, value] : libgtd::trial_end_names())
-    if (value == end) return name;
+std::string name_of(libgtd::TrialOutcome outcome) {
+  for (const auto& [name, value] : libgtd::trial_outcome_names())
+    if (value == outcome) return name;
   return "";
 }
 
@@ -100,11 +100,11 @@ std::string description(const libgtd::LocationResult& result, const libgtd::Tria
       fmt::format("{} (probability {:.2f}); the shown trial ",
                   result.holds() ? "holds" : "does not hold", result.hold_probability);
   const std::string direction = libgtd::pull_directions()[trial.direction].name();
-  if (trial.end == libgtd::TrialEnd::holds)
+  if (trial.outcome == libgtd::TrialOutcome::holds)
     return verdict + fmt::format("holds {:.1f} N in its weakest direction, {}; the load is {} N",
                                  trial.force_n, direction, libmap::to_text(load_n));
-  const std::string failure = "fails by " + name_of(trial.end);
-  if (trial.gripper.approach != libgtd::ApproachEnd::on_ground) return verdict + failure;
+  const std::string failure = "fails by " + name_of(trial.outcome);
+  if (trial.gripper.approach != libgtd::ApproachOutcome::on_ground) return verdict + failure;
   return verdict + failure +
          fmt::format(": {:.1f} N in its weakest direction, {}; the load is {} N", trial.force_n,
                      direction, libmap::to_text(load_n));
@@ -384,7 +384,7 @@ void say_fit(const libgtd::PullFit& fit, std::size_t tests, Run& run) {
     run.warn(
         "the model does not explain the tests: the mean squared score is {:.2f} instead of 1, "
         "each predicted from the others (probability {:.1g}){}; the ranges are too narrow",
-        fit.mean_squared_score, fit.chance, rows.empty() ? "" : ", worst rows " + rows);
+        fit.mean_squared_score, fit.p_value, rows.empty() ? "" : ", worst rows " + rows);
   else if (!rows.empty())
     run.warn("the other tests do not predict the tests of rows {}", rows);
   constexpr double few_sets = 8.0;
@@ -404,7 +404,7 @@ void say_fit(const libgtd::PullFit& fit, std::size_t tests, Run& run) {
   run.add_results({{"pull_tests", tests},
                    {"effective_sets", fit.effective_sets},
                    {"mean_squared_score", fit.mean_squared_score},
-                   {"chance", fit.chance},
+                   {"chance", fit.p_value},
                    {"outlier_rows", rows}});
 }
 

@@ -199,7 +199,7 @@ void lookup(LookupCommandOptions& options, Run& run) {
   options.map = without_trailing_slash(options.map);
   run.claim_output(options.output, {options.map, options.points, options.visible});
   options.points_frame = frame_of_points(options.points, options.points_frame, options.map, run);
-  if (options.points_frame == PointFrame::terrain) carry_terrain_transform(options.map, run);
+  if (options.points_frame == PointFrame::terrain) copy_terrain_transform(options.map, run);
   libmap::Table table = libmap::read_csv(options.points);
   MapAnswers map = is_tile_store(options.map) ? ask_tiles(options, positions_of(table), run)
                                               : ask_map(options, positions_of(table), run);

@@ -67,15 +67,15 @@ libmap::PointCloud read_points(const std::string& input, Run& run) {
 
 // Orients normals without a consistent orientation, such as those from Open3D, PCL or a PCA.
 void orient_if_mixed(const MeshOptions& options, libmap::PointCloud& cloud, Run& run) {
-  const double share = libmap::opposing_share(cloud.positions, cloud.normals);
-  run.add_results({{"opposing_normals", share}});
-  if (share <= libmap::max_opposing_share || options.normals == NormalSource::cloud) return;
+  const double fraction = libmap::opposing_fraction(cloud.positions, cloud.normals);
+  run.add_results({{"opposing_normals", fraction}});
+  if (fraction <= libmap::max_opposing_fraction || options.normals == NormalSource::cloud) return;
   const libmap::NormalEstimationResult oriented =
       run.timed("normals", [&] { return libmap::orient_normals(cloud); });
   cloud.normals = oriented.normals;
   const std::string way(to_text(oriented.orientation));
   run.warn("{}: {:.1f} % of neighboring normals face opposite sides: all are oriented by {}",
-           options.cloud, 100.0 * share, way);
+           options.cloud, 100.0 * fraction, way);
   run.add_results({{"normals_oriented_by", way}});
 }
 
@@ -194,7 +194,7 @@ void mesh(const MeshOptions& options, Run& run) {
                    [&](const auto& temporary) { libmap::write_mesh(temporary, surface); });
 }
 
-TileFolder::TileData facts_of(const libmap::SurfaceTile& made) {
+TileFolder::TileData tile_data_of(const libmap::SurfaceTile& made) {
   return {{"vertices", made.mesh.vertices.size()},
           {"triangles", made.mesh.triangles.size()},
           {"area_m2", libmap::surface_area(made.mesh)},
@@ -204,7 +204,7 @@ TileFolder::TileData facts_of(const libmap::SurfaceTile& made) {
 
 // Totals of the written tiles.
 struct Totals {
-  std::int64_t pieces = 0;
+  std::int64_t tiles = 0;
   std::int64_t vertices = 0;
   std::int64_t triangles = 0;
   double area_m2 = 0.0;
@@ -214,12 +214,12 @@ struct Totals {
          {"triangles", mesh.triangles.size()},
          {"area_m2", libmap::surface_area(mesh)}});
   }
-  void add(const TileFolder::TileData& facts) {
-    const auto count = facts.at("triangles").get<std::int64_t>();
-    pieces += count > 0 ? 1 : 0;
-    vertices += facts.at("vertices").get<std::int64_t>();
+  void add(const TileFolder::TileData& data) {
+    const auto count = data.at("triangles").get<std::int64_t>();
+    tiles += count > 0 ? 1 : 0;
+    vertices += data.at("vertices").get<std::int64_t>();
     triangles += count;
-    area_m2 += facts.at("area_m2").get<double>();
+    area_m2 += data.at("area_m2").get<double>();
   }
 };
 
@@ -230,16 +230,16 @@ Totals assemble(const MeshOptions& options, const TileFolder& output,
                 const std::vector<libmap::XyTile>& tiles, const fs::path& folder, Run& run) {
   libmap::SurfaceIslands islands;
   for (const libmap::XyTile& tile : tiles) {
-    const TileFolder::TileData facts = output.facts(name_of(tile));
+    const TileFolder::TileData data = output.tile_data(name_of(tile));
     libmap::SurfaceTile made;
-    facts.at("component_areas_m2").get_to(made.component_areas_m2);
-    facts.at("seams").get_to(made.seams);
+    data.at("component_areas_m2").get_to(made.component_areas_m2);
+    data.at("seams").get_to(made.seams);
     islands.add(tile, made);
   }
   const libmap::SurfaceIslands::Dropped dropped = islands.dropped(options.surface.cleaning);
   Totals totals;
   for (const libmap::XyTile& tile : tiles) {
-    const TileFolder::TileData facts = output.facts(name_of(tile));
+    const TileFolder::TileData data = output.tile_data(name_of(tile));
     const fs::path to = folder / libmap::tile_file_name(tile, ".ply");
     const auto components = dropped.find(tile);
     if (components != dropped.end()) {
@@ -247,15 +247,15 @@ Totals assemble(const MeshOptions& options, const TileFolder& output,
           libmap::read_mesh(output.file(name_of(tile), ".ply")).mesh, components->second);
       totals.add(kept);
       if (!kept.triangles.empty()) libmap::write_mesh(to, kept);
-    } else if (facts.at("triangles") > 0) {
-      totals.add(facts);
+    } else if (data.at("triangles") > 0) {
+      totals.add(data);
       TileFolder::link_file(output.file(name_of(tile), ".ply"), to);
     }
   }
   if (totals.triangles == 0)
     throw libmap::Error("no surface was found: there are too few points, or their normals cancel",
                         {.file = options.cloud});
-  run.add_results({{"pieces", totals.pieces},
+  run.add_results({{"tiles", totals.tiles},
                    {"islands_across_tiles", islands.islands()},
                    {"vertices", totals.vertices},
                    {"triangles", totals.triangles},
@@ -265,21 +265,21 @@ Totals assemble(const MeshOptions& options, const TileFolder& output,
 
 // Makes and writes the tiles one by one.
 void make_tiles(const MeshOptions& options, TileFolder& output, Run& run) {
-  libmap::CloudStatistics survey;
+  libmap::CloudStatistics statistics;
   std::map<libmap::XyTile, std::size_t> points_in_tiles;
-  libmap::TileIndex index = run.timed("survey", [&] {
+  libmap::TileIndex index = run.timed("statistics", [&] {
     return libmap::TileIndex(libmap::cloud_tiles(options.cloud),
-                             [&](const libmap::PointCloud& piece) {
-                               survey.add(piece, options.surface.reconstruction.weigh_by_error);
-                               libmap::add_surface_tiles(piece, options.surface, points_in_tiles);
+                             [&](const libmap::PointCloud& tile) {
+                               statistics.add(tile, options.surface.reconstruction.weigh_by_error);
+                               libmap::add_surface_tiles(tile, options.surface, points_in_tiles);
                              });
   });
   check_points(options.cloud, index.points(), index.dropped_points(), run);
-  if (survey.dropped_points() > 0)
-    run.warn("{} of {} points have no normal and are skipped", survey.dropped_points(),
+  if (statistics.dropped_points() > 0)
+    run.warn("{} of {} points have no normal and are skipped", statistics.dropped_points(),
              index.points());
   run.add_results({{"points", index.points()},
-                   {"dropped_points", survey.dropped_points()},
+                   {"dropped_points", statistics.dropped_points()},
                    {"cell_size_m", options.surface.reconstruction.cell_size_m}});
   std::vector<libmap::XyTile> tiles;
   std::vector<std::string> names;
@@ -291,14 +291,14 @@ void make_tiles(const MeshOptions& options, TileFolder& output, Run& run) {
     const libmap::XyBox box =
         libmap::xy_box_of(tiles[n], options.surface.tile_m, options.surface.margin_m());
     const libmap::SurfaceTile made = libmap::make_surface_tile(
-        index.points_in(box.min(), box.max()), survey, tiles[n], options.surface);
+        index.points_in(box.min(), box.max()), statistics, tiles[n], options.surface);
     if (!made.mesh.triangles.empty()) libmap::write_mesh(to, made.mesh);
-    return facts_of(made);
+    return tile_data_of(made);
   };
   const auto finish = [&](const fs::path& folder) {
     const Totals totals = assemble(options, output, tiles, folder, run);
     run.info("{} points -> {} triangles in {} tiles", index.points(), totals.triangles,
-             totals.pieces);
+             totals.tiles);
   };
   output.make({names, ".ply", make, finish});
 }

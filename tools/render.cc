@@ -107,7 +107,7 @@ libmap::Pose turned_back(const libmap::Pose& terrain_from_input) {
 // A tile that the window shows, and the share of its area in the window.
 struct SeenTile {
   std::size_t tile = 0;
-  double share = 1.0;
+  double fraction = 1.0;
 };
 
 std::vector<SeenTile> seen_tiles(const MapTiles& tiles,
@@ -132,7 +132,7 @@ int columns_per_point(const MapTiles& tiles, const std::vector<SeenTile>& seen,
                       std::uint64_t max_points) {
   double points = 0.0;
   for (const SeenTile& one : seen)
-    points += one.share * static_cast<double>(tiles.index().tiles[one.tile].voxels);
+    points += one.fraction * static_cast<double>(tiles.index().tiles[one.tile].voxels);
   const double columns = std::ceil(std::sqrt(points / static_cast<double>(max_points)));
   // Limited, because the counts are read from the index; no map has more than 2^40 points.
   return columns >= 1.0 ? static_cast<int>(std::min(columns, 0x1p20)) : 1;
@@ -182,7 +182,7 @@ MapWindow read_window(const MapTiles& tiles, const std::optional<Eigen::AlignedB
     throw libmap::Error("the box contains no part of the map", {.field = "--box"});
   if (window.columns_per_point > 1) {
     window.cloud = libgtd::downsample_map(window.cloud, window.columns_per_point);
-    libgtd::snap_to_squares(tiles.index(), window.columns_per_point, window.cloud);
+    libgtd::snap_to_square_centers(tiles.index(), window.columns_per_point, window.cloud);
   }
   return window;
 }

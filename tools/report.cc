@@ -46,12 +46,12 @@ void bind(libmap::ParameterTable& table, ReportCommandOptions& options) {
 // Bytes per cell in the page: at most eleven, in base64.
 constexpr double bytes_per_cell = 44.0 / 3.0;
 // Maximum shares of the page for maps and for scenes.
-constexpr double maps_share = 0.4;
-constexpr double scenes_share = 0.4;
+constexpr double maps_fraction = 0.4;
+constexpr double scenes_fraction = 0.4;
 
 std::size_t cells_per_map(const ReportCommandOptions& options, const libmap::PlannedSection& plan) {
   const std::size_t maps = plan.count(libmap::ItemKind::map);
-  const double affordable = maps_share * options.max_size_mb * 1e6 / bytes_per_cell /
+  const double affordable = maps_fraction * options.max_size_mb * 1e6 / bytes_per_cell /
                             static_cast<double>(std::max<std::size_t>(maps, 1));
   return static_cast<std::size_t>(std::min(affordable, static_cast<double>(options.max_cells)));
 }
@@ -200,7 +200,7 @@ void make_report(ReportCommandOptions& options, Run& run) {
                          plan.count(libmap::ItemKind::scene) > 0;
   const bool with_views = !options.no_views && has_views;
   const libmap::PageAssets assets = read_assets(options, with_views, run);
-  double bytes_left = scenes_share * options.max_size_mb * 1e6;
+  double bytes_left = scenes_fraction * options.max_size_mb * 1e6;
   const libmap::ReportReadResult read = run.timed("read", [&] {
     return libmap::read_report_content(
         plan, {.folder = options.folder, .excluded = options.output},
@@ -217,7 +217,7 @@ void make_report(ReportCommandOptions& options, Run& run) {
     run.add_input(is_tile_store(file.string()) ? store_index_path(file.string()) : file);
   run.add_results({{"files", read.files.size()},
                    {"bytes", page.html.size()},
-                   {"pictures_made_smaller", page.changed_images}});
+                   {"resized_images", page.changed_images}});
   run.info("{} files, {:.1f} MB{}", read.files.size(), static_cast<double>(page.html.size()) / 1e6,
            page.changed_images == 0 ? "" : fmt::format(", {} images reduced", page.changed_images));
   run.write_text(options.output, page.html);

@@ -94,9 +94,9 @@ std::int64_t modified_ns(const fs::path& path) {
 }
 
 // Surveys the files. Data of an earlier run is used for files with the same name, size and time.
-std::vector<TerrainFile> survey(const std::vector<fs::path>& paths,
-                                const std::vector<TerrainFile>& known,
-                                const std::optional<libmap::Georeference>& georeference) {
+std::vector<TerrainFile> terrain_files(const std::vector<fs::path>& paths,
+                                       const std::vector<TerrainFile>& known,
+                                       const std::optional<libmap::Georeference>& georeference) {
   std::vector<TerrainFile> files(paths.size());
   libmap::parallel_each(paths.size(), [&](std::size_t n) {
     TerrainFile& file = files[n];
@@ -112,7 +112,7 @@ std::vector<TerrainFile> survey(const std::vector<fs::path>& paths,
       return;
     }
     file.input.sha256 = libmap::sha256_of_file(paths[n]);
-    const libmap::TileInfo info = libmap::survey_tile(paths[n], georeference);
+    const libmap::TileInfo info = libmap::read_tile_info(paths[n], georeference);
     file.points = info.points;
     file.dropped_points = info.dropped_points;
     file.box = info.box;
@@ -176,8 +176,9 @@ class StoreScoring {
   void check_plan() {
     const auto earlier = run_.options().force ? std::nullopt : store_.plan();
     if (!earlier && !run_.options().force) require_no_index(store_);
-    plan_.terrain = survey(stream_.tiles(), earlier ? earlier->terrain : std::vector<TerrainFile>{},
-                           stream_.georeference());
+    plan_.terrain =
+        terrain_files(stream_.tiles(), earlier ? earlier->terrain : std::vector<TerrainFile>{},
+                      stream_.georeference());
     plan_.index.manifest = make_manifest();
     plan_.key = libmap::key_of(plan_.index.manifest);
     if (earlier && earlier->key == plan_.key) {
@@ -207,7 +208,7 @@ class StoreScoring {
   // Manifest with parameters and inputs, as for a map in one file.
   libmap::Manifest make_manifest() {
     libmap::Manifest& manifest = run_.manifest();
-    carry_transforms(options_.terrain, run_);
+    copy_transforms(options_.terrain, run_);
     for (const TerrainFile& file : plan_.terrain) manifest.inputs.push_back(file.input);
     for (const auto& input : libgtd::gripper_files(options_.gripper_file)) run_.add_input(input);
     manifest.frame = options_.frame == libgtd::MapFrame::terrain ? "terrain" : "input";
@@ -363,12 +364,12 @@ void say_result(const libgtd::DetectionResult& result, const ScoreOptions& optio
   run.add_timings(result.timings_s);
   run.info("{} points, {} occupied voxels, {} scored in {} tiles, {} graspable", result.points,
            result.occupied_voxels, result.map.voxels.size(), result.tiles, result.graspable_voxels);
-  if (10 * result.lone_voxels > result.occupied_voxels && result.occupied_voxels >= 10)
+  if (10 * result.isolated_voxels > result.occupied_voxels && result.occupied_voxels >= 10)
     run.warn(
         "{}: {:.1f} % of the voxels have no neighbor: the points are too sparse for voxels of {:g} "
         "m (--interpolation, --voxel-size, or resample a mesh)",
         options.terrain,
-        100.0 * static_cast<double>(result.lone_voxels) /
+        100.0 * static_cast<double>(result.isolated_voxels) /
             static_cast<double>(result.occupied_voxels),
         options.detection.scenario.voxel_size_m);
   if (result.map.content.normals)
@@ -441,10 +442,10 @@ void score(ScoreOptions& options, Run& run) {
     return libgtd::detect(read.cloud, options.detection, run.progress());
   });
   run.manifest().parameters.emplace_back("tile", options.tile);
-  for (const auto& piece : libmap::cloud_tiles(options.terrain)) run.add_input(piece);
+  for (const auto& tile : libmap::cloud_tiles(options.terrain)) run.add_input(tile);
   for (const auto& input : libgtd::gripper_files(gripper_file)) run.add_input(input);
   add_results(result, options, run);
-  carry_transforms(options.terrain, run);
+  copy_transforms(options.terrain, run);
   say_result(result, options, run);
   const libmap::PointCloud cloud = libgtd::to_cloud(result.map, options.frame);
   run.write_output(options.output,

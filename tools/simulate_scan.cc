@@ -173,7 +173,7 @@ void scan_terrain(const SimulateScanOptions& options, const libmap::Trajectory& 
         temporary.has_parent_path() ? temporary.parent_path() : fs::path("."),
         {.tile_m = libmap::GroundHeights::cell_m, .buffer_bytes = spool_buffer_bytes});
     std::size_t count = 0;
-    for (const fs::path& piece : stream.tiles()) count += libmap::read_cloud_info(piece).points;
+    for (const fs::path& tile : stream.tiles()) count += libmap::read_cloud_info(tile).points;
     run.progress().begin("points", count);
     run.timed("read", [&] {
       stream.for_each_block(libmap::PointStream::Need::positions,
@@ -191,7 +191,7 @@ void scan_terrain(const SimulateScanOptions& options, const libmap::Trajectory& 
       write_scan(libmap::scene_of(terrain, ground, options.simulation, poses), options, temporary,
                  run);
     });
-    run.detail("{} tiles of the terrain were triangulated", terrain.squares_made());
+    run.detail("{} tiles of the terrain were triangulated", terrain.tiles_made());
   });
 }
 

@@ -29,7 +29,8 @@ void bind(libmap::ParameterTable& table, SimulateSiteOptions& options) {
             "approximate edge length of the mesh, m");
   table.add("closed", options.meshing.closed,
             "add the sides and base of the ground, so that the mesh is closed");
-  table.add("places", options.field_points, libmap::Range{0.0, 10'000.0},
+  table.add_former_key("places", "field_points");
+  table.add("field_points", options.field_points, libmap::Range{0.0, 10'000.0},
             "number of field points; 0: as in the site file");
 }
 

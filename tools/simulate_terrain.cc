@@ -16,18 +16,18 @@ namespace fs = std::filesystem;
 struct SimulateTerrainOptions {
   std::string output;
   std::string size = "100";
-  libmap::TerrainTilesOptions pieces;
+  libmap::TerrainTilesOptions tiles;
 };
 
 // Makes and writes the tiles one by one. Returns the number of points.
 std::size_t write_tiles(const SimulateTerrainOptions& options,
-                        const std::vector<libmap::XyTile>& pieces, const fs::path& folder,
+                        const std::vector<libmap::XyTile>& tiles, const fs::path& folder,
                         Run& run) {
-  run.progress().begin("pieces", pieces.size());
-  std::vector<std::size_t> points(pieces.size());
-  libmap::parallel_each(pieces.size(), [&](std::size_t n) {
-    const libmap::PointCloud cloud = libmap::sample_tile(options.pieces, pieces[n]);
-    libmap::write_cloud(folder / libmap::tile_file_name(pieces[n], ".pcd"), cloud);
+  run.progress().begin("tiles", tiles.size());
+  std::vector<std::size_t> points(tiles.size());
+  libmap::parallel_each(tiles.size(), [&](std::size_t n) {
+    const libmap::PointCloud cloud = libmap::sample_tile(options.tiles, tiles[n]);
+    libmap::write_cloud(folder / libmap::tile_file_name(tiles[n], ".pcd"), cloud);
     points[n] = cloud.size();
     run.progress().advance(1);
   });
@@ -42,17 +42,17 @@ void simulate(SimulateTerrainOptions& options, Run& run) {
   if (!size)
     throw libmap::Error(
         "not a size", {.field = "--size", .value = options.size, .bound = "M or XxY, meters, > 0"});
-  options.pieces.size_x_m = size->x();
-  options.pieces.size_y_m = size->y();
-  const std::vector<libmap::XyTile> pieces = libmap::terrain_tiles(options.pieces);
+  options.tiles.size_x_m = size->x();
+  options.tiles.size_y_m = size->y();
+  const std::vector<libmap::XyTile> tiles = libmap::terrain_tiles(options.tiles);
   const std::vector<std::string> names = tile_folder_names(options.output);
   run.claim_output_tree(options.output, names);
   run.manifest().frame = "terrain";
   run.write_output_tree(options.output, names, [&](const fs::path& folder) {
     if (folder.empty()) return;  // --dry-run
-    const std::size_t points = write_tiles(options, pieces, folder, run);
-    run.add_results({{"pieces", pieces.size()}, {"points", points}});
-    run.info("{} points in {} tiles", points, pieces.size());
+    const std::size_t points = write_tiles(options, tiles, folder, run);
+    run.add_results({{"tiles", tiles.size()}, {"points", points}});
+    run.info("{} points in {} tiles", points, tiles.size());
   });
 }
 
@@ -63,6 +63,6 @@ int graspmap_tools::simulate_terrain(int argc, char** argv) {
   Command command("simulate terrain", "Rocky ground of any size as a folder of clouds.");
   command.output(options.output, "folder: piece_I_J.pcd, one per tile of the x-y plane");
   command.parameters().add("size", options.size, "size of the terrain: M or XxY, m");
-  bind(command.parameters(), options.pieces);
+  bind(command.parameters(), options.tiles);
   return command.run(argc, argv, [&](Run& run) { simulate(options, run); });
 }

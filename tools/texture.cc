@@ -185,25 +185,25 @@ void texture(TextureCommandOptions options, Run& run) {
   if (!run.options().dry_run) remove_old_pages(old_pages, files);
 }
 
-std::vector<std::string> stems_of(const std::vector<fs::path>& pieces) {
+std::vector<std::string> stems_of(const std::vector<fs::path>& tiles) {
   std::vector<std::string> stems;
-  for (const fs::path& piece : pieces) stems.push_back(piece.stem().string());
+  for (const fs::path& tile : tiles) stems.push_back(tile.stem().string());
   const auto twice = std::adjacent_find(stems.begin(), stems.end());
   if (twice != stems.end())
     throw libmap::Error(
         "two tiles have this name",
-        {.file = pieces.front().parent_path().string(), .field = "name", .value = *twice});
+        {.file = tiles.front().parent_path().string(), .field = "name", .value = *twice});
   return stems;
 }
 
 // Makes and writes the models of the tiles one by one.
 void make_models(const TextureCommandOptions& options, const libmap::ScanSource& scan,
-                 const libmap::Trajectory& poses, const std::vector<fs::path>& pieces,
+                 const libmap::Trajectory& poses, const std::vector<fs::path>& tiles,
                  TileFolder& output, Run& run) {
   // Large arrays are returned to the system after each tile, because the heap would fragment.
   mallopt(M_MMAP_THRESHOLD, 1 << 20);
-  const std::vector<std::string> names = stems_of(pieces);
-  libmap::MeshTileIndex index(pieces);
+  const std::vector<std::string> names = stems_of(tiles);
+  libmap::MeshTileIndex index(tiles);
   libmap::TileTexturing texturing(index, options.margin_m, scan, poses, options.texture,
                                   run.progress());
   const TileFolder::TileData found =
@@ -211,35 +211,35 @@ void make_models(const TextureCommandOptions& options, const libmap::ScanSource&
   if (found.is_null()) return;  // --dry-run
   const auto exposure = found.get<libmap::TextureExposure>();
   const auto make = [&](std::size_t n, const fs::path& to) {
-    const libmap::TileTexturing::Piece tile = texturing.make(n, exposure);
+    const libmap::TileTexturing::Tile tile = texturing.make(n, exposure);
     libmap::textured_mesh_files(to, tile.model, options.writing).front().write(to);
-    return facts_of(tile.counts);
+    return tile_json_of(tile.counts);
   };
   const auto finish = [&](const fs::path& folder) {
     libmap::TextureReport whole = texturing.report();
     whole.exposure = exposure;
     for (const std::string& name : names) {
       libmap::merge_into<libmap::TextureCounts>(
-          whole, result_of<libmap::TextureCounts>(output.facts(name)));
+          whole, result_of<libmap::TextureCounts>(output.tile_data(name)));
       TileFolder::link_file(output.file(name, model_extension), folder / (name + model_extension));
     }
     libmap::require_seen(whole);
     report(whole, run);
-    run.add_results({{"pieces", names.size()}});
+    run.add_results({{"tiles", names.size()}});
   };
   output.make({names, model_extension, make, finish});
 }
 
-void texture_in_pieces(TextureCommandOptions options, Run& run) {
-  const std::vector<fs::path> pieces = libmap::mesh_tiles(options.mesh);
-  const std::vector<std::string> names = tile_folder_names(options.output, pieces, model_extension);
+void texture_tiles(TextureCommandOptions options, Run& run) {
+  const std::vector<fs::path> tiles = libmap::mesh_tiles(options.mesh);
+  const std::vector<std::string> names = tile_folder_names(options.output, tiles, model_extension);
   const auto scan = scan_of(options, run);
   const libmap::Trajectory poses = poses_of(options, *scan, run);
   add_inputs(options, run);
   TileFolder output(options.output, names, inputs_of(options), libmap::parse_share(options.tile),
                     run);
   if (output.is_complete()) return;
-  in_file(options.mesh, [&] { make_models(options, *scan, poses, pieces, output, run); });
+  in_file(options.mesh, [&] { make_models(options, *scan, poses, tiles, output, run); });
 }
 
 }  // namespace
@@ -261,7 +261,7 @@ int main(int argc, char** argv) {
   add_calibration_option(command, options.calibration);
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) {
-    if (is_tile_folder(options.output)) return texture_in_pieces(options, run);
+    if (is_tile_folder(options.output)) return texture_tiles(options, run);
     require_folder_of_share(options.output, options.tile);
     texture(options, run);
   });

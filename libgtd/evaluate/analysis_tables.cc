@@ -86,7 +86,7 @@ Json json_of(const MapAnalysis& analysis) {
                     {"evaluated_graspable", ground.graspable_voxels}};
   json["evaluated"] = {{"surface_area_m2", ground.area_m2},
                        {"graspable_surface_area_m2", ground.graspable_area_m2},
-                       {"graspable_share", json_of(ground.graspable_share())},
+                       {"graspable_share", json_of(ground.graspable_fraction())},
                        {"plan_area_m2", analysis.plan_area_m2},
                        {"graspable_plan_area_m2", analysis.graspable_plan_area_m2},
                        {"columns", analysis.columns},
@@ -95,17 +95,17 @@ Json json_of(const MapAnalysis& analysis) {
                        {"min_height_m", ground.low},
                        {"max_height_m", ground.high},
                        {"column_coverage", analysis.column_coverage}};
-  Json classes = Json::array();
-  for (std::size_t n = 0; n < analysis.classes.size(); ++n) {
-    const ScoreBin& bin = analysis.classes[n];
+  Json score_classes = Json::array();
+  for (std::size_t n = 0; n < analysis.score_classes.size(); ++n) {
+    const ScoreBin& bin = analysis.score_classes[n];
     Json entry;
     entry["score_from"] = std::isfinite(bin.low) ? Json(bin.low) : Json(nullptr);
     entry["all"] = bin.all;
     entry["evaluated"] = bin.evaluated;
     entry["area_m2"] = bin.area_m2;
-    classes.push_back(std::move(entry));
+    score_classes.push_back(std::move(entry));
   }
-  json["classes"] = std::move(classes);
+  json["classes"] = std::move(score_classes);
   return json;
 }
 
@@ -114,8 +114,8 @@ Json json_of(const MapRegionResult& regions, const RegionReachOptions& options,
   Json json;
   json["count"] = regions.regions.size();
   json["voxels"] = regions.voxels;
-  json["left_out_smaller"] = {{"regions", regions.left_out_regions},
-                              {"voxels", regions.left_out_voxels}};
+  json["skipped_small_regions"] = {{"regions", regions.skipped_regions},
+                                   {"voxels", regions.skipped_voxels}};
   if (!regions.regions.empty()) {
     const MapRegion& largest = regions.regions.front();
     json["largest"] = {{"voxels", largest.voxels.size()},
@@ -177,7 +177,7 @@ Table histogram_table(const MapAnalysis& analysis) {
                           text(bin.above_zero_plane), text(bin.evaluated), text(bin.graspable),
                           text(bin.area_m2)});
   };
-  for (const ScoreBin& bin : analysis.classes) add("class", bin);
+  for (const ScoreBin& bin : analysis.score_classes) add("class", bin);
   for (const ScoreBin& bin : analysis.score_bins) add("width", bin);
   return table;
 }
@@ -189,7 +189,7 @@ Table ground_table(const std::vector<GroundBin>& bins, const std::string& unit) 
   for (const GroundBin& bin : bins)
     table.rows.push_back({text(bin.low), text(bin.high), text(bin.voxels), text(bin.area_m2),
                           text(bin.graspable_voxels), text(bin.graspable_area_m2),
-                          text(bin.graspable_share()), text(bin.mean_score())});
+                          text(bin.graspable_fraction()), text(bin.mean_score())});
   return table;
 }
 

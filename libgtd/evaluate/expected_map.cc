@@ -127,9 +127,9 @@ const libmap::ScalarField& scores_of(const libmap::PointCloud& map) {
 bool ExpectedRegion::contains(const Eigen::Vector3d& point) const {
   const Eigen::Vector3d along = to - from;
   const double length2 = along.squaredNorm();
-  const double share =
+  const double fraction =
       length2 > 0.0 ? std::clamp((point - from).dot(along) / length2, 0.0, 1.0) : 0.0;
-  return (point - (from + share * along)).squaredNorm() <= radius_m * radius_m;
+  return (point - (from + fraction * along)).squaredNorm() <= radius_m * radius_m;
 }
 
 void ExpectedMap::check() const {
@@ -162,7 +162,7 @@ ExpectedMap parse_expected_map(const libmap::Table& table) {
     region.to = read_to(table, row, region.from);
     region.radius_m = table.number(row, table.column("radius"));
     region.graspable = label_at(table, row, table.column("graspable"));
-    region.why = table.rows[row][table.column("why")];
+    region.reason = table.rows[row][table.column("why")];
     expected.regions.push_back(std::move(region));
   }
   libmap::in_file(table.file, [&] { expected.check(); });
@@ -180,7 +180,7 @@ ExpectedMap transformed(const ExpectedMap& expected, const libmap::Pose& map_fro
 
 std::optional<bool> RegionResult::predicted() const {
   if (voxels == 0) return std::nullopt;
-  return 2 * reached >= voxels;
+  return 2 * reaching_cutoff >= voxels;
 }
 
 std::optional<double> youden_index(const Confusion& counts) {
@@ -209,13 +209,13 @@ ExpectedMapResult evaluate_expected_map(const libmap::PointCloud& map, const Exp
       ++result.unlisted_voxels;
       continue;
     }
-    const bool reached = reaches_cutoff(value, cutoff);
+    const bool reaching_cutoff = reaches_cutoff(value, cutoff);
     const bool flagged = flag != nullptr && flag->values[n] > 0.0 &&
                          !(obstacle != nullptr && obstacle->values[n] > 0.0);
     for (const std::size_t r : at.regions) {
       RegionResult& region = result.regions[r];
       ++region.voxels;
-      region.reached += reached ? 1 : 0;
+      region.reaching_cutoff += reaching_cutoff ? 1 : 0;
       region.graspable += flagged ? 1 : 0;
       region_scores[r].push_back(value);
     }
@@ -224,7 +224,7 @@ ExpectedMapResult evaluate_expected_map(const libmap::PointCloud& map, const Exp
       continue;
     }
     const bool truth = *expected.regions[at.regions.front()].graspable;
-    result.voxels_by_score.add(truth, reached);
+    result.voxels_by_score.add(truth, reaching_cutoff);
     if (result.voxels_by_flag) result.voxels_by_flag->add(truth, flagged);
     labels.emplace_back(truth);
     scores.emplace_back(value);
@@ -237,7 +237,7 @@ ExpectedMapResult evaluate_expected_map(const libmap::PointCloud& map, const Exp
   }
   RocOptions roc;
   roc.bootstrap_replicates = 0;
-  result.area = evaluate_roc(labels, scores, roc).area;
+  result.auc = evaluate_roc(labels, scores, roc).auc;
   return result;
 }
 

@@ -22,7 +22,7 @@ struct ExpectedRegion {
   Eigen::Vector3d to = Eigen::Vector3d::Zero();
   double radius_m = 0.0;
   std::optional<bool> graspable;  // expectation; nullopt: undecided
-  std::string why;                // reason of the expectation
+  std::string reason;             // reason of the expectation
 
   // Returns true if the point is at most radius_m from the segment.
   bool contains(const Eigen::Vector3d& point) const;
@@ -48,7 +48,7 @@ ExpectedMap transformed(const ExpectedMap& expected, const libmap::Pose& map_fro
 
 struct RegionResult {
   std::size_t voxels = 0;            // in the region and, if it is decided, in no undecided region
-  std::size_t reached = 0;           // voxels with score >= cutoff
+  std::size_t reaching_cutoff = 0;   // voxels with score >= cutoff
   std::size_t graspable = 0;         // voxels with the flag of the map
   std::optional<double> mean_score;  // nullopt without voxels
   std::optional<double> median_score;
@@ -68,7 +68,7 @@ struct ExpectedMapResult {
   Confusion voxels_by_score;
   std::optional<Confusion> voxels_by_flag;  // nullopt if the map has no field "graspable"
   Confusion region_confusion;               // each region with voxels counts once
-  std::optional<AreaUnderCurve> area;       // by voxel scores; nullopt unless both classes exist
+  std::optional<AreaUnderCurve> auc;        // by voxel scores; nullopt unless both classes exist
 };
 
 // Returns sensitivity + specificity - 1 (Youden 1950); nullopt if one of them is undefined.

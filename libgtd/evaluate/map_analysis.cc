@@ -49,7 +49,7 @@ class MapCounter {
     result_.score_bins = empty_bins<ScoreBin>(scores_);
     double upper = std::numeric_limits<double>::infinity();
     for (const libmap::ScoreClass& one : libmap::score_classes) {
-      result_.classes.push_back({.low = one.min_score, .high = upper});
+      result_.score_classes.push_back({.low = one.min_score, .high = upper});
       upper = one.min_score;
     }
   }
@@ -84,7 +84,7 @@ class MapCounter {
     if (!scored) return;
     const double score = static_cast<double>(map_.scores[n]);
     add_to(result_.score_bins[scores_.bin_of(score + score_tolerance)], n);
-    for (ScoreBin& one : result_.classes)
+    for (ScoreBin& one : result_.score_classes)
       if (score >= one.low - score_tolerance) {
         add_to(one, n);
         break;
@@ -169,7 +169,7 @@ void bind(libmap::ParameterTable& table, MapAnalysisOptions& options) {
   table.add("border", options.border, "include voxels with a mask that extends beyond the scan");
 }
 
-std::optional<double> GroundBin::graspable_share() const {
+std::optional<double> GroundBin::graspable_fraction() const {
   return area_m2 > 0.0 ? std::optional(graspable_area_m2 / area_m2) : std::nullopt;
 }
 
@@ -177,8 +177,8 @@ std::optional<double> GroundBin::mean_score() const {
   return voxels > 0 ? std::optional(score_sum / static_cast<double>(voxels)) : std::nullopt;
 }
 
-std::size_t nearest_rank(std::size_t count, double share) {
-  const double rank = std::ceil(share * static_cast<double>(count) - 1e-9);
+std::size_t nearest_rank(std::size_t count, double fraction) {
+  const double rank = std::ceil(fraction * static_cast<double>(count) - 1e-9);
   return static_cast<std::size_t>(std::clamp(rank, 1.0, static_cast<double>(count))) - 1;
 }
 

@@ -28,8 +28,8 @@ struct ValueBins {
 // Throws Error naming `field` for more than 100,000 bins.
 ValueBins bins_over(double low, double high, double width, const char* field);
 
-// Returns the index of the quantile `share` (nearest rank) of `count` > 0 ascending values.
-std::size_t nearest_rank(std::size_t count, double share);
+// Returns the index of the quantile `fraction` (nearest rank) of `count` > 0 ascending values.
+std::size_t nearest_rank(std::size_t count, double fraction);
 
 struct MapAnalysisOptions {
   double score_bin = 0.05;  // width of the histogram bins
@@ -61,8 +61,8 @@ struct GroundBin {
   double graspable_area_m2 = 0.0;
   double score_sum = 0.0;
 
-  std::optional<double> graspable_share() const;  // fraction of the area; nullopt without area
-  std::optional<double> mean_score() const;       // nullopt without voxels
+  std::optional<double> graspable_fraction() const;  // fraction of the area; nullopt without area
+  std::optional<double> mean_score() const;          // nullopt without voxels
 };
 
 struct MapAnalysis {
@@ -84,10 +84,10 @@ struct MapAnalysis {
   // occupied / (occupied + empty) columns of the whole map. Only gaps of at most six empty columns
   // along y count as empty. It is below 1 if the cloud has fewer points than columns.
   double column_coverage = 1.0;
-  std::vector<ScoreBin> classes;     // bins of the legend, best first
-  std::vector<ScoreBin> score_bins;  // from min(0, lowest score) to max(1, highest)
-  std::vector<GroundBin> by_height;  // heights in the terrain frame
-  std::vector<GroundBin> by_slope;   // from 0 to 90 degrees
+  std::vector<ScoreBin> score_classes;  // bins of the legend, best first
+  std::vector<ScoreBin> score_bins;     // from min(0, lowest score) to max(1, highest)
+  std::vector<GroundBin> by_height;     // heights in the terrain frame
+  std::vector<GroundBin> by_slope;      // from 0 to 90 degrees
 };
 
 // Computes the statistics. Throws Error for options out of range, more than 100,000 bins and a

@@ -377,8 +377,8 @@ MapRegionResult find_regions(const VoxelMap& map, const MapSurface& surface,
   MapRegionResult result;
   for (std::vector<std::uint32_t>& voxels : connected(map, graspable, options.adjacency_voxels)) {
     if (voxels.size() < static_cast<std::size_t>(options.min_voxels)) {
-      ++result.left_out_regions;
-      result.left_out_voxels += voxels.size();
+      ++result.skipped_regions;
+      result.skipped_voxels += voxels.size();
       continue;
     }
     result.voxels += voxels.size();

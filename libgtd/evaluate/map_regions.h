@@ -37,8 +37,8 @@ struct MapRegionResult {
   std::vector<MapRegion> regions;             // descending by area, then by first voxel
   std::vector<std::int32_t> region_of_voxel;  // index into `regions`; -1: none
   std::size_t voxels = 0;                     // voxels in regions
-  std::size_t left_out_regions = 0;           // regions smaller than min_voxels
-  std::size_t left_out_voxels = 0;
+  std::size_t skipped_regions = 0;            // regions smaller than min_voxels
+  std::size_t skipped_voxels = 0;
 };
 
 // Finds connected components of the evaluated graspable voxels. Throws Error for options out of

@@ -79,13 +79,13 @@ void add_confusion(const std::string& prefix, const Confusion& counts, Row& row)
 
 void add_expected(const ExpectedMapResult& expected, Row& row) {
   add_confusion("voxel", expected.voxels_by_score, row);
-  row.add("voxel_auc", expected.area ? std::optional(expected.area->trapezoid) : std::nullopt);
+  row.add("voxel_auc", expected.auc ? std::optional(expected.auc->trapezoid) : std::nullopt);
   // No rates without the flag of the map.
   add_confusion("flag", expected.voxels_by_flag.value_or(Confusion{}), row);
   add_confusion("place", expected.region_confusion, row);
 }
 
-std::optional<double> share(std::size_t part, std::size_t whole) {
+std::optional<double> fraction(std::size_t part, std::size_t whole) {
   return Rate{part, whole}.value();
 }
 
@@ -100,10 +100,11 @@ Row row_of(const SummarizedMap& map, bool with_expected) {
   const MapSummary& summary = map.summary;
   row.add("voxels", summary.voxels);
   row.add("evaluated", summary.evaluated);
-  row.add("reached_share", share(summary.reached, summary.evaluated));
-  row.add("graspable_share", share(summary.graspable, summary.evaluated));
-  row.add("few_solid_share",
-          summary.few_solid ? share(*summary.few_solid, summary.evaluated) : std::nullopt);
+  row.add("reached_share", fraction(summary.reaching_cutoff, summary.evaluated));
+  row.add("graspable_share", fraction(summary.graspable, summary.evaluated));
+  row.add("few_solid_share", summary.below_solid_threshold
+                                 ? fraction(*summary.below_solid_threshold, summary.evaluated)
+                                 : std::nullopt);
   add_quantiles("score", summary.scores, row);
   add_quantiles("ssv", summary.solid_voxels, row);
   if (with_expected) add_expected(map.expected.value_or(ExpectedMapResult{}), row);
@@ -130,20 +131,20 @@ MapSummary summarize_map(const libmap::PointCloud& map, const VoxelMap& voxels,
   MapSummary summary;
   summary.voxels = voxels.size();
   const libmap::ScalarField* ssv = map.find_field("ssv");
-  if (ssv != nullptr && options.solid_voxel_threshold) summary.few_solid = 0;
+  if (ssv != nullptr && options.solid_voxel_threshold) summary.below_solid_threshold = 0;
   std::vector<double> scores;
   std::vector<double> solid_voxels;
   for (std::size_t n = 0; n < voxels.size(); ++n) {
     if (!voxels.evaluated(n, false)) continue;
     ++summary.evaluated;
     const double score = static_cast<double>(voxels.scores[n]);
-    summary.reached += reaches_cutoff(score, options.graspability_threshold) ? 1 : 0;
+    summary.reaching_cutoff += reaches_cutoff(score, options.graspability_threshold) ? 1 : 0;
     summary.graspable += voxels.graspable[n] != 0 ? 1 : 0;
     scores.push_back(score);
     if (ssv == nullptr) continue;
     solid_voxels.push_back(ssv->values[voxels.map_points[n]]);
-    if (summary.few_solid && solid_voxels.back() < *options.solid_voxel_threshold)
-      ++*summary.few_solid;
+    if (summary.below_solid_threshold && solid_voxels.back() < *options.solid_voxel_threshold)
+      ++*summary.below_solid_threshold;
   }
   summary.score_bins = analyze_map(voxels, unmeasured(voxels)).score_bins;
   summary.scores = quantiles_of(std::move(scores));
@@ -183,14 +184,14 @@ libmap::Table region_table(const std::vector<SummarizedMap>& maps, const Expecte
       row.add("region", region.name);
       row.add("expected", yes_no(region.graspable));
       row.add("voxels", result.voxels);
-      row.add("reached_share", share(result.reached, result.voxels));
-      row.add("graspable_share", share(result.graspable, result.voxels));
+      row.add("reached_share", fraction(result.reaching_cutoff, result.voxels));
+      row.add("graspable_share", fraction(result.graspable, result.voxels));
       row.add("mean_score", result.mean_score);
       row.add("median_score", result.median_score);
       row.add("predicted", yes_no(predicted));
       row.add("agrees",
               yes_no(evaluated ? std::optional(*predicted == *region.graspable) : std::nullopt));
-      row.add("why", region.why);
+      row.add("why", region.reason);
       append(row.cells, table);
     }
   }
@@ -205,7 +206,7 @@ libmap::Table histogram_table(const std::vector<SummarizedMap>& maps) {
       row.add("map", map.name);
       row.add("score", std::optional((bin.low + bin.high) / 2.0));
       row.add("voxels", bin.evaluated);
-      row.add("share", share(bin.evaluated, map.summary.evaluated));
+      row.add("share", fraction(bin.evaluated, map.summary.evaluated));
       append(row.cells, table);
     }
   }

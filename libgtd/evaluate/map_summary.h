@@ -25,10 +25,10 @@ inline constexpr std::array<double, 5> summary_quantiles{0.05, 0.25, 0.5, 0.75, 
 struct MapSummary {
   std::size_t voxels = 0;  // all voxels of the map
   std::size_t evaluated = 0;
-  std::size_t reached = 0;    // voxels with score >= threshold
-  std::size_t graspable = 0;  // voxels with the flag of the map
+  std::size_t reaching_cutoff = 0;  // voxels with score >= threshold
+  std::size_t graspable = 0;        // voxels with the flag of the map
   // Voxels with fewer solid voxels in the mask (SSV) than TSV. nullopt if one of them is unknown.
-  std::optional<std::size_t> few_solid;
+  std::optional<std::size_t> below_solid_threshold;
   // Quantiles summary_quantiles by nearest rank; empty if no voxel was evaluated.
   std::vector<double> scores;
   std::vector<double> solid_voxels;  // quantiles of SSV; empty if unknown

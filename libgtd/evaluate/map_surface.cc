@@ -88,8 +88,8 @@ class AreaCounter {
         mass += weight;
         moment += weight * level;
       }
-    const double share = mass_of_offset_(moment.norm() / mass / radius_m_);
-    return share * pi * squared_radius / 2.0 / mass;
+    const double fraction = mass_of_offset_(moment.norm() / mass / radius_m_);
+    return fraction * pi * squared_radius / 2.0 / mass;
   }
 
  private:

@@ -79,7 +79,7 @@ class PairCount {
     twice_ += positives * (2 * negatives_below_ + negatives);
     negatives_below_ += negatives;
   }
-  double area(std::uint64_t positives, std::uint64_t negatives) const {
+  double auc(std::uint64_t positives, std::uint64_t negatives) const {
     return static_cast<double>(twice_) /
            (2.0 * static_cast<double>(positives) * static_cast<double>(negatives));
   }
@@ -89,10 +89,10 @@ class PairCount {
   std::uint64_t negatives_below_ = 0;
 };
 
-double trapezoid_area(const Sample& sample) {
+double trapezoid_auc(const Sample& sample) {
   PairCount pairs;
   for (const ScoreGroup& group : sample.groups) pairs.add(group.positives, group.negatives);
-  return pairs.area(sample.positives, sample.negatives);
+  return pairs.auc(sample.positives, sample.negatives);
 }
 
 double precision_at_half_recall(const Sample& sample) {
@@ -121,7 +121,7 @@ std::optional<double> calibration_error(const Sample& sample) {
   return sum / static_cast<double>(sample.positives + sample.negatives);
 }
 
-void sum_upper(const std::vector<RocPoint>& points, AreaUnderCurve& area) {
+void sum_upper(const std::vector<RocPoint>& points, AreaUnderCurve& auc) {
   const double pairs = static_cast<double>(points.front().counts.positives()) *
                        static_cast<double>(points.front().counts.negatives());
   std::uint64_t sum = 0;
@@ -129,14 +129,14 @@ void sum_upper(const std::vector<RocPoint>& points, AreaUnderCurve& area) {
     const Confusion& here = points[k].counts;
     const std::size_t next =
         k + 1 < points.size() ? points[k + 1].counts.false_positives : here.false_positives;
-    const std::uint64_t share = std::uint64_t{here.false_positives - next} * here.true_positives;
-    area.upper_sum_shares.push_back(static_cast<double>(share) / pairs);
-    sum += share;
+    const std::uint64_t fraction = std::uint64_t{here.false_positives - next} * here.true_positives;
+    auc.upper_sum_terms.push_back(static_cast<double>(fraction) / pairs);
+    sum += fraction;
   }
-  area.upper_sum = static_cast<double>(sum) / pairs;
+  auc.upper_sum = static_cast<double>(sum) / pairs;
   const Rate width = {points.front().counts.false_positives - points.back().counts.false_positives,
                       points.front().counts.negatives()};
-  area.upper_sum_width = width.value().value();
+  auc.upper_sum_width = width.value().value();
 }
 
 // Hyndman and Fan 1996, definition 7.
@@ -163,7 +163,7 @@ class Bootstrap {
     const auto negatives = draw(random, group_of_negative_);
     PairCount pairs;
     for (std::size_t g = 0; g < sample_.groups.size(); ++g) pairs.add(positives[g], negatives[g]);
-    return pairs.area(sample_.positives, sample_.negatives);
+    return pairs.auc(sample_.positives, sample_.negatives);
   }
 
  private:
@@ -181,12 +181,12 @@ class Bootstrap {
 std::optional<Interval> bootstrap_95(const Sample& sample, const RocOptions& options) {
   if (options.bootstrap_replicates == 0) return std::nullopt;
   const Bootstrap bootstrap(sample);
-  std::vector<double> areas(static_cast<std::size_t>(options.bootstrap_replicates));
-  libmap::parallel_each(areas.size(), 64, [&](std::size_t i) {
-    areas[i] = bootstrap.replicate(options.bootstrap_seed, i);
+  std::vector<double> aucs(static_cast<std::size_t>(options.bootstrap_replicates));
+  libmap::parallel_each(aucs.size(), 64, [&](std::size_t i) {
+    aucs[i] = bootstrap.replicate(options.bootstrap_seed, i);
   });
-  std::sort(areas.begin(), areas.end());
-  return Interval{quantile(areas, 0.025), quantile(areas, 0.975)};
+  std::sort(aucs.begin(), aucs.end());
+  return Interval{quantile(aucs, 0.025), quantile(aucs, 0.975)};
 }
 
 std::string why_no_area(const Sample& sample) {
@@ -255,9 +255,9 @@ RocResult evaluate_roc(const std::vector<std::optional<bool>>& labels,
   std::vector<std::pair<double, bool>> locations;
   for (std::size_t i = 0; i < labels.size(); ++i) {
     if (!scores[i].has_value() || std::isnan(*scores[i])) {
-      ++result.left_out_unscored;
+      ++result.without_score;
     } else if (!labels[i].has_value()) {
-      ++result.left_out_unlabeled;
+      ++result.without_label;
     } else {
       locations.emplace_back(*scores[i], *labels[i]);
     }
@@ -269,14 +269,14 @@ RocResult evaluate_roc(const std::vector<std::optional<bool>>& labels,
   result.calibration_error = calibration_error(sample);
   if (sample.positives > 0) result.precision_at_half_recall = precision_at_half_recall(sample);
   if (sample.positives == 0 || sample.negatives == 0) {
-    result.area_note = why_no_area(sample);
+    result.auc_note = why_no_area(sample);
     return result;
   }
-  AreaUnderCurve area;
-  area.trapezoid = trapezoid_area(sample);
-  sum_upper(result.at_cutoffs, area);
-  area.trapezoid_bootstrap_95 = bootstrap_95(sample, options);
-  result.area = std::move(area);
+  AreaUnderCurve auc;
+  auc.trapezoid = trapezoid_auc(sample);
+  sum_upper(result.at_cutoffs, auc);
+  auc.trapezoid_bootstrap_95 = bootstrap_95(sample, options);
+  result.auc = std::move(auc);
   return result;
 }
 
@@ -290,13 +290,13 @@ std::optional<Kappa> cohens_kappa(const Confusion& counts) {
       (evaluated_yes.count == 0) == (reference_yes.count == 0))
     return std::nullopt;
   const double n = static_cast<double>(counts.size());
-  const auto share = [n](std::size_t count) { return static_cast<double>(count) / n; };
+  const auto fraction = [n](std::size_t count) { return static_cast<double>(count) / n; };
   // Cells p[evaluated][reference] and their sums over rows and columns; 1 is yes.
-  const double p[2][2] = {{share(counts.true_negatives), share(counts.false_negatives)},
-                          {share(counts.false_positives), share(counts.true_positives)}};
-  const double evaluated[2] = {share(counts.predicted_negatives()), *evaluated_yes.value()};
-  const double reference[2] = {share(counts.negatives()), *reference_yes.value()};
-  const double po = share(counts.true_positives + counts.true_negatives);
+  const double p[2][2] = {{fraction(counts.true_negatives), fraction(counts.false_negatives)},
+                          {fraction(counts.false_positives), fraction(counts.true_positives)}};
+  const double evaluated[2] = {fraction(counts.predicted_negatives()), *evaluated_yes.value()};
+  const double reference[2] = {fraction(counts.negatives()), *reference_yes.value()};
+  const double po = fraction(counts.true_positives + counts.true_negatives);
   const double pe = evaluated[0] * reference[0] + evaluated[1] * reference[1];
   double sum = -squared(po * pe - 2.0 * pe + po);
   for (int i = 0; i < 2; ++i)

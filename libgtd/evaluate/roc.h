@@ -81,8 +81,8 @@ struct AreaUnderCurve {
   // This sum is at least the trapezoid area over the same cutoffs, and at least `trapezoid` if
   // `upper_sum_width` is 1. Negatives below the first cutoff or at the last do not contribute.
   double upper_sum = 0.0;
-  std::vector<double> upper_sum_shares;  // terms of the sum, one per cutoff
-  double upper_sum_width = 0.0;          // FPR at the first cutoff - FPR at the last
+  std::vector<double> upper_sum_terms;  // terms of the sum, one per cutoff
+  double upper_sum_width = 0.0;         // FPR at the first cutoff - FPR at the last
   // Bootstrap interval of `trapezoid` (95 %, percentile), stratified: positives and negatives are
   // resampled separately, so that every replicate has both classes. nullopt without replicates. (1,
   // 1) after a perfect separation, which does not prove one.
@@ -93,15 +93,15 @@ struct RocResult {
   std::vector<RocPoint> at_cutoffs;  // ascending, as given
   std::vector<RocPoint> at_scores;   // every distinct score, ascending
   RocPoint at_rate_cutoff;
-  std::optional<AreaUnderCurve> area;  // nullopt unless both classes exist
-  std::string area_note;               // reason for a missing area
+  std::optional<AreaUnderCurve> auc;  // nullopt unless both classes exist
+  std::string auc_note;               // reason for a missing area
   // Precision at the cutoff where recall reaches 1/2; ties count in full.
   std::optional<double> precision_at_half_recall;
   // Expected calibration error (Naeini et al. 2015), if all scores are in 0..1: mean over the
   // locations of |fraction of positives - mean score| of the location's bin (width 0.1).
   std::optional<double> calibration_error;
-  std::size_t left_out_unscored = 0;   // locations without a score: not visible
-  std::size_t left_out_unlabeled = 0;  // locations with a score but no label
+  std::size_t without_score = 0;  // locations without a score: not visible
+  std::size_t without_label = 0;  // locations with a score but no label
 };
 
 // Evaluates one label and one score per location. A location without one of them, or with a score

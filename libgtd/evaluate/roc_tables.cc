@@ -66,7 +66,7 @@ std::vector<std::optional<double>> read_scores(const Table& table, const std::st
 }
 
 void add_roc_row(const std::string& name, const char* at, const RocPoint& point,
-                 std::optional<double> share, Table& table) {
+                 std::optional<double> fraction, Table& table) {
   const Confusion& counts = point.counts;
   append({{"scores", name},
           {"at", at},
@@ -79,7 +79,7 @@ void add_roc_row(const std::string& name, const char* at, const RocPoint& point,
           {"false_negatives", std::to_string(counts.false_negatives)},
           {"true_positive_rate", text_or_empty(counts.true_positive_rate().value())},
           {"false_positive_rate", text_or_empty(counts.false_positive_rate().value())},
-          {"upper_sum_share", text_or_empty(share)}},
+          {"upper_sum_share", text_or_empty(fraction)}},
          table);
 }
 
@@ -89,18 +89,18 @@ Json json_of(const RocResult& result) {
   json["locations"] = counts.size();
   json["positives"] = counts.positives();
   json["negatives"] = counts.negatives();
-  json["left_out_without_score"] = result.left_out_unscored;
-  json["left_out_without_label"] = result.left_out_unlabeled;
+  json["without_score"] = result.without_score;
+  json["without_label"] = result.without_label;
   Json auc;
-  if (const auto& area = result.area) {
-    auc["trapezoid"] = area->trapezoid;
-    auc["trapezoid_bootstrap_95"] = json_of(area->trapezoid_bootstrap_95);
-    auc["upper_sum"] = area->upper_sum;
-    auc["upper_sum_shares"] = area->upper_sum_shares;
-    auc["upper_sum_width"] = area->upper_sum_width;
+  if (const auto& found = result.auc) {
+    auc["trapezoid"] = found->trapezoid;
+    auc["trapezoid_bootstrap_95"] = json_of(found->trapezoid_bootstrap_95);
+    auc["upper_sum"] = found->upper_sum;
+    auc["upper_sum_terms"] = found->upper_sum_terms;
+    auc["upper_sum_width"] = found->upper_sum_width;
   } else {
     auc["trapezoid"] = auc["trapezoid_bootstrap_95"] = auc["upper_sum"] = nullptr;
-    auc["note"] = result.area_note;
+    auc["note"] = result.auc_note;
   }
   json["auc"] = std::move(auc);
   const auto optional = [](const std::optional<double>& value) {
@@ -138,13 +138,13 @@ std::string areas_markdown(const TableEvaluation& evaluation) {
     const RocResult& result = column.result;
     const Confusion& counts = result.at_rate_cutoff.counts;
     text += "| " + markdown_cell(column.name) + " | " + std::to_string(counts.size()) + " | " +
-            std::to_string(counts.positives()) + " | " + std::to_string(result.left_out_unscored) +
+            std::to_string(counts.positives()) + " | " + std::to_string(result.without_score) +
             " | ";
-    if (result.area) {
-      text += to_fixed_text(result.area->trapezoid, 3) +
-              interval_text(result.area->trapezoid_bootstrap_95, 3) + " | " +
-              to_fixed_text(result.area->upper_sum, 3) +
-              (result.area->upper_sum_width < 1.0 ? " (incomplete, see below) |" : " |");
+    if (result.auc) {
+      text += to_fixed_text(result.auc->trapezoid, 3) +
+              interval_text(result.auc->trapezoid_bootstrap_95, 3) + " | " +
+              to_fixed_text(result.auc->upper_sum, 3) +
+              (result.auc->upper_sum_width < 1.0 ? " (incomplete, see below) |" : " |");
     } else {
       text += "not defined | not defined |";
     }
@@ -180,15 +180,15 @@ std::string notes_markdown(const TableEvaluation& evaluation) {
   std::string text;
   for (const ColumnEvaluation& column : evaluation.columns) {
     const RocResult& result = column.result;
-    if (!result.area) text += "- " + markdown_cell(column.name) + ": " + result.area_note + ".\n";
-    if (result.left_out_unlabeled > 0)
-      text += "- " + markdown_cell(column.name) + ": " + std::to_string(result.left_out_unlabeled) +
+    if (!result.auc) text += "- " + markdown_cell(column.name) + ": " + result.auc_note + ".\n";
+    if (result.without_label > 0)
+      text += "- " + markdown_cell(column.name) + ": " + std::to_string(result.without_label) +
               " locations have a score and no label and are skipped.\n";
-    if (result.area && result.area->upper_sum_width < 1.0)
+    if (result.auc && result.auc->upper_sum_width < 1.0)
       text += "- " + markdown_cell(column.name) +
               ": some locations that are not graspable score below the first cutoff or reach the "
               "last one; the upper sum covers only " +
-              to_fixed_text(result.area->upper_sum_width, 3) +
+              to_fixed_text(result.auc->upper_sum_width, 3) +
               " of the false positive rate and can be below the trapezoid.\n";
   }
   return text.empty() ? text : text + "\n";
@@ -292,9 +292,9 @@ Table roc_table(const TableEvaluation& evaluation) {
   for (const ColumnEvaluation& column : evaluation.columns) {
     const RocResult& result = column.result;
     for (std::size_t k = 0; k < result.at_cutoffs.size(); ++k) {
-      std::optional<double> share;
-      if (result.area) share = result.area->upper_sum_shares[k];
-      add_roc_row(column.name, "cutoff", result.at_cutoffs[k], share, table);
+      std::optional<double> fraction;
+      if (result.auc) fraction = result.auc->upper_sum_terms[k];
+      add_roc_row(column.name, "cutoff", result.at_cutoffs[k], fraction, table);
     }
     for (const RocPoint& point : result.at_scores)
       add_roc_row(column.name, "score", point, std::nullopt, table);

@@ -145,25 +145,25 @@ void fill_values(const PointCloud& map, VoxelMap& result) {
 }  // namespace
 
 MapInfo map_info(const libmap::Manifest& manifest) {
-  MapInfo facts;
-  facts.zero_plane_m =
-      libmap::number_of(manifest.find_parameter("zero_plane_m")).value_or(facts.zero_plane_m);
+  MapInfo info;
+  info.zero_plane_m =
+      libmap::number_of(manifest.find_parameter("zero_plane_m")).value_or(info.zero_plane_m);
   const std::optional<double> size_m = libmap::number_of(manifest.find_parameter("voxel_size_m"));
   const libmap::ManifestValue* value = manifest.find_result("lattice_origin_m");
   const auto* origin = value == nullptr ? nullptr : std::get_if<std::vector<double>>(value);
   if (size_m && *size_m > 0.0 && origin != nullptr && origin->size() == 3) {
-    facts.lattice = VoxelLattice{{(*origin)[0], (*origin)[1], (*origin)[2]}, *size_m};
-    if (!facts.lattice->origin_m.allFinite() || !std::isfinite(*size_m))
+    info.lattice = VoxelLattice{{(*origin)[0], (*origin)[1], (*origin)[2]}, *size_m};
+    if (!info.lattice->origin_m.allFinite() || !std::isfinite(*size_m))
       throw libmap::Error("is not finite in the map's manifest",
                           {.field = "lattice_origin_m or voxel_size_m"});
   }
   if (const libmap::Pose* pose = manifest.find_transform("terrain_from_input");
       pose != nullptr && manifest.frame == "input")
-    facts.terrain_from_map = *pose;
-  return facts;
+    info.terrain_from_map = *pose;
+  return info;
 }
 
-VoxelMap voxel_map_of(const PointCloud& map, const MapInfo& facts) {
+VoxelMap voxel_map_of(const PointCloud& map, const MapInfo& info) {
   map.check();
   if (map.size() > std::numeric_limits<std::uint32_t>::max())
     throw libmap::Error(
@@ -172,17 +172,17 @@ VoxelMap voxel_map_of(const PointCloud& map, const MapInfo& facts) {
   values_of(map, "score");
   values_of(map, "graspable");
   VoxelMap result;
-  result.terrain_from_map = facts.terrain_from_map;
-  result.zero_plane_m = facts.zero_plane_m;
+  result.terrain_from_map = info.terrain_from_map;
+  result.zero_plane_m = info.zero_plane_m;
   std::vector<std::uint32_t> kept;
   kept.reserve(map.size());
   for (std::uint32_t n = 0; n < map.size(); ++n)
     if (map.positions[n].allFinite()) kept.push_back(n);
   if (kept.empty()) throw libmap::Error("the map has no points");
   std::vector<Voxel> voxels;
-  if (!facts.lattice || map.find_field("i") != nullptr) voxels = voxels_of_fields(map, kept);
+  if (!info.lattice || map.find_field("i") != nullptr) voxels = voxels_of_fields(map, kept);
   result.lattice =
-      facts.lattice ? *facts.lattice : fitted_lattice(map, result.terrain_from_map, kept, voxels);
+      info.lattice ? *info.lattice : fitted_lattice(map, result.terrain_from_map, kept, voxels);
   require_measurable(result.lattice);
   if (voxels.empty())
     for (const std::uint32_t n : kept) {

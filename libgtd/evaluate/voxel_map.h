@@ -55,6 +55,6 @@ struct VoxelMap {
 // or a known lattice. With the fields only, the lattice is fitted to the points in the terrain
 // frame. Points without a position are skipped. Throws Error for a map without points, a missing
 // or invalid field, points that are not at voxel centers, and two points in one voxel.
-VoxelMap voxel_map_of(const libmap::PointCloud& map, const MapInfo& facts = {});
+VoxelMap voxel_map_of(const libmap::PointCloud& map, const MapInfo& info = {});
 
 }  // namespace libgtd

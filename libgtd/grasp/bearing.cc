@@ -20,21 +20,21 @@ constexpr std::size_t chunk = 12;  // facets at once
 struct FacetLoop {
   double x, y, z;
   double friction;
-  double slant;
+  double cos_friction_angle;
 };
 
 // Products with the best of the eight edges of the friction pyramid on each facet of a chunk.
 GRASPMAP_CLONED void best_edge_products(const double* cosines, const double* sines,
                                         const FacetLoop& loop, double* products) {
   constexpr double diagonal = std::numbers::sqrt2 / 2.0;
-  const auto [x, y, z, friction, slant] = loop;
+  const auto [x, y, z, friction, cos_friction_angle] = loop;
   const double beside = std::abs(z);
   for (std::size_t n = 0; n < chunk; ++n) {
     const double along = std::abs(sines[n] * x + cosines[n] * y);
     const double both = (along + beside) * diagonal;
     const double straight = along < beside ? beside : along;
     const double slope = both < straight ? straight : both;
-    products[n] = slant * (cosines[n] * x - sines[n] * y + friction * slope);
+    products[n] = cos_friction_angle * (cosines[n] * x - sines[n] * y + friction * slope);
   }
 }
 
@@ -44,7 +44,7 @@ GRASPMAP_CLONED double max_shared_product(const double* cosines, const double* s
                                           const double* counts, std::size_t padded,
                                           const FacetLoop& loop) {
   constexpr double diagonal = std::numbers::sqrt2 / 2.0;
-  const auto [x, y, z, friction, slant] = loop;
+  const auto [x, y, z, friction, cos_friction_angle] = loop;
   const double beside = std::abs(z);
   double most[chunk] = {};
   for (std::size_t begin = 0; begin < padded; begin += chunk)
@@ -56,7 +56,7 @@ GRASPMAP_CLONED double max_shared_product(const double* cosines, const double* s
       const double straight = along < beside ? beside : along;
       const double slope = both < straight ? straight : both;
       const double product =
-          counts[begin + n] * (slant * (cosine * x - sine * y + friction * slope));
+          counts[begin + n] * (cos_friction_angle * (cosine * x - sine * y + friction * slope));
       most[n] = most[n] < product ? product : most[n];
     }
   // Halves, so that the loops are vectorized.
@@ -73,7 +73,7 @@ double best_level_product(const FacetLoop& loop) {
   const double along = std::abs(loop.y);
   const double beside = std::abs(loop.z);
   const double both = (along + beside) * (std::numbers::sqrt2 / 2.0);
-  return loop.slant * (loop.x + loop.friction * std::max({along, beside, both}));
+  return loop.cos_friction_angle * (loop.x + loop.friction * std::max({along, beside, both}));
 }
 
 }  // namespace
@@ -97,13 +97,13 @@ void bind(libmap::ParameterTable& table, EngagementOptions& options) {
             "law adhesion: maximum angle between pull-off force and tension, degrees");
 }
 
-// Edge of a pyramid: its product with `worth`, and the edge in normal, drag and lateral.
+// Edge of a pyramid: its product with `objective`, and the edge in normal, drag and lateral.
 struct BearingContact::Edge {
   double product = 0.0;
   Eigen::Vector3d local = Eigen::Vector3d::Zero();
 };
 
-BearingContact::BearingContact(const GripContact& contact, std::vector<double> leans_rad,
+BearingContact::BearingContact(const GripContact& contact, std::vector<double> facet_angles_rad,
                                double friction, double limit_n)
     : point_(contact.point),
       normal_(contact.normal),
@@ -113,16 +113,16 @@ BearingContact::BearingContact(const GripContact& contact, std::vector<double> l
       finger_(contact.finger),
       is_link_(!contact.by_spines),
       friction_(friction),
-      slant_(std::cos(std::atan(friction))),
+      cos_friction_angle_(std::cos(std::atan(friction))),
       limit_n_(limit_n) {
-  std::sort(leans_rad.begin(), leans_rad.end(), std::greater<>());
-  spines_ = leans_rad.size();
+  std::sort(facet_angles_rad.begin(), facet_angles_rad.end(), std::greater<>());
+  spines_ = facet_angles_rad.size();
   // Padded to whole chunks.
   cosines_.assign((spines_ + chunk - 1) / chunk * chunk, 0.0);
   counts_ = sines_ = cosines_;
   for (std::size_t n = 0; n < spines_; ++n) {
-    cosines_[n] = std::cos(leans_rad[n]);
-    sines_[n] = std::sin(leans_rad[n]);
+    cosines_[n] = std::cos(facet_angles_rad[n]);
+    sines_[n] = std::sin(facet_angles_rad[n]);
     counts_[n] = static_cast<double>(n + 1);
   }
 }
@@ -155,10 +155,10 @@ BearingContact::Edge BearingContact::best_edge(double cosine, double sine,
     to_lateral = std::copysign(1.0, local.z());
   }
   Edge edge;
-  edge.product = slant_ * (axis + friction_ * (to_out * out + to_lateral * local.z()));
-  edge.local =
-      slant_ * Eigen::Vector3d(cosine - friction_ * to_out * sine,
-                               -sine - friction_ * to_out * cosine, friction_ * to_lateral);
+  edge.product = cos_friction_angle_ * (axis + friction_ * (to_out * out + to_lateral * local.z()));
+  edge.local = cos_friction_angle_ * Eigen::Vector3d(cosine - friction_ * to_out * sine,
+                                                     -sine - friction_ * to_out * cosine,
+                                                     friction_ * to_lateral);
   return edge;
 }
 
@@ -168,7 +168,7 @@ double BearingContact::max_local_product(const Eigen::Vector3d& local, SpineShar
     for (const Eigen::Vector3d& edge : adhesion_) most = std::max(most, edge.dot(local));
     return limit_n_ * most;
   }
-  const FacetLoop loop{local.x(), local.y(), local.z(), friction_, slant_};
+  const FacetLoop loop{local.x(), local.y(), local.z(), friction_, cos_friction_angle_};
   double sum = static_cast<double>(spines_) * std::max(0.0, best_level_product(loop));
   if (sharing == SpineSharing::equally)
     return limit_n_ * std::max(sum, max_shared_product(cosines_.data(), sines_.data(),
@@ -196,7 +196,7 @@ Eigen::Vector3d BearingContact::best_local_force(const Eigen::Vector3d& along,
       if (const Edge edge = best_edge(cosines_[n], sines_[n], along); edge.product > 0.0)
         best = {best.product + edge.product, best.local + edge.local};
   } else if (adhesion_.empty()) {
-    const FacetLoop loop{along.x(), along.y(), along.z(), friction_, slant_};
+    const FacetLoop loop{along.x(), along.y(), along.z(), friction_, cos_friction_angle_};
     std::array<double, chunk> products;
     std::size_t steepest = spines_;  // no facet
     for (std::size_t begin = 0; begin < spines_; begin += chunk) {
@@ -233,25 +233,27 @@ std::vector<BearingContact> draw_bearing(const std::vector<GripContact>& contact
                                          const Gripper& gripper, const EngagementOptions& options,
                                          libmap::RandomStream& random) {
   const GripperFingers& fingers = *gripper.fingers;
-  const Engagement& its = gripper.engagement;
-  const double share = engagement_share(its, fingers.spine_tip_radius_um);
+  const Engagement& engagement = gripper.engagement;
+  const double fraction = engagement_fraction(engagement, fingers.spine_tip_radius_um);
   std::vector<BearingContact> bearing;
   for (const GripContact& contact : contacts) {
     if (!contact.by_spines) {
-      bearing.emplace_back(contact, std::vector<double>{0.0}, its.friction,
+      bearing.emplace_back(contact, std::vector<double>{0.0}, engagement.friction,
                            fingers.spines_per_finger * fingers.spine_force_limit_n);
     } else if (options.law == EngagementLaw::adhesion) {
-      bearing.emplace_back(contact, options, its.friction,
+      bearing.emplace_back(contact, options, engagement.friction,
                            options.adhesion_limit_n / fingers.count);
     } else {
-      std::vector<double> leans;
+      std::vector<double> facet_angles;
       for (int spine = 0; spine < fingers.spines_per_finger; ++spine) {
-        const bool engages = random.uniform() < share;
-        const double lean = random.uniform(its.asperity_min_deg, its.asperity_max_deg);
-        if (engages) leans.push_back(lean * libmap::radians_per_degree);
+        const bool engages = random.uniform() < fraction;
+        const double facet_angle =
+            random.uniform(engagement.asperity_min_deg, engagement.asperity_max_deg);
+        if (engages) facet_angles.push_back(facet_angle * libmap::radians_per_degree);
       }
-      if (!leans.empty())
-        bearing.emplace_back(contact, std::move(leans), its.friction, fingers.spine_force_limit_n);
+      if (!facet_angles.empty())
+        bearing.emplace_back(contact, std::move(facet_angles), engagement.friction,
+                             fingers.spine_force_limit_n);
     }
   }
   return bearing;

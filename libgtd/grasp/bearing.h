@@ -38,8 +38,9 @@ enum class SpineSharing { best, equally };
 // friction cone. Forces in N, directions in the frame of the contacts.
 class BearingContact {
  public:
-  // Law `asperities`: `leans_rad` are the inclinations of the engaged facets, or one 0 for a link.
-  BearingContact(const GripContact& contact, std::vector<double> leans_rad, double friction,
+  // Law `asperities`: `facet_angles_rad` are the inclinations of the engaged facets, or one 0 for a
+  // link.
+  BearingContact(const GripContact& contact, std::vector<double> facet_angles_rad, double friction,
                  double limit_n);
   // Law `adhesion`: `limit_n` is the limit of this finger.
   BearingContact(const GripContact& contact, const EngagementOptions& options, double friction,
@@ -52,9 +53,9 @@ class BearingContact {
   bool is_link() const { return is_link_; }
   std::size_t spines() const { return spines_; }
 
-  // Returns the force of the set with the maximum scalar product with `worth`, N.
-  Eigen::Vector3d best_force(const Eigen::Vector3d& worth, SpineSharing sharing) const {
-    return best_local_force(frame().transpose() * worth, sharing);
+  // Returns the force of the set with the maximum scalar product with `objective`, N.
+  Eigen::Vector3d best_force(const Eigen::Vector3d& objective, SpineSharing sharing) const {
+    return best_local_force(frame().transpose() * objective, sharing);
   }
   // Returns the contact frame; the columns are normal, drag and lateral direction.
   Eigen::Matrix3d frame() const {
@@ -81,12 +82,12 @@ class BearingContact {
   std::size_t finger_ = 0;
   bool is_link_ = false;
   double friction_ = 0.0;
-  double slant_ = 1.0;  // cosine of the friction angle
+  double cos_friction_angle_ = 1.0;  // cosine of the friction angle
   double limit_n_ = 0.0;
   std::size_t spines_ = 0;
-  std::vector<double> cosines_;  // cosines of the leans, descending; padded with 0
+  std::vector<double> cosines_;  // cosines of the facet angles, descending; padded with 0
   std::vector<double> sines_;
-  std::vector<double> counts_;             // number of leans up to each; padded with 0
+  std::vector<double> counts_;             // number of facet angles up to each; padded with 0
   std::vector<Eigen::Vector3d> adhesion_;  // edges for `limit_n_`; empty for asperities
 };
 

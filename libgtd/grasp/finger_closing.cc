@@ -88,9 +88,9 @@ class FirstContact {
     const double half = a.dot(d) / dd;
     const double root = half * half - (a.squaredNorm() - reach_ * reach_) / dd;
     if (root < 0.0) return;
-    for (const double share : {-half + std::sqrt(root), -half - std::sqrt(root)}) {
-      if (share < 0.0 || share > 1.0) continue;
-      const Eigen::Vector2d point = a + share * d;
+    for (const double fraction : {-half + std::sqrt(root), -half - std::sqrt(root)}) {
+      if (fraction < 0.0 || fraction > 1.0) continue;
+      const Eigen::Vector2d point = a + fraction * d;
       offer(angle_of(point) + link_.lag(link_.length), link_.length, point);
     }
   }
@@ -169,11 +169,11 @@ FingerClosing close_finger(const FingerGeometry& finger, std::span<const GroundS
   if (on_distal && (!on_proximal || on_distal->angle > on_proximal->angle)) {
     closing.proximal_rad = on_distal->angle;
     const bool by_spines = on_distal->along >= outer_half;
-    closing.end = by_spines ? FingerEnd::spines : FingerEnd::link;
+    closing.outcome = by_spines ? FingerOutcome::spines : FingerOutcome::link;
     (by_spines ? closing.spines : closing.link) = on_distal->point;
     return closing;
   }
-  closing.end = FingerEnd::link;
+  closing.outcome = FingerOutcome::link;
   closing.proximal_rad = on_proximal->angle;
   closing.link = on_proximal->point;
   const double first = closing.proximal_rad - finger.curl_rad;
@@ -182,7 +182,7 @@ FingerClosing close_finger(const FingerGeometry& finger, std::span<const GroundS
   const auto contact = first_contact(alone, first, last, profile);
   closing.curl_rad = closing.proximal_rad - (contact ? contact->angle : last);
   if (contact && contact->along >= outer_half) {
-    closing.end = FingerEnd::spines;
+    closing.outcome = FingerOutcome::spines;
     closing.spines = contact->point;
   }
   return closing;

@@ -44,10 +44,10 @@ struct GroundSegment {
 
 // Result of closing. spines: the outer half of the distal link or the tip is in contact. link: only
 // another part is in contact. end_stop: no contact.
-enum class FingerEnd { spines, link, end_stop };
+enum class FingerOutcome { spines, link, end_stop };
 
 struct FingerClosing {
-  FingerEnd end = FingerEnd::end_stop;
+  FingerOutcome outcome = FingerOutcome::end_stop;
   double proximal_rad = 0.0;
   double curl_rad = 0.0;
   // Contact points on the profile; nullopt without contact.

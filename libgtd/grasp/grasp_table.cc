@@ -13,9 +13,9 @@ struct Column {
 
 std::string number(double value) { return libmap::to_text(static_cast<float>(value)); }
 
-template <TrialEnd end>
-std::string share_of(const LocationResult& result) {
-  return number(static_cast<double>(result.ends[static_cast<std::size_t>(end)]) /
+template <TrialOutcome outcome>
+std::string fraction_of(const LocationResult& result) {
+  return number(static_cast<double>(result.outcomes[static_cast<std::size_t>(outcome)]) /
                 static_cast<double>(result.trials));
 }
 
@@ -39,14 +39,14 @@ constexpr Column columns[] = {
     {"spine_fingers", [](const LocationResult& r) { return number(r.spine_fingers); }},
     {"link_fingers", [](const LocationResult& r) { return number(r.link_fingers); }},
     {"free_fingers", [](const LocationResult& r) { return number(r.free_fingers); }},
-    {"palm_share", [](const LocationResult& r) { return number(r.palm_share); }},
+    {"palm_share", [](const LocationResult& r) { return number(r.palm_fraction); }},
     {"clearance_m", [](const LocationResult& r) { return number(r.clearance_m); }},
     {"unseen", [](const LocationResult& r) { return number(r.unseen); }},
-    {"fails_approach", share_of<TrialEnd::approach>},
-    {"fails_contact", share_of<TrialEnd::contact>},
-    {"fails_engagement", share_of<TrialEnd::engagement>},
-    {"fails_load", share_of<TrialEnd::load>},
-    {"fails_unseen", share_of<TrialEnd::unseen>},
+    {"fails_approach", fraction_of<TrialOutcome::approach>},
+    {"fails_contact", fraction_of<TrialOutcome::contact>},
+    {"fails_engagement", fraction_of<TrialOutcome::engagement>},
+    {"fails_load", fraction_of<TrialOutcome::load>},
+    {"fails_unseen", fraction_of<TrialOutcome::unseen>},
     {"shown_pose", [](const LocationResult& r) { return std::to_string(r.median_pose); }},
     {"shown_draw", [](const LocationResult& r) { return std::to_string(r.median_draw); }},
 };
@@ -65,7 +65,7 @@ std::vector<std::string> grasp_columns(const std::vector<double>& extra_loads_n)
 std::vector<std::string> grasp_cells(const LocationResult& result) {
   std::vector<std::string> cells;
   for (const Column& column : columns) cells.push_back(column.cell(result));
-  for (const double probability : result.more_probabilities) {
+  for (const double probability : result.extra_load_probabilities) {
     cells.emplace_back(probability >= 0.5 ? "1" : "0");
     cells.push_back(number(probability));
   }

@@ -147,20 +147,20 @@ std::vector<BearingContact> draw_asperities(const ClosedGripper& closed, std::ui
   return draw_bearing(closed.contacts, gripper, options.engagement, random);
 }
 
-TrialEnd end_of(const ClosedGripper& closed, std::size_t bearing, double force_n,
-                const GraspOptions& options) {
-  if (closed.approach != ApproachEnd::on_ground) return TrialEnd::approach;
-  if (force_n >= options.load_n * options.safety) return TrialEnd::holds;
+TrialOutcome outcome_of(const ClosedGripper& closed, std::size_t bearing, double force_n,
+                        const GraspOptions& options) {
+  if (closed.approach != ApproachOutcome::on_ground) return TrialOutcome::approach;
+  if (force_n >= options.load_n * options.safety) return TrialOutcome::holds;
   for (const ClosedFinger& finger : closed.fingers)
-    if (finger.unseen > options.closing.max_unseen) return TrialEnd::unseen;
-  if (bearing < 2) return TrialEnd::contact;
-  return force_n > 0.0 ? TrialEnd::load : TrialEnd::engagement;
+    if (finger.unseen > options.closing.max_unseen) return TrialOutcome::unseen;
+  if (bearing < 2) return TrialOutcome::contact;
+  return force_n > 0.0 ? TrialOutcome::load : TrialOutcome::engagement;
 }
 
 // Quantile of sorted values; the lower of two.
-double sorted_quantile(const std::vector<double>& sorted, double share) {
+double sorted_quantile(const std::vector<double>& sorted, double fraction) {
   if (sorted.empty()) return 0.0;
-  return sorted[static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1))];
+  return sorted[static_cast<std::size_t>(fraction * static_cast<double>(sorted.size() - 1))];
 }
 
 std::array<double, 3> quantiles(std::vector<double> values) {
@@ -180,7 +180,7 @@ void count_pose(const ClosedGripper& closed, double weight, LocationResult& resu
     (by_spines[n] ? result.spine_fingers
      : touches[n] ? result.link_fingers
                   : result.free_fingers) += weight;
-  result.palm_share += closed.palm_touches ? weight : 0.0;
+  result.palm_fraction += closed.palm_touches ? weight : 0.0;
   result.unseen += weight * closed.unseen;
   result.clearance_m += weight * closed.patch_from_gripper.translation().z();
 }
@@ -217,12 +217,12 @@ class LocationTrials {
       trials += static_cast<double>(pose.forces.size());
       variance += variance_to_come(pose);
     }
-    const double share = static_cast<double>(result_.ends[0]) / trials;
+    const double fraction = static_cast<double>(result_.outcomes[0]) / trials;
     constexpr double quantile_of_90_percent = 1.645;
-    const auto [low, high] = wilson_interval(share, poses, quantile_of_90_percent);
+    const auto [low, high] = wilson_interval(fraction, poses, quantile_of_90_percent);
     if (low > 0.5 || high < 0.5) return true;
     return poses_.size() == static_cast<std::size_t>(options_.poses) &&
-           std::abs(share - 0.5) > quantile_of_90_percent * std::sqrt(variance) / poses;
+           std::abs(fraction - 0.5) > quantile_of_90_percent * std::sqrt(variance) / poses;
   }
 
   LocationResult result() &&;
@@ -253,19 +253,19 @@ class LocationTrials {
       const Gripper& gripper = parameters_.grippers[set];
       const HoldingOptions equally = holding_of(pose.closed, gripper, SpineSharing::equally);
       const auto bearing = draw_asperities(pose.closed, site_.key(), gripper, options_, number, n);
-      const LeastForce least = least_holding_force(bearing, equally, pose.guess);
+      const WeakestDirection least = min_holding_force(bearing, equally, pose.guess);
       pose.guess = least.direction;
       pose.forces.push_back(least.force_n);
       if (n < options_.best_draws)
         best_forces_.push_back(
-            least_holding_force(bearing, holding_of(pose.closed, gripper, SpineSharing::best),
-                                pose.guess)
+            min_holding_force(bearing, holding_of(pose.closed, gripper, SpineSharing::best),
+                              pose.guess)
                 .force_n);
       if (least.force_n > 0.0) log_forces_[set].push_back(std::log(least.force_n));
       if (options_.pull_limits) add_pulls(bearing, equally);
       if (least.force_n > 0.0) ++limiting_[least.direction];
-      ++result_.ends[static_cast<std::size_t>(
-          end_of(pose.closed, bearing.size(), least.force_n, options_))];
+      ++result_.outcomes[static_cast<std::size_t>(
+          outcome_of(pose.closed, bearing.size(), least.force_n, options_))];
     }
   }
 
@@ -324,11 +324,11 @@ LocationResult LocationTrials::result() && {
   }
   result.trials = forces.size();
   result.hold_probability =
-      static_cast<double>(result.ends[0]) / static_cast<double>(result.trials);
+      static_cast<double>(result.outcomes[0]) / static_cast<double>(result.trials);
   std::tie(result.hold_low, result.hold_high) =
       wilson_interval(result.hold_probability, static_cast<double>(poses_.size()));
   for (const double load : options.extra_loads_n)
-    result.more_probabilities.push_back(
+    result.extra_load_probabilities.push_back(
         static_cast<double>(
             std::count_if(forces.begin(), forces.end(),
                           [&](double force) { return force >= load * options.safety; })) /
@@ -416,20 +416,21 @@ void bind(libmap::ParameterTable& table, GraspOptions& options) {
   bind(table, options.surface);
 }
 
-const std::vector<std::pair<std::string, TrialEnd>>& trial_end_names() {
-  static const std::vector<std::pair<std::string, TrialEnd>> names = {
-      {"holds", TrialEnd::holds},     {"approach", TrialEnd::approach},
-      {"contact", TrialEnd::contact}, {"engagement", TrialEnd::engagement},
-      {"load", TrialEnd::load},       {"unseen", TrialEnd::unseen}};
+const std::vector<std::pair<std::string, TrialOutcome>>& trial_outcome_names() {
+  static const std::vector<std::pair<std::string, TrialOutcome>> names = {
+      {"holds", TrialOutcome::holds},     {"approach", TrialOutcome::approach},
+      {"contact", TrialOutcome::contact}, {"engagement", TrialOutcome::engagement},
+      {"load", TrialOutcome::load},       {"unseen", TrialOutcome::unseen}};
   return names;
 }
 
-std::pair<double, double> wilson_interval(double share, double count, double z) {
-  const double middle = share + z * z / (2.0 * count);
-  const double half = z * std::sqrt(share * (1.0 - share) / count + z * z / (4.0 * count * count));
+std::pair<double, double> wilson_interval(double fraction, double count, double z) {
+  const double middle = fraction + z * z / (2.0 * count);
+  const double half =
+      z * std::sqrt(fraction * (1.0 - fraction) / count + z * z / (4.0 * count * count));
   const double scale = 1.0 + z * z / count;
-  return {std::clamp((middle - half) / scale, 0.0, share),
-          std::clamp((middle + half) / scale, share, 1.0)};
+  return {std::clamp((middle - half) / scale, 0.0, fraction),
+          std::clamp((middle + half) / scale, fraction, 1.0)};
 }
 
 std::vector<SequentialRound> sequential_rounds(const GraspOptions& options) {
@@ -503,11 +504,11 @@ Trial repeat_trial(const Ground& ground, const Gripper& gripper, const Eigen::Ve
   const TrialParameters parameters(gripper, options);
   const Gripper& drawn = parameters.grippers[parameters.set_of(site.key(), pose, draw)];
   trial.bearing = draw_asperities(trial.gripper, site.key(), drawn, options, pose, draw);
-  const LeastForce least =
-      least_holding_force(trial.bearing, holding_of(trial.gripper, drawn, SpineSharing::equally));
+  const WeakestDirection least =
+      min_holding_force(trial.bearing, holding_of(trial.gripper, drawn, SpineSharing::equally));
   trial.force_n = least.force_n;
   trial.direction = least.direction;
-  trial.end = end_of(trial.gripper, trial.bearing.size(), least.force_n, options);
+  trial.outcome = outcome_of(trial.gripper, trial.bearing.size(), least.force_n, options);
   return trial;
 }
 

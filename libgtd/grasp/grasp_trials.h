@@ -54,14 +54,14 @@ void bind(libmap::ParameterTable& table, GraspOptions& options);
 // the ground. contact: fewer than two contacts. engagement: in some direction, the contacts balance
 // no pull at all. load: they balance a smaller pull than the load. unseen: a failure of any kind
 // but approach while too much of the ground below a finger is unseen.
-enum class TrialEnd { holds, approach, contact, engagement, load, unseen };
-const std::vector<std::pair<std::string, TrialEnd>>& trial_end_names();
+enum class TrialOutcome { holds, approach, contact, engagement, load, unseen };
+const std::vector<std::pair<std::string, TrialOutcome>>& trial_outcome_names();
 
 struct Trial {
   Eigen::Isometry3d mesh_from_patch = Eigen::Isometry3d::Identity();
   ClosedGripper gripper;
   std::vector<BearingContact> bearing;
-  TrialEnd end = TrialEnd::approach;
+  TrialOutcome outcome = TrialOutcome::approach;
   double force_n = 0.0;       // holding force: equal sharing, minimum over directions
   std::size_t direction = 0;  // direction of the minimum, index in pull_directions()
 };
@@ -69,14 +69,14 @@ struct Trial {
 struct LocationResult {
   Eigen::Vector3d location;  // as given, in the mesh frame, m
   std::size_t trials = 0;
-  std::array<std::size_t, 6> ends{};  // number of trials per TrialEnd
+  std::array<std::size_t, 6> outcomes{};  // number of trials per TrialOutcome
   double hold_probability = 0.0;
   // Wilson interval of 95 %. Trials of one pose are correlated, so that a pose counts once.
   double hold_low = 0.0;
   double hold_high = 0.0;
-  std::vector<double> more_probabilities;  // for extra_loads_n
-  std::array<double, 3> force_n{};         // equal sharing: quantiles 0.1, 0.5, 0.9
-  std::array<double, 3> best_force_n{};    // best sharing: quantiles 0.1, 0.5, 0.9
+  std::vector<double> extra_load_probabilities;  // for extra_loads_n
+  std::array<double, 3> force_n{};               // equal sharing: quantiles 0.1, 0.5, 0.9
+  std::array<double, 3> best_force_n{};          // best sharing: quantiles 0.1, 0.5, 0.9
   // Most frequent direction of minimum force (trials with a force); index in pull_directions().
   std::size_t limiting_direction = 0;
   bool has_force = false;                 // at least one trial has a force
@@ -91,9 +91,9 @@ struct LocationResult {
   double spine_fingers = 0.0;
   double link_fingers = 0.0;
   double free_fingers = 0.0;
-  double palm_share = 0.0;   // fraction of poses in which the palm touches the ground
-  double unseen = 0.0;       // mean of ClosedFinger::unseen
-  double clearance_m = 0.0;  // mean height of the palm above the location
+  double palm_fraction = 0.0;  // fraction of poses in which the palm touches the ground
+  double unseen = 0.0;         // mean of ClosedFinger::unseen
+  double clearance_m = 0.0;    // mean height of the palm above the location
   // Trial with the force nearest to the median.
   int median_pose = 0;
   int median_draw = 0;
@@ -151,6 +151,7 @@ class ClosedPoses {
 
 // Returns the Wilson score interval {low, high} of a proportion (Wilson 1927). `z` is a quantile of
 // the normal distribution; the default gives a 95 % interval.
-std::pair<double, double> wilson_interval(double share, double count, double z = 1.959963984540054);
+std::pair<double, double> wilson_interval(double fraction, double count,
+                                          double z = 1.959963984540054);
 
 }  // namespace libgtd

@@ -28,8 +28,8 @@ GripCandidates::GripCandidates(const libmap::TriangleMesh& mesh, const Gripper& 
   for (std::int64_t i = -reach; i <= reach; ++i)
     for (std::int64_t j = -reach; j <= reach; ++j)
       if (cell_m_ * std::hypot(i, j) <= radius) reach_.push_back({i, j});
-  most_blocked_ =
-      static_cast<std::size_t>(options.max_blocked * static_cast<double>(reach_.size()));
+  max_blocked_cells_ =
+      static_cast<std::size_t>(options.max_blocked_fraction * static_cast<double>(reach_.size()));
 }
 
 void GripCandidates::init_grid(const libmap::TriangleMesh& mesh, double cell_m) {
@@ -49,7 +49,7 @@ void GripCandidates::init_grid(const libmap::TriangleMesh& mesh, double cell_m) 
     const double count = sides[static_cast<Eigen::Index>(side)] / cell_m_;
     cells_[side] = std::isfinite(count) ? static_cast<std::int64_t>(count) + 1 : 1;
   }
-  tops_.assign(static_cast<std::size_t>(cells_[0] * cells_[1]), no_ground);
+  cell_tops_.assign(static_cast<std::size_t>(cells_[0] * cells_[1]), no_ground);
 }
 
 std::int64_t GripCandidates::cell(double coordinate, std::size_t side) const {
@@ -61,7 +61,7 @@ std::int64_t GripCandidates::cell(double coordinate, std::size_t side) const {
 // Raises the columns of the corners and those whose center is on the triangle.
 void GripCandidates::add_triangle(const std::array<Eigen::Vector3d, 3>& corners) {
   const auto raise_to = [&](std::int64_t i, std::int64_t j, double z) {
-    float& top = tops_[static_cast<std::size_t>(i * cells_[1] + j)];
+    float& top = cell_tops_[static_cast<std::size_t>(i * cells_[1] + j)];
     top = std::max(top, static_cast<float>(z));
   };
   for (const Eigen::Vector3d& corner : corners)
@@ -89,7 +89,7 @@ void GripCandidates::add_triangle(const std::array<Eigen::Vector3d, 3>& corners)
 
 float GripCandidates::top_at(std::int64_t i, std::int64_t j) const {
   if (i < 0 || j < 0 || i >= cells_[0] || j >= cells_[1]) return no_ground;
-  return tops_[static_cast<std::size_t>(i * cells_[1] + j)];
+  return cell_tops_[static_cast<std::size_t>(i * cells_[1] + j)];
 }
 
 bool GripCandidates::may_hold(const Eigen::Vector3d& location) const {
@@ -101,7 +101,7 @@ bool GripCandidates::may_hold(const Eigen::Vector3d& location) const {
   std::size_t blocked = 0;
   for (const auto& [di, dj] : reach_)
     if (top_at(i + di, j + dj) > location.z() + start_height_m_) ++blocked;
-  return blocked <= most_blocked_;
+  return blocked <= max_blocked_cells_;
 }
 
 }  // namespace libgtd

@@ -17,7 +17,7 @@ struct CandidateOptions {
   double start_height_m = 0.15;  // see ClosingOptions
   // Maximum fraction of the columns below the open gripper that rise above the start of the
   // approach, so that a finger may start inside the ground.
-  double max_blocked = 0.15;
+  double max_blocked_fraction = 0.15;
 };
 
 // Heights of the ground in columns. At least 99.8 % of the voxels that hold in 32 x 8 trials are
@@ -42,9 +42,9 @@ class GripCandidates {
   Eigen::Vector2d low_ = Eigen::Vector2d::Zero();
   double cell_m_ = 0.01;
   std::array<std::int64_t, 2> cells_{0, 0};
-  std::vector<float> tops_;  // heights of the columns; -infinity without ground
+  std::vector<float> cell_tops_;  // heights of the columns; -infinity without ground
   double start_height_m_ = 0.0;
-  std::size_t most_blocked_ = 0;
+  std::size_t max_blocked_cells_ = 0;
   std::vector<std::array<std::int64_t, 2>> reach_;  // columns under the open gripper
 };
 

@@ -72,8 +72,8 @@ void add_cut(const GroundPatch& patch, const CarriedVertices& vertices, const Ei
                            : (side[0] >= 0.0) == (side[2] >= 0.0) ? 1
                                                                   : 2;
   const auto cut = [&](std::size_t other) {
-    const double share = side[lone] / (side[lone] - side[other]);
-    const Eigen::Vector3d point = corners[lone] + share * (corners[other] - corners[lone]);
+    const double fraction = side[lone] / (side[lone] - side[other]);
+    const Eigen::Vector3d point = corners[lone] + fraction * (corners[other] - corners[lone]);
     return Eigen::Vector2d(along.dot(point.head<2>()), point.z());
   };
   GroundSegment segment{cut((lone + 1) % 3), cut((lone + 2) % 3), t,
@@ -98,8 +98,8 @@ std::optional<double> height_over_disc(const std::array<Eigen::Vector3d, 3>& cor
     const double half = p.head<2>().dot(edge.head<2>()) / dd;
     const double root = half * half - (p.head<2>().squaredNorm() - square) / dd;
     if (root < 0.0) continue;
-    for (const double share : {-half - std::sqrt(root), -half + std::sqrt(root)})
-      if (share >= 0.0 && share <= 1.0) offer(p.z() + share * edge.z());
+    for (const double fraction : {-half - std::sqrt(root), -half + std::sqrt(root)})
+      if (fraction >= 0.0 && fraction <= 1.0) offer(p.z() + fraction * edge.z());
   }
   // Highest point of the circle on the plane of the triangle, if it is on the triangle.
   const Eigen::Vector3d normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
@@ -173,12 +173,12 @@ bool is_blocked(std::vector<GroundSegment>& profile, const FingerGeometry& finge
 }
 
 // Computes ClosedFinger::unseen from the union of the segments of the profile.
-double unseen_share(const GroundPatch& patch, const std::vector<GroundSegment>& profile,
-                    double tip_radius) {
+double unseen_fraction(const GroundPatch& patch, const std::vector<GroundSegment>& profile,
+                       double tip_radius) {
   std::vector<std::pair<double, double>> spans;
   for (const GroundSegment& segment : profile)
     if (segment.faces_palm && std::min(segment.a.y(), segment.b.y()) < 0.0 &&
-        (patch.is_unsure.empty() || patch.is_unsure[segment.triangle] == 0))
+        (patch.is_unscanned.empty() || patch.is_unscanned[segment.triangle] == 0))
       spans.push_back(std::minmax(segment.a.x(), segment.b.x()));
   std::sort(spans.begin(), spans.end());
   double seen = 0.0;
@@ -277,7 +277,7 @@ ClosedGripper close_gripper(const GroundPatch& patch, const Gripper& gripper,
   std::optional<double> height = palm;
   for (std::vector<GroundSegment>& profile : profiles) {
     if (is_blocked(profile, finger, options.start_height_m)) {
-      closed.approach = ApproachEnd::blocked;
+      closed.approach = ApproachOutcome::blocked;
       return closed;
     }
     if (const auto needed = open_finger_height(finger, profile))
@@ -287,7 +287,7 @@ ClosedGripper close_gripper(const GroundPatch& patch, const Gripper& gripper,
     closed.unseen = 1.0;
     return closed;
   }
-  closed.approach = ApproachEnd::on_ground;
+  closed.approach = ApproachOutcome::on_ground;
   closed.palm_touches = palm && *palm >= *height;
   *height += clearance_m;
   closed.patch_from_gripper.translate(Eigen::Vector3d(0.0, 0.0, *height));
@@ -300,7 +300,7 @@ ClosedGripper close_gripper(const GroundPatch& patch, const Gripper& gripper,
     }
     ClosedFinger one;
     one.azimuth_rad = 2.0 * std::numbers::pi * n / count;
-    one.unseen = unseen_share(patch, profile, tip);
+    one.unseen = unseen_fraction(patch, profile, tip);
     one.closing = close_finger(finger, profile);
     closed.unseen += one.unseen / count;
     closed.fingers.push_back(one);

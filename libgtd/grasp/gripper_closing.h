@@ -43,11 +43,11 @@ struct GripContact {
 // End of the approach. on_ground: the palm or an open finger rests on the ground. no_ground: there
 // is no ground below. blocked: the approach starts inside the ground, for example below the top of
 // a higher rock.
-enum class ApproachEnd { on_ground, no_ground, blocked };
+enum class ApproachOutcome { on_ground, no_ground, blocked };
 
 struct ClosedGripper {
-  ApproachEnd approach = ApproachEnd::no_ground;  // `fingers` is empty unless on_ground
-  bool palm_touches = false;                      // else an open finger rests on the ground
+  ApproachOutcome approach = ApproachOutcome::no_ground;  // `fingers` is empty unless on_ground
+  bool palm_touches = false;                              // else an open finger rests on the ground
   Eigen::Isometry3d patch_from_gripper = Eigen::Isometry3d::Identity();  // palm at z = 0, axis z
   std::vector<ClosedFinger> fingers;
   std::vector<GripContact> contacts;  // by finger; contact of the link before contacts of spines

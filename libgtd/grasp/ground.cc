@@ -22,8 +22,9 @@ double square_distance(const Eigen::Vector3d& p, const Corners& corners) {
   const auto to_edge = [&](const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
     const Eigen::Vector3d edge = to - from;
     const double length = edge.squaredNorm();
-    const double share = length > 0.0 ? std::clamp((p - from).dot(edge) / length, 0.0, 1.0) : 0.0;
-    return (p - from - share * edge).squaredNorm();
+    const double fraction =
+        length > 0.0 ? std::clamp((p - from).dot(edge) / length, 0.0, 1.0) : 0.0;
+    return (p - from - fraction * edge).squaredNorm();
   };
   const Eigen::Vector3d normal = (b - a).cross(c - a);
   const double square = normal.squaredNorm();
@@ -239,7 +240,7 @@ Ground::Ground(const libmap::TriangleMesh& mesh, GroundErrors errors)
   index_->fill();
   if (index_->errors.vertex_errors_m.empty()) return;
   if (index_->errors.vertex_errors_m.size() != mesh.vertices.size() ||
-      index_->errors.is_unsure.size() != mesh.triangles.size())
+      index_->errors.is_unscanned.size() != mesh.triangles.size())
     throw libmap::Error("the number of errors differs from the number of vertices or triangles");
   index_->find_vertex_normals();
 }
@@ -298,7 +299,7 @@ GroundPatch Ground::patch(const Eigen::Vector3d& location, const Eigen::Vector3d
       triangle[corner] = number;
     }
     patch.triangles.push_back(triangle);
-    if (has_errors) patch.is_unsure.push_back(index_->errors.is_unsure[n]);
+    if (has_errors) patch.is_unscanned.push_back(index_->errors.is_unscanned[n]);
   }
   patch.measure_triangles();
   return patch;

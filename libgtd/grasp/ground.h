@@ -24,7 +24,7 @@ struct GroundPatch {
   // See GroundErrors; empty without errors.
   std::vector<double> vertex_errors_m;
   std::vector<Eigen::Vector3d> vertex_normals;
-  std::vector<std::uint8_t> is_unsure;
+  std::vector<std::uint8_t> is_unscanned;
 
   // Computes normals, centers and radii from the vertices.
   void measure_triangles();
@@ -36,8 +36,8 @@ struct GroundPatch {
 
 // Errors of the ground of a mesh; empty: exact ground.
 struct GroundErrors {
-  std::vector<double> vertex_errors_m;  // standard deviations along the vertex normals
-  std::vector<std::uint8_t> is_unsure;  // per triangle: 1 if insufficiently scanned
+  std::vector<double> vertex_errors_m;     // standard deviations along the vertex normals
+  std::vector<std::uint8_t> is_unscanned;  // per triangle: 1 if insufficiently scanned
 };
 
 // Returns mesh_from_patch of a location; `away` is the direction opposite to the approach.

@@ -44,11 +44,11 @@ GRASPMAP_CLONED void exchange(double* matrix, const double* change, double pivot
   for (std::ptrdiff_t n = 0; n < size; ++n) {
     double* column = matrix + n * stride;
     if (column[leaving] == 0.0) continue;
-    const double share = column[leaving] / pivot;
-    column[leaving] = share;
+    const double fraction = column[leaving] / pivot;
+    column[leaving] = fraction;
     for (std::ptrdiff_t row = 0; row < stride; row += group)
       for (std::ptrdiff_t lane = 0; lane < group; ++lane)
-        column[row + lane] -= share * change[row + lane];
+        column[row + lane] -= fraction * change[row + lane];
   }
 }
 
@@ -98,7 +98,7 @@ class EquilibriumProgram {
 
   // Starts from the basis of the previous direction, if any: the new pull first replaces the
   // previous pull, as part of the same program.
-  double max_pull(const Eigen::Vector3d& direction, double enough) {
+  double max_pull(const Eigen::Vector3d& direction, double sufficient_force_n) {
     if (pull_ >= 0) formers_.push_back(std::exchange(pull_, -1));
     direction_ = direction;
     make_pull();
@@ -108,8 +108,8 @@ class EquilibriumProgram {
     constexpr double max_cost = 1e9;
     constexpr int max_pivots = 2000;
     for (int pivot = 0; pivot < max_pivots && cost < max_cost; ++pivot) {
-      if (pull_ >= 0 && values_[pull_] >= enough && are_formers_gone() &&
-          true_value(pull_) >= enough)
+      if (pull_ >= 0 && values_[pull_] >= sufficient_force_n && are_formers_gone() &&
+          true_value(pull_) >= sufficient_force_n)
         break;
       prices_.setZero();
       if (pull_ >= 0) prices_ += inverse_.row(pull_);
@@ -162,8 +162,8 @@ class EquilibriumProgram {
     column_.head<3>() = direction_;
     if (!options_.holds_when_closed) return;
     for (std::size_t n = 0; n < contacts_.size(); ++n) {
-      double& share = column_[drive_rows_[n]];
-      share = std::min(share, -reaction_of(contacts_[n]) / options_.closing_force_n);
+      double& fraction = column_[drive_rows_[n]];
+      fraction = std::min(fraction, -reaction_of(contacts_[n]) / options_.closing_force_n);
     }
   }
   // Value of a basic variable without the perturbation.
@@ -316,18 +316,18 @@ class EquilibriumProgram {
 }  // namespace
 
 double holding_force(const std::vector<BearingContact>& contacts, const Eigen::Vector3d& direction,
-                     const HoldingOptions& options, double enough) {
+                     const HoldingOptions& options, double sufficient_force_n) {
   if (contacts.size() < 2) return 0.0;  // one contact cannot balance moments
-  return EquilibriumProgram(contacts, options).max_pull(direction, enough);
+  return EquilibriumProgram(contacts, options).max_pull(direction, sufficient_force_n);
 }
 
-LeastForce least_holding_force(const std::vector<BearingContact>& contacts,
-                               const HoldingOptions& options, std::size_t first) {
+WeakestDirection min_holding_force(const std::vector<BearingContact>& contacts,
+                                   const HoldingOptions& options, std::size_t first) {
   if (contacts.size() < 2) return {0.0, first};
   const std::vector<PullDirection>& directions = pull_directions();
   EquilibriumProgram program(contacts, options);
   constexpr double all = std::numeric_limits<double>::infinity();
-  LeastForce least{program.max_pull(directions[first].vector, all), first};
+  WeakestDirection least{program.max_pull(directions[first].vector, all), first};
   // Each direction is adjacent to its predecessor, so that few contacts change their forces.
   constexpr std::size_t ways[] = {0, 1, 9, 10, 2, 3, 11, 12, 4, 5, 13, 14, 6, 7, 15, 16, 8};
   for (const std::size_t n : ways) {

@@ -29,10 +29,10 @@ struct HoldingOptions {
 // that falls outward by g: the part of the pull that an elastic contact, twice as stiff along the
 // ground as across it, converts into a force toward the axis (Chen et al. 2024). Returns 0 if no
 // pull along the unit vector w is balanced. The search may stop at a smaller value that is at least
-// `enough`.
+// `sufficient_force_n`.
 double holding_force(const std::vector<BearingContact>& contacts, const Eigen::Vector3d& direction,
                      const HoldingOptions& options,
-                     double enough = std::numeric_limits<double>::infinity());
+                     double sufficient_force_n = std::numeric_limits<double>::infinity());
 
 // Direction of a pull: at the angle `tilt_deg` to the direction away from the ground and the
 // azimuth `azimuth_deg` from the x axis of the frame (0 if the tilt is 0).
@@ -48,14 +48,14 @@ struct PullDirection {
 const std::vector<PullDirection>& pull_directions();
 
 // Minimum holding force over pull_directions().
-struct LeastForce {
+struct WeakestDirection {
   double force_n = 0.0;
   std::size_t direction = 0;  // index in pull_directions(); any of equal ones
 };
 
 // Computes the minimum. Direction `first` is tested first; a good guess saves time and only affects
 // the choice among equal directions.
-LeastForce least_holding_force(const std::vector<BearingContact>& contacts,
-                               const HoldingOptions& options, std::size_t first = 0);
+WeakestDirection min_holding_force(const std::vector<BearingContact>& contacts,
+                                   const HoldingOptions& options, std::size_t first = 0);
 
 }  // namespace libgtd

@@ -18,11 +18,11 @@ namespace libgtd {
 namespace {
 
 constexpr double least_force_n = 0.05;  // lower limit of forces
-constexpr double prior_share = 0.1;     // fraction of the sets of a round drawn from the prior
+constexpr double prior_fraction = 0.1;  // fraction of the sets of a round drawn from the prior
 constexpr int min_rounds = 3;
 constexpr double log_force_range = 9.2;  // range of outliers: ln of 0.05 to 500 N
 
-double normal_share(double z) { return 0.5 * std::erfc(-z / std::sqrt(2.0)); }
+double normal_cdf(double z) { return 0.5 * std::erfc(-z / std::sqrt(2.0)); }
 
 Eigen::Vector3d direction_of(const PullTest& test) {
   const double tilt = test.tilt_deg * libmap::radians_per_degree;
@@ -126,18 +126,18 @@ Prediction predict(const PullTest& test, const std::vector<double>& log_forces,
     for (const double log_force : log_forces) {
       const double z = (observed - log_force) / noise;
       density += std::exp(-0.5 * z * z) / (noise * 2.5066282746310002 * count);
-      prediction.below += normal_share(z) / count;
+      prediction.below += normal_cdf(z) / count;
     }
     prediction.likelihood =
-        (1.0 - options.outlier_share) * density + options.outlier_share / log_force_range;
-    const double share = (observed - std::log(least_force_n)) / log_force_range;
-    prediction.below = (1.0 - options.outlier_share) * prediction.below +
-                       options.outlier_share * std::clamp(share, 0.0, 1.0);
+        (1.0 - options.outlier_fraction) * density + options.outlier_fraction / log_force_range;
+    const double probability = (observed - std::log(least_force_n)) / log_force_range;
+    prediction.below = (1.0 - options.outlier_fraction) * prediction.below +
+                       options.outlier_fraction * std::clamp(probability, 0.0, 1.0);
   } else {
     double held = 0.0;
     for (const double log_force : log_forces)
-      held += normal_share((log_force - std::log(test.load_n)) / noise) / count;
-    held = (1.0 - options.outlier_share) * held + 0.5 * options.outlier_share;
+      held += normal_cdf((log_force - std::log(test.load_n)) / noise) / count;
+    held = (1.0 - options.outlier_fraction) * held + 0.5 * options.outlier_fraction;
     prediction.likelihood = test.held ? held : 1.0 - held;
     prediction.below = 1.0 - held;
   }
@@ -205,14 +205,14 @@ class Proposal {
     for (double& width : widths_) width = std::max(0.01, scale * width);
   }
 
-  ParameterValues draw(double share, libmap::RandomStream& random) const {
-    if (random.uniform() < prior_share) {
+  ParameterValues draw(double probability, libmap::RandomStream& random) const {
+    if (random.uniform() < prior_fraction) {
       ParameterValues quantiles;
       for (double& quantile : quantiles) quantile = random.uniform();
       return quantiles;
     }
     std::size_t center = 0;
-    for (double sum = weights_[0]; share >= sum && center + 1 < weights_.size();)
+    for (double sum = weights_[0]; probability >= sum && center + 1 < weights_.size();)
       sum += weights_[++center];
     ParameterValues point = centers_[center];
     for (std::size_t k = 0; k < point.size(); ++k) {
@@ -236,7 +236,7 @@ class Proposal {
       }
       sum += product;
     }
-    return prior_share + (1.0 - prior_share) * sum;
+    return prior_fraction + (1.0 - prior_fraction) * sum;
   }
 
  private:
@@ -333,8 +333,9 @@ class PullFitting {
     const std::size_t count = before.quantiles.size();
     for (std::size_t n = 0; n < count; ++n) {
       libmap::RandomStream random(options_.grasp.seed, libmap::mix_bits(round, n));
-      const double share = (static_cast<double>(n) + random.uniform()) / static_cast<double>(count);
-      population.quantiles.push_back(proposal.draw(share, random));
+      const double probability =
+          (static_cast<double>(n) + random.uniform()) / static_cast<double>(count);
+      population.quantiles.push_back(proposal.draw(probability, random));
     }
     weigh(population, &proposal);
     return population;
@@ -368,15 +369,15 @@ class PullFitting {
       for (std::size_t n = 0; n < population.weights.size(); ++n)
         sorted.emplace_back(population.quantiles[n][k], population.weights[n]);
       std::sort(sorted.begin(), sorted.end());
-      const double shares[3] = {0.05, 0.5, 0.95};
+      const double probabilities[3] = {0.05, 0.5, 0.95};
       for (std::size_t q = 0; q < 3; ++q) {
         ParameterValues at{};
-        at.fill(shares[q]);
+        at.fill(probabilities[q]);
         fitted.prior[q] = prior_values(gripper_.ranges, middle_, at)[k];
         double sum = 0.0;
         for (const auto& [quantile, weight] : sorted) {
           at[k] = quantile;
-          if ((sum += weight) >= shares[q]) break;
+          if ((sum += weight) >= probabilities[q]) break;
         }
         fitted.fitted[q] = prior_values(gripper_.ranges, middle_, at)[k];
       }
@@ -411,13 +412,13 @@ class PullFitting {
       if (tail < 0.01) result.outliers.push_back(test.row);
     }
     const auto n = static_cast<double>(tests_.size());
-    result.chance = boost::math::cdf(
+    result.p_value = boost::math::cdf(
         boost::math::complement(boost::math::chi_squared(n), n * result.mean_squared_score));
   }
 
   // Squared normal score of a probability, at most 3.5^2.
-  static double squared_normal_score(double share) {
-    const double tail = std::max(normal_share(-3.5), std::min(share, 1.0 - share));
+  static double squared_normal_score(double probability) {
+    const double tail = std::max(normal_cdf(-3.5), std::min(probability, 1.0 - probability));
     const double score = boost::math::quantile(boost::math::normal(), tail);
     return score * score;
   }
@@ -442,9 +443,9 @@ class PullFitting {
 };
 
 // Entropy of a verdict, bits.
-double entropy(double share) {
-  if (share <= 0.0 || share >= 1.0) return 0.0;
-  return -share * std::log2(share) - (1.0 - share) * std::log2(1.0 - share);
+double entropy(double probability) {
+  if (probability <= 0.0 || probability >= 1.0) return 0.0;
+  return -probability * std::log2(probability) - (1.0 - probability) * std::log2(1.0 - probability);
 }
 
 // Pull with the load that about half of the sets hold, and the information of its verdict.
@@ -459,9 +460,9 @@ PlannedPull informative_pull(const std::vector<std::vector<double>>& forces_of_s
   PlannedPull best;
   std::vector<double> loads = medians;
   std::sort(loads.begin(), loads.end());
-  for (const double share : {0.3, 0.5, 0.7}) {
+  for (const double probability : {0.3, 0.5, 0.7}) {
     const double load =
-        loads[static_cast<std::size_t>(share * static_cast<double>(loads.size() - 1))];
+        loads[static_cast<std::size_t>(probability * static_cast<double>(loads.size() - 1))];
     if (!(load > 0.1)) continue;
     double held = 0.0;
     double expected = 0.0;

@@ -35,11 +35,11 @@ struct PullTest {
 std::vector<PullTest> pull_tests_of(const libmap::Table& table);
 
 struct PullFitOptions {
-  GraspOptions grasp;           // `poses` and `draws` apply to each pull
-  double force_noise = 0.15;    // standard deviation of the logarithm of a measured force
-  double outlier_share = 0.05;  // prior fraction of uninformative tests
-  int sets = 256;               // per round
-  int rounds = 8;               // maximum; fewer if a quarter of the sets are effective
+  GraspOptions grasp;              // `poses` and `draws` apply to each pull
+  double force_noise = 0.15;       // standard deviation of the logarithm of a measured force
+  double outlier_fraction = 0.05;  // prior fraction of uninformative tests
+  int sets = 256;                  // per round
+  int rounds = 8;                  // maximum; fewer if a quarter of the sets are effective
 };
 
 // Median and 90 % interval.
@@ -69,10 +69,10 @@ struct PullFit {
   // about 1 if the model explains the tests; and the probability of a value at least as large by
   // chance.
   double mean_squared_score = 0.0;
-  double chance = 1.0;
+  double p_value = 1.0;
   std::vector<std::size_t> outliers;  // rows with a probability below 0.01 given the other tests
 
-  bool explains_tests() const { return chance >= 0.02; }
+  bool explains_tests() const { return p_value >= 0.02; }
 };
 
 // Fits the parameters. `ground` may be null if all tests are on level ground. Throws Error if there

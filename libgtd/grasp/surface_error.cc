@@ -26,7 +26,7 @@ GroundErrors bounded(const libmap::TriangleMesh& mesh, std::vector<double> error
                      double max_error_m) {
   GroundErrors errors;
   for (const libmap::Triangle& triangle : mesh.triangles)
-    errors.is_unsure.push_back(
+    errors.is_unscanned.push_back(
         std::all_of(triangle.begin(), triangle.end(),
                     [&](std::uint32_t corner) { return errors_m[corner] <= max_error_m; })
             ? 0
@@ -59,8 +59,8 @@ GroundErrors errors_of(const libmap::TriangleMesh& mesh, const SurfaceErrorOptio
                            .bound = ">= 0"});
   GroundErrors errors = bounded(mesh, expected->values, options.max_error_m);
   if (const libmap::ScalarField* filled = field_of(mesh.face_fields, "filled"))
-    for (std::size_t n = 0; n < errors.is_unsure.size(); ++n)
-      if (filled->values[n] != 0.0) errors.is_unsure[n] = 1;
+    for (std::size_t n = 0; n < errors.is_unscanned.size(); ++n)
+      if (filled->values[n] != 0.0) errors.is_unscanned[n] = 1;
   return errors;
 }
 
@@ -102,17 +102,17 @@ double RandomField::node(const Eigen::Array3i& number) {
 double RandomField::at(const Eigen::Vector3d& position) {
   const Eigen::Array3d cell = position.array() / length_m_ + shift_;
   const Eigen::Array3d low = cell.floor();
-  const Eigen::Array3d share = cell - low;
+  const Eigen::Array3d fraction = cell - low;
   const Eigen::Array3i first = low.max(-1e9).min(1e9).cast<int>();
   double sum = 0.0;
   for (int corner = 0; corner < 8; ++corner) {
     const Eigen::Array3i side(corner & 1, (corner >> 1) & 1, corner >> 2);
     double weight = 1.0;
     for (Eigen::Index axis = 0; axis < 3; ++axis)
-      weight *= side[axis] == 0 ? 1.0 - share[axis] : share[axis];
+      weight *= side[axis] == 0 ? 1.0 - fraction[axis] : fraction[axis];
     sum += weight * node(first + side);
   }
-  const double squares = (share.square() + (1.0 - share).square()).prod();
+  const double squares = (fraction.square() + (1.0 - fraction).square()).prod();
   return std::clamp(sum / std::sqrt(squares), -most_deviations, most_deviations);
 }
 

@@ -40,9 +40,9 @@ ScenePolygon clipped(const ScenePolygon& polygon, const Height& height) {
     if (std::lexicographical_compare(b.position.begin(), b.position.end(), a.position.begin(),
                                      a.position.end()))
       std::swap(a, b);
-    const double share = height(a.position) / (height(a.position) - height(b.position));
-    kept.push_back(
-        {a.position + share * (b.position - a.position), a.color + share * (b.color - a.color)});
+    const double fraction = height(a.position) / (height(a.position) - height(b.position));
+    kept.push_back({a.position + fraction * (b.position - a.position),
+                    a.color + fraction * (b.color - a.color)});
   }
   return kept;
 }
@@ -285,7 +285,7 @@ libmap::TriangleMesh trial_scene(const libmap::TriangleMesh& mesh, const Gripper
   const double low = trial.gripper.patch_from_gripper.translation().z() - measures.reach;
   builder.add_ground(mesh, Eigen::AlignedBox3d(Eigen::Vector3d(-half, -half, low),
                                                Eigen::Vector3d::Constant(half)));
-  if (trial.gripper.approach != ApproachEnd::on_ground) {
+  if (trial.gripper.approach != ApproachOutcome::on_ground) {
     builder.add_sphere(ScenePart::idle, Eigen::Vector3d::Zero(), 1.5 * measures.link);
     return builder.take();
   }

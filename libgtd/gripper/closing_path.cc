@@ -34,7 +34,7 @@ struct Slope {
 
 // Draws the facets that the spines of one finger meet: psi + atan(friction) - 90 degrees,
 // descending.
-std::vector<Slope> draw_facets(const Gripper& gripper, double share, std::uint64_t draw) {
+std::vector<Slope> draw_facets(const Gripper& gripper, double fraction, std::uint64_t draw) {
   constexpr std::uint64_t seed = 0x66696e676572;
   libmap::RandomStream shifts(seed, 0);
   std::uint64_t power = draw;
@@ -43,20 +43,21 @@ std::vector<Slope> draw_facets(const Gripper& gripper, double share, std::uint64
     power = power * generator % draws;
     return value < 1.0 ? value : value - 1.0;
   };
-  std::vector<double> leans;
+  std::vector<double> facet_angles;
   for (int spine = 0; spine < gripper.fingers->spines_per_finger; ++spine) {
-    const bool engages = next() < share;
-    const double lean = next();
-    const Engagement& its = gripper.engagement;
+    const bool engages = next() < fraction;
+    const double facet_angle = next();
+    const Engagement& engagement = gripper.engagement;
     if (engages)
-      leans.push_back(
-          (its.asperity_min_deg + lean * (its.asperity_max_deg - its.asperity_min_deg)) *
+      facet_angles.push_back(
+          (engagement.asperity_min_deg +
+           facet_angle * (engagement.asperity_max_deg - engagement.asperity_min_deg)) *
           libmap::radians_per_degree);
   }
-  std::sort(leans.begin(), leans.end(), std::greater<>());
+  std::sort(facet_angles.begin(), facet_angles.end(), std::greater<>());
   const double shift = std::atan(gripper.engagement.friction) - std::numbers::pi / 2.0;
   std::vector<Slope> facets;
-  for (const double lean : leans) facets.emplace_back(lean + shift);
+  for (const double facet_angle : facet_angles) facets.emplace_back(facet_angle + shift);
   return facets;
 }
 
@@ -98,7 +99,7 @@ struct Pulls {
 // Mean pulls at falls of -90 .. 90 degrees.
 Pulls pulls_of(const Gripper& gripper) {
   const GripperFingers& fingers = *gripper.fingers;
-  const double share = engagement_share(gripper.engagement, fingers.spine_tip_radius_um);
+  const double fraction = engagement_fraction(gripper.engagement, fingers.spine_tip_radius_um);
   std::vector<Slope> slopes;
   for (std::size_t n = 0; n < falls; n += step_deg)
     slopes.emplace_back((static_cast<double>(n) - 90.0) * libmap::radians_per_degree);
@@ -106,7 +107,7 @@ Pulls pulls_of(const Gripper& gripper) {
   std::array<double, falls>& means = pulls.means;
   double squares = 0.0;
   for (std::uint64_t draw = 0; draw < draws; ++draw) {
-    const std::vector<Slope> facets = draw_facets(gripper, share, draw);
+    const std::vector<Slope> facets = draw_facets(gripper, fraction, draw);
     for (std::size_t n = 0; n < falls; n += step_deg) {
       const double pull =
           pull_of(facets, slopes[n / step_deg],
@@ -132,22 +133,22 @@ FingerPulls finger_pulls(const Gripper& gripper, const std::vector<ParameterSet>
   FingerPulls result;
   result.sets = sets.size();
   result.pulls.resize(falls * sets.size());
-  result.spreads.resize(sets.size());
-  result.pushes.resize(sets.size());
-  result.all_fingers.resize(sets.size());
+  result.level_spreads.resize(sets.size());
+  result.max_spine_forces.resize(sets.size());
+  result.total_closing_forces_n.resize(sets.size());
   libmap::parallel_for(sets.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t s = begin; s < end; ++s) {
-      const Gripper its = with_parameters(gripper, sets[s].values);
-      const Pulls pulls = pulls_of(its);
+      const Gripper varied = with_parameters(gripper, sets[s].values);
+      const Pulls pulls = pulls_of(varied);
       for (std::size_t n = 0; n < falls; ++n)
         result.pulls[n * sets.size() + s] = static_cast<float>(pulls.means[n]);
-      result.spreads[s] = static_cast<float>(pulls.level_spread);
-      const GripperFingers& fingers = *its.fingers;
-      result.pushes[s] =
+      result.level_spreads[s] = static_cast<float>(pulls.level_spread);
+      const GripperFingers& fingers = *varied.fingers;
+      result.max_spine_forces[s] =
           static_cast<float>(fingers.spines_per_finger *
-                             engagement_share(its.engagement, fingers.spine_tip_radius_um) *
+                             engagement_fraction(varied.engagement, fingers.spine_tip_radius_um) *
                              fingers.spine_force_limit_n / fingers.closing_force_n);
-      result.all_fingers[s] = fingers.count * fingers.closing_force_n;
+      result.total_closing_forces_n[s] = fingers.count * fingers.closing_force_n;
     }
   });
   return result;
@@ -166,7 +167,7 @@ ClosingPath make_closing_path(const Gripper& gripper, double voxel_size_m, doubl
   path.load_n = load_n;
   path.sets = parameter_sets(gripper);
   path.pulls = finger_pulls(gripper, path.sets);
-  path.reference = finger_pulls(gripper, {{.weight = 1.0, .values = parameters_of(gripper)}});
+  path.nominal_pulls = finger_pulls(gripper, {{.weight = 1.0, .values = parameters_of(gripper)}});
   path.palm_radius_m = 0.0005 * gripper.palm_diameter_mm;
   const double joint = 0.0005 * gripper.finger_joint_diameter_mm;
   const double proximal = 0.001 * gripper.finger_length_mm;
@@ -186,8 +187,8 @@ ClosingPath make_closing_path(const Gripper& gripper, double voxel_size_m, doubl
                                              (0.5 * voxel_size_m))));
   for (int n = 0; n <= steps; ++n) {
     const double angle = opening + (closing - opening) * n / steps;
-    for (const double share : {1.0, 0.5, 0.0})
-      path.closing.push_back(point_at(angle, proximal, share * distal));
+    for (const double fraction : {1.0, 0.5, 0.0})
+      path.closing.push_back(point_at(angle, proximal, fraction * distal));
   }
   const int parts =
       std::max(1, static_cast<int>(std::ceil(path.finger_length_m / (0.5 * voxel_size_m))));

@@ -19,10 +19,10 @@ namespace libgtd {
 // k counts.
 struct FingerPulls {
   std::size_t sets = 0;
-  std::vector<float> pulls;         // at (fall + 90) * sets + set
-  std::vector<float> pushes;        // per set: force that all engaged spines bear
-  std::vector<float> spreads;       // per set: standard deviation / mean of a pull on level ground
-  std::vector<double> all_fingers;  // per set: closing force of all fingers, N
+  std::vector<float> pulls;             // at (fall + 90) * sets + set
+  std::vector<float> max_spine_forces;  // per set: force that all engaged spines bear
+  std::vector<float> level_spreads;  // per set: standard deviation / mean of a pull on level ground
+  std::vector<double> total_closing_forces_n;  // per set: closing force of all fingers, N
 
   const float* at(int fall_deg) const {
     return &pulls[static_cast<std::size_t>(fall_deg + 90) * sets];
@@ -49,7 +49,7 @@ struct ClosingPath {
   double load_n = 0.0;             // load of the hold probability
   std::vector<ParameterSet> sets;  // parameter sets of the prediction
   FingerPulls pulls;               // for `sets`
-  FingerPulls reference;           // for the parameters of the gripper file
+  FingerPulls nominal_pulls;       // for the parameters of the gripper file
 
   double reach_m() const;  // maximum radius of all positions
 };

@@ -19,8 +19,8 @@ double usable_asperities(double tip_radius_um) {
 constexpr std::array<bool, uncertain_parameters> is_logarithmic{true,  true,  true,
                                                                 false, false, true};
 
-double between(double low, double high, double share, bool logarithmic) {
-  return logarithmic ? low * std::pow(high / low, share) : low + share * (high - low);
+double between(double low, double high, double fraction, bool logarithmic) {
+  return logarithmic ? low * std::pow(high / low, fraction) : low + fraction * (high - low);
 }
 
 }  // namespace
@@ -36,12 +36,12 @@ void Engagement::check() const {
 }
 
 void bind(libmap::ParameterTable& table, Engagement& engagement) {
-  constexpr libmap::Range lean{0.0, 90.0};
+  constexpr libmap::Range angle_range{0.0, 90.0};
   table.add("engagement.friction", engagement.friction, libmap::not_negative,
             "coefficient of Coulomb friction of spines and links on the ground");
-  table.add("engagement.asperity_min_deg", engagement.asperity_min_deg, lean,
+  table.add("engagement.asperity_min_deg", engagement.asperity_min_deg, angle_range,
             "minimum inclination of an asperity's facet to the ground, against the drag, degrees");
-  table.add("engagement.asperity_max_deg", engagement.asperity_max_deg, lean,
+  table.add("engagement.asperity_max_deg", engagement.asperity_max_deg, angle_range,
             "maximum inclination of an asperity's facet to the ground, against the drag, degrees");
   table.add("engagement.engagement_rate", engagement.engagement_rate, libmap::not_negative,
             "mean number of facets that a dragged spine meets, 1/mm");
@@ -49,7 +49,7 @@ void bind(libmap::ParameterTable& table, Engagement& engagement) {
             "distance over which the closing gripper drags its spines, mm");
 }
 
-double engagement_share(const Engagement& engagement, double spine_tip_radius_um) {
+double engagement_fraction(const Engagement& engagement, double spine_tip_radius_um) {
   const double scale = usable_asperities(spine_tip_radius_um) / usable_asperities(25.0);
   return -std::expm1(-scale * engagement.engagement_rate * engagement.drag_mm);
 }
@@ -67,13 +67,13 @@ ParameterValues prior_values(const ParameterRanges& ranges, const ParameterValue
   for (std::size_t n = 0; n < values.size(); ++n) {
     if (!ranges[n]) continue;
     const auto [low, high] = *ranges[n];
-    const double share = quantiles[n];
+    const double fraction = quantiles[n];
     if (!(middle[n] > low && middle[n] < high))
-      values[n] = between(low, high, share, is_logarithmic[n]);
-    else if (share < 0.5)
-      values[n] = between(low, middle[n], 2.0 * share, is_logarithmic[n]);
+      values[n] = between(low, high, fraction, is_logarithmic[n]);
+    else if (fraction < 0.5)
+      values[n] = between(low, middle[n], 2.0 * fraction, is_logarithmic[n]);
     else
-      values[n] = between(middle[n], high, 2.0 * share - 1.0, is_logarithmic[n]);
+      values[n] = between(middle[n], high, 2.0 * fraction - 1.0, is_logarithmic[n]);
   }
   return values;
 }
@@ -92,11 +92,11 @@ std::vector<ParameterValues> low_discrepancy_quantiles(std::size_t count, std::u
   return quantiles;
 }
 
-std::size_t parameter_set_at(const std::vector<ParameterSet>& ensemble, double share) {
+std::size_t parameter_set_at(const std::vector<ParameterSet>& ensemble, double fraction) {
   double sum = 0.0;
   for (std::size_t n = 0; n < ensemble.size(); ++n) {
     sum += ensemble[n].weight;
-    if (share < sum) return n;
+    if (fraction < sum) return n;
   }
   return ensemble.size() - 1;
 }

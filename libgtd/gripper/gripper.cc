@@ -90,13 +90,13 @@ void require_fingers(const Gripper& gripper) {
 }
 
 ParameterValues parameters_of(const Gripper& gripper) {
-  const Engagement& its = gripper.engagement;
+  const Engagement& engagement = gripper.engagement;
   return {gripper.fingers->spine_force_limit_n,
           gripper.fingers->closing_force_n,
-          its.friction,
-          its.asperity_min_deg,
-          its.asperity_max_deg,
-          its.engagement_rate};
+          engagement.friction,
+          engagement.asperity_min_deg,
+          engagement.asperity_max_deg,
+          engagement.engagement_rate};
 }
 
 Gripper with_parameters(Gripper gripper, const ParameterValues& values) {

@@ -50,7 +50,7 @@ void bind(libmap::ParameterTable& table, Engagement& engagement);
 // Returns the fraction of spines that meet a facet. The rate is scaled by the fraction of
 // asperities that are usable for this tip radius, relative to a radius of 25 micrometers: 2.49 (r +
 // 39.44)^-0.7116 - 0.01212 (fitted to concrete, Chen et al. 2024).
-double engagement_share(const Engagement& engagement, double spine_tip_radius_um);
+double engagement_fraction(const Engagement& engagement, double spine_tip_radius_um);
 
 // Number of uncertain parameters: spine_force_limit_n and closing_force_n of `fingers`; friction,
 // asperity_min_deg, asperity_max_deg and engagement_rate of `engagement`; in this order.
@@ -82,9 +82,9 @@ struct ParameterSet {
 // (2018), shifted by the seed.
 std::vector<ParameterValues> low_discrepancy_quantiles(std::size_t count, std::uint64_t seed);
 
-// Returns the index of the set at `share` (0 .. 1) of the cumulative weights. With evenly spaced
+// Returns the index of the set at `fraction` (0 .. 1) of the cumulative weights. With evenly spaced
 // shares, sets are drawn in proportion to the weights.
-std::size_t parameter_set_at(const std::vector<ParameterSet>& ensemble, double share);
+std::size_t parameter_set_at(const std::vector<ParameterSet>& ensemble, double fraction);
 
 // Dimensions (mm, degrees) and force parameters of a gripper.
 struct Gripper {

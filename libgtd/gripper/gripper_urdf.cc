@@ -30,7 +30,7 @@ constexpr double max_length_m = 1.0;
 constexpr double tolerance = 0.1;  // mm or degrees, between fingers
 constexpr double max_spacing_error_deg = 1.0;
 constexpr double min_tangential_cosine = 0.999;  // 2.6 degrees
-constexpr double max_beside_share = 0.05;        // fraction of the distance from the joint
+constexpr double max_beside_fraction = 0.05;     // fraction of the distance from the joint
 
 double degrees(double radians) { return radians / libmap::radians_per_degree; }
 
@@ -300,7 +300,7 @@ class Finger {
   // finger.
   Eigen::Vector2d in_plane(const Eigen::Vector3d& vector) const {
     const double beside_m = std::abs(vector.dot(tangent()));
-    if (beside_m > max_beside_share * vector.norm())
+    if (beside_m > max_beside_fraction * vector.norm())
       throw wrong_joint(joint_.name, "the finger of this joint is " +
                                          libmap::to_fixed_text(1000.0 * beside_m, 1) +
                                          " mm outside the plane of the palm's axis");

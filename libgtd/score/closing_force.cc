@@ -311,7 +311,7 @@ GRASPMAP_CLONED_CHOICE void find_forces(const SetSums& sums, const MeanTerms& me
   const float* __restrict capacities = sums.capacities.data();
   float* __restrict probability = forces.probability.data();
   float* __restrict log_force = forces.log_force.data();
-  float* __restrict spreads = forces.spread.data();
+  float* __restrict level_spreads = forces.spread.data();
   float* __restrict scale = forces.scale.data();
   const std::size_t sets = sums.weights.size();
   for (std::size_t s = 0; s < sets; ++s) {
@@ -327,8 +327,8 @@ GRASPMAP_CLONED_CHOICE void find_forces(const SetSums& sums, const MeanTerms& me
     log_force[s] = log_scale[s] + mean.bias + 1.006F * log - 0.537F * pull_spreads[s];
     const float log_spread = -1.540F + 1.056F * spread + 0.745F * pull_spreads[s];
     const float low = log_spread > -3.0F ? log_spread : -3.0F;
-    spreads[s] = quick_exp(low < 1.0F ? low : 1.0F);
-    scale[s] = beta_spread / spreads[s];
+    level_spreads[s] = quick_exp(low < 1.0F ? low : 1.0F);
+    scale[s] = beta_spread / level_spreads[s];
   }
 }
 
@@ -345,8 +345,8 @@ GRASPMAP_CLONED_CHOICE void find_survivals(const float* weights, const SetForces
     const float scale = forces.scale[s];
     const float start = beta_mean + forces.log_force[s] * scale;
     for (std::size_t n = 0; n < force_steps; ++n) {
-      const float share = start - at[n] * scale;
-      const float below_one = share < 1.0F ? share : 1.0F;
+      const float fraction = start - at[n] * scale;
+      const float below_one = fraction < 1.0F ? fraction : 1.0F;
       const float t = below_one > 0.0F ? below_one : 0.0F;
       sums[n] += weight * t * t * (10.0F + t * (-20.0F + t * (15.0F - 4.0F * t)));
     }
@@ -379,7 +379,7 @@ class BlockCloser {
     for (auto* values : {&forces_.probability, &forces_.log_force, &forces_.spread, &forces_.scale})
       values->resize(sets_);
     scratch_.resize(sets_);
-    for (const double force : path.pulls.all_fingers)
+    for (const double force : path.pulls.total_closing_forces_n)
       log_scale_.push_back(static_cast<float>(std::log(force)));
     for (std::size_t n = 0; n < force_steps; ++n)
       log_forces_[n] = first_log_force + static_cast<float>(n) * log_force_step;
@@ -408,7 +408,7 @@ class BlockCloser {
         {.contact = static_cast<float>(mean.contact / weights),
          .bias = static_cast<float>(0.293 + (0.663 * mean.tilt - 0.446 * mean.palm) / lengths),
          .weights = static_cast<float>(weights)},
-        log_scale_.data(), path_.pulls.spreads.data(), forces_);
+        log_scale_.data(), path_.pulls.level_spreads.data(), forces_);
     return estimate();
   }
 
@@ -467,18 +467,18 @@ class BlockCloser {
   // all sets increase with the fall.
   std::size_t weakest_side(const Contacts& contacts) const {
     SideValues pulls{};
-    SideValues pushes{};
+    SideValues max_spine_forces{};
     for (std::size_t a = 0; a < azimuths; ++a) {
       if (contacts.are_there[a] == 0.0F) continue;
-      pulls[a] = path_.reference.at(contacts.fall_deg[a])[0];
-      pushes[a] = contacts.upright[a] * path_.reference.pushes[0];
+      pulls[a] = path_.nominal_pulls.at(contacts.fall_deg[a])[0];
+      max_spine_forces[a] = contacts.upright[a] * path_.nominal_pulls.max_spine_forces[0];
     }
     std::size_t weakest = 0;
     float least = std::numeric_limits<float>::infinity();
     for (std::size_t u = 0; u < dual_steps.size(); ++u) {
       SideValues sums{};
       add_side_values(rays_.pull[u], pulls, sums);
-      add_side_values(rays_.push[u], pushes, sums);
+      add_side_values(rays_.push[u], max_spine_forces, sums);
       const auto here = std::min_element(sums.begin(), sums.end());
       if (*here >= least) continue;
       least = *here;
@@ -500,7 +500,7 @@ class BlockCloser {
           add_scaled(path_.pulls.at(contacts.fall_deg[a]), rays_.pull[u][a][side], scratch_.data(),
                      sets_);
       }
-      add_scaled(path_.pulls.pushes.data(), push, scratch_.data(), sets_);
+      add_scaled(path_.pulls.max_spine_forces.data(), push, scratch_.data(), sets_);
       for (std::size_t s = 0; s < sets_; ++s) capacities[s] = std::min(capacities[s], scratch_[s]);
     }
     bound_capacities(capacities, logs, sets_);
@@ -515,9 +515,9 @@ class BlockCloser {
       if (survivals.front() <= above) return 0.0F;
       std::size_t n = 1;
       while (n + 2 < force_steps && survivals[n] > above) ++n;
-      const float share = std::min(
+      const float fraction = std::min(
           1.0F, (survivals[n - 1] - above) / std::max(1e-9F, survivals[n - 1] - survivals[n]));
-      return std::exp(log_forces_[n - 1] + share * log_force_step);
+      return std::exp(log_forces_[n - 1] + fraction * log_force_step);
     };
     result.median_n = quantile(0.5F);
     result.low_n = quantile(0.95F);
@@ -526,12 +526,12 @@ class BlockCloser {
     float log = 0.0F;
     float square = 0.0F;
     for (std::size_t s = 0; s < sets_; ++s) {
-      const float its = weights_[s] * forces_.probability[s];
-      if (its <= 0.0F) continue;
-      weight += its;
-      log += its * forces_.log_force[s];
-      square += its * forces_.log_force[s] * forces_.log_force[s];
-      result.trial_spread += its * forces_.spread[s];
+      const float set_weight = weights_[s] * forces_.probability[s];
+      if (set_weight <= 0.0F) continue;
+      weight += set_weight;
+      log += set_weight * forces_.log_force[s];
+      square += set_weight * forces_.log_force[s] * forces_.log_force[s];
+      result.trial_spread += set_weight * forces_.spread[s];
     }
     if (weight > 0.0F) {
       result.trial_spread /= weight;
@@ -648,12 +648,12 @@ std::vector<ForceEstimate> closing_forces(const VoxelGrid& grid, const ClosingPa
   return forces;
 }
 
-std::vector<double> outward_shares(const VoxelGrid& grid, const GripperMask& mask,
-                                   const std::vector<std::size_t>& pivots) {
+std::vector<double> outward_fall_fractions(const VoxelGrid& grid, const GripperMask& mask,
+                                           const std::vector<std::size_t>& pivots) {
   std::array<std::vector<RayCell>, azimuths> rays;
   for (std::size_t a = 0; a < azimuths; ++a)
     rays[a] = outward_cells(mask, 2.0 * std::numbers::pi * static_cast<double>(a) / azimuths);
-  std::vector<double> shares(pivots.size(), 0.0);
+  std::vector<double> fractions(pivots.size(), 0.0);
   for_each_block(grid, pivots, mask.pivot_xy + gap_columns,
                  [&](const std::vector<std::size_t>& members, const Heights& heights) {
                    for (const std::size_t n : members) {
@@ -662,10 +662,10 @@ std::vector<double> outward_shares(const VoxelGrid& grid, const GripperMask& mas
                      const auto falling = std::count_if(
                          rays.begin(), rays.end(),
                          [&](const auto& ray) { return heights.fall(at, ray) > mask.min_fall_m; });
-                     shares[n] = static_cast<double>(falling) / azimuths;
+                     fractions[n] = static_cast<double>(falling) / azimuths;
                    }
                  });
-  return shares;
+  return fractions;
 }
 
 }  // namespace libgtd

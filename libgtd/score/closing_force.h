@@ -23,7 +23,7 @@ std::vector<ForceEstimate> closing_forces(const VoxelGrid& grid, const ClosingPa
 // columns fall by more than min_fall_m from the circle of the closed spines to the circle of the
 // open fingers. Columns without ground are skipped. A shape that the closed spines cannot reach,
 // such as a small ball on level ground, has the value 0.
-std::vector<double> outward_shares(const VoxelGrid& grid, const GripperMask& mask,
-                                   const std::vector<std::size_t>& pivots);
+std::vector<double> outward_fall_fractions(const VoxelGrid& grid, const GripperMask& mask,
+                                           const std::vector<std::size_t>& pivots);
 
 }  // namespace libgtd

@@ -157,9 +157,10 @@ class FootholdSearch {
     double weights = 0.0;
     for_each_near(grid_, map_.positions, center, radius_m, runs, [&](std::uint32_t point) {
       if (!std::isfinite(scores_[point])) return;
-      const double share = (map_.positions[point] - center).squaredNorm() / (radius_m * radius_m);
-      sum += (1.0 - share) * scores_[point];
-      weights += 1.0 - share;
+      const double fraction =
+          (map_.positions[point] - center).squaredNorm() / (radius_m * radius_m);
+      sum += (1.0 - fraction) * scores_[point];
+      weights += 1.0 - fraction;
       if (!graspable.empty() && graspable[point] != 0.0) ++foothold.graspable_points;
     });
     // If the square of the separation underflows, no point has a weight.

@@ -76,7 +76,7 @@ PointCloud to_cloud(const GraspabilityMap& map, MapFrame frame) {
   add("i", ScalarType::int32, [](const MapVoxel& one) { return one.voxel.i; });
   add("j", ScalarType::int32, [](const MapVoxel& one) { return one.voxel.j; });
   add("k", ScalarType::int32, [](const MapVoxel& one) { return one.voxel.k; });
-  if (map.content.falling_shares)
+  if (map.content.outward_fall_fractions)
     add("falling_share", ScalarType::float32,
         [](const auto& one) { return one.outward_fall_fraction; });
   if (map.content.forces) {

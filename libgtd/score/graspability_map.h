@@ -28,11 +28,11 @@ struct MapVoxel {
 
 // Optional fields of a map.
 struct MapContent {
-  bool normals = false;         // the mask was tilted
-  bool slopes = false;          // obstacles are evaluated
-  bool forces = false;          // the method is calibrated
-  bool falling_shares = false;  // outward_fall_fraction is evaluated
-  bool obstacles = false;       // evaluated, which requires the whole map
+  bool normals = false;                 // the mask was tilted
+  bool slopes = false;                  // obstacles are evaluated
+  bool forces = false;                  // the method is calibrated
+  bool outward_fall_fractions = false;  // outward_fall_fraction is evaluated
+  bool obstacles = false;               // evaluated, which requires the whole map
 };
 
 struct GraspabilityMap {

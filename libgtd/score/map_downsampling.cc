@@ -57,7 +57,7 @@ libmap::PointCloud voxel_downsample_map(const libmap::PointCloud& map, int width
   return thin(map, width, true);
 }
 
-void snap_to_squares(const TileStoreIndex& index, int width, libmap::PointCloud& map) {
+void snap_to_square_centers(const TileStoreIndex& index, int width, libmap::PointCloud& map) {
   const VoxelFields voxels(map);
   const libmap::Pose terrain_from_map = index.frame == MapFrame::input
                                             ? index.terrain_from_input()

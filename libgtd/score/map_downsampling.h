@@ -18,6 +18,6 @@ libmap::PointCloud downsample_map(const libmap::PointCloud& map, int width);
 libmap::PointCloud voxel_downsample_map(const libmap::PointCloud& map, int width);
 
 // Moves each point horizontally to the middle of the block, so that the points form a lattice.
-void snap_to_squares(const TileStoreIndex& index, int width, libmap::PointCloud& map);
+void snap_to_square_centers(const TileStoreIndex& index, int width, libmap::PointCloud& map);
 
 }  // namespace libgtd

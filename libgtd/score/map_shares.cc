@@ -87,7 +87,7 @@ void require_shares_of_one_map(const std::vector<Manifest>& manifests,
   require_all_shares(manifests, files);
 }
 
-void copy_common_facts(const Manifest& part, Manifest& whole) {
+void copy_common_entries(const Manifest& part, Manifest& whole) {
   for (const auto& parameter : part.parameters)
     if (parameter.first != "tile") whole.parameters.push_back(parameter);
   whole.frame = part.frame;

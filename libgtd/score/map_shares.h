@@ -20,7 +20,7 @@ void require_shares_of_one_map(const std::vector<libmap::Manifest>& manifests,
 
 // Copies common content of all shares to the manifest of the whole map: parameters, frame,
 // transforms, and results such as the plane's.
-void copy_common_facts(const libmap::Manifest& part, libmap::Manifest& whole);
+void copy_common_entries(const libmap::Manifest& part, libmap::Manifest& whole);
 
 // Adds obstacles to the merged map `whole` with the parameters of a share, and returns the number
 // of obstacle points. Throws like add_obstacles.

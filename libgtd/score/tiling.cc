@@ -31,7 +31,7 @@ std::vector<std::uint8_t> find_pivots(const VoxelGrid& grid, const GripperMask& 
       const std::vector<std::size_t> pivots = pivots_in(grid, mask, tiles[t]);
       for (const std::size_t at : pivots) flags[at] = is_pivot;
       if (!flag_edges) continue;
-      const std::vector<std::uint8_t> edges = find_edges(grid, mask, tiles[t], pivots);
+      const std::vector<std::uint8_t> edges = find_border_pivots(grid, mask, tiles[t], pivots);
       for (std::size_t n = 0; n < pivots.size(); ++n)
         if (edges[n] != 0) flags[pivots[n]] |= is_border;
     }
@@ -80,9 +80,9 @@ std::vector<TileBounds> make_tiles(const VoxelGrid& grid, int tile_voxels) {
   return tiles;
 }
 
-std::vector<std::uint8_t> find_edges(const VoxelGrid& grid, const GripperMask& mask,
-                                     const TileBounds& tile,
-                                     const std::vector<std::size_t>& pivots) {
+std::vector<std::uint8_t> find_border_pivots(const VoxelGrid& grid, const GripperMask& mask,
+                                             const TileBounds& tile,
+                                             const std::vector<std::size_t>& pivots) {
   const int below = mask.pivot_xy;
   const int above = mask.side - mask.pivot_xy - 1;
   std::vector<std::uint8_t> edges(pivots.size(), 0);
@@ -114,11 +114,11 @@ std::vector<ScoredVoxel> score_tiles(const VoxelGrid& grid, const GripperMask& m
   const std::vector<VoxelCounts> counts =
       match_voxels(grid, mask, pivots, options.instructions, progress);
   std::vector<ForceEstimate> forces;
-  std::vector<double> shares;  // corrected only
+  std::vector<double> fractions;  // corrected only
   if (mask.closing)
     forces = closing_forces(grid, *mask.closing, pivots);
   else if (mask.method == Method::corrected)
-    shares = outward_shares(grid, mask, pivots);
+    fractions = outward_fall_fractions(grid, mask, pivots);
   std::vector<ScoredVoxel> scored(pivots.size());
   libmap::parallel_for(pivots.size(), pivots_per_chunk, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
@@ -129,7 +129,7 @@ std::vector<ScoredVoxel> score_tiles(const VoxelGrid& grid, const GripperMask& m
         one.force = forces[n];
         one.score = forces[n].hold_probability;
       } else {
-        if (!shares.empty()) one.outward_fall_fraction = shares[n];
+        if (!fractions.empty()) one.outward_fall_fraction = fractions[n];
         one.score = score_percent(counts[n], mask.method, options.solid_voxel_threshold) / 100.0 *
                     one.outward_fall_fraction;
       }

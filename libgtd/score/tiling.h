@@ -34,7 +34,7 @@ struct ScoredVoxel {
   double score = 0.0;                  // score_percent / 100
   bool border = false;                 // the window of the mask leaves the scanned area
   ForceEstimate force{};               // calibrated only
-  double outward_fall_fraction = 1.0;  // corrected only, see outward_shares
+  double outward_fall_fraction = 1.0;  // corrected only, see outward_fall_fractions
 };
 
 struct ScoringOptions {
@@ -49,8 +49,8 @@ std::vector<ScoredVoxel> score_tiles(const VoxelGrid& grid, const GripperMask& m
                                      libmap::Progress& progress = libmap::no_progress());
 
 // Returns 1 for pivots with a mask window that contains a column outside the scanned area, else 0.
-std::vector<std::uint8_t> find_edges(const VoxelGrid& grid, const GripperMask& mask,
-                                     const TileBounds& tile,
-                                     const std::vector<std::size_t>& pivots);
+std::vector<std::uint8_t> find_border_pivots(const VoxelGrid& grid, const GripperMask& mask,
+                                             const TileBounds& tile,
+                                             const std::vector<std::size_t>& pivots);
 
 }  // namespace libgtd

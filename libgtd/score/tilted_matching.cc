@@ -22,7 +22,7 @@ double matched_reach(const GripperMask& mask) {
   return std::sqrt(2.0 * across * across + along * along);
 }
 
-// Half the side of the cube that find_edges searches, in voxels.
+// Half the side of the cube that find_border_pivots searches, in voxels.
 int edge_half_side(const GripperMask& mask) {
   return std::max(mask.pivot_xy, mask.side - mask.pivot_xy - 1) + 2 * scan_gap_voxels;
 }
@@ -131,7 +131,7 @@ std::vector<std::uint8_t> find_tilted_edges(const std::vector<Voxel>& voxels,
         pivots_here.push_back(pivots[n]);
       });
       if (here.empty()) continue;
-      const std::vector<std::uint8_t> found = terrain.find_edges(
+      const std::vector<std::uint8_t> found = terrain.find_border_pivots(
           pivots_here, unscanned_columns(grid, expanded(tiles[t], reach, reach)));
       for (std::size_t n = 0; n < here.size(); ++n) edges[here[n]] = found[n];
     }
@@ -382,8 +382,8 @@ class EdgeSearch {
 
 }  // namespace
 
-std::vector<std::uint8_t> TiltedTerrain::find_edges(const std::vector<TiltedPivot>& pivots,
-                                                    const ColumnSums& unscanned) const {
+std::vector<std::uint8_t> TiltedTerrain::find_border_pivots(const std::vector<TiltedPivot>& pivots,
+                                                            const ColumnSums& unscanned) const {
   const EdgeSearch search(mask_, lattice_, unscanned);
   std::vector<std::uint8_t> edges(pivots.size(), 0);
   std::vector<std::size_t> doubtful;

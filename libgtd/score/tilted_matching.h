@@ -46,8 +46,8 @@ class TiltedTerrain {
   // mask (within half the square plus the closed gaps, and closed over gaps like scanned columns)
   // and is over a column that was not scanned. Empty space beside a rock is therefore not an edge.
   // `unscanned` must contain the columns within tilted_reach_voxels.
-  std::vector<std::uint8_t> find_edges(const std::vector<TiltedPivot>& pivots,
-                                       const ColumnSums& unscanned) const;
+  std::vector<std::uint8_t> find_border_pivots(const std::vector<TiltedPivot>& pivots,
+                                               const ColumnSums& unscanned) const;
 
  private:
   class Window;

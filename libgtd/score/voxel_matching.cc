@@ -413,8 +413,8 @@ double score_percent(const VoxelCounts& counts, Method method, int solid_voxel_t
   switch (method) {
     case Method::thesis:
     case Method::envelope: {
-      const float share = static_cast<float>(counts.gsv) / static_cast<float>(counts.ssv);
-      const auto percent = static_cast<float>(static_cast<double>(share) * 100.0);
+      const float fraction = static_cast<float>(counts.gsv) / static_cast<float>(counts.ssv);
+      const auto percent = static_cast<float>(static_cast<double>(fraction) * 100.0);
       return lowered(static_cast<double>(percent), counts.ssv, solid_voxel_threshold);
     }
     case Method::climblab:

@@ -336,7 +336,7 @@ void fill_triangles(const std::vector<Vector3d>& points, const std::vector<Corne
     grid.place(placements[n], t);
   });
   result.triangles = triangles.size();
-  result.refused_triangles = static_cast<std::size_t>(std::count_if(
+  result.rejected_triangles = static_cast<std::size_t>(std::count_if(
       placements.begin(), placements.end(), [](const Placement& one) { return one.refused; }));
   if (options.method == InterpolationMethod::thesis)
     grid.fill(placements, triangle_at, plane_height);

@@ -37,13 +37,13 @@ struct InterpolationOptions {
 struct InterpolationResult {
   libmap::PointCloud cloud;  // x outer, y inner; positions and the input's viewpoint
   double grid_spacing_m = 0;
-  double area_m2 = 0;                 // thesis: bounding box; corrected: occupied cells
-  std::size_t triangles = 0;          // of the triangulation
-  std::size_t refused_triangles = 0;  // triangles with an edge longer than max_edge_m
-  std::size_t nodes = 0;              // grid nodes
-  std::size_t outside_nodes = 0;      // outside the hull or inside refused triangles
-  std::size_t zero_nodes = 0;         // `thesis`: dropped because of a height of exactly 0
-  std::size_t skipped_points = 0;     // not finite, or below a point of the same x and y
+  double area_m2 = 0;                  // thesis: bounding box; corrected: occupied cells
+  std::size_t triangles = 0;           // of the triangulation
+  std::size_t rejected_triangles = 0;  // triangles with an edge longer than max_edge_m
+  std::size_t nodes = 0;               // grid nodes
+  std::size_t outside_nodes = 0;       // outside the hull or inside refused triangles
+  std::size_t zero_nodes = 0;          // `thesis`: dropped because of a height of exactly 0
+  std::size_t skipped_points = 0;      // not finite, or below a point of the same x and y
 };
 
 // Interpolates `cloud`, which is in the terrain frame (z up, meters). Throws Error for an option

@@ -120,7 +120,7 @@ Facts facts_of(const PointStream& points) {
       if (block.positions[i].allFinite()) facts.first = block.positions[i];
     if (facts.first) add_offsets(block, *facts.first, facts.offsets);
     if (block.has_normals() && facts.points == block.size())
-      facts.opposing_normals = libmap::opposing_share(block.positions, block.normals);
+      facts.opposing_normals = libmap::opposing_fraction(block.positions, block.normals);
   });
   return facts;
 }
@@ -361,7 +361,7 @@ double choose_up(const Facts& facts, const RegressionPlaneOptions& options, cons
     if (side != 0) return side;
   }
   source = UpSource::normals;
-  if (fit.normals.agree() && facts.opposing_normals <= libmap::max_opposing_share)
+  if (fit.normals.agree() && facts.opposing_normals <= libmap::max_opposing_fraction)
     return fit.normals.along - fit.normals.against;
   source = UpSource::frame_z;
   if (std::abs(fit.normal.z()) >= min_cosine_of_frame_z) return fit.normal.z();

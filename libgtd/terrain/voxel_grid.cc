@@ -248,16 +248,16 @@ std::size_t count_isolated(const std::vector<Voxel>& voxels) {
   return static_cast<std::size_t>(std::count(has_neighbor.begin(), has_neighbor.end(), 0));
 }
 
-void require_dense(std::size_t lone, std::size_t voxels, double voxel_size_m,
+void require_dense(std::size_t isolated, std::size_t voxels, double voxel_size_m,
                    const std::vector<Eigen::Vector3d>& points) {
   constexpr std::size_t min_voxels = 10;
-  if (voxels < min_voxels || 5 * lone <= 3 * voxels) return;
+  if (voxels < min_voxels || 5 * isolated <= 3 * voxels) return;
   throw libmap::Error(
       "the points are too sparse for this voxel size: interpolate (--interpolation), use larger "
       "voxels (--voxel-size), or sample the surface of a mesh (graspmap resample)",
       {.field = "share of voxels without a neighbor",
        .value = libmap::to_fixed_text(
-                    100.0 * static_cast<double>(lone) / static_cast<double>(voxels), 1) +
+                    100.0 * static_cast<double>(isolated) / static_cast<double>(voxels), 1) +
                 " % (voxels of " + libmap::to_text(voxel_size_m) + " m, median point spacing " +
                 libmap::to_fixed_text(1000.0 * libmap::median_spacing(points), 1) + " mm)",
        .bound = "<= 60 %"});

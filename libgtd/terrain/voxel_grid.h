@@ -33,7 +33,7 @@ struct TileBounds {
 // Returns the first iterator in at..end with a voxel not below `voxel` (exponential search, fast if
 // the result is near `at`).
 template <typename Iterator>
-Iterator first_not_below(Iterator at, Iterator end, const Voxel& voxel) {
+Iterator advance_lower_bound(Iterator at, Iterator end, const Voxel& voxel) {
   auto step = typename std::iterator_traits<Iterator>::difference_type{1};
   while (step < end - at && *(at + step) < voxel) {
     at += step;
@@ -55,7 +55,7 @@ void visit_pairs(const std::vector<Voxel>& voxels, int reach, const Visit& visit
     const Voxel& voxel = voxels[n];
     for (int di = 0; di <= reach; ++di) {
       auto& first = firsts[static_cast<std::size_t>(di)];
-      first = first_not_below(first, voxels.end(), {voxel.i + di, voxel.j - reach, lowest});
+      first = advance_lower_bound(first, voxels.end(), {voxel.i + di, voxel.j - reach, lowest});
       for (auto at = first; at != voxels.end() && at->i == voxel.i + di && at->j <= voxel.j + reach;
            ++at) {
         const auto m = static_cast<std::size_t>(at - voxels.begin());
@@ -72,7 +72,7 @@ std::size_t count_isolated(const std::vector<Voxel>& voxels);
 // do not form a surface at this voxel size. A regular grid with a spacing of more than two voxels
 // has 100 %, one of 1.5 voxels less than half. The published pre-scanned cloud of scenario 2 has 54
 // % at the published voxel size and must be accepted.
-void require_dense(std::size_t lone, std::size_t voxels, double voxel_size_m,
+void require_dense(std::size_t isolated, std::size_t voxels, double voxel_size_m,
                    const std::vector<Eigen::Vector3d>& points);
 
 // Calls visit(first, last) for each row (one i) of voxels in the columns, ascending. The row is
@@ -85,11 +85,11 @@ void visit_rows(const VoxelGrid& grid, const TileBounds& columns, const Visit& v
   auto at = std::lower_bound(begin, end, Voxel{columns.i_begin, columns.j_begin, lowest});
   while (at != end && at->i < columns.i_end) {
     const int i = at->i;
-    const auto first = first_not_below(at, end, {i, columns.j_begin, lowest});
-    at = first_not_below(first, end, {i, columns.j_end, lowest});
+    const auto first = advance_lower_bound(at, end, {i, columns.j_begin, lowest});
+    at = advance_lower_bound(first, end, {i, columns.j_end, lowest});
     if (first != at)
       visit(static_cast<std::size_t>(first - begin), static_cast<std::size_t>(at - begin));
-    at = first_not_below(at, end, {i + 1, columns.j_begin, lowest});
+    at = advance_lower_bound(at, end, {i + 1, columns.j_begin, lowest});
   }
 }
 

@@ -19,7 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 
 // Metadata of a topic of depth images: stamps, calibrations, frames.
-struct SurveyedImages {
+struct ImageTopic {
   std::string topic{};
   bool compressed = false;
   std::string encoding{};  // encoding of the first message; empty if none could be read
@@ -44,8 +44,8 @@ struct SurveyedImages {
   }
 };
 
-struct BagSurvey {
-  std::vector<SurveyedImages> images{};  // in the order of the topics
+struct BagTopics {
+  std::vector<ImageTopic> images{};  // in the order of the topics
   TransformTree transforms{};
 };
 
@@ -64,7 +64,7 @@ bool is_rectified(const std::string& topic) {
   return after == '\0' || after == '_' || after == '/';
 }
 
-void take_image(const BagMessage& message, SurveyedImages& images) {
+void take_image(const BagMessage& message, ImageTopic& images) {
   DepthMessageHead head;
   try {
     head = read_image_head(message.topic.encoding, message.bytes, images.compressed);
@@ -79,7 +79,7 @@ void take_image(const BagMessage& message, SurveyedImages& images) {
   images.stamps_ns.push_back(head.stamp_ns == 0 ? message.recorded_ns : head.stamp_ns);
 }
 
-void take_info(const BagMessage& message, SurveyedImages& images) {
+void take_info(const BagMessage& message, ImageTopic& images) {
   try {
     const CameraInfoMessage info =
         decode_camera_info(message.topic.encoding, message.bytes, is_rectified(images.topic));
@@ -112,33 +112,33 @@ std::string namespace_of_image(const std::string& topic, bool compressed) {
 // Reads the bag once. `topics` contains topics of images, each with true if it is compressed; no
 // transforms are read if `transform_topic` is empty. Throws Error for a damaged bag or message, or
 // transforms that change.
-BagSurvey survey_bag(const std::filesystem::path& bag,
-                     const std::vector<std::pair<std::string, bool>>& topics,
-                     const std::string& transform_topic) {
+BagTopics read_bag_topics(const std::filesystem::path& bag,
+                          const std::vector<std::pair<std::string, bool>>& topics,
+                          const std::string& transform_topic) {
   constexpr std::size_t head_bytes = 1024;
-  BagSurvey survey;
+  BagTopics bag_topics;
   std::vector<BagRequest> requests;
   for (const auto& [topic, compressed] : topics) {
-    survey.images.push_back({.topic = topic, .compressed = compressed});
-    survey.images.back().info_topic = namespace_of_image(topic, compressed) + "/camera_info";
+    bag_topics.images.push_back({.topic = topic, .compressed = compressed});
+    bag_topics.images.back().info_topic = namespace_of_image(topic, compressed) + "/camera_info";
     requests.push_back({topic, head_bytes});
-    requests.push_back({survey.images.back().info_topic});
+    requests.push_back({bag_topics.images.back().info_topic});
   }
   if (!transform_topic.empty()) requests.push_back({transform_topic});
   read_bag(bag, requests, [&](const BagMessage& message) {
     const std::string& topic = message.topic.name;
     if (!transform_topic.empty() && topic == transform_topic &&
         message.topic.has_definition_of(ros_message::TFMessage::type))
-      take_transforms(message, survey.transforms);
-    for (SurveyedImages& images : survey.images) {
+      take_transforms(message, bag_topics.transforms);
+    for (ImageTopic& images : bag_topics.images) {
       if (topic == images.topic) take_image(message, images);
       if (topic == images.info_topic &&
           message.topic.has_definition_of(ros_message::CameraInfo::type))
         take_info(message, images);
     }
   });
-  for (SurveyedImages& images : survey.images) std::sort(images.infos.begin(), images.infos.end());
-  return survey;
+  for (ImageTopic& images : bag_topics.images) std::sort(images.infos.begin(), images.infos.end());
+  return bag_topics;
 }
 
 constexpr double float_unit_m = 1e-4;  // unit of images of 32FC1: up to 6.5 m
@@ -185,25 +185,25 @@ std::vector<Choice> choices_of(const BagListing& listing, const BagRigOptions& o
 
 // Keeps topics of depth images among the topics not given by the user; prefers a raw topic to a
 // compressed one of the same images.
-void keep_depth_topics(std::vector<Choice>& choices, BagSurvey& survey) {
+void keep_depth_topics(std::vector<Choice>& choices, BagTopics& bag_topics) {
   std::vector<Choice> kept_choices;
-  std::vector<SurveyedImages> kept;
+  std::vector<ImageTopic> kept;
   const auto raw_is_there = [&](const std::string& topic) {
-    return std::any_of(survey.images.begin(), survey.images.end(),
-                       [&](const SurveyedImages& images) {
+    return std::any_of(bag_topics.images.begin(), bag_topics.images.end(),
+                       [&](const ImageTopic& images) {
                          return topic == images.topic + "/compressedDepth" &&
                                 is_depth_encoding(images.encoding, false);
                        });
   };
   for (std::size_t n = 0; n < choices.size(); ++n) {
-    const SurveyedImages& images = survey.images[n];
+    const ImageTopic& images = bag_topics.images[n];
     if (!is_depth_encoding(images.encoding, images.compressed)) continue;
     if (images.compressed && raw_is_there(images.topic)) continue;
     kept_choices.push_back(choices[n]);
     kept.push_back(images);
   }
   choices = kept_choices;
-  survey.images = kept;
+  bag_topics.images = kept;
 }
 
 std::vector<std::string> parts_of(const std::string& topic) {
@@ -218,10 +218,10 @@ std::vector<std::string> parts_of(const std::string& topic) {
 }
 
 // Names topics by the parts in which they differ, joined by '_'; a single topic by its first part.
-std::vector<std::string> names_by_difference(const std::vector<SurveyedImages>& images) {
+std::vector<std::string> names_by_difference(const std::vector<ImageTopic>& images) {
   std::vector<std::vector<std::string>> parts;
   parts.reserve(images.size());
-  for (const SurveyedImages& one : images)
+  for (const ImageTopic& one : images)
     parts.push_back(parts_of(namespace_of_image(one.topic, one.compressed)));
   std::size_t shortest = parts.front().size();
   bool equal_length = true;
@@ -263,7 +263,7 @@ std::size_t camera_of_rig(const CameraRig& rig, const Choice& choice, const std:
       {.field = "topic", .value = choice.topic});
 }
 
-Camera calibrated_camera(const SurveyedImages& images, const BagListing& listing) {
+Camera calibrated_camera(const ImageTopic& images, const BagListing& listing) {
   if (!images.calibrations.empty())
     return images.calibrations[images.calibration_at(images.stamps_ns.front())];
   if (!images.info_error.empty())
@@ -272,37 +272,38 @@ Camera calibrated_camera(const SurveyedImages& images, const BagListing& listing
   throw Error("contains no camera info", {.field = images.info_topic});
 }
 
-std::string base_frame_of(const BagSurvey& survey, const BagRigOptions& options) {
+std::string base_frame_of(const BagTopics& bag_topics, const BagRigOptions& options) {
   if (options.base_frame != "auto") return plain_frame(options.base_frame);
   const std::string usual = "base_link";  // REP-105
-  return survey.transforms.has(usual) ? usual
-                                      : survey.transforms.root_of(survey.images.front().frame);
+  return bag_topics.transforms.has(usual)
+             ? usual
+             : bag_topics.transforms.root_of(bag_topics.images.front().frame);
 }
 
 // Makes a rig from the bag's camera infos and transforms.
-void rig_from_bag(const BagSurvey& survey, const BagListing& listing, const BagRigOptions& options,
-                  BagRigPlan& plan) {
-  if (survey.transforms.empty())
+void rig_from_bag(const BagTopics& bag_topics, const BagListing& listing,
+                  const BagRigOptions& options, BagRigPlan& plan) {
+  if (bag_topics.transforms.empty())
     require_topic(listing, options.transform_topic, ros_message::TFMessage::type);
-  const std::string base = base_frame_of(survey, options);
-  for (std::size_t n = 0; n < survey.images.size(); ++n) {
-    const SurveyedImages& images = survey.images[n];
+  const std::string base = base_frame_of(bag_topics, options);
+  for (std::size_t n = 0; n < bag_topics.images.size(); ++n) {
+    const ImageTopic& images = bag_topics.images[n];
     RigCamera& camera = plan.rig.cameras[n];
     in_field(images.topic, [&] {
       camera.camera = calibrated_camera(images, listing);
-      camera.camera.base_from_camera = survey.transforms.target_from_source(base, images.frame);
+      camera.camera.base_from_camera = bag_topics.transforms.target_from_source(base, images.frame);
     });
   }
 }
 
-void set_limits(const BagSurvey& survey, const BagRigOptions& options, BagRigPlan& plan) {
+void set_limits(const BagTopics& bag_topics, const BagRigOptions& options, BagRigPlan& plan) {
   for (std::size_t n = 0; n < plan.rig.cameras.size(); ++n) {
     RigCamera& camera = plan.rig.cameras[n];
     const auto images =
-        std::find_if(survey.images.begin(), survey.images.end(),
-                     [&](const SurveyedImages& one) { return one.topic == plan.topics[n]; });
+        std::find_if(bag_topics.images.begin(), bag_topics.images.end(),
+                     [&](const ImageTopic& one) { return one.topic == plan.topics[n]; });
     const bool floats =
-        images != survey.images.end() && images->encoding.find("32FC1") != std::string::npos;
+        images != bag_topics.images.end() && images->encoding.find("32FC1") != std::string::npos;
     if (options.depth_scale_m > 0)
       camera.depth_scale_m = options.depth_scale_m;
     else if (!options.rig)
@@ -314,8 +315,7 @@ void set_limits(const BagSurvey& survey, const BagRigOptions& options, BagRigPla
 
 // Adds the camera's images in ascending order, at most one per microsecond, and only those with its
 // first calibration.
-void add_images(const SurveyedImages& images, std::size_t camera, bool calibrated,
-                BagRigPlan& plan) {
+void add_images(const ImageTopic& images, std::size_t camera, bool calibrated, BagRigPlan& plan) {
   std::vector<std::int64_t> stamps = images.stamps_ns;
   std::sort(stamps.begin(), stamps.end());
   const auto microsecond = [](std::int64_t stamp) { return (stamp + 500) / 1000; };
@@ -349,7 +349,7 @@ void choose_sets(const BagRigOptions& options, const std::optional<double>& stam
     stamps.push_back({image.camera, ros_message::seconds_of(image.stamp_ns)});
   std::vector<SynchronizedSet> sets =
       synchronized_sets(stamps, plan.rig.cameras.size(), options.tolerance_s);
-  plan.all_sets = sets.size();
+  plan.sets_in_bag = sets.size();
   if (stamp_s) {
     const auto nearest = std::min_element(
         sets.begin(), sets.end(), [&](const SynchronizedSet& a, const SynchronizedSet& b) {
@@ -369,9 +369,9 @@ void choose_sets(const BagRigOptions& options, const std::optional<double>& stam
   plan.images = kept;
 }
 
-std::string topics_with_encodings(const BagSurvey& survey) {
+std::string topics_with_encodings(const BagTopics& bag_topics) {
   std::string text;
-  for (const SurveyedImages& images : survey.images)
+  for (const ImageTopic& images : bag_topics.images)
     text += (text.empty() ? "" : ", ") + images.topic + " " + images.encoding;
   return text;
 }
@@ -383,19 +383,19 @@ BagRigPlan plan_of(const fs::path& bag, const BagRigOptions& options,
   std::vector<std::pair<std::string, bool>> topics;
   topics.reserve(choices.size());
   for (const Choice& choice : choices) topics.emplace_back(choice.topic, choice.compressed);
-  BagSurvey survey = survey_bag(bag, topics, options.rig ? "" : options.transform_topic);
-  const std::string found = topics_with_encodings(survey);
-  if (options.topics.empty()) keep_depth_topics(choices, survey);
+  BagTopics bag_topics = read_bag_topics(bag, topics, options.rig ? "" : options.transform_topic);
+  const std::string found = topics_with_encodings(bag_topics);
+  if (options.topics.empty()) keep_depth_topics(choices, bag_topics);
   if (choices.empty())
     throw Error("no topic contains depth images", {.field = "topics of images",
                                                    .value = found.empty() ? "none" : found,
                                                    .bound = "16UC1, 32FC1 or compressedDepth"});
-  for (const SurveyedImages& images : survey.images)
+  for (const ImageTopic& images : bag_topics.images)
     if (!is_depth_encoding(images.encoding, images.compressed))
       throw Error("contains no depth images", {.field = "encoding of " + images.topic,
                                                .value = images.encoding,
                                                .bound = "16UC1, 32FC1 or compressedDepth"});
-  const std::vector<std::string> names = names_by_difference(survey.images);
+  const std::vector<std::string> names = names_by_difference(bag_topics.images);
   BagRigPlan plan;
   plan.depth_unit_m = options.depth_unit_m;
   plan.tolerance_s = options.tolerance_s;
@@ -412,11 +412,11 @@ BagRigPlan plan_of(const fs::path& bag, const BagRigOptions& options,
       throw Error("belongs to the same camera as " + plan.topics[camera],
                   {.field = "topic", .value = choices[n].topic});
     plan.topics[camera] = choices[n].topic;
-    add_images(survey.images[n], camera, !options.rig && !survey.images[n].calibrations.empty(),
-               plan);
+    add_images(bag_topics.images[n], camera,
+               !options.rig && !bag_topics.images[n].calibrations.empty(), plan);
   }
-  if (!options.rig) rig_from_bag(survey, listing, options, plan);
-  set_limits(survey, options, plan);
+  if (!options.rig) rig_from_bag(bag_topics, listing, options, plan);
+  set_limits(bag_topics, options, plan);
   plan.rig.check();
   std::sort(plan.images.begin(), plan.images.end());
   choose_sets(options, stamp_s, plan);

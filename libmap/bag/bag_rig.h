@@ -47,7 +47,7 @@ struct BagRigPlan {
   std::vector<std::string> topics{};    // topic of each camera; empty: none
   std::vector<BagImage> images{};       // images of the selected sets, ascending
   std::vector<SynchronizedSet> sets{};  // selected sets; Camera::image is not set
-  std::size_t all_sets = 0;
+  std::size_t sets_in_bag = 0;
   std::vector<std::string> warnings{};
   double depth_unit_m = 0.001;
   double tolerance_s = 0.02;
@@ -73,7 +73,7 @@ struct BagRigExport {
   std::size_t overflow_pixels =
       0;  // pixels with a depth beyond 16 bits at the camera's depth scale
   // Number of unusable images, and the reason for the first one of each camera.
-  std::size_t broken = 0;
+  std::size_t undecodable_images = 0;
   std::vector<std::string> warnings{};
 };
 

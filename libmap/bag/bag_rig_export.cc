@@ -78,7 +78,7 @@ class ImageWriter {
   }
 
   void say_broken(std::size_t camera, const std::string& reason) {
-    ++result_.broken;
+    ++result_.undecodable_images;
     auto& known = reasons_[camera];
     if (known.second++ == 0) known.first = reason;
   }

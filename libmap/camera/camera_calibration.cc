@@ -169,8 +169,8 @@ BoardFit fit_from_many_starts(const BoardCorners& corners, int width, int height
   camera.distortion_model = distortion_of(lens);
   camera.distortion.assign(lens_terms(lens), 0.0);
   std::vector<std::pair<double, BoardFit>> starts;
-  for (double share = 0.2; share < 2.5; share *= 1.2) {
-    camera.fx = camera.fy = share * width;
+  for (double fraction = 0.2; fraction < 2.5; fraction *= 1.2) {
+    camera.fx = camera.fy = fraction * width;
     const std::optional<BoardFit> fit = with_poses(camera, corners);
     if (!fit) continue;
     const double error = robust_error(*fit, corners);
@@ -225,8 +225,8 @@ void add_coverage(CameraCalibrationResult& result) {
       low = low.min(corner.array());
       high = high.max(corner.array());
     }
-  result.corners_width_share = (high.x() - low.x()) / result.camera.width;
-  result.corners_height_share = (high.y() - low.y()) / result.camera.height;
+  result.width_coverage = (high.x() - low.x()) / result.camera.width;
+  result.height_coverage = (high.y() - low.y()) / result.camera.height;
 }
 
 // Returns true if both images show the same corners, in either order.
@@ -409,8 +409,8 @@ GrayImage stretch_contrast(const Image<std::uint16_t>& image) {
   const double low = percentile(1);
   const double high = std::max(percentile(99), low + 1);
   for (std::size_t n = 0; n < image.pixels.size(); ++n) {
-    const double share = std::clamp((image.pixels[n] - low) / (high - low), 0.0, 1.0);
-    gray.pixels[n] = static_cast<std::uint8_t>(std::lround(255 * share));
+    const double fraction = std::clamp((image.pixels[n] - low) / (high - low), 0.0, 1.0);
+    gray.pixels[n] = static_cast<std::uint8_t>(std::lround(255 * fraction));
   }
   return gray;
 }

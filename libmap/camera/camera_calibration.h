@@ -76,10 +76,10 @@ struct CameraCalibrationResult {
   // Standard deviations of fx fy cx cy and the terms of `camera.distortion`, for the noise
   // estimated from the residuals.
   std::vector<double> deviations{};
-  double rms_px = 0.0;               // RMS distance between detected and projected corners
-  double sigma_px = 0.0;             // noise of one coordinate of a corner
-  double corners_width_share = 0.0;  // share of the image's width and height spanned by the corners
-  double corners_height_share = 0.0;
+  double rms_px = 0.0;          // RMS distance between detected and projected corners
+  double sigma_px = 0.0;        // noise of one coordinate of a corner
+  double width_coverage = 0.0;  // share of the image's width and height spanned by the corners
+  double height_coverage = 0.0;
   std::vector<CalibratedImage> images{};
   std::vector<std::string> rejected{};  // above max_image_error_px
   std::vector<std::string> repeated{};  // duplicates of earlier images

@@ -232,8 +232,8 @@ std::string quoted(const std::string& text) {
 
 }  // namespace
 
-Pose CameraFile::color_from_depth_at(double stamp_s, double depth_later_s) const {
-  const double delay_s = depth_delay_s + depth_later_s;
+Pose CameraFile::color_from_depth_at(double stamp_s, double depth_stamp_offset_s) const {
+  const double delay_s = depth_delay_s + depth_stamp_offset_s;
   const auto motion = std::lower_bound(
       motions.begin(), motions.end(), stamp_s,
       [](const FrameMotion& frame, double stamp) { return frame.stamp_s < stamp; });

@@ -72,8 +72,8 @@ struct CameraFile {
   std::vector<std::string> findings{};  // results of the estimation, one sentence each
 
   // Pose of the depth camera in the frame of this stamp, including the motion during the delay. The
-  // base does not move in frames that are not in `motions`. `depth_later_s` as in RgbdFrame.
-  Pose color_from_depth_at(double stamp_s, double depth_later_s = 0.0) const;
+  // base does not move in frames that are not in `motions`. `depth_stamp_offset_s` as in RgbdFrame.
+  Pose color_from_depth_at(double stamp_s, double depth_stamp_offset_s = 0.0) const;
   bool changes_depth() const {
     return !depth.empty() || !color_from_depth.matrix().isIdentity(0.0) ||
            (depth_delay_s != 0.0 && !motions.empty());

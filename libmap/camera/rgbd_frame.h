@@ -24,7 +24,7 @@ struct StereoCamera {
 struct RgbdFrame {
   int node = 0;
   double stamp_s = 0.0;
-  double depth_later_s = 0.0;   // stamp of depth minus stamp of color, if both are known
+  double depth_stamp_offset_s = 0.0;  // stamp of depth minus stamp of color, if both are known
   std::vector<Camera> cameras;  // of the color images; of the depth images if there is no color
   ColorImage color;             // empty if not stored or not requested
   DepthImage depth;

@@ -29,10 +29,12 @@ void bind(ParameterTable& table, SensorModel& model) {
   table.add("rolling_shutter_s", model.rolling_shutter_s, not_negative,
             "time from the first to the last row of the color image, s");
   table.add("refine.frame_time_s", model.frame_time_s, positive, "time between two frames, s");
-  table.add("refine.max_bend_m", model.max_depth_correction_m, not_negative,
+  table.add_former_key("refine.max_bend_m", "refine.max_depth_correction_m");
+  table.add("refine.max_depth_correction_m", model.max_depth_correction_m, not_negative,
             "maximum systematic depth error: constant term, m");
-  table.add("refine.bend_of_range", model.max_depth_correction_per_m, not_negative,
-            "maximum systematic depth error: term proportional to range, m per m");
+  table.add_former_key("refine.bend_of_range", "refine.max_depth_correction_of_range");
+  table.add("refine.max_depth_correction_of_range", model.max_depth_correction_of_range,
+            not_negative, "maximum systematic depth error: term proportional to range, m per m");
 }
 
 std::filesystem::path sensor_file(const std::string& name) {

@@ -13,15 +13,15 @@ std::uint64_t machine_memory() {
 
 MemoryBudget::MemoryBudget() : MemoryBudget(machine_memory() / 8) {}
 
-MemoryBudget::Share MemoryBudget::take(std::uint64_t bytes) {
-  const std::uint64_t share = std::min(bytes, bytes_);
+MemoryBudget::Reservation MemoryBudget::take(std::uint64_t bytes) {
+  const std::uint64_t reservation = std::min(bytes, bytes_);
   std::unique_lock lock(mutex_);
-  returned_.wait(lock, [&] { return share <= free_; });
-  free_ -= share;
-  return {*this, share};
+  returned_.wait(lock, [&] { return reservation <= free_; });
+  free_ -= reservation;
+  return {*this, reservation};
 }
 
-MemoryBudget::Share::~Share() {
+MemoryBudget::Reservation::~Reservation() {
   {
     const std::lock_guard lock(budget_.mutex_);
     budget_.free_ += bytes_;

@@ -23,22 +23,22 @@ class MemoryBudget {
   MemoryBudget(const MemoryBudget&) = delete;
   MemoryBudget& operator=(const MemoryBudget&) = delete;
 
-  class Share {
+  class Reservation {
    public:
-    ~Share();
-    Share(const Share&) = delete;
-    Share& operator=(const Share&) = delete;
+    ~Reservation();
+    Reservation(const Reservation&) = delete;
+    Reservation& operator=(const Reservation&) = delete;
 
    private:
     friend class MemoryBudget;
-    Share(MemoryBudget& budget, std::uint64_t bytes) : budget_(budget), bytes_(bytes) {}
+    Reservation(MemoryBudget& budget, std::uint64_t bytes) : budget_(budget), bytes_(bytes) {}
 
     MemoryBudget& budget_;
     std::uint64_t bytes_;
   };
 
   // Blocks until the bytes are free. A request above the whole budget waits for the whole budget.
-  [[nodiscard]] Share take(std::uint64_t bytes);
+  [[nodiscard]] Reservation take(std::uint64_t bytes);
 
  private:
   std::mutex mutex_;

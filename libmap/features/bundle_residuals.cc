@@ -37,8 +37,8 @@ bool CalibratedFeature::evaluate(const Pose& map_from_base, const Vector6d& moti
   Eigen::Matrix3d by_base = camera_from_base_;
   double added = calibrated_.added_m;
   if (calibrated_.timing) {
-    moving.time_s = camera_params[timing_at + 1] * calibrated_.row_share;
-    moving.later_s = camera_params[timing_at] + calibrated_.depth_later_s - moving.time_s;
+    moving.time_s = camera_params[timing_at + 1] * calibrated_.image_row_fraction;
+    moving.later_s = camera_params[timing_at] + calibrated_.depth_stamp_offset_s - moving.time_s;
     moving.velocity = motion.head<3>() + motion.tail<3>().cross(in_base);
     by_base -= moving.time_s * camera_from_base_ * cross_matrix(motion.tail<3>());
     // Registration step caused by a motion: motion_in_camera, transposed.
@@ -104,7 +104,8 @@ bool CalibratedFeature::evaluate(const Pose& map_from_base, const Vector6d& moti
   const Eigen::Vector3d by_delay(0.0, 0.0, -weight_.z() * moving.added_by_time);
   result.by_camera.col(timing_at) = by_delay;
   result.by_camera.col(timing_at + 1) =
-      -calibrated_.row_share * (by_camera * (camera_from_base_ * moving.velocity) + by_delay);
+      -calibrated_.image_row_fraction *
+      (by_camera * (camera_from_base_ * moving.velocity) + by_delay);
   return true;
 }
 

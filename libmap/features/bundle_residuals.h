@@ -30,8 +30,8 @@ struct CalibratedObservation {
   double added_m = 0.0;                 // change of the depth by the known registration and timing
   Vector6d by_step = Vector6d::Zero();  // derivative of the depth by a registration step
   Vector6d known_step = Vector6d::Zero();  // registration step equal to the known timing
-  double row_share = 0.0;                  // row_fraction
-  double depth_later_s = 0.0;              // FrameFeatures::depth_later_s
+  double image_row_fraction = 0.0;         // row_fraction
+  double depth_stamp_offset_s = 0.0;       // FrameFeatures::depth_stamp_offset_s
 };
 
 // Indices of a camera's parameters: step of the intrinsics (4), step of the registration (6),

@@ -150,7 +150,7 @@ std::string feature_key(const RgbdFrame& frame, const FeatureOptions& options) {
   bind(table, copy);
   for (const auto& [key, value] : table.values())
     bytes.append("\n").append(key).append("=").append(value);
-  for (const double number : {options.planes.min_pair_share, options.planes.max_incidence_deg})
+  for (const double number : {options.planes.min_pair_fraction, options.planes.max_incidence_deg})
     append(bytes, number);
   append(bytes, options.planes.radius_px);
   for (const Camera& camera : frame.cameras) append(bytes, camera);

@@ -39,11 +39,11 @@ class FeatureSets {
     if (one == other) return Join::joined;
     Join result = Join::joined;
     for (const std::uint32_t member : members(other))
-      for (const std::uint32_t its : members(one)) {
+      for (const std::uint32_t own : members(one)) {
         const std::size_t frame = frame_of_[member];
-        const std::size_t its_frame = frame_of_[its];
-        if (frame == its_frame) return Join::conflict;
-        if (linked != nullptr && !linked->contains(std::minmax(frame, its_frame)))
+        const std::size_t own_frame = frame_of_[own];
+        if (frame == own_frame) return Join::conflict;
+        if (linked != nullptr && !linked->contains(std::minmax(frame, own_frame)))
           result = Join::unlinked;
       }
     if (result != Join::joined) return result;
@@ -134,7 +134,7 @@ const std::vector<FeatureMatch>* known_matches(const KnownMatches* known, const 
 // `counted` is in the order of RelativePoseOutcome.
 void count(RelativePoseOutcome outcome, RejectionCounts& counts) {
   constexpr std::array counted = {&RejectionCounts::accepted, &RejectionCounts::too_few_matches,
-                                  &RejectionCounts::too_few_inliers, &RejectionCounts::narrow,
+                                  &RejectionCounts::too_few_inliers, &RejectionCounts::degenerate,
                                   &RejectionCounts::not_converged};
   ++counts.candidates;
   ++(counts.*counted.at(static_cast<std::size_t>(outcome)));
@@ -186,7 +186,7 @@ std::optional<Pose> guess_motion(const std::vector<FrameFeatures>& frames, const
                                  const MatchingOptions& options, std::uint64_t seed) {
   MatchingOptions few = options;
   few.estimate.min_inliers = few_matches;
-  few.estimate.min_inlier_share = 0.0;
+  few.estimate.min_inlier_fraction = 0.0;
   few.estimate.min_spread = 0.0;
   const PairVerification verified = verify_pairs(frames, {pair}, few, seed);
   if (verified.links.empty()) return std::nullopt;

@@ -38,7 +38,7 @@ struct RejectionCounts {
   std::size_t candidates = 0;
   std::size_t too_few_matches = 0;
   std::size_t too_few_inliers = 0;
-  std::size_t narrow = 0;  // inliers in one spot or on one line of the image
+  std::size_t degenerate = 0;  // inliers in one spot or on one line of the image
   std::size_t not_converged = 0;
   std::size_t against_graph = 0;  // not consistent with the graph's estimate and covariance
   std::size_t unconfirmed = 0;    // the only link between two components of the graph

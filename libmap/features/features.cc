@@ -182,7 +182,7 @@ FoundFeatures features_of(const ScanSource& scan, int node, const FeatureOptions
   for (const CameraView& view : views) {
     frame.cameras.push_back(view.color_camera);
     if (result.from_cache) continue;
-    const MemoryBudget::Share share = memory.take(bytes_to_find(view));
+    const MemoryBudget::Reservation reservation = memory.take(bytes_to_find(view));
     const DepthPlanes planes =
         fit_depth_planes(view.depth, *rays.rays_of(view.depth_camera), options.planes);
     frame.surfaces.emplace_back(planes, view.depth_camera, options.planes.noise,
@@ -192,8 +192,8 @@ FoundFeatures features_of(const ScanSource& scan, int node, const FeatureOptions
   if (!result.from_cache) cache.write(key, frame);
   for (Feature& feature : frame.features)
     if (!has_plane(frame, feature)) feature.depth_noise_m = unknown_depth_m;
-  frame.depth_later_s = read.depth_later_s;
-  frame.stamp_s = read.stamp_s - read.depth_later_s;
+  frame.depth_stamp_offset_s = read.depth_stamp_offset_s;
+  frame.stamp_s = read.stamp_s - read.depth_stamp_offset_s;
   return result;
 }
 

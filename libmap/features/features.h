@@ -57,9 +57,9 @@ struct Feature {
 
 struct FrameFeatures {
   int node = 0;
-  double stamp_s = 0.0;         // time of the color images
-  double depth_later_s = 0.0;   // RgbdFrame::depth_later_s
-  std::vector<Camera> cameras;  // of the color images
+  double stamp_s = 0.0;               // time of the color images
+  double depth_stamp_offset_s = 0.0;  // RgbdFrame::depth_stamp_offset_s
+  std::vector<Camera> cameras;        // of the color images
   std::vector<Feature> features;
   FeatureType type = FeatureType::sift;
   // 128 (SIFT) or 32 (ORB) bytes per feature; may be dropped after the search for similar frames.

@@ -8,8 +8,8 @@ namespace libmap {
 
 namespace {
 
-constexpr double plane_radius_px = 3.0;    // of the disc that a plane is fitted to
-constexpr double unmeasured_share = 0.01;  // of the depths, ignored at either end of the range
+constexpr double plane_radius_px = 3.0;       // of the disc that a plane is fitted to
+constexpr double unmeasured_fraction = 0.01;  // of the depths, ignored at either end of the range
 
 // Finds the depth plane that a feature's ray intersects if the depth camera is at
 // `color_from_depth`. Returns false if there is none.
@@ -46,14 +46,14 @@ DepthCorrection correction_for(const std::vector<FrameFeatures>& frames, std::si
       if (feature.camera == camera) depths.push_back(feature.depth_m);
   DepthCorrection correction;
   if (depths.empty()) return correction;
-  const auto quantile = [&](double share) {
+  const auto quantile = [&](double fraction) {
     const auto at = depths.begin() +
-                    static_cast<std::ptrdiff_t>(share * static_cast<double>(depths.size() - 1));
+                    static_cast<std::ptrdiff_t>(fraction * static_cast<double>(depths.size() - 1));
     std::nth_element(depths.begin(), at, depths.end());
     return *at;
   };
-  const float nearest = quantile(unmeasured_share);
-  const float farthest = quantile(1.0 - unmeasured_share);
+  const float nearest = quantile(unmeasured_fraction);
+  const float farthest = quantile(1.0 - unmeasured_fraction);
   if (!(farthest > nearest)) return correction;
   const double reach = static_cast<double>(farthest) - static_cast<double>(nearest);
   const double pieces = std::clamp(std::ceil(reach / knot_m), 1.0, 100.0);
@@ -80,8 +80,9 @@ void register_surfaces(FrameFeatures& frame, const SensorCalibration& calibratio
     const auto motion = calibration.motion.find(frame.node);
     if (n < calibration.timing.size() && motion != calibration.motion.end())
       camera.base_from_camera =
-          moved(Pose::Identity(),
-                (calibration.timing[n].depth_delay_s + frame.depth_later_s) * motion->second) *
+          moved(
+              Pose::Identity(),
+              (calibration.timing[n].depth_delay_s + frame.depth_stamp_offset_s) * motion->second) *
           camera.base_from_camera;
     frame.surfaces[n].set_camera(camera);
   }
@@ -145,22 +146,23 @@ FrameFeatures calibrated_features(const FrameFeatures& frame,
   FrameFeatures result;
   result.node = frame.node;
   result.stamp_s = frame.stamp_s;
-  result.depth_later_s = frame.depth_later_s;
+  result.depth_stamp_offset_s = frame.depth_stamp_offset_s;
   result.cameras = frame.cameras;
   result.features = frame.features;
   // Pixels are those of the stored camera.
   const std::vector<Pose> motions = row_motions(frame, calibration);
   if (!calibration.color_from_depth.empty() || !motions.empty())
-    for (Feature& its : result.features) {
+    for (Feature& feature : result.features) {
       const RegisteredDepth depth =
-          registered_depth(frame, its, color_from_depth_of(frame, its, calibration));
-      its.depth_m += static_cast<float>(depth.added_m);
-      if (!depth.known) its.depth_noise_m = unknown_depth_m;
+          registered_depth(frame, feature, color_from_depth_of(frame, feature, calibration));
+      feature.depth_m += static_cast<float>(depth.added_m);
+      if (!depth.known) feature.depth_noise_m = unknown_depth_m;
     }
   if (!calibration.depth.empty()) correct_depth(result, calibration.depth);
   if (!calibration.intrinsics.empty()) {
-    for (Feature& its : result.features)
-      its.ray = moved_ray(its, frame.cameras[its.camera], calibration.intrinsics[its.camera]);
+    for (Feature& feature : result.features)
+      feature.ray =
+          moved_ray(feature, frame.cameras[feature.camera], calibration.intrinsics[feature.camera]);
     for (std::size_t n = 0; n < frame.cameras.size(); ++n)
       result.cameras[n] = moved(frame.cameras[n], calibration.intrinsics[n]);
   }
@@ -217,7 +219,7 @@ Pose color_from_depth_of(const FrameFeatures& frame, const Feature& feature,
     return pose;
   const Camera& camera = frame.cameras[feature.camera];
   const CameraTiming& timing = calibration.timing[feature.camera];
-  const double later_s = timing.depth_delay_s + frame.depth_later_s -
+  const double later_s = timing.depth_delay_s + frame.depth_stamp_offset_s -
                          timing.rolling_shutter_s * row_fraction(feature, camera);
   return moved(Pose::Identity(), later_s * motion_in_camera(camera, motion->second)) * pose;
 }

@@ -25,7 +25,7 @@ struct IntrinsicsStep {
 // the time of the frame's pose. All depth is measured at one time.
 struct CameraTiming {
   double depth_delay_s = 0.0;      // delay of the depth relative to the middle image row, in
-                                   // addition to FrameFeatures::depth_later_s
+                                   // addition to FrameFeatures::depth_stamp_offset_s
   double rolling_shutter_s = 0.0;  // time from the first to the last image row
 };
 

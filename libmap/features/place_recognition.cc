@@ -132,7 +132,8 @@ std::vector<std::vector<SimilarFrame>> find_similar_frames(const std::vector<Fra
     for (std::size_t f = begin; f < end; ++f) {
       std::vector<double> cosine(frames.size(), 0.0);
       for (const auto& [word, weight] : bags[f])
-        for (const auto& [other, its] : frames_of_word.at(word)) cosine[other] += weight * its;
+        for (const auto& [other, other_weight] : frames_of_word.at(word))
+          cosine[other] += weight * other_weight;
       append_best(
           cosine, count, [&](std::size_t other) { return other != f; }, similar[f]);
       if (!parts.empty())

@@ -96,9 +96,9 @@ class RelativePoseEstimate {
 
  private:
   std::size_t least() const {
-    return std::max(
-        enough_, static_cast<std::size_t>(
-                     std::ceil(options_.min_inlier_share * static_cast<double>(matches_.size()))));
+    return std::max(enough_,
+                    static_cast<std::size_t>(std::ceil(options_.min_inlier_fraction *
+                                                       static_cast<double>(matches_.size()))));
   }
 
   std::vector<std::size_t> inliers_of(const Pose& pose, double max_chi_square) const {
@@ -149,8 +149,9 @@ bool RelativePoseEstimate::sample(std::uint64_t seed) {
     inliers_ = std::move(inliers);
     pose_ = motion;
     // Congruent triples are correct more often than single matches, so this stops late.
-    const double share = static_cast<double>(inliers_.size()) / static_cast<double>(pairs.size());
-    needed = std::max(20.0, std::log(1e-4) / std::log(1.0 - std::pow(share, 3) + 1e-12));
+    const double fraction =
+        static_cast<double>(inliers_.size()) / static_cast<double>(pairs.size());
+    needed = std::max(20.0, std::log(1e-4) / std::log(1.0 - std::pow(fraction, 3) + 1e-12));
   }
   return inliers_.size() >= enough_ / 2;
 }

@@ -36,11 +36,11 @@ MatchResidual match_residual(const FrameFeatures& a, const FrameFeatures& b,
                              bool with_jacobian = false);
 
 struct RelativePoseOptions {
-  int ransac_iterations = 400;     // >= 1
-  int min_inliers = 25;            // >= 6
-  double min_inlier_share = 0.25;  // >= 0: minimum share of the matches
-  double max_chi_square = 14.16;   // of a match's three residuals; 99.7 % of true matches are below
-  double min_spread = 0.06;        // of RelativePose::spread
+  int ransac_iterations = 400;        // >= 1
+  int min_inliers = 25;               // >= 6
+  double min_inlier_fraction = 0.25;  // >= 0: minimum share of the matches
+  double max_chi_square = 14.16;  // of a match's three residuals; 99.7 % of true matches are below
+  double min_spread = 0.06;       // of RelativePose::spread
 };
 
 // Outcome of the estimation. degenerate: the inliers are in one spot or on one line of the image.

@@ -55,14 +55,14 @@ void check(const DepthFusionOptions& options) {
 
 std::string node_name(int node) { return "node " + std::to_string(node); }
 
-// Contribution of one frame to a coarse surface and the survey.
+// Contribution of one frame to a coarse surface and the frame selection.
 struct CoarseFrame {
   SurfaceVoxels::Frame voxels;
   DepthPixelCounts pixels;
   std::size_t number = 0;      // index of the frame
-  FusionFrame frame;           // survey only
-  FrameCoverage coverage;      // survey only
-  std::optional<Error> fault;  // survey only; none for a usable frame
+  FusionFrame frame;           // selection only
+  FrameCoverage coverage;      // selection only
+  std::optional<Error> fault;  // selection only; none for a usable frame
 };
 
 DepthFusionOptions with_sensor(DepthFusionOptions options) {
@@ -73,23 +73,23 @@ DepthFusionOptions with_sensor(DepthFusionOptions options) {
 class Fusion {
  public:
   Fusion(const ScanSource& scan, const Trajectory& world_from_base,
-         const DepthFusionOptions& options, Progress& progress, const FusionSurvey* known)
+         const DepthFusionOptions& options, Progress& progress, const FusionPlan* known)
       : options_(with_sensor(options)),
         progress_(&progress),
         world_from_base_(world_from_base),
         images_(scan, {.stereo = options.stereo, .strict = options.strict}) {
     check(options);
     if (known != nullptr) {
-      survey_ = *known;
+      plan_ = *known;
     } else {
       const std::vector<FusionFrame> given = place_frames();
-      timed("survey", [&] { survey(given); });
+      timed("frame selection", [&] { select_frames(given); });
       timed("registration", [&] { register_frames(); });
     }
     if (frames().empty()) throw no_frames(world_from_base.size());
   }
 
-  const FusionSurvey& survey() const { return survey_; }
+  const FusionPlan& plan() const { return plan_; }
   const std::vector<XyTile>& tiles() const { return tiles_; }
   void make_tiles(double tile_m);
   TileFusion::Tile make(std::size_t tile);
@@ -106,19 +106,19 @@ class Fusion {
   void timed(const char* name, const Step& step) {
     libmap::timed(timings_s_, name, step);
   }
-  const std::vector<FusionFrame>& frames() const { return survey_.frames; }
+  const std::vector<FusionFrame>& frames() const { return plan_.frames; }
 
   Error no_frames(std::size_t poses) const {
-    if (survey_.skipped.empty())
+    if (plan_.skipped.empty())
       return Error(poses == 0 ? "no frame can be fused: there are no poses"
                               : "no frame can be fused: none has depth");
     return Error("none of " + std::to_string(poses) +
-                 " frames can be used; the first: " + survey_.skipped.front().second.what());
+                 " frames can be used; the first: " + plan_.skipped.front().second.what());
   }
 
   void skip(int node, const Error& fault) {
     if (options_.strict) throw fault;
-    survey_.skipped.emplace_back(node, fault);
+    plan_.skipped.emplace_back(node, fault);
   }
 
   std::vector<FusionFrame> place_frames() {
@@ -129,11 +129,11 @@ class Fusion {
         continue;
       }
       if (frames.empty())
-        survey_.grid_origin =
+        plan_.grid_origin =
             (pose.world_from_base.translation() / options_.voxel_size_m).array().floor() *
             options_.voxel_size_m;
       frames.push_back(
-          frame_at(pose, survey_.grid_origin, options_.voxel_size_m, options_.planes.max_depth_m));
+          frame_at(pose, plan_.grid_origin, options_.voxel_size_m, options_.planes.max_depth_m));
     }
     std::stable_sort(frames.begin(), frames.end(),
                      [](const FusionFrame& a, const FusionFrame& b) { return a.node < b.node; });
@@ -164,7 +164,8 @@ class Fusion {
   // Adds the planes of one frame's pixels that are in `cells`.
   void add_frame(const RgbdFrame& depth, const Pose& grid_from_base, const TileMask& cells,
                  FittedPixels fitted, CoarseFrame& coarse) {
-    const MemoryBudget::Share share = memory_.take(coarse_pixel_bytes * depth.depth.pixels.size());
+    const MemoryBudget::Reservation reservation =
+        memory_.take(coarse_pixel_bytes * depth.depth.pixels.size());
     SurfaceVoxels voxels;
     for (const CameraView& view : camera_views(depth)) {
       const auto rays = images_.rays_of(view.depth_camera);
@@ -177,7 +178,7 @@ class Fusion {
   }
 
   // Determines the frame's reach and coverage, or the fault that makes it unusable.
-  void survey_frame(CoarseFrame& coarse) {
+  void measure_frame(CoarseFrame& coarse) {
     FusionFrame& frame = coarse.frame;
     const std::shared_ptr<const RgbdFrame> depth = images_.depth_of(frame.node);
     images_.measure_reach(*depth, options_.planes.max_depth_m, frame);
@@ -192,15 +193,15 @@ class Fusion {
   }
 
   // Sorts frames into usable, redundant and skipped ones, comparing each with earlier frames.
-  void survey(const std::vector<FusionFrame>& given) {
-    progress_->begin("survey", given.size());
+  void select_frames(const std::vector<FusionFrame>& given) {
+    progress_->begin("frame selection", given.size());
     ViewCoverage known;
     for (std::size_t first = 0; first < given.size(); first += frames_in_flight) {
       std::vector<CoarseFrame> parts(std::min(frames_in_flight, given.size() - first));
       parallel_each(parts.size(), [&](std::size_t n) {
         parts[n].frame = given[first + n];
         try {
-          survey_frame(parts[n]);
+          measure_frame(parts[n]);
         } catch (const Error& error) {
           if (error.kind() != ErrorKind::bad_input) throw;
           parts[n].fault = error;
@@ -209,15 +210,15 @@ class Fusion {
       for (const CoarseFrame& part : parts) {
         if (part.fault) {
           skip(part.frame.node, *part.fault);
-        } else if (options_.enough_views > 0.0 && survey_.frames.size() > 1 &&
+        } else if (options_.enough_views > 0.0 && plan_.frames.size() > 1 &&
                    !known.is_improved_by(part.coverage, options_.enough_views)) {
-          survey_.redundant.push_back(part.frame.node);
+          plan_.redundant.push_back(part.frame.node);
         } else {
-          survey_.frames.push_back(part.frame);
+          plan_.frames.push_back(part.frame);
           known.add(part.coverage);
         }
       }
-      if (!survey_.redundant.empty()) images_.evict_others(frames());
+      if (!plan_.redundant.empty()) images_.evict_others(frames());
       progress_->advance(parts.size());
     }
   }
@@ -283,28 +284,28 @@ class Fusion {
   void register_frames() {
     if (frames().size() < 2) return;
     // Refined poses already use depth, so only color can confirm a registration.
-    survey_.registration_rejected = options_.refined_poses && !images_.has_color(frames());
-    for (int round = 1; round <= options_.registration_rounds && !survey_.registration_rejected;
+    plan_.registration_rejected = options_.refined_poses && !images_.has_color(frames());
+    for (int round = 1; round <= options_.registration_rounds && !plan_.registration_rejected;
          ++round) {
       progress_->begin("registration", 2 * frames().size());
       sample_surface();
       const FrameRegistration found = registration(round);
-      if (round == 1) survey_.disagreement_before_m = found.disagreement_before_m;
-      survey_.disagreement_after_m = found.disagreement_before_m;
+      if (round == 1) plan_.disagreement_before_m = found.disagreement_before_m;
+      plan_.disagreement_after_m = found.disagreement_before_m;
       // Correct poses remain unchanged.
       if (!(found.correction_m > min_correction_voxels * options_.voxel_size_m)) break;
       std::vector<FusionFrame> moved = frames();
       for (std::size_t n = 0; n < moved.size(); ++n) move(moved[n], found.corrected_from_given[n]);
       const RegistrationCheck check =
           check_registration(images_, frames(), moved, options_.planes, options_.voxel_size_m);
-      if (round == 1) survey_.registration_check = check;
+      if (round == 1) plan_.registration_check = check;
       if (!check.is_accepted(options_.refined_poses)) {
-        survey_.registration_rejected = round == 1;
+        plan_.registration_rejected = round == 1;
         break;
       }
-      survey_.frames = std::move(moved);
-      survey_.disagreement_after_m = found.disagreement_after_m;
-      ++survey_.registration_rounds;
+      plan_.frames = std::move(moved);
+      plan_.disagreement_after_m = found.disagreement_after_m;
+      ++plan_.registration_rounds;
     }
     sample_ = {};
   }
@@ -321,10 +322,10 @@ class Fusion {
           std::max(disc_m, frame.max_pixel_pitch * min_disc_pixels * options_.planes.max_depth_m);
     }
     const double unit = std::min(tile_m, options_.voxel_size_m);
-    if (!(survey_.grid_origin.cwiseAbs().maxCoeff() / unit < 1e15))
+    if (!(plan_.grid_origin.cwiseAbs().maxCoeff() / unit < 1e15))
       throw Error("poses are too far from the origin for tiles",
                   {.field = node_name(frames().front().node)});
-    return {tile_m, options_.voxel_size_m, survey_.grid_origin, shift_m, disc_m};
+    return {tile_m, options_.voxel_size_m, plan_.grid_origin, shift_m, disc_m};
   }
 
   const TrajectoryPose& given_pose(int node) const;
@@ -340,7 +341,7 @@ class Fusion {
   Trajectory world_from_base_;
   FusionFrames images_;
   MemoryBudget memory_;
-  FusionSurvey survey_;
+  FusionPlan plan_;
   TileMask sampled_;  // squares of the x-y plane used for registration
   SurfaceVoxels sample_;
   std::optional<FusionTiling> tiling_;
@@ -359,9 +360,9 @@ const TrajectoryPose& Fusion::given_pose(int node) const {
 // Applies the correction of the used frame with the nearest number to each redundant frame.
 void Fusion::add_redundant_poses(Trajectory& poses) const {
   const Trajectory used = poses;
-  for (const int node : survey_.redundant) {
+  for (const int node : plan_.redundant) {
     TrajectoryPose pose = given_pose(node);
-    if (survey_.registration_rounds > 0) {
+    if (plan_.registration_rounds > 0) {
       const auto nearest = std::min_element(used.begin(), used.end(), [&](auto& a, auto& b) {
         return std::abs(a.node - node) < std::abs(b.node - node);
       });
@@ -378,21 +379,21 @@ void Fusion::add_redundant_poses(Trajectory& poses) const {
 // Fills the poses and all metrics of the frames.
 DepthFusionResult Fusion::report() const {
   DepthFusionResult result;
-  result.redundant_frames = survey_.redundant.size();
+  result.redundant_frames = plan_.redundant.size();
   result.frames = frames().size();
-  result.registration_rounds = survey_.registration_rounds;
-  result.registration_rejected = survey_.registration_rejected;
-  result.registration_check = survey_.registration_check;
-  result.disagreement_before_m = survey_.disagreement_before_m;
-  result.disagreement_after_m = survey_.disagreement_after_m;
-  result.skipped = survey_.skipped;
+  result.registration_rounds = plan_.registration_rounds;
+  result.registration_rejected = plan_.registration_rejected;
+  result.registration_check = plan_.registration_check;
+  result.disagreement_before_m = plan_.disagreement_before_m;
+  result.disagreement_after_m = plan_.disagreement_after_m;
+  result.skipped = plan_.skipped;
   result.timings_s = timings_s_;
   double turns = 0.0;
   double shifts = 0.0;
   for (const FusionFrame& frame : frames()) {
     TrajectoryPose pose = given_pose(frame.node);
-    if (survey_.registration_rounds > 0) {
-      const Pose used = Eigen::Translation3d(survey_.grid_origin) * frame.grid_from_base;
+    if (plan_.registration_rounds > 0) {
+      const Pose used = Eigen::Translation3d(plan_.grid_origin) * frame.grid_from_base;
       const Pose given_from_used = pose.world_from_base.inverse() * used;
       pose.world_from_base = used;
       const double turn = Eigen::AngleAxisd(given_from_used.linear()).angle();
@@ -427,9 +428,9 @@ void Fusion::make_tiles(double tile_m) {
     });
     if (first) members[*first].counted.push_back(n);
   }
-  for (auto& [tile, its] : members) {
+  for (auto& [tile, tile_members] : members) {
     tiles_.push_back(tile);
-    members_.push_back(std::move(its));
+    members_.push_back(std::move(tile_members));
   }
 }
 
@@ -509,8 +510,8 @@ PointCloud Fusion::make_cloud(const TileMask& cells, const RefinedSurface& surfa
   SurfacePoints points =
       make_surface_points(surface, options_.voxel_size_m, cells, options_.points);
   counts.points = points.counts;
-  counts.points_made = points.cloud.size();
-  for (Eigen::Vector3d& position : points.cloud.positions) position += survey_.grid_origin;
+  counts.output_points = points.cloud.size();
+  for (Eigen::Vector3d& position : points.cloud.positions) position += plan_.grid_origin;
   return std::move(points.cloud);
 }
 
@@ -533,14 +534,14 @@ class TileFusion::Work : public Fusion {
 
 TileFusion::TileFusion(const ScanSource& scan, const Trajectory& world_from_base,
                        const DepthFusionOptions& options, double tile_m, Progress& progress,
-                       const FusionSurvey* known)
+                       const FusionPlan* known)
     : work_(std::make_unique<Work>(scan, world_from_base, options, progress, known)) {
   work_->make_tiles(tile_m);
 }
 
 TileFusion::~TileFusion() = default;
 
-const FusionSurvey& TileFusion::survey() const { return work_->survey(); }
+const FusionPlan& TileFusion::plan() const { return work_->plan(); }
 
 const std::vector<XyTile>& TileFusion::tiles() const { return work_->tiles(); }
 

@@ -64,7 +64,7 @@ struct FusionCounts {
   std::size_t occupied_voxels = 0;
   std::size_t elements = 0;  // surface elements, before points are selected
   SurfacePointCounts points;
-  std::size_t points_made = 0;
+  std::size_t output_points = 0;
 };
 void describe(ResultTable& table, const FusionCounts& counts);
 
@@ -90,7 +90,7 @@ struct RegistrationCheck {
 };
 
 // Result of the first step: usable frames with registered poses, common to all tiles.
-struct FusionSurvey {
+struct FusionPlan {
   // World position of the voxel grid's origin, near the first camera. Relative to it, single
   // precision is enough for scans at any offset.
   Eigen::Vector3d grid_origin = Eigen::Vector3d::Zero();
@@ -115,7 +115,7 @@ struct DepthFusionResult : FusionCounts {
   std::size_t redundant_frames = 0;
   // Registered poses of used and redundant frames, world from base, by ascending node.
   Trajectory poses;
-  // As in FusionSurvey; shift and turn are root mean squares over the frames.
+  // As in FusionPlan; shift and turn are root mean squares over the frames.
   int registration_rounds = 0;
   bool registration_rejected = false;
   RegistrationCheck registration_check{};
@@ -148,10 +148,10 @@ class TileFusion {
   // outlive this object. Throws as fuse_depth does, and if poses are too far from the origin.
   TileFusion(const ScanSource& scan, const Trajectory& world_from_base,
              const DepthFusionOptions& options, double tile_m, Progress& progress = no_progress(),
-             const FusionSurvey* known = nullptr);
+             const FusionPlan* known = nullptr);
   ~TileFusion();
 
-  const FusionSurvey& survey() const;        // for a later TileFusion
+  const FusionPlan& plan() const;            // for a later TileFusion
   const std::vector<XyTile>& tiles() const;  // tiles with frames, in ascending order
   struct Tile {
     PointCloud cloud;

@@ -16,13 +16,13 @@ void describe_surface(ResultTable& table, const FusionCounts& counts) {
             "number of elements dropped: too many views see through them");
   table.add("dropped_missed", points.missed, Merge::sum,
             "number of elements dropped: too many views have no depth there");
-  table.add("dropped_beside", points.contradicted, Merge::sum,
+  table.add("dropped_contradicted", points.contradicted, Merge::sum,
             "number of elements dropped: others around them are contradicted");
   table.add("dropped_beyond_edges", points.beyond_edge, Merge::sum,
             "number of points dropped: beyond an edge of the surface");
   table.add("merged", points.merged, Merge::sum,
             "number of elements merged with another one in the same voxel");
-  table.add("points", counts.points_made, Merge::sum, "number of points of the cloud");
+  table.add("points", counts.output_points, Merge::sum, "number of points of the cloud");
   table.add("points_beyond_edges", points.extended_points, Merge::sum,
             "number of points added beyond measured edges");
   table.add_hidden("max_views", points.max_views, Merge::max);
@@ -51,7 +51,8 @@ void bind(ParameterTable& table, DepthFusionOptions& options) {
             "standard deviation of measurements across the line of sight, pixels");
   table.add("plane_radius_px", planes.radius_px, {1, 7},
             "radius of the disc of pixels to which a plane is fitted, pixels");
-  table.add("min_pair_share", planes.min_pair_share, zero_to_one,
+  table.add_former_key("min_pair_share", "min_pair_fraction");
+  table.add("min_pair_fraction", planes.min_pair_fraction, zero_to_one,
             "minimum share of agreeing pairs of opposite neighbors for fitting a plane to a pixel");
   table.add("disc_radius_voxels", options.disc_radius_voxels, positive,
             "radius of the disc in which measurements are averaged, in voxels");

@@ -177,7 +177,7 @@ void PlaneFit::fit_pairs() {
   support_.assign(support_stride() * static_cast<std::size_t>(height_ + 2), 0);
   const std::vector<Loops::Offset> offsets = pair_offsets();
   const auto min_pairs =
-      static_cast<float>(options_.min_pair_share * static_cast<double>(offsets.size()));
+      static_cast<float>(options_.min_pair_fraction * static_cast<double>(offsets.size()));
   std::vector<std::uint8_t> wanted(stride_, 0);
   for (int y = 0; y < height_; ++y) {
     if (!only_.empty() && !mark_fours(&only_[at(0, y)], width_, wanted)) continue;

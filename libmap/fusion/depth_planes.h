@@ -21,8 +21,8 @@
 namespace libmap {
 
 struct DepthPlaneOptions : DepthSensor {
-  int radius_px = 3;            // 1 to 7: radius of the disc of pixels that a plane is fitted to
-  double min_pair_share = 0.5;  // minimum share of agreeing pairs of opposite pixels in the disc
+  int radius_px = 3;               // 1 to 7: radius of the disc of pixels that a plane is fitted to
+  double min_pair_fraction = 0.5;  // minimum share of agreeing pairs of opposite pixels in the disc
 };
 
 // Numbers of pixels by outcome.

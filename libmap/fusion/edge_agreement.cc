@@ -39,7 +39,7 @@ constexpr std::array<double, 7> coarse_factors = {1.0, 0.85, 0.9, 0.95, 1.05, 1.
 // A first search by so many edges ends the check if the displacement is below this share of the
 // smallest one that is reported.
 constexpr std::size_t quick_edges = 8000;
-constexpr double quick_share = 0.7;
+constexpr double quick_fraction = 0.7;
 // Registered scans, simulated and real, are up to 2.3 px (0.25 deg) and 4.1 standard errors off.
 constexpr double min_displacement_rad = 0.5 * std::numbers::pi / 180.0;
 constexpr double smallest_displacement_px = 3.0;
@@ -425,7 +425,7 @@ EdgeAgreement check_edge_agreement(const ScanSource& scan) {
   if (frames.size() < min_frames || found.edges < min_edges) return found;
   found.min_displacement_px = min_displacement_px(all);
   Alternative best = roughly_aligned(all, found.edges / quick_edges + 1);
-  if (distance_px(all, best, Alternative::Zero()) > quick_share * found.min_displacement_px) {
+  if (distance_px(all, best, Alternative::Zero()) > quick_fraction * found.min_displacement_px) {
     const std::array<Alternative, 2> by_half = {align(halves[0]), align(halves[1])};
     found.significance = significance_of(held_out_gains(halves, by_half));
     found.uncertainty_px = distance_px(all, by_half[0], by_half[1]);

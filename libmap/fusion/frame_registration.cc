@@ -35,7 +35,7 @@ class Adjustment {
         observations_(observations),
         centers_(centers),
         scatter2_(options.scatter_m * options.scatter_m),
-        share_(
+        information_factor_(
             std::min(1.0, options.independent_heights * static_cast<double>(centers.size()) /
                               static_cast<double>(std::max<std::size_t>(1, observations.size())))),
         weights_(observations.size()),
@@ -84,8 +84,8 @@ class Adjustment {
         find_offsets(element, off);
         for (std::size_t n = starts_[element]; n < starts_[element + 1]; ++n) {
           const double here = off[n - starts_[element]];
-          const double share = scatter2_ / (scatter2_ + here * here);
-          weights_[n] = information(observations_[n]) * share * share;
+          const double relative_weight = scatter2_ / (scatter2_ + here * here);
+          weights_[n] = information(observations_[n]) * relative_weight * relative_weight;
         }
       }
     });
@@ -146,7 +146,7 @@ class Adjustment {
     for (double& offset : offsets) offset -= mean;
   }
   double information(const SurfaceObservation& one) const {  // inverse variance
-    return share_ / (static_cast<double>(one.variance_m2) + scatter2_);
+    return information_factor_ / (static_cast<double>(one.variance_m2) + scatter2_);
   }
   // Derivative of the height by a rotation and a shift of its frame.
   Vector6d slope(std::size_t number) const {
@@ -223,8 +223,8 @@ class Adjustment {
   std::span<const SurfaceElement> elements_;
   std::span<const SurfaceObservation> observations_;
   std::span<const Eigen::Vector3d> centers_;
-  double scatter2_;  // m2
-  double share_;     // factor of the information of each observation
+  double scatter2_;            // m2
+  double information_factor_;  // factor of the information of each observation
   Vector6d prior_;
   std::vector<Vector6d> slopes_;     // of the observations; empty: recomputed each time
   std::vector<double> weights_;      // robust information of the observations

@@ -29,10 +29,10 @@ constexpr double min_shift_m = 0.1;
 constexpr double max_difference = 0.05;
 constexpr std::size_t min_measurements = 500;
 // Shares of contradicted measurements.
-constexpr double doubtful_share = 0.2;       // minimum for trying conventions
-constexpr double contradictory_share = 0.5;  // minimum for a warning without a convention
-constexpr double max_fitting_share = 0.5;    // maximum for a convention that fits
-constexpr double min_gain = 3.0;             // minimum ratio of differences, given to best
+constexpr double doubtful_fraction = 0.2;       // minimum for trying conventions
+constexpr double contradictory_fraction = 0.5;  // minimum for a warning without a convention
+constexpr double max_fitting_fraction = 0.5;    // maximum for a convention that fits
+constexpr double min_gain = 3.0;                // minimum ratio of differences, given to best
 
 // Converts poses from another convention; depth is multiplied by `depth_factor`.
 struct Convention {
@@ -180,7 +180,7 @@ std::vector<ViewedPair> read_pairs(const ScanSource& scan, const Trajectory& pos
 }  // namespace
 
 std::string PoseConsistency::warning() const {
-  const auto percent = [](double share) { return to_fixed_text(100.0 * share, 0) + " %"; };
+  const auto percent = [](double fraction) { return to_fixed_text(100.0 * fraction, 0) + " %"; };
   const std::string found = given.measurements == 0
                                 ? std::to_string(pairs) + " pairs of frames have no depth in common"
                                 : percent(given.contradicted) + " of the depth that " +
@@ -190,7 +190,8 @@ std::string PoseConsistency::warning() const {
     return "the poses fit " + to_fixed_text(given.difference / best.difference, 0) +
            " times better " + convention + "; " + found + ", and " + percent(best.contradicted) +
            " with it";
-  if (given.measurements < min_measurements || given.contradicted < contradictory_share) return {};
+  if (given.measurements < min_measurements || given.contradicted < contradictory_fraction)
+    return {};
   return found + ": poses, depth unit or calibration are wrong, and no usual convention fits";
 }
 
@@ -199,7 +200,7 @@ PoseConsistency check_pose_consistency(const ScanSource& scan, const Trajectory&
   PoseConsistency found;
   found.pairs = pairs.size();
   found.given = agreement_of(pairs, {"", [](const Pose& pose, const Pose&) { return pose; }});
-  if (pairs.empty() || found.given.contradicted < doubtful_share) return found;
+  if (pairs.empty() || found.given.contradicted < doubtful_fraction) return found;
   const std::vector<Convention> all = conventions();
   std::vector<DepthAgreement> agreements(all.size());
   parallel_each(all.size(), [&](std::size_t n) { agreements[n] = agreement_of(pairs, all[n]); });
@@ -211,7 +212,7 @@ PoseConsistency check_pose_consistency(const ScanSource& scan, const Trajectory&
       });
   if (best->measurements >= min_measurements &&
       2 * best->measurements >= found.given.measurements &&
-      best->contradicted < max_fitting_share && best->difference > 0.0 &&
+      best->contradicted < max_fitting_fraction && best->difference > 0.0 &&
       min_gain * best->difference < found.given.difference) {
     found.best = *best;
     found.convention = all[static_cast<std::size_t>(best - agreements.begin())].text;

@@ -21,7 +21,7 @@ constexpr double min_common_reach = 0.3;  // overlap of two boxes by the smaller
 constexpr float gate = 0.05F;             // maximum relative depth difference for comparing colors
 constexpr double cost_scale = 9.0;        // a cost is log(1 + chi-square / 9)
 constexpr double clear_deviations = 2.0;
-constexpr double clear_share = 0.005;
+constexpr double clear_fraction = 0.005;
 
 // A frame with the other frames that it is compared with.
 struct Anchor {
@@ -105,11 +105,11 @@ void keep_held_out(const RefinementView& from, double voxel_size_m, ViewComparis
 }  // namespace
 
 bool PairCosts::is_clearly_worse() const {
-  return after - before > std::max(clear_deviations * deviation, clear_share * before);
+  return after - before > std::max(clear_deviations * deviation, clear_fraction * before);
 }
 
 bool PairCosts::is_clearly_better() const {
-  return before - after > std::max(clear_deviations * deviation, clear_share * before);
+  return before - after > std::max(clear_deviations * deviation, clear_fraction * before);
 }
 
 bool RegistrationCheck::is_accepted(bool refined_poses) const {

@@ -28,7 +28,7 @@ constexpr double normal_radius_voxels = 2.0;
 // Points measured by at most this number of frames are dropped if other frames contradict this
 // share of such points around them.
 constexpr std::uint32_t weak_frames = 2;
-constexpr double contradicted_share = 0.5;
+constexpr double contradicted_fraction = 0.5;
 
 constexpr float min_agreement = 0.7F;
 // Neighbors are collinear if the second eigenvalue of their covariance, in squared radii, is
@@ -259,7 +259,7 @@ void PointMaker::spread_contradiction() {
       around.contradicted += counts[other].contradicted;
     }
     is_moved[number] = static_cast<double>(around.contradicted) >=
-                               contradicted_share * static_cast<double>(around.all)
+                               contradicted_fraction * static_cast<double>(around.all)
                            ? 1
                            : 0;
   }

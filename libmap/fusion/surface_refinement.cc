@@ -23,13 +23,13 @@ constexpr float prior_frames = 4.0F;
 // Lower bound of the cosine between a pixel's ray and the plane's normal.
 constexpr float min_cosine = 0.02F;
 // Share of a shift that is counted as remaining error, measured on the test sites.
-constexpr float bend_share = 0.5F;
+constexpr float bend_fraction = 0.5F;
 // Minimum cosine of incidence at which every surface is expected to be measured.
 constexpr float sure_cosine = 0.5F;
 // Share of a frame's depth range in which every surface is expected to be measured.
 constexpr float sure_range = 0.95F;
 // Weight of color without depth that confirms the element.
-constexpr float unmeasured_color_share = 1e-3F;
+constexpr float unmeasured_color_fraction = 1e-3F;
 
 using Four = Eigen::Array<float, 4, 1>;
 
@@ -146,7 +146,7 @@ class ViewGather {
     }
     sum.current += heights;
     if (is_measured) sum.seen += seen.cosine;
-    if (!view_.color.empty()) add_color(seen, is_measured ? 1.0F : unmeasured_color_share, sum);
+    if (!view_.color.empty()) add_color(seen, is_measured ? 1.0F : unmeasured_color_fraction, sum);
   }
 
  private:
@@ -272,7 +272,7 @@ class ViewGather {
             seen.information * squares.sum()};
   }
 
-  void add_color(const SeenElement& seen, float share, ElementSum& sum) const {
+  void add_color(const SeenElement& seen, float fraction, ElementSum& sum) const {
     const Camera& camera = view_.color_camera;
     Eigen::Vector2f pixel = seen.pixel;
     if (camera.width != view_.depth_camera.width || camera.height != view_.depth_camera.height) {
@@ -290,7 +290,7 @@ class ViewGather {
     const float b = v - static_cast<float>(y);
     // The squared number of pixels on the element favors near and frontal views.
     const float area = seen.cosine / (seen.position.z() * seen.position.z());
-    const float weight = share * area * area;
+    const float weight = fraction * area * area;
     for (std::size_t c = 0; c < 3; ++c) {
       const auto at = [&](int column, int row) {
         return static_cast<float>(view_.color.at(column, row)[c]);
@@ -321,12 +321,12 @@ void close_frame(ElementSum& sum, float pose_variance) {
     // All measurements of a frame share its pose error.
     const float own = one.weight * one.weight / one.squares;
     const float information = own / (1.0F + pose_variance * own);
-    const float share = 1.0F / (1.0F + pose_variance * own);
+    const float fraction = 1.0F / (1.0F + pose_variance * own);
     sum.scatter[0] += information;
     sum.scatter[1] += information * mean;
     sum.scatter[2] += information * mean * mean;
-    sum.all += {share * one.weight, share * one.height,
-                share * share * (one.squares + pose_variance * one.weight * one.weight)};
+    sum.all += {fraction * one.weight, fraction * one.height,
+                fraction * fraction * (one.squares + pose_variance * one.weight * one.weight)};
     ++sum.frames;
   }
   sum.current = {};
@@ -347,7 +347,7 @@ RefinedElement result_of(const ElementSum& sum) {
   const float birge =
       (prior_frames + excess) / (prior_frames + static_cast<float>(sum.frames) - 1.0F);
   const float noise = std::sqrt(sum.all.squares * birge) / sum.all.weight;
-  refined.expected_error_m = std::hypot(noise, bend_share * mean);
+  refined.expected_error_m = std::hypot(noise, bend_fraction * mean);
   for (std::size_t c = 0; c < 3; ++c)
     if (sum.color_weight > 0.0F)
       refined.color[c] =

@@ -9,7 +9,7 @@ namespace libmap {
 namespace {
 
 constexpr double pixels_per_view = 4800.0;
-constexpr double ignored_share = 0.05;  // share of a frame's pixels
+constexpr double ignored_fraction = 0.05;  // share of a frame's pixels
 
 }  // namespace
 
@@ -47,7 +47,7 @@ bool ViewCoverage::is_improved_by(const FrameCoverage& frame, double views) cons
         static_cast<double>(frame.information[n]) * views > information_[cell])
       improved += frame.pixels[n];
   }
-  return improved > ignored_share * all;
+  return improved > ignored_fraction * all;
 }
 
 void ViewCoverage::add(const FrameCoverage& frame) {

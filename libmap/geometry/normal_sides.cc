@@ -45,8 +45,8 @@ std::optional<Eigen::Vector3d> mean_direction(const std::vector<Eigen::Vector3f>
 
 }  // namespace
 
-double opposing_share(const std::vector<Eigen::Vector3d>& positions,
-                      const std::vector<Eigen::Vector3f>& normals) {
+double opposing_fraction(const std::vector<Eigen::Vector3d>& positions,
+                         const std::vector<Eigen::Vector3f>& normals) {
   std::vector<Eigen::Vector3d> points;
   std::vector<Eigen::Vector3f> directions;
   const std::size_t count = std::min({positions.size(), normals.size(), max_indexed});
@@ -68,10 +68,10 @@ double opposing_share(const std::vector<Eigen::Vector3d>& positions,
   return pairs < min_pairs ? 0.0 : static_cast<double>(opposing) / static_cast<double>(pairs);
 }
 
-std::string disagreement_text(double share, double opposing) {
+std::string disagreement_text(double fraction, double opposing) {
   const auto percent = [](double value) { return to_fixed_text(100.0 * value, 1) + " %"; };
-  return "its normals do not agree on a side: " + percent(share) + " are on the larger one (" +
-         percent(min_agreeing_share) + " decide), " + percent(opposing) +
+  return "its normals do not agree on a side: " + percent(fraction) + " are on the larger one (" +
+         percent(min_agreeing_fraction) + " decide), " + percent(opposing) +
          " of neighbors face opposite sides";
 }
 
@@ -81,9 +81,9 @@ UpOfNormals up_of_normals(const std::vector<Eigen::Vector3d>& positions,
   const std::optional<Eigen::Vector3d> mean = mean_direction(normals);
   NormalVotes votes;
   for (const Eigen::Vector3f& normal : normals) votes.add(normal, mean.value_or(up.direction));
-  up.share = votes.share();
-  up.opposing = opposing_share(positions, normals);
-  up.decided = mean && votes.agree() && up.opposing <= max_opposing_share;
+  up.fraction = votes.fraction();
+  up.opposing = opposing_fraction(positions, normals);
+  up.decided = mean && votes.agree() && up.opposing <= max_opposing_fraction;
   constexpr double cosine_of_20_deg = 0.9396926207859084;
   if (up.decided && mean->z() < cosine_of_20_deg) up.direction = *mean;
   return up;

@@ -11,9 +11,9 @@ namespace libmap {
 
 // Minimum share of normals on one side that decides the upper side. Rocks on the ground, seen from
 // all sides, have 0.92; unoriented eigenvectors have up to 0.82 (with opposing neighbors).
-inline constexpr double min_agreeing_share = 0.8;
+inline constexpr double min_agreeing_fraction = 0.8;
 // Maximum share of opposing neighbors of an oriented surface; only thin parts have such neighbors.
-inline constexpr double max_opposing_share = 0.1;
+inline constexpr double max_opposing_fraction = 0.1;
 
 // Sums of |cosine| between unit normals and an axis, by side. Zero and NaN normals are skipped.
 struct NormalVotes {
@@ -34,22 +34,22 @@ struct NormalVotes {
   }
   bool empty() const { return !(along + against > 0.0); }
   // Returns the share of the larger side, 0.5 (e.g. a closed surface) to 1; 0 without votes.
-  double share() const { return empty() ? 0.0 : std::max(along, against) / (along + against); }
-  bool agree() const { return share() >= min_agreeing_share; }
+  double fraction() const { return empty() ? 0.0 : std::max(along, against) / (along + against); }
+  bool agree() const { return fraction() >= min_agreeing_fraction; }
 };
 
 // Returns the share of neighboring points with normals on opposite sides, among the first 65536
 // points; 0.5 for random sides, 0 for too few points. Ignores neighbors across a crease, and NaN.
-double opposing_share(const std::vector<Eigen::Vector3d>& positions,
-                      const std::vector<Eigen::Vector3f>& normals);
+double opposing_fraction(const std::vector<Eigen::Vector3d>& positions,
+                         const std::vector<Eigen::Vector3f>& normals);
 
 // Returns the warning "its normals do not agree on a side: 52.0 % are on the larger one (...)".
-std::string disagreement_text(double share, double opposing);
+std::string disagreement_text(double fraction, double opposing);
 
 struct UpOfNormals {
   Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();  // unit
-  double share = 0.0;     // NormalVotes::share() of the normals; 0: no normals
-  double opposing = 0.0;  // opposing_share
+  double fraction = 0.0;  // NormalVotes::share() of the normals; 0: no normals
+  double opposing = 0.0;  // opposing_fraction
   bool decided = false;   // true if the normals agree; else `direction` is +z
 };
 

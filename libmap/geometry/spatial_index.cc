@@ -168,8 +168,8 @@ namespace {
 constexpr std::size_t area_neighbors = 17;  // the point itself is one
 // A nearest neighbor within this share of the spacing by area is a near-duplicate. Random points
 // have 0.47, grids 1.
-constexpr double min_nearest_share = 0.3;
-constexpr double merged_share = 0.25;
+constexpr double min_nearest_fraction = 0.3;
+constexpr double merged_fraction = 0.25;
 
 // Spacing of a square grid with as many points per area. The median distance to the 16th neighbor
 // is the radius of a disc that contains 16 points.
@@ -211,8 +211,9 @@ CloudSpacing point_spacing(const std::vector<Eigen::Vector3d>& points) {
   std::erase(squares, 0.0);
   if (squares.empty()) return {};
   CloudSpacing spacing{std::sqrt(median(std::move(squares))), area_spacing(tree, points)};
-  if (spacing.nearest_m >= min_nearest_share * spacing.by_area_m) return spacing;
-  const std::vector<Eigen::Vector3d> merged = merge_near(points, merged_share * spacing.by_area_m);
+  if (spacing.nearest_m >= min_nearest_fraction * spacing.by_area_m) return spacing;
+  const std::vector<Eigen::Vector3d> merged =
+      merge_near(points, merged_fraction * spacing.by_area_m);
   if (merged.size() > area_neighbors) spacing.nearest_m = area_spacing(PointTree(merged), merged);
   return spacing;
 }

@@ -193,26 +193,26 @@ std::vector<std::filesystem::path> cloud_tiles(const std::filesystem::path& give
     require_cloud_file(given);
     return {given};
   }
-  std::vector<std::filesystem::path> pieces;
+  std::vector<std::filesystem::path> tiles;
   for (const std::filesystem::directory_entry& entry : std::filesystem::directory_iterator(given)) {
     const std::string format = format_of(entry.path());
     // A .vtp counts as a cloud, so that opening it fails: without it, the terrain is incomplete.
     const bool is_cloud = format == ".pcd" || format == ".ply" || format == ".vtp" ||
                           format == ".csv" || is_dem_path(entry.path());
     if (is_cloud && entry.is_regular_file() && entry.path().filename().string().front() != '.')
-      pieces.push_back(entry.path());
+      tiles.push_back(entry.path());
   }
-  if (pieces.empty())
+  if (tiles.empty())
     throw Error("the folder contains no cloud (.pcd, .ply, .csv, .tif)", {.file = given.string()});
-  std::sort(pieces.begin(), pieces.end());
-  return pieces;
+  std::sort(tiles.begin(), tiles.end());
+  return tiles;
 }
 
 CloudReadResult read_cloud(const std::filesystem::path& path) {
   if (std::filesystem::is_directory(path)) {
     CloudReadResult joined;
-    for (const std::filesystem::path& piece : cloud_tiles(path)) {
-      CloudReadResult read = read_cloud(piece);
+    for (const std::filesystem::path& tile : cloud_tiles(path)) {
+      CloudReadResult read = read_cloud(tile);
       append_cloud(read.cloud, joined.cloud);
       joined.dropped_points += read.dropped_points;
       joined.info = std::move(read.info);

@@ -211,7 +211,7 @@ void TileStream::for_each_block(Need need, const Visit& visit) const {
   if (!block.empty()) visit(block);
 }
 
-TileInfo survey_tile(const fs::path& tile, const std::optional<Georeference>& georeference) {
+TileInfo read_tile_info(const fs::path& tile, const std::optional<Georeference>& georeference) {
   TileInfo info;
   CloudBlockReader reader(tile, georeference);
   reader.leave_out_normals();

@@ -45,8 +45,8 @@ struct TileInfo {
 };
 // Reads a file and returns the number and bounding box of the points. `georeference` is the
 // TileStream's. Throws Error naming the file if it cannot be read.
-TileInfo survey_tile(const std::filesystem::path& tile,
-                     const std::optional<Georeference>& georeference = std::nullopt);
+TileInfo read_tile_info(const std::filesystem::path& tile,
+                        const std::optional<Georeference>& georeference = std::nullopt);
 
 struct TilesReadResult {
   PointCloud cloud;

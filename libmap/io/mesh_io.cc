@@ -284,16 +284,16 @@ void encode(const std::string& format, const TriangleMesh& mesh,
 
 std::vector<std::filesystem::path> mesh_tiles(const std::filesystem::path& given) {
   if (!std::filesystem::is_directory(given)) return {given};
-  std::vector<std::filesystem::path> pieces;
+  std::vector<std::filesystem::path> tiles;
   for (const auto& entry : std::filesystem::directory_iterator(given))
     if (is_read(format_of(entry.path())) && entry.is_regular_file() &&
         entry.path().filename().string().front() != '.')
-      pieces.push_back(entry.path());
-  if (pieces.empty())
+      tiles.push_back(entry.path());
+  if (tiles.empty())
     throw Error("the folder contains no mesh (.ply, .obj, .stl, .off, .glb)",
                 {.file = given.string()});
-  std::sort(pieces.begin(), pieces.end());
-  return pieces;
+  std::sort(tiles.begin(), tiles.end());
+  return tiles;
 }
 
 void require_mesh_format(const std::filesystem::path& path) {
@@ -305,8 +305,8 @@ void require_mesh_format(const std::filesystem::path& path) {
 MeshReadResult read_mesh(const std::filesystem::path& path) {
   if (std::filesystem::is_directory(path)) {
     MeshReadResult joined;
-    for (const std::filesystem::path& piece : mesh_tiles(path)) {
-      MeshReadResult read = read_mesh(piece);
+    for (const std::filesystem::path& tile : mesh_tiles(path)) {
+      MeshReadResult read = read_mesh(tile);
       append_mesh(read.mesh, joined.mesh);
       joined.info = std::move(read.info);
     }

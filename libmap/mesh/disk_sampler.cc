@@ -19,16 +19,16 @@ namespace libmap {
 
 namespace {
 
-constexpr std::size_t pieces_per_block = 128;
+constexpr std::size_t fragments_per_block = 128;
 
 const Fragment whole{0, {Eigen::Vector2d(0.0, 0.0), {1.0, 0.0}, {0.0, 1.0}}};
 
 PlacedFragment placed_triangle(const TriangleMesh& mesh, std::size_t number) {
   const Triangle& corners = mesh.triangles[number];
-  PlacedFragment piece{
+  PlacedFragment placed_fragment{
       whole, {mesh.vertices[corners[0]], mesh.vertices[corners[1]], mesh.vertices[corners[2]]}};
-  piece.fragment.triangle = static_cast<std::uint32_t>(number);
-  return piece;
+  placed_fragment.fragment.triangle = static_cast<std::uint32_t>(number);
+  return placed_fragment;
 }
 
 }  // namespace
@@ -90,7 +90,7 @@ SurfaceFragments::SurfaceFragments(const SurfaceFragments& triangles, double lon
       continue;
     }
     for (std::size_t n = block.begin; n < block.end; ++n)
-      cut(triangles.piece(n), longest_m, max_parts);
+      cut(triangles.fragment_at(n), longest_m, max_parts);
   }
   add_blocks(mesh_.triangles.size(), mesh_.triangles.size() + parts_.size());
 }
@@ -116,7 +116,7 @@ double SurfaceFragments::area_m2() const {
   return area;
 }
 
-PlacedFragment SurfaceFragments::piece(std::size_t number) const {
+PlacedFragment SurfaceFragments::fragment_at(std::size_t number) const {
   if (number >= mesh_.triangles.size())
     return placed(mesh_, parts_[number - mesh_.triangles.size()]);
   return placed_triangle(mesh_, number);
@@ -124,9 +124,9 @@ PlacedFragment SurfaceFragments::piece(std::size_t number) const {
 
 void SurfaceFragments::add_blocks(std::size_t begin, std::size_t end) {
   const std::size_t first = blocks_.size();
-  blocks_.resize(first + (end - begin + pieces_per_block - 1) / pieces_per_block);
-  parallel_for(end - begin, pieces_per_block, [&](std::size_t from, std::size_t to) {
-    blocks_[first + from / pieces_per_block] = measured(begin + from, begin + to);
+  blocks_.resize(first + (end - begin + fragments_per_block - 1) / fragments_per_block);
+  parallel_for(end - begin, fragments_per_block, [&](std::size_t from, std::size_t to) {
+    blocks_[first + from / fragments_per_block] = measured(begin + from, begin + to);
   });
 }
 
@@ -136,7 +136,7 @@ SurfaceBlock SurfaceFragments::measured(std::size_t begin, std::size_t end) cons
   block.end = end;
   Eigen::AlignedBox3d box;
   for (std::size_t n = begin; n < end; ++n) {
-    const PlacedFragment fragment = piece(n);
+    const PlacedFragment fragment = fragment_at(n);
     block.area_m2 += fragment.area_m2();
     block.longest_m = std::max(block.longest_m, fragment.square_of_longest_side());
     for (const Eigen::Vector3d& corner : fragment.corners) box.extend(corner);
@@ -144,7 +144,7 @@ SurfaceBlock SurfaceFragments::measured(std::size_t begin, std::size_t end) cons
   block.longest_m = std::sqrt(block.longest_m);
   block.center = box.center();
   for (std::size_t n = begin; n < end; ++n)
-    for (const Eigen::Vector3d& corner : piece(n).corners)
+    for (const Eigen::Vector3d& corner : fragment_at(n).corners)
       block.reach_m = std::max(block.reach_m, (corner - block.center).squaredNorm());
   block.reach_m = std::sqrt(block.reach_m);
   return block;
@@ -153,13 +153,13 @@ SurfaceBlock SurfaceFragments::measured(std::size_t begin, std::size_t end) cons
 namespace {
 
 // Lengths in radii.
-constexpr double piece_size = 4.0;
+constexpr double fragment_size = 4.0;
 constexpr double first_gap_size = 1.0 / 3.0;
 constexpr double smallest_gap = 1e-3;
 
 constexpr std::size_t gaps_per_chunk = 256;
 constexpr double samples_per_part = 131072.0;
-constexpr std::size_t max_pieces = 30'000'000;
+constexpr std::size_t max_fragments = 30'000'000;
 
 // Darts per round over the whole surface, relative to the expected number of samples.
 constexpr std::array<double, 5> dart_rounds = {0.5, 0.5, 1.0, 2.0, 4.0};
@@ -290,9 +290,9 @@ class Sampler {
         seed_(seed),
         expected_(saturation_density * surface.area_m2 / (radius_m * radius_m)),
         samples_(surface.low, 2.0 * radius_m,
-                 static_cast<std::size_t>(1.1 * expected_) + surface.others.size() + 16),
-        pieces_(surface.triangles, piece_size * radius_m, max_pieces) {
-    for (const Eigen::Vector3d& other : surface.others) samples_.add(other);
+                 static_cast<std::size_t>(1.1 * expected_) + surface.neighbor_samples.size() + 16),
+        fragments_(surface.triangles, fragment_size * radius_m, max_fragments) {
+    for (const Eigen::Vector3d& other : surface.neighbor_samples) samples_.add(other);
   }
 
   DiskSamples run(const std::function<bool(std::size_t)>& goes_on, Progress& progress) {
@@ -305,7 +305,7 @@ class Sampler {
     progress.end();
     DiskSamples result;
     result.positions.reserve(triangle_points_.size());
-    for (std::size_t n = surface_.others.size(); n < samples_.size(); ++n)
+    for (std::size_t n = surface_.neighbor_samples.size(); n < samples_.size(); ++n)
       result.positions.push_back(samples_[n]);
     result.triangle_points = std::move(triangle_points_);
     return result;
@@ -314,7 +314,7 @@ class Sampler {
  private:
   // Processes the surface in parts, to limit the memory for gaps.
   void fill_gaps(Progress& progress) {
-    const std::vector<SurfaceBlock>& blocks = pieces_.blocks();
+    const std::vector<SurfaceBlock>& blocks = fragments_.blocks();
     const double max_m2 = samples_per_part * radius_m_ * radius_m_ / saturation_density;
     progress.begin("gaps", blocks.size());
     std::uint64_t round = dart_rounds.size();
@@ -341,7 +341,7 @@ class Sampler {
 
   // Throws darts evenly over the surface. Returns those that no sample rejects.
   std::vector<Candidate> darts(std::uint64_t round, double per_m2) const {
-    const std::vector<SurfaceBlock>& blocks = pieces_.blocks();
+    const std::vector<SurfaceBlock>& blocks = fragments_.blocks();
     return collect<Candidate>(
         blocks.size(), 1, [&](std::size_t begin, std::size_t end, std::vector<Candidate>& found) {
           for (std::size_t n = begin; n < end; ++n) {
@@ -356,19 +356,19 @@ class Sampler {
                    std::vector<Candidate>& found) const {
     const double count = std::floor(block.area_m2 * per_m2 + random.uniform());
     if (!(count >= 1.0)) return;
-    const double share = block.area_m2 / count;
+    const double fraction = block.area_m2 / count;
     double thrown = 0.0;
-    double next = random.uniform() * share;  // area before the next dart
+    double next = random.uniform() * fraction;  // area before the next dart
     double area = 0.0;
     Candidate candidate{};
     for (std::size_t n = block.begin; n < block.end && thrown < count; ++n) {
-      const PlacedFragment piece = pieces_.piece(n);
-      area += piece.area_m2();
+      const PlacedFragment placed_fragment = fragments_.fragment_at(n);
+      area += placed_fragment.area_m2();
       while (next < area && thrown < count) {
         candidate.order = random.uniform();
-        if (place(piece.fragment, random, candidate)) found.push_back(candidate);
+        if (place(placed_fragment.fragment, random, candidate)) found.push_back(candidate);
         thrown += 1.0;
-        next = (thrown + random.uniform()) * share;
+        next = (thrown + random.uniform()) * fraction;
       }
     }
   }
@@ -402,16 +402,16 @@ class Sampler {
   }
 
   std::vector<Fragment> first_gaps(std::size_t first, std::size_t last) const {
-    return collect<Fragment>(last - first, 1,
-                             [&](std::size_t begin, std::size_t end, std::vector<Fragment>& found) {
-                               GapSearch search(samples_, radius_m_);
-                               for (std::size_t n = first + begin; n < first + end; ++n) {
-                                 const SurfaceBlock& block = pieces_.blocks()[n];
-                                 if (search.is_covered(block)) continue;
-                                 for (std::size_t p = block.begin; p < block.end; ++p)
-                                   search.find(pieces_.piece(p), first_gap_size * radius_m_, found);
-                               }
-                             });
+    return collect<Fragment>(
+        last - first, 1, [&](std::size_t begin, std::size_t end, std::vector<Fragment>& found) {
+          GapSearch search(samples_, radius_m_);
+          for (std::size_t n = first + begin; n < first + end; ++n) {
+            const SurfaceBlock& block = fragments_.blocks()[n];
+            if (search.is_covered(block)) continue;
+            for (std::size_t p = block.begin; p < block.end; ++p)
+              search.find(fragments_.fragment_at(p), first_gap_size * radius_m_, found);
+          }
+        });
   }
 
   // Returns the uncovered parts of the gaps, divided further. The smallest gaps are dropped: their
@@ -438,7 +438,7 @@ class Sampler {
   double expected_;
   GrowingGrid samples_;
   std::vector<TrianglePoint> triangle_points_;
-  SurfaceFragments pieces_;
+  SurfaceFragments fragments_;
 };
 
 }  // namespace

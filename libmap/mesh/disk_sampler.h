@@ -58,7 +58,7 @@ class SurfaceFragments {
   const std::vector<SurfaceBlock>& blocks() const { return blocks_; }
   double area_m2() const;  // of all fragments
   // Fragment with this index and the positions of the corners.
-  PlacedFragment piece(std::size_t number) const;
+  PlacedFragment fragment_at(std::size_t number) const;
 
  private:
   void cut(const PlacedFragment& fragment, double longest_m, std::size_t max_parts);
@@ -78,7 +78,7 @@ struct SampledSurface {
   // Maximum displacement by rounding positions to single precision; 0: positions are not rounded.
   double rounding_m = 0.0;
   // Samples of other surfaces, which keep the minimum distance and cover this surface as well.
-  std::vector<Eigen::Vector3d> others{};
+  std::vector<Eigen::Vector3d> neighbor_samples{};
 };
 
 struct DiskSamples {

@@ -64,14 +64,14 @@ class CountSearch {
         random_(options.seed, options.count) {}
 
   // Returns the samples of the tried radius whose number is closest to the wanted one.
-  DiskSamples run(double& radius_m, std::size_t& tries, Progress& progress) {
+  DiskSamples run(double& radius_m, std::size_t& tried_radii, Progress& progress) {
     radius_ = std::sqrt(saturation_density * surface_.area_m2 / wanted_);
     DiskSamples best;
     double best_miss = 0.0;
-    for (tries = 1;; ++tries) {
+    for (tried_radii = 1;; ++tried_radii) {
       DiskSamples samples = sample_disks(
-          surface_, radius_, seed_, [&](std::size_t thrown) { return is_near(thrown, tries); },
-          progress);
+          surface_, radius_, seed_,
+          [&](std::size_t thrown) { return is_near(thrown, tried_radii); }, progress);
       const double found = static_cast<double>(samples.positions.size());
       const double miss = is_full_ ? std::abs(found - wanted_) : 2.0 * max_samples;
       if (best.positions.empty() || miss < best_miss) {
@@ -80,9 +80,9 @@ class CountSearch {
         radius_m = radius_;
       }
       const bool hit = is_full_ && miss <= count_tolerance * wanted_;
-      if (hit || tries == max_tries) return best;
-      if (is_full_) share_of_darts_ = thrown_ / found;
-      aim(is_full_ ? found : thrown_ / share_of_darts_, tries);
+      if (hit || tried_radii == max_tries) return best;
+      if (is_full_) fraction_of_darts_ = thrown_ / found;
+      aim(is_full_ ? found : thrown_ / fraction_of_darts_, tried_radii);
     }
   }
 
@@ -91,22 +91,23 @@ class CountSearch {
   static constexpr std::size_t direct_tries = 8;  // before random radii within a bracket
 
   // True if the number of darts predicts about the wanted number of samples.
-  bool is_near(std::size_t thrown, std::size_t tries) {
+  bool is_near(std::size_t thrown, std::size_t tried_radii) {
     thrown_ = static_cast<double>(thrown);
-    const double miss = std::abs(thrown_ / share_of_darts_ / wanted_ - 1.0);
-    is_full_ = tries > direct_tries || miss <= 0.5 * count_tolerance + 1.0 / std::sqrt(wanted_);
+    const double miss = std::abs(thrown_ / fraction_of_darts_ / wanted_ - 1.0);
+    is_full_ =
+        tried_radii > direct_tries || miss <= 0.5 * count_tolerance + 1.0 / std::sqrt(wanted_);
     return is_full_;
   }
 
   // Sets the next radius after the current one yielded `found` samples.
-  void aim(double found, std::size_t tries) {
+  void aim(double found, std::size_t tried_radii) {
     if (is_full_ && found > wanted_) too_small_ = std::max(too_small_, radius_);
     if (is_full_ && found < wanted_) too_large_ = std::min(too_large_, radius_);
     const bool is_bracketed = too_small_ > 0.0 && std::isfinite(too_large_);
-    if (tries < direct_tries || !is_bracketed) {
+    if (tried_radii < direct_tries || !is_bracketed) {
       // Islands much smaller than the radius keep one sample each until it exceeds their distances.
       const double step = std::sqrt(found / wanted_);
-      radius_ *= tries < direct_tries ? step : (step > 1.0 ? std::max(step, 1.5) : step);
+      radius_ *= tried_radii < direct_tries ? step : (step > 1.0 ? std::max(step, 1.5) : step);
       return;
     }
     const double low = 0.95 * std::min(too_small_, too_large_);
@@ -120,7 +121,7 @@ class CountSearch {
   RandomStream random_;
   double radius_ = 0.0;
   double thrown_ = 0.0;
-  double share_of_darts_ = dart_fraction;
+  double fraction_of_darts_ = dart_fraction;
   bool is_full_ = false;  // the last try filled the gaps
   double too_small_ = 0.0;
   double too_large_ = std::numeric_limits<double>::infinity();
@@ -133,9 +134,9 @@ PoissonDiskResult sample(const SampledSurface& surface, const PoissonDiskOptions
   result.area_m2 = surface.area_m2;
   DiskSamples samples = timed(result.timings_s, "samples", [&] {
     if (options.count > 0)
-      return CountSearch(surface, options).run(result.radius_m, result.tries, progress);
+      return CountSearch(surface, options).run(result.radius_m, result.tried_radii, progress);
     result.radius_m = options.radius_m;
-    result.tries = 1;
+    result.tried_radii = 1;
     return sample_disks(
         surface, options.radius_m, options.seed, [](std::size_t) { return true; }, progress);
   });
@@ -144,7 +145,7 @@ PoissonDiskResult sample(const SampledSurface& surface, const PoissonDiskOptions
       options.count == 0 ||
       std::abs(static_cast<double>(samples.positions.size()) - wanted) <= count_tolerance * wanted;
   result.smallest_distance_m = timed(result.timings_s, "smallest distance", [&] {
-    std::vector<Eigen::Vector3d> all = surface.others;
+    std::vector<Eigen::Vector3d> all = surface.neighbor_samples;
     all.insert(all.end(), samples.positions.begin(), samples.positions.end());
     return smallest_distance(all, result.radius_m);
   });
@@ -184,7 +185,7 @@ PoissonDiskResult TileSampler::sample(const TriangleMesh& mesh, std::size_t numb
                                       Progress& progress) {
   if (!(surface_area(mesh) > 0.0)) return {};
   SampledSurface surface = surface_of(mesh);
-  surface.others = std::move(near_[number]);
+  surface.neighbor_samples = std::move(near_[number]);
   PoissonDiskOptions options = options_;
   options.seed = mix_bits(options_.seed, number);
   PoissonDiskResult result = libmap::sample(surface, options, progress);
@@ -209,7 +210,7 @@ void describe(ResultTable& table, const PoissonDiskResult& result) {
             "actual minimum distance between samples, m");
   table.add("relative_radius", result.relative_radius,
             "minimum distance relative to the densest packing of as many discs");
-  table.add("radii_tried", result.tries, "number of radii that were tried");
+  table.add("radii_tried", result.tried_radii, "number of radii that were tried");
 }
 
 }  // namespace libmap

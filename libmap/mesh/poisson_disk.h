@@ -33,8 +33,8 @@ struct PoissonDiskResult {
   // smallest_distance_m relative to the densest packing of as many discs in the plane: R / (2
   // sqrt(A / (2 sqrt(3) N))) (Lagae and Dutre 2008). At most 1 in the plane.
   double relative_radius = 0.0;
-  std::size_t tries = 0;      // number of radii that were tried
-  bool count_reached = true;  // false if `count` was missed by more than 1 %
+  std::size_t tried_radii = 0;  // number of radii that were tried
+  bool count_reached = true;    // false if `count` was missed by more than 1 %
   StageTimings timings_s;
 };
 void describe(ResultTable& table, const PoissonDiskResult& result);

@@ -71,7 +71,8 @@ struct ReferenceSurface::MeshShape : Shape {
   }
 
   // Barycentric coordinates of a position in the triangle; all zero if it has no area.
-  std::array<double, 3> shares(std::uint32_t t, const Eigen::Vector3d& position) const {
+  std::array<double, 3> barycentric_coordinates(std::uint32_t t,
+                                                const Eigen::Vector3d& position) const {
     const Eigen::Vector3d normal = (at(t, 1) - at(t, 0)).cross(at(t, 2) - at(t, 0));
     std::array<double, 3> result{};
     if (!(normal.squaredNorm() > 0.0)) return result;
@@ -87,16 +88,16 @@ struct ReferenceSurface::MeshShape : Shape {
     NearestSurfacePoint found_point{found.position, Eigen::Vector3d::Zero(), found.distance_m,
                                     false};
     const std::uint32_t t = found.triangle;
-    const std::array<double, 3> share = shares(t, found.position);
+    const std::array<double, 3> coordinates = barycentric_coordinates(t, found.position);
     std::size_t zeros = 0;
     std::size_t zero = 0;     // last corner with a coordinate of zero
     std::size_t largest = 0;  // corner with the largest coordinate
     for (std::size_t k = 0; k < 3; ++k) {
-      if (share[k] < on_edge) {
+      if (coordinates[k] < on_edge) {
         ++zeros;
         zero = k;
       }
-      if (share[k] > share[largest]) largest = k;
+      if (coordinates[k] > coordinates[largest]) largest = k;
     }
     if (zeros == 0) {
       found_point.normal = normal_of(t);

@@ -63,12 +63,12 @@ std::vector<Pair> pairs_of(const std::vector<Eigen::Vector3d>& points, const Pos
   std::erase_if(pairs, [&](const Pair& pair) {
     return pair.nearest.on_border || !(pair.nearest.distance_m <= options.max_distance_m);
   });
-  const double share = static_cast<double>(pairs.size()) / static_cast<double>(points.size());
-  if (pairs.size() < 6 || share < options.min_overlap)
+  const double fraction = static_cast<double>(pairs.size()) / static_cast<double>(points.size());
+  if (pairs.size() < 6 || fraction < options.min_overlap)
     throw Error("too few points are near the surface for an alignment",
                 {.field = "points within " + to_text(static_cast<float>(options.max_distance_m)) +
                           " m of the surface",
-                 .value = to_fixed_text(100.0 * share, 1) + " %",
+                 .value = to_fixed_text(100.0 * fraction, 1) + " %",
                  .bound = ">= " + to_fixed_text(100.0 * options.min_overlap, 1) + " %"});
   return pairs;
 }

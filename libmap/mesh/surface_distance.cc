@@ -165,9 +165,9 @@ std::vector<TrianglePoint> sample_triangles(const TriangleMesh& mesh, double per
         (static_cast<double>(n) + random.uniform()) / static_cast<double>(count) * area;
     const auto above = std::upper_bound(area_before.begin(), area_before.end(), at);
     const double root = std::sqrt(random.uniform());
-    const double share = random.uniform();
-    samples[n] = {static_cast<std::uint32_t>(above - area_before.begin() - 1), root * (1.0 - share),
-                  root * share};
+    const double fraction = random.uniform();
+    samples[n] = {static_cast<std::uint32_t>(above - area_before.begin() - 1),
+                  root * (1.0 - fraction), root * fraction};
   }
   return samples;
 }
@@ -193,7 +193,7 @@ std::vector<bool> covered(const std::vector<Eigen::Vector3d>& samples,
   return {flags.begin(), flags.end()};
 }
 
-double share_of(const std::vector<bool>& flags) {
+double fraction_of(const std::vector<bool>& flags) {
   if (flags.empty()) return 0.0;
   return static_cast<double>(std::count(flags.begin(), flags.end(), true)) /
          static_cast<double>(flags.size());

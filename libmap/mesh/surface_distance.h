@@ -63,6 +63,6 @@ std::vector<SurfacePoint> sample_surface(const TriangleMesh& mesh, double per_m2
 // For each sample, true if one of `points` is within `radius_m`.
 std::vector<bool> covered(const std::vector<Eigen::Vector3d>& samples,
                           const std::vector<Eigen::Vector3d>& points, double radius_m);
-double share_of(const std::vector<bool>& flags);  // share of true flags; 0 if there are no flags
+double fraction_of(const std::vector<bool>& flags);  // share of true flags; 0 if there are no flags
 
 }  // namespace libmap

@@ -134,11 +134,11 @@ class Adjustment {
   std::size_t cameras_ = 0;                   // number of cameras; 0 if none is refined
   std::vector<DepthCorrection> corrections_;  // zero corrections that define the knots
   SensorCalibration start_;
-  std::map<int, std::size_t> row_;   // row of a node's pose
-  std::vector<Eigen::Index> first_;  // first parameter of a camera
-  std::vector<bool> sees_;           // true for cameras with observations
-  double mean_later_s_ = 0.0;        // of FrameFeatures::depth_later_s
-  double later_deviation_s_ = 0.0;
+  std::map<int, std::size_t> row_;    // row of a node's pose
+  std::vector<Eigen::Index> first_;   // first parameter of a camera
+  std::vector<bool> sees_;            // true for cameras with observations
+  double mean_stamp_offset_s_ = 0.0;  // of FrameFeatures::depth_stamp_offset_s
+  double stamp_offset_deviation_s_ = 0.0;
   std::vector<Eigen::Index> free_;   // indices of the free parameters
   std::vector<std::size_t> points_;  // track of each point
   JointProblem problem_;
@@ -206,10 +206,12 @@ void Adjustment::init_params(const SensorCalibration& start,
   if (!options_.refine_timing) return;
   problem_.has_motion = true;
   const double count = static_cast<double>(std::max<std::size_t>(1, frames_.size()));
-  for (const FrameFeatures& frame : frames_) mean_later_s_ += frame.depth_later_s / count;
   for (const FrameFeatures& frame : frames_)
-    later_deviation_s_ += std::pow(frame.depth_later_s - mean_later_s_, 2) / count;
-  later_deviation_s_ = std::sqrt(later_deviation_s_);
+    mean_stamp_offset_s_ += frame.depth_stamp_offset_s / count;
+  for (const FrameFeatures& frame : frames_)
+    stamp_offset_deviation_s_ +=
+        std::pow(frame.depth_stamp_offset_s - mean_stamp_offset_s_, 2) / count;
+  stamp_offset_deviation_s_ = std::sqrt(stamp_offset_deviation_s_);
   const std::map<int, KnownMotion> between = relative_motions(frames_, state_.poses, components);
   for (const auto& [node, pose] : state_.poses) {
     const auto found = between.find(node);
@@ -231,12 +233,12 @@ void Adjustment::add_observations() {
     for (const Observation& seen : all) {
       if (!has_pose(seen)) continue;
       const FrameFeatures& frame = frames_[seen.frame];
-      const Feature& its = feature(seen);
+      const Feature& observed = feature(seen);
       sum += state_.poses.at(frame.node) * frame.point_in_base(seen.feature);
       problem_.observations.push_back(
-          {row_.at(frame.node), cameras_ > 0 ? first_[its.camera] : 0,
-           CalibratedFeature(its, frame.cameras[its.camera], calibrated(seen))});
-      if (cameras_ > 0) sees_[its.camera] = true;
+          {row_.at(frame.node), cameras_ > 0 ? first_[observed.camera] : 0,
+           CalibratedFeature(observed, frame.cameras[observed.camera], calibrated(seen))});
+      if (cameras_ > 0) sees_[observed.camera] = true;
     }
     points_.push_back(t);
     problem_.begin.push_back(problem_.observations.size());
@@ -249,29 +251,29 @@ CalibratedObservation Adjustment::calibrated(const Observation& seen) const {
   CalibratedObservation calibrated;
   if (cameras_ == 0) return calibrated;
   const FrameFeatures& frame = frames_[seen.frame];
-  const Feature& its = feature(seen);
-  const Camera& camera = frame.cameras[its.camera];
+  const Feature& observed = feature(seen);
+  const Camera& camera = frame.cameras[observed.camera];
   calibrated.intrinsics = options_.refine_intrinsics;
   calibrated.registration = options_.refine_registration;
   calibrated.timing = options_.refine_timing;
-  if (options_.refine_depth && !corrections_[its.camera].empty()) {
+  if (options_.refine_depth && !corrections_[observed.camera].empty()) {
     calibrated.depth = true;
-    calibrated.terms = corrections_[its.camera].terms(static_cast<double>(its.depth_m),
-                                                      squared_radius_of(its, camera));
+    calibrated.terms = corrections_[observed.camera].terms(static_cast<double>(observed.depth_m),
+                                                           squared_radius_of(observed, camera));
   }
   if (options_.refine_registration || options_.refine_timing) {
     const RegisteredDepth depth =
-        registered_depth(frame, its, color_from_depth_of(frame, its, start_));
+        registered_depth(frame, observed, color_from_depth_of(frame, observed, start_));
     calibrated.has_depth = depth.known;
     calibrated.added_m = depth.added_m;
     calibrated.by_step = depth.by_step;
   }
   if (options_.refine_timing) {
-    const CameraTiming& timing = start_.timing[its.camera];
-    calibrated.row_share = row_fraction(its, camera);
-    calibrated.depth_later_s = frame.depth_later_s;
-    calibrated.known_step = (timing.depth_delay_s + frame.depth_later_s -
-                             timing.rolling_shutter_s * calibrated.row_share) *
+    const CameraTiming& timing = start_.timing[observed.camera];
+    calibrated.image_row_fraction = row_fraction(observed, camera);
+    calibrated.depth_stamp_offset_s = frame.depth_stamp_offset_s;
+    calibrated.known_step = (timing.depth_delay_s + frame.depth_stamp_offset_s -
+                             timing.rolling_shutter_s * calibrated.image_row_fraction) *
                             motion_in_camera(camera, start_.motion.at(frame.node));
   }
   return calibrated;
@@ -322,11 +324,11 @@ void Adjustment::add_depth_priors(std::size_t camera, Priors& priors) {
   Eigen::VectorXd& gauge = priors.add();
   double count = 0.0;
   for (const FrameFeatures& frame : frames_)
-    for (const Feature& its : frame.features) {
-      if (its.camera != camera) continue;
-      const auto z = static_cast<double>(its.depth_m);
+    for (const Feature& observed : frame.features) {
+      if (observed.camera != camera) continue;
+      const auto z = static_cast<double>(observed.depth_m);
       const DepthCorrection::Terms terms =
-          depth.terms(z, squared_radius_of(its, frame.cameras[camera]));
+          depth.terms(z, squared_radius_of(observed, frame.cameras[camera]));
       gauge.segment<4>(spline + static_cast<Eigen::Index>(terms.first)) +=
           Eigen::Map<const Eigen::Vector4d>(terms.spline.data()) / z;
       gauge.segment<3>(radial) += Eigen::Map<const Eigen::Vector3d>(terms.radial.data()) / z;
@@ -340,7 +342,8 @@ void Adjustment::add_depth_priors(std::size_t camera, Priors& priors) {
 // that least squares with both as measurements overestimates times.
 double Adjustment::motion_scale() const {
   // Varying delays of the stamps determine the scale.
-  if (!problem_.has_motion || problem_.fix_cameras || later_deviation_s_ > observable_delay_s)
+  if (!problem_.has_motion || problem_.fix_cameras ||
+      stamp_offset_deviation_s_ > observable_delay_s)
     return 1.0;
   double mixed = 0.0;
   double squares = 0.0;
@@ -365,8 +368,9 @@ SensorCalibration Adjustment::calibration(const JointState& state, double motion
           moved(Pose::Identity(), Eigen::Map<const Vector6d>(own + registration_at)) *
           start_.color_from_depth[n]);
     if (options_.refine_timing)
-      found.timing.push_back({motion_scale * (own[timing_at] + mean_later_s_) - mean_later_s_,
-                              motion_scale * own[timing_at + 1]});
+      found.timing.push_back(
+          {motion_scale * (own[timing_at] + mean_stamp_offset_s_) - mean_stamp_offset_s_,
+           motion_scale * own[timing_at + 1]});
     if (options_.refine_depth) {
       found.depth.push_back(corrections_[n]);
       std::copy_n(own + radial_at, 3, found.depth[n].radial.begin());
@@ -399,7 +403,7 @@ void Adjustment::find_alternatives() {
     spread.camera_params(free_) = modes.deviations.tail(static_cast<Eigen::Index>(free_.size()));
     result_.deviations = calibration(spread, scale);
     for (CameraTiming& timing : result_.deviations.timing)
-      timing.depth_delay_s += (1.0 - scale) * mean_later_s_;
+      timing.depth_delay_s += (1.0 - scale) * mean_stamp_offset_s_;
   }
   for (const Eigen::VectorXd& change : modes.changes) {
     JointState other = state_;
@@ -465,17 +469,20 @@ void bind(ParameterTable& table, BundleAdjustmentOptions& options) {
             "prior standard deviation of the principal point, pixels");
   table.add("depth_prior", options.depth_prior, positive,
             "prior standard deviation of the depth correction, relative to the depth noise");
-  table.add("depth_bend", options.depth_smoothness_prior, positive,
+  table.add_former_key("depth_bend", "depth_smoothness_prior");
+  table.add("depth_smoothness_prior", options.depth_smoothness_prior, positive,
             "prior standard deviation of the depth correction's second differences between knots, "
             "relative to the depth noise");
   table.add("depth_knot_m", options.depth_knot_m, {0.02},
             "distance in depth between the knots of the depth correction, m");
   table.add("frame_time_s", options.bounds.frame_time_s, positive,
             "maximum depth delay and rolling shutter time that a calibration may contain, s");
-  table.add("max_bend_m", options.bounds.max_depth_correction_m, not_negative,
+  table.add_former_key("max_bend_m", "max_depth_correction_m");
+  table.add("max_depth_correction_m", options.bounds.max_depth_correction_m, not_negative,
             "maximum depth correction: constant term, m");
-  table.add("bend_of_range", options.bounds.max_depth_correction_per_m, not_negative,
-            "maximum depth correction: term proportional to range, m per m");
+  table.add_former_key("bend_of_range", "max_depth_correction_of_range");
+  table.add("max_depth_correction_of_range", options.bounds.max_depth_correction_of_range,
+            not_negative, "maximum depth correction: term proportional to range, m per m");
 }
 
 namespace {
@@ -527,7 +534,8 @@ std::optional<std::string> exceeded_bound(const SensorCalibration& calibration,
                      1e3 * bounds.deviations * registration_prior_m, " mm");
   for (const DepthCorrection& depth : calibration.depth)
     for (const auto& [z, bend] : largest_bends(depth))
-      if (const double most = bounds.max_depth_correction_m + bounds.max_depth_correction_per_m * z;
+      if (const double most =
+              bounds.max_depth_correction_m + bounds.max_depth_correction_of_range * z;
           bend >= most)
         return exceeds("depth correction", 1e3 * bend, 1e3 * most, " mm") + " at a depth of " +
                to_fixed_text(z, 1) + " m";

@@ -20,9 +20,9 @@ namespace libmap {
 
 // Bounds of physically possible calibrations. Estimates beyond the bounds compensate other errors.
 struct CalibrationBounds {
-  double frame_time_s = 0.033;               // > 0: maximum depth delay and rolling shutter time
-  double max_depth_correction_m = 0.01;      // >= 0: maximum depth correction: constant term
-  double max_depth_correction_per_m = 0.02;  // >= 0: term proportional to range, m/m
+  double frame_time_s = 0.033;                  // > 0: maximum depth delay and rolling shutter time
+  double max_depth_correction_m = 0.01;         // >= 0: maximum depth correction: constant term
+  double max_depth_correction_of_range = 0.02;  // >= 0: term proportional to range, m/m
   double deviations = 4.0;  // not bound; other parameters, in deviations of the prior
 };
 

@@ -110,13 +110,13 @@ std::vector<FramePair> overlapping_pairs(const std::vector<FrameFeatures>& frame
       std::vector<std::pair<double, std::size_t>> ranked;
       for (const std::size_t candidate : candidates_of(neighbors, posed, component_of, n)) {
         const PosedFrame& other = posed[candidate];
-        const double share = overlap_of(few, frames[other.index],
-                                        other.map_from_base.inverse() * frame.map_from_base);
-        if (share >= options.min_overlap) ranked.emplace_back(-share, other.index);
+        const double fraction = overlap_of(few, frames[other.index],
+                                           other.map_from_base.inverse() * frame.map_from_base);
+        if (fraction >= options.min_overlap) ranked.emplace_back(-fraction, other.index);
       }
       std::sort(ranked.begin(), ranked.end());
       ranked.resize(std::min(ranked.size(), static_cast<std::size_t>(options.pairs_per_frame)));
-      for (const auto& [share, other] : ranked)
+      for (const auto& [fraction, other] : ranked)
         of_frame[n].push_back(std::minmax(frame.index, other));
     }
   });

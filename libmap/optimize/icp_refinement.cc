@@ -32,14 +32,14 @@ constexpr double settled_step = 2e-6;
 constexpr double max_step = 0.2;  // m and rad
 constexpr double cell_m = 0.25;   // residuals within one cell of the map are correlated
 constexpr std::size_t max_cells = 400;
-constexpr std::size_t frames_per_cell_share = 100;
+constexpr std::size_t frames_per_cell_interval = 100;
 
 // align_pair
 constexpr double guess_m = 0.15;  // standard deviations of the initial guess
 constexpr double guess_rad = 0.1;
 constexpr double pair_degenerate = 1e-4;
 constexpr std::size_t min_pair_samples = 300;  // matched samples
-constexpr double min_pair_share = 0.4;         // matched share of a pair's samples
+constexpr double min_pair_fraction = 0.4;      // matched share of a pair's samples
 constexpr double max_pair_rms_m = 0.012;
 constexpr int pair_agreement_samples = 300;
 constexpr double pair_agreement_m = 0.005;
@@ -47,11 +47,11 @@ constexpr double min_pair_agreement = 0.95;
 
 using Cell = std::array<int, 3>;
 
-// Selects one cell in `share` by a hash of the cell.
-bool is_drawn(const Cell& cell, std::uint64_t share) {
+// Selects one cell in `interval` by a hash of the cell.
+bool is_drawn(const Cell& cell, std::uint64_t interval) {
   std::uint64_t bits = 0;
   for (const int number : cell) bits = mix_bits(bits, static_cast<std::uint64_t>(number));
-  return bits % share == 0;
+  return bits % interval == 0;
 }
 
 // Normal equations of one pair in steps of a_from_b.
@@ -67,8 +67,8 @@ struct PairEquations {
   void add(const PairEquations& other) {
     information += other.information;
     rhs += other.rhs;
-    for (const auto& [cell, its] : other.rhs_of_cell)
-      rhs_of_cell.try_emplace(cell, Vector6d::Zero()).first->second += its;
+    for (const auto& [cell, cell_rhs] : other.rhs_of_cell)
+      rhs_of_cell.try_emplace(cell, Vector6d::Zero()).first->second += cell_rhs;
     squares_m2 += other.squares_m2;
     weight += other.weight;
     samples += other.samples;
@@ -100,8 +100,9 @@ class Alignment {
   }
   PairEquations half_of(const std::vector<PlacedElement>& samples, std::size_t onto,
                         const Pose& onto_from_from, bool from_is_a, double max_distance_m,
-                        std::uint64_t cell_share) const;
-  std::vector<PairEquations> all_equations(double max_distance_m, std::uint64_t cell_share) const;
+                        std::uint64_t cell_interval) const;
+  std::vector<PairEquations> all_equations(double max_distance_m,
+                                           std::uint64_t cell_interval) const;
   void drop_degenerate(PairEquations& equations) const;
   void add_prior(BlockSystem& system) const;
   double add_pairs(double max_distance_m, BlockSystem& system);
@@ -122,7 +123,7 @@ class Alignment {
 // frame is b, a sample p moves to p + t + r x p before a_from_b; if it is a, by the inverse.
 PairEquations Alignment::half_of(const std::vector<PlacedElement>& samples, std::size_t onto,
                                  const Pose& onto_from_from, bool from_is_a, double max_distance_m,
-                                 std::uint64_t cell_share) const {
+                                 std::uint64_t cell_interval) const {
   PairEquations equations;
   const double min_cosine = std::cos(options_.max_normal_angle_deg * std::numbers::pi / 180.0);
   for (const PlacedElement& sample : samples) {
@@ -164,12 +165,12 @@ PairEquations Alignment::half_of(const std::vector<PlacedElement>& samples, std:
     equations.information +=
         (0.5 * weight) * (by_sample * by_plane.transpose() + by_plane * by_sample.transpose());
     equations.rhs -= weight * distance * by_sample;
-    if (cell_share > 0) {
+    if (cell_interval > 0) {
       const Eigen::Vector3d in_cells = *pose_of(onto) * point / cell_m;
       const Cell cell = {static_cast<int>(std::floor(in_cells.x())),
                          static_cast<int>(std::floor(in_cells.y())),
                          static_cast<int>(std::floor(in_cells.z()))};
-      if (is_drawn(cell, cell_share))
+      if (is_drawn(cell, cell_interval))
         equations.rhs_of_cell.try_emplace(cell, Vector6d::Zero()).first->second -=
             weight * distance * by_sample;
     }
@@ -185,7 +186,7 @@ PairEquations Alignment::half_of(const std::vector<PlacedElement>& samples, std:
 // radians are compared with translations in meters.
 void Alignment::drop_degenerate(PairEquations& equations) const {
   const SymmetricEigen<6> eigen = symmetric_eigen(equations.information);
-  const double least = options_.degenerate * eigen.values[5];
+  const double least = options_.max_degenerate_ratio * eigen.values[5];
   Matrix6d kept = Matrix6d::Zero();
   for (int n = 0; n < 6; ++n) {
     if (eigen.values[n] < least || !(eigen.values[n] > 0.0)) {
@@ -213,10 +214,10 @@ void Alignment::add_prior(BlockSystem& system) const {
 }
 
 // Equations of all pairs. The work is done by frame, to limit the samples in memory; then both
-// halves of each pair are added. Right-hand sides by cell are set for one cell in cell_share; 0:
+// halves of each pair are added. Right-hand sides by cell are set for one cell in cell_interval; 0:
 // none.
 std::vector<PairEquations> Alignment::all_equations(double max_distance_m,
-                                                    std::uint64_t cell_share) const {
+                                                    std::uint64_t cell_interval) const {
   std::vector<std::vector<std::size_t>> pairs_of_frame(frames_.size());
   for (std::size_t n = 0; n < pairs_.size(); ++n) {
     pairs_of_frame[pairs_[n].first].push_back(n);
@@ -233,7 +234,7 @@ std::vector<PairEquations> Alignment::all_equations(double max_distance_m,
       const std::size_t other = is_a ? pairs_[n].second : pairs_[n].first;
       (is_a ? of_first : of_second)[n] =
           half_of(samples, other, pose_of(other)->inverse() * *pose_of(frame), is_a, max_distance_m,
-                  cell_share);
+                  cell_interval);
     }
   });
   parallel_each(pairs_.size(), [&](std::size_t n) {
@@ -299,8 +300,8 @@ double Alignment::deviation_scale(double max_distance_m) const {
   add_prior(system);
   std::map<Cell, std::map<std::size_t, Vector6d>> sides;
   // For a long scan, only a sample of the cells is in memory; about max_cells suffice.
-  const std::uint64_t share = 1 + frames_.size() / frames_per_cell_share;
-  const std::vector<PairEquations> equations = all_equations(max_distance_m, share);
+  const std::uint64_t interval = 1 + frames_.size() / frames_per_cell_interval;
+  const std::vector<PairEquations> equations = all_equations(max_distance_m, interval);
   for (std::size_t n = 0; n < pairs_.size(); ++n) {
     const std::size_t a = row_.at(frames_[pairs_[n].first].node);
     const std::size_t b = row_.at(frames_[pairs_[n].second].node);
@@ -332,7 +333,7 @@ double Alignment::deviation_scale(double max_distance_m) const {
     for (const auto& [row, part] : of_cell) side[row] = part;
     squares += square(side);
   }
-  squares *= static_cast<double>(share * sides.size()) / static_cast<double>(used);
+  squares *= static_cast<double>(interval * sides.size()) / static_cast<double>(used);
   const double unknowns = 6.0 * static_cast<double>(row_.size() - components_.size());
   if (!(unknowns > 0.0)) return 1.0;
   double way = 0.0;
@@ -420,7 +421,7 @@ void bind(ParameterTable& table, IcpOptions& options) {
             "approximate number of ICP samples per frame");
   table.add("icp_distance_m", options.max_distance_m, positive,
             "maximum distance between an ICP sample and the surface in the first iteration, m");
-  table.add("icp_degenerate", options.degenerate, zero_to_one,
+  table.add("icp_degenerate", options.max_degenerate_ratio, zero_to_one,
             "share of the largest eigenvalue of the ICP information matrix below which a direction "
             "is ignored");
   table.add("icp_correlation", options.correlation, {1.0},
@@ -455,7 +456,7 @@ std::optional<PoseLink> align_pair(const FrameFeatures& a, const FrameFeatures& 
   options.iterations = 40;
   options.graduated = true;
   options.max_distance_m = guess_m;
-  options.degenerate = pair_degenerate;
+  options.max_degenerate_ratio = pair_degenerate;
   const std::size_t side_of_b = a.node < b.node ? 1 : 0;
   BlockSystem prior(2);
   Vector6d variances;
@@ -469,7 +470,7 @@ std::optional<PoseLink> align_pair(const FrameFeatures& a, const FrameFeatures& 
   const std::size_t all = surface_samples(a, options.samples, SampleUse::estimation).size() +
                           surface_samples(b, options.samples, SampleUse::estimation).size();
   if (aligned.samples < min_pair_samples ||
-      static_cast<double>(aligned.samples) < min_pair_share * static_cast<double>(all) ||
+      static_cast<double>(aligned.samples) < min_pair_fraction * static_cast<double>(all) ||
       aligned.final_rms_m > max_pair_rms_m)
     return std::nullopt;
   link.from_from_to = aligned.map_from_base.at(b.node);

@@ -27,9 +27,9 @@ struct IcpOptions {
   int samples = 1500;            // >= 1: approximate number of samples per frame
   double max_distance_m = 0.03;  // > 0: initial maximum distance between a sample and the plane
   double max_normal_angle_deg = 35.0;
-  double correlation = 4.0;   // >= 1: samples equivalent to one independent sample
-  double degenerate = 0.002;  // >= 0: share of the largest information; a pair's directions with
-                              // less are ignored
+  double correlation = 4.0;             // >= 1: samples equivalent to one independent sample
+  double max_degenerate_ratio = 0.002;  // >= 0: share of the largest information; a pair's
+                                        // directions with less are ignored
   // Not bound: for inaccurate initial poses, the width of the loss starts at the distance and
   // decreases slowly (graduated non-convexity, Blake and Zisserman 1987).
   bool graduated = false;

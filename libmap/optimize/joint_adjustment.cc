@@ -206,21 +206,21 @@ void JointSolver::fix() {
 void JointSolver::linearize() {
   const BundleView view = view_of(state_);
   const Eigen::Index size = cameras_at_ + params_;
-  std::vector<JointSystem> shares(parts,
-                                  {Eigen::MatrixXd::Zero(size, size), Eigen::VectorXd::Zero(size)});
+  std::vector<JointSystem> partial_systems(
+      parts, {Eigen::MatrixXd::Zero(size, size), Eigen::VectorXd::Zero(size)});
   parallel_each(parts, [&](std::size_t part) {
     const std::size_t end = (part + 1) * problem_.points() / parts;
     for (std::size_t point = part * problem_.points() / parts; point < end; ++point) {
       if (problem_.has_motion)
-        add_point<12>(view, point, shares[part]);
+        add_point<12>(view, point, partial_systems[part]);
       else
-        add_point<6>(view, point, shares[part]);
+        add_point<6>(view, point, partial_systems[part]);
     }
   });
-  system_ = std::move(shares[0]);
+  system_ = std::move(partial_systems[0]);
   for (std::size_t part = 1; part < parts; ++part) {
-    system_.matrix += shares[part].matrix;
-    system_.rhs += shares[part].rhs;
+    system_.matrix += partial_systems[part].matrix;
+    system_.rhs += partial_systems[part].rhs;
   }
   add_priors();
   add_links();

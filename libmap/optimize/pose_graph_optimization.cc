@@ -22,10 +22,10 @@ namespace {
 
 constexpr double min_scale = 0.01;  // bounds of the factor of a group's standard deviations
 constexpr double max_scale = 20.0;
-constexpr double settled = 0.02;        // relative change of the scales at convergence
-constexpr double min_redundancy = 0.1;  // per residual of a link used for its group's scale
-constexpr std::size_t min_links = 3;    // of a group whose scale is estimated
-constexpr double worst_share = 0.25;    // of the worst chi-square; closures above are rejected too
+constexpr double settled = 0.02;         // relative change of the scales at convergence
+constexpr double min_redundancy = 0.1;   // per residual of a link used for its group's scale
+constexpr std::size_t min_links = 3;     // of a group whose scale is estimated
+constexpr double worst_fraction = 0.25;  // of the worst chi-square; closures above are rejected too
 constexpr int max_rejections = 20;
 constexpr std::size_t simplicial_below = 120;              // poses
 constexpr double unknown_landmark_information = 1.001e-4;  // RTAB-Map: variance >= 9999
@@ -338,7 +338,7 @@ bool Optimization::reject() {
   for (std::size_t n = 0; n < links_.size(); ++n) {
     GraphLinkResult& link = result_.links[n];
     if (used_[n] && links_[n].may_be_rejected && !link.rejected &&
-        link.chi_square > std::max(options_.max_chi_square, worst_share * worst))
+        link.chi_square > std::max(options_.max_chi_square, worst_fraction * worst))
       link.rejected = true;
   }
   return true;
@@ -366,12 +366,12 @@ bool Optimization::recalibrate() {
     const std::string& group = links_[n].group;
     // Translation and rotation are separate if the link's information has no mixed terms.
     const bool apart = link.information.topRightCorner<3, 3>().isZero(0.0);
-    const Matrix6d share = link.information * covariance.of_relative(link.from, link.to);
+    const Matrix6d fraction = link.information * covariance.of_relative(link.from, link.to);
     for (std::size_t part = 0; part < 2; ++part) {
       const auto first = static_cast<Eigen::Index>(apart ? 3 * part : 0);
       const Eigen::Index size = apart ? 3 : 6;
       const double all = static_cast<double>(size);
-      const double redundancy = all - share.diagonal().segment(first, size).sum();
+      const double redundancy = all - fraction.diagonal().segment(first, size).sum();
       if (redundancy < min_redundancy * all) continue;
       const double square = residual.segment(first, size)
                                 .dot(link.information.block(first, first, size, size) *

@@ -21,15 +21,15 @@ constexpr double max_motion_gap_s = 3.0;
 Vector6d slope_of(const std::vector<double>& times, const std::vector<Vector6d>& values) {
   Vector6d slope = Vector6d::Zero();
   for (std::size_t n = 0; n < times.size(); ++n) {
-    double share = 0.0;
+    double fraction = 0.0;
     for (std::size_t m = 0; m < times.size(); ++m) {
       if (m == n) continue;
       double product = 1.0 / (times[n] - times[m]);
       for (std::size_t k = 0; k < times.size(); ++k)
         if (k != n && k != m) product *= -times[k] / (times[n] - times[k]);
-      share += product;
+      fraction += product;
     }
-    slope += share * values[n];
+    slope += fraction * values[n];
   }
   return slope;
 }

@@ -360,11 +360,12 @@ ScaleEstimate scale_by_board(const std::vector<FrameFeatures>& frames,
   for (const double disagreement : disagreements) scale.chi_square += disagreement;
   scale.chi_square /=
       freedom_of_pose * static_cast<double>(best.observations.size()) - freedom_of_board;
-  const double share = std::sqrt(found->size_variance * std::max(1.0, scale.chi_square));
-  scale.deviation = scale.factor * share;
-  if (!(share <= max_deviation))
+  const double relative_deviation =
+      std::sqrt(found->size_variance * std::max(1.0, scale.chi_square));
+  scale.deviation = scale.factor * relative_deviation;
+  if (!(relative_deviation <= max_deviation))
     refuse_board(board, "the images determine the scale only to " +
-                            to_fixed_text(100.0 * share, 1) + " %, not to " +
+                            to_fixed_text(100.0 * relative_deviation, 1) + " %, not to " +
                             to_text(100.0 * max_deviation) +
                             " %; show the board from locations farther apart");
   return scale;

@@ -73,9 +73,9 @@ class LostFrames {
     if (a == no_frame || b == no_frame || part(a) != part(b) || stamp_s(a) == stamp_s(b))
       return std::nullopt;
     const Vector6d step = step_between(pose(a), pose(b));
-    const double share = (stamp_s(frame) - stamp_s(a)) / (stamp_s(b) - stamp_s(a));
-    if (share <= 1.0) return moved(pose(a), std::max(0.0, share) * step);
-    return moved(pose(b), std::min(most_steps_on, share - 1.0) * step);
+    const double fraction = (stamp_s(frame) - stamp_s(a)) / (stamp_s(b) - stamp_s(a));
+    if (fraction <= 1.0) return moved(pose(a), std::max(0.0, fraction) * step);
+    return moved(pose(b), std::min(most_steps_on, fraction - 1.0) * step);
   }
 
   bool place(std::size_t frame) {
@@ -126,9 +126,10 @@ class LostFrames {
       of_node = move * of_node;
     }
     for (TrackingLoss& loss : result_.losses)
-      if (loss.found_node == 0 && std::find(nodes.begin(), nodes.end(), loss.node) != nodes.end()) {
-        loss.found_node = node(frame);
-        loss.found_at = at;
+      if (loss.relocalized_node == 0 &&
+          std::find(nodes.begin(), nodes.end(), loss.node) != nodes.end()) {
+        loss.relocalized_node = node(frame);
+        loss.relocalized_at = at;
       }
   }
 

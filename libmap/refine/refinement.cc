@@ -19,7 +19,7 @@ namespace libmap {
 
 namespace {
 
-constexpr double settled_share = 0.01;  // rounds end with a smaller share of new links
+constexpr double settled_fraction = 0.01;  // rounds end with a smaller share of new links
 constexpr int max_calibrations = 3;
 // A smaller change of the calibration does not change the matches.
 constexpr double settled_m = 5e-4;
@@ -62,7 +62,7 @@ Trajectory trajectory_at(const PoseGraph& graph, const std::map<int, Pose>& pose
 
 bool is_all_tracked(const RefinementInput& input, const RefinementState& state) {
   return std::all_of(state.poses.begin(), state.poses.end(), [&](const auto& pose) {
-    return pose.first < 0 || input.tracked.contains(pose.first);
+    return pose.first < 0 || input.odometry_nodes.contains(pose.first);
   });
 }
 
@@ -72,13 +72,13 @@ std::vector<int> unjoined(const RefinementInput& input, const RefinementState& s
                           const std::vector<std::vector<int>>& parts) {
   std::vector<int> left;
   const bool one_map = input.options.one_map;
-  if (input.tracked.empty() && !one_map) return left;
+  if (input.odometry_nodes.empty() && !one_map) return left;
   const bool nothing_known = is_all_tracked(input, state);
   const auto largest = std::max_element(
       parts.begin(), parts.end(), [](const auto& a, const auto& b) { return a.size() < b.size(); });
   for (auto part = parts.begin(); part != parts.end(); ++part) {
     const bool alone = std::all_of(part->begin(), part->end(), [&](int node) {
-      return node < 0 || input.tracked.contains(node);
+      return node < 0 || input.odometry_nodes.contains(node);
     });
     if (one_map ? part != largest : alone && !(part == largest && nothing_known))
       left.insert(left.end(), part->begin(), part->end());
@@ -188,7 +188,7 @@ void start(Run& run) {
   if (state.other_links.empty() && options.start != StartPoses::visual)
     state.other_links = odometry_links(graph);
   if (options.start == StartPoses::visual || options.start == StartPoses::automatic) {
-    run.input.tracked.insert(initial.without_pose.begin(), initial.without_pose.end());
+    run.input.odometry_nodes.insert(initial.without_pose.begin(), initial.without_pose.end());
   } else {
     run.result.without_pose = std::move(initial.without_pose);
     if (!run.result.without_pose.empty())
@@ -217,7 +217,7 @@ void find_frames(Run& run, const FeatureCache& cache) {
   RefinementResult& result = run.result;
   std::vector<int> nodes;
   for (const auto& [node, pose] : run.state.poses) nodes.push_back(node);
-  nodes.insert(nodes.end(), input.tracked.begin(), input.tracked.end());
+  nodes.insert(nodes.end(), input.odometry_nodes.begin(), input.odometry_nodes.end());
   std::sort(nodes.begin(), nodes.end());
   FeatureResult found = find_features(input.scan, nodes, options.features, input.progress, &cache);
   check_known_lengths(found.frames, options.known_lengths);
@@ -237,7 +237,7 @@ void find_frames(Run& run, const FeatureCache& cache) {
                           {"without_depth", without_depth}}});
   if (!options.board) return;
   input.board_views = find_boards(input.scan, frames, *options.board, input.progress);
-  run.report({.name = "board", .metrics = {{"pictures", input.board_views.size()}}});
+  run.report({.name = "board", .metrics = {{"images", input.board_views.size()}}});
 }
 
 // Computes poses of all nodes by visual odometry and links, from the initial poses. The suffix is
@@ -249,12 +249,12 @@ void link_frames(Run& run, const std::string& suffix = {}) {
     stage.report.name += suffix;
     return stage;
   };
-  if (!input.tracked.empty()) run.accept(named(track_stage(input, state)));
+  if (!input.odometry_nodes.empty()) run.accept(named(track_stage(input, state)));
   state.graph = graph_as_stored(input, state);
   for (int round = 0; round <= input.options.rounds; ++round) {
     std::vector<FramePair> pairs;
     for (const FramePair& pair : candidate_pairs(input, state, round))
-      if (state.tried.insert(pair).second) pairs.push_back(pair);
+      if (state.tried_pairs.insert(pair).second) pairs.push_back(pair);
     if (pairs.empty() && round > 0) break;
     if (pairs.empty()) continue;
     const std::size_t before = state.feature_links.size();
@@ -263,7 +263,7 @@ void link_frames(Run& run, const std::string& suffix = {}) {
     if (run.propose(std::move(stage)))
       run.result.stages.back().metrics.emplace_back("rejected_by_optimization",
                                                     drop_rejected_links(state));
-    if (round > 0 && static_cast<double>(fresh) <= settled_share * static_cast<double>(before))
+    if (round > 0 && static_cast<double>(fresh) <= settled_fraction * static_cast<double>(before))
       break;
   }
   state.information = link_system(state.poses, state.graph.links);
@@ -276,7 +276,7 @@ void link_again(Run& run) {
   run.state.poses = run.input.start;
   run.state.parts = run.input.start_parts;
   run.state.feature_links.clear();
-  run.state.tried.clear();
+  run.state.tried_pairs.clear();
   std::erase_if(run.state.other_links, is_by_depth);
   link_frames(run, " again");
   StageResult stage{.state = std::exchange(run.state, std::move(before)),
@@ -303,8 +303,8 @@ RefinementOptions with_sensor(RefinementOptions options) {
   set(bundle.bounds.frame_time_s, bounds.frame_time_s, model.frame_time_s);
   set(bundle.bounds.max_depth_correction_m, bounds.max_depth_correction_m,
       model.max_depth_correction_m);
-  set(bundle.bounds.max_depth_correction_per_m, bounds.max_depth_correction_per_m,
-      model.max_depth_correction_per_m);
+  set(bundle.bounds.max_depth_correction_of_range, bounds.max_depth_correction_of_range,
+      model.max_depth_correction_of_range);
   bundle.timing_mean = {model.depth_delay_s, model.rolling_shutter_s};
   return options;
 }
@@ -371,7 +371,7 @@ void calibrate_sensor(Run& run) {
       state.feature_links = rematched_links(run.input, state);
   }
   state.information = information_of(run.input, state);
-  state.by_observations = true;
+  state.is_from_bundle = true;
 }
 
 void drop_descriptors(RefinementState& state) {
@@ -382,7 +382,7 @@ void drop_descriptors(RefinementState& state) {
 // Restores the initial poses if the held-out observations fit them better than the final ones.
 // This is impossible for a scan with nodes without initial poses.
 void keep_start_if_better(const RefinementInput& input, RefinementState& state) {
-  if (!input.tracked.empty() || input.start.size() != state.poses.size()) return;
+  if (!input.odometry_nodes.empty() || input.start.size() != state.poses.size()) return;
   const HeldOutEvaluation whole =
       evaluate_held_out(held_out_costs(*state.stored_frames, state.feature_links, input.start),
                         costs_at(state, state.feature_links));
@@ -406,7 +406,7 @@ std::map<int, Matrix6d> covariances(const RefinementInput& input, const Refineme
   const GraphCovariance covariance(state.poses, state.information, state.graph.components);
   input.progress.end();
   const double scale =
-      state.by_observations ? std::max(1.0, min_deviation_scale / state.deviation_scale) : 1.0;
+      state.is_from_bundle ? std::max(1.0, min_deviation_scale / state.deviation_scale) : 1.0;
   std::map<int, Matrix6d> of_nodes;
   if (!covariance.valid()) return of_nodes;
   for (const auto& [node, pose] : state.poses) {
@@ -433,7 +433,7 @@ void drop_unjoined(const RefinementInput& input, const RefinementState& state,
     result.warnings.push_back(
         "the scan has " + std::to_string(kept) +
         " parts of the scan are not connected by links; relative poses between parts are unknown");
-  if (input.tracked.empty() && !input.options.one_map) return;
+  if (input.odometry_nodes.empty() && !input.options.one_map) return;
   for (const int node : left) result.covariance.erase(node);
   std::sort(left.begin(), left.end());
   std::erase_if(left, [](int node) { return node < 0; });
@@ -443,7 +443,7 @@ void drop_unjoined(const RefinementInput& input, const RefinementState& state,
   std::erase_if(result.links, leaves);
   std::erase_if(result.closures, leaves);
   for (const auto& [node, reason] : result.skipped)
-    if (input.tracked.contains(node)) left.push_back(node);
+    if (input.odometry_nodes.contains(node)) left.push_back(node);
   std::sort(left.begin(), left.end());
   if (!left.empty())
     result.warnings.push_back("nodes are skipped, because no link connects them to the others: " +
@@ -621,7 +621,7 @@ void describe(ResultTable& table, const RefinementResult& result) {
   table.add("sensor", sensor, "findings about the sensor, such as calibration errors");
   table.add("noise", result.noise, "depth noise and its source");
   table.add("scale", result.scale, "source and uncertainty of the scale");
-  table.add("stages_undone", rejected, "names of rejected stages");
+  table.add("rejected_stages", rejected, "names of rejected stages");
   table.add("trajectory_rmse_m", rmse_m, "absolute trajectory error against true poses (RMS), m");
   table.add("trajectory_rotation_error_deg", rotation_deg,
             "mean rotation error against true poses, degrees");

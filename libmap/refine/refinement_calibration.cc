@@ -13,7 +13,7 @@ namespace libmap {
 namespace {
 
 constexpr std::size_t max_alternatives = 10;
-constexpr double min_rematched_share = 0.9;  // minimum share of linked pairs that match again
+constexpr double min_rematched_fraction = 0.9;  // minimum share of linked pairs that match again
 // Factors of the calibration's standard deviations, measured on simulated scans. They are above 1
 // because matches are selected with the uncorrected camera and errors outside the model are
 // correlated between frames. With timing, motions also change within a frame.
@@ -35,7 +35,7 @@ void add_figures(const CalibrationEstimate& estimate, StageReport& report) {
     report.metrics.emplace_back(name, value);
   };
   add("frames", static_cast<double>(estimate.frames));
-  for (const auto& [name, change] : estimate.tried) {
+  for (const auto& [name, change] : estimate.evaluated_models) {
     add(name + "_matches", change.matches.after);
     add(name + "_surfaces", change.surfaces.after);
   }
@@ -68,7 +68,7 @@ CalibrationChoice choice_of(const RefinementOptions& options, const SensorCalibr
                     options.register_depth, options.estimate_timing};
   } else {
     choice.parts = parts_of(known);
-    choice.leave_out = choice.parts.timing;
+    choice.drop_unneeded = choice.parts.timing;
   }
   return choice;
 }
@@ -98,7 +98,8 @@ std::optional<ScaleEstimate> odometry_scale(const RefinementInput& input,
   std::vector<GraphLinkResult> links;
   if (!input.scan.graph().links.empty()) links = state.results_of_other_links();
   std::erase_if(links, [&](const GraphLinkResult& link) {  // links from depth
-    return input.tracked.contains(link.link.from) || input.tracked.contains(link.link.to);
+    return input.odometry_nodes.contains(link.link.from) ||
+           input.odometry_nodes.contains(link.link.to);
   });
   return scale_by_odometry(links, state.poses);
 }
@@ -168,7 +169,7 @@ std::vector<FeatureLink> rematched_links(const RefinementInput& input,
   PairVerification verified = verify_pairs(*state.frames, pairs, input.options.closures,
                                            input.options.seed, input.progress, input.known_matches);
   if (verified.links.size() <
-      static_cast<std::size_t>(min_rematched_share * static_cast<double>(pairs.size())))
+      static_cast<std::size_t>(min_rematched_fraction * static_cast<double>(pairs.size())))
     return state.feature_links;
   for (FeatureLink& link : verified.links) link.link.type = types.at(link.frames);
   return std::move(verified.links);
@@ -214,7 +215,7 @@ CalibrationMoves calibration_moves(const RefinementInput& input, const Refinemen
   deviations = std::move(varied.deviations);
   const bool by_stamps =
       std::any_of(state.frames->begin(), state.frames->end(),
-                  [](const FrameFeatures& frame) { return frame.depth_later_s != 0.0; });
+                  [](const FrameFeatures& frame) { return frame.depth_stamp_offset_s != 0.0; });
   for (CameraTiming& timing : deviations.timing) {
     timing.depth_delay_s =
         std::hypot(stated_timing_scale * timing.depth_delay_s, by_stamps ? stamp_deviation_s : 0.0);

@@ -41,13 +41,15 @@ StageResult track_stage(const RefinementInput& input, const RefinementState& sta
   next.feature_links = std::move(tracked.links);
   for (const PoseLink& link : tracked.depth_links)
     next.other_links.push_back({link, depth_link_group});
-  next.tried = std::move(tracked.tried);
+  next.tried_pairs = std::move(tracked.tried_pairs);
   next.losses = std::move(tracked.losses);
-  result.report.metrics = {
-      {"frames", input.tracked.size()},     {"key_frames", tracked.key_frames.size()},
-      {"links", next.feature_links.size()}, {"tracked_by_depth", tracked.depth_links.size()},
-      {"lost_nodes", next.losses.size()},   {"relocalized", tracked.relocalized},
-      {"parts", next.parts.size()}};
+  result.report.metrics = {{"frames", input.odometry_nodes.size()},
+                           {"key_frames", tracked.key_frames.size()},
+                           {"links", next.feature_links.size()},
+                           {"tracked_by_depth", tracked.depth_links.size()},
+                           {"lost_nodes", next.losses.size()},
+                           {"relocalized", tracked.relocalized},
+                           {"parts", next.parts.size()}};
   const LinkConsistency consistency = link_consistency(
       next.feature_links, trajectory_of(input.scan.graph(), PoseSource::ground_truth));
   if (consistency.links > 0)
@@ -171,7 +173,7 @@ StageResult bundle_stage(const RefinementInput& input, const RefinementState& st
       {"depth_rms_m", adjusted.depth_rms_m}};
   result.state.poses = std::move(adjusted.map_from_base);
   result.state.information = std::move(adjusted.information);
-  result.state.by_observations = true;
+  result.state.is_from_bundle = true;
   return result;
 }
 

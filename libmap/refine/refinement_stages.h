@@ -22,7 +22,7 @@ struct RefinementInput {
   Progress& progress;
   std::map<int, Pose> start{};                  // initial poses
   std::vector<std::vector<int>> start_parts{};  // nodes with initial poses in one frame
-  std::set<int> tracked{};                      // nodes with poses from visual odometry
+  std::set<int> odometry_nodes{};               // nodes with poses from visual odometry
   std::vector<BoardView> board_views{};
   // Matches of pairs of frames, cached for matching with another calibration; nullptr for long
   // scans, where descriptors are compared again.
@@ -42,11 +42,11 @@ struct RefinementState {
   SensorCalibration calibration{};
   std::vector<GraphLink> other_links{};  // of the scan, and from alignment of depth images
   std::vector<FeatureLink> feature_links{};
-  std::set<FramePair> tried{};         // pairs of frames that have been compared
+  std::set<FramePair> tried_pairs{};   // pairs of frames that have been compared
   PoseGraphResult graph{};             // links: other_links, then feature_links
   std::vector<TrackingLoss> losses{};  // of visual odometry
   BlockSystem information{0};          // information of steps of the poses, in the order of poses
-  bool by_observations = false;        // the information is from a bundle adjustment
+  bool is_from_bundle = false;         // the information is from a bundle adjustment
   std::vector<FramePair> surface_pairs{};  // pairs of frames that ICP has aligned
   double surface_distance_m = 0.0;         // IcpResult::max_distance_m
   double deviation_scale = 1.0;            // IcpResult::deviation_scale

@@ -181,8 +181,8 @@ void interpolate_motions(const std::vector<FrameFeatures>& frames,
     if (motions.contains(frame.node) || after == known.begin() || after == known.end()) continue;
     const auto before = std::prev(after);
     if (after->first - before->first > max_interpolated_s) continue;
-    const double share = (frame.stamp_s - before->first) / (after->first - before->first);
-    motions.emplace(frame.node, (1.0 - share) * before->second + share * after->second);
+    const double fraction = (frame.stamp_s - before->first) / (after->first - before->first);
+    motions.emplace(frame.node, (1.0 - fraction) * before->second + fraction * after->second);
   }
 }
 
@@ -197,8 +197,9 @@ void add_other_motions(const SensorCalibration& known, SensorCalibration& calibr
                : of.timing.front().depth_delay_s;
   };
   const double time_s = time_of(calibration);
-  const double share = time_s != 0.0 ? std::clamp(time_of(known) / time_s, 0.5, 2.0) : 1.0;
-  for (const auto& [node, motion] : known.motion) calibration.motion.emplace(node, share * motion);
+  const double fraction = time_s != 0.0 ? std::clamp(time_of(known) / time_s, 0.5, 2.0) : 1.0;
+  for (const auto& [node, motion] : known.motion)
+    calibration.motion.emplace(node, fraction * motion);
 }
 
 bool is_short_path(const SubScan& part) {
@@ -243,7 +244,8 @@ class ModelSearch {
   Candidate attempt(const CalibrationParts& model, const SensorCalibration& start,
                     const std::map<int, Pose>& poses, int rounds) {
     Candidate candidate = try_model(model, part_, rough_, start, poses, rounds);
-    estimate_.tried.emplace_back(model.name(), evaluate_held_out(before_, candidate.costs));
+    estimate_.evaluated_models.emplace_back(model.name(),
+                                            evaluate_held_out(before_, candidate.costs));
     if (const auto reason = exceeded_bound(candidate.adjustment.calibration, options_)) {
       candidate.possible = false;
       estimate_.impossible.emplace_back(model.name(), *reason);
@@ -256,7 +258,7 @@ class ModelSearch {
   }
   bool is_good(const Candidate& candidate) const;
   void simplify_to(const CalibrationParts& simpler);
-  void leave_out();
+  void drop_unneeded();
   void settle_motions();
   bool is_timing_enough(const CalibrationParts& others);
   void use_timing_alone();
@@ -291,8 +293,8 @@ void ModelSearch::simplify_to(const CalibrationParts& simpler) {
     best_ = std::move(candidate);
 }
 
-void ModelSearch::leave_out() {
-  if (!choice_.only_if_better || !choice_.leave_out) return;
+void ModelSearch::drop_unneeded() {
+  if (!choice_.only_if_better || !choice_.drop_unneeded) return;
   if (best_.model.timing) simplify_to({.timing = true});
   for (bool CalibrationParts::*const part_of :
        {&CalibrationParts::registration, &CalibrationParts::depth, &CalibrationParts::intrinsics}) {
@@ -337,22 +339,23 @@ void ModelSearch::try_timing() {
   Candidate candidate = attempt_from_best(timed, 1);
   if (!is_good(candidate) || !is_needed(best_.costs, candidate.costs, min_timing_gain)) return;
   best_ = std::move(candidate);
-  leave_out();
+  drop_unneeded();
   settle_motions();
 }
 
 CalibrationEstimate ModelSearch::run() {
   CalibrationParts all = choice_.parts;
   all.timing = all.timing && !choice_.start.timing.empty();
-  const bool may_time = choice_.parts.timing && choice_.leave_out && !all.timing;
+  const bool may_time = choice_.parts.timing && choice_.drop_unneeded && !all.timing;
   if (may_time && is_timing_enough(all)) {
     use_timing_alone();
   } else {
     best_ = attempt(all, choice_.start, part_.poses, max_rounds);
     // With little data, too many free parameters may fit worse than intrinsics alone.
-    if (!is_good(best_) && choice_.leave_out && all.intrinsics && (all.depth || all.registration))
+    if (!is_good(best_) && choice_.drop_unneeded && all.intrinsics &&
+        (all.depth || all.registration))
       best_ = attempt({.intrinsics = true}, {}, part_.poses, 1);
-    leave_out();
+    drop_unneeded();
     if (may_time) try_timing();
     if (timed_ && (!is_good(best_) || is_needed(best_.costs, timed_->costs, min_timing_gain)))
       use_timing_alone();

@@ -41,7 +41,7 @@ CalibrationParts parts_of(const SensorCalibration& calibration);
 struct CalibrationChoice {
   CalibrationParts parts{true, true, true, true};  // parts that may be estimated
   bool only_if_better = true;  // require that the held-out data fit clearly better
-  bool leave_out = true;       // drop parts that are not needed
+  bool drop_unneeded = true;   // drop parts that are not needed
   bool converge = true;        // iterate the best model to the tolerance of the options
   SensorCalibration start;     // initial values of registration and timing
 };
@@ -51,8 +51,9 @@ struct CalibrationEstimate {
   SensorCalibration calibration;      // empty: the stored calibration remains
   BundleAdjustmentResult adjustment;  // of these frames, best model; without information
   HeldOutEvaluation held_out;         // of these frames: stored calibration against best model
-  std::vector<std::pair<std::string, HeldOutEvaluation>> tried;  // held_out of each model
-  std::vector<std::pair<std::string, std::string>> impossible;   // models, and exceeded bounds
+  std::vector<std::pair<std::string, HeldOutEvaluation>>
+      evaluated_models;                                         // held_out of each model
+  std::vector<std::pair<std::string, std::string>> impossible;  // models, and exceeded bounds
 };
 
 // Selects a calibration by bundle adjustments. Timing alone is tried first; it is the result if the

@@ -33,7 +33,7 @@ struct Trial {
 std::string reason_of(const RejectionCounts& counts) {
   if (counts.too_few_matches > 0) return "too few matches";
   if (counts.too_few_inliers > 0) return "too few matches agree on a motion";
-  if (counts.narrow > 0) return "matches cover too little of the image";
+  if (counts.degenerate > 0) return "matches cover too little of the image";
   return "motion did not converge";
 }
 
@@ -247,10 +247,11 @@ bool Tracker::track(std::size_t frame) {
     if (reference == none) continue;
     // The gap counts from the last tracked frame, not from the key frame.
     if (frame - (reference == earlier_ ? earlier_ : last_) > longest_gap) continue;
-    const Trial& tried = reference == key_ ? prefetch_trial(key_, frame) : trial(reference, frame);
-    if (!tried.link) continue;
+    const Trial& tried_pairs =
+        reference == key_ ? prefetch_trial(key_, frame) : trial(reference, frame);
+    if (!tried_pairs.link) continue;
     if (reference == earlier_) earlier_ = none;
-    place(frame, reference, *tried.link);
+    place(frame, reference, *tried_pairs.link);
     return true;
   }
   return false;
@@ -359,8 +360,8 @@ void Tracker::lose(std::size_t frame, std::size_t reference, std::string reason)
 void Tracker::find_lost(std::size_t part, std::size_t frame, std::size_t at) {
   const auto loss = loss_of_part_.find(part);
   if (loss == loss_of_part_.end()) return;
-  result_.losses[loss->second].found_node = frames_[frame].node;
-  result_.losses[loss->second].found_at = frames_[at].node;
+  result_.losses[loss->second].relocalized_node = frames_[frame].node;
+  result_.losses[loss->second].relocalized_at = frames_[at].node;
 }
 
 VisualOdometryResult Tracker::finish() {
@@ -381,9 +382,9 @@ VisualOdometryResult Tracker::finish() {
                            result_.key_frames.end());
   std::set<FramePair> linked;
   for (const FeatureLink& link : result_.links) linked.insert(link.frames);
-  // Unconfirmed motions may be confirmed later and are not in `tried`.
-  for (const auto& [pair, tried] : trials_)
-    if (!tried.link || linked.contains(pair)) result_.tried.insert(pair);
+  // Unconfirmed motions may be confirmed later and are not in `tried_pairs`.
+  for (const auto& [pair, tried_pairs] : trials_)
+    if (!tried_pairs.link || linked.contains(pair)) result_.tried_pairs.insert(pair);
   return std::move(result_);
 }
 
@@ -474,11 +475,11 @@ std::string describe(const std::vector<TrackingLoss>& losses) {
     const TrackingLoss& loss = losses[n];
     text +=
         (n > 0 ? "; " : "") + std::string("node ") + std::to_string(loss.node) + ", " + loss.reason;
-    if (loss.found_node == loss.node)
-      text += ", found again at node " + std::to_string(loss.found_at);
-    else if (loss.found_node > 0)
-      text += ", found again by node " + std::to_string(loss.found_node) + " at node " +
-              std::to_string(loss.found_at);
+    if (loss.relocalized_node == loss.node)
+      text += ", found again at node " + std::to_string(loss.relocalized_at);
+    else if (loss.relocalized_node > 0)
+      text += ", found again by node " + std::to_string(loss.relocalized_node) + " at node " +
+              std::to_string(loss.relocalized_at);
   }
   if (losses.size() > most) text += "; and " + std::to_string(losses.size() - most) + " more";
   return text;

@@ -42,8 +42,8 @@ struct TrackingLoss {
   int node = 0;
   int key_frame = 0;  // node that it was compared with; 0: none
   std::string reason{};
-  int found_node = 0;  // relocalized node: this one or a later one of the part; 0: none
-  int found_at = 0;    // earlier node that found_node was relocalized at
+  int relocalized_node = 0;  // relocalized node: this one or a later one of the part; 0: none
+  int relocalized_at = 0;    // earlier node that found_node was relocalized at
 };
 
 // Returns text on the first losses: node, reason, and where it was found again.
@@ -55,7 +55,7 @@ struct VisualOdometryResult {
   // Tracked frames (LinkType::neighbor) and relocalized frames (local_space_closure).
   std::vector<FeatureLink> links;
   std::vector<PoseLink> depth_links;  // of frames tracked by depth only
-  std::set<FramePair> tried;          // pairs that need not be tried again
+  std::set<FramePair> tried_pairs;    // pairs that need not be tried again
   std::vector<int> key_frames;
   std::vector<TrackingLoss> losses;
   std::size_t relocalized = 0;  // parts joined to others, and frames found again

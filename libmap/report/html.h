@@ -76,8 +76,8 @@ std::string sources_html(const ReportContent& content);
 std::string timings_html(const TimingTable& table);
 
 // Legend, still image, canvas, look-ups and data of a map; canvas and data only if `with_view`.
-// `still` is an <img> element that replaces the view, or empty.
-std::string map_html(const ReportMap& map, const std::string& still, bool with_view);
+// `preview` is an <img> element that replaces the view, or empty.
+std::string map_html(const ReportMap& map, const std::string& preview, bool with_view);
 
 // Colors of classes and flags, for the page's script.
 std::string palette_json();

@@ -85,9 +85,9 @@ ReportImage fit_image(const ReportImage& report_image, int level) {
   const int side = std::max(image.width, image.height);
   const bool scaled = side > bound.max_side;
   if (scaled) {
-    const double share = static_cast<double>(bound.max_side) / side;
+    const double fraction = static_cast<double>(bound.max_side) / side;
     const auto shrunk = [&](int length) {
-      return std::max(1, static_cast<int>(std::lround(length * share)));
+      return std::max(1, static_cast<int>(std::lround(length * fraction)));
     };
     image = shrink_image(image, shrunk(image.width), shrunk(image.height));
   }

@@ -39,7 +39,7 @@ struct ReportTable {
 struct ReportMap {
   MapView view{};
   std::optional<ReportTable> locations{};  // row n corresponds to marker n
-  std::optional<ReportImage> still{};
+  std::optional<ReportImage> preview{};
 };
 
 // A colored mesh and the meaning of the colors.
@@ -69,7 +69,7 @@ struct TimingTable {
 
 struct ReportListing {
   std::string text{};
-  std::size_t left_out_lines = 0;
+  std::size_t omitted_lines = 0;
 };
 
 // A file that cannot be shown.

@@ -132,10 +132,10 @@ class PageWriter {
     const bool view = with_views_ && !map.view.cells.empty();
     has_views_ = has_views_ || view;
     const std::string caption = item.caption.empty() ? "Graspability map." : item.caption;
-    const std::string still =
-        map.still ? "<div class=\"still\">" + image_html(*map.still, caption) + "</div>"
-                  : "<p class=\"still\">No image of this map was made.</p>";
-    return figure("map", number, item, map_html(map, still, view), "Graspability map.");
+    const std::string preview =
+        map.preview ? "<div class=\"still\">" + image_html(*map.preview, caption) + "</div>"
+                    : "<p class=\"still\">No image of this map was made.</p>";
+    return figure("map", number, item, map_html(map, preview, view), "Graspability map.");
   }
 
   std::string body_html(const ReportScene& scene, const ReportItem& item) {
@@ -166,9 +166,9 @@ class PageWriter {
     std::string html =
         "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Text\"><pre>" +
         escape_html(listing.text) + "</pre></div>\n";
-    if (listing.left_out_lines > 0)
+    if (listing.omitted_lines > 0)
       html += fmt::format("<p class=\"changed\">{} more lines are omitted.</p>\n",
-                          listing.left_out_lines);
+                          listing.omitted_lines);
     return figure("listing", "", item, html, "");
   }
 
@@ -223,7 +223,7 @@ std::vector<ReportImage*> images_of(ReportContent& content) {
     if (auto* images = std::get_if<ReportImages>(&item.body))
       for (ReportImage& image : *images) found.push_back(&image);
     auto* map = std::get_if<ReportMap>(&item.body);
-    if (map != nullptr && map->still) found.push_back(&*map->still);
+    if (map != nullptr && map->preview) found.push_back(&*map->preview);
   });
   return found;
 }

@@ -175,7 +175,7 @@ class Reader {
       map.view = load_map_(path, map.locations ? std::optional(plan.lookup) : std::nullopt);
       use(path);
       if (map.locations) name_markers(plan.lookup, map);
-      if (!plan.image.empty()) map.still = read_image(plan.image, item);
+      if (!plan.image.empty()) map.preview = read_image(plan.image, item);
       item.body = std::move(map);
     });
   }
@@ -251,7 +251,7 @@ class Reader {
         listing.text += line.size() > max_line ? " ...\n" : "\n";
         rest.remove_prefix(std::min(rest.size(), line.size() + 1));
       }
-      listing.left_out_lines = head.lines - lines;
+      listing.omitted_lines = head.lines - lines;
       item.body = std::move(listing);
       use(path);
     });

@@ -226,10 +226,10 @@ std::string scene_legend_html(const ReportScene& scene) {
 
 }  // namespace
 
-std::string map_html(const ReportMap& map, const std::string& still, bool with_view) {
+std::string map_html(const ReportMap& map, const std::string& preview, bool with_view) {
   std::string html = "<div class=\"viewer\"><div class=\"stage\">\n";
   if (with_view) html += tools_html(map.view);
-  html += "<div class=\"viewport\">" + still;
+  html += "<div class=\"viewport\">" + preview;
   if (with_view)
     html +=
         "<noscript><p>The 3-D view needs JavaScript.</p></noscript>"

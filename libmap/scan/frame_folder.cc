@@ -108,9 +108,9 @@ bool is_depth_image(const fs::path& file) {
 }
 
 // Spherical interpolation of the rotation, linear of the position.
-Pose between(const Pose& a, const Pose& b, double share) {
-  return make_pose((1.0 - share) * a.translation() + share * b.translation(),
-                   Eigen::Quaterniond(a.linear()).slerp(share, Eigen::Quaterniond(b.linear())));
+Pose between(const Pose& a, const Pose& b, double fraction) {
+  return make_pose((1.0 - fraction) * a.translation() + fraction * b.translation(),
+                   Eigen::Quaterniond(a.linear()).slerp(fraction, Eigen::Quaterniond(b.linear())));
 }
 
 // Returns the pose at a stamp; nullopt if none is near. `trajectory` is in ascending order of
@@ -126,8 +126,8 @@ std::optional<Pose> pose_at(const Trajectory& trajectory, double stamp_s, double
   if (!has_before) return std::nullopt;
   const TrajectoryPose& before = *(after - 1);
   if (!has_after) return before.world_from_base;
-  const double share = (stamp_s - before.stamp_s) / (after->stamp_s - before.stamp_s);
-  return between(before.world_from_base, after->world_from_base, share);
+  const double fraction = (stamp_s - before.stamp_s) / (after->stamp_s - before.stamp_s);
+  return between(before.world_from_base, after->world_from_base, fraction);
 }
 
 DepthImage read_depth(const std::string& bytes, double depth_unit_m) {
@@ -384,7 +384,7 @@ void FrameFolder::add_images(const Listing& color, const Listing& depth) {
     Files of_node;
     of_node.color = color_of_depth[j];
     of_node.depth = depth.names[j];
-    of_node.depth_later_s = later_s[j];
+    of_node.depth_stamp_offset_s = later_s[j];
     of_node.cameras = {camera};
     files_.emplace(node.id, std::move(of_node));
   }
@@ -477,7 +477,7 @@ RgbdFrame FrameFolder::read_frame(int node, FrameParts parts) const {
   RgbdFrame frame;
   frame.node = node;
   frame.stamp_s = graph_.find_node(node)->stamp_s;
-  frame.depth_later_s = of_node.depth_later_s;
+  frame.depth_stamp_offset_s = of_node.depth_stamp_offset_s;
   const auto read = [&](const std::string& name, const char* part, const auto& decode) {
     if (name.empty()) return;
     const std::string field = "node " + std::to_string(node) + ": " + part;

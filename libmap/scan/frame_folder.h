@@ -91,7 +91,7 @@ class FrameFolder : public ScanSource {
     std::string color{};
     std::string depth{};
     std::string right{};
-    double depth_later_s = 0.0;          // RgbdFrame::depth_later_s
+    double depth_stamp_offset_s = 0.0;   // RgbdFrame::depth_stamp_offset_s
     std::vector<std::size_t> cameras{};  // indices; stereo pairs: left, right, left, ...
     std::vector<double> baselines_m{};   // baselines of stereo pairs; else empty
   };

@@ -275,7 +275,8 @@ void apply(RgbdFrame& frame, const CameraFile& calibration, LensRays& rays) {
                                                  .bound = size_text(known.width, known.height)});
   const Pose base_from_camera = camera.base_from_camera;
   // Uses the stored camera, for which the transform was estimated.
-  const Pose color_from_depth = calibration.color_from_depth_at(frame.stamp_s, frame.depth_later_s);
+  const Pose color_from_depth =
+      calibration.color_from_depth_at(frame.stamp_s, frame.depth_stamp_offset_s);
   if (!color_from_depth.matrix().isIdentity(0.0))
     frame.depth = registered_depth(frame, color_from_depth, rays);
   camera = known;

@@ -334,7 +334,7 @@ class DatabaseVerification {
                           });
     if (blobs.size() < 7) return;
     findings_.check(node, "Data.scan", blobs[0], [&](const std::string& scan) {
-      const MemoryBudget::Share share = memory_.take(scan_bytes(scan));
+      const MemoryBudget::Reservation reservation = memory_.take(scan_bytes(scan));
       check_laser_scan(scan, is_absent(blobs[1]) ? std::string() : blobs[1]);
     });
     for (std::size_t i = 0; i < matrices.size(); ++i)
@@ -345,7 +345,7 @@ class DatabaseVerification {
     const FrameBlobs blobs = scan_.read_blobs(node);
     for (const std::string* blob : {&blobs.image, &blobs.depth, &blobs.calibration})
       if (!blob->empty()) findings_.count(*blob);
-    const MemoryBudget::Share share = memory_.take(frame_bytes(blobs));
+    const MemoryBudget::Reservation reservation = memory_.take(frame_bytes(blobs));
     try {
       camera_views(decode_frame(blobs));
     } catch (const Error& error) {

@@ -71,17 +71,17 @@ double ProfileSegment::curvature_around(const Eigen::Vector2d& at) const {
   return normal_rho == 0.0 ? 0.0 : normal_rho / at.x();
 }
 
-double ProfileSegment::t_of_area_share(double t0, double t1, double share) const {
+double ProfileSegment::t_of_area_fraction(double t0, double t1, double fraction) const {
   const Eigen::Vector2d p0 = point(t0);
   const Eigen::Vector2d p1 = point(t1);
   if (is_arc) {
-    const double cosine = (p0.y() + share * (p1.y() - p0.y()) - center_a) / radius;
+    const double cosine = (p0.y() + fraction * (p1.y() - p0.y()) - center_a) / radius;
     const double angle = std::acos(std::clamp(cosine, -1.0, 1.0));
     return std::clamp((angle - angle_start) / (angle_end - angle_start), t0, t1);
   }
   const double difference = p1.x() - p0.x();
-  if (std::abs(difference) <= 1e-12 * (p0.x() + p1.x())) return t0 + share * (t1 - t0);
-  const double rho = std::sqrt(p0.x() * p0.x() + share * (p1.x() * p1.x() - p0.x() * p0.x()));
+  if (std::abs(difference) <= 1e-12 * (p0.x() + p1.x())) return t0 + fraction * (t1 - t0);
+  const double rho = std::sqrt(p0.x() * p0.x() + fraction * (p1.x() * p1.x() - p0.x() * p0.x()));
   return t0 + (rho - p0.x()) / difference * (t1 - t0);
 }
 

@@ -35,8 +35,8 @@ struct ProfileSegment {
   double curvature_along() const;  // of the profile, 1/m
   // Curvature of the surface around the axis (Meusnier), 1/m.
   double curvature_around(const Eigen::Vector2d& point) const;
-  // Returns t such that area_between(t0, t) is `share` of area_between(t0, t1).
-  double t_of_area_share(double t0, double t1, double share) const;
+  // Returns t such that area_between(t0, t) is `fraction` of area_between(t0, t1).
+  double t_of_area_fraction(double t0, double t1, double fraction) const;
   // Unsigned distance in the half-plane.
   double distance(const Eigen::Vector2d& point) const;
   // Returns true if a point of the half-plane is on the outer side of the line, or in the arc's

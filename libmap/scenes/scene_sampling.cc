@@ -69,7 +69,7 @@ class Sampler {
       const double phase = random.uniform();
       for (double column = 0.0; column < columns; column += 1.0) {
         const double angle = 2.0 * pi * (column + phase + jittered(random)) / columns;
-        const double t = segment.t_of_area_share(t0, t1, jittered(random));
+        const double t = segment.t_of_area_fraction(t0, t1, jittered(random));
         samples.push_back(geometry_.on_profile(*patch.solid, patch.segment, t, angle));
       }
     }
@@ -123,16 +123,16 @@ class Sampler {
                      const Eigen::Vector2d& tile) const {
     if (!patch.solid->is_ground || !geometry_.has_bumps()) return {};
     constexpr int nodes = 4;
-    constexpr double share = 1.0 / (nodes * nodes);
+    constexpr double fraction = 1.0 / (nodes * nodes);
     Stretch sum{0.0, 0.0, 0.0};
     for (int j = 0; j < nodes; ++j) {
       for (int i = 0; i < nodes; ++i) {
         const Eigen::Vector2d at =
             corner + tile.cwiseProduct(Eigen::Vector2d(i + 0.5, j + 0.5)) / double{nodes};
         const Eigen::Vector2d gradient = geometry_.ground_height(at.x(), at.y()).gradient;
-        sum.along_x += share * std::hypot(1.0, gradient.x());
-        sum.along_y += share * std::hypot(1.0, gradient.y());
-        sum.area += share * std::sqrt(1.0 + gradient.squaredNorm());
+        sum.along_x += fraction * std::hypot(1.0, gradient.x());
+        sum.along_y += fraction * std::hypot(1.0, gradient.y());
+        sum.area += fraction * std::sqrt(1.0 + gradient.squaredNorm());
       }
     }
     return sum;
@@ -244,9 +244,9 @@ SceneSamples sample_scene(const PrimitiveScene& scene, const SceneSamplingOption
                 options.count > 0 ? "count" : "spacing_m", to_text(spacing));
   SceneSamples samples = sample_at(geometry, patches, spacing, options);
   for (int round = 0; round < 3 && options.count > 0 && !samples.cloud.empty(); ++round) {
-    const double share = static_cast<double>(samples.cloud.size()) / wanted;
-    if (std::abs(share - 1.0) <= 0.005) break;
-    spacing *= std::sqrt(share);
+    const double fraction = static_cast<double>(samples.cloud.size()) / wanted;
+    if (std::abs(fraction - 1.0) <= 0.005) break;
+    spacing *= std::sqrt(fraction);
     samples = sample_at(geometry, patches, spacing, options);
   }
   return samples;

@@ -78,9 +78,9 @@ class ConvexBody {
     if (found != crossings_.end()) return found->second;
     const double from = distances_[edge.first];
     const double to = distances_[edge.second];
-    const double share = from / (from - to);
+    const double fraction = from / (from - to);
     const Eigen::Vector3d point =
-        vertices_[edge.first] + share * (vertices_[edge.second] - vertices_[edge.first]);
+        vertices_[edge.first] + fraction * (vertices_[edge.second] - vertices_[edge.first]);
     const auto vertex = static_cast<std::uint32_t>(vertices_.size());
     vertices_.push_back(point);
     crossings_.emplace(edge, vertex);

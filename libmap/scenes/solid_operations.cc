@@ -332,8 +332,8 @@ class FacetRefiner {
     bool inside = false;
     for (const Segment& s : outline_) {
       if ((s.from.y() > at.y()) == (s.to.y() > at.y())) continue;
-      const double share = (at.y() - s.from.y()) / (s.to.y() - s.from.y());
-      if (at.x() < s.from.x() + share * (s.to.x() - s.from.x())) inside = !inside;
+      const double fraction = (at.y() - s.from.y()) / (s.to.y() - s.from.y());
+      if (at.x() < s.from.x() + fraction * (s.to.x() - s.from.x())) inside = !inside;
     }
     return inside;
   }
@@ -342,9 +342,9 @@ class FacetRefiner {
     const double margin = 0.6 * edge_length_m_;
     return std::none_of(outline_.begin(), outline_.end(), [&](const Segment& s) {
       const Eigen::Vector2d along = s.to - s.from;
-      const double share =
+      const double fraction =
           std::clamp((at - s.from).dot(along) / std::max(along.squaredNorm(), 1e-30), 0.0, 1.0);
-      return (s.from + share * along - at).squaredNorm() < margin * margin;
+      return (s.from + fraction * along - at).squaredNorm() < margin * margin;
     });
   }
 

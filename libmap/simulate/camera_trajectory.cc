@@ -102,7 +102,7 @@ CameraRoute way_of(const TriangleMesh& mesh, const CameraTrajectoryOptions& opti
 }
 
 // 0 on the first loop, 1 on the last. The transition between loops takes +-15 % of a loop.
-double loop_share(double loop, int loops) {
+double loop_fraction(double loop, int loops) {
   if (loops < 2) return 0.0;
   const double nearest_end = std::clamp(std::round(loop), 1.0, loops - 1.0);
   const double t = std::clamp((loop - nearest_end) / 0.3 + 0.5, 0.0, 1.0);
@@ -112,9 +112,9 @@ double loop_share(double loop, int loops) {
 // Position on the path without sway; `loop` is the number of loops from the start.
 Eigen::Vector3d position_on(const CameraRoute& way, const CameraTrajectoryOptions& options,
                             double loop) {
-  const double share = loop_share(loop, options.loops);
-  const double radius = way.radius + share * (way.last_radius - way.radius);
-  const double height = way.height + share * (way.last_height - way.height);
+  const double fraction = loop_fraction(loop, options.loops);
+  const double radius = way.radius + fraction * (way.last_radius - way.radius);
+  const double height = way.height + fraction * (way.last_height - way.height);
   double turns = loop;
   if (std::abs(way.sweep_deg) < 360.0) {
     const double phase = std::fmod(loop, 2.0);
@@ -336,12 +336,12 @@ CameraMotion motion_through(Trajectory poses) {
     if (after_s == 0.0 || poses.size() < 2) return here;
     // Interpolates to the next pose; the motion of the last interval continues after the end.
     const std::size_t from = std::min(frame, poses.size() - 2);
-    const double share = after_s / (poses[from + 1].stamp_s - poses[from].stamp_s);
+    const double fraction = after_s / (poses[from + 1].stamp_s - poses[from].stamp_s);
     const Pose motion = poses[from].world_from_base.inverse() * poses[from + 1].world_from_base;
     const Eigen::AngleAxisd turn(motion.linear());
     Pose part = Pose::Identity();
-    part.linear() = Eigen::AngleAxisd(share * turn.angle(), turn.axis()).toRotationMatrix();
-    part.translation() = share * motion.translation();
+    part.linear() = Eigen::AngleAxisd(fraction * turn.angle(), turn.axis()).toRotationMatrix();
+    part.translation() = fraction * motion.translation();
     return here * part;
   };
 }

@@ -21,9 +21,9 @@ namespace {
 
 constexpr double hard_slope_deg = 60.0;
 // Thresholds of the eigenvalues of the normals' mean outer product, whose sum is 1.
-constexpr double arc_share = 0.05;  // an edge of 26 degrees
-constexpr double tip_share = 0.04;
-constexpr double hollow_share = 0.06;  // mean depth below the neighbors' planes, in radii
+constexpr double arc_fraction = 0.05;  // an edge of 26 degrees
+constexpr double tip_fraction = 0.04;
+constexpr double hollow_fraction = 0.06;  // mean depth below the neighbors' planes, in radii
 
 // Triangles connected to the vertex within a ball around it.
 std::vector<std::uint32_t> triangles_within(const TriangleMesh& mesh, const VertexTriangles& around,
@@ -70,12 +70,12 @@ void look_around(const TriangleMesh& mesh, const VertexTriangles& around, std::u
   }
   if (area <= 0.0) return;
   point.normal = sum.normalized();
-  const Eigen::Vector3d shares = symmetric_eigen(Eigen::Matrix3d(spread / area)).values;
-  if (hollow / area > hollow_share * radius_m)
+  const Eigen::Vector3d eigenvalues = symmetric_eigen(Eigen::Matrix3d(spread / area)).values;
+  if (hollow / area > hollow_fraction * radius_m)
     point.kind = LocationKind::irregular;
-  else if (shares[0] > tip_share)
+  else if (eigenvalues[0] > tip_fraction)
     point.kind = LocationKind::corner;
-  else if (shares[1] > arc_share)
+  else if (eigenvalues[1] > arc_fraction)
     point.kind = LocationKind::edge;
   else
     point.kind = LocationKind::flat;

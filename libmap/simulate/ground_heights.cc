@@ -41,7 +41,7 @@ double GroundHeights::height(const Eigen::Vector2d& position) const {
       weights += weight;
     }
   if (weights > 0.0) return sum / weights;
-  for (const auto& [its, cell] : cells_) sum += mean(cell);
+  for (const auto& [index, cell] : cells_) sum += mean(cell);
   return cells_.empty() ? 0.0 : sum / static_cast<double>(cells_.size());
 }
 

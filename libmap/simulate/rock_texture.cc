@@ -25,16 +25,16 @@ double smooth_step(double low, double high, double value) {
   return t * t * (3.0 - 2.0 * t);
 }
 
-Tone blend(const Tone& a, const Tone& b, double share) { return a + share * (b - a); }
+Tone blend(const Tone& a, const Tone& b, double fraction) { return a + fraction * (b - a); }
 
 // Displaces the point by noise of wavelength `length_m`, up to a share of it, and rotates it off
 // the lattice axes, so that marks have ragged outlines.
 Eigen::Vector3d ragged(const Eigen::Vector3d& point, std::uint64_t seed, double length_m,
-                       double share) {
+                       double fraction) {
   const Eigen::Vector3d at = point / length_m;
   const Eigen::Vector3d shift(gradient_noise(at, seed), gradient_noise(at, seed + 1),
                               gradient_noise(at, seed + 2));
-  const Eigen::Vector3d moved = point + share * length_m * shift;
+  const Eigen::Vector3d moved = point + fraction * length_m * shift;
   return {0.8 * moved.x() + 0.36 * moved.y() + 0.48 * moved.z(),
           -0.6 * moved.x() + 0.48 * moved.y() + 0.64 * moved.z(),
           -0.8 * moved.y() + 0.6 * moved.z()};
@@ -50,9 +50,9 @@ struct Mark {
   double strength = 0.0;
   std::uint64_t kind = 0;
 };
-Mark marks(const Eigen::Vector3d& point, std::uint64_t seed, double share, double radius) {
+Mark marks(const Eigen::Vector3d& point, std::uint64_t seed, double fraction, double radius) {
   const CellNoise cell = cell_noise(point, seed);
-  if (unit_noise(cell.cell, 1) >= share) return {};
+  if (unit_noise(cell.cell, 1) >= fraction) return {};
   const double size = radius * (0.5 + 0.5 * unit_noise(cell.cell, 2));
   return {1.0 - smooth_step(0.7 * size, size, cell.distance), mix_bits(cell.cell, 3)};
 }

@@ -97,9 +97,10 @@ std::vector<ExtraBody> extra_bodies(const TriangleMesh& mesh, const ScanEvents& 
     const double length = bounds.max.y() - bounds.min.y();
     add(walker(), TextureSource::mesh, [=](std::size_t frame) -> std::optional<Pose> {
       if (!is_within(frame, events.walker_first_frame, events.walker_frames)) return std::nullopt;
-      const double share =
+      const double fraction =
           (static_cast<double>(frame) + 1.5 - events.walker_first_frame) / events.walker_frames;
-      return at_position({middle.x(), bounds.min.y() + share * length, ground + walker_radii.z()});
+      return at_position(
+          {middle.x(), bounds.min.y() + fraction * length, ground + walker_radii.z()});
     });
   }
   if (events.stone_moved_frame > 0) {
@@ -121,7 +122,7 @@ std::vector<ExtraBody> extra_bodies(const TriangleMesh& mesh, const ScanEvents& 
   return bodies;
 }
 
-void take_nearer(SurfaceView& view, const SurfaceView& other) {
+void merge_nearer(SurfaceView& view, const SurfaceView& other) {
   const auto is_nearer = [](float depth, float than) {
     return depth > 0.0F && (than <= 0.0F || depth < than);
   };

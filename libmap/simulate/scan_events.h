@@ -45,6 +45,6 @@ std::vector<ExtraBody> extra_bodies(const TriangleMesh& mesh, const ScanEvents& 
                                     std::uint64_t seed);
 
 // Merges another view of the same camera into `view`, keeping the nearer surface of each pixel.
-void take_nearer(SurfaceView& view, const SurfaceView& other);
+void merge_nearer(SurfaceView& view, const SurfaceView& other);
 
 }  // namespace libmap

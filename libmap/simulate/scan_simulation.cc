@@ -143,7 +143,7 @@ SurfaceView ScanCamera::view(std::size_t n, const VisibleSurface& surface, const
   for (const ExtraBody& body : scene_.bodies)
     if (const auto world_from_body = body.world_from_body(n)) {
       const Pose body_from_world = world_from_body->inverse();
-      take_nearer(
+      merge_nearer(
           view,
           body.surface->view(
               rays, [&](double row) -> Pose { return body_from_world * world_from_camera(row); },
@@ -155,8 +155,8 @@ SurfaceView ScanCamera::view(std::size_t n, const VisibleSurface& surface, const
 std::vector<Pose> ScanCamera::world_from_cameras(std::size_t n) const {
   std::vector<Pose> poses = {world_from_camera(n, 0.0)};
   if (faults_.rolling_shutter_s != 0.0)
-    for (const double share : {-0.5, 0.5})
-      poses.push_back(world_from_camera(n, share * faults_.rolling_shutter_s));
+    for (const double fraction : {-0.5, 0.5})
+      poses.push_back(world_from_camera(n, fraction * faults_.rolling_shutter_s));
   if (is_depth_apart()) poses.push_back(world_from_depth_camera(n));
   return poses;
 }
@@ -341,14 +341,14 @@ ScanSimulationResult simulate_scan(const ScanScene& scene, const ScanSimulationO
     const std::size_t count = std::min(batch, truth.size() - first);
     std::vector<std::vector<Pose>> poses;
     for (std::size_t i = 0; i < count; ++i)
-      poses.push_back(camera.world_from_cameras(recorded[first + i].images_of));
+      poses.push_back(camera.world_from_cameras(recorded[first + i].image_frame));
     const std::vector<VisibleSurface> surfaces = scene.surfaces(poses, camera.range());
     std::array<RgbdFrame, batch> frames;
     std::array<DepthMeasurement, batch> measured;
     parallel_each(count, [&](std::size_t i) {
       frames[i].node = truth[first + i].node;
       frames[i].stamp_s = truth[first + i].stamp_s;
-      measured[i] = camera.take(recorded[first + i].images_of, surfaces[i], frames[i]);
+      measured[i] = camera.take(recorded[first + i].image_frame, surfaces[i], frames[i]);
       frames[i].depth = std::move(measured[i].depth);
     });
     for (std::size_t i = 0; i < count; ++i) {

@@ -178,10 +178,12 @@ Eigen::Vector3d random_direction(RandomStream& random) {
 void bind(ParameterTable& table, DepthFaults& faults) {
   table.add("depth_scale_percent", faults.scale_percent, {-50.0, 50.0},
             "fault: scale error of depth, percent");
+  table.add_former_key("depth_wiggle_m", "depth_periodic_error_m");
   table.add(
-      "depth_wiggle_m", faults.periodic_error_m, any_number,
+      "depth_periodic_error_m", faults.periodic_error_m, any_number,
       "fault: amplitude of a periodic depth error (time of flight: Lindner and Kolb 2006), m");
-  table.add("depth_wiggle_period_m", faults.wiggle_period_m, positive,
+  table.add_former_key("depth_wiggle_period_m", "depth_error_period_m");
+  table.add("depth_error_period_m", faults.error_period_m, positive,
             "period, in depth, of the periodic depth error, m");
   table.add("depth_corner_m", faults.corner_m, any_number,
             "fault: depth error in the image corners, proportional to the squared radius "
@@ -247,7 +249,7 @@ void bind(ParameterTable& table, SensorFaults& faults) {
 
 double DepthFaults::measured(double depth_m, double radius2) const {
   return depth_m * (1.0 + 0.01 * scale_percent) +
-         periodic_error_m * std::sin(2.0 * pi * depth_m / wiggle_period_m) + corner_m * radius2;
+         periodic_error_m * std::sin(2.0 * pi * depth_m / error_period_m) + corner_m * radius2;
 }
 
 Camera stored_camera(Camera camera, const CalibrationFaults& faults) {
@@ -283,7 +285,7 @@ std::vector<RecordedFrame> recorded_frames(std::size_t frames, const RecordingFa
     const double repetition = random.uniform();
     if (n > 0 && fate < faults.dropped_frames) continue;
     const bool repeats = n > 0 && repetition < faults.duplicated_frames;
-    recorded.push_back({n, repeats ? recorded.back().images_of : n,
+    recorded.push_back({n, repeats ? recorded.back().image_frame : n,
                         faults.stamp_error_s > 0.0 ? faults.stamp_error_s * random.normal() : 0.0});
   }
   return recorded;
@@ -310,9 +312,9 @@ void distort_depth(SurfaceView& view, const DepthFaults& faults) {
 std::size_t punch_holes(DepthImage& depth, const DepthFaults& faults, std::uint64_t seed) {
   if (!(faults.holes > 0.0)) return 0;
   // One disc per square of a lattice, with a probability for the requested share of the image.
-  const double share_of_disc =
+  const double fraction_of_disc =
       pi * hole_radius_px * hole_radius_px / (hole_spacing_px * hole_spacing_px);
-  const double probability = faults.holes / share_of_disc;
+  const double probability = faults.holes / fraction_of_disc;
   std::size_t lost = 0;
   std::uint64_t square = 0;
   for (int top = 0; top < depth.height; top += hole_spacing_px)

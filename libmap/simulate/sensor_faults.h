@@ -23,8 +23,8 @@ namespace libmap {
 // 2019).
 struct DepthFaults {
   double scale_percent = 0.0;     // scale error of depth
-  double periodic_error_m = 0.0;  // amplitude of the error sin(2 pi depth / wiggle_period_m)
-  double wiggle_period_m = 1.2;
+  double periodic_error_m = 0.0;  // amplitude of the error sin(2 pi depth / error_period_m)
+  double error_period_m = 1.2;
   double corner_m = 0.0;   // error in the corners, proportional to the squared radius
   double holes = 0.0;      // share of the image in discs without depth
   double multipath = 0.0;  // reflectance of surfaces for multipath interference (add_multipath)
@@ -91,7 +91,7 @@ Pose stored_color_from_depth(const CalibrationFaults& faults);
 // A stored frame: index of the frame (from 0) and index of the frame that provides the images.
 struct RecordedFrame {
   std::size_t frame = 0;
-  std::size_t images_of = 0;
+  std::size_t image_frame = 0;
   double stamp_error_s = 0.0;
 };
 std::vector<RecordedFrame> recorded_frames(std::size_t frames, const RecordingFaults& faults,

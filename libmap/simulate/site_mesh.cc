@@ -258,7 +258,7 @@ namespace {
 
 constexpr double base_depth_m = 0.2;  // depth of rocks below the lowest ground under them
 
-constexpr double splinter_share = 0.004;  // minimum edge length, relative to edge_length_m
+constexpr double splinter_fraction = 0.004;  // minimum edge length, relative to edge_length_m
 
 double edge_length_of(const SiteRock& rock, double edge_length_m) {
   return std::min(edge_length_m,
@@ -406,7 +406,7 @@ TriangleMesh site_mesh(const RockSite& site, const SiteMeshOptions& options) {
         n == 0 ? ground_solid(site, relief, options.edge_length_m)
                : placed_rock(site.rocks[n - 1], static_cast<int>(n), relief, options.edge_length_m);
   });
-  Solid solid = part_of_ground(unite(solids, splinter_share * options.edge_length_m), site);
+  Solid solid = part_of_ground(unite(solids, splinter_fraction * options.edge_length_m), site);
   if (!options.closed) solid = select(solid, [&](std::size_t n) { return solid.labels[n] >= 0; });
   return painted(solid, site);
 }

@@ -95,14 +95,14 @@ TerrainSurface::TerrainSurface(const PointTileStore& points, const GroundHeights
       options_(options),
       max_radius_m_(options.gap_spacings * heights.spacing_m()) {
   const double cells =
-      std::round(options.square_spacings * heights.spacing_m() / GroundHeights::cell_m);
-  square_m_ = GroundHeights::cell_m * std::max(1.0, cells);
+      std::round(options.tile_spacings * heights.spacing_m() / GroundHeights::cell_m);
+  tile_m_ = GroundHeights::cell_m * std::max(1.0, cells);
 }
 
 Eigen::AlignedBox2d TerrainSurface::rectangle_of(const TilePosition& tile) const {
-  const Eigen::Vector2d low = square_m_ * Eigen::Vector2d(static_cast<double>(tile.first),
-                                                          static_cast<double>(tile.second));
-  return {low, low + Eigen::Vector2d::Constant(square_m_)};
+  const Eigen::Vector2d low =
+      tile_m_ * Eigen::Vector2d(static_cast<double>(tile.first), static_cast<double>(tile.second));
+  return {low, low + Eigen::Vector2d::Constant(tile_m_)};
 }
 
 std::vector<TerrainSurface::TilePosition> TerrainSurface::tiles_in_view(
@@ -115,7 +115,7 @@ std::vector<TerrainSurface::TilePosition> TerrainSurface::tiles_in_view(
     const Pose camera_from_world = pose.inverse();
     const Eigen::Vector2d here = pose.translation().head<2>();
     const auto index = [&](double at) {
-      return static_cast<std::int64_t>(std::floor(at / square_m_));
+      return static_cast<std::int64_t>(std::floor(at / tile_m_));
     };
     for (std::int64_t i = index(here.x() - reach); i <= index(here.x() + reach); ++i)
       for (std::int64_t j = index(here.y() - reach); j <= index(here.y() + reach); ++j) {
@@ -131,33 +131,33 @@ std::vector<TerrainSurface::TilePosition> TerrainSurface::tiles_in_view(
   return tiles;
 }
 
-TerrainSurface::Square TerrainSurface::make(const TilePosition& tile) const {
+TerrainSurface::CachedTile TerrainSurface::make(const TilePosition& tile) const {
   const Eigen::AlignedBox2d rectangle = rectangle_of(tile);
   const Eigen::Vector2d margin = Eigen::Vector2d::Constant(margin_radii * max_radius_m_);
   const TriangleMesh mesh = triangulate_plan(
       points_.points_in(rectangle.min() - margin, rectangle.max() + margin).positions, rectangle,
       max_radius_m_);
-  Square square;
-  square.points = mesh.vertices.size();
+  CachedTile cached;
+  cached.points = mesh.vertices.size();
   if (!mesh.triangles.empty())
-    square.surface.emplace(mesh, TextureSource::rock, options_.texture_seed,
+    cached.surface.emplace(mesh, TextureSource::rock, options_.texture_seed,
                            ShadingNormals::per_vertex);
-  return square;
+  return cached;
 }
 
 void TerrainSurface::load(const std::vector<TilePosition>& tiles) {
   std::vector<TilePosition> missing;
   for (const TilePosition& tile : tiles)
-    if (!squares_.contains(tile)) missing.push_back(tile);
-  std::vector<Square> made(missing.size());
+    if (!tiles_.contains(tile)) missing.push_back(tile);
+  std::vector<CachedTile> made(missing.size());
   parallel_each(missing.size(), [&](std::size_t n) { made[n] = make(missing[n]); });
-  for (std::size_t n = 0; n < missing.size(); ++n) squares_[missing[n]] = std::move(made[n]);
+  for (std::size_t n = 0; n < missing.size(); ++n) tiles_[missing[n]] = std::move(made[n]);
   made_ += missing.size();
 }
 
 std::size_t TerrainSurface::points_in_memory() const {
   std::size_t points = 0;
-  for (const auto& [tile, square] : squares_) points += square.points;
+  for (const auto& [tile, cached] : tiles_) points += cached.points;
   return points;
 }
 
@@ -166,11 +166,11 @@ void TerrainSurface::evict() {
   std::size_t points = points_in_memory();
   while (points > options_.kept_points) {
     const auto oldest = std::min_element(
-        squares_.begin(), squares_.end(),
+        tiles_.begin(), tiles_.end(),
         [](const auto& a, const auto& b) { return a.second.last_use < b.second.last_use; });
     if (oldest->second.last_use == uses_) break;
     points -= oldest->second.points;
-    squares_.erase(oldest);
+    tiles_.erase(oldest);
   }
 }
 
@@ -186,17 +186,16 @@ std::vector<VisibleSurface> TerrainSurface::seen_from(
   std::sort(all.begin(), all.end());
   all.erase(std::unique(all.begin(), all.end()), all.end());
   for (const TilePosition& tile : all)
-    if (const auto known = squares_.find(tile); known != squares_.end())
-      known->second.last_use = uses_;
+    if (const auto known = tiles_.find(tile); known != tiles_.end()) known->second.last_use = uses_;
   evict();  // before loading more squares
   load(all);
   std::vector<VisibleSurface> surfaces;
   for (const std::vector<TilePosition>& tiles : of_camera) {
     std::vector<VisibleSurface> parts;
     for (const TilePosition& tile : tiles) {
-      Square& square = squares_.at(tile);
-      square.last_use = uses_;
-      if (square.surface) parts.push_back(*square.surface);
+      CachedTile& cached = tiles_.at(tile);
+      cached.last_use = uses_;
+      if (cached.surface) parts.push_back(*cached.surface);
     }
     surfaces.emplace_back(std::span<const VisibleSurface>(parts));
   }

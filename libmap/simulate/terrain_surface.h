@@ -32,7 +32,7 @@ TriangleMesh triangulate_plan(const std::vector<Eigen::Vector3d>& points,
                               const Eigen::AlignedBox2d& rectangle, double max_radius_m);
 
 struct TerrainSurfaceOptions {
-  double square_spacings = 256.0;     // side of a square in point spacings; rounded to a multiple
+  double tile_spacings = 256.0;       // side of a square in point spacings; rounded to a multiple
                                       // of GroundHeights::cell_m
   double gap_spacings = 5.0;          // maximum circumradius of triangles in point spacings
   std::size_t kept_points = 500'000;  // maximum in memory, unless more are in view at once
@@ -51,12 +51,12 @@ class TerrainSurface {
                                         const ViewRange& range);
 
   // Number of triangulations so far, and of points in memory.
-  std::size_t squares_made() const { return made_; }
+  std::size_t tiles_made() const { return made_; }
   std::size_t points_in_memory() const;
 
  private:
   using TilePosition = std::pair<std::int64_t, std::int64_t>;
-  struct Square {
+  struct CachedTile {
     std::optional<VisibleSurface> surface;  // nullopt if there is no triangle
     std::size_t points = 0;
     std::uint64_t last_use = 0;
@@ -64,16 +64,16 @@ class TerrainSurface {
   Eigen::AlignedBox2d rectangle_of(const TilePosition& tile) const;
   std::vector<TilePosition> tiles_in_view(const std::vector<Pose>& world_from_camera,
                                           const ViewRange& range) const;
-  Square make(const TilePosition& tile) const;
+  CachedTile make(const TilePosition& tile) const;
   void load(const std::vector<TilePosition>& tiles);
   void evict();
 
   const PointTileStore& points_;
   const GroundHeights& heights_;
   TerrainSurfaceOptions options_;
-  double square_m_ = 0.0;
+  double tile_m_ = 0.0;
   double max_radius_m_ = 0.0;
-  std::map<TilePosition, Square> squares_;
+  std::map<TilePosition, CachedTile> tiles_;
   std::uint64_t uses_ = 0;
   std::size_t made_ = 0;
 };

@@ -16,10 +16,10 @@ namespace libmap {
 namespace {
 
 using std::numbers::pi;
-constexpr double rock_cell_m = 1.0;    // cells in which rocks are drawn
-constexpr double bucket_m = 0.25;      // buckets for searching rocks
-constexpr double power_index = 2.65;   // of rock heights (Michikami et al. 2019)
-constexpr double cobble_share = 0.25;  // share of cobbles among the rocks
+constexpr double rock_cell_m = 1.0;       // cells in which rocks are drawn
+constexpr double bucket_m = 0.25;         // buckets for searching rocks
+constexpr double power_index = 2.65;      // of rock heights (Michikami et al. 2019)
+constexpr double cobble_fraction = 0.25;  // share of cobbles among the rocks
 constexpr double roughness_length_m = 0.16;
 constexpr double rounding_m = 1e-6;    // tolerance at the borders of buckets
 constexpr double largest_reach = 2.4;  // maximum reach of a rock, in rock heights
@@ -133,7 +133,7 @@ void RockyTerrain::add_rocks_of_cell(std::int64_t i, std::int64_t j) {
     const double x = (static_cast<double>(i) + draw.uniform()) * rock_cell_m;
     const double y = (static_cast<double>(j) + draw.uniform()) * rock_cell_m;
     const double height_m = draw_height(options_, draw);
-    const bool is_cobble = draw.uniform() < cobble_share;
+    const bool is_cobble = draw.uniform() < cobble_fraction;
     const std::uint64_t seed = mix_bits(mix_bits(options_.seed, cell), static_cast<unsigned>(n));
     Rock rock = is_cobble ? draw_cobble(height_m, seed) : draw_block(height_m, seed);
     rock.center = {x, y};
@@ -278,7 +278,8 @@ class CellSampler {
 
 void bind(ParameterTable& table, TerrainTilesOptions& options) {
   table.add("spacing_m", options.spacing_m, Range{1e-4, 10.0}, "mean point spacing, m");
-  table.add("piece_m", options.tile_m, Range{1e-3, 1000.0},
+  table.add_former_key("piece_m", "tile_size_m");
+  table.add("tile_size_m", options.tile_m, Range{1e-3, 1000.0},
             "side of a tile, m; each tile is one file of the output");
   bind(table, options.terrain);
 }
@@ -295,9 +296,9 @@ void TerrainTilesOptions::check() const {
   if (cells < 1.0 || cells * cells > 1e8)
     throw Error(
         "too few or too many points per tile",
-        {.field = "piece_m", .value = to_text(tile_m), .bound = "1 to 10,000 times spacing_m"});
+        {.field = "tile_size_m", .value = to_text(tile_m), .bound = "1 to 10,000 times spacing_m"});
   if (std::ceil(size_x_m / tile_m) * std::ceil(size_y_m / tile_m) > 1e6)
-    throw Error("too many tiles", {.field = "piece_m",
+    throw Error("too many tiles", {.field = "tile_size_m",
                                    .value = to_text(tile_m),
                                    .bound = "large enough for at most 1,000,000 tiles"});
 }

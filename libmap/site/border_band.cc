@@ -41,14 +41,14 @@ struct TopView {
     if (!(low.x() >= 0.0 && low.y() >= 0.0 && low.x() < levels.width - 1 &&
           low.y() < levels.height - 1))
       return unseen;
-    const Vector2d share = index - low;
+    const Vector2d fraction = index - low;
     double sum = 0.0;
     double weights = 0.0;
     for (int n = 0; n < 4; ++n) {
       const double level =
           levels.at(static_cast<int>(low.x()) + n % 2, static_cast<int>(low.y()) + n / 2);
-      const double weight =
-          (n % 2 == 0 ? 1.0 - share.x() : share.x()) * (n / 2 == 0 ? 1.0 - share.y() : share.y());
+      const double weight = (n % 2 == 0 ? 1.0 - fraction.x() : fraction.x()) *
+                            (n / 2 == 0 ? 1.0 - fraction.y() : fraction.y());
       if (level == unseen) continue;
       sum += weight * level;
       weights += weight;
@@ -176,7 +176,7 @@ std::vector<Line> lines_along(const std::vector<Vector2d>& locations, const Axis
   return lines;
 }
 
-double share_seen(const Line& line, const Axis& along, double from, double to) {
+double seen_fraction(const Line& line, const Axis& along, double from, double to) {
   const std::size_t first = along.bin_of(from);
   const std::size_t last = along.bin_of(to);
   return static_cast<double>(line.sums[last + 1] - line.sums[first]) /
@@ -210,10 +210,10 @@ Frame best_frame(const std::vector<Vector2d>& white, double yaw_deg, double bin,
           const Vector2d min(upright[left].across, level[low].across);
           const Vector2d max(upright[right].across, level[high].across);
           if ((max - min).minCoeff() < options.min_side_m) continue;
-          const std::array<double, 4> seen = {share_seen(level[low], x, min.x(), max.x()),
-                                              share_seen(level[high], x, min.x(), max.x()),
-                                              share_seen(upright[left], y, min.y(), max.y()),
-                                              share_seen(upright[right], y, min.y(), max.y())};
+          const std::array<double, 4> seen = {seen_fraction(level[low], x, min.x(), max.x()),
+                                              seen_fraction(level[high], x, min.x(), max.x()),
+                                              seen_fraction(upright[left], y, min.y(), max.y()),
+                                              seen_fraction(upright[right], y, min.y(), max.y())};
           const double least = *std::min_element(seen.begin(), seen.end());
           if (least < options.min_seen) continue;
           const double length =

@@ -233,8 +233,8 @@ struct FlatTriangle {
       const Vector2d& p = corners[k];
       const Vector2d& q = corners[(k + 1) % 3];
       if (y < std::min(p.y(), q.y()) || y > std::max(p.y(), q.y())) continue;
-      const double share = p.y() == q.y() ? 0.0 : (y - p.y()) / (q.y() - p.y());
-      const double x = p.x() + share * (q.x() - p.x());
+      const double fraction = p.y() == q.y() ? 0.0 : (y - p.y()) / (q.y() - p.y());
+      const double x = p.x() + fraction * (q.x() - p.x());
       reach = {std::min(reach[0], x), std::max(reach[1], x)};
     }
     return reach;

@@ -15,7 +15,8 @@
 namespace libmap {
 
 void bind(ParameterTable& table, EdgeCheckOptions& options) {
-  table.add("places", options.positions_per_edge, {1.0, 10000.0},
+  table.add_former_key("places", "positions_per_edge");
+  table.add("positions_per_edge", options.positions_per_edge, {1.0, 10000.0},
             "number of measured positions along each edge of the site");
   table.add("inset_m", options.inset_m, not_negative,
             "distance of the measured positions from the edge, m");
@@ -193,9 +194,9 @@ EdgeCheckResult check_edges(const SiteCorners& site, const HeightFunction& surfa
     const Eigen::Vector2d along = site.corners[(e + 1) % 4] - from;
     const Eigen::Vector2d inwards = Eigen::Vector2d(-along.y(), along.x()).normalized();
     for (int n = 0; n < options.positions_per_edge; ++n) {
-      const double share = (n + 0.5) / options.positions_per_edge;
+      const double fraction = (n + 0.5) / options.positions_per_edge;
       EdgeCheckPoint& point = result.edges[e].emplace_back();
-      point.position = from + share * along + options.inset_m * inwards;
+      point.position = from + fraction * along + options.inset_m * inwards;
       point.height_m = surface(point.position);
       point.ground_m = ground(point.position);
     }

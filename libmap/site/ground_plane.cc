@@ -111,7 +111,7 @@ struct Candidate {
 };
 
 std::vector<Candidate> find_candidates(Points points, const GroundPlaneOptions& options,
-                                       const Eigen::Vector3d& up, double& largest_share) {
+                                       const Eigen::Vector3d& up, double& largest_fraction) {
   const auto total = static_cast<double>(points.size());
   RandomStream random(options.seed, hypotheses_stream);
   std::vector<Candidate> candidates;
@@ -129,16 +129,17 @@ std::vector<Candidate> find_candidates(Points points, const GroundPlaneOptions& 
     points = std::move(rest);
     // The fit rotated towards a wall or slope that intersects the plane.
     if (degrees_between(plane->normal, up) > options.max_tilt_deg) continue;
-    const double share = static_cast<double>(candidate.points.size()) / total;
-    largest_share = std::max(largest_share, share);
-    const double least = std::max(options.min_share, options.min_share_of_largest * largest_share);
-    if (candidate.points.size() < 3 || share < least) break;
+    const double fraction = static_cast<double>(candidate.points.size()) / total;
+    largest_fraction = std::max(largest_fraction, fraction);
+    const double least =
+        std::max(options.min_fraction, options.min_fraction_of_largest * largest_fraction);
+    if (candidate.points.size() < 3 || fraction < least) break;
     candidates.push_back(std::move(candidate));
   }
   return candidates;
 }
 
-double share_above(const Plane& plane, const Points& points) {
+double fraction_above(const Plane& plane, const Points& points) {
   std::size_t above = 0;
   for (const Eigen::Vector3d& point : points) above += plane.height(point) > 0.0 ? 1U : 0U;
   return static_cast<double>(above) / static_cast<double>(points.size());
@@ -147,8 +148,8 @@ double share_above(const Plane& plane, const Points& points) {
 // True if `other` is below `ground`, the plane with more points.
 bool is_below(const Candidate& other, const Candidate& ground, const Eigen::Vector3d& up,
               double tolerance) {
-  const double above_other = share_above(other.plane, ground.points);
-  const double above_ground = share_above(ground.plane, other.points);
+  const double above_other = fraction_above(other.plane, ground.points);
+  const double above_ground = fraction_above(ground.plane, other.points);
   if (std::abs(above_other - above_ground) > 0.25) return above_other > above_ground;
   // The planes meet in a ridge or a valley.
   const double tilt_of_other = degrees_between(other.plane.normal, up);
@@ -218,16 +219,16 @@ void require_plane_spread(const Points& points) {
   if (!is_plane(spread)) throw Error("all points are on one line: no ground plane");
 }
 
-std::string percent(double share) { return to_fixed_text(100.0 * share, 1) + " %"; }
+std::string percent(double fraction) { return to_fixed_text(100.0 * fraction, 1) + " %"; }
 
 // Suggests an option with which there is a ground plane, for example a larger tolerance.
 std::string remedy(const Points& points, const GroundPlaneOptions& options,
                    const Eigen::Vector3d& up) {
   GroundPlaneOptions rougher = options;
-  double share = 0.0;
+  double fraction = 0.0;
   for (int doubling = 0; doubling < 5; ++doubling) {
     rougher.tolerance_m *= 2.0;
-    if (!find_candidates(drawn_points(points, options.seed), rougher, up, share).empty())
+    if (!find_candidates(drawn_points(points, options.seed), rougher, up, fraction).empty())
       return "for natural terrain use --plane-tolerance " + to_text(rougher.tolerance_m);
   }
   // The ground may be steeper, or z may not be up.
@@ -236,7 +237,7 @@ std::string remedy(const Points& points, const GroundPlaneOptions& options,
                                [](const Eigen::Vector3d&) { return 1.0; }),
                up)
           .normal;
-  if (!find_candidates(drawn_points(points, options.seed), options, normal, share).empty()) {
+  if (!find_candidates(drawn_points(points, options.seed), options, normal, fraction).empty()) {
     const auto text = [](double value) { return to_fixed_text(value, 2); };
     return "use the normal of the points, --up " + text(normal.x()) + "," + text(normal.y()) + "," +
            text(normal.z()) + ", or its opposite";
@@ -247,15 +248,17 @@ std::string remedy(const Points& points, const GroundPlaneOptions& options,
 }  // namespace
 
 void bind(ParameterTable& table, GroundPlaneOptions& options) {
-  constexpr Range share{0.0, 1.0, true, false};
+  constexpr Range fraction{0.0, 1.0, true, false};
   table.add("plane_tolerance_m", options.tolerance_m, positive,
             "maximum distance from a plane of the points that belong to it, m");
   table.add("max_tilt_deg", options.max_tilt_deg, {0.0, 90.0, true, true},
             "maximum angle between the ground's normal and up, degrees");
-  table.add("min_ground_share", options.min_share, share,
+  table.add_former_key("min_ground_share", "min_ground_fraction");
+  table.add("min_ground_fraction", options.min_fraction, fraction,
             "minimum share of the cloud's points, or of the mesh's area, on the ground plane");
+  table.add_former_key("min_share_of_largest", "min_fraction_of_largest");
   table.add(
-      "min_share_of_largest", options.min_share_of_largest, share,
+      "min_fraction_of_largest", options.min_fraction_of_largest, fraction,
       "minimum size, relative to the largest plane, of a lower plane that is taken as the ground");
   table.add("plane_hypotheses", options.hypotheses, {1.0, 1e6},
             "number of random planes through three points that are tried for each plane");
@@ -267,16 +270,16 @@ GroundPlane find_ground_plane(const std::vector<Eigen::Vector3d>& points,
   require_ranges(options);
   const Eigen::Vector3d up = options.up.normalized();
   require_plane_spread(points);
-  double largest_share = 0.0;
+  double largest_fraction = 0.0;
   const std::vector<Candidate> candidates =
-      find_candidates(drawn_points(points, options.seed), options, up, largest_share);
+      find_candidates(drawn_points(points, options.seed), options, up, largest_fraction);
   if (candidates.empty())
     throw Error("no plane within " + to_text(options.max_tilt_deg) + " degrees of up, (" +
                     to_text(up.x()) + ", " + to_text(up.y()) + ", " + to_text(up.z()) +
                     "), is large enough to be the ground: " + remedy(points, options, up),
                 {.field = "share of the points on the largest plane",
-                 .value = percent(largest_share),
-                 .bound = ">= " + percent(options.min_share)});
+                 .value = percent(largest_fraction),
+                 .bound = ">= " + percent(options.min_fraction)});
   const Candidate* ground = &candidates.front();
   for (const Candidate& other : candidates)
     if (&other != ground && is_below(other, *ground, up, options.tolerance_m)) ground = &other;
@@ -300,7 +303,7 @@ GroundPlane find_ground_plane(const std::vector<Eigen::Vector3d>& points,
     result.center += mean - plane.normal.dot(mean) * plane.normal;
   }
   result.offset_m = result.normal.dot(result.center);
-  result.share = count / static_cast<double>(points.size());
+  result.fraction = count / static_cast<double>(points.size());
   result.tilt_deg = degrees_between(result.normal, up);
   return result;
 }

@@ -16,10 +16,10 @@ struct GroundPlaneOptions {
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();  // approximate up direction, of any length
   double tolerance_m = 0.02;                      // > 0: maximum distance of the inliers of a plane
   double max_tilt_deg = 40.0;  // > 0, < 90: maximum angle between the ground's normal and `up`
-  double min_share = 0.05;     // (0, 1]: minimum share of the points on a plane
+  double min_fraction = 0.05;  // (0, 1]: minimum share of the points on a plane
   // (0, 1]: minimum number of points on a lower plane to be the ground, relative to the largest
   // plane.
-  double min_share_of_largest = 0.2;
+  double min_fraction_of_largest = 0.2;
   int hypotheses = 3000;  // > 0: number of RANSAC hypotheses per plane
   std::uint64_t seed = 1;
 };
@@ -32,7 +32,7 @@ struct GroundPlane {
   Eigen::Vector3d center = Eigen::Vector3d::Zero();   // of the inliers, on the plane
   double rmse_m = 0.0;                                // of the inliers
   std::size_t inliers = 0;                            // points within the tolerance
-  double share = 0.0;                                 // inliers as a share of all points
+  double fraction = 0.0;                              // inliers as a share of all points
   double tilt_deg = 0.0;                              // angle between the normal and `up`
 };
 

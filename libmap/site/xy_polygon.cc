@@ -83,9 +83,9 @@ XyPolygon::XyPolygon(std::vector<Vector2d> corners) : corners_(std::move(corners
 
 std::size_t XyPolygon::strip_of(double y) const {
   const double height = max_.y() - min_.y();
-  const double share = height > 0.0 ? (y - min_.y()) / height : 0.0;
+  const double fraction = height > 0.0 ? (y - min_.y()) / height : 0.0;
   const auto count = static_cast<double>(strips_.size());
-  return static_cast<std::size_t>(std::clamp(std::floor(share * count), 0.0, count - 1.0));
+  return static_cast<std::size_t>(std::clamp(std::floor(fraction * count), 0.0, count - 1.0));
 }
 
 void XyPolygon::make_strips() {

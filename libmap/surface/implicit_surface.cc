@@ -23,7 +23,7 @@ constexpr std::size_t corners_per_block =
     std::size_t{block_corners} * block_corners * block_corners;
 // Minimum distance of a vertex from the ends of its edge, per edge length, so that triangles have
 // an area.
-constexpr double min_share = 0.01;
+constexpr double min_fraction = 0.01;
 // Maximum tangential distance from the weighted mean of the samples, per reach. It is 0.26 at the
 // straight border of evenly distributed samples.
 constexpr double max_aside = 0.4;
@@ -135,7 +135,7 @@ class ImplicitSurface {
   static bool is_crossed(const BlockGrid& grid, Cube& cube);
   void add_cube(const Block& block, const Cube& cube, BlockGrid& grid, Part& part) const;
   Part::Vertex vertex_of(const Block& block, const Vector3i& in_block, int axis,
-                         double share) const;
+                         double fraction) const;
   TriangleMesh joined() const;
 
   static std::size_t corner_index(const Vector3i& corner) {
@@ -239,9 +239,9 @@ void ImplicitSurface::add_cube(const Block& block, const Cube& cube, BlockGrid& 
       known = static_cast<std::uint32_t>(part.vertices.size());
       const double from = grid.values[cube.at[a]];
       const double to = grid.values[cube.at[b]];
-      const double share = std::clamp(from / (from - to), min_share, 1.0 - min_share);
+      const double fraction = std::clamp(from / (from - to), min_fraction, 1.0 - min_fraction);
       part.vertices.push_back(
-          vertex_of(block, cube.position + Vector3i(low[0], low[1], low[2]), axis, share));
+          vertex_of(block, cube.position + Vector3i(low[0], low[1], low[2]), axis, fraction));
     }
     numbers[e] = known;
   }
@@ -254,10 +254,10 @@ void ImplicitSurface::add_cube(const Block& block, const Cube& cube, BlockGrid& 
 
 // Vertex on the edge from a corner of the block, at the given share of its length.
 Part::Vertex ImplicitSurface::vertex_of(const Block& block, const Vector3i& in_block, int axis,
-                                        double share) const {
+                                        double fraction) const {
   const Vector3i corner = block.begin + in_block;
   Part::Vertex vertex;
-  vertex.position = cell_m_ * (corner.cast<double>() + share * Vector3d::Unit(axis));
+  vertex.position = cell_m_ * (corner.cast<double>() + fraction * Vector3d::Unit(axis));
   vertex.corner = pack({corner, 0});
   vertex.axis = static_cast<std::size_t>(axis);
   for (int other = 0; other < 3; ++other)

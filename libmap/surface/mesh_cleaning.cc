@@ -22,7 +22,7 @@ namespace libmap {
 namespace {
 
 // Default merge distance relative to the mesh's size.
-constexpr double merge_share = 1e-7;
+constexpr double merge_fraction = 1e-7;
 
 std::vector<bool> inverse(std::vector<bool> marks) {
   marks.flip();
@@ -179,7 +179,7 @@ Neighbors neighbors_of(const TriangleMesh& mesh) {
   return result;
 }
 
-void smoothing_step(const Neighbors& neighbors, double share,
+void smoothing_step(const Neighbors& neighbors, double fraction,
                     const std::vector<Eigen::Vector3d>& from, std::vector<Eigen::Vector3d>& to) {
   parallel_each(from.size(), vertices_grain, [&](std::size_t v) {
     Eigen::Vector3d towards = Eigen::Vector3d::Zero();
@@ -191,7 +191,7 @@ void smoothing_step(const Neighbors& neighbors, double share,
       towards += edge / length;
       weights += 1.0 / length;
     }
-    to[v] = weights > 0.0 ? Eigen::Vector3d(from[v] + share / weights * towards) : from[v];
+    to[v] = weights > 0.0 ? Eigen::Vector3d(from[v] + fraction / weights * towards) : from[v];
   });
 }
 
@@ -268,7 +268,7 @@ class Cleaning {
 
   double merge_distance() {
     return options_.merge_distance_m > 0.0 ? options_.merge_distance_m
-                                           : merge_share * size_of(mesh_());
+                                           : merge_fraction * size_of(mesh_());
   }
 
   void repair_triangles() {
@@ -317,7 +317,7 @@ class Cleaning {
     double largest = 0.0;
     for (const double area : components.areas_m2) largest = std::max(largest, area);
     const double smallest =
-        std::max(options_.min_island_area_m2, options_.min_island_share * largest);
+        std::max(options_.min_island_area_m2, options_.min_island_fraction * largest);
     std::vector<bool> are_kept = components_beyond(mesh_(), components, options_.known);
     std::size_t islands = 0;
     for (std::size_t c = 0; c < are_kept.size(); ++c) {
@@ -363,7 +363,8 @@ void bind(ParameterTable& table, MeshCleaningOptions& options) {
             "maximum distance between vertices that are merged, m; 0: 1e-7 of the mesh's size");
   table.add("min_island_area_m2", options.min_island_area_m2, not_negative,
             "minimum area of a component, m2; smaller components are dropped");
-  table.add("min_island_share", options.min_island_share, zero_to_one,
+  table.add_former_key("min_island_share", "min_island_fraction");
+  table.add("min_island_fraction", options.min_island_fraction, zero_to_one,
             "minimum area of a component relative to the largest; smaller components are dropped");
   table.add("max_hole_m", options.max_hole_m, not_negative,
             "maximum diameter of filled holes, m; outer boundaries stay open");

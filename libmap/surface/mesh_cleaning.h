@@ -31,7 +31,7 @@ struct MeshCleaningOptions {
   // >= 0: vertices within this distance are merged; 0: 1e-7 of the diagonal of the bounding box.
   double merge_distance_m = 0.0;
   double min_island_area_m2 = 0.01;  // >= 0: smaller components are dropped
-  double min_island_share = 0.0;     // 0 to 1: minimum area relative to the largest component
+  double min_island_fraction = 0.0;  // 0 to 1: minimum area relative to the largest component
   // >= 0: maximum diameter (largest distance between two boundary vertices) of filled holes. The
   // longest boundary of a component is the outer boundary and is not filled, unless the boundary
   // radius is less than half of the component's radius (the hole of a ball).

@@ -24,8 +24,8 @@ namespace {
 constexpr int max_attempts = 12;
 // Tolerance for removed vertices relative to the maximum error, because the distance between
 // vertices can be larger, and its factor per later attempt.
-constexpr double tolerance_share = 0.7;
-constexpr double next_share = 0.7;
+constexpr double tolerance_fraction = 0.7;
+constexpr double next_fraction = 0.7;
 constexpr double max_turn_deg = 30.0;
 constexpr float min_roundness = 0.2F;
 // Parts smaller than this share of the maximum error are not divided but regarded as above it.
@@ -191,11 +191,11 @@ double deviation(const TriangleMesh& original, const TriangleMesh& smaller, doub
 MeshDecimation decimate_mesh(TriangleMesh& mesh, double max_error_m, Progress& progress) {
   MeshDecimation result;
   if (max_error_m <= 0.0 || mesh.triangles.empty()) return result;
-  double tolerance = tolerance_share * max_error_m;
+  double tolerance = tolerance_fraction * max_error_m;
   std::vector<bool> locked(mesh.vertices.size(), false);
   progress.begin("decimating", 0);
   for (int attempt = 0; attempt < max_attempts; ++attempt) {
-    if (attempt >= max_attempts / 2) tolerance *= next_share;
+    if (attempt >= max_attempts / 2) tolerance *= next_fraction;
     TriangleMesh smaller = collapsed(mesh, locked, tolerance);
     if (smaller.triangles.empty() || smaller.triangles.size() == mesh.triangles.size()) break;
     const double proved = deviation(mesh, smaller, max_error_m, attempt, locked);
@@ -213,7 +213,7 @@ MeshDecimation decimate_triangles(TriangleMesh& mesh, double max_error_m) {
   MeshDecimation result;
   if (max_error_m <= 0.0 || mesh.triangles.empty()) return result;
   TriangleMesh smaller = collapsed(mesh, std::vector<bool>(mesh.vertices.size(), false),
-                                   tolerance_share * max_error_m);
+                                   tolerance_fraction * max_error_m);
   const std::vector<Deviation> there = deviations(smaller, mesh, max_error_m);
   std::vector<bool> keep(there.size());
   for (std::size_t t = 0; t < keep.size(); ++t) keep[t] = there[t].nearest_there == none;

@@ -398,8 +398,8 @@ std::size_t split_vertices(TriangleMesh& mesh, const std::vector<HalfEdge>& fan_
       const std::uint32_t copy = append_vertex_between(mesh, v, v, 0.0);
       const Eigen::Vector3d middle = fan->ring_sum / static_cast<double>(fan->ring_count);
       const Eigen::Vector3d way = middle - mesh.vertices[copy];
-      const double share = way.norm() > 0.0 ? std::max(gap, min_gap_m / way.norm()) : 0.0;
-      mesh.vertices[copy] += std::min(share, max_gap) * way;
+      const double fraction = way.norm() > 0.0 ? std::max(gap, min_gap_m / way.norm()) : 0.0;
+      mesh.vertices[copy] += std::min(fraction, max_gap) * way;
       copy_of_fan.emplace_back(fan->name, copy);
     }
   }

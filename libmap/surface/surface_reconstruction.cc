@@ -113,11 +113,12 @@ struct UsedPoint {
 
 class Reconstruction {
  public:
-  // `survey` describes the whole cloud of which `cloud` is a part; nullptr: `cloud` is the whole.
-  Reconstruction(const PointCloud& cloud, const CloudStatistics* survey,
+  // `statistics` describes the whole cloud of which `cloud` is a part; nullptr: `cloud` is the
+  // whole.
+  Reconstruction(const PointCloud& cloud, const CloudStatistics* statistics,
                  const SurfaceReconstructionOptions& options, Progress& progress)
-      : cloud_(cloud), options_(options), progress_(progress), is_part_(survey != nullptr) {
-    if (is_part_) survey_ = *survey;
+      : cloud_(cloud), options_(options), progress_(progress), is_part_(statistics != nullptr) {
+    if (is_part_) statistics_ = *statistics;
   }
 
   SurfaceReconstructionResult run(const AnnounceWork& announce = {}) {
@@ -171,7 +172,7 @@ class Reconstruction {
   const SurfaceReconstructionOptions& options_;
   Progress& progress_;
   bool is_part_;
-  CloudStatistics survey_;
+  CloudStatistics statistics_;
   std::vector<std::size_t> used_;
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
   double median_error_m_ = 0.0;
@@ -187,13 +188,13 @@ class Reconstruction {
 
 void Reconstruction::choose_points() {
   cloud_.check();
-  if (!is_part_) survey_.add(cloud_, options_.weigh_by_error);
+  if (!is_part_) statistics_.add(cloud_, options_.weigh_by_error);
   if (!cloud_.has_normals()) throw Error("the cloud has no normals");
   for (std::size_t n = 0; n < cloud_.size(); ++n)
     if (has_normal(cloud_, n)) used_.push_back(n);
   result_.dropped_points = cloud_.size() - used_.size();
-  if (survey_.points() == 0) throw Error("no point of the cloud has a normal");
-  const double opposing = opposing_share(cloud_.positions, cloud_.normals);
+  if (statistics_.points() == 0) throw Error("no point of the cloud has a normal");
+  const double opposing = opposing_fraction(cloud_.positions, cloud_.normals);
   if (opposing > max_mixed_sides)
     throw Error("the normals are not consistently oriented; use --normals estimate",
                 {.field = "share of neighbors with normals on opposite sides",
@@ -211,7 +212,7 @@ void Reconstruction::choose_points() {
 }
 
 void Reconstruction::choose_cell_size() {
-  origin_ = survey_.origin();
+  origin_ = statistics_.origin();
   result_.cell_size_m = options_.cell_size_m;
   if (is_part_) return;
   std::vector<Eigen::Vector3d> distinct;
@@ -253,7 +254,7 @@ SurfaceWork Reconstruction::expected_work() const {
 }
 
 void Reconstruction::check_cell_size() {
-  const Bounds3d& bounds = survey_.bounds();
+  const Bounds3d& bounds = statistics_.bounds();
   const double extent = (bounds.max - bounds.min).maxCoeff();
   // The surface extends by about a cell, so larger cells would create ground around the points.
   if (result_.cell_size_m > extent)
@@ -289,7 +290,7 @@ double Reconstruction::weight_of(std::size_t point) const {
 }
 
 void Reconstruction::make_samples() {
-  median_error_m_ = survey_.median_error_m();
+  median_error_m_ = statistics_.median_error_m();
   errors_ = median_error_m_ > 0.0 ? cloud_.find_field("expected_error") : nullptr;
   std::vector<UsedPoint> points;
   points.reserve(used_.size());
@@ -453,12 +454,13 @@ SurfaceReconstructionResult reconstruct_surface(const PointCloud& cloud,
   return Reconstruction(cloud, nullptr, options, progress).run(announce);
 }
 
-SurfaceReconstructionResult reconstruct_part(const PointCloud& part, const CloudStatistics& survey,
+SurfaceReconstructionResult reconstruct_part(const PointCloud& part,
+                                             const CloudStatistics& statistics,
                                              const SurfaceReconstructionOptions& options,
                                              Progress& progress) {
   check_parameters(options);
   surface_margin_m(options);
-  return Reconstruction(part, &survey, options, progress).run();
+  return Reconstruction(part, &statistics, options, progress).run();
 }
 
 double surface_margin_m(const SurfaceReconstructionOptions& options) {

@@ -99,11 +99,12 @@ SurfaceReconstructionResult reconstruct_surface(const PointCloud& cloud,
                                                 Progress& progress = no_progress(),
                                                 const AnnounceWork& announce = {});
 
-// Reconstructs the surface of a part of a cloud; `survey` are the statistics of the whole cloud. At
-// a distance of surface_margin_m() from missing points, the surface equals the surface of the whole
-// cloud, except for the order. Returns an empty mesh for too few points. Throws Error as
+// Reconstructs the surface of a part of a cloud; `statistics` are the statistics of the whole
+// cloud. At a distance of surface_margin_m() from missing points, the surface equals the surface of
+// the whole cloud, except for the order. Returns an empty mesh for too few points. Throws Error as
 // reconstruct_surface and surface_margin_m.
-SurfaceReconstructionResult reconstruct_part(const PointCloud& part, const CloudStatistics& survey,
+SurfaceReconstructionResult reconstruct_part(const PointCloud& part,
+                                             const CloudStatistics& statistics,
                                              const SurfaceReconstructionOptions& options,
                                              Progress& progress = no_progress());
 // Returns the distance up to which points influence the surface, m. Throws Error unless the method

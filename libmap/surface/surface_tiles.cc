@@ -132,16 +132,16 @@ void add_surface_tiles(const PointCloud& cloud, const SurfaceTileOptions& option
   }
 }
 
-SurfaceTile make_surface_tile(const PointCloud& points, const CloudStatistics& survey,
+SurfaceTile make_surface_tile(const PointCloud& points, const CloudStatistics& statistics,
                               const XyTile& tile, const SurfaceTileOptions& options,
                               Progress& progress) {
   options.check();
   SurfaceTile made;
-  made.reconstruction = reconstruct_part(points, survey, options.reconstruction, progress);
+  made.reconstruction = reconstruct_part(points, statistics, options.reconstruction, progress);
   const double cell_m = options.reconstruction.cell_size_m;
   MeshCleaningOptions cleaning = options.cleaning;
   cleaning.known = xy_box_of(tile, options.tile_m, cleaning_margin_m(options));
-  cleaning.min_island_share = 0.0;
+  cleaning.min_island_fraction = 0.0;
   const XyBox cut =
       xy_box_of(tile, options.tile_m, cleaning_margin_m(options) + triangle_cells * cell_m);
   const TriangleMesh around = select_triangles(
@@ -182,7 +182,8 @@ SurfaceIslands::Dropped SurfaceIslands::dropped(const MeshCleaningOptions& optio
   for (std::size_t n = 0; n < parts_.size(); ++n) areas[sets.find(n)] += parts_[n].area_m2;
   double largest = 0.0;
   for (const double area : areas) largest = std::max(largest, area);
-  const double smallest = std::max(options.min_island_area_m2, options.min_island_share * largest);
+  const double smallest =
+      std::max(options.min_island_area_m2, options.min_island_fraction * largest);
   Dropped found;
   std::set<std::size_t> islands;
   for (std::size_t n = 0; n < parts_.size(); ++n)

@@ -49,12 +49,12 @@ struct SurfaceTile {
   MeshCleaningResult cleaning;                 // of the tile with its margin, without mesh
 };
 
-// Reconstructs the surface of one tile from the `points` within margin_m() of it; `survey` are the
-// statistics of the whole cloud. The surface equals the result of reconstruct_surface() and
+// Reconstructs the surface of one tile from the `points` within margin_m() of it; `statistics` are
+// the statistics of the whole cloud. The surface equals the result of reconstruct_surface() and
 // clean_mesh() for the whole cloud, except that small components (islands) at the margin are kept,
 // for SurfaceIslands. Holes beside islands narrower than min_island_area_m2 / margin_m() may stay
 // open. Throws Error as options.check(), reconstruct_part and clean_mesh.
-SurfaceTile make_surface_tile(const PointCloud& points, const CloudStatistics& survey,
+SurfaceTile make_surface_tile(const PointCloud& points, const CloudStatistics& statistics,
                               const XyTile& tile, const SurfaceTileOptions& options,
                               Progress& progress = no_progress());
 

@@ -58,7 +58,7 @@ class Texturing {
   TextureResult whole(const TriangleMesh& mesh);
   std::vector<ColorObservation> observe(MeshTileIndex& index, double margin_m);
   void even_out(std::vector<ColorObservation> observations);
-  TileTexturing::Piece piece(MeshWithMargin part);
+  TileTexturing::Tile tile(MeshWithMargin part);
   TextureReport& report() { return report_; }
 
  private:
@@ -154,9 +154,9 @@ TexturedMesh Texturing::paint(MeshWithMargin part, TextureViews views, Progress&
   count_charts(atlas, mesh);
   return timed("painting", [&] {
     TexturedMesh model = atlas.make_model(mesh, *photos_);
-    const BlendingWeights shares =
+    const BlendingWeights weights =
         blending_weights(views.of_vertices, options_.blend_views, options_.blend_exponent);
-    paint_texture(atlas, {*photos_, report_.exposure, shares, options_.unseen_color}, model,
+    paint_texture(atlas, {*photos_, report_.exposure, weights, options_.unseen_color}, model,
                   progress);
     return model;
   });
@@ -186,8 +186,8 @@ std::vector<ColorObservation> Texturing::observe(MeshTileIndex& index, double ma
   std::vector<ColorObservation> all;
   std::size_t before = 0;
   progress_.begin("exposure", index.size());
-  for (std::size_t piece = 0; piece < index.size(); ++piece) {
-    const MeshWithMargin part = cut_finely(index.with_margin(piece, margin_m));
+  for (std::size_t tile = 0; tile < index.size(); ++tile) {
+    const MeshWithMargin part = cut_finely(index.with_margin(tile, margin_m));
     const TextureViews views = find_texture_views(part.mesh, *photos_, options_.views,
                                                   {part.triangles, 0, 0, wanted}, no_progress());
     for (ColorObservation seen : views.observations) {
@@ -201,7 +201,7 @@ std::vector<ColorObservation> Texturing::observe(MeshTileIndex& index, double ma
   return all;
 }
 
-TileTexturing::Piece Texturing::piece(MeshWithMargin part) {
+TileTexturing::Tile Texturing::tile(MeshWithMargin part) {
   static_cast<TextureCounts&>(report_) = {};
   const std::size_t uncut = part.triangles;
   part = timed("cutting", [&] { return cut_finely(std::move(part)); });
@@ -211,7 +211,7 @@ TileTexturing::Piece Texturing::piece(MeshWithMargin part) {
   });
   TexturedMesh model = paint(std::move(part), std::move(views), no_progress());
   // Frees memory: the peak is reached while the model is encoded.
-  photos_->forget_images();
+  photos_->evict_images();
   model.mesh = select_triangles(model.mesh, std::vector<bool>(model.mesh.triangles.size(), true));
   return {std::move(model), report_};
 }
@@ -266,11 +266,11 @@ class TileTexturing::Work {
   Texturing texturing;
 };
 
-TileTexturing::TileTexturing(MeshTileIndex& pieces, double margin_m, const ScanSource& scan,
+TileTexturing::TileTexturing(MeshTileIndex& tiles, double margin_m, const ScanSource& scan,
                              const Trajectory& world_from_base, const TextureOptions& options,
                              Progress& progress)
     : work_(new Work{
-          pieces, margin_m,
+          tiles, margin_m,
           Texturing(scan, world_from_base, options, progress, max_image_bytes_in_pieces)}) {}
 
 TileTexturing::~TileTexturing() = default;
@@ -280,9 +280,9 @@ TextureExposure TileTexturing::find_exposure() {
   return work_->texturing.report().exposure;
 }
 
-TileTexturing::Piece TileTexturing::make(std::size_t piece, const TextureExposure& exposure) {
+TileTexturing::Tile TileTexturing::make(std::size_t tile, const TextureExposure& exposure) {
   work_->texturing.report().exposure = exposure;
-  return work_->texturing.piece(work_->index.with_margin(piece, work_->margin_m));
+  return work_->texturing.tile(work_->index.with_margin(tile, work_->margin_m));
 }
 
 TextureReport TileTexturing::report() const {

@@ -89,21 +89,21 @@ TextureResult texture_mesh(const TriangleMesh& mesh, const ScanSource& scan,
 // Error as texture_mesh does, except for a tile that no photograph shows.
 class TileTexturing {
  public:
-  // Only the mesh within `margin_m` of a tile is considered as an occluder. `pieces`, `scan` and
+  // Only the mesh within `margin_m` of a tile is considered as an occluder. `tiles`, `scan` and
   // `progress` must outlive this object.
-  TileTexturing(MeshTileIndex& pieces, double margin_m, const ScanSource& scan,
+  TileTexturing(MeshTileIndex& tiles, double margin_m, const ScanSource& scan,
                 const Trajectory& world_from_base, const TextureOptions& options,
                 Progress& progress = no_progress());
   ~TileTexturing();
 
   // Estimates the common exposure from all tiles.
   TextureExposure find_exposure();
-  struct Piece {
+  struct Tile {
     TexturedMesh model;
     TextureCounts counts;
   };
   // Textures one tile with the result of find_exposure.
-  Piece make(std::size_t piece, const TextureExposure& exposure);
+  Tile make(std::size_t tile, const TextureExposure& exposure);
   // Returns the report on the photographs, with the running times so far and empty counts.
   TextureReport report() const;
 

@@ -52,7 +52,7 @@ class PlaneTriangle {
 };
 
 // A photograph of a triangle and its blending weights at the corners.
-struct CornerShares {
+struct CornerWeights {
   std::uint32_t photo = 0;
   Eigen::Vector3d at_corners = Eigen::Vector3d::Zero();
 };
@@ -74,7 +74,7 @@ class ChartPainter {
   void spread_owners();
   void sort_texels();
   void paint_triangle(std::int32_t local, std::span<const std::uint32_t> texels);
-  void gather_shares(std::uint32_t triangle);
+  void gather_weights(std::uint32_t triangle);
   Eigen::Vector3f color_at(std::uint32_t triangle, const Eigen::Vector3d& weights);
   PlaneTriangle on_chart(std::uint32_t triangle) const;
   std::size_t index(int column, int row) const {
@@ -94,7 +94,7 @@ class ChartPainter {
   std::vector<std::int32_t> owners_;        // per texel: index in chart_->triangles, or nobody
   std::vector<std::uint32_t> first_texel_;  // per triangle: index in texels_
   std::vector<std::uint32_t> texels_;
-  std::vector<CornerShares> shares_;  // of the current triangle
+  std::vector<CornerWeights> corner_weights_;  // of the current triangle
 };
 
 void ChartPainter::paint(const TextureChart& chart) {
@@ -177,25 +177,25 @@ void ChartPainter::sort_texels() {
     texels_[next[static_cast<std::size_t>(owners_[i])]++] = i;
 }
 
-void ChartPainter::gather_shares(std::uint32_t triangle) {
-  shares_.clear();
-  const auto add = [this](std::uint32_t photo, int corner, double share) {
-    auto found = std::find_if(shares_.begin(), shares_.end(),
-                              [photo](const CornerShares& s) { return s.photo == photo; });
-    if (found == shares_.end()) {
-      shares_.push_back({photo, Eigen::Vector3d::Zero()});
-      found = shares_.end() - 1;
+void ChartPainter::gather_weights(std::uint32_t triangle) {
+  corner_weights_.clear();
+  const auto add = [this](std::uint32_t photo, int corner, double weight) {
+    auto found = std::find_if(corner_weights_.begin(), corner_weights_.end(),
+                              [photo](const CornerWeights& s) { return s.photo == photo; });
+    if (found == corner_weights_.end()) {
+      corner_weights_.push_back({photo, Eigen::Vector3d::Zero()});
+      found = corner_weights_.end() - 1;
     }
-    found->at_corners[corner] += share;
+    found->at_corners[corner] += weight;
   };
-  const BlendingWeights& all = paint_.shares;
+  const BlendingWeights& all = paint_.weights;
   for (int k = 0; k < 3; ++k) {
     const std::uint32_t vertex = model_.mesh.triangles[triangle][static_cast<std::size_t>(k)];
     const std::uint32_t first = all.first[vertex];
     const std::uint32_t last = all.first[vertex + 1];
     if (first == last) add(chart_->photo, k, 1.0);
     for (std::uint32_t i = first; i < last; ++i)
-      add(all.shares[i].photo, k, static_cast<double>(all.shares[i].share));
+      add(all.weights[i].photo, k, static_cast<double>(all.weights[i].weight));
   }
 }
 
@@ -206,17 +206,17 @@ Eigen::Vector3f ChartPainter::color_at(std::uint32_t triangle, const Eigen::Vect
                                 weights[2] * model_.mesh.vertices[corners[2]];
   Eigen::Vector3f sum = Eigen::Vector3f::Zero();
   float total = 0.0F;
-  for (const CornerShares& view : shares_) {
-    const auto share = static_cast<float>(view.at_corners.dot(weights));
-    if (share < 1e-3F) continue;
+  for (const CornerWeights& view : corner_weights_) {
+    const auto weight = static_cast<float>(view.at_corners.dot(weights));
+    if (weight < 1e-3F) continue;
     const PhotoProjector& projector = paint_.photos[view.photo].projector;
     const Eigen::Vector3d seen = projector.project(point);
     const Eigen::Vector2d middle((projector.camera().width - 1) / 2.0,
                                  (projector.camera().height - 1) / 2.0);
     const double radius2 = (seen.head<2>() - middle).squaredNorm() / middle.squaredNorm();
     const Eigen::Vector3f color = sample_bicubic(image(view.photo), seen.x(), seen.y());
-    sum += share * color.cwiseQuotient(paint_.exposure.factor(view.photo, radius2));
-    total += share;
+    sum += weight * color.cwiseQuotient(paint_.exposure.factor(view.photo, radius2));
+    total += weight;
   }
   return sum / total;
 }
@@ -225,7 +225,7 @@ void ChartPainter::paint_triangle(std::int32_t local, std::span<const std::uint3
   if (texels.empty()) return;
   const std::uint32_t triangle = chart_->triangles[static_cast<std::size_t>(local)];
   const PlaneTriangle plane = on_chart(triangle);
-  gather_shares(triangle);
+  gather_weights(triangle);
   ColorImage& page = model_.pages[static_cast<std::size_t>(chart_->page)];
   const int samples =
       std::clamp(static_cast<int>(std::ceil(1.0 / chart_->scale - 1e-6)), 1, max_samples);
@@ -261,21 +261,21 @@ BlendingWeights blending_weights(const ViewTable& of_vertices, int views, double
   result.first.push_back(0);
   for (std::size_t v = 0; v < of_vertices.rows(); ++v) {
     const auto all = of_vertices[v];
-    const auto worth = [&](std::size_t i) {
+    const auto relative_quality = [&](std::size_t i) {
       return std::pow(static_cast<double>(all[i].quality / all[0].quality), exponent);
     };
     const std::size_t count = std::min<std::size_t>(all.size(), static_cast<std::size_t>(views));
     if (views > 1 && count > 0) {
-      const double least = all.size() > count ? worth(count) : 0.0;
+      const double excluded_quality = all.size() > count ? relative_quality(count) : 0.0;
       double total = 0.0;
-      for (std::size_t i = 0; i < count; ++i) total += worth(i) - least;
+      for (std::size_t i = 0; i < count; ++i) total += relative_quality(i) - excluded_quality;
       for (std::size_t i = 0; i < count; ++i) {
-        const double share =
-            total > 0.0 ? (worth(i) - least) / total : 1.0 / static_cast<double>(count);
-        if (share > 0.0) result.shares.push_back({all[i].photo, static_cast<float>(share)});
+        const double weight = total > 0.0 ? (relative_quality(i) - excluded_quality) / total
+                                          : 1.0 / static_cast<double>(count);
+        if (weight > 0.0) result.weights.push_back({all[i].photo, static_cast<float>(weight)});
       }
     }
-    result.first.push_back(static_cast<std::uint32_t>(result.shares.size()));
+    result.first.push_back(static_cast<std::uint32_t>(result.weights.size()));
   }
   return result;
 }

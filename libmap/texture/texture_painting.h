@@ -16,13 +16,13 @@ namespace libmap {
 // Blending weight of a photograph at a vertex.
 struct BlendingWeight {
   std::uint32_t photo = 0;
-  float share = 0.0F;
+  float weight = 0.0F;
 };
 
 // Blending weights of all vertices: vertex v has shares[first[v]] .. [first[v + 1] - 1], which sum
 // up to 1. A vertex without weights uses the photograph of the triangle.
 struct BlendingWeights {
-  std::vector<BlendingWeight> shares;
+  std::vector<BlendingWeight> weights;
   std::vector<std::uint32_t> first;
 };
 
@@ -34,7 +34,7 @@ BlendingWeights blending_weights(const ViewTable& of_vertices, int views, double
 struct TexturePaint {
   const TexturePhotos& photos;
   const TextureExposure& exposure;
-  const BlendingWeights& shares;
+  const BlendingWeights& weights;
   Color neutral{};
 };
 

@@ -225,7 +225,7 @@ void TexturePhotos::keep(std::size_t photo, std::shared_ptr<const ColorImage> im
   }
 }
 
-void TexturePhotos::forget_images() const {
+void TexturePhotos::evict_images() const {
   const std::scoped_lock lock(mutex_);
   for (const std::size_t photo : order_) images_[photo].reset();
   order_.clear();

@@ -106,7 +106,7 @@ class TexturePhotos {
   // Returns the pixels, decoded again unless cached. May be called from several threads.
   std::shared_ptr<const ColorImage> image(std::size_t photo) const;
   // Clears the cache.
-  void forget_images() const;
+  void evict_images() const;
 
  private:
   struct Frame;

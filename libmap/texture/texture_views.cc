@@ -22,7 +22,7 @@ namespace {
 constexpr double block_m = 0.5;
 // Width of the band at the border in which quality decreases, relative to the smaller image side.
 constexpr double border_band = 0.15;
-constexpr double min_border_share = 0.05;
+constexpr double min_border_fraction = 0.05;
 // Triangles larger than this in the photograph are also tested at their center.
 constexpr float center_test_px = 6.0F;
 
@@ -311,10 +311,10 @@ float ViewFinder::rate(std::size_t t, double sharpness) const {
                                        camera.height - 1.0 - static_cast<double>(a.y)});
   const double inside = smooth_step((from_border - options_.border_px) /
                                     (border_band * std::min(camera.width, camera.height)));
-  const double slant = (cosine - min_cos_) / (1.0 - min_cos_);
+  const double incidence_factor = (cosine - min_cos_) / (1.0 - min_cos_);
   const double resolution = camera.fx * camera.fy / distance2 * cosine;
-  return static_cast<float>(resolution * slant * std::clamp(sharpness, 0.1, 2.0) *
-                            (min_border_share + (1.0 - min_border_share) * inside));
+  return static_cast<float>(resolution * incidence_factor * std::clamp(sharpness, 0.1, 2.0) *
+                            (min_border_fraction + (1.0 - min_border_fraction) * inside));
 }
 
 void ViewFinder::rate_triangles(double sharpness) {

@@ -186,15 +186,15 @@ void Canvas::text(const Eigen::Vector2d& position, const std::string& text,
                   const TextStyle& style) {
   const ScaledFont font = font_of(style);
   const TextLine line = lay_out(text, font.get());
-  const double share = style.align == TextAlign::left     ? 0.0
-                       : style.align == TextAlign::center ? 0.5
-                                                          : 1.0;
+  const double fraction = style.align == TextAlign::left     ? 0.0
+                          : style.align == TextAlign::center ? 0.5
+                                                             : 1.0;
   constexpr double half_capital = 0.365;  // half height of capital letters, in font sizes
   cairo_t* context = context_.get();
   cairo_save(context);
   cairo_translate(context, position.x(), position.y());
   if (style.upward) cairo_rotate(context, -std::numbers::pi / 2.0);
-  cairo_translate(context, -share * line.width_px, half_capital * style.size_px);
+  cairo_translate(context, -fraction * line.width_px, half_capital * style.size_px);
   set_color(style.color);
   cairo_set_scaled_font(context, font.get());
   const int count = static_cast<int>(line.glyphs.size());

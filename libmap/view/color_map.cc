@@ -95,9 +95,9 @@ std::pair<double, double> percentile_range(std::vector<double> values, ColorScal
   if (values.empty()) return {0.0, 0.0};
   if (scale == ColorScale::diverging)
     for (double& value : values) value = std::abs(value);
-  const auto at = [&values](double share) {
+  const auto at = [&values](double fraction) {
     const auto rank =
-        static_cast<std::ptrdiff_t>(std::lround(share * static_cast<double>(values.size() - 1)));
+        static_cast<std::ptrdiff_t>(std::lround(fraction * static_cast<double>(values.size() - 1)));
     std::nth_element(values.begin(), values.begin() + rank, values.end());
     return values[static_cast<std::size_t>(rank)];
   };
@@ -223,8 +223,8 @@ ColorMode automatic_mode(const ColorSource& source, const std::string& field) {
   return varied ? ColorMode::own : ColorMode::height;
 }
 
-std::uint8_t to_byte(double share) {
-  return static_cast<std::uint8_t>(std::lround(255.0 * std::clamp(share, 0.0, 1.0)));
+std::uint8_t to_byte(double fraction) {
+  return static_cast<std::uint8_t>(std::lround(255.0 * std::clamp(fraction, 0.0, 1.0)));
 }
 
 // Index of the color below t among `count` evenly spaced ones, and the fraction to the next.
@@ -238,10 +238,11 @@ std::pair<std::size_t, double> segment_of(std::size_t count, double t) {
 template <typename Points>
 Color interpolated(const Points& points, double full, double t) {
   if (std::isnan(t)) return no_value_color;
-  const auto [below, share] = segment_of(points.size(), t);
+  const auto [below, fraction] = segment_of(points.size(), t);
   Color color{};
   for (std::size_t c = 0; c < 3; ++c)
-    color[c] = to_byte(((1.0 - share) * points[below][c] + share * points[below + 1][c]) / full);
+    color[c] =
+        to_byte(((1.0 - fraction) * points[below][c] + fraction * points[below + 1][c]) / full);
   return color;
 }
 

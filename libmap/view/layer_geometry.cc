@@ -24,8 +24,8 @@ constexpr double filler_per_spacing = 3.0;
 constexpr double filler_depth_per_size = 2.75;
 
 // Quantile of the values.
-double quantile_of(std::vector<double> values, double share) {
-  const auto rank = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+double quantile_of(std::vector<double> values, double fraction) {
+  const auto rank = static_cast<std::ptrdiff_t>(fraction * static_cast<double>(values.size() - 1));
   std::nth_element(values.begin(), values.begin() + rank, values.end());
   return values[static_cast<std::size_t>(rank)];
 }
@@ -243,10 +243,10 @@ std::vector<PreparedLayer> prepare_textured(const TexturedMesh& model, const Sce
   return parts;
 }
 
-Color darkened(const Color& color, double share) {
+Color darkened(const Color& color, double fraction) {
   Color result{};
   for (std::size_t c = 0; c < 3; ++c)
-    result[c] = static_cast<std::uint8_t>(std::lround(share * color[c]));
+    result[c] = static_cast<std::uint8_t>(std::lround(fraction * color[c]));
   return result;
 }
 

@@ -98,9 +98,9 @@ void draw_scalar_bar(const Legend& legend, double left, double top, int font, Ca
                    frame_color);
   constexpr int strips = 128;
   for (int strip = 0; strip < strips; ++strip) {
-    const double share = static_cast<double>(strip) / strips;
+    const double fraction = static_cast<double>(strip) / strips;
     // Strips overlap, so that no seams are visible.
-    canvas.rectangle({bar.left, bar.top, bar.width, height * (1.0 - share)},
+    canvas.rectangle({bar.left, bar.top, bar.width, height * (1.0 - fraction)},
                      color_at(legend.scale, (strip + 0.5) / strips));
   }
   const std::vector<double> ticks = ticks_of(legend);

@@ -17,7 +17,7 @@ namespace {
 
 constexpr double min_height_m = 1e-5;
 constexpr double max_depth_of_radius = 1.5;
-constexpr double thickness_share = 0.5;
+constexpr double thickness_fraction = 0.5;
 // MuJoCo rejects flatter pieces.
 constexpr double min_depth_m = 2e-4;
 constexpr std::size_t max_outline = 8;
@@ -139,7 +139,7 @@ ConvexPieces make_convex_pieces(const TriangleMesh& mesh, const std::vector<bool
       center += mesh.vertices[v] / static_cast<double>(corners.size());
     const Eigen::Vector3d behind = -facet.normal.normalized();
     if (const auto hit = rays.cast(center, behind, ray_start_m + facet.bulge_m + body_error_m))
-      depth_m = std::min(depth_m, thickness_share * hit->distance);
+      depth_m = std::min(depth_m, thickness_fraction * hit->distance);
     depth_m = std::max(depth_m, min_depth_m);
     ConvexPiece piece;
     piece.center = (center / center_unit_m).array().round() / std::round(1 / center_unit_m);

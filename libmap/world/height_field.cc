@@ -186,23 +186,23 @@ std::vector<float> deviations(const TriangleMesh& mesh, const HeightField& field
 
 // Cells with too large a deviation and those around them, so that the nodes between a cell and one
 // that is skipped are on the surface.
-void leave_out(const std::vector<float>& deviation, double max_deviation_m, HeightField& field) {
+void mark_missing(const std::vector<float>& deviation, double max_deviation_m, HeightField& field) {
   const std::size_t columns = field.columns - 1;
   const std::size_t rows = field.rows - 1;
-  field.left_out.assign(deviation.size(), false);
+  field.is_missing.assign(deviation.size(), false);
   for (std::size_t row = 0; row < rows; ++row)
     for (std::size_t column = 0; column < columns; ++column) {
       if (static_cast<double>(deviation[row * columns + column]) <= max_deviation_m) continue;
       for (std::size_t y = std::max<std::size_t>(row, 1) - 1; y <= std::min(row + 1, rows - 1); ++y)
         for (std::size_t x = std::max<std::size_t>(column, 1) - 1;
              x <= std::min(column + 1, columns - 1); ++x)
-          field.left_out[y * columns + x] = true;
+          field.is_missing[y * columns + x] = true;
     }
   for (std::size_t cell = 0; cell < deviation.size(); ++cell)
-    if (!field.left_out[cell])
+    if (!field.is_missing[cell])
       field.deviation_m = std::max(field.deviation_m, static_cast<double>(deviation[cell]));
-  field.left_out_cells =
-      static_cast<std::size_t>(std::count(field.left_out.begin(), field.left_out.end(), true));
+  field.missing_cells =
+      static_cast<std::size_t>(std::count(field.is_missing.begin(), field.is_missing.end(), true));
 }
 
 // Nodes that no remaining cell has are put below the surface.
@@ -210,7 +210,7 @@ void sink_nodes(HeightField& field) {
   std::vector<bool> needed(field.heights_m.size(), false);
   for (std::size_t row = 0; row + 1 < field.rows; ++row)
     for (std::size_t column = 0; column + 1 < field.columns; ++column) {
-      if (field.left_out[row * (field.columns - 1) + column]) continue;
+      if (field.is_missing[row * (field.columns - 1) + column]) continue;
       const std::size_t first = row * field.columns + column;
       const std::array<std::size_t, 4> nodes = {first, first + 1, first + field.columns,
                                                 first + field.columns + 1};
@@ -248,18 +248,18 @@ HeightField make_height_field(const TriangleMesh& mesh, const HeightFieldOptions
   if (field.min_m() == missing)
     throw Error("no triangle of the mesh faces up, so there is no height field");
   extend_border(field);
-  leave_out(deviations(mesh, field), options.max_deviation_m, field);
+  mark_missing(deviations(mesh, field), options.max_deviation_m, field);
   sink_nodes(field);
   return field;
 }
 
-bool is_above_left_out(const HeightField& field, const TriangleMesh& mesh,
-                       const Triangle& triangle) {
+bool is_above_missing(const HeightField& field, const TriangleMesh& mesh,
+                      const Triangle& triangle) {
   const Corners corners = corners_of(mesh, triangle);
   const auto [first_column, last_column, first_row, last_row] = field.cells_of(corners);
   for (std::size_t row = first_row; row <= last_row; ++row)
     for (std::size_t column = first_column; column <= last_column; ++column) {
-      if (!field.left_out[row * (field.columns - 1) + column]) continue;
+      if (!field.is_missing[row * (field.columns - 1) + column]) continue;
       const std::array<Eigen::Vector3d, 4> cell = {
           node(field, column, row), node(field, column + 1, row), node(field, column + 1, row + 1),
           node(field, column, row + 1)};

@@ -26,8 +26,8 @@ struct HeightField {
   std::vector<float> heights_m;                        // above base_m, row by row
   // Cells, (columns - 1) x (rows - 1), that another shape must cover: the surface overhangs, or the
   // field deviates from it. Nodes that belong only to such cells are below the surface.
-  std::vector<bool> left_out;
-  std::size_t left_out_cells = 0;
+  std::vector<bool> is_missing;
+  std::size_t missing_cells = 0;
   // In the other cells no point of the field is farther from the surface, and no point of the
   // surface above these cells farther from the field. The field may exceed the surface's border by
   // one cell.
@@ -44,7 +44,6 @@ struct HeightField {
 HeightField make_height_field(const TriangleMesh& mesh, const HeightFieldOptions& options);
 
 // Returns true if a triangle is above or below a cell that is skipped.
-bool is_above_left_out(const HeightField& field, const TriangleMesh& mesh,
-                       const Triangle& triangle);
+bool is_above_missing(const HeightField& field, const TriangleMesh& mesh, const Triangle& triangle);
 
 }  // namespace libmap

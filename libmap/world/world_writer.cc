@@ -24,10 +24,10 @@ namespace fs = std::filesystem;
 namespace {
 
 // Vertices this near to each other, of the mesh's size, are one.
-constexpr double weld_share = 1e-7;
+constexpr double weld_fraction = 1e-7;
 // Vertices of the collision mesh are multiples of this; so MJCF rounds, ten times as coarse.
 constexpr double rounding_m = 1e-6;
-constexpr double bulge_share = 0.7;
+constexpr double bulge_fraction = 0.7;
 
 struct CollisionMesh {
   TriangleMesh mesh;
@@ -39,7 +39,7 @@ CollisionMesh make_collision_mesh(const TriangleMesh& visual, double max_error_m
   CollisionMesh collision;
   collision.mesh.vertices = visual.vertices;
   collision.mesh.triangles = visual.triangles;
-  const double weld_m = weld_share * size_of(visual);
+  const double weld_m = weld_fraction * size_of(visual);
   weld_vertices(collision.mesh, weld_m);
   const std::vector<bool> repeated = repeated_triangles(collision.mesh.triangles);
   std::vector<bool> keep(repeated.size());
@@ -136,9 +136,9 @@ ConvexPieces pieces_of(const TriangleMesh& collision, const TriangleMesh& visual
                        const HeightField& field, const WorldOptions& options) {
   std::vector<bool> marks(collision.triangles.size());
   for (std::size_t t = 0; t < marks.size(); ++t)
-    marks[t] = is_above_left_out(field, collision, collision.triangles[t]);
+    marks[t] = is_above_missing(field, collision, collision.triangles[t]);
   return make_convex_pieces(collision, marks, visual, options.collision_error_m,
-                            bulge_share * options.collision_error_m, options.piece_depth_m);
+                            bulge_fraction * options.collision_error_m, options.piece_depth_m);
 }
 
 }  // namespace
@@ -156,7 +156,7 @@ void describe(ResultTable& table, const WorldReport& report) {
   table.add("field_nodes", report.field_nodes, Merge::sum, "nodes of the height fields");
   table.add("field_deviation_m", report.field_deviation_m, Merge::max,
             "maximum distance between height fields and surface, in both directions, m");
-  table.add("left_out_cells", report.left_out_cells, Merge::sum,
+  table.add("missing_cells", report.missing_cells, Merge::sum,
             "cells of the height fields that convex pieces replace");
   table.add("convex_pieces", report.convex_pieces, Merge::sum, "convex pieces");
   table.add("piece_deviation_m", report.piece_deviation_m, Merge::max,
@@ -198,11 +198,11 @@ WorldModel write_world_model(const fs::path& folder, const WorldModelInput& inpu
   report.collision_deviation_m = std::max(report.collision_deviation_m, collision.deviation_m);
   report.field_nodes += model.field.heights_m.size();
   report.field_deviation_m = std::max(report.field_deviation_m, model.field.deviation_m);
-  report.left_out_cells += model.field.left_out_cells;
+  report.missing_cells += model.field.missing_cells;
   report.convex_pieces += model.pieces.size();
   report.piece_deviation_m = std::max(report.piece_deviation_m,
                                       collision.deviation_m + pieces.deviation_m + 10 * rounding_m);
-  model.field.left_out = {};
+  model.field.is_missing = {};
   return model;
 }
 

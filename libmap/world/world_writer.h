@@ -31,7 +31,7 @@ struct WorldReport {
   double collision_deviation_m = 0.0;
   std::size_t field_nodes = 0;
   double field_deviation_m = 0.0;  // of HeightField
-  std::size_t left_out_cells = 0;
+  std::size_t missing_cells = 0;
   std::size_t convex_pieces = 0;
   double piece_deviation_m = 0.0;   // of their outer faces from the visual mesh
   std::size_t collision_bytes = 0;  // of collision meshes and height fields

@@ -22,7 +22,7 @@ from benchmark_runs import measure, put_into_page, scan_options
 
 SITES = ("rocks", "slopes_and_bumps")
 INTRINSICS = {"stored-focal-percent": 1.0, "stored-cx": 4.0}
-DEPTH = {"depth-scale-percent": 0.8, "depth-wiggle": 0.004, "depth-corner": 0.006, "depth-holes": 0.05}
+DEPTH = {"depth-scale-percent": 0.8, "depth-periodic-error": 0.004, "depth-corner": 0.006, "depth-holes": 0.05}
 PICTURES = {"exposure-drift": 0.4, "vignetting": 0.35, "exposure": 0.05, "blurred-frames": 0.5,
             "jpeg-quality": 60}
 # Options of `simulate scan` at full size.

@@ -160,8 +160,8 @@ void print_row(const std::string& scan, const std::string& poses, const std::str
   std::cout << fmt::format(
       "| {} | {} | {} | {} | {:.2f} | {:.2f} | {:.2f} | {:.2f} | {:.2f} | {} |\n", scan, poses,
       name, cloud.size(), 1e3 * statistics.rmse_m, 1e3 * statistics.median_m,
-      1e3 * statistics.p95_m, 1e2 * libmap::share_of(flags), 1e2 * libmap::share_of(flags_inside),
-      seconds ? fmt::format("{:.2f}", *seconds) : "");
+      1e3 * statistics.p95_m, 1e2 * libmap::fraction_of(flags),
+      1e2 * libmap::fraction_of(flags_inside), seconds ? fmt::format("{:.2f}", *seconds) : "");
   std::cout.flush();
 }
 

@@ -20,7 +20,7 @@ bool run_cloud(std::string_view bytes) {
   static const ScratchFile file(std::string("cloud") + extension);
   file.write(bytes);
   accepts([&] { libmap::read_cloud_info(file.path()); });
-  accepts([&] { libmap::survey_tile(file.path()); });
+  accepts([&] { libmap::read_tile_info(file.path()); });
   accepts([&] { libmap::read_tiles({file.path()}); });
   return accepts([&] { libmap::read_cloud(file.path()); });
 }

@@ -13,7 +13,7 @@ site=$scratch/terrain
 if [ -n "${GRASPMAP_DATA:-}" ]; then
   site=$GRASPMAP_DATA/clouds/artificial_rocks.pcd
 else
-  "$graspmap" simulate terrain --size 3 --piece 1 -o "$site" --quiet
+  "$graspmap" simulate terrain --size 3 --tile-size 1 -o "$site" --quiet
 fi
 SLURM_LOCAL=$scratch/slurm
 export SLURM_LOCAL

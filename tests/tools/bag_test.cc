@@ -98,8 +98,8 @@ TEST(BagCommand, ImagesIntoABagAndBackGiveTheSamePanorama) {
       {"convert", "run.bag", "-o", "back", "--near", "0.28", "--far", "1.5", "--strict"})));
   expect_same_panorama("back");
   const nlohmann::json manifest = json_of("back.json");
-  EXPECT_EQ(manifest["results"]["moments"], 1);
-  EXPECT_EQ(manifest["results"]["cameras_of_fullest_moment"], 6);
+  EXPECT_EQ(manifest["results"]["synchronized_sets"], 1);
+  EXPECT_EQ(manifest["results"]["cameras_of_fullest_set"], 6);
   EXPECT_EQ(manifest["results"]["rear.topic"], "/rear/depth/image_raw");
   EXPECT_EQ(manifest["frame"], "robot");
   // The cloud can be scored.

@@ -215,7 +215,7 @@ TEST(CommandLine, AFileThatGrowsBeyondItsLimitIsAnError) {
 TEST(CommandLine, AFileOfAFolderThatGrowsBeyondItsLimitIsNamed) {
   const ProgramResult result =
       in_shell("ulimit -f 512; ",
-               "simulate terrain --size 1.5 --piece 1.5 --spacing 0.008 -o pieces --quiet");
+               "simulate terrain --size 1.5 --tile-size 1.5 --spacing 0.008 -o pieces --quiet");
   EXPECT_TRUE(ended_with(result, {.file = "pieces/piece_0_0.pcd",
                                   .about = "File too large",
                                   .kind = libmap::ErrorKind::failed}));

@@ -102,7 +102,7 @@ TEST(SpotCheckCommand, MeshAgainstTheTruth) {
   EXPECT_NEAR(json.at("mean_m"), 0.003, 1e-6);
   EXPECT_NEAR(json.at("mean_signed_m"), -0.003, 1e-6);
   EXPECT_NEAR(json.at("max_m"), 0.003, 1e-6);
-  EXPECT_NEAR(json.at("edges").at(1).at("places").at(0).at("ground_m"), height_at(1.45), 1e-6);
+  EXPECT_NEAR(json.at("edges").at(1).at("positions").at(0).at("ground_m"), height_at(1.45), 1e-6);
   libmap::write_cloud(scratch("cloud.ply"), site_cloud());
   EXPECT_LT(checked({"cloud.ply", "--truth", "truth.ply"}).at("mean_m"), 2e-5);
 }
@@ -111,8 +111,8 @@ TEST(SpotCheckCommand, PlacesWithoutDataAreCounted) {
   libmap::PointCloud cloud = site_cloud();
   std::erase_if(cloud.positions, [](const auto& p) { return p.x() > 0 && p.y() < 0; });
   libmap::write_cloud(scratch("site.ply"), cloud);
-  const auto result = graspmap(
-      {"compare", "--edges", "site.ply", "--ground", "zero", "--places", "4", "-o", "check.csv"});
+  const auto result = graspmap({"compare", "--edges", "site.ply", "--ground", "zero",
+                                "--positions-per-edge", "4", "-o", "check.csv"});
   ASSERT_TRUE(succeeded(result));
   EXPECT_NE(result.standard_output.find("locations without data: 4"), std::string::npos);
   const libmap::Table table = libmap::read_csv(scratch("check.csv"));
@@ -165,8 +165,9 @@ TEST(SpotCheckCommand, BadInput) {
   };
   EXPECT_TRUE(bad_input(graspmap({"compare", "--edges", "none.ply"}), {.file = "none.ply"}));
   EXPECT_TRUE(bad_input(run({"-o", "check.txt"}), {.file = "check.txt", .about = ".csv"}));
-  EXPECT_TRUE(bad_input(run({"--places", "0"}),
-                        {.field = "--places", .value = "0", .bound = ">= 1 and <= 10000"}));
+  EXPECT_TRUE(
+      bad_input(run({"--positions-per-edge", "0"}),
+                {.field = "--positions-per-edge", .value = "0", .bound = ">= 1 and <= 10000"}));
   EXPECT_TRUE(
       bad_input(run({"--inset", "1"}), {.file = "site.ply", .field = "inset_m", .value = "1"}));
   EXPECT_TRUE(

@@ -285,7 +285,7 @@ TEST(ExtractBundler, CamerasAndImagesOfEveryPose) {
     EXPECT_GT(photo.width, lens.width / 2);
   }
   const auto manifest = json_of("out.json");
-  EXPECT_EQ(manifest["results"]["kept_pictures"], poses.size());
+  EXPECT_EQ(manifest["results"]["kept_images"], poses.size());
   EXPECT_EQ(manifest["parameters"]["poses"], "odometry");
 }
 
@@ -327,7 +327,7 @@ TEST(ExtractBundler, BesideTheWholeScan) {
   ASSERT_TRUE(succeeded(graspmap({"convert", "scan.db", "-o", "all", "--bundler", "pictures"})));
   EXPECT_EQ(files_in("all").count("nodes.csv"), 1U);
   EXPECT_EQ(files_in("pictures").count("bundle.out"), 1U);
-  EXPECT_FALSE(json_of("all.json")["results"].contains("kept_pictures"));
+  EXPECT_FALSE(json_of("all.json")["results"].contains("kept_images"));
   EXPECT_FALSE(json_of("pictures.json")["results"].contains("depth_images"));
 }
 

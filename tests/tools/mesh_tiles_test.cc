@@ -32,7 +32,7 @@ const Words mesh_of_terrain = {"mesh",        "terrain", "-o",          "surface
 
 void simulate_terrain() {
   ASSERT_TRUE(succeeded(graspmap({"simulate", "terrain", "--size", "3x2", "--spacing", "0.03",
-                                  "--piece", "1", "-o", "terrain"})));
+                                  "--tile-size", "1", "-o", "terrain"})));
 }
 
 std::size_t files_in(const std::string& folder) {
@@ -123,7 +123,7 @@ TEST(Pieces, OneModelPerPiece) {
   ASSERT_TRUE(succeeded(graspmap(texture)));
   EXPECT_EQ(files_in("model"), files_in("mesh"));
   const nlohmann::json results = json_of("model.json").at("results");
-  EXPECT_EQ(results.at("pieces"), files_in("mesh"));
+  EXPECT_EQ(results.at("tiles"), files_in("mesh"));
   EXPECT_EQ(json_of("model.json").at("inputs").size(), files_in("mesh") + 2);
   std::size_t triangles = 0;
   std::size_t pages = 0;

@@ -87,7 +87,7 @@ TEST(ExtractColmap, CamerasImagesAndPoints) {
         1e-9);
   }
   const auto manifest = json_of("out.json");
-  EXPECT_EQ(manifest["results"]["pictures"], 5);
+  EXPECT_EQ(manifest["results"]["images"], 5);
   EXPECT_EQ(manifest["results"]["points"], model.points.size());
   EXPECT_EQ(manifest["parameters"]["poses"], "odometry");
   ASSERT_TRUE(succeeded(graspmap({"convert", "scan.db", "--colmap", "again", "--transform",
@@ -160,8 +160,8 @@ TEST(ExtractColmap, BesideOthersAndInADryRun) {
   EXPECT_THAT(graspmap_test::names_in_scratch(), ElementsAre("scan.db"));
   ASSERT_TRUE(succeeded(
       graspmap({"convert", "scan.db", "-o", "all", "--bundler", "mesh", "--colmap", "model"})));
-  EXPECT_TRUE(json_of("mesh.json")["results"].contains("kept_pictures"));
-  EXPECT_FALSE(json_of("model.json")["results"].contains("kept_pictures"));
+  EXPECT_TRUE(json_of("mesh.json")["results"].contains("kept_images"));
+  EXPECT_FALSE(json_of("model.json")["results"].contains("kept_images"));
   EXPECT_FALSE(json_of("mesh.json")["results"].contains("points"));
   write_text(scratch("model/notes.txt"), "mine");
   EXPECT_TRUE(bad_input(graspmap({"convert", "scan.db", "--colmap", "model"}),

@@ -132,7 +132,7 @@ void write_small_camera() {
 }
 
 void write_ground() {
-  ASSERT_TRUE(succeeded(graspmap({"simulate", "terrain", "--size", "4x3", "--piece", "2",
+  ASSERT_TRUE(succeeded(graspmap({"simulate", "terrain", "--size", "4x3", "--tile-size", "2",
                                   "--spacing", "0.02", "-o", "ground"})));
   write_small_camera();
 }

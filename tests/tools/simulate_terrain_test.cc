@@ -15,7 +15,7 @@ using graspmap_test::succeeded;
 using Words = std::vector<std::string>;
 
 ProgramResult simulate(const std::string& output, Words more) {
-  Words words = {"simulate", "terrain", "--spacing", "0.05", "--piece", "1.5", "-o", output};
+  Words words = {"simulate", "terrain", "--spacing", "0.05", "--tile-size", "1.5", "-o", output};
   words.insert(words.end(), more.begin(), more.end());
   return graspmap(words);
 }
@@ -37,7 +37,7 @@ TEST(SimulateTerrain, PiecesAreTheSameWhateverTheSizeAndTheThreads) {
     }
   EXPECT_NE(content("a/piece_0_0.pcd"), content("other/piece_0_0.pcd"));
   EXPECT_EQ(json_of("a.json").at("results").at("points"), points);
-  EXPECT_EQ(json_of("a.json").at("results").at("pieces"), 6);
+  EXPECT_EQ(json_of("a.json").at("results").at("tiles"), 6);
 }
 
 TEST(SimulateTerrain, ASmallerTerrainTakesTheWholePlaceOfALargerOne) {

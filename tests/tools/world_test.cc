@@ -84,7 +84,7 @@ TEST(WorldCommand, TilesAreModels) {
     EXPECT_TRUE(files.contains(name)) << name;
   EXPECT_NE(files.at("world.sdf").find("<model name=\"x1\">"), std::string::npos);
   EXPECT_EQ(json_of("tiles.world.json")["results"]["models"], 2);
-  EXPECT_EQ(json_of("tiles.world.json")["results"]["left_out_cells"], 0);
+  EXPECT_EQ(json_of("tiles.world.json")["results"]["missing_cells"], 0);
 }
 
 TEST(WorldCommand, FramesAreNamed) {

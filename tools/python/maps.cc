@@ -149,7 +149,7 @@ py::dict evaluate(const py::dict& columns, const std::vector<std::string>& score
   py::dict areas;
   for (const libgtd::ColumnEvaluation& column : evaluation.columns)
     areas[column.name.c_str()] =
-        column.result.area ? py::cast(column.result.area->trapezoid) : py::none();
+        column.result.auc ? py::cast(column.result.auc->trapezoid) : py::none();
   py::dict made;
   made["areas"] = areas;
   made["summary_json"] = libgtd::to_json(evaluation);

@@ -27,7 +27,7 @@ namespace {
 using libgtd::StoredTile;
 using libgtd::TileNumber;
 
-constexpr std::size_t kept_pieces = 3;
+constexpr std::size_t kept_tiles = 3;
 // Margin for offset, tilt and uncertainty of a pose, in addition to twice the gripper's size.
 constexpr double extra_margin_m = 0.2;
 
@@ -137,7 +137,7 @@ class MapGrasping {
         ground_(ground),
         mesh_from_map_(map_from_input(map_.index().manifest).inverse()),
         store_(is_store() ? input.output : input.output + ".progress") {
-    carry_facts(map_.index().manifest, run);
+    copy_missing_entries(map_.index().manifest, run);
     in_file(input.map_file, [&] { require_usable(); });
     if (!map_.has_manifest())
       run.warn(input.map_file +
@@ -169,10 +169,10 @@ class MapGrasping {
       if (points.find_field("grasp_trials") != nullptr)
         throw libmap::Error("the map already has this field", {.field = "grasp_trials"});
       voxels += points.size();
-      for (const auto& [piece, members] : by_piece(points))
+      for (const auto& [mesh_tile, members] : by_mesh_tile(points))
         for (const std::size_t voxel : members)
           on_mesh +=
-              ground_.piece(piece)
+              ground_.mesh_tile(mesh_tile)
                       .ground
                       .distance(mesh_from_map_ * points.positions[voxel], options_.max_distance_m)
                       .has_value()
@@ -234,7 +234,8 @@ class MapGrasping {
   }
 
   // Indices of the points on each tile of the ground.
-  std::map<std::size_t, std::vector<std::size_t>> by_piece(const libmap::PointCloud& points) const {
+  std::map<std::size_t, std::vector<std::size_t>> by_mesh_tile(
+      const libmap::PointCloud& points) const {
     std::map<std::size_t, std::vector<std::size_t>> members;
     for (std::size_t n = 0; n < points.size(); ++n)
       members[ground_.tile_at(mesh_from_map_ * points.positions[n])].push_back(n);
@@ -243,7 +244,7 @@ class MapGrasping {
 
   // Returns one entry per member: its position if it is a candidate, else nullopt.
   std::vector<std::optional<Eigen::Vector3d>> candidates_of(
-      const GroundTiles::Piece& piece, const libmap::PointCloud& points,
+      const GroundTiles::MeshTile& mesh_tile, const libmap::PointCloud& points,
       const std::vector<std::size_t>& members) const {
     std::vector<std::optional<Eigen::Vector3d>> candidates(members.size());
     constexpr std::size_t grain = 256;
@@ -251,9 +252,9 @@ class MapGrasping {
       const Eigen::Vector3d position = mesh_from_map_ * points.positions[members[n]];
       // The filter is valid only for approach from above.
       if (options_.approach == libgtd::ApproachDirection::up &&
-          !piece.from_above.may_hold(position))
+          !mesh_tile.from_above.may_hold(position))
         return;
-      if (piece.ground.distance(position, options_.max_distance_m)) candidates[n] = position;
+      if (mesh_tile.ground.distance(position, options_.max_distance_m)) candidates[n] = position;
     });
     return candidates;
   }
@@ -263,14 +264,15 @@ class MapGrasping {
     points.fields.reserve(points.fields.size() + field_count);
     for (std::size_t field = 0; field < field_count; ++field)
       fields[field] = &points.add_field(grasp_fields()[field], libmap::ScalarType::float32).values;
-    for (const auto& [number, members] : by_piece(points)) {
-      const GroundTiles::Piece& piece = ground_.piece(number);
-      const auto candidates = candidates_of(piece, points, members);
+    for (const auto& [number, members] : by_mesh_tile(points)) {
+      const GroundTiles::MeshTile& mesh_tile = ground_.mesh_tile(number);
+      const auto candidates = candidates_of(mesh_tile, points, members);
       std::vector<Eigen::Vector3d> positions;
       for (const auto& candidate : candidates)
         if (candidate) positions.push_back(*candidate);
       steps.advance(members.size() - positions.size());
-      const auto results = libgtd::test_grasps(piece.ground, gripper_, positions, options_, steps);
+      const auto results =
+          libgtd::test_grasps(mesh_tile.ground, gripper_, positions, options_, steps);
       auto next = results.begin();
       for (std::size_t n = 0; n < members.size(); ++n) {
         const Values values = candidates[n] ? values_of(*next++) : no_candidate;
@@ -341,10 +343,13 @@ class MapGrasping {
 
 }  // namespace
 
-GroundTiles::Kept::Kept(std::size_t of, libmap::TriangleMesh around, const GroundTiles& pieces)
-    : Piece{.mesh = std::move(around),
-            .ground = pieces.make_ground_(mesh),
-            .from_above = {mesh, pieces.gripper_, {.start_height_m = pieces.start_height_m_}}},
+GroundTiles::Kept::Kept(std::size_t of, libmap::TriangleMesh around,
+                        const GroundTiles& ground_tiles)
+    : MeshTile{.mesh = std::move(around),
+               .ground = ground_tiles.make_ground_(mesh),
+               .from_above = {mesh,
+                              ground_tiles.gripper_,
+                              {.start_height_m = ground_tiles.start_height_m_}}},
       number(of) {}
 
 GroundTiles::GroundTiles(const std::string& mesh, const libgtd::Gripper& gripper,
@@ -374,14 +379,14 @@ std::size_t GroundTiles::tile_at(const Eigen::Vector3d& position) const {
   return best;
 }
 
-const GroundTiles::Piece& GroundTiles::piece(std::size_t number) {
+const GroundTiles::MeshTile& GroundTiles::mesh_tile(std::size_t number) {
   const auto found = std::find_if(kept_.begin(), kept_.end(),
                                   [&](const Kept& one) { return one.number == number; });
   if (found != kept_.end()) {
     kept_.splice(kept_.begin(), kept_, found);
     return kept_.front();
   }
-  if (kept_.size() == kept_pieces) kept_.pop_back();
+  if (kept_.size() == kept_tiles) kept_.pop_back();
   kept_.emplace_front(
       number,
       index_ ? index_->with_margin(number, margin_m_).mesh : libmap::read_mesh(files_.front()).mesh,

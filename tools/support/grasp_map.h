@@ -24,7 +24,7 @@ namespace graspmap_tools {
 class GroundTiles {
  public:
   // Mesh of one tile and of the surroundings within reach of a gripper.
-  struct Piece {
+  struct MeshTile {
     const libmap::TriangleMesh mesh;
     const libgtd::Ground ground;  // ground of `mesh`
     const libgtd::GripCandidates from_above;
@@ -40,11 +40,11 @@ class GroundTiles {
   std::size_t tile_at(const Eigen::Vector3d& position) const;
 
   // Returns the tile with this index; the reference is valid until two other tiles are requested.
-  const Piece& piece(std::size_t number);
+  const MeshTile& mesh_tile(std::size_t number);
 
  private:
-  struct Kept : Piece {
-    Kept(std::size_t of, libmap::TriangleMesh around, const GroundTiles& pieces);
+  struct Kept : MeshTile {
+    Kept(std::size_t of, libmap::TriangleMesh around, const GroundTiles& ground_tiles);
     std::size_t number = 0;
   };
 

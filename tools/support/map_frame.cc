@@ -61,7 +61,7 @@ void require_same_terrain_frame(const libmap::Manifest& points, const std::strin
                          .bound = "input, terrain or map"});
 }
 
-void carry_transform(const std::string& file, const char* name, Run& run) {
+void copy_transform(const std::string& file, const char* name, Run& run) {
   const auto manifest = manifest_of(file);
   const libmap::Pose* transform = manifest ? manifest->find_transform(name) : nullptr;
   if (transform != nullptr) run.manifest().transforms.emplace_back(name, *transform);
@@ -107,32 +107,32 @@ bool is_from_true_frame(const std::string& file) {
                       manifest->find_transform(truth_from_poses_name) != nullptr);
 }
 
-void carry_truth_transform(const std::string& input, Run& run) {
-  carry_transform(input, truth_from_poses_name, run);
+void copy_truth_transform(const std::string& input, Run& run) {
+  copy_transform(input, truth_from_poses_name, run);
 }
 
-void carry_terrain_transform(const std::string& map, Run& run) {
-  carry_transform(map, terrain_from_input_name, run);
+void copy_terrain_transform(const std::string& map, Run& run) {
+  copy_transform(map, terrain_from_input_name, run);
 }
 
-void carry_transforms(const std::string& input, Run& run) {
+void copy_transforms(const std::string& input, Run& run) {
   if (const auto site_from_map = site_from_map_of(input))
     run.manifest().transforms.emplace_back(site_from_map_name, *site_from_map);
-  carry_truth_transform(input, run);
-  carry_georeference(input, run);
+  copy_truth_transform(input, run);
+  copy_georeference(input, run);
 }
 
-void carry_georeference(const std::string& input, Run& run) {
+void copy_georeference(const std::string& input, Run& run) {
   if (const auto georeference = libmap::read_georeference(input))
     run.manifest().georeference = georeference;
 }
 
 void copy_frame(const std::string& input, Run& run) {
   if (const auto manifest = libmap::read_manifest_of(input)) run.manifest().frame = manifest->frame;
-  carry_transforms(input, run);
+  copy_transforms(input, run);
 }
 
-void carry_facts(const libmap::Manifest& source, Run& run) {
+void copy_missing_entries(const libmap::Manifest& source, Run& run) {
   const auto carry = [](const auto& facts, auto& own) {
     for (const auto& fact : facts)
       if (std::none_of(own.begin(), own.end(),

@@ -50,19 +50,19 @@ bool is_from_true_frame(const std::string& file);
 
 // Copies site_from_map, ground_truth_from_poses and georeference from the manifest of `input` to
 // the run's, for an output in the same frame.
-void carry_transforms(const std::string& input, Run& run);
-// As carry_transforms, and copies the frame's name.
+void copy_transforms(const std::string& input, Run& run);
+// As copy_transforms, and copies the frame's name.
 void copy_frame(const std::string& input, Run& run);
 // For a map made from a map: copies frame, transforms, georeference, and the parameters and results
 // that the run's manifest does not have, such as zero plane, lattice and method.
-void carry_facts(const libmap::Manifest& source, Run& run);
+void copy_missing_entries(const libmap::Manifest& source, Run& run);
 // Copy one of these only; the georeference of a DEM (.tif) is read from the file itself.
-void carry_truth_transform(const std::string& input, Run& run);
-void carry_georeference(const std::string& input, Run& run);
+void copy_truth_transform(const std::string& input, Run& run);
+void copy_georeference(const std::string& input, Run& run);
 
 // Copies terrain_from_input from the map's manifest to the run's, for an output in the terrain
 // frame of `map`.
-void carry_terrain_transform(const std::string& map, Run& run);
+void copy_terrain_transform(const std::string& map, Run& run);
 
 // Returns the transform from the frame of listed points to the frame of the points in `map`, from
 // the manifest of `map`; the identity, with a warning, without a manifest. Throws Error if

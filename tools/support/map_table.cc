@@ -86,9 +86,10 @@ std::string percent(std::optional<double> value) {
 
 void info(const libgtd::SummarizedMap& map, Run& run) {
   const libgtd::MapSummary& summary = map.summary;
-  std::string text = fmt::format("{}: {} of the voxels reach {}", map.name,
-                                 percent(libgtd::Rate{summary.reached, summary.evaluated}.value()),
-                                 libmap::to_text(map.cutoff));
+  std::string text =
+      fmt::format("{}: {} of the voxels reach {}", map.name,
+                  percent(libgtd::Rate{summary.reaching_cutoff, summary.evaluated}.value()),
+                  libmap::to_text(map.cutoff));
   if (map.expected) {
     const libgtd::Confusion& counts = map.expected->voxels_by_score;
     text += fmt::format("; sensitivity {}, specificity {}",

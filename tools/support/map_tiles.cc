@@ -154,7 +154,7 @@ void merge_store(const std::string& store, const std::string& output, const Merg
                         {.file = output, .field = "--encoding"});
   const MapTiles tiles(store);
   const libgtd::TileStoreIndex& index = tiles.index();
-  libgtd::copy_common_facts(index.manifest, run.manifest());
+  libgtd::copy_common_entries(index.manifest, run.manifest());
   run.manifest().inputs = index.manifest.inputs;
   run.add_input(store_index_path(store));
   run.add_results({{"scored_voxels", index.voxels()},
@@ -220,7 +220,7 @@ void merge_tiles(const std::vector<std::string>& tiles, const std::string& outpu
   for (const std::string& tile : tiles) parts.push_back(libmap::read_cloud(tile).cloud);
   libmap::PointCloud whole = joined(parts, tiles.front());
   restore_full_precision(manifests.front(), whole);
-  libgtd::copy_common_facts(manifests.front(), run.manifest());
+  libgtd::copy_common_entries(manifests.front(), run.manifest());
   // The inputs are those of the shares, then the shares.
   run.manifest().inputs = manifests.front().inputs;
   for (const std::string& tile : tiles) run.add_input(tile);

@@ -18,13 +18,13 @@ std::vector<std::string> split_texts(std::string_view text) {
   }
 }
 
-std::vector<std::string> split_texts(std::string_view text, std::size_t most,
+std::vector<std::string> split_texts(std::string_view text, std::size_t max_count,
                                      const std::string& reason, const std::string& field) {
   std::vector<std::string> texts = split_texts(text);
-  if (texts.size() <= most) return texts;
+  if (texts.size() <= max_count) return texts;
   throw libmap::Error(reason, {.field = field,
                                .value = std::to_string(texts.size()),
-                               .bound = "<= " + std::to_string(most)});
+                               .bound = "<= " + std::to_string(max_count)});
 }
 
 std::optional<std::vector<double>> split_numbers(std::string_view text, std::size_t count) {

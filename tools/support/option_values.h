@@ -11,8 +11,8 @@ namespace graspmap_tools {
 
 // Splits at '|': "a| b||c" -> a, b, "", c; returns nothing for an empty text.
 std::vector<std::string> split_texts(std::string_view text);
-// Splits at '|'. Throws Error with `reason` and `field` if there are more than `most` texts.
-std::vector<std::string> split_texts(std::string_view text, std::size_t most,
+// Splits at '|'. Throws Error with `reason` and `field` if there are more than `max_count` texts.
+std::vector<std::string> split_texts(std::string_view text, std::size_t max_count,
                                      const std::string& reason, const std::string& field);
 
 // Parses `count` finite numbers, separated by commas; returns nullopt for any other text.

@@ -29,12 +29,9 @@ Json array_of(const Items& items, const JsonOf& json_of) {
 // Numbers of pairs of frames without a link by reason, with the names of both kinds of report.
 std::vector<std::pair<const char*, std::size_t>> rejections_of(
     const libmap::RejectionCounts& counts) {
-  return {{"too_few_matches", counts.too_few_matches},
-          {"too_few_inliers", counts.too_few_inliers},
-          {"narrow", counts.narrow},
-          {"not_converged", counts.not_converged},
-          {"against_graph", counts.against_graph},
-          {"unconfirmed", counts.unconfirmed}};
+  return {{"too_few_matches", counts.too_few_matches}, {"too_few_inliers", counts.too_few_inliers},
+          {"degenerate", counts.degenerate},           {"not_converged", counts.not_converged},
+          {"against_graph", counts.against_graph},     {"unconfirmed", counts.unconfirmed}};
 }
 
 Json rejections_json(const libmap::RejectionCounts& counts) {
@@ -165,8 +162,8 @@ std::string refinement_json(const std::string& scan, const libmap::RefinementRes
     return {{"node", loss.node},
             {"key_frame", loss.key_frame},
             {"reason", loss.reason},
-            {"found_node", loss.found_node},
-            {"found_at", loss.found_at}};
+            {"found_node", loss.relocalized_node},
+            {"found_at", loss.relocalized_at}};
   });
   const Json skipped = array_of(result.skipped, [](const auto& frame) -> Json {
     return {{"node", frame.first}, {"reason", frame.second.what()}};

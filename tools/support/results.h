@@ -28,23 +28,23 @@ void print_json(const nlohmann::ordered_json& json);
 
 // Converts the results of a tile that are merged over tiles (Merge) to JSON, and back.
 template <typename Result>
-nlohmann::json facts_of(const Result& result) {
-  nlohmann::json facts;
+nlohmann::json tile_json_of(const Result& result) {
+  nlohmann::json data;
   const libmap::ResultTable table = libmap::described(result);
   for (const libmap::TileField& field : table.tile_fields())
-    facts[field.key] = to_json(field.value());
-  return facts;
+    data[field.key] = to_json(field.value());
+  return data;
 }
 
 template <typename Result>
-Result result_of(const nlohmann::json& facts) {
+Result result_of(const nlohmann::json& data) {
   Result result;
   const libmap::ResultTable table = libmap::described(result);
   for (const libmap::TileField& field : table.tile_fields()) {
     if (std::holds_alternative<double>(field.value()))
-      field.set(facts.at(field.key).get<double>());
+      field.set(data.at(field.key).get<double>());
     else
-      field.set(facts.at(field.key).get<std::int64_t>());
+      field.set(data.at(field.key).get<std::int64_t>());
   }
   return result;
 }

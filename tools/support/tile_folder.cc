@@ -8,7 +8,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-TileFolder::TileData parse_facts(const std::string& text, const fs::path& file) {
+TileFolder::TileData parse_tile_data(const std::string& text, const fs::path& file) {
   try {
     return libmap::parse_json<TileFolder::TileData>(text);
   } catch (const nlohmann::json::exception& error) {
@@ -58,7 +58,7 @@ TileFolder::TileFolder(const std::string& output, const std::vector<std::string>
 std::optional<TileFolder::TileData> TileFolder::earlier_plan() const {
   const auto text = run_.options().force ? std::nullopt : store_.plan_text();
   if (!text) return std::nullopt;
-  TileData plan = parse_facts(*text, store_.plan_path());
+  TileData plan = parse_tile_data(*text, store_.plan_path());
   if (plan.at("key") == key_) return plan;
   if (share_.count == 1) return std::nullopt;
   throw libmap::Error(
@@ -67,14 +67,14 @@ std::optional<TileFolder::TileData> TileFolder::earlier_plan() const {
       {.file = store_.folder().string()});
 }
 
-bool TileFolder::is_put_together() const {
+bool TileFolder::is_assembled() const {
   if (share_.count == 1 || !fs::is_directory(output_)) return false;
   const auto manifest = libmap::read_manifest_of(output_);
   return manifest && libmap::key_of(*manifest) == key_;
 }
 
 bool TileFolder::is_complete() const {
-  if (!is_put_together()) return false;
+  if (!is_assembled()) return false;
   run_.info("all tiles are complete");
   return true;
 }
@@ -110,17 +110,17 @@ void TileFolder::check_plan(const std::function<TileData()>& find) {
 void TileFolder::find_done() {
   done_.clear();
   store_.each_line([this](const std::string& text, const libmap::TileStore::Line& line) {
-    const TileData facts = TileData::parse(text, nullptr, false);
-    if (facts.is_object() && facts.value("key", TileData()) == key_ && facts.contains("tile"))
-      done_[json_text(facts.at("tile"))] = line;
+    const TileData data = TileData::parse(text, nullptr, false);
+    if (data.is_object() && data.value("key", TileData()) == key_ && data.contains("tile"))
+      done_[json_text(data.at("tile"))] = line;
   });
 }
 
 bool TileFolder::is_done(const std::string& tile) const { return done_.contains(json_text(tile)); }
 
-TileFolder::TileData TileFolder::facts(const std::string& tile) const {
+TileFolder::TileData TileFolder::tile_data(const std::string& tile) const {
   const libmap::TileStore::Line& line = done_.at(json_text(tile));
-  return parse_facts(libmap::TileStore::read_line(line), line.journal);
+  return parse_tile_data(libmap::TileStore::read_line(line), line.journal);
 }
 
 void TileFolder::make(const Work& work) {
@@ -141,11 +141,11 @@ void TileFolder::make_missing(const Work& work) {
   run_.progress().begin("tiles", missing.size());
   for (const std::size_t n : missing) {
     libmap::OutputFile tile(file(work.tiles[n], work.extension));
-    TileData facts = work.make(n, tile.temporary_path());
+    TileData data = work.make(n, tile.temporary_path());
     if (fs::file_size(tile.temporary_path()) > 0) tile.commit();
-    facts["key"] = key_;
-    facts["tile"] = work.tiles[n];
-    journal_->add({json_text(facts)});
+    data["key"] = key_;
+    data["tile"] = work.tiles[n];
+    journal_->add({json_text(data)});
     run_.progress().advance(1);
   }
   run_.progress().end();
@@ -157,7 +157,7 @@ void TileFolder::assemble(const Work& work) {
       std::count_if(work.tiles.begin(), work.tiles.end(),
                     [this](const std::string& tile) { return is_done(tile); }));
   // Another share may have been the last one too and may have removed the store.
-  if (done < work.tiles.size() && !is_put_together())
+  if (done < work.tiles.size() && !is_assembled())
     return run_.info("{} of {} tiles are complete", done, work.tiles.size());
   if (share_.count > 1) {
     try {
@@ -167,7 +167,7 @@ void TileFolder::assemble(const Work& work) {
       return run_.info("another share completes the folder");
     }
   }
-  if (!is_put_together()) run_.write_output_tree(output_, names_, work.finish);
+  if (!is_assembled()) run_.write_output_tree(output_, names_, work.finish);
   remove_store();
 }
 

@@ -78,7 +78,7 @@ class TileFolder {
   void make(const Work& work);
 
   // Data and file of a finished tile, for Work::finish.
-  TileData facts(const std::string& tile) const;
+  TileData tile_data(const std::string& tile) const;
   std::filesystem::path file(const std::string& tile, const std::string& extension) const {
     return store_.tiles() / (tile + extension);
   }
@@ -92,7 +92,7 @@ class TileFolder {
   void check_plan(const std::function<TileData()>& find);
   void find_done();
   bool is_done(const std::string& tile) const;
-  bool is_put_together() const;
+  bool is_assembled() const;
   void make_missing(const Work& work);
   void assemble(const Work& work);
   void remove_store() const;

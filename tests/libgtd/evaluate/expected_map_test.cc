@@ -62,10 +62,10 @@ TEST(ExpectedMap, CountsByHand) {
   EXPECT_EQ(result.unlisted_voxels, 2U);
   EXPECT_DOUBLE_EQ(*libgtd::youden_index(result.voxels_by_score), 2.0 / 3.0 + 0.5 - 1.0);
   // Pairs of a positive and a negative: 0.9, 0.79, 0.8 against 0.1, 0.85.
-  EXPECT_DOUBLE_EQ(result.area->trapezoid, 4.0 / 6.0);
+  EXPECT_DOUBLE_EQ(result.auc->trapezoid, 4.0 / 6.0);
   ASSERT_EQ(result.regions.size(), 3U);
   EXPECT_EQ(result.regions[0].voxels, 3U);
-  EXPECT_EQ(result.regions[0].reached, 2U);
+  EXPECT_EQ(result.regions[0].reaching_cutoff, 2U);
   EXPECT_EQ(result.regions[0].graspable, 1U);
   EXPECT_DOUBLE_EQ(*result.regions[0].median_score, 0.8);
   EXPECT_DOUBLE_EQ(*result.regions[1].mean_score, 0.475);
@@ -116,9 +116,9 @@ TEST(ExpectedMap, AgreesWithASlowOracle) {
       ++undecided;
       continue;
     }
-    const bool reached = scores[n] >= 0.6;
-    if (in(0) || in(1)) ++(reached ? counts.true_positives : counts.false_negatives);
-    if (in(2)) ++(reached ? counts.false_positives : counts.true_negatives);
+    const bool reaching_cutoff = scores[n] >= 0.6;
+    if (in(0) || in(1)) ++(reaching_cutoff ? counts.true_positives : counts.false_negatives);
+    if (in(2)) ++(reaching_cutoff ? counts.false_positives : counts.true_negatives);
   }
   const ExpectedMapResult result =
       evaluate_expected_map(map_of(positions, scores, flags), expected, 0.6);
@@ -244,16 +244,16 @@ TEST(MapSummary, CountsByHand) {
   map.add_field("i", libmap::ScalarType::int32).values = {0, 1, 2, 3, 4};
   map.add_field("j", libmap::ScalarType::int32).values = {0, 0, 0, 0, 0};
   map.add_field("k", libmap::ScalarType::int32).values = {0, 0, 0, 0, -10};
-  libgtd::MapInfo facts;
-  facts.zero_plane_m = 0.0;
+  libgtd::MapInfo info;
+  info.zero_plane_m = 0.0;
   const auto summary =
-      libgtd::summarize_map(map, libgtd::voxel_map_of(map, facts),
+      libgtd::summarize_map(map, libgtd::voxel_map_of(map, info),
                             {.graspability_threshold = 0.8, .solid_voxel_threshold = 120.0});
   EXPECT_EQ(summary.voxels, 5U);
   EXPECT_EQ(summary.evaluated, 3U);  // one at the edge, one below the zero plane
-  EXPECT_EQ(summary.reached, 2U);
+  EXPECT_EQ(summary.reaching_cutoff, 2U);
   EXPECT_EQ(summary.graspable, 1U);
-  EXPECT_EQ(*summary.few_solid, 2U);
+  EXPECT_EQ(*summary.below_solid_threshold, 2U);
   ASSERT_EQ(summary.scores.size(), libgtd::summary_quantiles.size());
   EXPECT_NEAR(summary.scores[0], 0.1, 1e-6);
   EXPECT_NEAR(summary.scores[2], 0.85, 1e-6);

@@ -60,15 +60,15 @@ TEST(VoxelMap, LatticeFromIndicesOrFromPlaces) {
       Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, 3).normalized()));
   const PointCloud turned = libmap::transform_cloud(graded_floor(), terrain_from_map.inverse());
   for (const bool known : {true, false}) {
-    MapInfo facts{.terrain_from_map = terrain_from_map};
-    if (known) facts.lattice = lattice;
-    EXPECT_EQ(libgtd::voxel_map_of(turned, facts).voxels, fitted.voxels);
+    MapInfo info{.terrain_from_map = terrain_from_map};
+    if (known) info.lattice = lattice;
+    EXPECT_EQ(libgtd::voxel_map_of(turned, info).voxels, fitted.voxels);
   }
 }
 
 TEST(VoxelMap, HostileMapsAreSaid) {
-  const auto field_of = [](PointCloud cloud, const MapInfo& facts = {}) {
-    return error_of([&] { libgtd::voxel_map_of(cloud, facts); }).context().field;
+  const auto field_of = [](PointCloud cloud, const MapInfo& info = {}) {
+    return error_of([&] { libgtd::voxel_map_of(cloud, info); }).context().field;
   };
   PointCloud plain;
   plain.positions.assign(3, Eigen::Vector3d::Zero());
@@ -129,9 +129,9 @@ TEST(VoxelMap, LatticesThatAreNotFinite) {
     manifest.results = {{"lattice_origin_m", origin}};
     EXPECT_TRUE(is_error(error_of([&] { libgtd::map_info(manifest); }),
                          {.field = "lattice_origin_m or voxel_size_m"}));
-    MapInfo facts;
-    facts.lattice = libgtd::VoxelLattice{{origin[0], origin[1], origin[2]}, 0.01};
-    EXPECT_TRUE(is_error(error_of([&] { libgtd::voxel_map_of(map, facts); }),
+    MapInfo info;
+    info.lattice = libgtd::VoxelLattice{{origin[0], origin[1], origin[2]}, 0.01};
+    EXPECT_TRUE(is_error(error_of([&] { libgtd::voxel_map_of(map, info); }),
                          {.field = "distance of point 1 from a voxel center"}));
   }
 }
@@ -177,17 +177,17 @@ TEST(MapAnalysis, CountsAndAreasByHand) {
   EXPECT_EQ(result.ground.voxels, 1900U);
   EXPECT_EQ(result.ground.graspable_voxels, 19U * 19U);
   EXPECT_NEAR(result.ground.area_m2, 0.19, 1e-7);
-  EXPECT_NEAR(*result.ground.graspable_share(), 0.19, 1e-6);
+  EXPECT_NEAR(*result.ground.graspable_fraction(), 0.19, 1e-6);
   EXPECT_NEAR(*result.ground.mean_score(), 0.5, 1e-6);
   EXPECT_EQ(result.columns, 1900U);
   EXPECT_EQ(result.graspable_columns, 361U);
   EXPECT_NEAR(result.plan_area_m2, 0.19, 1e-7);
   EXPECT_EQ(result.column_coverage, 1.0);
-  ASSERT_EQ(result.classes.size(), libmap::score_classes.size());
-  EXPECT_EQ(result.classes[0].all, 200U);
-  EXPECT_EQ(result.classes[0].evaluated, 190U);
-  EXPECT_EQ(result.classes[0].graspable, 171U);
-  EXPECT_EQ(result.classes[6].all, 800U);
+  ASSERT_EQ(result.score_classes.size(), libmap::score_classes.size());
+  EXPECT_EQ(result.score_classes[0].all, 200U);
+  EXPECT_EQ(result.score_classes[0].evaluated, 190U);
+  EXPECT_EQ(result.score_classes[0].graspable, 171U);
+  EXPECT_EQ(result.score_classes[6].all, 800U);
   ASSERT_EQ(result.score_bins.size(), 20U);
   for (const ScoreBin& bin : result.score_bins) EXPECT_EQ(bin.all, 100U);
   ASSERT_EQ(result.by_height.size(), 1U);
@@ -207,7 +207,7 @@ TEST(MapAnalysis, BoundsOfClassesAndScoresOutsideZeroToOne) {
   // Single precision stores 0.9, 0.8, 0.6 and 0.4 with rounding errors; the classes do not change.
   const std::vector<std::size_t> expected = {3, 1, 1, 1, 1, 1, 2};
   for (std::size_t n = 0; n < expected.size(); ++n)
-    EXPECT_EQ(result.classes[n].all, expected[n]) << n;
+    EXPECT_EQ(result.score_classes[n].all, expected[n]) << n;
   ASSERT_EQ(result.score_bins.size(), 13U);
   EXPECT_NEAR(result.score_bins.front().low, -0.3, 1e-12);
   EXPECT_EQ(result.score_bins.front().all, 1U);
@@ -233,7 +233,7 @@ TEST(MapAnalysis, ZeroPlaneHeightsAndGaps) {
   EXPECT_EQ(result.by_height[0].voxels, 60U);
   EXPECT_EQ(result.by_height[2].voxels, 20U);
   EXPECT_EQ(result.by_height[2].graspable_voxels, 20U);
-  EXPECT_NEAR(*result.by_height[1].graspable_share(), 1.0 / 3.0, 1e-6);
+  EXPECT_NEAR(*result.by_height[1].graspable_fraction(), 1.0 / 3.0, 1e-6);
 }
 
 TEST(MapAnalysis, BinsOutOfBounds) {

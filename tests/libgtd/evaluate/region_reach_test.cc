@@ -40,12 +40,12 @@ VoxelMap map_of(const std::vector<Patch>& patches) {
   return libgtd::voxel_map_of(map_cloud(listed, [](const Voxel&) { return 0.9; }));
 }
 
-VoxelMap random_map(int size, double share) {
+VoxelMap random_map(int size, double fraction) {
   std::vector<Voxel> voxels;
   for (int i = 0; i < size; ++i)
     for (int j = 0; j < size; ++j) voxels.push_back({i, j, static_cast<int>(uniform(0.0, 4.0))});
   return libgtd::voxel_map_of(
-      map_cloud(voxels, [&](const Voxel&) { return uniform(0.0, 1.0) < share ? 0.9 : 0.3; }));
+      map_cloud(voxels, [&](const Voxel&) { return uniform(0.0, 1.0) < fraction ? 0.9 : 0.3; }));
 }
 
 TEST(MapRegions, MeasuresByHand) {
@@ -61,7 +61,7 @@ TEST(MapRegions, MeasuresByHand) {
   EXPECT_NEAR(largest.best_score, 0.9, 1e-6);
   EXPECT_EQ(result.region_of_voxel[0], 0);
   EXPECT_EQ(result.region_of_voxel[9], 1);
-  EXPECT_EQ(libgtd::find_regions(map, level_surface(map), {.min_voxels = 5}).left_out_voxels, 4U);
+  EXPECT_EQ(libgtd::find_regions(map, level_surface(map), {.min_voxels = 5}).skipped_voxels, 4U);
 }
 
 TEST(MapRegions, VoxelsAboveEachOtherTouch) {
@@ -196,8 +196,8 @@ SlowReach slow_reach(const VoxelMap& map, const MapRegionResult& regions) {
 }
 
 TEST(RegionReach, IsThatOfTheDefinition) {
-  for (const double share : {0.005, 0.03}) {
-    const VoxelMap map = random_map(60, share);
+  for (const double fraction : {0.005, 0.03}) {
+    const VoxelMap map = random_map(60, fraction);
     const MapRegionResult regions = libgtd::find_regions(map, level_surface(map));
     const std::size_t count = regions.regions.size();
     ASSERT_GT(count, 8U);

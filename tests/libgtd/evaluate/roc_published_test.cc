@@ -83,24 +83,23 @@ TEST(RocPublished, EveryRowOfTheRocTables) {
     EXPECT_EQ(std::to_string(counts.predicted_negatives()), cell("predicted_negatives"));
     EXPECT_EQ(rounded(counts.true_positive_rate().value(), 2), cell("true_positive_rate"));
     EXPECT_EQ(rounded(counts.false_positive_rate().value(), 2), cell("false_positive_rate"));
-    EXPECT_EQ(rounded(result.area->upper_sum_shares[k], 2), cell("auc_share"));
+    EXPECT_EQ(rounded(result.auc->upper_sum_terms[k], 2), cell("auc_share"));
   }
 }
 
 TEST(RocPublished, ThePublishedAreaIsTheUpperSumAndNotTheTrapezoid) {
   GRASPMAP_REQUIRE_DATA();
   const Table field = published("field_test_scenario4.csv");
-  const std::vector<std::array<std::string, 3>> areas = {
-      {"prescan", "0.84", "0.745"},
-      {"realtime_raw", "0.75", "0.642"},
-      {"realtime_interpolated", "0.72", "0.650"}};
-  for (const auto& [name, upper_sum, trapezoid] : areas) {
+  const std::vector<std::array<std::string, 3>> aucs = {{"prescan", "0.84", "0.745"},
+                                                        {"realtime_raw", "0.75", "0.642"},
+                                                        {"realtime_interpolated", "0.72", "0.650"}};
+  for (const auto& [name, upper_sum, trapezoid] : aucs) {
     const RocResult result = evaluate(field, "graspable", name, 0.8);
-    EXPECT_EQ(rounded(result.area->upper_sum, 2), upper_sum) << name;
-    EXPECT_EQ(rounded(result.area->trapezoid, 3), trapezoid) << name;
-    EXPECT_EQ(result.area->upper_sum_width, 1.0) << name;
-    EXPECT_LT(result.area->trapezoid_bootstrap_95->low, result.area->trapezoid) << name;
-    EXPECT_GT(result.area->trapezoid_bootstrap_95->high, result.area->trapezoid) << name;
+    EXPECT_EQ(rounded(result.auc->upper_sum, 2), upper_sum) << name;
+    EXPECT_EQ(rounded(result.auc->trapezoid, 3), trapezoid) << name;
+    EXPECT_EQ(result.auc->upper_sum_width, 1.0) << name;
+    EXPECT_LT(result.auc->trapezoid_bootstrap_95->low, result.auc->trapezoid) << name;
+    EXPECT_GT(result.auc->trapezoid_bootstrap_95->high, result.auc->trapezoid) << name;
   }
 }
 

@@ -58,10 +58,10 @@ TEST(RocTables, EvaluatesEachColumnOnItsOwnLocations) {
   const TableEvaluation evaluation = evaluate_small();
   ASSERT_EQ(evaluation.columns.size(), 2u);
   EXPECT_EQ(evaluation.columns[0].name, "map");
-  EXPECT_EQ(evaluation.columns[0].result.area->trapezoid, 3.5 / 4);
-  EXPECT_EQ(evaluation.columns[0].result.left_out_unlabeled, 1u);
-  EXPECT_EQ(evaluation.columns[1].result.left_out_unscored, 1u);
-  EXPECT_EQ(evaluation.columns[1].result.area->trapezoid, 0.25);
+  EXPECT_EQ(evaluation.columns[0].result.auc->trapezoid, 3.5 / 4);
+  EXPECT_EQ(evaluation.columns[0].result.without_label, 1u);
+  EXPECT_EQ(evaluation.columns[1].result.without_score, 1u);
+  EXPECT_EQ(evaluation.columns[1].result.auc->trapezoid, 0.25);
 }
 
 TEST(RocTables, RocTableHasTheCutoffsThenTheScores) {

@@ -53,7 +53,7 @@ Sample random_sample(std::size_t size, int levels) {
 }
 
 // Oracle: every pair of a positive and a negative.
-double pair_count_area(const Sample& sample) {
+double pair_count_auc(const Sample& sample) {
   double wins = 0, pairs = 0;
   for (std::size_t a = 0; a < sample.labels.size(); ++a) {
     for (std::size_t b = 0; b < sample.labels.size(); ++b) {
@@ -70,20 +70,20 @@ double pair_count_area(const Sample& sample) {
 
 // Trapezoids under the curve through `points` (ascending cutoffs) and the corner (0, 0).
 double trapezoids_under(const std::vector<RocPoint>& points) {
-  double area = 0;
+  double auc = 0;
   for (std::size_t k = 0; k < points.size(); ++k) {
     const double tpr = *points[k].counts.true_positive_rate().value();
     const double fpr = *points[k].counts.false_positive_rate().value();
     const bool last = k + 1 == points.size();
     const double next_tpr = last ? 0 : *points[k + 1].counts.true_positive_rate().value();
     const double next_fpr = last ? 0 : *points[k + 1].counts.false_positive_rate().value();
-    area += (fpr - next_fpr) * (tpr + next_tpr) / 2;
+    auc += (fpr - next_fpr) * (tpr + next_tpr) / 2;
   }
-  return area;
+  return auc;
 }
 
 double trapezoid_of(const Sample& sample) {
-  return evaluate_roc(sample.labels, sample.scores, without_bootstrap()).area.value().trapezoid;
+  return evaluate_roc(sample.labels, sample.scores, without_bootstrap()).auc.value().trapezoid;
 }
 
 TEST(Roc, CountsOfASmallExampleByHand) {
@@ -105,9 +105,9 @@ TEST(Roc, CountsOfASmallExampleByHand) {
   EXPECT_DOUBLE_EQ(*counts.false_negative_rate().value(), 1.0 / 3);
   EXPECT_DOUBLE_EQ(*counts.positive_predictive_value().value(), 2.0 / 3);
   EXPECT_DOUBLE_EQ(*counts.accuracy().value(), 0.6);
-  EXPECT_EQ(result.left_out_unscored, 1u);
+  EXPECT_EQ(result.without_score, 1u);
   // Pairs: 0.9 beats both; 0.4 beats 0.1 alone; 0.6 ties with 0.6 and beats 0.1: 4.5 of 6.
-  EXPECT_DOUBLE_EQ(result.area->trapezoid, 0.75);
+  EXPECT_DOUBLE_EQ(result.auc->trapezoid, 0.75);
   ASSERT_EQ(result.at_scores.size(), 4u);
   EXPECT_EQ(result.at_scores.front().cutoff, 0.1);
   EXPECT_EQ(result.at_scores.front().counts.predicted_negatives(), 0u);
@@ -140,7 +140,7 @@ TEST(Roc, NegativeScoresAndCutoffs) {
       evaluate_roc({true, true, false, false}, {single, -0.7, -0.700001, -infinity}, options);
   EXPECT_EQ(result.at_rate_cutoff.counts.true_positives, 2u);
   EXPECT_EQ(result.at_rate_cutoff.counts.false_positives, 0u);
-  EXPECT_EQ(result.area->trapezoid, 1.0);
+  EXPECT_EQ(result.auc->trapezoid, 1.0);
 }
 
 TEST(Roc, AScoreOfZeroReachesTheCutoffZero) {
@@ -156,8 +156,8 @@ TEST(Roc, TrapezoidEqualsThePairCount) {
     const auto size = static_cast<std::size_t>(graspmap_test::uniform(2, 120));
     const Sample sample = random_sample(size, round % 3 == 0 ? 1000000 : 1 + round % 10);
     const RocResult result = evaluate_roc(sample.labels, sample.scores, without_bootstrap());
-    EXPECT_NEAR(result.area->trapezoid, pair_count_area(sample), 1e-12);
-    EXPECT_NEAR(result.area->trapezoid, trapezoids_under(result.at_scores), 1e-12);
+    EXPECT_NEAR(result.auc->trapezoid, pair_count_auc(sample), 1e-12);
+    EXPECT_NEAR(result.auc->trapezoid, trapezoids_under(result.at_scores), 1e-12);
   }
 }
 
@@ -175,9 +175,9 @@ TEST(Roc, AreaIsUnchangedUnderStrictlyMonotoneMaps) {
     for (std::optional<double>& score : mapped)
       if (score) score = map(*score);
     const RocResult result = evaluate_roc(sample.labels, mapped, options);
-    EXPECT_EQ(result.area->trapezoid, plain.area->trapezoid);
-    EXPECT_EQ(result.area->trapezoid_bootstrap_95->low, plain.area->trapezoid_bootstrap_95->low);
-    EXPECT_EQ(result.area->trapezoid_bootstrap_95->high, plain.area->trapezoid_bootstrap_95->high);
+    EXPECT_EQ(result.auc->trapezoid, plain.auc->trapezoid);
+    EXPECT_EQ(result.auc->trapezoid_bootstrap_95->low, plain.auc->trapezoid_bootstrap_95->low);
+    EXPECT_EQ(result.auc->trapezoid_bootstrap_95->high, plain.auc->trapezoid_bootstrap_95->high);
     ASSERT_EQ(result.at_scores.size(), plain.at_scores.size());
   }
 }
@@ -200,9 +200,9 @@ TEST(Roc, OrderOfTheLocationsDoesNotMatter) {
   std::reverse(sample.labels.begin(), sample.labels.end());
   std::reverse(sample.scores.begin(), sample.scores.end());
   const RocResult after = evaluate_roc(sample.labels, sample.scores);
-  EXPECT_EQ(before.area->trapezoid, after.area->trapezoid);
-  EXPECT_EQ(before.area->upper_sum, after.area->upper_sum);
-  EXPECT_EQ(before.area->trapezoid_bootstrap_95->low, after.area->trapezoid_bootstrap_95->low);
+  EXPECT_EQ(before.auc->trapezoid, after.auc->trapezoid);
+  EXPECT_EQ(before.auc->upper_sum, after.auc->upper_sum);
+  EXPECT_EQ(before.auc->trapezoid_bootstrap_95->low, after.auc->trapezoid_bootstrap_95->low);
 }
 
 TEST(Roc, PerfectWorstAndEqualScores) {
@@ -223,17 +223,17 @@ TEST(Roc, UpperSumIsNeverBelowTheTrapezoidsOfItsCutoffs) {
                               &next = result.at_cutoffs[k + 1].counts;
       const double width =
           *here.false_positive_rate().value() - *next.false_positive_rate().value();
-      EXPECT_NEAR(result.area->upper_sum_shares[k], width * *here.true_positive_rate().value(),
+      EXPECT_NEAR(result.auc->upper_sum_terms[k], width * *here.true_positive_rate().value(),
                   1e-12);
       sum += width * *here.true_positive_rate().value();
       trapezoids +=
           width * (*here.true_positive_rate().value() + *next.true_positive_rate().value()) / 2;
     }
-    EXPECT_EQ(result.area->upper_sum_shares.back(), 0.0);
-    EXPECT_NEAR(result.area->upper_sum, sum, 1e-12);
-    EXPECT_GE(result.area->upper_sum, trapezoids - 1e-12);
-    if (result.area->upper_sum_width == 1.0) {
-      EXPECT_GE(result.area->upper_sum, result.area->trapezoid);
+    EXPECT_EQ(result.auc->upper_sum_terms.back(), 0.0);
+    EXPECT_NEAR(result.auc->upper_sum, sum, 1e-12);
+    EXPECT_GE(result.auc->upper_sum, trapezoids - 1e-12);
+    if (result.auc->upper_sum_width == 1.0) {
+      EXPECT_GE(result.auc->upper_sum, result.auc->trapezoid);
     }
   }
 }
@@ -242,27 +242,27 @@ TEST(Roc, UpperSumMissesNegativesOutsideItsCutoffs) {
   // A perfect score with negatives below the first cutoff, which the upper sum ignores.
   const RocResult result =
       evaluate_roc({true, true, false, false}, {0.9, 0.8, 0.05, 0.01}, without_bootstrap());
-  EXPECT_EQ(result.area->trapezoid, 1.0);
-  EXPECT_EQ(result.area->upper_sum, 0.0);
-  EXPECT_EQ(result.area->upper_sum_width, 0.0);
+  EXPECT_EQ(result.auc->trapezoid, 1.0);
+  EXPECT_EQ(result.auc->upper_sum, 0.0);
+  EXPECT_EQ(result.auc->upper_sum_width, 0.0);
 }
 
 TEST(Roc, OneClassAloneHasNoAreaAndSaysWhy) {
   const RocResult positive = evaluate_roc({true, true, true}, {0.1, 0.8, 0.9});
-  EXPECT_FALSE(positive.area.has_value());
-  EXPECT_EQ(positive.area_note,
+  EXPECT_FALSE(positive.auc.has_value());
+  EXPECT_EQ(positive.auc_note,
             "all 3 locations are labeled true: the area under the curve is not defined");
   EXPECT_FALSE(positive.at_rate_cutoff.counts.false_positive_rate().value().has_value());
   EXPECT_FALSE(positive.at_rate_cutoff.counts.true_negative_rate().wilson_95().has_value());
   EXPECT_DOUBLE_EQ(*positive.at_rate_cutoff.counts.true_positive_rate().value(), 2.0 / 3);
 
   const RocResult negative = evaluate_roc({true, false}, {std::nullopt, 0.9});
-  EXPECT_FALSE(negative.area.has_value());
-  EXPECT_THAT(negative.area_note, testing::HasSubstr("all 1 locations are labeled false"));
+  EXPECT_FALSE(negative.auc.has_value());
+  EXPECT_THAT(negative.auc_note, testing::HasSubstr("all 1 locations are labeled false"));
 
   const RocResult empty = evaluate_roc({}, {});
-  EXPECT_FALSE(empty.area.has_value());
-  EXPECT_THAT(empty.area_note, testing::HasSubstr("no location"));
+  EXPECT_FALSE(empty.auc.has_value());
+  EXPECT_THAT(empty.auc_note, testing::HasSubstr("no location"));
   EXPECT_TRUE(empty.at_scores.empty());
   EXPECT_FALSE(empty.at_rate_cutoff.counts.accuracy().value().has_value());
 }
@@ -271,10 +271,10 @@ TEST(Roc, LocationsWithoutLabelOrScoreAreLeftOutAndCounted) {
   const RocResult result =
       evaluate_roc({true, std::nullopt, false, std::nullopt, true, false},
                    {0.9, 0.9, 0.1, std::nullopt, nan_value, infinity}, without_bootstrap());
-  EXPECT_EQ(result.left_out_unscored, 2u);
-  EXPECT_EQ(result.left_out_unlabeled, 1u);
+  EXPECT_EQ(result.without_score, 2u);
+  EXPECT_EQ(result.without_label, 1u);
   EXPECT_EQ(result.at_rate_cutoff.counts.size(), 3u);
-  EXPECT_EQ(result.area->trapezoid, 0.5);
+  EXPECT_EQ(result.auc->trapezoid, 0.5);
 }
 
 TEST(Roc, WilsonIntervals) {
@@ -309,13 +309,13 @@ TEST(Roc, BootstrapIsTheSameAtAnyThreadCountAndDiffersWithTheSeed) {
   for (const unsigned threads : {1u, 2u, 7u, 0u}) {
     const libmap::ThreadLimit limit(threads);
     intervals.push_back(
-        *evaluate_roc(sample.labels, sample.scores, options).area->trapezoid_bootstrap_95);
+        *evaluate_roc(sample.labels, sample.scores, options).auc->trapezoid_bootstrap_95);
     EXPECT_EQ(intervals.back().low, intervals.front().low);
     EXPECT_EQ(intervals.back().high, intervals.front().high);
   }
   options.bootstrap_seed = 2;
   const auto other =
-      *evaluate_roc(sample.labels, sample.scores, options).area->trapezoid_bootstrap_95;
+      *evaluate_roc(sample.labels, sample.scores, options).auc->trapezoid_bootstrap_95;
   EXPECT_NE(other.low, intervals.front().low);
   EXPECT_NEAR(other.low, intervals.front().low, 0.02);
   EXPECT_NEAR(other.high, intervals.front().high, 0.02);
@@ -329,7 +329,7 @@ std::vector<double> slow_bootstrap(const Sample& sample, std::uint64_t replicate
     if (sample.scores[i]) (*sample.labels[i] ? positives : negatives).push_back(*sample.scores[i]);
   std::sort(positives.begin(), positives.end());
   std::sort(negatives.begin(), negatives.end());
-  std::vector<double> areas;
+  std::vector<double> aucs;
   for (std::uint32_t replicate = 0; replicate < replicates; ++replicate) {
     libmap::RandomStream random(seed, replicate);
     const auto draw = [&](const std::vector<double>& of) {
@@ -342,11 +342,11 @@ std::vector<double> slow_bootstrap(const Sample& sample, std::uint64_t replicate
     std::uint64_t twice = 0;
     for (const double p : drawn_positives)
       for (const double n : drawn_negatives) twice += p > n ? 2U : p == n ? 1U : 0U;
-    areas.push_back(static_cast<double>(twice) / (2.0 * static_cast<double>(positives.size()) *
-                                                  static_cast<double>(negatives.size())));
+    aucs.push_back(static_cast<double>(twice) / (2.0 * static_cast<double>(positives.size()) *
+                                                 static_cast<double>(negatives.size())));
   }
-  std::sort(areas.begin(), areas.end());
-  return areas;
+  std::sort(aucs.begin(), aucs.end());
+  return aucs;
 }
 
 TEST(Roc, BootstrapIsTheDefinitionToTheBit) {
@@ -358,10 +358,10 @@ TEST(Roc, BootstrapIsTheDefinitionToTheBit) {
     options.bootstrap_replicates = replicates;
     options.bootstrap_seed = 7;
     const auto interval =
-        *evaluate_roc(sample.labels, sample.scores, options).area->trapezoid_bootstrap_95;
-    const std::vector<double> areas = slow_bootstrap(sample, replicates, 7);
-    EXPECT_EQ(interval.low, areas[1]) << size;
-    EXPECT_EQ(interval.high, areas[39]) << size;
+        *evaluate_roc(sample.labels, sample.scores, options).auc->trapezoid_bootstrap_95;
+    const std::vector<double> aucs = slow_bootstrap(sample, replicates, 7);
+    EXPECT_EQ(interval.low, aucs[1]) << size;
+    EXPECT_EQ(interval.high, aucs[39]) << size;
   }
 }
 
@@ -373,13 +373,13 @@ TEST(Roc, BootstrapAgreesWithTheNormalApproximationOnManyLocations) {
     if (sample.scores[i]) (*sample.labels[i] ? positives : negatives).push_back(*sample.scores[i]);
   const double np = static_cast<double>(positives.size());
   const double nn = static_cast<double>(negatives.size());
-  const double area = trapezoid_of(sample);
-  const auto variance_of_means = [area](const auto& of, const auto& against, double sign) {
+  const double auc = trapezoid_of(sample);
+  const auto variance_of_means = [auc](const auto& of, const auto& against, double sign) {
     double sum = 0;
     for (const double a : of) {
       double wins = 0;
       for (const double b : against) wins += sign * (a - b) > 0 ? 1.0 : a == b ? 0.5 : 0.0;
-      const double deviation = wins / static_cast<double>(against.size()) - area;
+      const double deviation = wins / static_cast<double>(against.size()) - auc;
       sum += deviation * deviation;
     }
     return sum / static_cast<double>(of.size() - 1);
@@ -387,17 +387,17 @@ TEST(Roc, BootstrapAgreesWithTheNormalApproximationOnManyLocations) {
   const double error = std::sqrt(variance_of_means(positives, negatives, 1) / np +
                                  variance_of_means(negatives, positives, -1) / nn);
   const RocResult result = evaluate_roc(sample.labels, sample.scores);
-  const libgtd::Interval interval = *result.area->trapezoid_bootstrap_95;
-  EXPECT_NEAR(interval.low, area - 1.96 * error, 0.15 * error);
-  EXPECT_NEAR(interval.high, area + 1.96 * error, 0.15 * error);
+  const libgtd::Interval interval = *result.auc->trapezoid_bootstrap_95;
+  EXPECT_NEAR(interval.low, auc - 1.96 * error, 0.15 * error);
+  EXPECT_NEAR(interval.high, auc + 1.96 * error, 0.15 * error);
 }
 
 TEST(Roc, BootstrapOfOneLocationAClass) {
   const RocResult result = evaluate_roc({true, false}, {0.9, 0.1});
-  EXPECT_EQ(result.area->trapezoid_bootstrap_95->low, 1.0);
-  EXPECT_EQ(result.area->trapezoid_bootstrap_95->high, 1.0);
+  EXPECT_EQ(result.auc->trapezoid_bootstrap_95->low, 1.0);
+  EXPECT_EQ(result.auc->trapezoid_bootstrap_95->high, 1.0);
   EXPECT_FALSE(evaluate_roc({true, false}, {0.9, 0.1}, without_bootstrap())
-                   .area->trapezoid_bootstrap_95.has_value());
+                   .auc->trapezoid_bootstrap_95.has_value());
 }
 
 TEST(Roc, WrongOptionsNameTheFieldAndTheBound) {

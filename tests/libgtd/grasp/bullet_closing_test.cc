@@ -77,7 +77,7 @@ double reach_m(const Gripper& gripper) {
 // 2 of 20,000 fingers on such random shapes differ: a grazing contact, and a contact assigned to
 // the other half of the distal link at the same angle.
 TEST(BulletGripper, ClosesAlike) {
-  std::map<FingerEnd, int> ends;
+  std::map<FingerOutcome, int> outcomes;
   int went_on_alone = 0;
   int palms = 0;
   for (int number = 0; number < shape_count; ++number) {
@@ -102,12 +102,12 @@ TEST(BulletGripper, ClosesAlike) {
     for (std::size_t n = 0; n < ours.fingers.size(); ++n) {
       const libgtd::FingerClosing& closing = ours.fingers[n].closing;
       const ClosedByBullet::Finger& finger = theirs.fingers[n];
-      EXPECT_EQ(closing.end, finger.end) << name << ", finger " << n;
+      EXPECT_EQ(closing.outcome, finger.outcome) << name << ", finger " << n;
       EXPECT_EQ(closing.link.has_value(), finger.link.has_value()) << name << ", finger " << n;
       EXPECT_NEAR(closing.proximal_rad, finger.proximal_rad, 0.1 * radians) << name;
       EXPECT_NEAR(closing.curl_rad, finger.curl_rad, 0.1 * radians) << name;
       points += (finger.link ? 1 : 0) + (finger.spines ? 1 : 0);
-      ++ends[closing.end];
+      ++outcomes[closing.outcome];
       went_on_alone += closing.spines && closing.link ? 1 : 0;
     }
     EXPECT_EQ(ours.contacts.size(), points) << name;
@@ -118,9 +118,9 @@ TEST(BulletGripper, ClosesAlike) {
       EXPECT_LT((contact.point - *point).norm(), 1e-4) << name;
     }
   }
-  EXPECT_GT(ends[FingerEnd::spines], 100);
-  EXPECT_GT(ends[FingerEnd::link], 20);
-  EXPECT_GT(ends[FingerEnd::end_stop], 50);
+  EXPECT_GT(outcomes[FingerOutcome::spines], 100);
+  EXPECT_GT(outcomes[FingerOutcome::link], 20);
+  EXPECT_GT(outcomes[FingerOutcome::end_stop], 50);
   EXPECT_GT(went_on_alone, 20);
   EXPECT_GT(palms, 10);
   EXPECT_LT(palms, shape_count - 10);

@@ -22,7 +22,7 @@ namespace bullet_test {
 
 using libgtd::ApproachPose;
 using libgtd::ClosedGripper;
-using libgtd::FingerEnd;
+using libgtd::FingerOutcome;
 using libgtd::Gripper;
 
 constexpr double radians = libmap::radians_per_degree;
@@ -112,7 +112,7 @@ struct ClosedByBullet {
   bool palm_touches = false;
   Eigen::Isometry3d patch_from_gripper = Eigen::Isometry3d::Identity();
   struct Finger {
-    FingerEnd end = FingerEnd::end_stop;
+    FingerOutcome outcome = FingerOutcome::end_stop;
     double proximal_rad = 0.0;
     double curl_rad = 0.0;
     std::optional<Eigen::Vector3d> link;  // points of the ground, m
@@ -257,7 +257,7 @@ class HandInBullet {
     finger.proximal_rad = first ? first->at : closing_;
     finger.curl_rad = curl_;
     if (!first) return finger;
-    finger.end = first->part == Part::outer_half ? FingerEnd::spines : FingerEnd::link;
+    finger.outcome = first->part == Part::outer_half ? FingerOutcome::spines : FingerOutcome::link;
     (first->part == Part::outer_half ? finger.spines : finger.link) = first->point;
     if (first->part != Part::proximal) return finger;
     const auto alone = [&](Part part) {
@@ -271,7 +271,7 @@ class HandInBullet {
                              finger.proximal_rad - curl_, last);
     finger.curl_rad = finger.proximal_rad - (second ? second->at : last);
     if (second && second->part == Part::outer_half) {
-      finger.end = FingerEnd::spines;
+      finger.outcome = FingerOutcome::spines;
       finger.spines = second->point;
     }
     return finger;

@@ -11,8 +11,8 @@ namespace finger_closing_test {
 
 using graspmap_test::error_of;
 using libgtd::FingerClosing;
-using libgtd::FingerEnd;
 using libgtd::FingerGeometry;
+using libgtd::FingerOutcome;
 using libgtd::GroundSegment;
 
 constexpr double degree = libmap::radians_per_degree;
@@ -49,14 +49,14 @@ FingerClosing close_in_steps(const FingerGeometry& finger,
     const Eigen::Vector2d knuckle = finger.knuckle(t);
     const Eigen::Vector2d tip = finger.tip(t, finger.curl_rad);
     if (touches(finger.joint(), knuckle, profile)) {
-      closing.end = FingerEnd::link;
+      closing.outcome = FingerOutcome::link;
       for (double c = finger.curl_rad; c <= finger.curl_limit_rad; c += step) {
         closing.curl_rad = c;
         // Excludes the knuckle itself, which may touch.
         const Eigen::Vector2d end = finger.tip(t, c);
         const Eigen::Vector2d middle = 0.5 * (knuckle + end);
         if (touches(middle, end, profile)) {
-          closing.end = FingerEnd::spines;
+          closing.outcome = FingerOutcome::spines;
           return closing;
         }
         if (touches(knuckle + 0.02 * (end - knuckle), middle, profile)) return closing;
@@ -65,15 +65,15 @@ FingerClosing close_in_steps(const FingerGeometry& finger,
     }
     const Eigen::Vector2d middle = 0.5 * (knuckle + tip);
     if (touches(middle, tip, profile)) {
-      closing.end = FingerEnd::spines;
+      closing.outcome = FingerOutcome::spines;
       return closing;
     }
     if (touches(knuckle, middle, profile)) {
-      closing.end = FingerEnd::link;
+      closing.outcome = FingerOutcome::link;
       return closing;
     }
   }
-  closing.end = FingerEnd::end_stop;
+  closing.outcome = FingerOutcome::end_stop;
   closing.proximal_rad = finger.closing_rad;
   return closing;
 }
@@ -88,7 +88,7 @@ TEST(FingerClosing, OnNothingItReachesTheEndStop) {
   const FingerGeometry finger = libgtd::finger_geometry(grasp_test::gripper());
   for (const auto& profile : {profile_through({}), profile_through({{-1, -0.3}, {1, -0.3}})}) {
     const FingerClosing closing = libgtd::close_finger(finger, profile);
-    EXPECT_EQ(closing.end, FingerEnd::end_stop);
+    EXPECT_EQ(closing.outcome, FingerOutcome::end_stop);
     EXPECT_EQ(closing.proximal_rad, finger.closing_rad);
     EXPECT_FALSE(closing.spines || closing.link);
   }
@@ -101,7 +101,7 @@ TEST(FingerClosing, TipOnAPlane) {
     const FingerClosing closing =
         libgtd::close_finger(finger, profile_through({{-1, -depth}, {1, -depth}}));
     ASSERT_TRUE(closing.spines);
-    EXPECT_EQ(closing.end, FingerEnd::spines);
+    EXPECT_EQ(closing.outcome, FingerOutcome::spines);
     EXPECT_NEAR(closing.spines->y(), -depth, 1e-12);
     EXPECT_NEAR((*closing.spines - finger.tip(closing.proximal_rad, finger.curl_rad)).norm(), 0,
                 1e-12);
@@ -124,16 +124,16 @@ TEST(FingerClosing, AThinRidgeIsNotSkipped) {
   const Eigen::Vector2d tip = finger.tip(0.8, finger.curl_rad);
   const Eigen::Vector2d outer = knuckle + 0.75 * (tip - knuckle);
   const FingerClosing spines = libgtd::close_finger(finger, ridge(outer.x(), outer.y()));
-  EXPECT_EQ(spines.end, FingerEnd::spines);
+  EXPECT_EQ(spines.outcome, FingerOutcome::spines);
   EXPECT_NEAR(spines.proximal_rad, 0.8, 1e-5);
   const Eigen::Vector2d inner = knuckle + 0.25 * (tip - knuckle);
-  EXPECT_EQ(libgtd::close_finger(finger, ridge(inner.x(), inner.y())).end, FingerEnd::link);
+  EXPECT_EQ(libgtd::close_finger(finger, ridge(inner.x(), inner.y())).outcome, FingerOutcome::link);
 }
 
 TEST(FingerClosing, AgreesWithSmallSteps) {
   constexpr double step = 0.02 * degree;
   int compared = 0;
-  int ends[3] = {};
+  int outcomes[3] = {};
   for (std::uint64_t seed = 0; seed < 300; ++seed) {
     libmap::RandomStream random(seed, 1);
     FingerGeometry finger = libgtd::finger_geometry(grasp_test::gripper());
@@ -147,15 +147,15 @@ TEST(FingerClosing, AgreesWithSmallSteps) {
     const auto profile = profile_through(points);
     const FingerClosing exact = libgtd::close_finger(finger, profile);
     const FingerClosing stepped = close_in_steps(finger, profile, step);
-    ++ends[static_cast<int>(exact.end)];
+    ++outcomes[static_cast<int>(exact.outcome)];
     EXPECT_LE(std::abs(exact.proximal_rad - stepped.proximal_rad), 3 * step) << seed;
     // Two contacts at nearly the same angle may occur in either order.
-    if (exact.end != stepped.end) continue;
+    if (exact.outcome != stepped.outcome) continue;
     ++compared;
     EXPECT_LE(std::abs(exact.curl_rad - stepped.curl_rad), 20 * step) << seed;
   }
   EXPECT_GE(compared, 285);
-  for (const int count : {ends[0], ends[1]}) EXPECT_GE(count, 10);
+  for (const int count : {outcomes[0], outcomes[1]}) EXPECT_GE(count, 10);
 }
 
 TEST(FingerClosing, HeightOfTheOpenFinger) {

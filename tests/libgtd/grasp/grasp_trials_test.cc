@@ -18,7 +18,7 @@ using grasp_test::with_lean;
 using graspmap_test::error_of;
 using libgtd::GraspOptions;
 using libgtd::LocationResult;
-using libgtd::TrialEnd;
+using libgtd::TrialOutcome;
 
 constexpr double degree = libmap::radians_per_degree;
 const double phi = std::atan(0.39);
@@ -172,11 +172,11 @@ TEST(GraspTrials, CountsAddUp) {
   bool any_holds = false;
   for (const LocationResult& result : test_on(mesh, places_on(mesh, 30), few_trials())) {
     std::size_t trials = 0;
-    for (const std::size_t count : result.ends) trials += count;
+    for (const std::size_t count : result.outcomes) trials += count;
     EXPECT_EQ(trials, 24u);
     EXPECT_EQ(result.trials, 24u);
     EXPECT_NEAR(result.spine_fingers + result.link_fingers + result.free_fingers,
-                8 * (1 - static_cast<double>(result.ends[1]) / 24), 1e-9);
+                8 * (1 - static_cast<double>(result.outcomes[1]) / 24), 1e-9);
     EXPECT_LE(result.hold_low, result.hold_probability);
     EXPECT_GE(result.hold_high, result.hold_probability);
     EXPECT_LE(result.force_n[0], result.force_n[1]);
@@ -269,35 +269,35 @@ TEST(GraspTrials, ATrialIsRepeated) {
     const libgtd::Trial trial = libgtd::repeat_trial(ground, gripper(), result.location, options,
                                                      result.median_pose, result.median_draw);
     EXPECT_NEAR(trial.force_n, result.force_n[1], 1e-9);
-    EXPECT_EQ(trial.end == TrialEnd::holds, trial.force_n >= options.load_n);
+    EXPECT_EQ(trial.outcome == TrialOutcome::holds, trial.force_n >= options.load_n);
   }
 }
 
 TEST(GraspTrials, FailuresAreNamed) {
-  const auto end_on = [](const libmap::TriangleMesh& mesh, const GraspOptions& options,
-                         double psi_deg = 88, double drag_mm = 5) {
+  const auto outcome_on = [](const libmap::TriangleMesh& mesh, const GraspOptions& options,
+                             double psi_deg = 88, double drag_mm = 5) {
     libgtd::Gripper of = with_lean(gripper(), psi_deg);
     of.engagement.drag_mm = drag_mm;
     const LocationResult result = test_on(mesh, {{0, 0, 0}}, options, of)[0];
-    const auto most = std::max_element(result.ends.begin(), result.ends.end());
+    const auto most = std::max_element(result.outcomes.begin(), result.outcomes.end());
     EXPECT_EQ(*most, result.trials);
-    return static_cast<TrialEnd>(most - result.ends.begin());
+    return static_cast<TrialOutcome>(most - result.outcomes.begin());
   };
   const auto flat = height_mesh(0.3, 60, [](double, double) { return 0.0; });
-  EXPECT_EQ(end_on(flat, certain(), 30), TrialEnd::engagement);
+  EXPECT_EQ(outcome_on(flat, certain(), 30), TrialOutcome::engagement);
   GraspOptions strong = certain();
   strong.load_n = 1000;
-  EXPECT_EQ(end_on(flat, strong), TrialEnd::load);
-  EXPECT_EQ(end_on(flat, certain(), 88, 0), TrialEnd::contact);
+  EXPECT_EQ(outcome_on(flat, strong), TrialOutcome::load);
+  EXPECT_EQ(outcome_on(flat, certain(), 88, 0), TrialOutcome::contact);
   const auto step = height_mesh(0.3, 60, [](double x, double) { return x > 0.08 ? 0.6 : 0.0; });
-  EXPECT_EQ(end_on(step, certain()), TrialEnd::approach);
+  EXPECT_EQ(outcome_on(step, certain()), TrialOutcome::approach);
   auto hole = flat;
   std::erase_if(hole.triangles, [&](const libmap::Triangle& triangle) {
     return hole.vertices[triangle[0]].head<2>().norm() > 0.06;
   });
   GraspOptions usual = certain();
   usual.closing.max_unseen = 0.1;
-  EXPECT_EQ(end_on(hole, usual), TrialEnd::unseen);
+  EXPECT_EQ(outcome_on(hole, usual), TrialOutcome::unseen);
 }
 
 TEST(GraspTrials, AlongTheGroundsNormal) {
@@ -372,8 +372,8 @@ TEST(GraspTrials, SequentialTestsOfUnclearPlacesGoOn) {
   EXPECT_EQ(text_of({unclear}), text_of(test_on(mesh, {best->location}, options)));
   options.sequential = true;
   std::set<std::size_t> trials;
-  for (double share = 0.7; share < 1.3; share += 0.02) {
-    options.load_n = share * best->force_n[1];
+  for (double fraction = 0.7; fraction < 1.3; fraction += 0.02) {
+    options.load_n = fraction * best->force_n[1];
     const LocationResult one = test_on(mesh, {best->location}, options)[0];
     trials.insert(one.trials);
     if (one.trials >= 64 && one.trials < 256) {

@@ -31,17 +31,17 @@ TEST(GripCandidates, AllThatHoldAreAmongThem) {
   options.max_distance_m = 0.2;
   const libgtd::Ground ground(mesh);
   int holding = 0;
-  int left_out = 0;
+  int rejected = 0;
   for (const auto& result :
        libgtd::test_grasps(ground, gripper(), places, options, libmap::no_progress())) {
     const bool is_candidate = candidates.may_hold(result.location);
-    left_out += is_candidate ? 0 : 1;
+    rejected += is_candidate ? 0 : 1;
     if (!result.holds()) continue;
     ++holding;
     EXPECT_TRUE(is_candidate) << result.location.transpose();
   }
   EXPECT_GT(holding, 40);
-  EXPECT_GT(left_out, 40);
+  EXPECT_GT(rejected, 40);
 }
 
 TEST(GripCandidates, FromAboveOnly) {

@@ -12,9 +12,9 @@ using grasp_test::height_mesh;
 using grasp_test::revolved;
 using graspmap_test::error_of;
 using graspmap_test::is_error;
-using libgtd::ApproachEnd;
+using libgtd::ApproachOutcome;
 using libgtd::ClosedGripper;
-using libgtd::FingerEnd;
+using libgtd::FingerOutcome;
 
 constexpr double degree = libmap::radians_per_degree;
 
@@ -31,7 +31,7 @@ double flat(double, double) { return 0.0; }
 
 TEST(GripperClosing, OnAPlaneTheTipsTouchFirst) {
   const ClosedGripper closed = close_on(height_mesh(0.3, 30, flat), {0.1, {0.01, -0.02}, {0, 0}});
-  EXPECT_EQ(closed.approach, ApproachEnd::on_ground);
+  EXPECT_EQ(closed.approach, ApproachOutcome::on_ground);
   EXPECT_FALSE(closed.palm_touches);
   const libgtd::FingerGeometry finger = libgtd::finger_geometry(gripper());
   const double depth = -finger.tip(finger.opening_rad, finger.curl_rad).y();
@@ -76,7 +76,7 @@ TEST(GripperClosing, Spheres) {
     libgtd::ClosingOptions options;
     options.max_unseen = 1;
     const ClosedGripper closed = close_on(mesh, {}, gripper(), options);
-    ASSERT_EQ(closed.approach, ApproachEnd::on_ground);
+    ASSERT_EQ(closed.approach, ApproachOutcome::on_ground);
     const double palm = closed.patch_from_gripper.translation().z();
     if (radius > 0.1) {
       EXPECT_FALSE(closed.palm_touches);
@@ -89,8 +89,8 @@ TEST(GripperClosing, Spheres) {
     const Eigen::Vector2d center(0, -radius - palm);
     const auto distance = [&](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
       const Eigen::Vector2d d = b - a;
-      const double share = std::clamp((center - a).dot(d) / d.squaredNorm(), 0.0, 1.0);
-      return (a + share * d - center).norm();
+      const double fraction = std::clamp((center - a).dot(d) / d.squaredNorm(), 0.0, 1.0);
+      return (a + fraction * d - center).norm();
     };
     double angle = finger.opening_rad;
     bool by_link = false;
@@ -178,12 +178,12 @@ TEST(GripperClosing, GroundBehindAHoleIsUnseen) {
   const auto cliff =
       close_on(height_mesh(0.3, 60, [](double x, double) { return x > 0.03 ? -0.9 : 0.0; }));
   EXPECT_NEAR(cliff.unseen, 0, 1e-9);
-  EXPECT_EQ(cliff.fingers[0].closing.end, FingerEnd::end_stop);
+  EXPECT_EQ(cliff.fingers[0].closing.outcome, FingerOutcome::end_stop);
 }
 
 TEST(GripperClosing, BesideAHighRockTheWayIsBlocked) {
   const auto step = [](double x, double) { return x > 0.08 ? 0.6 : 0.0; };
-  EXPECT_EQ(close_on(height_mesh(0.3, 60, step)).approach, ApproachEnd::blocked);
+  EXPECT_EQ(close_on(height_mesh(0.3, 60, step)).approach, ApproachOutcome::blocked);
   // A roof with free space below is not an obstacle.
   auto mesh = height_mesh(0.3, 60, flat);
   for (const double z : {0.5, 0.6}) {
@@ -195,14 +195,14 @@ TEST(GripperClosing, BesideAHighRockTheWayIsBlocked) {
       mesh.triangles.push_back(z == 0.6 ? libmap::Triangle{a, b, c} : libmap::Triangle{a, c, b});
   }
   const ClosedGripper under_roof = close_on(mesh);
-  EXPECT_EQ(under_roof.approach, ApproachEnd::on_ground);
+  EXPECT_EQ(under_roof.approach, ApproachOutcome::on_ground);
   EXPECT_EQ(under_roof.contacts.size(), 8u);
 }
 
 TEST(GripperClosing, NoGroundBelow) {
   auto mesh = height_mesh(0.3, 3, flat);
   for (Eigen::Vector3d& vertex : mesh.vertices) vertex.x() += 1;
-  EXPECT_EQ(close_on(mesh).approach, ApproachEnd::no_ground);
+  EXPECT_EQ(close_on(mesh).approach, ApproachOutcome::no_ground);
   EXPECT_EQ(close_on(mesh).unseen, 1);
 }
 

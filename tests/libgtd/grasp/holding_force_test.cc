@@ -19,10 +19,11 @@ const double phi = std::atan(0.39);
 const Eigen::Vector3d away = Eigen::Vector3d::UnitZ();
 
 std::vector<BearingContact> bearing(const std::vector<GripContact>& contacts,
-                                    const std::vector<double>& leans, double friction = 0.39,
+                                    const std::vector<double>& facet_angles, double friction = 0.39,
                                     double limit_n = 1e3) {
   std::vector<BearingContact> made;
-  for (const GripContact& contact : contacts) made.emplace_back(contact, leans, friction, limit_n);
+  for (const GripContact& contact : contacts)
+    made.emplace_back(contact, facet_angles, friction, limit_n);
   return made;
 }
 
@@ -80,10 +81,11 @@ TEST(HoldingForce, PublishedMonteCarlo) {
     for (int draw = 0; draw < 400; ++draw) {
       std::vector<BearingContact> contacts;
       for (const GripContact& contact : ring_of_contacts(2, 0.08, row.slope_deg * degree)) {
-        std::vector<double> leans;
+        std::vector<double> facet_angles;
         for (int n = 0; n < 10; ++n)
-          leans.push_back(random.uniform(90 * degree - phi - row.slope_deg * degree, 90 * degree));
-        contacts.emplace_back(contact, leans, 0.39, 10.0);
+          facet_angles.push_back(
+              random.uniform(90 * degree - phi - row.slope_deg * degree, 90 * degree));
+        contacts.emplace_back(contact, facet_angles, 0.39, 10.0);
       }
       HoldingOptions options = limited(10, SpineSharing::equally);
       options.holds_when_closed = true;
@@ -102,12 +104,12 @@ std::vector<BearingContact> random_contacts(libmap::RandomStream& random, int co
         ring_of_contacts(count, random.uniform(0.04, 0.1),
                          random.uniform(0, 100) * degree)[static_cast<std::size_t>(n)];
     contact.point.z() = random.uniform(-0.05, 0);
-    std::vector<double> leans;
-    for (int spine = 0; spine < 4; ++spine) leans.push_back(random.uniform(0, 90) * degree);
+    std::vector<double> facet_angles;
+    for (int spine = 0; spine < 4; ++spine) facet_angles.push_back(random.uniform(0, 90) * degree);
     contact.point = motion * contact.point;
     for (Eigen::Vector3d* v : {&contact.normal, &contact.drag, &contact.outward})
       *v = motion.linear() * *v;
-    contacts.emplace_back(contact, leans, friction, limit_n);
+    contacts.emplace_back(contact, facet_angles, friction, limit_n);
   }
   return contacts;
 }
@@ -158,16 +160,16 @@ TEST(HoldingForce, RisesWithWhatHolds) {
 
 TEST(HoldingForce, SpinesThatShareEqually) {
   // On a cylinder without friction, only the facets bear force: 5 N each.
-  const auto force = [](std::vector<double> leans, SpineSharing sharing) {
-    return libgtd::holding_force(bearing(ring_of_contacts(4, 0.08, 0), leans, 0.0, 5.0), away,
-                                 limited(1e3, sharing));
+  const auto force = [](std::vector<double> facet_angles, SpineSharing sharing) {
+    return libgtd::holding_force(bearing(ring_of_contacts(4, 0.08, 0), facet_angles, 0.0, 5.0),
+                                 away, limited(1e3, sharing));
   };
   // Without friction there is no pull down along the normal unless the facet overhangs.
   EXPECT_NEAR(force({80 * degree}, SpineSharing::best), 0, 1e-9);
   // Friction of 20 deg, facets of 90 and 75 deg: pulls at 20 and 5 deg below the plane.
   const double mu = std::tan(20 * degree);
-  const auto with_friction = [&](std::vector<double> leans, SpineSharing sharing) {
-    return libgtd::holding_force(bearing(ring_of_contacts(4, 0.08, 0), leans, mu, 5.0), away,
+  const auto with_friction = [&](std::vector<double> facet_angles, SpineSharing sharing) {
+    return libgtd::holding_force(bearing(ring_of_contacts(4, 0.08, 0), facet_angles, mu, 5.0), away,
                                  limited(1e3, sharing));
   };
   const double steep = 5 * std::sin(20 * degree);
@@ -193,10 +195,10 @@ TEST(HoldingForce, AdhesionLaw) {
 }
 
 TEST(HoldingForce, NothingHolds) {
-  EXPECT_EQ(libgtd::least_holding_force({}, limited()).force_n, 0);
-  EXPECT_EQ(libgtd::least_holding_force(bearing(ring_of_contacts(1, 0.08, 1.5), {1.5}), limited())
-                .force_n,
-            0);
+  EXPECT_EQ(libgtd::min_holding_force({}, limited()).force_n, 0);
+  EXPECT_EQ(
+      libgtd::min_holding_force(bearing(ring_of_contacts(1, 0.08, 1.5), {1.5}), limited()).force_n,
+      0);
   // All on one side.
   auto contacts = ring_of_contacts(8, 0.08, 60 * degree);
   contacts.resize(3);
@@ -218,7 +220,7 @@ TEST(HoldingForce, TheLeastOfTheDirections) {
     for (const auto& direction : libgtd::pull_directions())
       least = std::min(least, libgtd::holding_force(contacts, direction.vector, limited()));
     for (const std::size_t first : {0, 5, 16}) {
-      const libgtd::LeastForce found = libgtd::least_holding_force(contacts, limited(), first);
+      const libgtd::WeakestDirection found = libgtd::min_holding_force(contacts, limited(), first);
       EXPECT_NEAR(found.force_n, least, 1e-9);
       EXPECT_NEAR(libgtd::holding_force(contacts, libgtd::pull_directions()[found.direction].vector,
                                         limited()),
@@ -229,10 +231,10 @@ TEST(HoldingForce, TheLeastOfTheDirections) {
 
 TEST(Engagement, ShareOfSpines) {
   libgtd::Engagement engagement;
-  EXPECT_NEAR(libgtd::engagement_share(engagement, 25), 1 - std::exp(-3.0), 1e-12);
-  EXPECT_LT(libgtd::engagement_share(engagement, 100), 0.9);
+  EXPECT_NEAR(libgtd::engagement_fraction(engagement, 25), 1 - std::exp(-3.0), 1e-12);
+  EXPECT_LT(libgtd::engagement_fraction(engagement, 100), 0.9);
   engagement.drag_mm = 0;
-  EXPECT_EQ(libgtd::engagement_share(engagement, 25), 0);
+  EXPECT_EQ(libgtd::engagement_fraction(engagement, 25), 0);
   // Random draws of 10000 spines.
   libmap::RandomStream random(1, 1);
   libgtd::Gripper many = grasp_test::gripper();

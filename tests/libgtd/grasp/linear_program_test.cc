@@ -18,13 +18,14 @@ using libgtd::SpineSharing;
 
 struct ContactData {
   GripContact contact;
-  std::vector<double> leans;
+  std::vector<double> facet_angles;
 };
 
 // Eight unit edges on the friction cone of a facet, by rotations.
-std::vector<Eigen::Vector3d> edges_of(const GripContact& contact, double lean, double friction) {
+std::vector<Eigen::Vector3d> edges_of(const GripContact& contact, double facet_angle,
+                                      double friction) {
   const Eigen::Vector3d lateral = contact.normal.cross(contact.drag);
-  const Eigen::Vector3d axis = Eigen::AngleAxisd(-lean, lateral) * contact.normal;
+  const Eigen::Vector3d axis = Eigen::AngleAxisd(-facet_angle, lateral) * contact.normal;
   const Eigen::Vector3d steepest = Eigen::AngleAxisd(-std::atan(friction), lateral) * axis;
   std::vector<Eigen::Vector3d> edges;
   for (int n = 0; n < 8; ++n)
@@ -82,24 +83,25 @@ double exact_force(const std::vector<ContactData>& contacts, const Eigen::Vector
       program.set_a(variable, cap_row, cost);
       ++variable;
     };
-    auto leans = one.leans;
-    std::sort(leans.rbegin(), leans.rend());
+    auto facet_angles = one.facet_angles;
+    std::sort(facet_angles.rbegin(), facet_angles.rend());
     const auto ground = edges_of(one.contact, 0, friction);
     if (options.sharing == SpineSharing::best) {
-      for (const double lean : leans) {
+      for (const double facet_angle : facet_angles) {
         program.set_b(row, limit_n);
-        for (const auto& edge : edges_of(one.contact, lean, friction)) add(edge, row, 1.0);
+        for (const auto& edge : edges_of(one.contact, facet_angle, friction)) add(edge, row, 1.0);
         ++row;
       }
-      program.set_b(row, limit_n * static_cast<double>(leans.size()));
+      program.set_b(row, limit_n * static_cast<double>(facet_angles.size()));
       for (const auto& edge : ground) add(edge, row, 1.0);
       ++row;
     } else {
       program.set_b(row, limit_n);
-      for (std::size_t n = 0; n < leans.size(); ++n)
-        for (const auto& edge : edges_of(one.contact, leans[n], friction))
+      for (std::size_t n = 0; n < facet_angles.size(); ++n)
+        for (const auto& edge : edges_of(one.contact, facet_angles[n], friction))
           add(edge, row, 1.0 / static_cast<double>(n + 1));
-      for (const auto& edge : ground) add(edge, row, 1.0 / static_cast<double>(leans.size()));
+      for (const auto& edge : ground)
+        add(edge, row, 1.0 / static_cast<double>(facet_angles.size()));
       ++row;
     }
   }
@@ -128,7 +130,7 @@ std::vector<ContactData> random_set(libmap::RandomStream& random) {
     }
     const std::size_t spines = 1 + random.below(2);
     for (std::size_t spine = 0; spine < spines; ++spine)
-      one.leans.push_back(random.uniform(0, 90) * libmap::radians_per_degree);
+      one.facet_angles.push_back(random.uniform(0, 90) * libmap::radians_per_degree);
     contacts.push_back(std::move(one));
   }
   return contacts;
@@ -151,7 +153,7 @@ TEST(LinearProgram, AgreesWithAnExactSolver) {
         libgtd::pull_directions()[random.below(libgtd::pull_directions().size())].vector;
     std::vector<BearingContact> bearing;
     for (const ContactData& one : contacts)
-      bearing.emplace_back(one.contact, one.leans, friction, limit_n);
+      bearing.emplace_back(one.contact, one.facet_angles, friction, limit_n);
     const double force = libgtd::holding_force(bearing, direction, options);
     // If the contacts do not resist some moment, exact equality of rounded numbers has a different
     // solution than the real problem.

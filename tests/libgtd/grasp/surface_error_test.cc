@@ -71,11 +71,11 @@ TEST(SurfaceError, DisplacesAlongTheNormalByTheError) {
   GroundErrors errors;
   for (const Eigen::Vector3d& vertex : mesh.vertices)
     errors.vertex_errors_m.push_back(vertex.y() < 0 ? 0.001 : 0.003);
-  errors.is_unsure.assign(mesh.triangles.size(), 0);
+  errors.is_unscanned.assign(mesh.triangles.size(), 0);
   const Ground ground(mesh, errors);
   const GroundPatch patch = ground.patch({0, 0, 0}, Eigen::Vector3d::UnitZ(), 0.05, 0.05);
   ASSERT_EQ(patch.vertex_errors_m.size(), patch.vertices.size());
-  ASSERT_EQ(patch.is_unsure.size(), patch.triangles.size());
+  ASSERT_EQ(patch.is_unscanned.size(), patch.triangles.size());
   const Eigen::Vector3d normal = Eigen::Vector3d(1, 0, 1).normalized();
   std::array<double, 2> squares{};
   std::array<int, 2> counts{};
@@ -184,7 +184,7 @@ TEST(SurfaceError, UnsureGroundIsUnseen) {
       of_vertex[n] = mesh.vertices[n].x() > 0 ? error : 0.001;
     const libgtd::LocationResult half = unseen();
     EXPECT_NEAR(half.unseen, 0.5, 0.1);
-    EXPECT_EQ(half.ends[static_cast<std::size_t>(libgtd::TrialEnd::unseen)], half.trials);
+    EXPECT_EQ(half.outcomes[static_cast<std::size_t>(libgtd::TrialOutcome::unseen)], half.trials);
   }
   of_vertex = errors;
   mesh.face_fields.push_back(

@@ -24,7 +24,7 @@ TEST(HoldingForce, IsThatOfThePostIfContactsAreNearlySymmetric) {
     const double yaw = random.uniform(0.0, 6.3);
     const double radius = random.uniform(0.02, 0.07);
     const double height = random.uniform(-0.08, 0.0);
-    const double lean = random.uniform() < 0.2 ? 0.0 : std::pow(10.0, random.uniform(-15.0, -4.0));
+    const double tilt = random.uniform() < 0.2 ? 0.0 : std::pow(10.0, random.uniform(-15.0, -4.0));
     const double limit_n = std::pow(10.0, random.uniform(1.3, 6.0));
     std::vector<BearingContact> contacts;
     for (std::size_t n = 0; n < fingers; ++n) {
@@ -37,7 +37,7 @@ TEST(HoldingForce, IsThatOfThePostIfContactsAreNearlySymmetric) {
       contact.point = radius * contact.outward + height * Eigen::Vector3d::UnitZ();
       const Eigen::Vector3d aside(random.uniform(-0.5, 0.5), random.uniform(-0.5, 0.5),
                                   random.uniform(-0.5, 0.5));
-      contact.normal = (contact.outward + lean * aside).normalized();
+      contact.normal = (contact.outward + tilt * aside).normalized();
       contact.drag = (contact.normal.z() * contact.normal - Eigen::Vector3d::UnitZ()).normalized();
       contacts.emplace_back(contact, std::vector<double>{0.0}, friction, limit_n);
     }
@@ -46,7 +46,7 @@ TEST(HoldingForce, IsThatOfThePostIfContactsAreNearlySymmetric) {
     options.holds_when_closed = false;
     const double expected = 10.0 * friction * static_cast<double>(fingers);
     EXPECT_NEAR(libgtd::holding_force(contacts, Eigen::Vector3d::UnitZ(), options), expected,
-                expected * (1e-4 + 60.0 * lean / friction))
+                expected * (1e-4 + 60.0 * tilt / friction))
         << seed;
   }
 }

@@ -204,7 +204,7 @@ TEST(TrialScene, NoGroundIsALoneSphere) {
   TriangleMesh mesh = floor(-1.0, 1.0);
   mesh = graspmap_test::join_meshes(mesh, floor(-0.1, 0.1, 0.05));
   const Shown shown = show(mesh, {0.0, 0.0, 0.0}, options);
-  ASSERT_NE(shown.trial.gripper.approach, libgtd::ApproachEnd::on_ground);
+  ASSERT_NE(shown.trial.gripper.approach, libgtd::ApproachOutcome::on_ground);
   EXPECT_EQ(spheres(shown.scene, ScenePart::idle), 1U);
   EXPECT_TRUE(vertices_of(shown.scene, ScenePart::gripper).empty());
 }

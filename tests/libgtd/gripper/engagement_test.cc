@@ -20,17 +20,17 @@ std::string scar_e() {
 TEST(Engagement, PriorsAreMonotonicAboutTheirMiddle) {
   const Gripper gripper = libgtd::find_gripper("scar-e");
   const ParameterValues middle = parameters_of(gripper);
-  const auto at = [&](double share) {
+  const auto at = [&](double fraction) {
     ParameterValues shares;
-    shares.fill(share);
+    shares.fill(fraction);
     return prior_values(gripper.ranges, middle, shares);
   };
   for (std::size_t n = 0; n < middle.size(); ++n) {
     const auto [low, high] = *gripper.ranges[n];
     EXPECT_DOUBLE_EQ(at(0.0)[n], low);
     EXPECT_DOUBLE_EQ(at(1.0)[n], high);
-    for (double share = 0.1; share < 1.0; share += 0.1)
-      EXPECT_LT(at(share - 0.1)[n], at(share)[n]) << n;
+    for (double fraction = 0.1; fraction < 1.0; fraction += 0.1)
+      EXPECT_LT(at(fraction - 0.1)[n], at(fraction)[n]) << n;
     if (middle[n] > low && middle[n] < high) {
       EXPECT_DOUBLE_EQ(at(0.5)[n], middle[n]);
     }

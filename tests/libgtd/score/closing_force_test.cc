@@ -28,7 +28,7 @@ using libgtd::VoxelGrid;
 constexpr double degree = std::numbers::pi / 180;
 
 // Share of beta(4, 2) below this number of standard deviations above its mean, of 1 - x.
-double beta_share(double deviations) {
+double beta_fraction(double deviations) {
   const double t = std::clamp(1.0 / 3 + std::sqrt(8.0 / 252) * deviations, 0.0, 1.0);
   return t * t * (10 - 20 * t + 15 * t * t - 4 * t * t * t);
 }
@@ -74,9 +74,9 @@ TEST(FingerPulls, ClosedFormOfOneLean) {
       gripper.fingers->spine_force_limit_n = limit_n;
       const libgtd::FingerPulls pulls =
           libgtd::finger_pulls(gripper, {{1.0, parameters_of(gripper)}});
-      EXPECT_NEAR(pulls.pushes[0], 10 * limit_n / 10, 1e-5);
-      EXPECT_EQ(pulls.all_fingers[0], 80);
-      EXPECT_NEAR(pulls.spreads[0], 0, 1e-3);
+      EXPECT_NEAR(pulls.max_spine_forces[0], 10 * limit_n / 10, 1e-5);
+      EXPECT_EQ(pulls.total_closing_forces_n[0], 80);
+      EXPECT_NEAR(pulls.level_spreads[0], 0, 1e-3);
       for (const int fall : {-90, -30, 0, 15, 45, 60}) {  // on the grid of the table
         const double b = (fall + 70 - 90) * degree + std::atan(0.39);
         const double sine = std::sin(fall * degree);
@@ -99,10 +99,10 @@ TEST(FingerPulls, SpreadOfSpinesThatEngage) {
   gripper.engagement.engagement_rate = std::log(2.0) / gripper.engagement.drag_mm;
   gripper.fingers->spine_force_limit_n = 0.1;
   const auto pulls = libgtd::finger_pulls(gripper, {{1.0, parameters_of(gripper)}});
-  EXPECT_NEAR(pulls.spreads[0], std::sqrt(0.5 / (10 * 0.5)), 0.05);
+  EXPECT_NEAR(pulls.level_spreads[0], std::sqrt(0.5 / (10 * 0.5)), 0.05);
   // Without a facet against which a spine can pull, the spread is at its bound.
   gripper.engagement.asperity_min_deg = gripper.engagement.asperity_max_deg = 10;
-  EXPECT_EQ(libgtd::finger_pulls(gripper, {{1.0, parameters_of(gripper)}}).spreads[0], 4);
+  EXPECT_EQ(libgtd::finger_pulls(gripper, {{1.0, parameters_of(gripper)}}).level_spreads[0], 4);
 }
 
 TEST(FingerPulls, RiseWithFallFrictionAndLimit) {
@@ -131,14 +131,14 @@ TEST(ClosingForce, LevelGround) {
   EXPECT_NEAR(depth, (40 * std::cos(85 * degree) + 41 * std::cos(65 * degree)) / 1000, 1e-12);
   double c = path.pulls.at(0)[0];
   c /= std::sqrt(1 + c * c / (0.55 * 0.55));
-  const double v = path.pulls.spreads[0];
+  const double v = path.pulls.level_spreads[0];
   const double probability =
       1 / (1 + std::exp(-(1.234 + 1.623 + 3.988 + 0.679 * std::log(c + 0.003) - 1.203 * v)));
   const double log_force =
       std::log(80.0) + 0.293 + 1.006 * std::log(c) - 0.446 * depth / 0.081 - 0.537 * v;
   const double spread = std::exp(-1.540 + 0.745 * v);
   const auto survival = [&](double force) {
-    return probability * beta_share((log_force - std::log(force)) / spread);
+    return probability * beta_fraction((log_force - std::log(force)) / spread);
   };
   const auto level = ground([](int, int) { return 4; });
   for (const double load_n : {1.0, 3.0, 5.0})
@@ -202,14 +202,14 @@ TEST(ClosingForce, AnEnsembleIsAMixture) {
   EXPECT_GT(force.parameter_spread, force.trial_spread);
 }
 
-double share_at_origin(const std::vector<Voxel>& ground) {
+double fraction_at_origin(const std::vector<Voxel>& ground) {
   const VoxelGrid grid = grid_of(ground);
   const auto mask =
       libgtd::make_gripper_mask(gripper_named("scar-e"), {libgtd::Method::corrected, 0.01, 1});
   const auto at = std::find_if(grid.voxels.rbegin(), grid.voxels.rend(),
                                [](const Voxel& v) { return v.i == 0 && v.j == 0; });
-  return libgtd::outward_shares(grid, mask,
-                                {static_cast<std::size_t>(grid.voxels.rend() - at - 1)})[0];
+  return libgtd::outward_fall_fractions(grid, mask,
+                                        {static_cast<std::size_t>(grid.voxels.rend() - at - 1)})[0];
 }
 
 // The circle of the closed spines has a radius of 49.4 mm, that of the open fingers one of 127 mm.
@@ -220,30 +220,31 @@ TEST(OutwardShares, OfShapes) {
       return square > 0 ? static_cast<int>(std::floor(std::sqrt(square))) : 0;
     });
   };
-  EXPECT_EQ(share_at_origin(ball(4)), 0);
-  EXPECT_EQ(share_at_origin(ball(5)), 0);
-  for (const double radius : {7.5, 10.0, 15.0, 25.0}) EXPECT_EQ(share_at_origin(ball(radius)), 1);
+  EXPECT_EQ(fraction_at_origin(ball(4)), 0);
+  EXPECT_EQ(fraction_at_origin(ball(5)), 0);
+  for (const double radius : {7.5, 10.0, 15.0, 25.0})
+    EXPECT_EQ(fraction_at_origin(ball(radius)), 1);
   // A fall of one voxel may be rounding, two voxels are a fall.
   const auto step = [](int fall) {
     return ground([fall](int i, int j) { return std::hypot(i, j) < 9 ? 0 : -fall; });
   };
-  EXPECT_EQ(share_at_origin(step(0)), 0);
-  EXPECT_EQ(share_at_origin(step(1)), 0);
-  EXPECT_EQ(share_at_origin(step(2)), 1);
+  EXPECT_EQ(fraction_at_origin(step(0)), 0);
+  EXPECT_EQ(fraction_at_origin(step(1)), 0);
+  EXPECT_EQ(fraction_at_origin(step(2)), 1);
   // A bowl and a pit fall inward. On a slope of 45 degrees, the azimuths at right angles to its
   // fall are level.
-  EXPECT_EQ(share_at_origin(step(-5)), 0);
-  EXPECT_EQ(share_at_origin(ground([](int i, int) { return i; })), 7.0 / 16);
-  EXPECT_EQ(share_at_origin(ground([](int i, int) { return i + 1000000; })), 7.0 / 16);
+  EXPECT_EQ(fraction_at_origin(step(-5)), 0);
+  EXPECT_EQ(fraction_at_origin(ground([](int i, int) { return i; })), 7.0 / 16);
+  EXPECT_EQ(fraction_at_origin(ground([](int i, int) { return i + 1000000; })), 7.0 / 16);
 }
 
 TEST(OutwardShares, SkipColumnsWithoutGround) {
   auto voxels = ground([](int i, int j) { return std::hypot(i, j) < 9 ? 0 : -3; });
   std::erase_if(voxels, [](const Voxel& v) { return v.i > 8; });
-  EXPECT_LT(share_at_origin(voxels), 1);
-  EXPECT_GT(share_at_origin(voxels), 0.5);
+  EXPECT_LT(fraction_at_origin(voxels), 1);
+  EXPECT_GT(fraction_at_origin(voxels), 0.5);
   std::erase_if(voxels, [](const Voxel& v) { return std::hypot(v.i, v.j) > 1; });
-  EXPECT_EQ(share_at_origin(voxels), 0);
+  EXPECT_EQ(fraction_at_origin(voxels), 0);
 }
 
 TEST(ClosingForce, UpToThreeColumnsOfAGapAreFilled) {
@@ -285,7 +286,7 @@ SlowColumn slow_column(const std::map<std::pair<int, int>, double>& heights, con
     }
   std::vector<double> contacts(16, 0);
   std::vector<double> pulls(16, 0);
-  std::vector<double> pushes(16, 0);
+  std::vector<double> max_spine_forces(16, 0);
   Eigen::Vector2d moment(0, 0);
   double touching = 0;
   for (int a = 0; a < 16; ++a) {
@@ -303,7 +304,8 @@ SlowColumn slow_column(const std::map<std::pair<int, int>, double>& heights, con
         contacts[static_cast<std::size_t>(a)] = 1;
         const auto fall_deg = static_cast<int>(std::lround(std::atan(fall) / degree));
         pulls[static_cast<std::size_t>(a)] = path.pulls.at(fall_deg)[0];
-        pushes[static_cast<std::size_t>(a)] = path.pulls.pushes[0] * std::cos(std::atan(fall));
+        max_spine_forces[static_cast<std::size_t>(a)] =
+            path.pulls.max_spine_forces[0] * std::cos(std::atan(fall));
         moment += point.depth_m * Eigen::Vector2d(std::cos(angle), std::sin(angle));
         touching += 1;
       }
@@ -331,7 +333,7 @@ SlowColumn slow_column(const std::map<std::pair<int, int>, double>& heights, con
       for (int a = 0; a < 16; ++a) {
         const double weight = 1 - u * std::cos((a - side) * std::numbers::pi / 8);
         const auto n = static_cast<std::size_t>(a);
-        sum += (weight > 0 ? weight * pulls[n] : -weight * pushes[n]) / 16;
+        sum += (weight > 0 ? weight * pulls[n] : -weight * max_spine_forces[n]) / 16;
       }
       capacity = std::min(capacity, sum);
     }
@@ -378,12 +380,12 @@ SlowForce slow_force(const std::map<std::pair<int, int>, double>& heights, const
   if (with_force == 0) return {};
   const double log = logs / with_force;
   const double variance = std::max(0.0, squares / with_force - log * log);
-  const double v = path.pulls.spreads[0];
+  const double v = path.pulls.level_spreads[0];
   const double logit = 1.234 + 1.623 * with_force / weights + 3.988 * mean.contact / weights +
                        0.679 * std::log(mean.capacity / weights + 0.003) - 1.203 * v;
   return {1 / (1 + std::exp(-logit)),
-          std::log(path.pulls.all_fingers[0]) + 0.293 + 1.006 * log - 0.446 * mean.rise / weights +
-              0.663 * mean.tilt / weights - 0.537 * v,
+          std::log(path.pulls.total_closing_forces_n[0]) + 0.293 + 1.006 * log -
+              0.446 * mean.rise / weights + 0.663 * mean.tilt / weights - 0.537 * v,
           std::exp(std::clamp(-1.540 + 1.056 * std::sqrt(variance) + 0.745 * v, -3.0, 1.0))};
 }
 
@@ -416,7 +418,7 @@ TEST(ClosingForce, AgreesWithItsDefinition) {
   for (std::size_t n = 0; n < forces.size(); ++n) {
     const SlowForce slow = slow_force(heights, grid.voxels[n], path, there);
     const double expected =
-        slow.probability == 0 ? 0 : slow.probability * beta_share(slow.log_force / slow.spread);
+        slow.probability == 0 ? 0 : slow.probability * beta_fraction(slow.log_force / slow.spread);
     held += expected > 0.3 ? 1 : 0;
     // A height on a layer boundary or an angle between two degrees may round either way in single
     // precision.

@@ -132,7 +132,7 @@ TEST(Detection, NormalsWithRandomSidesAreNoOutside) {
 TEST(Detection, LoneVoxelsAreCountedAndRefused) {
   DetectionOptions options = options_for(Method::corrected);
   options.scenario.voxel_size_m = 0.01;
-  EXPECT_EQ(detect(bumpy_cloud(0.5, 0.008), options).lone_voxels, 0U);
+  EXPECT_EQ(detect(bumpy_cloud(0.5, 0.008), options).isolated_voxels, 0U);
   const libmap::Error error = error_of([&] { detect(bumpy_cloud(0.5, 0.03), options); });
   EXPECT_EQ(error.context().field, "share of voxels without a neighbor");
 }

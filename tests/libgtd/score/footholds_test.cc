@@ -90,10 +90,10 @@ std::vector<std::size_t> slow_footholds(const PointCloud& map, double separation
     double sum = 0.0;
     double weights = 0.0;
     for (std::size_t m = 0; m < map.size(); ++m) {
-      const double share = (map.positions[m] - map.positions[n]).norm() / (0.5 * separation_m);
-      if (share > 1.0) continue;
-      sum += (1.0 - share * share) * scores[m];
-      weights += 1.0 - share * share;
+      const double fraction = (map.positions[m] - map.positions[n]).norm() / (0.5 * separation_m);
+      if (fraction > 1.0) continue;
+      sum += (1.0 - fraction * fraction) * scores[m];
+      weights += 1.0 - fraction * fraction;
     }
     return sum / weights;
   };

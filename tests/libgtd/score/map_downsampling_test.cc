@@ -73,12 +73,12 @@ TEST(MapDownsampling, PointsComeToTheMiddleOfTheirSquares) {
   libgtd::TileStoreIndex index;
   index.lattice = {{1, 2, 3}, 0.1};
   PointCloud map = map_of({{-1, 5, 2}});
-  libgtd::snap_to_squares(index, 4, map);
+  libgtd::snap_to_square_centers(index, 4, map);
   EXPECT_TRUE(map.positions[0].isApprox(Eigen::Vector3d(0.8, 2.6, 3.25), 1e-12));
   index.frame = libgtd::MapFrame::input;
   const libmap::Pose terrain_from_input = libmap::make_pose_from_rpy({1, 0, 0}, {0, 0, 90});
   index.manifest.transforms.emplace_back("terrain_from_input", terrain_from_input);
-  libgtd::snap_to_squares(index, 4, map);
+  libgtd::snap_to_square_centers(index, 4, map);
   EXPECT_TRUE(
       (terrain_from_input * map.positions[0]).isApprox(Eigen::Vector3d(0.8, 2.6, 3.25), 1e-12));
 }

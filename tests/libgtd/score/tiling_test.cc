@@ -111,7 +111,7 @@ TEST(Edges, AgreeWithThePlainClosing) {
   const GripperMask mask = make_gripper_mask(gripper_named("scar-e"), {Method::corrected, 0.02, 1});
   const TileBounds box = graspmap_test::whole_box(grid);
   const auto pivots = pivots_in(grid, mask, box);
-  const auto edges = find_edges(grid, mask, box, pivots);
+  const auto edges = find_border_pivots(grid, mask, box, pivots);
   std::map<std::pair<int, int>, bool> scanned;
   for (int i = -10; i < 56; ++i)
     for (int j = -10; j < 52; ++j) scanned[{i, j}] = is_scanned_plainly(grid.voxels, i, j);
@@ -141,7 +141,7 @@ TEST(Edges, OfAWideTileWithLittleGround) {
   const GripperMask mask = make_gripper_mask(gripper_named("scar-e"), {Method::corrected, 0.02, 1});
   const TileBounds box = graspmap_test::whole_box(grid);
   const auto pivots = pivots_in(grid, mask, box);
-  const auto edges = find_edges(grid, mask, box, pivots);
+  const auto edges = find_border_pivots(grid, mask, box, pivots);
   const ColumnSums unscanned =
       unscanned_columns(grid, expanded(box, mask.pivot_xy, mask.side - mask.pivot_xy - 1));
   ASSERT_EQ(edges.size(), pivots.size());

@@ -170,8 +170,8 @@ TEST(VoxelMatching, AgreesWithTheTripleLoop) {
           name + " " + std::to_string(voxel_size_m));
 }
 
-// Mask of random bits with the fraction `share` set; V = 1 everywhere if `counts_all`.
-GripperMask random_mask(int side, int layers, double share, bool counts_all) {
+// Mask of random bits with the fraction `fraction` set; V = 1 everywhere if `counts_all`.
+GripperMask random_mask(int side, int layers, double fraction, bool counts_all) {
   GripperMask mask;
   mask.method = Method::corrected;
   mask.side = side;
@@ -180,8 +180,8 @@ GripperMask random_mask(int side, int layers, double share, bool counts_all) {
   mask.pivot_z = static_cast<int>(uniform(0, layers));
   const int size = side * side * layers;
   for (int n = 0; n < size; ++n) {
-    mask.solid.push_back(uniform(0, 1) < share ? 1 : 0);
-    mask.counted.push_back(counts_all || uniform(0, 1) < share ? 1 : 0);
+    mask.solid.push_back(uniform(0, 1) < fraction ? 1 : 0);
+    mask.counted.push_back(counts_all || uniform(0, 1) < fraction ? 1 : 0);
   }
   return mask;
 }
@@ -201,18 +201,18 @@ TEST(VoxelMatching, MasksOfAnySizeAndAnyNumberOfLayers) {
     for (const int layers : {1, 3, 15, 16, 17, 31, 32, 33, 70}) {
       if (side * side * layers > 80000) continue;
       for (const bool counts_all : {true, false})
-        for (const double share : {0.02, 0.6})
+        for (const double fraction : {0.02, 0.6})
           expect_as_plainly(grid_of(porous_ground(6, 18)),
-                            random_mask(side, layers, share, counts_all),
+                            random_mask(side, layers, fraction, counts_all),
                             std::to_string(side) + " x " + std::to_string(layers));
     }
 }
 
 TEST(VoxelMatching, MasksWithoutASolidVoxelOrOfNothingElse) {
   const VoxelGrid grid = grid_of(porous_ground(12, 40));
-  for (const double share : {0.0, 1.0})
+  for (const double fraction : {0.0, 1.0})
     for (const bool counts_all : {true, false})
-      expect_as_plainly(grid, random_mask(13, 37, share, counts_all), std::to_string(share));
+      expect_as_plainly(grid, random_mask(13, 37, fraction, counts_all), std::to_string(fraction));
 }
 
 // Box sums have 16 bits: a row of columns with 260 x 255 voxels does not fit.

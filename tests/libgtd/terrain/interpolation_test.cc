@@ -256,7 +256,7 @@ TEST(Interpolation, LongTrianglesAcrossAGapAreRefused) {
   options.max_edge_m = 0.12;
   const InterpolationResult refused = interpolate(cloud, options);
   EXPECT_EQ(in_gap(refused), 0);
-  EXPECT_GT(refused.refused_triangles, 0u);
+  EXPECT_GT(refused.rejected_triangles, 0u);
   EXPECT_GT(refused.cloud.size(), 3000u);
 }
 

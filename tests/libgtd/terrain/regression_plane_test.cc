@@ -213,19 +213,20 @@ TEST(RegressionPlaneUp, ThenTheNormalsIfTheyAgree) {
 // Normals with random sides, as from eigenvector solvers and closed surfaces: any majority is
 // chance.
 TEST(RegressionPlaneUp, NormalsThatDisagreeDoNotDecide) {
-  for (const double share : {0.25, 0.5, 0.7, 0.78}) {
+  for (const double fraction : {0.25, 0.5, 0.7, 0.78}) {
     PointCloud cloud = bumpy_ground(1000);
     cloud.normals.assign(1000, Eigen::Vector3f(0, 0, 1));
     for (std::size_t i = 0; i < 1000; ++i)  // in one part of the ground
-      if (cloud.positions[i].x() < 4 * share - 1) cloud.normals[i].z() = -1;
+      if (cloud.positions[i].x() < 4 * fraction - 1) cloud.normals[i].z() = -1;
     const RegressionPlane plane = fit_regression_plane(cloud);
-    EXPECT_EQ(plane.up_source, UpSource::frame_z) << share;
-    EXPECT_GT(axes_of(plane)(2, 2), 0) << share;
-    EXPECT_LT(plane.opposing_normals, 0.1) << share;
-    for (Eigen::Vector3f& normal : cloud.normals) normal.z() = uniform(0, 1) < share ? -1.0F : 1.0F;
+    EXPECT_EQ(plane.up_source, UpSource::frame_z) << fraction;
+    EXPECT_GT(axes_of(plane)(2, 2), 0) << fraction;
+    EXPECT_LT(plane.opposing_normals, 0.1) << fraction;
+    for (Eigen::Vector3f& normal : cloud.normals)
+      normal.z() = uniform(0, 1) < fraction ? -1.0F : 1.0F;
     const RegressionPlane mixed = fit_regression_plane(cloud);
-    EXPECT_EQ(mixed.up_source, UpSource::frame_z) << share;
-    EXPECT_GT(mixed.opposing_normals, 0.1) << share;
+    EXPECT_EQ(mixed.up_source, UpSource::frame_z) << fraction;
+    EXPECT_GT(mixed.opposing_normals, 0.1) << fraction;
   }
 }
 

@@ -234,7 +234,7 @@ TEST(BagRig, SetsAreChosen) {
   EXPECT_EQ(all.images.size(), 9U);
   const BagRigPlan second = plan({.every = 2});
   EXPECT_EQ(second.images.size(), 5U);
-  EXPECT_EQ(second.all_sets, 5U);
+  EXPECT_EQ(second.sets_in_bag, 5U);
   EXPECT_EQ(images_of(second, "a").size(), 3U);
   EXPECT_THAT(graspmap_test::read_text(scratch_folder() / "rig" / "synchronized_sets.csv"),
               HasSubstr("stamp_s,cameras,spread_s\n5.000000,2,0.012000\n5.200000,1,0.000000\n"));
@@ -282,7 +282,7 @@ TEST(BagRig, BrokenImagesAreCountedAndLeftOut) {
   bag.close();
   const libmap::BagRigExport result = libmap::export_bag_rig(bag_path(), plan(), {});
   EXPECT_EQ(result.images, 1U);
-  EXPECT_EQ(result.broken, 8U);
+  EXPECT_EQ(result.undecodable_images, 8U);
   ASSERT_EQ(result.warnings.size(), 1U);
   EXPECT_THAT(result.warnings[0], HasSubstr("/a/image_raw: 8 images"));
   EXPECT_THAT(result.warnings[0], HasSubstr("23 bytes"));

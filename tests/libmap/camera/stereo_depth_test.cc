@@ -79,8 +79,8 @@ GrayImage view_of(const Scene& scene, const libmap::Camera& camera, double eye_x
 }
 
 struct Comparison {
-  double share = 0.0;  // with a depth
-  double rms = 0.0;    // relative
+  double fraction = 0.0;  // with a depth
+  double rms = 0.0;       // relative
 };
 
 Comparison compare(const DepthImage& depth, const Scene& scene, const libmap::Camera& camera,
@@ -94,7 +94,7 @@ Comparison compare(const DepthImage& depth, const Scene& scene, const libmap::Ca
       result.rms += std::pow(depth.at(x, y) / truth - 1, 2);
       ++measured;
     }
-  result.share = static_cast<double>(measured) / ((to_x - from_x) * (height - 10));
+  result.fraction = static_cast<double>(measured) / ((to_x - from_x) * (height - 10));
   result.rms = std::sqrt(result.rms / std::max(1, measured));
   return result;
 }
@@ -112,7 +112,7 @@ TEST(StereoDepth, SlantedWall) {
                                             view_of(scene, cameras.right, 0.12), cameras, options);
       // Left of 30 the right camera sees less of the wall.
       const Comparison result = compare(depth, scene, cameras.left, 45, 195);
-      EXPECT_GT(result.share, 0.97) << slope;
+      EXPECT_GT(result.fraction, 0.97) << slope;
       // A quarter of a pixel of some 20 px of disparity.
       EXPECT_LT(result.rms, 0.0125) << slope;
     }
@@ -129,8 +129,8 @@ TEST(StereoDepth, StepOfKnownDepth) {
   // The step stands at column 101.5 + 250 * 0.05 = 114.
   const Comparison far = compare(depth, scene, cameras.left, 45, 98);
   const Comparison near = compare(depth, scene, cameras.left, 118, 195);
-  EXPECT_GT(far.share, 0.95);
-  EXPECT_GT(near.share, 0.97);
+  EXPECT_GT(far.fraction, 0.95);
+  EXPECT_GT(near.fraction, 0.97);
   EXPECT_LT(far.rms, 0.0125);
   EXPECT_LT(near.rms, 0.0125);
   // The 0.12 (1/1 - 1/1.5) 250 = 10 columns that only the left camera sees have no depth.
@@ -140,8 +140,8 @@ TEST(StereoDepth, StepOfKnownDepth) {
   options.max_depth_m = 1.2;
   const DepthImage cut = stereo_depth(view_of(scene, cameras.left, 0),
                                       view_of(scene, cameras.right, 0.12), cameras, options);
-  EXPECT_EQ(compare(cut, scene, cameras.left, 45, 98).share, 0.0);
-  EXPECT_GT(compare(cut, scene, cameras.left, 118, 195).share, 0.97);
+  EXPECT_EQ(compare(cut, scene, cameras.left, 45, 98).fraction, 0.0);
+  EXPECT_GT(compare(cut, scene, cameras.left, 118, 195).fraction, 0.97);
 }
 
 TEST(StereoDepth, NothingFromImagesWithoutTexture) {

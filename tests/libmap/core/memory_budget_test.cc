@@ -19,9 +19,9 @@ bool both_at_once(std::uint64_t first, std::uint64_t second) {
   bool was_given = false;
   std::thread other;
   {
-    const MemoryBudget::Share share = budget.take(first);
+    const MemoryBudget::Reservation reservation = budget.take(first);
     other = std::thread([&] {
-      const MemoryBudget::Share share_of_other = budget.take(second);
+      const MemoryBudget::Reservation share_of_other = budget.take(second);
       is_given = true;
     });
     const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(100);
@@ -50,7 +50,7 @@ TEST(MemoryBudgetTest, AllComeToTheirTurn) {
   for (int t = 0; t < 4; ++t)
     threads.emplace_back([&, t] {
       for (int n = 0; n < 500; ++n) {
-        const MemoryBudget::Share share =
+        const MemoryBudget::Reservation reservation =
             budget.take(static_cast<std::uint64_t>(1 + (7 * n + 3 * t) % 12));
         ++turns;
       }

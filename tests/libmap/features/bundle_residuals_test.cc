@@ -43,7 +43,7 @@ TEST(CalibratedFeature, DerivativesAreThoseOfDifferences) {
   calibrated.terms = {0, {0.1, 0.4, 0.4, 0.1}, {0.3, 0.09, 0.5}};
   calibrated.by_step = random_six();
   calibrated.known_step = 0.01 * random_six();
-  calibrated.row_share = 0.37;
+  calibrated.image_row_fraction = 0.37;
   const libmap::CalibratedFeature feature(frame.features[0], camera, calibrated);
   const Pose pose = libmap::make_pose({0.02, -0.01, 0.03}, libmap::rotation_of({0.05, -0.08, 0.1}));
   Unknowns at = Unknowns::Zero();

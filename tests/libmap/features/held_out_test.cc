@@ -128,8 +128,8 @@ TEST(HeldOut, SurfacesTellWrongPosesFromTrueOnes) {
 
 // Share of the common elements that differ by more than 1 mm or 0.1 degrees. At edges, planes are
 // fitted to different pixels.
-double share_of_other_elements(const std::vector<libmap::FrameFeatures>& one,
-                               const std::vector<libmap::FrameFeatures>& other) {
+double fraction_of_other_elements(const std::vector<libmap::FrameFeatures>& one,
+                                  const std::vector<libmap::FrameFeatures>& other) {
   double elements = 0.0;
   double others = 0.0;
   for (std::size_t n = 0; n < one.size(); ++n)
@@ -171,7 +171,7 @@ TEST(HeldOut, SurfacesAreSeenThroughTheCameraThatIsRefined) {
   EXPECT_LT(gain.after, 0.5 * gain.before);
   const auto same = libmap::compare_held_out(from_start, put_right);
   EXPECT_NEAR(same.after, same.before, 0.02 * same.before);
-  EXPECT_LT(share_of_other_elements(found.frames, right.frames), 0.02);
+  EXPECT_LT(fraction_of_other_elements(found.frames, right.frames), 0.02);
 }
 
 // Corrected surfaces equal the surfaces of corrected images.
@@ -182,10 +182,10 @@ TEST(HeldOut, SurfacesTurnWithTheCorrectionOfDepth) {
   auto found = libmap::find_features(scan, {1, 2});
   for (auto& [node, frame] : scan.frames) libmap::correct_depth(frame.depth, correction);
   const auto wanted = libmap::find_features(scan, {1, 2});
-  EXPECT_GT(share_of_other_elements(found.frames, wanted.frames), 0.5);
+  EXPECT_GT(fraction_of_other_elements(found.frames, wanted.frames), 0.5);
   for (libmap::FrameFeatures& frame : found.frames)
     libmap::calibrate(frame, {.depth = {correction}});
-  EXPECT_LT(share_of_other_elements(found.frames, wanted.frames), 0.05);
+  EXPECT_LT(fraction_of_other_elements(found.frames, wanted.frames), 0.05);
 }
 
 }  // namespace held_out_test

@@ -66,8 +66,8 @@ TEST(DepthFusionTiles, SamePointsAsAtOnceBitForBit) {
                        {"expected_error", ScalarType::float32, {}}};
       std::size_t tiles = 0;
       TileFusion fusion(scan, scan.poses, {}, tile_m);
-      // Continues with the survey of the first object, as another process does.
-      TileFusion again(scan, scan.poses, {}, tile_m, no_progress(), &fusion.survey());
+      // Continues with the plan of the first object, as another process does.
+      TileFusion again(scan, scan.poses, {}, tile_m, no_progress(), &fusion.plan());
       DepthFusionResult parts = again.report();
       EXPECT_EQ(parts.poses.size(), 10U);
       for (std::size_t n = 0; n < again.tiles().size(); ++n) {
@@ -99,7 +99,7 @@ TEST(DepthFusionTiles, SamePointsAsAtOnceBitForBit) {
       for (std::size_t n = 0; n < found.size(); ++n) ASSERT_EQ(found[n], expected[n]) << tile_m;
       const auto counts = [](const DepthFusionResult& result) {
         const SurfacePointCounts& points = result.points;
-        return std::tuple(result.points_made, result.elements, result.occupied_voxels,
+        return std::tuple(result.output_points, result.elements, result.occupied_voxels,
                           result.pixels.used, result.pixels.flying, points.merged,
                           points.seen_through, points.beyond_edge, points.extended_points,
                           points.max_views);

@@ -12,7 +12,7 @@ namespace normal_sides_test {
 
 using Eigen::Vector3d;
 using Eigen::Vector3f;
-using libmap::opposing_share;
+using libmap::opposing_fraction;
 using libmap::up_of_normals;
 using libmap::UpOfNormals;
 
@@ -88,7 +88,7 @@ TEST(UpOfNormals, OrientedNormalsDecide) {
   Oriented made = ground();
   UpOfNormals up = up_of_normals(made.positions, made.normals);
   EXPECT_TRUE(up.decided);
-  EXPECT_EQ(up.share, 1.0);
+  EXPECT_EQ(up.fraction, 1.0);
   EXPECT_LT(up.opposing, 0.01);
   for (Vector3f& normal : made.normals) normal = -normal;
   up = up_of_normals(made.positions, made.normals);
@@ -104,7 +104,7 @@ TEST(UpOfNormals, RandomSidesDoNotDecide) {
     const UpOfNormals up = up_of_normals(made.positions, made.normals);
     EXPECT_FALSE(up.decided);
     EXPECT_EQ(up.direction, Vector3d::UnitZ());
-    EXPECT_NEAR(up.share, 0.5, 0.05);
+    EXPECT_NEAR(up.fraction, 0.5, 0.05);
     EXPECT_NEAR(up.opposing, 0.5, 0.05);
   }
 }
@@ -117,7 +117,7 @@ TEST(UpOfNormals, PatchesOfBothSidesDoNotDecide) {
   const UpOfNormals up = up_of_normals(made.positions, made.normals);
   EXPECT_FALSE(up.decided);
   EXPECT_EQ(up.direction, Vector3d::UnitZ());
-  EXPECT_NEAR(up.share, 0.75, 0.05);
+  EXPECT_NEAR(up.fraction, 0.75, 0.05);
 }
 
 // The normals of a closed surface sum to zero, but neighbors agree.
@@ -126,17 +126,17 @@ TEST(UpOfNormals, ClosedSurfacesDoNotDecide) {
   const UpOfNormals up = up_of_normals(made.positions, made.normals);
   EXPECT_FALSE(up.decided);
   EXPECT_EQ(up.direction, Vector3d::UnitZ());
-  EXPECT_NEAR(up.share, 0.5, 0.01);
+  EXPECT_NEAR(up.fraction, 0.5, 0.01);
   EXPECT_EQ(up.opposing, 0.0);
 }
 
 TEST(OpposingShare, SkipsWhatIsNoDirectionAndCreases) {
-  EXPECT_EQ(opposing_share({}, {}), 0.0);
+  EXPECT_EQ(opposing_fraction({}, {}), 0.0);
   Oriented made = ground();
   for (std::size_t n = 0; n < made.normals.size(); n += 3) made.normals[n] = Vector3f::Zero();
   for (std::size_t n = 1; n < made.normals.size(); n += 3)
     made.positions[n].x() = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(opposing_share(made.positions, made.normals), 0.0);
+  EXPECT_EQ(opposing_fraction(made.positions, made.normals), 0.0);
   // Pairs of points, each far from the others: two faces of an edge, two sides of a sheet.
   Oriented edges, sheets;
   for (int n = 0; n < 200; ++n)
@@ -145,10 +145,10 @@ TEST(OpposingShare, SkipsWhatIsNoDirectionAndCreases) {
       edges.normals.push_back(beside > 0 ? Vector3f(0.9F, 0, -0.5F) : Vector3f(0, 0, 1));
       sheets.normals.emplace_back(0, 0, beside > 0 ? -1 : 1);
     }
-  EXPECT_EQ(opposing_share(edges.positions, edges.normals), 0.0);
-  EXPECT_GT(opposing_share(edges.positions, sheets.normals), 0.3);
+  EXPECT_EQ(opposing_fraction(edges.positions, edges.normals), 0.0);
+  EXPECT_GT(opposing_fraction(edges.positions, sheets.normals), 0.3);
   sheets.normals.resize(20);
-  EXPECT_EQ(opposing_share(edges.positions, sheets.normals), 0.0) << "too few to say";
+  EXPECT_EQ(opposing_fraction(edges.positions, sheets.normals), 0.0) << "too few to say";
 }
 
 }  // namespace normal_sides_test

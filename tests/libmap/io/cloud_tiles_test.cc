@@ -84,7 +84,7 @@ TEST(CloudTiles, SurveyCountsAndBounds) {
   cloud.positions[0] = {std::nan(""), 0, 0};
   cloud.positions[99999] = {50, -60, 7};
   cloud.positions[70000] = {-50, 60, -7};
-  const libmap::TileInfo info = libmap::survey_tile(write("a.pcd", cloud));
+  const libmap::TileInfo info = libmap::read_tile_info(write("a.pcd", cloud));
   EXPECT_EQ(info.points, 99999u);
   EXPECT_EQ(info.dropped_points, 1u);
   EXPECT_EQ(info.box.min, Eigen::Vector3d(-50, -60, -7));

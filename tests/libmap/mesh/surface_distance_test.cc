@@ -180,10 +180,10 @@ TEST(SurfaceDistance, CoverageAgreesWithASearchOfAllPoints) {
     for (const Eigen::Vector3d& point : points) best = std::min(best, (point - samples[n]).norm());
     ASSERT_EQ(flags[n], best <= 0.15);
   }
-  EXPECT_GT(share_of(flags), 0.1);
-  EXPECT_LT(share_of(flags), 0.9);
-  EXPECT_EQ(share_of(covered(samples, {}, 0.15)), 0.0);
-  EXPECT_EQ(share_of({}), 0.0);
+  EXPECT_GT(fraction_of(flags), 0.1);
+  EXPECT_LT(fraction_of(flags), 0.9);
+  EXPECT_EQ(fraction_of(covered(samples, {}, 0.15)), 0.0);
+  EXPECT_EQ(fraction_of({}), 0.0);
 }
 
 TEST(SurfaceDistance, ThreadsMakeNoDifference) {

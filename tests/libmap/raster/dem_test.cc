@@ -60,8 +60,8 @@ TEST(Dem, UndeclaredNodataIsDroppedAndCounted) {
   const libmap::CloudReadResult read = libmap::read_cloud(undeclared);
   EXPECT_EQ(read.dropped_points, 2U);
   EXPECT_EQ(read.cloud.positions, libmap::read_cloud(declared).cloud.positions);
-  EXPECT_EQ(libmap::survey_tile(undeclared).dropped_points, 2U);
-  EXPECT_EQ(libmap::survey_tile(undeclared).points, 10U);
+  EXPECT_EQ(libmap::read_tile_info(undeclared).dropped_points, 2U);
+  EXPECT_EQ(libmap::read_tile_info(undeclared).points, 10U);
   EXPECT_EQ(libmap::read_mesh(undeclared).mesh.vertices, libmap::read_mesh(declared).mesh.vertices);
 }
 
@@ -171,7 +171,7 @@ TEST(Dem, PiecesShareTheFrameOfTheFirst) {
   EXPECT_EQ(cloud.positions[11] - cloud.positions[0], Eigen::Vector3d(5000, 0, 0));
   EXPECT_EQ(libmap::read_georeference(scratch_folder() / "pieces"),
             libmap::read_georeference(first));
-  const auto box = libmap::survey_tile(second, libmap::read_georeference(first)).box;
+  const auto box = libmap::read_tile_info(second, libmap::read_georeference(first)).box;
   EXPECT_EQ(box.min.x(), cloud.positions[11].x());
   libmap::write_cloud(scratch_folder() / "pieces/c.pcd", cloud);
   EXPECT_EQ(error_of([] { libmap::read_tiles(libmap::cloud_tiles(scratch_folder() / "pieces")); })

@@ -23,10 +23,10 @@ std::vector<SurfaceResidual> residuals_of(const DepthNoise& truth, const DepthNo
   std::normal_distribution<double> normal;
   for (int n = 0; n < count; ++n) {
     const double range_m = graspmap_test::uniform(0.6, 4.0);
-    const double share = 1.0 / 6.0;  // a plane averages pixels
-    const double distance_m = share * truth.axial_at(range_m) * normal(engine);
-    residuals.push_back(
-        {n % 10 == 0 ? 5.0 * distance_m : distance_m, share * assumed.axial_at(range_m), range_m});
+    const double fraction = 1.0 / 6.0;  // a plane averages pixels
+    const double distance_m = fraction * truth.axial_at(range_m) * normal(engine);
+    residuals.push_back({n % 10 == 0 ? 5.0 * distance_m : distance_m,
+                         fraction * assumed.axial_at(range_m), range_m});
     residuals.push_back({.distance_m = std::numeric_limits<double>::quiet_NaN()});
   }
   return residuals;

@@ -67,8 +67,8 @@ TEST(RefinementStages, ReturnTheNextStateAndLeaveTheirOwn) {
   const StageResult bundled = libmap::bundle_stage(way.input, linked.state);
   EXPECT_FALSE(bundled.report.rejected);
   EXPECT_LT(largest_error_m(bundled.state), 0.2 * error_m);
-  EXPECT_TRUE(bundled.state.by_observations);
-  EXPECT_FALSE(linked.state.by_observations);
+  EXPECT_TRUE(bundled.state.is_from_bundle);
+  EXPECT_FALSE(linked.state.is_from_bundle);
   EXPECT_EQ(bundled.state.frames, state.frames) << "frames are shared";
 }
 

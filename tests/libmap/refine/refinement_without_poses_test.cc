@@ -150,8 +150,8 @@ TEST(RefinementWithoutPoses, DepthFindsAFrameFromBothSides) {
   EXPECT_EQ(result.poses.size(), 7U);
   ASSERT_EQ(result.losses.size(), 1U);
   EXPECT_EQ(result.losses[0].node, 5);
-  EXPECT_EQ(result.losses[0].found_node, 5);
-  EXPECT_EQ(result.losses[0].found_at, 4);
+  EXPECT_EQ(result.losses[0].relocalized_node, 5);
+  EXPECT_EQ(result.losses[0].relocalized_at, 4);
   EXPECT_EQ(figure(stage_of(result, "odometry"), "tracked_by_depth"), 2.0);
   EXPECT_TRUE(result.warnings.size() == 1U) << result.warnings.back();
   EXPECT_LT(result.stages.back().error->absolute.rmse_m, 0.002);
@@ -174,8 +174,8 @@ TEST(RefinementWithoutPoses, APartIsCarriedToWhereItsDepthFits) {
   EXPECT_EQ(found.parts, (std::vector<std::vector<int>>{{1, 2, 3, 4, 5, 6, 7}}));
   for (const auto& [node, pose] : truth)
     EXPECT_LT((found.map_from_base.at(node).translation() - pose.translation()).norm(), 0.005);
-  EXPECT_EQ(found.losses[0].found_node, 4);
-  EXPECT_EQ(found.losses[0].found_at, 3);
+  EXPECT_EQ(found.losses[0].relocalized_node, 4);
+  EXPECT_EQ(found.losses[0].relocalized_at, 3);
   EXPECT_FALSE(found.depth_links.empty());
   // Poses that are known stay.
   libmap::VisualOdometryResult kept = lost;

@@ -92,7 +92,7 @@ TEST(SensorCalibration, LateDepthIsMovedBack) {
   const double row = libmap::row_fraction(frame.features[0], frame.cameras[0]);
   EXPECT_NEAR(libmap::color_from_depth_of(frame, frame.features[0], calibration).translation().z(),
               0.4 * (0.05 - 0.05 * row), 1e-12);
-  frame.depth_later_s = -0.01;
+  frame.depth_stamp_offset_s = -0.01;
   EXPECT_NEAR(libmap::color_from_depth_of(frame, frame.features[0], calibration).translation().z(),
               0.4 * (0.04 - 0.05 * row), 1e-12)
       << "stamps of depth that is earlier by 10 ms";

@@ -188,7 +188,7 @@ TEST(VisualOdometry, ABlankImageCostsOneNode) {
   EXPECT_EQ(result.parts[1], std::vector<int>{6});
   ASSERT_EQ(result.losses.size(), 1U);
   EXPECT_EQ(result.losses[0].node, 6);
-  EXPECT_EQ(result.losses[0].found_node, 0);
+  EXPECT_EQ(result.losses[0].relocalized_node, 0);
   EXPECT_NE(result.losses[0].reason.find("0 features"), std::string::npos);
   EXPECT_LT(error_of(walk, result, 1, 10), 2e-5);
 }
@@ -205,9 +205,9 @@ TEST(VisualOdometry, IsFoundAgainByAppearance) {
   EXPECT_EQ(result.parts[0].size(), 23U);
   ASSERT_EQ(result.losses.size(), 9U);
   EXPECT_EQ(result.losses.back().node, 29);
-  EXPECT_EQ(result.losses.back().found_node, 29);
-  EXPECT_GE(result.losses.back().found_at, 3);
-  EXPECT_LE(result.losses.back().found_at, 8);
+  EXPECT_EQ(result.losses.back().relocalized_node, 29);
+  EXPECT_GE(result.losses.back().relocalized_at, 3);
+  EXPECT_LE(result.losses.back().relocalized_at, 8);
   EXPECT_EQ(result.relocalized, 1U);
   EXPECT_LT(error_of(walk, result, 1, 31), 3e-5);
   std::size_t closures = 0;
@@ -246,7 +246,7 @@ TEST(VisualOdometry, OneLookAlikeIsNotBelieved) {
   EXPECT_EQ(part_of(18), part_of(20)) << "the frame before the odd one binds the one after it";
   const auto matched = libmap::verify_pairs(walk.frames, {{4, 18}}, {}, 1);
   EXPECT_EQ(matched.links.size(), 1U) << "the motion is there";
-  EXPECT_FALSE(result.tried.contains({4, 18})) << "and may find a witness later";
+  EXPECT_FALSE(result.tried_pairs.contains({4, 18})) << "and may find a witness later";
 }
 
 // A part that begins after dark frames is joined to the others when it shows the same scene.
@@ -260,9 +260,9 @@ TEST(VisualOdometry, ALatePartJoinsTheFirst) {
   ASSERT_EQ(result.losses.size(), 1U);
   EXPECT_EQ(result.losses[0].node, 9);
   EXPECT_EQ(result.losses[0].key_frame, 7);
-  EXPECT_GT(result.losses[0].found_node, 14) << "at y = 4 it begins to see what 8 has seen";
-  EXPECT_LE(result.losses[0].found_node, 20);
-  EXPECT_LE(result.losses[0].found_at, 8);
+  EXPECT_GT(result.losses[0].relocalized_node, 14) << "at y = 4 it begins to see what 8 has seen";
+  EXPECT_LE(result.losses[0].relocalized_node, 20);
+  EXPECT_LE(result.losses[0].relocalized_at, 8);
   EXPECT_EQ(result.relocalized, 1U);
   for (int node = 2; node <= 24; ++node) EXPECT_LT(error_of(walk, result, 1, node), 1e-4) << node;
 }

@@ -196,9 +196,9 @@ TEST_F(TumFolder, PairsListsOfImagesByTime) {
   EXPECT_EQ(read.warnings(), (std::vector<std::string>{
                                  "skipped 1 depth image without a color image within 0.02 s",
                                  "skipped 1 color image without a depth image within 0.02 s"}));
-  EXPECT_NEAR(read.read_frame(1).depth_later_s, 1102.160407 - 1102.175304, 1e-6);
+  EXPECT_NEAR(read.read_frame(1).depth_stamp_offset_s, 1102.160407 - 1102.175304, 1e-6);
   const libmap::RgbdFrame frame = read.read_frame(2);
-  EXPECT_NEAR(frame.depth_later_s, 1102.226738 - 1102.211214, 1e-6);
+  EXPECT_NEAR(frame.depth_stamp_offset_s, 1102.226738 - 1102.211214, 1e-6);
   EXPECT_TRUE(frame.color == libmap::decode_color(graspmap_test::read_text(folder_ / "rgb/b.png")));
   ASSERT_EQ(frame.cameras.size(), 1U);
   graspmap_test::expect_same_camera(frame.cameras[0], camera_);
@@ -224,7 +224,7 @@ TEST_F(TumFolder, SmoothsTheDelayOfDepthByItsStamps) {
   const FrameFolder read(folder_);
   ASSERT_EQ(read.graph().nodes.size(), 40U);
   for (int n = 0; n < 40; ++n)
-    EXPECT_NEAR(read.read_frame(n + 1).depth_later_s, n < 20 ? 0.005 : -0.016, 1e-5) << n;
+    EXPECT_NEAR(read.read_frame(n + 1).depth_stamp_offset_s, n < 20 ? 0.005 : -0.016, 1e-5) << n;
 }
 
 TEST_F(TumFolder, TakesAssociationsInEitherOrder) {

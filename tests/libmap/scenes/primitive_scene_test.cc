@@ -240,9 +240,9 @@ TEST(Profile, a_share_of_the_area_lies_before_the_point_that_marks_it) {
     for (int i = 0; i < 50; ++i) {
       const double t0 = uniform(0.0, 0.7);
       const double t1 = uniform(t0 + 0.01, 1.0);
-      const double share = uniform(0.0, 1.0);
-      const double t = segment.t_of_area_share(t0, t1, share);
-      EXPECT_NEAR(segment.area_between(t0, t), share * segment.area_between(t0, t1), 1e-14);
+      const double fraction = uniform(0.0, 1.0);
+      const double t = segment.t_of_area_fraction(t0, t1, fraction);
+      EXPECT_NEAR(segment.area_between(t0, t), fraction * segment.area_between(t0, t1), 1e-14);
     }
   }
 }

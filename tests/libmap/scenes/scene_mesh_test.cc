@@ -118,7 +118,7 @@ const SceneSolid& solid_of(const SceneGeometry& geometry, double shape) {
 }
 
 void expect_on_surface_and_outward(const PrimitiveScene& scene, const SceneMeshOptions& options,
-                                   double exact_share) {
+                                   double exact_fraction) {
   const SceneGeometry geometry(scene);
   const TriangleMesh mesh = scene_mesh(scene, options);
   mesh.check();
@@ -130,7 +130,7 @@ void expect_on_surface_and_outward(const PrimitiveScene& scene, const SceneMeshO
     EXPECT_LT(distance, 2.0 * options.chord_error_m);
     exact += distance < 2e-9 ? 1 : 0;
   }
-  EXPECT_GE(static_cast<double>(exact), exact_share * static_cast<double>(mesh.vertices.size()));
+  EXPECT_GE(static_cast<double>(exact), exact_fraction * static_cast<double>(mesh.vertices.size()));
   const double step = 0.1 * options.edge_length_m;
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
     const Triangle& triangle = mesh.triangles[i];

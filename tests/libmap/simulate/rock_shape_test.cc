@@ -80,7 +80,7 @@ SiteRock plain_block() {
   return rock;
 }
 
-double largest_share_down(const SiteRock& rock) {
+double largest_fraction_down(const SiteRock& rock) {
   // Area of walls above the ground that face down by more than 5 degrees.
   const Solid solid = rock_solid(rock, 0.02, 0.15);
   double down = 0.0;
@@ -97,9 +97,9 @@ double largest_share_down(const SiteRock& rock) {
 
 TEST(RockShape, OverhangsFaceDown) {
   SiteRock rock = plain_block();
-  EXPECT_EQ(largest_share_down(rock), 0.0);
+  EXPECT_EQ(largest_fraction_down(rock), 0.0);
   rock.overhang_deg = 20.0;
-  EXPECT_GT(largest_share_down(rock), 0.08);
+  EXPECT_GT(largest_fraction_down(rock), 0.08);
 }
 
 TEST(RockShape, AClefTakesAWedgeOutOfTheTop) {

@@ -63,7 +63,7 @@ TEST(SensorFaults, WhatIsOffChangesNothing) {
   ScanSimulationOptions options = small_scan();
   options.depth = {};
   const auto plain = frames_of(options);
-  options.faults.depth.wiggle_period_m = 0.7;
+  options.faults.depth.error_period_m = 0.7;
   options.faults.photo.blurred_frames = 0.3;
   const auto same = frames_of(options);
   for (std::size_t n = 0; n < plain.size(); ++n) {
@@ -285,9 +285,9 @@ TEST(SensorFaults, FramesAreDroppedRepeatedAndMisdated) {
   double squares = 0.0;
   for (std::size_t n = 0; n < recorded.size(); ++n) {
     squares += recorded[n].stamp_error_s * recorded[n].stamp_error_s;
-    if (recorded[n].images_of == recorded[n].frame) continue;
+    if (recorded[n].image_frame == recorded[n].frame) continue;
     ++repeated;
-    EXPECT_EQ(recorded[n].images_of, recorded[n - 1].images_of);
+    EXPECT_EQ(recorded[n].image_frame, recorded[n - 1].image_frame);
   }
   EXPECT_NEAR(static_cast<double>(repeated), 160.0, 40.0);
   EXPECT_NEAR(std::sqrt(squares / static_cast<double>(recorded.size())), 0.01, 0.0006);

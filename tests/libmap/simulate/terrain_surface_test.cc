@@ -143,7 +143,7 @@ TEST(GroundHeights, MeansSpacingAndExtent) {
 TEST(TerrainSurface, SlopeIsSeenAtItsDepth) {
   const auto slope = [](double x, double y) { return 0.3 * x - 0.2 * y; };
   const Ground ground(grid({-3, -3}, {5, 3}, 0.04, slope));
-  TerrainSurface terrain(ground.points, ground.heights, {.square_spacings = 32.0});
+  TerrainSurface terrain(ground.points, ground.heights, {.tile_spacings = 32.0});
   const libmap::ViewRays rays = small_rays();
   const Pose pose = looking({0, 0, 1.2}, 20, 50);
   const auto surfaces = terrain.seen_from({{pose}}, libmap::view_range(rays, 3.0));
@@ -172,9 +172,8 @@ TEST(TerrainSurface, StreamedIsWholeWhateverWasSeenBefore) {
                              libmap::TextureSource::rock, 1, libmap::ShadingNormals::per_vertex);
   const libmap::ViewRays rays = small_rays();
   const double far_m = 2.5;
-  TerrainSurface fleeting(ground.points, ground.heights,
-                          {.square_spacings = 24.0, .kept_points = 0});
-  TerrainSurface keeping(ground.points, ground.heights, {.square_spacings = 24.0});
+  TerrainSurface fleeting(ground.points, ground.heights, {.tile_spacings = 24.0, .kept_points = 0});
+  TerrainSurface keeping(ground.points, ground.heights, {.tile_spacings = 24.0});
   std::size_t compared = 0;
   std::size_t wrong = 0;
   for (int n = 0; n < 8; ++n) {
@@ -195,21 +194,21 @@ TEST(TerrainSurface, StreamedIsWholeWhateverWasSeenBefore) {
   }
   EXPECT_GT(compared, 5000U);
   EXPECT_EQ(wrong, 0U);
-  EXPECT_GT(fleeting.squares_made(), keeping.squares_made());
+  EXPECT_GT(fleeting.tiles_made(), keeping.tiles_made());
 }
 
 TEST(TerrainSurface, MemoryDoesNotGrowWithTheGround) {
   const auto most_points = [](double length_m) {
     const Ground ground(grid({0, 0}, {length_m, 4}, 0.05, wave));
     TerrainSurface terrain(ground.points, ground.heights,
-                           {.square_spacings = 20.0, .kept_points = 5000});
+                           {.tile_spacings = 20.0, .kept_points = 5000});
     const libmap::ViewRays rays = small_rays();
     std::size_t most = 0;
     for (double x = 0.0; x < length_m - 2.0; x += 0.5) {
       terrain.seen_from({{looking({x, 2.0, 1.2}, 0.0, 45.0)}}, libmap::view_range(rays, 2.5));
       most = std::max(most, terrain.points_in_memory());
     }
-    EXPECT_GT(terrain.squares_made(), static_cast<std::size_t>(2.0 * length_m));
+    EXPECT_GT(terrain.tiles_made(), static_cast<std::size_t>(2.0 * length_m));
     return most;
   };
   const std::size_t of_short = most_points(8.0);

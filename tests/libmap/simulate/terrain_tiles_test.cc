@@ -202,12 +202,12 @@ TEST(TerrainTiles, ImpossibleOptionsAreNamed) {
     return error_of([&] { terrain_tiles(options); }).context().field;
   };
   EXPECT_EQ(field_of([](auto& o) { o.spacing_m = 0.0; }), "spacing_m");
-  EXPECT_EQ(field_of([](auto& o) { o.tile_m = 0.001; }), "piece_m");
+  EXPECT_EQ(field_of([](auto& o) { o.tile_m = 0.001; }), "tile_size_m");
   EXPECT_EQ(field_of([](auto& o) {
               o.size_x_m = 90'000;
               o.size_y_m = 90'000;
             }),
-            "piece_m");
+            "tile_size_m");
   EXPECT_EQ(field_of([](auto& o) { o.size_y_m = HUGE_VAL; }), "size_y_m");
   EXPECT_EQ(field_of([](auto& o) { o.terrain.max_rock_m = 0.1; }), "max_rock_m");
   EXPECT_EQ(field_of([](auto& o) { o.terrain.rocks_per_m2 = -1; }), "rocks_per_m2");

@@ -157,8 +157,9 @@ TEST(EdgeCheck, SitesThatCannotBe) {
   const SiteCorners site = corners_of({0, 0}, {1, 2});
   EXPECT_TRUE(is_error(error_of([&] { check_edges(site, zero, zero, {.inset_m = 0.5}); }),
                        {.field = "inset_m", .value = "0.5"}));
-  EXPECT_TRUE(is_error(error_of([&] { check_edges(site, zero, zero, {.positions_per_edge = 0}); }),
-                       {.field = "places", .value = "0", .bound = ">= 1 and <= 10000"}));
+  EXPECT_TRUE(
+      is_error(error_of([&] { check_edges(site, zero, zero, {.positions_per_edge = 0}); }),
+               {.field = "positions_per_edge", .value = "0", .bound = ">= 1 and <= 10000"}));
   EXPECT_TRUE(is_error(error_of([&] { check_edges(site, zero, zero, {.inset_m = NAN}); }),
                        {.field = "inset_m", .value = "nan", .bound = ">= 0"}));
 }

@@ -102,7 +102,7 @@ TEST(GroundPlane, RocksOverMoreThanHalfDoNotTiltIt) {
     const GroundPlane plane = find_ground_plane(points);
     EXPECT_LT(degrees_between(plane.normal, map_from_site.linear().col(2)), 0.01) << sigma;
     EXPECT_NEAR((map_from_site.inverse() * plane.center).z(), 0, sigma / 6 + 1e-9);
-    EXPECT_LT(plane.share, 0.25) << "walls and tops of the boxes contain the rest";
+    EXPECT_LT(plane.fraction, 0.25) << "walls and tops of the boxes contain the rest";
     // The feet of the boxes are within the tolerance as well.
     EXPECT_NEAR(plane.rmse_m, sigma, 0.006);
   }
@@ -169,7 +169,7 @@ TEST(GroundPlane, LowerOfTwoTerraces) {
   add_patch(points, 1500, {3, 0, -0.5}, {2, 0, 0}, {0, 3, 0}, 0.002);
   EXPECT_NEAR(find_ground_plane(points).offset_m, -0.5, 1e-3);
   GroundPlaneOptions options;
-  options.min_share_of_largest = 0.9;
+  options.min_fraction_of_largest = 0.9;
   EXPECT_NEAR(find_ground_plane(points, options).offset_m, 0, 1e-3);
 }
 
@@ -311,7 +311,7 @@ TEST(GroundPlane, RealSite) {
       read_cloud(graspmap_test::data_folder() / "clouds/artificial_rocks.pcd").cloud.positions;
   const GroundPlane plane = find_ground_plane(points);
   EXPECT_LT(plane.tilt_deg, 1.5);
-  EXPECT_GT(plane.share, 0.4);
+  EXPECT_GT(plane.fraction, 0.4);
   EXPECT_LT(plane.rmse_m, 0.01);
   // Hardly any points are below the ground.
   const auto below = std::count_if(points.begin(), points.end(), [&](const Vector3d& point) {

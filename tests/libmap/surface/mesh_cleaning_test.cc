@@ -70,7 +70,7 @@ TEST(MeshCleaning, IslandsAreDropped) {
   EXPECT_NEAR(result.island_area_m2 + libmap::surface_area(result.mesh), libmap::surface_area(mesh),
               1e-12);
   options.min_island_area_m2 = 0.0;
-  options.min_island_share = 0.1;
+  options.min_island_fraction = 0.1;
   result = cleaned(mesh, options);
   EXPECT_EQ(result.islands, 2U);
   options.min_island_area_m2 = 100.0;
@@ -205,14 +205,14 @@ TEST(MeshCleaning, OptionsOutOfRange) {
   };
   EXPECT_EQ(field({.merge_distance_m = -1}), "merge_distance_m");
   EXPECT_EQ(field({.min_island_area_m2 = std::nan("")}), "min_island_area_m2");
-  EXPECT_EQ(field({.min_island_share = 1.5}), "min_island_share");
+  EXPECT_EQ(field({.min_island_fraction = 1.5}), "min_island_fraction");
   EXPECT_EQ(field({.max_hole_m = -0.1}), "max_hole_m");
   EXPECT_EQ(field({.smoothing_iterations = -1}), "smoothing_iterations");
   EXPECT_EQ(field({.decimation_error_m = -1}), "decimation_error_m");
   MeshCleaningOptions options;
   libmap::ParameterTable table;
   libmap::bind(table, options);
-  EXPECT_THROW(table.set("min_island_share", "2"), libmap::Error);
+  EXPECT_THROW(table.set("min_island_fraction", "2"), libmap::Error);
   table.set("max_hole_m", "0.3");
   EXPECT_EQ(options.max_hole_m, 0.3);
 }

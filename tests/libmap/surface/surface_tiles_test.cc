@@ -113,9 +113,9 @@ TEST(SurfaceTiles, SameTrianglesAsAtOnceBitForBit) {
   Rows expected;
   add_rows(whole.mesh, expected);
 
-  CloudStatistics survey;
-  survey.add(points_in(cloud, {Eigen::Vector2d(2, -1), Eigen::Vector2d(9, 9)}), true);
-  survey.add(points_in(cloud, {Eigen::Vector2d(-9, -1), Eigen::Vector2d(2, 9)}), true);
+  CloudStatistics statistics;
+  statistics.add(points_in(cloud, {Eigen::Vector2d(2, -1), Eigen::Vector2d(9, 9)}), true);
+  statistics.add(points_in(cloud, {Eigen::Vector2d(-9, -1), Eigen::Vector2d(2, 9)}), true);
   std::map<XyTile, std::size_t> tiles;
   add_surface_tiles(cloud, options, tiles);
   SurfaceIslands islands;
@@ -123,7 +123,7 @@ TEST(SurfaceTiles, SameTrianglesAsAtOnceBitForBit) {
   for (const auto& [tile, points] : tiles) {
     const SurfaceTile one =
         make_surface_tile(points_in(cloud, xy_box_of(tile, options.tile_m, options.margin_m())),
-                          survey, tile, options);
+                          statistics, tile, options);
     islands.add(tile, one);
     made[tile] = one.mesh;
   }
@@ -156,8 +156,8 @@ TEST(SurfaceTiles, IslandsAreJudgedAcrossTiles) {
   strip(0.3, 0.3);
   SurfaceTileOptions options = options_of(0.4);
   options.cleaning.min_island_area_m2 = 0.03;
-  CloudStatistics survey;
-  survey.add(cloud, true);
+  CloudStatistics statistics;
+  statistics.add(cloud, true);
   std::map<XyTile, std::size_t> tiles;
   add_surface_tiles(cloud, options, tiles);
   SurfaceIslands islands;
@@ -165,7 +165,7 @@ TEST(SurfaceTiles, IslandsAreJudgedAcrossTiles) {
   for (const auto& [tile, points] : tiles) {
     const SurfaceTile one =
         make_surface_tile(points_in(cloud, xy_box_of(tile, options.tile_m, options.margin_m())),
-                          survey, tile, options);
+                          statistics, tile, options);
     islands.add(tile, one);
     area += surface_area(one.mesh);
   }

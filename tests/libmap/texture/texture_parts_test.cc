@@ -53,13 +53,13 @@ TEST(ShareViews, AddUpToOneAndEndSoftly) {
   const libmap::BlendingWeights two = libmap::blending_weights(table, 2, 1.0);
   EXPECT_EQ(two.first, (std::vector<std::uint32_t>{0, 2, 3, 3}));
   // Less the third best: 3/4 to 1/4 of the best.
-  EXPECT_FLOAT_EQ(two.shares[0].share, 0.75F);
-  EXPECT_FLOAT_EQ(two.shares[1].share, 0.25F);
-  EXPECT_EQ(two.shares[1].photo, 6U);
-  EXPECT_FLOAT_EQ(two.shares[2].share, 1.0F);
+  EXPECT_FLOAT_EQ(two.weights[0].weight, 0.75F);
+  EXPECT_FLOAT_EQ(two.weights[1].weight, 0.25F);
+  EXPECT_EQ(two.weights[1].photo, 6U);
+  EXPECT_FLOAT_EQ(two.weights[2].weight, 1.0F);
   const libmap::BlendingWeights sharper = libmap::blending_weights(table, 2, 2.0);
-  EXPECT_FLOAT_EQ(sharper.shares[0].share, 15.0F / 18.0F);
-  EXPECT_TRUE(libmap::blending_weights(table, 1, 1.0).shares.empty());
+  EXPECT_FLOAT_EQ(sharper.weights[0].weight, 15.0F / 18.0F);
+  EXPECT_TRUE(libmap::blending_weights(table, 1, 1.0).weights.empty());
 }
 
 struct LabelProblem {

@@ -53,10 +53,10 @@ std::vector<TexturedMesh> textured(const TriangleMesh& mesh, const PaintedScan& 
   report = texturing.report();
   std::vector<TexturedMesh> models;
   for (std::size_t n = 0; n < index.size(); ++n) {
-    libmap::TileTexturing::Piece piece = texturing.make(n, exposure);
-    piece.model.check();
-    libmap::merge_into<libmap::TextureCounts>(report, piece.counts);
-    models.push_back(std::move(piece.model));
+    libmap::TileTexturing::Tile tile = texturing.make(n, exposure);
+    tile.model.check();
+    libmap::merge_into<libmap::TextureCounts>(report, tile.counts);
+    models.push_back(std::move(tile.model));
   }
   libmap::require_seen(report);
   return models;
@@ -95,18 +95,18 @@ struct SeamErrors {
 SeamErrors errors_at_seams(const std::vector<TexturedMesh>& models) {
   std::map<std::array<Position, 2>, std::pair<std::size_t, Eigen::Vector3f>> edges;
   SeamErrors errors;
-  for (std::size_t piece = 0; piece < models.size(); ++piece)
-    for (std::uint32_t t = 0; t < models[piece].mesh.triangles.size(); ++t)
+  for (std::size_t tile = 0; tile < models.size(); ++tile)
+    for (std::uint32_t t = 0; t < models[tile].mesh.triangles.size(); ++t)
       for (std::size_t k = 0; k < 3; ++k) {
-        const libmap::Triangle& corners = models[piece].mesh.triangles[t];
+        const libmap::Triangle& corners = models[tile].mesh.triangles[t];
         std::array<Position, 2> ends = {
-            position_of(models[piece].mesh.vertices[corners[k]]),
-            position_of(models[piece].mesh.vertices[corners[(k + 1) % 3]])};
+            position_of(models[tile].mesh.vertices[corners[k]]),
+            position_of(models[tile].mesh.vertices[corners[(k + 1) % 3]])};
         if (ends[1] < ends[0]) std::swap(ends[0], ends[1]);
         const Eigen::Vector3f color =
-            graspmap_test::texture_color(models[piece], t, k == 2 ? 0.0 : 0.5, k == 0 ? 0.0 : 0.5);
-        const auto [other, is_new] = edges.try_emplace(ends, piece, color);
-        if (is_new || other->second.first == piece) continue;
+            graspmap_test::texture_color(models[tile], t, k == 2 ? 0.0 : 0.5, k == 0 ? 0.0 : 0.5);
+        const auto [other, is_new] = edges.try_emplace(ends, tile, color);
+        if (is_new || other->second.first == tile) continue;
         const auto error =
             static_cast<double>((color - other->second.second).cwiseAbs().maxCoeff());
         errors.mean += error;
@@ -178,8 +178,8 @@ TEST(TextureTiles, VerticesOnSeamsAreSeenAlikeByBothPieces) {
   MeshTileIndex index = pieces_of(mesh);
   std::map<Position, std::vector<libmap::ViewQuality>> seen;
   int common = 0;
-  for (std::size_t piece = 0; piece < index.size(); ++piece) {
-    const libmap::MeshWithMargin part = index.with_margin(piece, 0.5);
+  for (std::size_t tile = 0; tile < index.size(); ++tile) {
+    const libmap::MeshWithMargin part = index.with_margin(tile, 0.5);
     const libmap::ViewTable views =
         libmap::find_texture_views(part.mesh, photos, {}, {part.triangles, 1, 4, 0},
                                    libmap::no_progress())
@@ -275,12 +275,12 @@ TEST(TextureTiles, OnePieceIsTheWholeMesh) {
       libmap::read_mesh(graspmap_test::scratch_folder() / "piece_0_0.ply").mesh, scan,
       scan.poses());
   libmap::TileTexturing texturing(index, 2.0, scan, scan.poses(), {});
-  const libmap::TileTexturing::Piece piece = texturing.make(0, texturing.find_exposure());
-  EXPECT_EQ(piece.model.texture_coordinates, whole.model.texture_coordinates);
-  ASSERT_EQ(piece.model.pages.size(), whole.model.pages.size());
+  const libmap::TileTexturing::Tile tile = texturing.make(0, texturing.find_exposure());
+  EXPECT_EQ(tile.model.texture_coordinates, whole.model.texture_coordinates);
+  ASSERT_EQ(tile.model.pages.size(), whole.model.pages.size());
   for (std::size_t page = 0; page < whole.model.pages.size(); ++page)
-    EXPECT_EQ(piece.model.pages[page].pixels, whole.model.pages[page].pixels);
-  EXPECT_EQ(piece.counts.charts, whole.charts);
+    EXPECT_EQ(tile.model.pages[page].pixels, whole.model.pages[page].pixels);
+  EXPECT_EQ(tile.counts.charts, whole.charts);
 }
 
 TEST(TextureTiles, APieceThatNobodySeesIsGray) {

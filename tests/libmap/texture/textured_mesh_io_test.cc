@@ -217,11 +217,11 @@ TEST(TexturedMeshIo, FilesThatAreBroken) {
   EXPECT_FALSE(libmap::read_textured_mesh(folder / "m.obj").has_texture());
   graspmap_test::write_textured_mesh(folder / "m.glb", model);
   const std::string whole = graspmap_test::read_text(folder / "m.glb");
-  for (const double share : {0.0, 0.01, 0.3, 0.8, 0.999}) {
+  for (const double fraction : {0.0, 0.01, 0.3, 0.8, 0.999}) {
     graspmap_test::write_text(
         folder / "cut.glb",
-        whole.substr(0, static_cast<std::size_t>(share * static_cast<double>(whole.size()))));
-    EXPECT_THROW(libmap::read_textured_mesh(folder / "cut.glb"), libmap::Error) << share;
+        whole.substr(0, static_cast<std::size_t>(fraction * static_cast<double>(whole.size()))));
+    EXPECT_THROW(libmap::read_textured_mesh(folder / "cut.glb"), libmap::Error) << fraction;
   }
   for (const std::size_t at : {12U, 13U, 14U, 15U}) {  // the length of the text
     std::string forged = whole;

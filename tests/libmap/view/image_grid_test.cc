@@ -200,8 +200,8 @@ TEST_F(ImageGridTest, ContinuousColorsShareTheirRange) {
   options.cell_height_px = 100;
   const ColorImage sheet = draw_sheet(cells, options);
   const SheetLayout layout = plan_sheet(cells, options, {}, 1.0);
-  const auto color = [&](std::size_t cell, double share) {
-    return at(sheet, layout.cells[cell].left + share * 200, layout.cells[cell].top + 50);
+  const auto color = [&](std::size_t cell, double fraction) {
+    return at(sheet, layout.cells[cell].left + fraction * 200, layout.cells[cell].top + 50);
   };
   EXPECT_EQ(color(0, 0.25), viridis(0.0));
   EXPECT_EQ(color(0, 0.75), viridis(0.25));

@@ -27,7 +27,7 @@ TriangleMesh mesh_of(const HeightField& field, double half_m) {
   TriangleMesh mesh;
   for (std::size_t row = 0; row + 1 < field.rows; ++row)
     for (std::size_t column = 0; column + 1 < field.columns; ++column) {
-      if (field.left_out[row * (field.columns - 1) + column]) continue;
+      if (field.is_missing[row * (field.columns - 1) + column]) continue;
       if (node(field, column, row).head<2>().minCoeff() < -half_m ||
           node(field, column + 1, row + 1).head<2>().maxCoeff() > half_m)
         continue;
@@ -53,7 +53,7 @@ TEST(HeightField, OfAPlaneIsThePlane) {
   TriangleMesh mesh = square_mesh(0.0, 0.5);
   for (Eigen::Vector3d& v : mesh.vertices) v.z() = 1000.0 + 0.4 * v.x() - 0.7 * v.y();
   const HeightField field = libmap::make_height_field(mesh, {.cell_size_m = 0.03});
-  EXPECT_EQ(field.left_out_cells, 0U);
+  EXPECT_EQ(field.missing_cells, 0U);
   EXPECT_LT(field.deviation_m, 1e-6);
   std::size_t nodes = 0;
   for (std::size_t row = 0; row < field.rows; ++row)
@@ -72,7 +72,7 @@ TEST(HeightField, NoPointIsFartherThanItsDeviation) {
     const TriangleMesh ground = wavy_ground();
     const HeightField field =
         libmap::make_height_field(ground, {.cell_size_m = cell, .max_deviation_m = 1.0});
-    EXPECT_EQ(field.left_out_cells, 0U);
+    EXPECT_EQ(field.missing_cells, 0U);
     EXPECT_GT(field.deviation_m, 1e-6);
     const double there = farthest(mesh_of(field, 0.4), ground);
     const double back = farthest(ground, mesh_of(field, 1.0));
@@ -86,17 +86,17 @@ TEST(HeightField, LeavesOutOverhangs) {
   const HeightField field = libmap::make_height_field(mesh, {});
   EXPECT_LE(field.deviation_m, 0.002);
   EXPECT_LE(farthest(mesh_of(field, 0.4), mesh), field.deviation_m + 1e-6);
-  double left_out_m2 = 0.0;
+  double missing_m2 = 0.0;
   for (std::size_t row = 0; row + 1 < field.rows; ++row)
     for (std::size_t column = 0; column + 1 < field.columns; ++column) {
-      const bool left_out = field.left_out[row * (field.columns - 1) + column];
-      if (left_out) left_out_m2 += field.cell_size_m * field.cell_size_m;
+      const bool is_missing = field.is_missing[row * (field.columns - 1) + column];
+      if (is_missing) missing_m2 += field.cell_size_m * field.cell_size_m;
       const Eigen::Vector2d at = node(field, column, row).head<2>();
-      EXPECT_TRUE(left_out || (at - Eigen::Vector2d(0.1, 0.05)).norm() > 0.11);
+      EXPECT_TRUE(is_missing || (at - Eigen::Vector2d(0.1, 0.05)).norm() > 0.11);
       EXPECT_LE(node(field, column, row).z(),
                 wavy_height(at.x(), at.y()) + 0.002);  // no node is above the ground
     }
-  EXPECT_NEAR(left_out_m2, 3.1416 * 0.127 * 0.127, 0.01);
+  EXPECT_NEAR(missing_m2, 3.1416 * 0.127 * 0.127, 0.01);
 }
 
 TEST(HeightField, BadMeshes) {
