@@ -21,8 +21,7 @@
 namespace libgtd {
 
 // Source of the terrain frame. fit: downsamples the cloud (`thesis` only), fits the regression
-// plane and transforms the cloud into the frame of the plane. none: the cloud is in the terrain
-// frame.
+// plane and transforms the cloud into its frame. none: the cloud is in the terrain frame.
 enum class PlaneSource { fit, none };
 
 struct DetectionOptions {

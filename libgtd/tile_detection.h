@@ -33,8 +33,8 @@ int tile_voxels(const Scenario& scenario);
 // Returns the width of the halo in voxels: the columns around a tile that affect the voxels of the
 // tile. The halo covers the mask window, the closing of the scanned area, the points that decide
 // convexity with all neighbors, and the points of surface normals, but not interpolation and
-// obstacles, which use the whole terrain. Throws Error naming a radius that is too large for the
-// voxel size.
+// obstacles, which use the whole terrain. Throws Error naming a radius too large for the voxel
+// size.
 int halo_voxels(const GripperMask& mask, const Scenario& scenario);
 
 // Returns the radius of the surface normal fits of a scenario, m.

@@ -50,13 +50,13 @@ struct SpotCheckCommandOptions {
 void bind(libmap::ParameterTable& table, SpotCheckCommandOptions& options) {
   bind(table, options.check);
   table.add("radius_m", options.radius_m, libmap::positive,
-            "for a cloud: horizontal radius of the points with the median height of a position, m");
+            "for a cloud: radius of the points that determine the median height at a position, m");
   table.add("min_points", options.min_points, {1.0, 1e9},
             "for a cloud: minimum number of points for the height of a position");
   table.add("outline", options.outline,
             {{"axes", SiteOutline::axes}, {"turned", SiteOutline::turned}},
-            "outline of the site; axes: smallest rectangle around the data parallel to the axes; "
-            "turned: smallest rotated rectangle");
+            "outline of the site: smallest rectangle; axes: parallel to the axes; turned: "
+            "rotated");
   table.add(
       "ground", options.ground,
       {{"auto", Ground::automatic}, {"zero", Ground::zero}, {"fit", Ground::fit}},
@@ -64,8 +64,8 @@ void bind(libmap::ParameterTable& table, SpotCheckCommandOptions& options) {
       "the transform of a site or terrain frame, else fit");
   table.add("truth_frame", options.truth_frame,
             {{"site", TruthFrame::site}, {"map", TruthFrame::map}},
-            "frame of --truth; site: frame of the site; map: frame of the map from which the "
-            "site was cropped");
+            "frame of --truth; site: of the site; map: of the map from which the site was "
+            "cropped");
   bind(table, options.plane);
 }
 

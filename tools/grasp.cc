@@ -199,8 +199,8 @@ void bind(libmap::ParameterTable& table, GraspCommandOptions& options) {
             {{"auto", SequentialTest::automatic},
              {"on", SequentialTest::on},
              {"off", SequentialTest::off}},
-            "end of the test of a location as soon as its verdict is certain; on: always; off: "
-            "never; auto: only with --map");
+            "end of a test as soon as the verdict is certain; on: always; off: never; auto: with "
+            "--map");
   table.add("map_draws", options.map_draws, {1, 100000},
             "with --map: number of random draws per pose, instead of --draws");
   table.add("more_loads", options.more_loads,
@@ -321,8 +321,7 @@ void grasp_places(GraspCommandOptions& options, Run& run) {
   for (const std::string& text : libmap::split_list(options.more_loads)) {
     const auto load = libmap::parse_double(text);
     if (!load || !(*load > 0.0))
-      throw libmap::Error("not a force, N",
-                          {.field = "--more-loads", .value = text, .bound = "> 0"});
+      throw libmap::Error("not a force", {.field = "--more-loads", .value = text, .bound = "> 0"});
     options.grasp.extra_loads_n.push_back(*load);
   }
   claim_scenes(options.scenes, run);

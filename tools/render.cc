@@ -253,8 +253,8 @@ SceneFile scene_of(const std::string& file, const SceneFileOptions& options, Run
 // Options of marked locations only.
 void bind_points(libmap::ParameterTable& table, SceneFileOptions& options) {
   table.add("label", options.label,
-            "column of the names of marked locations; auto: the first column, unless it is x, y "
-            "or z; none: no names");
+            "column of names of marked locations; auto: the first, unless x, y or z; none: no "
+            "names");
   table.add("verdict", options.verdict,
             "column of the verdicts of marked locations; 1: green; 0: red; empty: neutral");
   table.add("points_frame", options.points_frame, listed_point_frame_names(),
@@ -266,8 +266,8 @@ void bind_points(libmap::ParameterTable& table, SceneFileOptions& options) {
 void bind(libmap::ParameterTable& table, SceneFileOptions& options) {
   bind(table, options.layer);
   table.add("zero_plane", options.zero_plane,
-            "height in the terrain frame below which ground is white, m; auto: zero plane of the "
-            "map; none: no zero plane");
+            "height in the terrain frame below which ground is white, m; auto: as the map; none: "
+            "no limit");
   table.add("box", options.box,
             "shown rectangle of a cloud or map: X0,Y0,X1,Y1 in the frame of the file, m");
   table.add("max_points", options.max_points, libmap::Range{1'000.0, 1e9},
@@ -336,8 +336,8 @@ void bind_page(libmap::ParameterTable& table, RenderOptions& options) {
             "for several files: titles of the rows, separated by |");
   table.add("shared_view", sheet.shared_view,
             {{"sheet", libmap::SharedView::sheet}, {"row", libmap::SharedView::row}},
-            "maps with common scale and extent on a page of several files; sheet: all; row: maps "
-            "of each row");
+            "maps with common scale on a page of several files; sheet: all; row: maps of each "
+            "row");
 }
 
 void bind(libmap::ParameterTable& table, RenderOptions& options) {

@@ -49,9 +49,8 @@ void bind(libmap::ParameterTable& table, TextureCommandOptions& options) {
             {{"auto", MeshFrame::automatic},
              {"poses", MeshFrame::poses},
              {"ground-truth", MeshFrame::ground_truth}},
-            "frame of the mesh; poses: frame of the poses; ground-truth: frame of the scan's "
-            "true poses, to which the poses are aligned; auto: from the mesh's manifest, else "
-            "poses");
+            "frame of the mesh; poses: frame of the poses; ground-truth: frame of true poses, to "
+            "which the poses are aligned; auto: from the mesh's manifest, else poses");
   libmap::bind(table, options.texture);
   table.add("margin_m", options.margin_m, libmap::not_negative,
             "for an output folder: maximum distance of occluding surfaces from a tile, m");

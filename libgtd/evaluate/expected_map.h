@@ -15,8 +15,7 @@
 
 namespace libgtd {
 
-// Region of all points at most `radius_m` from a segment in 3D; a ball if the ends of the segment
-// coincide.
+// Region of all points at most `radius_m` from a segment in 3D; a ball if both ends coincide.
 struct ExpectedRegion {
   std::string name;
   Eigen::Vector3d from = Eigen::Vector3d::Zero();  // meters

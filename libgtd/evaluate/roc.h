@@ -16,8 +16,8 @@
 namespace libgtd {
 
 struct RocOptions {
-  // Cutoffs of the ROC table and the upper sum, finite and ascending; the default is from tab. 5-1
-  // to 5-3 of the thesis.
+  // Cutoffs of the ROC table and the upper sum, finite and ascending; default: tab. 5-1 to 5-3 of
+  // the thesis.
   std::vector<double> cutoffs = {0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0};
   double rate_cutoff = 0.8;          // cutoff of the rates
   int bootstrap_replicates = 10000;  // 0: no interval

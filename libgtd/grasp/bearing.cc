@@ -88,8 +88,7 @@ void bind(libmap::ParameterTable& table, EngagementOptions& options) {
   using libmap::positive;
   constexpr libmap::Range cone{0.0, 89.0};
   table.add("law", options.law, engagement_law_names(),
-            "force that a contact bears; asperities: random facets; adhesion: limited tension "
-            "(LORIS)");
+            "force of a contact; asperities: random facets; adhesion: limited tension (LORIS)");
   table.add("adhesion_limit_n", options.adhesion_limit_n, positive,
             "law adhesion: maximum total tension of all fingers, N");
   table.add("adhesion_lateral_deg", options.adhesion_lateral_deg, cone,

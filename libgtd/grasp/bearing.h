@@ -29,8 +29,7 @@ struct EngagementOptions {
 void bind(libmap::ParameterTable& table, EngagementOptions& options);
 
 // Distribution of a contact's force over the spines of the contact. best: the distribution with the
-// largest force. equally: equal parts; if a spine slips, spines on steeper facets bear the part of
-// this spine.
+// largest force. equally: equal parts; if a spine slips, spines on steeper facets bear its part.
 enum class SpineSharing { best, equally };
 
 // Convex set of forces that a contact can exert on the gripper; it contains 0. A spine touches both

@@ -77,8 +77,7 @@ struct LocationResult {
   std::vector<double> extra_load_probabilities;  // for extra_loads_n
   std::array<double, 3> force_n{};               // equal sharing: quantiles 0.1, 0.5, 0.9
   std::array<double, 3> best_force_n{};          // best sharing: quantiles 0.1, 0.5, 0.9
-  // Direction that most often has the minimum force (trials with a force only); index in
-  // pull_directions().
+  // Most frequent direction of minimum force (trials with a force); index in pull_directions().
   std::size_t limiting_direction = 0;
   bool has_force = false;                 // at least one trial has a force
   std::array<double, 2> force_range_n{};  // equal sharing: quantiles 0.05 and 0.95

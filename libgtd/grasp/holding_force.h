@@ -21,8 +21,8 @@ struct HoldingOptions {
   SpineSharing sharing = SpineSharing::best;
 };
 
-// Returns the maximum F (N) for which forces f_i of the contacts, each in the contact's force set,
-// balance the pull F w:
+// Returns the maximum F (N) for which forces f_i of the contacts, each in its set, balance the pull
+// F w:
 //   sum f_i + F w = 0,  sum (p_i - p) x f_i = 0,  sum over finger k of r_k . f_i <= P + c_k F / m
 // (Kumar and Waldron 1988), with r_k outward and m fingers with contacts. c_k is 0, or, if the
 // drives resist opening, sin g cos g / (1 + sin^2 g) of the finger's steepest contact on ground

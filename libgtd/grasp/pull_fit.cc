@@ -259,8 +259,7 @@ class PullFitting {
       const std::string row = "row " + std::to_string(test.row);
       const Ground* under = test.on_level_ground ? &level_ : ground;
       if (under == nullptr)
-        throw libmap::Error("the test is at a location on the ground and requires a mesh",
-                            {.field = row});
+        throw libmap::Error("a test at a location requires a mesh of the ground", {.field = row});
       const Eigen::Vector3d at = test.on_level_ground ? Eigen::Vector3d::Zero() : test.location;
       if (!under->distance(at, options.grasp.max_distance_m))
         throw libmap::Error("not on the mesh",
@@ -488,10 +487,7 @@ PlannedPull informative_pull(const std::vector<std::vector<double>>& forces_of_s
 }  // namespace
 
 std::vector<PullTest> pull_tests_of(const libmap::Table& table) {
-  if (table.rows.empty())
-    throw libmap::Error(
-        "too few",
-        {.file = table.file, .field = "number of pull tests", .value = "0", .bound = ">= 1"});
+  if (table.rows.empty()) throw libmap::Error("contains no pull tests", {.file = table.file});
   const PullReader reader(table);
   std::vector<PullTest> tests;
   for (std::size_t row = 0; row < table.rows.size(); ++row) tests.push_back(reader.read(row));

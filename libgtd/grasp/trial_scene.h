@@ -14,8 +14,7 @@ namespace libgtd {
 
 // Part of the scene, stored in the vertex field `scene_part`. engaged, link: contacts that bear a
 // force. idle: a finger that bears no force. cone: forces that a contact can bear on the steepest
-// facet. pull: the direction with the minimum holding force. load: arrow of `load_n` with a disc at
-// its end.
+// facet. pull: the direction with the minimum holding force. load: arrow of `load_n` with a disc.
 enum class ScenePart { ground, gripper, engaged, link, idle, cone, pull, load };
 
 struct ScenePartStyle {

@@ -19,8 +19,8 @@ struct ClosingPath;  // closing_path.h
 // thesis: the author's program (eq. 3-6..3-16). envelope: the alternative design of the thesis
 // (5.1), which does not count voxels outside the reach of the fingers. climblab: mask of ClimbLab
 // v3, without void layers. corrected: as thesis, with an odd side centered on the pivot voxel and
-// exact radii. calibrated: the mask of `corrected`; the score is the probability of holding the
-// load (closing_force.h).
+// exact radii. calibrated: the mask of `corrected`; the score is the hold probability
+// (closing_force.h).
 enum class Method { thesis, envelope, climblab, corrected, calibrated };
 
 const std::vector<std::pair<std::string, Method>>& method_names();

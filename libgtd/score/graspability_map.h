@@ -19,8 +19,8 @@ struct MapVoxel {
   bool border = false;     // the window of the mask extends beyond the scanned area
   Obstacle obstacle = Obstacle::none;
   ForceEstimate force{};  // calibrated only
-  // Fraction of 16 azimuths in which the ground drops outward by more than GripperMask::min_fall_m;
-  // `corrected` with upright masks only.
+  // Fraction of 16 azimuths in which the ground drops outward by more than the mask's min_fall_m;
+  // corrected, upright masks only.
   double outward_fall_fraction = 1.0;
   float slope_deg = 0.0F;                             // see SurfaceNormal
   Eigen::Vector3f normal = Eigen::Vector3f::UnitZ();  // axis of the mask, in the terrain frame

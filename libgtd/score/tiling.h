@@ -48,8 +48,7 @@ std::vector<ScoredVoxel> score_tiles(const VoxelGrid& grid, const GripperMask& m
                                      const ScoringOptions& options,
                                      libmap::Progress& progress = libmap::no_progress());
 
-// Returns 1 for each pivot with a mask window that contains a column outside the scanned area, else
-// 0.
+// Returns 1 for pivots with a mask window that contains a column outside the scanned area, else 0.
 std::vector<std::uint8_t> find_border_pivots(const VoxelGrid& grid, const GripperMask& mask,
                                              const TileBounds& tile,
                                              const std::vector<std::size_t>& pivots);

@@ -26,10 +26,10 @@ struct VoxelCounts {
 std::vector<std::size_t> pivots_in(const VoxelGrid& grid, const GripperMask& mask,
                                    const TileBounds& tile);
 
-// Returns the counts of each pivot. Terrain around a block of pivots is stored as bits, and matches
-// are counted by popcount, in parallel. The counts do not depend on the other pivots, the number of
-// threads or `instructions`, which the processor must support. Memory is proportional to the number
-// of voxels and the size of the mask, not to the bounding box.
+// Returns the counts of each pivot. Terrain around a block of pivots is stored as bits; popcount
+// counts matches, in parallel. The counts do not depend on the other pivots, the number of threads
+// or `instructions`, which the processor must support. Memory is proportional to the number of
+// voxels and the size of the mask, not to the bounding box.
 std::vector<VoxelCounts> match_voxels(
     const VoxelGrid& grid, const GripperMask& mask, const std::vector<std::size_t>& pivots,
     libmap::InstructionSet instructions = libmap::best_instruction_set(),

@@ -27,8 +27,7 @@ struct ConvexityOptions {
 
 // Returns 1 for each convex point of `curvature`, else 0, by the rule of the method that estimated
 // it. `positions` are the positions of curvature.points in the terrain frame. Points without a
-// curvature are not convex. Throws Error for arrays of different length and for bounds that are
-// NaN.
+// curvature are not convex. Throws Error for arrays of different length and for NaN bounds.
 std::vector<std::uint8_t> find_convex(const CurvatureResult& curvature,
                                       const std::vector<Eigen::Vector3d>& positions,
                                       const ConvexityOptions& options = {});

@@ -11,8 +11,7 @@ namespace libgtd {
 
 // thesis: the grid starts at the minimum x and y of the points, has the pitch of the author's
 // program, drops nodes of height exactly 0 and rounds coordinates to single precision. corrected:
-// the pitch follows eq. 3-5 as printed, and nodes are at whole multiples of the pitch in the input
-// frame.
+// the pitch follows eq. 3-5 as printed, and nodes are at multiples of the pitch in the input frame.
 enum class InterpolationMethod { thesis, corrected };
 
 struct InterpolationOptions {

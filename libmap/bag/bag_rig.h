@@ -1,5 +1,4 @@
-// Exports depth images of a robot's cameras from a ROS bag to a rig and images of the rig
-// (rig_io.h).
+// Exports depth images of a robot's cameras from a ROS bag to a rig with images (rig_io.h).
 #pragma once
 
 #include <cstddef>

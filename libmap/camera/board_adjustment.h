@@ -31,8 +31,7 @@ double squared_error(const BoardFit& fit, const BoardCorners& corners);
 double adjust_boards(BoardFit& fit, const BoardCorners& corners);
 
 // Covariance of the intrinsics (fx fy cx cy and distortion terms) for a noise of 1 px in each
-// coordinate, with the board poses marginalized. Empty if the images do not determine the
-// intrinsics.
+// coordinate, with the board poses marginalized. Empty if the intrinsics are not determined.
 Eigen::MatrixXd unit_covariance(const BoardFit& fit, const BoardCorners& corners);
 
 }  // namespace libmap

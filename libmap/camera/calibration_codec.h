@@ -63,8 +63,8 @@ std::string encode_calibration(const Calibration& calibration);
 
 // Cameras of the stored images: from P if it is stored (images are rectified), else from K and D.
 // A camera without a stored size has an equal share of an image of `image_width` x `image_height`.
-// D of 6 terms is equidistant: k1 k2 0 0 k3 k4. Throws Error naming the field, for example without
-// K and P.
+// D of 6 terms is equidistant: k1 k2 0 0 k3 k4. Throws Error naming the field, e.g. without K and
+// P.
 std::vector<Camera> cameras_of(const Calibration& calibration, int image_width, int image_height);
 std::vector<StereoCamera> stereo_cameras_of(const Calibration& calibration, int image_width,
                                             int image_height);

@@ -261,8 +261,8 @@ Pose pose_from_yaml(const YAML::Node& node, const std::string& field) {
   const Eigen::Matrix3d rotation = nearest_rotation(written);
   const double deviation = (rotation - written).cwiseAbs().maxCoeff();
   if (!(deviation <= 1e-3))
-    refuse("error of the rotation in " + field, to_text(deviation),
-           "the 3 x 3 part is not a rotation", "<= 0.001");
+    refuse(field + ", rotation error", to_text(deviation), "the 3 x 3 part is not a rotation",
+           "<= 0.001");
   // Exact rotations are not modified.
   if (deviation > 1e-9) pose.linear() = rotation;
   return pose;

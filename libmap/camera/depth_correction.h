@@ -51,8 +51,7 @@ double squared_image_radius(int width, int height, double x_px, double y_px);
 void correct_depth(DepthImage& depth, const DepthCorrection& correction);
 
 // Registers a depth image of `camera` to the pixels of `target`. Each measurement covers the pixels
-// of `target` inside the projected pixel; the nearest measurement is kept. Occluded pixels have no
-// depth.
+// of `target` inside the projected pixel; the nearest one is kept. Occluded pixels have no depth.
 DepthImage register_depth(const DepthImage& depth, const Camera& camera, const Camera& target,
                           const Pose& target_from_camera);
 

@@ -42,8 +42,7 @@ struct StoredMatrix {
   bool operator==(const StoredMatrix&) const = default;
 };
 
-// Reads sizes and type from a blob's end; `bytes` is empty. Throws Error if sizes or type are
-// invalid.
+// Reads sizes and type from a blob's end; `bytes` is empty. Throws Error if invalid.
 StoredMatrix read_matrix_header(std::string_view blob);
 
 // Maximum compression ratio of deflate (RFC 1951: 258 bytes in two bits).

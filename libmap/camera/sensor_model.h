@@ -8,7 +8,7 @@
 
 namespace libmap {
 
-// Keys are those of `simulate scan`; keys "refine.KEY" are only used for refinement. The standard
+// Keys as in `simulate scan`; keys "refine.KEY" are only used for refinement. The standard
 // deviation of depth z is noise_m + noise_of_range z + noise_of_square z^2.
 struct SensorModel {
   double noise_m = 0.0;

@@ -31,7 +31,7 @@ class Error : public std::runtime_error {
 
   // Returns a copy that names `file`, unless the error names a file already.
   Error in_file(const std::string& file) const;
-  // Returns a copy with `prefix` as field, followed by `joint` and the old field if there is one:
+  // Returns a copy with field `prefix`, followed by `joint` and the old field if there is one:
   // "rig: width".
   Error in_field(const std::string& prefix, const char* joint = ": ") const;
 

@@ -63,8 +63,7 @@ class ParameterTable {
   }
 
   // Collects values of keys "PREFIX.KEY" as text, e.g. "gripper.opening_angle_deg", to override the
-  // values of a file that is read later. The last text of a key counts; the caller checks the
-  // names.
+  // values of a file that is read later. The last text counts; the caller checks the names.
   void add_overrides(std::string prefix, std::vector<std::pair<std::string, std::string>>& texts);
 
   const std::vector<Parameter>& parameters() const { return parameters_; }
@@ -105,8 +104,7 @@ void check_parameters(Options options) {
   table.check();
 }
 
-// Returns the key of the first bound field that differs from the default; nullopt if all are
-// default.
+// Returns the key of the first bound field that differs from the default, or nullopt.
 template <typename Options>
 std::optional<std::string> changed_key(Options options, void (*bind)(ParameterTable&, Options&)) {
   Options unset;

@@ -106,8 +106,7 @@ class SandboxReader {
 };
 
 // Calls make() in a child process and returns the result or throws the Error of make(). pass(end,
-// result) sends and receives the result. Throws Error with the reason `broken` if the child
-// crashes.
+// result) sends and receives the result. Throws Error with reason `broken` if the child crashes.
 template <typename Result, typename Make, typename Pass>
 Result run_sandboxed(std::uint64_t max_data_bytes, const std::string& broken, const Make& make,
                      const Pass& pass) {

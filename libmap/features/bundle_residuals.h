@@ -35,8 +35,7 @@ struct CalibratedObservation {
 };
 
 // Indices of a camera's parameters: step of the intrinsics (4), step of the registration (6),
-// timing (2), radial terms of the depth correction (3), coefficients of the depth correction's
-// spline.
+// timing (2), radial terms of the depth correction (3), coefficients of the spline.
 inline constexpr Eigen::Index intrinsics_at = 0;
 inline constexpr Eigen::Index registration_at = 4;
 inline constexpr Eigen::Index timing_at = 10;

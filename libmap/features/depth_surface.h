@@ -42,8 +42,7 @@ class DepthSurface {
   // quarter of the pixels of a full disc, for example at edges.
   DepthSurface(const DepthPlanes& planes, const Camera& depth_camera, const DepthNoise& noise,
                double surface_noise_m, int step_px);
-  // Restores a stored surface. Throws Error unless there is one cell per step_px-th pixel in both
-  // directions.
+  // Restores a stored surface. Throws Error unless there is one cell per step_px-th pixel.
   DepthSurface(const Camera& depth_camera, int step_px, std::vector<Cell> cells);
 
   const Camera& camera() const { return camera_; }

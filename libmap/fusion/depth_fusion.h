@@ -100,8 +100,7 @@ struct FusionPlan {
   int registration_rounds = 0;                   // rounds that moved frames; 0: poses are unchanged
   bool registration_rejected = false;            // the first round was rejected
   RegistrationCheck registration_check{};        // of the first round
-  // RMS deviation of surface heights of single frames from the mean height, with given and final
-  // poses.
+  // RMS deviation of single frames' heights from the mean height, with given and final poses.
   double disagreement_before_m = 0.0;
   double disagreement_after_m = 0.0;
   DepthNoise noise{};  // noise of all passes

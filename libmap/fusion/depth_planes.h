@@ -50,9 +50,8 @@ struct DepthPlanes {
 
 // Fits each pixel's plane to the pairs of opposite neighbors with a mean that agrees with the pixel
 // within the noise, by mean inverse depth and least-squares slopes. A pixel with too few such
-// pairs, at the edge of a surface, takes an adjacent plane that predicts the pixel's depth within
-// the noise; without one, it is a flying pixel. Image (depth in m) and rays must have the same
-// size.
+// pairs, at the edge of a surface, takes an adjacent plane that predicts its depth within the
+// noise; without one, it is a flying pixel. Image (depth in m) and rays must have the same size.
 DepthPlanes fit_depth_planes(const DepthImage& depth, const PixelRays& rays,
                              const DepthPlaneOptions& options = {});
 

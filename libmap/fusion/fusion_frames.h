@@ -61,8 +61,7 @@ class FusionFrames {
   // for an invalid camera. Can be called from several threads.
   void measure_reach(const RgbdFrame& depth, double max_depth_m, FusionFrame& frame);
 
-  // Calls use(views, frames) for groups of frames, in the order of the frames; views are numbered
-  // by frame.
+  // Calls use(views, frames) for groups of frames, in order; views are numbered by frame.
   using UseViews = std::function<void(std::span<const RefinementView> views, std::size_t frames)>;
   void each_view_group(std::span<const FusionFrame> frames, bool color, const UseViews& use);
 

@@ -14,12 +14,10 @@
 
 namespace libmap {
 
-// Distance in voxels within which other voxels affect a SurfaceElement (surface_voxels.h), from
-// which a point is made.
+// Distance in voxels within which other voxels affect a SurfaceElement, the source of a point.
 inline constexpr int element_neighborhood = 3;
 
-// Tiles of whole voxels in the x-y plane of the world, with the margins that affect the points of
-// the tiles.
+// Tiles of whole voxels in the x-y plane of the world, with the margins that affect points.
 class FusionTiling {
  public:
   using Cell = Eigen::Array<std::int64_t, 2, 1>;
@@ -35,8 +33,8 @@ class FusionTiling {
         frame_margin_(element_margin_ + element_neighborhood + 1 +
                       static_cast<int>(std::ceil((shift_m + disc_m) / voxel_m))) {}
 
-  // Calls use(tile) for each tile that is affected by a frame whose measurements are inside `reach`
-  // (m, grid frame).
+  // Calls use(tile) for each tile affected by a frame with measurements inside `reach` (m, grid
+  // frame).
   template <typename Use>
   void each_tile(const Eigen::AlignedBox3d& reach, const Use& use) const {
     const auto tile_of = [&](const Eigen::Vector3d& position, int margin) -> Cell {

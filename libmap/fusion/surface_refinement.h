@@ -66,8 +66,7 @@ struct RefinedSurface {
 
 // Refines the elements, in meters, with all views. `pose_error_m` >= 0 is the standard deviation of
 // a whole frame along the normal. `each_group(add)` must call add(views) for all views, by frame.
-// The order of views affects the result by rounding only; grouping and the number of threads do
-// not.
+// The order of views affects the result by rounding only; the number of threads does not.
 using AddViews = std::function<void(std::span<const RefinementView>)>;
 RefinedSurface refine_surface(std::vector<SurfaceElement> elements, const DepthSensor& sensor,
                               const SurfaceSearch& search, double pose_error_m,

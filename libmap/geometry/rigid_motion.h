@@ -25,8 +25,7 @@ Eigen::Quaterniond rotation_of(const Eigen::Vector3d& rotation_vector);
 Eigen::Vector3d rotation_vector_of(const Eigen::Matrix3d& rotation);
 
 // Derivative of rotation_vector_of(R * exp(r)) by r at 0, for R = exp(rotation_vector): the inverse
-// right Jacobian of SO(3). The derivative of rotation_vector_of(exp(r) * R) is the transpose of
-// this matrix.
+// right Jacobian of SO(3). The derivative of rotation_vector_of(exp(r) * R) is the transpose.
 Eigen::Matrix3d rotation_vector_derivative(const Eigen::Vector3d& rotation_vector);
 
 Pose moved(const Pose& pose, const Vector6d& step);

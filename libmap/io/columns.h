@@ -60,8 +60,7 @@ struct ColumnSet {
   std::vector<std::shared_ptr<const void>> storage;  // owners of the viewed memory
 
   const Column* find(std::string_view name) const;  // nullptr if there is no such column
-  // Adds a column of `rows` numbers, owned by the set, and returns a pointer for filling the
-  // column.
+  // Adds a column of `rows` numbers, owned by the set, and returns a pointer to fill it.
   double* add_numbers(std::string name, ScalarType type);
 };
 

@@ -36,9 +36,8 @@ class MeshTileIndex {
   // Bounding box in x and y.
   const Eigen::AlignedBox2d& box(std::size_t tile) const { return tiles_[tile].box; }
 
-  // Returns the tile, and the triangles of other tiles with a corner within `margin_m` of the
-  // tile's box. Caches recently used tiles, up to 1 million triangles. Throws Error if a file
-  // cannot be read.
+  // Returns the tile, and the triangles of other tiles with a corner within `margin_m` of its box.
+  // Caches recently used tiles, up to 1 million triangles. Throws Error if a file cannot be read.
   MeshWithMargin with_margin(std::size_t tile, double margin_m);
 
  private:

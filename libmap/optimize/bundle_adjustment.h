@@ -70,7 +70,7 @@ struct BundleAdjustmentResult {
   std::vector<Eigen::Vector3d> points;  // in the map, one per track
   SensorCalibration calibration;        // of the free parameters
   // Calibrations at one standard deviation along the independent directions that change positions
-  // of poses most.
+  // most.
   std::vector<SensorCalibration> alternatives;
   SensorCalibration deviations;  // of intrinsics and timing; set if alternatives are requested
   // Information of steps of the poses (rigid_motion.h) at the optimum, in the order of
@@ -94,8 +94,8 @@ struct BundleAdjustmentResult {
 // other closures, priors). The gauge node of each component is fixed. The information is computed
 // from `system_tracks` if there are any: with TrackFrames::linked tracks the information is sparse
 // and slightly smaller. `start` is the initial calibration; by default the stored cameras and the
-// motion between poses. Memory is proportional to the square of the number of poses. Throws Error:
-// options out of range.
+// motion between poses. Memory is proportional to (number of poses)^2. Throws Error: options out of
+// range.
 BundleAdjustmentResult adjust_bundle(
     const std::vector<FrameFeatures>& frames, const std::vector<FeatureTrack>& tracks,
     const std::map<int, Pose>& map_from_base, const std::vector<GraphLinkResult>& links,

@@ -14,8 +14,8 @@ namespace libmap {
 class GraphCovariance {
  public:
   // Uses links with robust weights; rejected links are ignored. The gauge node of each component is
-  // fixed. Covariances of all nodes, linked pairs and `pairs` are computed here, in about the time
-  // of one factorization.
+  // fixed. Covariances of all nodes, linked pairs and `pairs` are computed here, in the time of one
+  // factorization.
   explicit GraphCovariance(const PoseGraphResult& graph,
                            const std::vector<std::pair<int, int>>& pairs = {});
   // Uses any system with one block per node of `map_from_base`, in the same order. The gauge node

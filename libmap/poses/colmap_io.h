@@ -39,8 +39,7 @@ struct ColmapObservation {
   std::int64_t point = -1;                          // POINT3D_ID; -1: no point
 };
 
-// Two lines of images.txt: "IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME" and the features of the
-// image.
+// Two lines of images.txt: "IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME" and the features.
 struct ColmapImage {
   int camera = 0;                             // CAMERA_ID
   std::string name{};                         // relative to the folder of the images

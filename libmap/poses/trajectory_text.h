@@ -68,8 +68,7 @@ std::string to_g2o(const Trajectory& poses, const std::vector<PoseLink>& links);
 PoseGraphText parse_toro(std::string_view text, const std::string& file);
 std::string to_toro(const Trajectory& poses, const std::vector<PoseLink>& links);
 
-// Axes of a file's poses. RTAB-Map rotates the axes in formats 1 and 2; the file does not indicate
-// this rotation.
+// Axes of a file's poses. RTAB-Map rotates the axes in formats 1 and 2; files do not indicate this.
 enum class PoseAxes {
   map,            // axes of the scan: x forward, z up
   optical,        // format 2: z forward, x right, y down, for the world and the moving body

@@ -38,8 +38,8 @@ std::vector<BoardView> find_boards(const ScanSource& scan, const std::vector<Fra
 // `calibration` is applied to them. In the result, `lengths` is the number of views used,
 // `chi_square` is per degree of freedom, of the views' poses against the board. If `chi_square` is
 // above 1, `deviation` is multiplied by sqrt(chi_square). Throws Error if no two images agree on
-// the board's pose, or if the views do not determine the scale to 3 %, for example if all are from
-// one location.
+// the board's pose, or if the views do not determine the scale to 3 %, e.g. if all are from one
+// location.
 ScaleEstimate scale_by_board(const std::vector<FrameFeatures>& frames,
                              const SensorCalibration& calibration,
                              const std::map<int, Pose>& map_from_base,

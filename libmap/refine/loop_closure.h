@@ -34,8 +34,7 @@ std::set<FramePair> consecutive_pairs(const std::vector<FrameFeatures>& frames, 
 std::set<FramePair> similar_pairs(const std::vector<FrameFeatures>& frames,
                                   const std::vector<GraphComponent>& components,
                                   const LoopClosureDetectionOptions& options, std::uint64_t seed);
-// Returns pairs with near poses, within a component of the graph. Frames without a pose have no
-// pairs.
+// Returns pairs with near poses in one component of the graph. Frames without a pose have none.
 std::set<FramePair> near_pairs(const std::vector<FrameFeatures>& frames,
                                const std::map<int, Pose>& map_from_base,
                                const std::vector<GraphComponent>& components,

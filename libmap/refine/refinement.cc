@@ -535,8 +535,8 @@ void bind(ParameterTable& table, RefinementOptions& options) {
             "with them");
   table.add("scale_from", options.scale_from,
             {{"depth", ScaleSource::depth}, {"odometry", ScaleSource::odometry}},
-            "source of the scale without a factor, known length or board; depth: depth images; "
-            "odometry: odometry links");
+            "source of the scale without a factor, length or board; depth: images; odometry: "
+            "links");
   table.add("scale", options.scale, {0.5, 2.0},
             "known scale factor of the scan, e.g. as printed by crop --border-size; 1: no factor "
             "is known");

@@ -57,8 +57,7 @@ std::optional<ScaleEstimate> scale_by_odometry(const std::vector<GraphLinkResult
                                                const std::map<int, Pose>& map_from_base);
 
 // Scales positions about the position of `fixed_node`, and the calibration so that depth after
-// registration and correction is multiplied by `factor`. `cameras` is the number of cameras in the
-// rig.
+// registration and correction is multiplied by `factor`. `cameras`: number in the rig.
 void apply_scale(double factor, int fixed_node, std::size_t cameras,
                  std::map<int, Pose>& map_from_base, SensorCalibration& calibration);
 

@@ -78,8 +78,7 @@ VisualOdometryResult track_frames(const std::vector<FrameFeatures>& frames,
 // nearest frames of larger parts before and after them. The initial pose is from constant motion,
 // interpolated between both sides or extrapolated from one, else from a few matches (guess_motion).
 // Alignments with both sides must agree. In `result` the frame's part is then joined to the larger
-// parts, and the links are added to depth_links. `start` has the sessions and the nodes with known
-// poses.
+// parts, and the links are added to depth_links. `start` has sessions and nodes with known poses.
 void place_lost_frames(const std::vector<FrameFeatures>& frames, const TrackingStart& start,
                        const LoopClosureDetectionOptions& matching, std::uint64_t seed,
                        VisualOdometryResult& result);

@@ -144,10 +144,8 @@ DepthImage read_depth(const std::string& bytes, double depth_unit_m) {
 // Registers depth to the color camera, at the size of the depth image.
 void register_to_color(RgbdFrame& frame, const Camera& depth_camera) {
   if (frame.cameras.size() != 1 || !frame.stereo.empty())
-    throw Error("depth_calibration requires one camera per frame",
-                {.field = "cameras",
-                 .value = std::to_string(frame.cameras.size() + 2 * frame.stereo.size()),
-                 .bound = "1"});
+    throw Error("depth_calibration requires one camera without stereo",
+                {.field = "cameras", .value = std::to_string(frame.cameras.size())});
   if (frame.depth.width != depth_camera.width || frame.depth.height != depth_camera.height)
     throw Error("differs from the calibration",
                 {.field = "size of the depth image",
@@ -223,8 +221,7 @@ void bind(ParameterTable& table, FrameFolderOptions& options) {
   table.add("depth_calibration", options.depth_calibration,
             "camera file of a separate depth camera; empty: depth is already registered to color");
   table.add("pose_frame", options.pose_frame, pose_frame_names(),
-            "frame of the poses in the pose files; camera: optical frame; base: frame of the "
-            "robot's base");
+            "frame of the poses in the pose files; camera: optical frame; base: robot's base");
   table.add("pairing_tolerance_s", options.pairing_tolerance_s, not_negative,
             "maximum time difference between paired color, depth and poses, s");
 }

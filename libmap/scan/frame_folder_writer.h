@@ -41,8 +41,8 @@ class FrameFolderWriter {
   // rounded to whole millimeters; 0 beyond 65.534 m.
   void add_frame(const RgbdFrame& frame, const StoredImages& stored = {});
 
-  // Writes nodes, poses, links and scan.yaml. Returns the numbers of images and calibrations, and
-  // of nodes with color and depth.
+  // Writes nodes, poses, links and scan.yaml. Returns numbers of images, calibrations and
+  // associations.
   FrameFolderCounts finish(const PoseGraph& graph);
 
  private:

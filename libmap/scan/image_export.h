@@ -38,8 +38,7 @@ void bind(ParameterTable& table, ViewSelectionOptions& options);
 // Selects views greedily by descending quality and returns their indices in ascending order. Two
 // views are similar if the distance is below the radius and the angle between the axes is below the
 // limit. No two selected views are similar; each other view is similar to a better selected view.
-// `qualities` has one value per view; the first of equal views is better. Poses are of optical
-// frames.
+// `qualities` has one value per view; the first of equal views is better. Poses are optical.
 std::vector<std::size_t> select_views(const std::vector<Pose>& world_from_camera,
                                       const std::vector<double>& qualities,
                                       const ViewSelectionOptions& options = {});

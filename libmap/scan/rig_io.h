@@ -1,5 +1,5 @@
-// Rigs of several depth cameras on one robot, images of rigs, and sets of synchronized images. A
-// rig is YAML:
+// Rigs of several depth cameras on one robot, images, and sets of synchronized images. A rig is
+// YAML:
 //
 //   depth_scale_m: 0.001       # meters per unit of the depth images
 //   near_m: 0.28               # measurements outside near..far are dropped

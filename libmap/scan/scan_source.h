@@ -62,8 +62,7 @@ std::unique_ptr<ScanSource> open_scans(const std::vector<std::filesystem::path>&
 
 // Replaces the focal lengths, principal point and distortion of the frame's camera, and corrects
 // and registers the depth. The mounting pose and the rolling shutter are unchanged. Throws Error
-// for a frame of several cameras or a stereo pair, or if the image size differs from the
-// calibration.
+// for a frame of several cameras or a stereo pair, or if the image size differs.
 void apply_calibration(RgbdFrame& frame, const CameraFile& calibration);
 
 // Returns `scan` with the calibration applied to each frame; read_frame throws Error naming the

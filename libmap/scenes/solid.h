@@ -23,8 +23,7 @@ struct HalfSpace {
 };
 
 // Intersection of half-spaces; the label of a face is the index of the face's half-space. Throws
-// Error if the solid is empty, degenerate or extends farther than `bound_m` from the origin along
-// an axis.
+// Error if it is empty, degenerate or extends farther than `bound_m` from the origin along an axis.
 Solid convex_solid(const std::vector<HalfSpace>& half_spaces, double bound_m);
 
 // An ellipsoid around the origin with edges of about `edge_length_m` and label 0.

@@ -255,8 +255,8 @@ void bind(ParameterTable& table, CameraTrajectoryOptions& options) {
             {{"auto", CameraPath::automatic},
              {"loops", CameraPath::loops},
              {"serpentine", CameraPath::serpentine}},
-            "camera path; loops: around the site; serpentine: lanes over the terrain; auto: "
-            "loops for a mesh, serpentine for a folder of clouds");
+            "camera path; loops: around the site; serpentine: in lanes; auto: serpentine for "
+            "clouds");
   bind(table, options.serpentine);
   table.add("frames", options.frames, {1.0, 1e6}, "number of poses");
   table.add("loops", options.loops, {1.0, 1000.0}, "number of loops around the site");

@@ -40,8 +40,7 @@ struct SurfaceView {
   Image<Eigen::Vector3f> color;  // 0 to 1; weights: 1/2 for the center, 1/8 for each corner
 };
 
-// Source of colors: the vertex colors, or rock_color(). automatic: vertex colors unless missing or
-// all equal.
+// Source of colors: the vertex colors, or rock_color(). automatic: vertex colors unless all equal.
 enum class TextureSource { automatic, mesh, rock };
 
 // Source of the normals for shading: estimated from the mesh, or vertex normals of the mesh.

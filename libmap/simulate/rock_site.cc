@@ -82,8 +82,8 @@ ParameterTable rock_parameters(SiteRock& rock) {
   ParameterTable table;
   table.add("name", rock.name, "name of the rock");
   table.add("shape", rock.shape, rock_shape_names(),
-            "shape of the rock; block: flat top and walls; cobble: rounded stone; dome: rounded "
-            "hump; jug, sloper, crimp, pinch: climbing holds");
+            "shape: block; cobble: rounded stone; dome: hump; jug, sloper, crimp, pinch: "
+            "climbing holds");
   table.add("x_m", rock.x_m, Range{-100.0, 100.0}, "x of the rock's center on the ground, m");
   table.add("y_m", rock.y_m, Range{-100.0, 100.0}, "y of the rock's center on the ground, m");
   table.add("height_m", rock.height_m, rock_size_range, "height of the top above the ground, m");

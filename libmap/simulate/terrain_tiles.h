@@ -29,8 +29,8 @@ void bind(ParameterTable& table, RockyTerrainOptions& options);
 
 // The terrain over a rectangle. Relief and roughness are fractal noise. Rocks are faceted blocks
 // and rounded cobbles without overhangs at random positions; they may overlap. Heights of rocks
-// follow a power law with a cumulative index of -2.65, as of the boulders on Ryugu (Michikami et
-// al. 2019).
+// follow a power law with a cumulative index of -2.65, as boulders on Ryugu (Michikami et al.
+// 2019).
 class RockyTerrain {
  public:
   // Draws all rocks that intersect the rectangle.

@@ -25,8 +25,7 @@ struct SiteRectangle {
 // that has the largest clearance, over all positions and directions. Among equal rectangles, the
 // smallest rotation and the mean position are used. `points` are the data in the x-y plane, with
 // gaps below max_gap_m between neighbors. Clearances down to one cell below margin_m are accepted.
-// Throws Error: options out of range, no point, no rectangle fits (the bound is the largest size
-// that fits).
+// Throws Error: options out of range, no point, no rectangle fits (the bound is the largest size).
 SiteRectangle find_site_rectangle(const std::vector<Eigen::Vector2d>& points,
                                   const Eigen::Vector2d& size_m,
                                   const SiteRectangleOptions& options = {});

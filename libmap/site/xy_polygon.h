@@ -31,8 +31,7 @@ class XyPolygon {
   // True for points inside or within 1e-9 m of the border.
   bool contains(const Eigen::Vector2d& point) const;
 
-  // Candidates for edges that intersect the box, by the index of the edge's first corner,
-  // ascending.
+  // Candidates for edges that intersect the box, by index of the first corner, ascending.
   std::vector<std::uint32_t> edges_near(const Eigen::Vector2d& box_min,
                                         const Eigen::Vector2d& box_max) const;
 
@@ -51,8 +50,7 @@ class XyPolygon {
 // The rectangle from min to max.
 XyPolygon make_rectangle(const Eigen::Vector2d& min, const Eigen::Vector2d& max);
 
-// Polygon extruded between two heights. Without a polygon, all points between the heights are
-// inside.
+// Polygon extruded between two heights. Without a polygon, contains all points between.
 struct ExtrudedPolygon {
   std::optional<XyPolygon> polygon{};
   double min_z = -std::numeric_limits<double>::infinity();

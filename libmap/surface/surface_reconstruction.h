@@ -93,8 +93,7 @@ using AnnounceWork = std::function<void(const SurfaceWork& work)>;
 // A shift of the cloud shifts the mesh, except for rounding. `announce` is called with the
 // estimated work before the work begins. Throws Error: no normals, no point with a normal,
 // inconsistent normals, fewer than 3 positions, positions on a line, options out of range, cells
-// larger than the cloud or too small for the point spacing, an octree deeper than max_octree_depth,
-// PCL failed.
+// larger than the cloud or too small for the point spacing, an octree too deep, PCL failed.
 SurfaceReconstructionResult reconstruct_surface(const PointCloud& cloud,
                                                 const SurfaceReconstructionOptions& options = {},
                                                 Progress& progress = no_progress(),

@@ -16,8 +16,7 @@ struct SurfaceSample {
   float spacing_m = 0.0F;                              // local distance between samples
 };
 
-// Maximum of spacing_m in cells, which callers must apply. Work is proportional to the cube of
-// spacing_m.
+// Maximum of spacing_m in cells, which callers must apply; work is proportional to spacing_m^3.
 inline constexpr double max_spacing_cells = 4.0;
 
 // Algebraic point set surface (Guennebaud and Gross 2007). At x, an algebraic sphere is fitted to

@@ -1,6 +1,5 @@
 // Reconstructs and cleans the surface of a large cloud in tiles of the x-y plane, so that memory
-// does not depend on the cloud's area. Adjacent tiles have the same vertices on the common border
-// (seam).
+// does not depend on the cloud's area. Adjacent tiles have the same vertices on the seam.
 #pragma once
 
 #include <Eigen/Geometry>

@@ -4,9 +4,8 @@
 // The energy is that of Lempitsky and Ivanov 2007 (equation 1): the loss of view quality against
 // the best view of each triangle, plus the length of the seams. The energy is minimized by exact
 // dynamic programming over forests of triangles, alternating with forests of regions of one
-// photograph, while the photographs of all other triangles are fixed (block coordinate descent as
-// in Thuerck et al. 2016, "A Fast, Massively Parallel Solver for Large, Irregular Pairwise Markov
-// Random Fields").
+// photograph, while all other photographs are fixed (block coordinate descent as in Thuerck et al.
+// 2016, "A Fast, Massively Parallel Solver for Large, Irregular Pairwise Markov Random Fields").
 #pragma once
 
 #include <cstdint>

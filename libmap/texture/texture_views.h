@@ -78,8 +78,7 @@ struct TextureViews {
   // One row per triangle: photographs that see it completely.
   ViewTable of_triangles;
   // One row per vertex up to the last one of the part: photographs that see all triangles of the
-  // vertex, with the minimum quality over the triangles. Empty for vertices of other triangles
-  // only.
+  // vertex, with the minimum quality. Empty for vertices of other triangles only.
   ViewTable of_vertices;
   // All views of a subset of vertices, spread over the part. Colors are not set yet.
   std::vector<ColorObservation> observations;

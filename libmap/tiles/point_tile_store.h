@@ -36,8 +36,8 @@ class PointTileStore {
   // Returns the points with low <= (x, y) <= high in the order of add(). Reads the tiles that
   // intersect the rectangle.
   PointCloud points_in(const Eigen::Vector2d& low, const Eigen::Vector2d& high) const;
-  // Returns an upper bound of the number of points in the rectangle: all points of the tiles that
-  // meet the rectangle.
+  // Returns an upper bound of the number of points in the rectangle: all points of tiles that meet
+  // it.
   std::size_t count_in(const Eigen::Vector2d& low, const Eigen::Vector2d& high) const;
   std::size_t size() const { return size_; }
 

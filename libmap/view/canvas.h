@@ -27,8 +27,8 @@ struct TextStyle {
 // Width and line height of `text` in pixels. Throws Error (failed) if the font is not installed.
 Eigen::Vector2d text_size(const std::string& text, const TextStyle& style);
 
-// `text`, or the longest prefix of `text` with "..." that is at most `width_px` wide; empty if
-// "..." is wider.
+// `text`, or the longest prefix of `text` with "..." at most `width_px` wide; empty if "..." is
+// wider.
 std::string shortened_text(const std::string& text, const TextStyle& style, double width_px);
 
 // Output of a canvas: an image or an SVG document.

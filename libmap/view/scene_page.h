@@ -54,8 +54,7 @@ struct LabelRequest {
 
 // Returns one box per request, in the order of the requests: beside the point, or farther away if
 // there is no room. Boxes do not overlap the points (of radius `point_radius_px`) or each other and
-// are inside `bounds`; else the area that overlaps points and other boxes or is outside `bounds` is
-// minimized.
+// are inside `bounds`; else the area that overlaps or is outside `bounds` is minimized.
 std::vector<PixelRect> place_labels(const std::vector<LabelRequest>& requests,
                                     double point_radius_px, const PixelRect& bounds);
 

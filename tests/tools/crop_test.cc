@@ -165,7 +165,7 @@ TEST(Crop, Polygons) {
                          .field = "edge from (0, 0) to (1, 1)",
                          .value = "meeting the edge from (1, 0) to (0, 1)"}));
   EXPECT_TRUE(
-      bad_input(with("x,y\n50,50\n51,50\n51,51\n"), {.file = "map.ply", .about = "nothing of"}));
+      bad_input(with("x,y\n50,50\n51,50\n51,51\n"), {.file = "map.ply", .about = "no part of"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("new.ply")));
   EXPECT_FALSE(std::filesystem::exists(scratch("new.site_from_map.txt")));
 }

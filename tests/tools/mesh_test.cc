@@ -132,7 +132,7 @@ TEST(Mesh, CloudsThatAreTooThin) {
   line.normals.assign(50, Eigen::Vector3f::UnitZ());
   libmap::write_cloud(scratch("line.ply"), line);
   EXPECT_TRUE(bad_input(graspmap({"mesh", "line.ply", "-o", "mesh.ply"}),
-                        {.file = "line.ply", .field = "points", .value = "50 positions"}));
+                        {.file = "line.ply", .field = "number of distinct points", .value = "50"}));
   libmap::write_cloud(scratch("empty.ply"), {});
   EXPECT_TRUE(bad_input(graspmap({"mesh", "empty.ply", "-o", "mesh.ply"}),
                         {.file = "empty.ply", .about = "no points"}));

@@ -186,7 +186,7 @@ TEST(SimulateCamerasCommand, UnitsTooFineForTheRangeAreRefused) {
   EXPECT_TRUE(bad_input(run({}), {.file = "far.yaml",
                                   .field = "depth_scale_m",
                                   .value = "1e-05",
-                                  .bound = ">= far_m / 65534, 2.2888882e-05"}));
+                                  .bound = ">= far_m / 65534 = 2.2888882e-05"}));
   EXPECT_TRUE(
       bad_input(run({"--depth-scale", "0.00002"}), {.field = "depth_scale_m", .value = "2e-05"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("rig")));

@@ -180,13 +180,11 @@ class MapGrasping {
                   : 0;
     }
     if (on_mesh == 0)
-      throw libmap::Error("no voxel of the map is within " +
-                          libmap::to_text(options_.max_distance_m) +
+      throw libmap::Error("no voxel is within " + libmap::to_text(options_.max_distance_m) +
                           " m of the mesh; check the frames of map and mesh");
     if (2 * on_mesh < voxels)
-      run_.warn(
-          "only {} of {} voxels are within {} m of the mesh; check the frames of map and mesh",
-          on_mesh, voxels, options_.max_distance_m);
+      run_.warn("only {} of {} voxels are within {} m of the mesh; check both frames", on_mesh,
+                voxels, options_.max_distance_m);
   }
 
   // Resumes the store's plan if it is of the same mesh, map and parameters, else writes a new one.

@@ -48,9 +48,7 @@ ReadMap summarize_one(const std::string& file, const MapTableOptions& options,
   own.graspability_threshold = map.cutoff = cutoff_of(options, own);
   read.voxels = libgtd::voxel_map_of(cloud, libgtd::map_info(map.manifest));
   if (map.manifest.find_parameter("zero_plane_m") == nullptr)
-    run.warn(
-        file +
-        ": has no manifest with a zero plane; all points are assumed to be above the zero plane");
+    run.warn(file + ": has no manifest with a zero plane; all points are assumed to be above it");
   map.summary = libgtd::summarize_map(cloud, read.voxels, own);
   if (expected != nullptr)
     map.expected = libgtd::evaluate_expected_map(

@@ -62,8 +62,7 @@ std::optional<TileFolder::TileData> TileFolder::earlier_plan() const {
   if (plan.at("key") == key_) return plan;
   if (share_.count == 1) return std::nullopt;
   throw libmap::Error(
-      "contains tiles of another input or of other parameters; use --force without --tile to "
-      "replace "
+      "contains tiles of another input or other parameters; use --force without --tile to replace "
       "them",
       {.file = store_.folder().string()});
 }

@@ -150,11 +150,11 @@ TEST(PointGrid, RefusesCellsWithoutSizeOrTooMany) {
   EXPECT_TRUE(is_error(error_of([&] {
                          PointGrid({{0, 0, 0}, {1e9, 0, 0}}, 1e-6);
                        }),
-                       {.value = "1e-06 m cells up to 1e+09 m from the origin"}));
+                       {.value = "1e-06", .about = "1e+09 m"}));
   EXPECT_TRUE(is_error(error_of([&] {
                          PointGrid({{-1e308, 0, 0}, {1e308, 0, 0}}, 1);
                        }),
-                       {.value = "1 m cells up to 1e+308 m from the origin"}));
+                       {.value = "1", .about = "1e+308 m"}));
 }
 
 }  // namespace point_grid_test

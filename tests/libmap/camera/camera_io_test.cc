@@ -258,7 +258,7 @@ TEST(CameraIo, BadFilesAreNamed) {
        {.file = "bad.yaml", .field = "distortion_coefficients"}},
       {plain + "local_transform: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1, 0]\n",
        {.file = "bad.yaml",
-        .field = "error of the rotation in local_transform",
+        .field = "local_transform, rotation error",
         .value = "2",
         .bound = "<= 0.001"}},
       {plain + "local_transform: [1, 0, 0]\n",

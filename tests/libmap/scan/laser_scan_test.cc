@@ -58,14 +58,14 @@ TEST(LaserScan, WhatIsBroken) {
   EXPECT_TRUE(is_error(error_of([&] { libmap::check_laser_scan(blob, info_76(1)); }),
                        {.value = "3", .bound = "2"}));
   EXPECT_TRUE(is_error(error_of([&] { libmap::check_laser_scan(blob, info_76(5).substr(1)); }),
-                       {.value = "75 bytes", .bound = "56, 60 or 76"}));
+                       {.value = "75 bytes", .bound = "56, 60 or 76 bytes"}));
   EXPECT_TRUE(is_error(error_of([&] { libmap::check_laser_scan(blob.substr(1), info_76(5)); }),
                        {.about = "compressed matrix"}));
   for (const float points : {-1.0F, NAN, 3e9F}) {
     std::string info = info_76(5);
     info.replace(24, 4, bytes_of(std::vector<float>{points}));
     EXPECT_TRUE(is_error(error_of([&] { libmap::check_laser_scan(blob, info); }),
-                         {.about = "number of points"}));
+                         {.field = "number of points in scan_info"}));
   }
   EXPECT_TRUE(is_error(
       error_of([&] { libmap::check_laser_scan(scan_blob(9, std::vector<float>(9, 1.0F)), ""); }),

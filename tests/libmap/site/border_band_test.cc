@@ -206,7 +206,8 @@ TEST(BorderBand, WhatHasNone) {
   EXPECT_TRUE(is_error(refusal(gray), {.about = "no colors"}));
   PointCloud high = cloud;
   for (Eigen::Vector3d& point : high.positions) point.z() += 3;
-  EXPECT_TRUE(is_error(refusal(high), {.field = "height", .bound = "-0.1 to 0.15 m"}));
+  EXPECT_TRUE(
+      is_error(refusal(high), {.field = "heights of the points", .bound = "-0.1 to 0.15 m"}));
   o.white = 110;
   EXPECT_TRUE(
       is_error(refusal(floor_with_band(o)), {.field = "99.5 % quantile of the brightness"}));

@@ -256,11 +256,11 @@ TEST(Crop, WhatCannotBe) {
   const auto message = [](const CropOptions& options) {
     return error_of([&] { crop_cloud(site_cloud(), options); });
   };
-  EXPECT_TRUE(is_error(message(box_options({50, 50}, {51, 51})), {.about = "nothing of"}));
+  EXPECT_TRUE(is_error(message(box_options({50, 50}, {51, 51})), {.about = "no part of"}));
   EXPECT_TRUE(is_error(error_of([] {
                          crop_mesh(site_mesh(), box_options({50, 50}, {51, 51}));
                        }),
-                       {.about = "nothing of"}));
+                       {.about = "no part of"}));
   EXPECT_TRUE(is_error(message(box_options({1, 0}, {0, 1})), {.field = "box"}));
   CropOptions options;
   options.region = CropRegion::polygon;

@@ -352,7 +352,7 @@ TEST(ImageFile, IsWrittenWholeAndRefusedTorn) {
   // libpng would abort the program.
   const Error wide = error_of([] { to_png(ColorImage(1'000'001, 1)); });
   EXPECT_EQ(wide.context().value, "1000001 x 1");
-  EXPECT_EQ(wide.context().bound, "at most 1000000 per side");
+  EXPECT_EQ(wide.context().bound, "<= 1000000 pixels per side");
 }
 
 }  // namespace scene_view_test
