@@ -25,6 +25,7 @@ constexpr int terms = 3;
 // An estimate that differs from the assumed noise by this factor replaces it.
 constexpr double other_noise = 1.8;
 constexpr int samples_per_frame = 200;
+constexpr std::size_t max_pairs_of_noise = 12;  // above, every second pair is used
 
 // Fits non-negative terms of the noise with the least relative errors, by trying all subsets of
 // terms.
@@ -121,7 +122,11 @@ ScanNoise choose_noise(const ScanSource& scan, const Trajectory& world_from_base
     return {planes.noise, false,
             sensor == "auto" ? "depth noise " + describe(planes.noise) + " as given"
                              : "depth noise of " + sensor};
-  const auto pairs = near_pairs_of(world_from_base);
+  auto pairs = near_pairs_of(world_from_base);
+  if (pairs.size() > max_pairs_of_noise) {
+    std::size_t n = 0;
+    std::erase_if(pairs, [&](const auto&) { return n++ % 2 == 1; });
+  }
   std::set<int> nodes;
   for (const auto& [a, b] : pairs) nodes.insert({world_from_base[a].node, world_from_base[b].node});
   FeatureOptions options{.planes = planes};

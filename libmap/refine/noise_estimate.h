@@ -35,7 +35,7 @@ struct ScanNoise {
 // Replaces the assumed noise by an estimate that differs by a factor of 1.8.
 ScanNoise choose_noise(const std::vector<SurfaceResidual>& residuals, const DepthNoise& assumed);
 
-// Chooses the noise by held-out depth of up to 24 pairs of near frames, each aligned by the rest of
+// Chooses the noise by held-out depth of up to 12 pairs of near frames, each aligned by the rest of
 // its depth. Noise that is given by a sensor or by other terms than the default ones is kept.
 // Frames that cannot be read are ignored.
 ScanNoise choose_noise(const ScanSource& scan, const Trajectory& world_from_base,
