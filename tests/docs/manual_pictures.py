@@ -3,12 +3,13 @@
 
 manual_pictures.py BUILD_FOLDER SOURCE_FOLDER [PAGE...]
 
-The commands of each page PAGE.md write PAGE.png. It is copied to tools/manual/pictures, or, if it is
-larger than 60,000 bytes, converted to a JPEG and scaled down to this size. The page shows it by the
-resulting name. Inspect the changed images.
+The commands of each page PAGE.md write PAGE.png, and further images that the page shows. They are
+copied to tools/manual/pictures, or, if larger than 60,000 bytes, converted to a JPEG and scaled down to
+this size. The page shows them by the resulting names. Inspect the changed images.
 """
 
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
@@ -71,9 +72,11 @@ def main():
         for page in pages:
             subprocess.run([*run, str(manual / f"{page}.md"), "--begin-with", example, "--in",
                             f"{scratch}/{page}"], check=True)
-            picture = pathlib.Path(scratch) / page / f"{page}.png"
-            if picture.is_file():
-                put_picture(picture, manual / "pictures")
+            text = (manual / f"{page}.md").read_text(encoding="utf-8")
+            for name in [page, *re.findall(r"\(pictures/(\w+)\.", text)]:
+                picture = pathlib.Path(scratch) / page / f"{name}.png"
+                if picture.is_file():
+                    put_picture(picture, manual / "pictures")
 
 
 if __name__ == "__main__":

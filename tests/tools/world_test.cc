@@ -1,9 +1,16 @@
 #include <gtest/gtest.h>
+#include <signal.h>
+
+#include <chrono>
+#include <thread>
 
 #include "libmap/core/file_output.h"
+#include "libmap/core/manifest.h"
 #include "libmap/io/cloud_io.h"
 #include "libmap/io/mesh_io.h"
+#include "libmap/texture/textured_mesh_io.h"
 #include "tests/libmap/world/world_samples.h"
+#include "tests/support/running_program.h"
 #include "tests/tools/tool_test_support.h"
 
 namespace world_tool_test {
@@ -85,6 +92,89 @@ TEST(WorldCommand, TilesAreModels) {
   EXPECT_NE(files.at("world.sdf").find("<model name=\"x1\">"), std::string::npos);
   EXPECT_EQ(json_of("tiles.world.json")["results"]["models"], 2);
   EXPECT_EQ(json_of("tiles.world.json")["results"]["missing_cells"], 0);
+  EXPECT_EQ(json_of("tiles.world.json")["results"]["balls"], 0);
+}
+
+// A texture is kept as it is, and only used by its own triangles.
+TEST(WorldCommand, TexturedSite) {
+  libmap::TexturedMesh model;
+  model.mesh = graspmap_test::wavy_ground(0.4);
+  const std::size_t count = model.mesh.triangles.size();
+  model.texture_coordinates.assign(count,
+                                   {Eigen::Vector2f(0.1F, 0.2F), {0.9F, 0.2F}, {0.5F, 0.8F}});
+  model.page_of_triangle.assign(count, 0);
+  for (std::size_t t = count / 2; t < count; ++t) model.page_of_triangle[t] = 1;
+  for (const std::uint8_t red : {std::uint8_t{10}, std::uint8_t{200}}) {
+    model.pages.emplace_back(8, 4);
+    for (libmap::Color& color : model.pages.back().pixels) color = {red, 20, 30};
+  }
+  for (const libmap::ModelFile& file : libmap::textured_mesh_files(scratch("site.glb"), model))
+    file.write(file.path);
+  ASSERT_TRUE(succeeded(graspmap({"convert", "site.glb", "-o", "textured.world"})));
+  const auto files = files_of(scratch("textured.world"));
+  for (const std::size_t n : {0U, 1U}) {
+    const std::string stem = "meshes/site_visual_" + std::to_string(n);
+    ASSERT_TRUE(files.contains(stem + ".obj"));
+    EXPECT_NE(files.at("world.xml").find("site_visual_" + std::to_string(n) + "_0.png"),
+              std::string::npos);
+    const libmap::TexturedMesh part =
+        libmap::read_textured_mesh(scratch("textured.world") / (stem + ".obj"));
+    EXPECT_EQ(part.mesh.triangles.size(), count / 2);
+    ASSERT_EQ(part.pages.size(), 1U);
+    EXPECT_EQ(part.pages[0].pixels[0],
+              (libmap::Color{n == 0 ? std::uint8_t{10} : std::uint8_t{200}, 20, 30}));
+    EXPECT_NEAR(part.texture_coordinates[0][1].x(), 0.9, 1e-6);
+  }
+  const libmap::TexturedMesh whole =
+      libmap::read_textured_mesh(scratch("textured.world/meshes/site.glb"));
+  EXPECT_EQ(whole.pages.size(), 2U);
+  EXPECT_EQ(whole.mesh.triangles.size(), count);
+}
+
+// The georeference is in the manifest and in a comment of each file.
+TEST(WorldCommand, Georeference) {
+  write_site();
+  libmap::Manifest manifest;
+  manifest.command = "crop";
+  manifest.georeference = libmap::Georeference{
+      .crs_wkt = "LOCAL_CS[\"a--b\"]", .unit_m = 1.0, .origin_m = {500000.25, 4000000.5, -3.0}};
+  graspmap_test::write_text(libmap::manifest_path(scratch("site.ply")), libmap::to_json(manifest));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "site.ply", "-o", "geo.world"})));
+  const auto written = libmap::read_manifest_of(scratch("geo.world"));
+  ASSERT_TRUE(written && written->georeference);
+  EXPECT_EQ(*written->georeference, *manifest.georeference);
+  for (const char* file : {"world.sdf", "world.xml", "world.urdf"})
+    EXPECT_NE(libmap::read_whole_file(scratch("geo.world") / file)
+                  .find("georeference: offset 500000.25 4000000.5 -3 m, CRS LOCAL_CS[\"a- -b\"]"),
+              std::string::npos)
+        << file;
+}
+
+// A run that is killed leaves nothing that looks like a world, and the next one is undisturbed.
+TEST(WorldCommand, AKilledRunLeavesNoWorld) {
+  write_site();
+  ASSERT_TRUE(succeeded(graspmap({"convert", "site.ply", "-o", "whole.world"})));
+  const auto expected = files_of(scratch("whole.world"));
+  const std::vector<std::string> line = {(graspmap_test::build_folder() / "graspmap").string(),
+                                         "convert", "site.ply", "-o", "killed.world"};
+  int killed = 0;
+  for (int ms = 5; ms < 3000; ms = ms * 3 / 2) {
+    graspmap_test::RunningProgram running(line, {.folder = scratch("")}, true);
+    const pid_t process = running.process();
+    std::this_thread::sleep_for(std::chrono::milliseconds(ms));
+    if (running.has_ended()) break;
+    kill(-process, SIGKILL);
+    running.wait();
+    ++killed;
+    EXPECT_FALSE(fs::exists(scratch("killed.world"))) << ms;
+    EXPECT_FALSE(fs::exists(scratch("killed.world.json"))) << ms;
+  }
+  EXPECT_GT(killed, 2);
+  fs::remove_all(scratch("killed.world"));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "site.ply", "-o", "killed.world"})));
+  EXPECT_EQ(files_of(scratch("killed.world")), expected);
+  for (const std::string& name : names_in_scratch())
+    EXPECT_EQ(name.find(".partial"), std::string::npos) << name;
 }
 
 TEST(WorldCommand, FramesAreNamed) {
