@@ -58,8 +58,6 @@ DetectionStages stages_of(const DetectionOptions& options, GripperMask mask) {
   const Scenario& scenario = options.scenario;
   const bool thesis = follows_thesis(scenario.method);
   const bool fits_plane = options.plane == PlaneSource::fit;
-  // Obstacles need the whole map, because a face may cross any number of tiles.
-  const bool obstacles = scenario.evaluates_obstacles() && options.share.count == 1;
   return {.tile_voxels = tile_voxels(scenario),
           .downsampling_leaf_m =
               thesis && fits_plane ? std::optional(scenario.voxel_size_m) : std::nullopt,
@@ -71,10 +69,12 @@ DetectionStages stages_of(const DetectionOptions& options, GripperMask mask) {
           .voxel_size_m = scenario.voxel_size_m,
           .thesis_lattice = thesis,
           .tiles = tile_detection_options(mask, scenario),
-          .obstacles = obstacles ? std::optional(ObstacleOptions{scenario.obstacle_slope_deg,
-                                                                 scenario.obstacle_height_m,
-                                                                 normal_radius_m(mask, scenario)})
-                                 : std::nullopt,
+          // Obstacles need the whole map, because a face may cross any number of tiles.
+          .obstacles = scenario.evaluates_obstacles()
+                           ? std::optional(ObstacleOptions{scenario.obstacle_slope_deg,
+                                                           scenario.obstacle_height_m,
+                                                           normal_radius_m(mask, scenario)})
+                           : std::nullopt,
           .mask = std::move(mask)};
 }
 
@@ -192,13 +192,10 @@ DetectionResult detect(const PointCloud& terrain, const DetectionOptions& option
   result.map.zero_plane_m = stages.tiles.graspable.zero_plane_m;
   result.map.content = content_of(scenario);
   if (scenario.fits_normals()) result.normal_radius_m = normal_radius_m(result.mask, scenario);
-  const std::vector<TileBounds> tiles =
-      share_of(make_tiles(grid, stages.tile_voxels), options.share);
+  const std::vector<TileBounds> tiles = make_tiles(grid, stages.tile_voxels);
   result.tiles = tiles.size();
-  TileDetectionResult detected = detect_tiles(
-      {in_frame, surface, grid}, stages.mask, tiles,
-      options.share.count == 1 ? CurvatureExtent::all_points : CurvatureExtent::points_near_tiles,
-      stages.tiles, progress);
+  TileDetectionResult detected = detect_tiles({in_frame, surface, grid}, stages.mask, tiles,
+                                              CurvatureExtent::all_points, stages.tiles, progress);
   result.curvature_points = detected.curvature_points;
   result.convex_points = detected.convex_points;
   result.timings_s.insert(result.timings_s.end(), detected.timings_s.begin(),

@@ -16,7 +16,6 @@
 #include "libmap/core/progress.h"
 #include "libmap/core/result_table.h"
 #include "libmap/core/stage_timer.h"
-#include "libmap/tiles/tile_share.h"
 
 namespace libgtd {
 
@@ -30,7 +29,6 @@ struct DetectionOptions {
   PlaneSource plane = PlaneSource::fit;
   std::optional<Eigen::Vector3d> up;  // direction out of the ground, cloud's frame
   double max_tilt_deg = 90.0;         // maximum angle between `up` and the plane's normal
-  libmap::TileShare share;            // tiles to score
 };
 // Binds the keys of the scenario and `plane`.
 void bind(libmap::ParameterTable& table, DetectionOptions& options);
@@ -52,8 +50,8 @@ struct DetectionResult {
   std::size_t convex_points = 0;     // among the curvature points
   std::size_t graspable_voxels = 0;
   std::size_t border_voxels = 0;
-  std::size_t unoriented_voxels = 0;      // orientation surface: no normal, scored upright
-  std::size_t obstacle_voxels = 0;        // 0 for a share of a map
+  std::size_t unoriented_voxels = 0;  // orientation surface: no normal, scored upright
+  std::size_t obstacle_voxels = 0;
   std::optional<double> normal_radius_m;  // nullopt if no surface normals were fitted
   libmap::StageTimings timings_s;         // wall time of each step
 };

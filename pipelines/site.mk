@@ -1,4 +1,4 @@
-# Graspability map of a site from its cloud, tile by tile, with look-up, evaluation and images.
+# Graspability map of a site from its cloud, with look-up, evaluation and images.
 #
 #   make -f pipelines/site.mk SITE=cloud.pcd POINTS=points.csv SCENARIO=artificial_rocks_prescan \
 #        OUT=folder [METHOD=thesis] [SHARES=8] [SCORE="..."] [POINTS_FRAME=map] [TITLE="..."] -j2
@@ -6,7 +6,7 @@
 # POINTS is optional (columns x, y, z; first column: name). If it has a column `graspable` (1 or 0), the
 # map is evaluated against it. POINTS are in the frame of the site, or with POINTS_FRAME=map in the frame
 # of the map that the site was cropped from. SCENARIO is a name in data/scenarios or a file. METHOD
-# replaces the scenario's method. A second run does nothing. A stopped run is resumed. If a variable or
+# replaces the scenario's method. SHARES is the number of threads of the scoring. A second run does nothing. A stopped run is resumed. If a variable or
 # a file changes, the results that depend on it are recomputed.
 
 here := $(dir $(lastword $(MAKEFILE_LIST)))
@@ -44,7 +44,6 @@ gripper := $(if $(scenario_file),$(shell sed -n 's/^gripper: *\([^ \#]*\).*/\1/p
 gripper_file := $(firstword $(wildcard $(gripper) $(data)/grippers/$(gripper).yaml))
 
 score_flags := --config $(SCENARIO) $(if $(METHOD),--method $(METHOD)) $(SCORE)
-tiles := $(foreach k,$(shell seq $(SHARES)),$(OUT)/tiles/$(k)-of-$(SHARES).pcd)
 results := $(OUT)/map.pcd $(OUT)/map.vtp $(OUT)/top.png $(OUT)/oblique.png $(OUT)/curvature.png
 markers :=
 ifneq ($(POINTS),)
@@ -62,7 +61,7 @@ endif
 .PHONY: all FORCE
 all: $(results)
 
-$(OUT) $(OUT)/tiles:
+$(OUT):
 	@mkdir -p $@
 
 # Stamp files of the variables that results depend on, rewritten only if the variables change.
@@ -71,13 +70,8 @@ export shown_with := $(POINTS) $(POINTS_FRAME) $(TITLE)
 $(OUT)/scored_with $(OUT)/shown_with: FORCE | $(OUT)
 	@printf '%s\n' "$${$(@F)}" | cmp -s - $@ || printf '%s\n' "$${$(@F)}" > $@
 
-# make runs the shares in parallel, so each process uses one thread.
-$(OUT)/tiles/%-of-$(SHARES).pcd: $(SITE) $(OUT)/scored_with $(scenario_file) $(gripper_file) \
-    | $(OUT)/tiles
-	@exec $(GRASPMAP) score $(SITE) -o $@ $(score_flags) --tile $*/$(SHARES) --threads 1 --quiet
-
-$(OUT)/map.pcd: $(tiles)
-	@exec $(GRASPMAP) convert $(tiles) -o $@
+$(OUT)/map.pcd: $(SITE) $(OUT)/scored_with $(scenario_file) $(gripper_file)
+	@exec $(GRASPMAP) score $(SITE) -o $@ $(score_flags) --threads $(SHARES)
 
 $(OUT)/map.vtp: $(OUT)/map.pcd
 	@exec $(GRASPMAP) convert $< -o $@ --quiet

@@ -12,7 +12,7 @@
 # the noise of a real sensor (SENSOR). EDGE, SPACING and COUNT set the resolution of sites, scene and
 # samples. CAMERAS, PANORAMA and LOOKUP are further flags of `simulate cameras`, `fuse` and `lookup`; on
 # the wall, the look-up of a hold uses the best voxel within HOLD_RADIUS instead. SHARES is the number of
-# processes per map. PLACES and TRIALS are the numbers of locations and trials of the virtual field
+# threads per map. PLACES and TRIALS are the numbers of locations and trials of the virtual field
 # test. A second run does nothing. If a variable or a file changes, the results that depend on it are
 # recomputed.
 

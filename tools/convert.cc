@@ -25,7 +25,7 @@ using libmap::TrajectoryFormat;
 
 struct ConvertOptions {
   std::vector<std::string> inputs;
-  std::string input;  // the single input, or the first of several shares of a map
+  std::string input;  // the single input
   std::string output;
   libmap::GeometryWriteOptions writing;
   double pixel_size_m = 0.0;
@@ -210,10 +210,13 @@ bool is_dem_as_cloud(const ConvertOptions& options) {
 
 void convert(ConvertOptions& options, Run& run) {
   options.input = options.inputs.front();
-  if (options.inputs.size() > 1 || is_part_of_map(options.input)) {
+  if (options.inputs.size() > 1)
+    throw libmap::Error(
+        "is a second input; shares of a map require a tile store: score --tile K/N -o MAP.tiles",
+        {.file = options.inputs[1]});
+  if (is_tile_store(options.input)) {
     refuse_ignored(options);
-    return merge_tiles(options.inputs, options.output, {options.writing, options.pixel_size_m},
-                       run);
+    return merge_store(options.input, options.output, {options.writing, options.pixel_size_m}, run);
   }
   const bool poses = holds_poses(options);
   if (!poses) refuse_ignored(options);
@@ -232,10 +235,10 @@ int convert_file(int argc, char** argv) {
   command.inputs("IN", options.inputs,
                  "cloud (.pcd .ply .csv), mesh (.ply .obj .stl ...), DEM (.tif), poses (.tum "
                  ".kitti .g2o .toro "
-                 "...), tile store (.tiles), or all shares of a map");
+                 "...), or tile store (.tiles)");
   command.output(options.output,
                  "output in the format of its extension, .vtp for ParaView, or .tif (GeoTIFF) for "
-                 "GIS; for tiles and shares the whole map, the same bytes as in one run");
+                 "GIS; for a tile store the whole map, the same bytes as in one run");
   command.parameters().add("encoding", options.writing.encoding,
                            {{"ascii", FileEncoding::ascii},
                             {"binary", FileEncoding::binary},
@@ -300,7 +303,7 @@ bool has_cloud_extension(const std::string& path) {
 
 // Selects the subcommand. A scan is a database or a folder of frames; other folders that are
 // converted to a file are, for example, models of COLMAP. An output without an extension is
-// otherwise a bag, of a rig or of one map; several inputs are shares of a map.
+// otherwise a bag, of a rig or of one map; several inputs are an error.
 Subcommand* subcommand_of(const Words& words) {
   if (is_world_path(words.output)) return convert_world;
   if (words.any_input([](const std::string& word) { return word.ends_with(".db"); }))

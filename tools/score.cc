@@ -120,36 +120,47 @@ std::vector<TerrainFile> terrain_files(const std::vector<fs::path>& paths,
   return files;
 }
 
-struct ScoreStoreOptions {
-  std::string terrain;  // a cloud file or a folder of clouds
-  std::string store;
-  std::filesystem::path gripper_file;
-  libgtd::MapFrame frame = libgtd::MapFrame::terrain;
+struct ScoreOptions {
+  std::string terrain;
+  std::string output;
+  std::string tile = "1/1";
+  libmap::TileShare share;  // of `tile`
+  std::string up = "auto";
   bool append = false;
-  std::size_t max_points_in_memory = 1'000'000;
-  libgtd::DetectionOptions detection;  // includes the share
+  std::string max_points_in_memory = "1000000";
+  libgtd::MapFrame frame = libgtd::MapFrame::terrain;
+  libgtd::DetectionOptions detection;
 };
+
+std::size_t parse_max_points(const ScoreOptions& options) {
+  const auto count = libmap::parse_integer(options.max_points_in_memory);
+  if (!count || *count < 1)
+    throw libmap::Error("not a number of points", {.field = "--max-points-in-memory",
+                                                   .value = options.max_points_in_memory,
+                                                   .bound = ">= 1"});
+  return static_cast<std::size_t>(*count);
+}
 
 class StoreScoring {
  public:
-  StoreScoring(const ScoreStoreOptions& options, Run& run)
+  StoreScoring(const ScoreOptions& options, fs::path gripper_file, Run& run)
       : options_(options),
+        gripper_file_(std::move(gripper_file)),
         run_(run),
-        store_(options.store),
+        store_(options.output),
         stream_(libmap::cloud_tiles(options.terrain)),
         tiling_(options.detection) {
-    if (fs::is_directory(options.store) && fs::is_directory(options.terrain) &&
-        fs::equivalent(options.store, options.terrain))
-      throw libmap::Error("is the input; choose another output name", {.file = options.store});
+    if (fs::is_directory(options.output) && fs::is_directory(options.terrain) &&
+        fs::equivalent(options.output, options.terrain))
+      throw libmap::Error("is the input; choose another output name", {.file = options.output});
   }
 
   void score() {
     if (run_.options().dry_run) return;
-    libmap::TileJournal journal = run_.timed(
-        "plan", [&] { return store_.begin(options_.detection.share, [&] { check_plan(); }); });
+    libmap::TileJournal journal =
+        run_.timed("plan", [&] { return store_.begin(options_.share, [&] { check_plan(); }); });
     const std::vector<TileNumber> wanted = run_.timed("check", [&] {
-      return store_.missing(
-          plan_, libgtd::tiles_of(frame_, tiling_.tile_voxels, options_.detection.share));
+      return store_.missing(plan_, libgtd::tiles_of(frame_, tiling_.tile_voxels, options_.share));
     });
     if (!wanted.empty()) {
       libmap::PointTileStore points(
@@ -163,7 +174,7 @@ class StoreScoring {
                                   [&](std::vector<libgtd::StreamedTile> tiles) {
                                     libgtd::add_tiles(write(tiles), plan_.key, journal);
                                   },
-                                  run_.progress(), {.max_points = options_.max_points_in_memory});
+                                  run_.progress(), {.max_points = parse_max_points(options_)});
         });
       });
     }
@@ -190,7 +201,7 @@ class StoreScoring {
     } else {
       if (earlier) {
         libgtd::require_appendable(*earlier, plan_, options_.detection, options_.append,
-                                   options_.store);
+                                   options_.output);
         libgtd::frame_of(*earlier, options_.detection, store_.plan_path());
       }
       store_.require_idle();
@@ -210,7 +221,7 @@ class StoreScoring {
     libmap::Manifest& manifest = run_.manifest();
     copy_transforms(options_.terrain, run_);
     for (const TerrainFile& file : plan_.terrain) manifest.inputs.push_back(file.input);
-    for (const auto& input : libgtd::gripper_files(options_.gripper_file)) run_.add_input(input);
+    for (const auto& input : libgtd::gripper_files(gripper_file_)) run_.add_input(input);
     manifest.frame = options_.frame == libgtd::MapFrame::terrain ? "terrain" : "input";
     libmap::Manifest copy = manifest;
     copy.timings_s.clear();
@@ -306,7 +317,8 @@ class StoreScoring {
       run_.warn("the terrain is smaller than the gripper mask: nothing was scored");
   }
 
-  const ScoreStoreOptions& options_;
+  const ScoreOptions& options_;
+  fs::path gripper_file_;
   Run& run_;
   libgtd::MapTileStore store_;
   libmap::TileStream stream_;
@@ -316,24 +328,14 @@ class StoreScoring {
 };
 
 // Scores the missing tiles of the share in the store, which is created if it is missing.
-void score_into_store(const ScoreStoreOptions& options, Run& run) {
+void score_into_store(const ScoreOptions& options, const fs::path& gripper_file, Run& run) {
   libgtd::require_streamable(options.detection);
-  if (run.options().force && options.detection.share.count > 1)
+  if (run.options().force && options.share.count > 1)
     throw libmap::Error("deletes the tiles of all shares and cannot be combined with --tile",
                         {.field = "--force"});
-  StoreScoring(options, run).score();
+  parse_max_points(options);
+  StoreScoring(options, gripper_file, run).score();
 }
-
-struct ScoreOptions {
-  std::string terrain;
-  std::string output;
-  std::string tile = "1/1";
-  std::string up = "auto";
-  bool append = false;
-  std::string max_points_in_memory = "1000000";
-  libgtd::MapFrame frame = libgtd::MapFrame::terrain;
-  libgtd::DetectionOptions detection;
-};
 
 void bind(libmap::ParameterTable& table, ScoreOptions& options) {
   bind(table, options.detection);
@@ -342,14 +344,6 @@ void bind(libmap::ParameterTable& table, ScoreOptions& options) {
       "direction toward the outer side of the fitted plane: auto, or X,Y,Z in the cloud's frame");
   table.add("frame", options.frame, libgtd::map_frame_names(),
             "frame of the map's points; terrain: terrain frame; input: frame of the scored cloud");
-}
-
-std::size_t parse_max_points(const std::string& text) {
-  const auto count = libmap::parse_integer(text);
-  if (!count || *count < 1)
-    throw libmap::Error("not a number of points",
-                        {.field = "--max-points-in-memory", .value = text, .bound = ">= 1"});
-  return static_cast<std::size_t>(*count);
 }
 
 void add_results(const libgtd::DetectionResult& result, const ScoreOptions& options, Run& run) {
@@ -375,11 +369,8 @@ void say_result(const libgtd::DetectionResult& result, const ScoreOptions& optio
   if (result.map.content.normals)
     run.info("mask tilted to the surface's normal within {:g} m; {} voxels without a normal",
              *result.normal_radius_m, result.unoriented_voxels);
-  if (result.map.content.obstacles)
-    run.info("{} voxels are obstacles", result.obstacle_voxels);
-  else if (result.map.content.slopes)
-    run.info("obstacles are determined when `graspmap convert` merges the shares");
-  if (result.map.voxels.empty() && options.detection.share.count == 1)
+  if (result.map.content.obstacles) run.info("{} voxels are obstacles", result.obstacle_voxels);
+  if (result.map.voxels.empty())
     run.warn("the terrain is smaller than the gripper mask: nothing was scored");
 }
 
@@ -392,7 +383,7 @@ libmap::TilesReadResult read_terrain(const std::string& path) {
 
 void score(ScoreOptions& options, Run& run) {
   libgtd::Scenario& scenario = options.detection.scenario;
-  options.detection.share = libmap::parse_share(options.tile);
+  options.share = libmap::parse_share(options.tile);
   refuse_mesh(options.terrain);
   if (options.up != "auto")
     options.detection.up = parse_vector(options.up, "--up");
@@ -412,22 +403,13 @@ void score(ScoreOptions& options, Run& run) {
   if (scenario.method == libgtd::Method::calibrated)
     in_file(gripper_file.string(), [&] { libgtd::require_fingers(gripper); });
   libgtd::make_gripper_mask(gripper, mask_options(scenario));
-  if (libgtd::is_tile_store_name(options.output)) {
-    score_into_store({.terrain = options.terrain,
-                      .store = options.output,
-                      .gripper_file = gripper_file,
-                      .frame = options.frame,
-                      .append = options.append,
-                      .max_points_in_memory = parse_max_points(options.max_points_in_memory),
-                      .detection = options.detection},
-                     run);
-    return;
-  }
-  if (options.append)
-    throw libmap::Error("requires a tile store as output, MAP.tiles", {.field = "--append"});
-  if (options.max_points_in_memory != ScoreOptions{}.max_points_in_memory)
-    throw libmap::Error("requires a tile store as output, MAP.tiles",
-                        {.field = "--max-points-in-memory"});
+  if (libgtd::is_tile_store_name(options.output))
+    return score_into_store(options, gripper_file, run);
+  reject_given({{"--tile", options.share.count > 1},
+                {"--append", options.append},
+                {"--max-points-in-memory",
+                 options.max_points_in_memory != ScoreOptions{}.max_points_in_memory}},
+               "requires a tile store, MAP.tiles");
   libmap::require_cloud_format(options.output);
   run.claim_output(options.output, {options.terrain});
   const libmap::TilesReadResult read =
@@ -461,8 +443,9 @@ int main(int argc, char** argv) {
                 "cloud of the terrain (.pcd, .ply, .csv) or DEM (.tif), or a folder of its tiles");
   command.output(options.output,
                  "graspability map (.pcd, .ply, .vtp, .csv), or tile store (.tiles)");
-  command.option("--tile", "K/N", options.tile,
-                 "score only share K of N of the tiles; `graspmap convert` merges the shares");
+  command.option(
+      "--tile", "K/N", options.tile,
+      "score only share K of N of the tiles of a tile store; the last share completes it");
   command.option("--max-points-in-memory", "N", options.max_points_in_memory,
                  "for a tile store: maximum number of points in memory (about 250 bytes each); the "
                  "map does not depend on this number");

@@ -136,20 +136,18 @@ FingerPulls finger_pulls(const Gripper& gripper, const std::vector<ParameterSet>
   result.level_spreads.resize(sets.size());
   result.max_spine_forces.resize(sets.size());
   result.total_closing_forces_n.resize(sets.size());
-  libmap::parallel_for(sets.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t s = begin; s < end; ++s) {
-      const Gripper varied = with_parameters(gripper, sets[s].values);
-      const Pulls pulls = pulls_of(varied);
-      for (std::size_t n = 0; n < falls; ++n)
-        result.pulls[n * sets.size() + s] = static_cast<float>(pulls.means[n]);
-      result.level_spreads[s] = static_cast<float>(pulls.level_spread);
-      const GripperFingers& fingers = *varied.fingers;
-      result.max_spine_forces[s] =
-          static_cast<float>(fingers.spines_per_finger *
-                             engagement_fraction(varied.engagement, fingers.spine_tip_radius_um) *
-                             fingers.spine_force_limit_n / fingers.closing_force_n);
-      result.total_closing_forces_n[s] = fingers.count * fingers.closing_force_n;
-    }
+  libmap::parallel_each(sets.size(), [&](std::size_t s) {
+    const Gripper varied = with_parameters(gripper, sets[s].values);
+    const Pulls pulls = pulls_of(varied);
+    for (std::size_t n = 0; n < falls; ++n)
+      result.pulls[n * sets.size() + s] = static_cast<float>(pulls.means[n]);
+    result.level_spreads[s] = static_cast<float>(pulls.level_spread);
+    const GripperFingers& fingers = *varied.fingers;
+    result.max_spine_forces[s] =
+        static_cast<float>(fingers.spines_per_finger *
+                           engagement_fraction(varied.engagement, fingers.spine_tip_radius_um) *
+                           fingers.spine_force_limit_n / fingers.closing_force_n);
+    result.total_closing_forces_n[s] = fingers.count * fingers.closing_force_n;
   });
   return result;
 }

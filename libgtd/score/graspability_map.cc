@@ -102,22 +102,6 @@ PointCloud to_cloud(const GraspabilityMap& map, MapFrame frame) {
   return cloud;
 }
 
-std::size_t add_obstacles(PointCloud& map, double voxel_size_m, const ObstacleOptions& options) {
-  const ScalarField* slopes = map.find_field(slope_field);
-  if (slopes == nullptr)
-    throw libmap::Error("the map has no slopes: the field is missing", {.field = slope_field});
-  const std::vector<Obstacle> obstacles = find_obstacles(
-      VoxelFields(map).all(), std::vector<float>(slopes->values.begin(), slopes->values.end()),
-      voxel_size_m, options);
-  ScalarField& field = map.add_field(obstacle_field, ScalarType::uint8);
-  std::size_t count = 0;
-  for (std::size_t n = 0; n < map.size(); ++n) {
-    field.values[n] = static_cast<double>(obstacles[n]);
-    count += obstacles[n] == Obstacle::none ? 0 : 1;
-  }
-  return count;
-}
-
 PointCloud merge_map_clouds(const std::vector<PointCloud>& parts) {
   PointCloud whole;
   for (std::size_t n = 0; n < parts.size(); ++n) {

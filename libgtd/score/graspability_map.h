@@ -57,12 +57,6 @@ const std::vector<std::pair<std::string, MapFrame>>& map_frame_names();
 // parameter_spread of the ForceEstimate.
 libmap::PointCloud to_cloud(const GraspabilityMap& map, MapFrame frame);
 
-// Evaluates the obstacles of a complete map with slopes, sets the field `obstacle` and returns the
-// number of obstacle points. Throws Error for a map without the fields i, j, k, slope_deg or not
-// ascending by i, j, k.
-std::size_t add_obstacles(libmap::PointCloud& map, double voxel_size_m,
-                          const ObstacleOptions& options);
-
 // Merges clouds that to_cloud made from parts of one map, ascending by i, j, k as in to_cloud of
 // the whole map. Throws Error for a cloud without the fields i, j, k, clouds with different fields,
 // and two points of one voxel.

@@ -391,16 +391,14 @@ std::vector<TileNumber> MapTileStore::missing(const TilePlan& plan,
                                               const std::vector<TileNumber>& tiles) const {
   const std::map<TileNumber, StoredTile> finished = done(plan);
   std::vector<std::uint8_t> is_there(tiles.size(), 0);
-  libmap::parallel_for(tiles.size(), 16, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n) {
-      const auto found = finished.find(tiles[n]);
-      if (found == finished.end()) continue;
-      try {
-        if (found->second.voxels > 0) checked_tile_path(folder(), found->second);
-        is_there[n] = 1;
-      } catch (const libmap::Error&) {
-        continue;
-      }
+  libmap::parallel_each(tiles.size(), 16, [&](std::size_t n) {
+    const auto found = finished.find(tiles[n]);
+    if (found == finished.end()) return;
+    try {
+      if (found->second.voxels > 0) checked_tile_path(folder(), found->second);
+      is_there[n] = 1;
+    } catch (const libmap::Error&) {
+      return;
     }
   });
   std::vector<TileNumber> missing;

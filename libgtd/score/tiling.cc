@@ -26,15 +26,13 @@ std::vector<std::uint8_t> find_pivots(const VoxelGrid& grid, const GripperMask& 
   std::vector<std::uint8_t> flags(grid.voxels.size(), 0);
   // The other methods do not score the border.
   const bool flag_edges = mask.method == Method::corrected;
-  libmap::parallel_for(tiles.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t t = begin; t < end; ++t) {
-      const std::vector<std::size_t> pivots = pivots_in(grid, mask, tiles[t]);
-      for (const std::size_t at : pivots) flags[at] = is_pivot;
-      if (!flag_edges) continue;
-      const std::vector<std::uint8_t> edges = find_border_pivots(grid, mask, tiles[t], pivots);
-      for (std::size_t n = 0; n < pivots.size(); ++n)
-        if (edges[n] != 0) flags[pivots[n]] |= is_border;
-    }
+  libmap::parallel_each(tiles.size(), [&](std::size_t t) {
+    const std::vector<std::size_t> pivots = pivots_in(grid, mask, tiles[t]);
+    for (const std::size_t at : pivots) flags[at] = is_pivot;
+    if (!flag_edges) return;
+    const std::vector<std::uint8_t> edges = find_border_pivots(grid, mask, tiles[t], pivots);
+    for (std::size_t n = 0; n < pivots.size(); ++n)
+      if (edges[n] != 0) flags[pivots[n]] |= is_border;
   });
   return flags;
 }
@@ -120,21 +118,19 @@ std::vector<ScoredVoxel> score_tiles(const VoxelGrid& grid, const GripperMask& m
   else if (mask.method == Method::corrected)
     fractions = outward_fall_fractions(grid, mask, pivots);
   std::vector<ScoredVoxel> scored(pivots.size());
-  libmap::parallel_for(pivots.size(), pivots_per_chunk, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n) {
-      ScoredVoxel& one = scored[n];
-      one.voxel = grid.voxels[pivots[n]];
-      one.counts = counts[n];
-      if (mask.closing) {
-        one.force = forces[n];
-        one.score = forces[n].hold_probability;
-      } else {
-        if (!fractions.empty()) one.outward_fall_fraction = fractions[n];
-        one.score = score_percent(counts[n], mask.method, options.solid_voxel_threshold) / 100.0 *
-                    one.outward_fall_fraction;
-      }
-      one.border = (flags[pivots[n]] & is_border) != 0;
+  libmap::parallel_each(pivots.size(), pivots_per_chunk, [&](std::size_t n) {
+    ScoredVoxel& one = scored[n];
+    one.voxel = grid.voxels[pivots[n]];
+    one.counts = counts[n];
+    if (mask.closing) {
+      one.force = forces[n];
+      one.score = forces[n].hold_probability;
+    } else {
+      if (!fractions.empty()) one.outward_fall_fraction = fractions[n];
+      one.score = score_percent(counts[n], mask.method, options.solid_voxel_threshold) / 100.0 *
+                  one.outward_fall_fraction;
     }
+    one.border = (flags[pivots[n]] & is_border) != 0;
   });
   return scored;
 }

@@ -58,14 +58,12 @@ struct VoxelPoints {
 std::vector<std::size_t> find_voxels(const libmap::PointCloud& terrain, const VoxelLattice& lattice,
                                      const std::vector<Voxel>& voxels) {
   std::vector<std::size_t> voxel_of_point(terrain.size(), voxels.size());
-  libmap::parallel_for(terrain.size(), 4096, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n) {
-      if (!terrain.positions[n].allFinite()) continue;
-      const Voxel voxel = lattice.voxel_of(terrain.positions[n]);
-      const auto found = std::lower_bound(voxels.begin(), voxels.end(), voxel);
-      if (found != voxels.end() && *found == voxel)
-        voxel_of_point[n] = static_cast<std::size_t>(found - voxels.begin());
-    }
+  libmap::parallel_each(terrain.size(), 4096, [&](std::size_t n) {
+    if (!terrain.positions[n].allFinite()) return;
+    const Voxel voxel = lattice.voxel_of(terrain.positions[n]);
+    const auto found = std::lower_bound(voxels.begin(), voxels.end(), voxel);
+    if (found != voxels.end() && *found == voxel)
+      voxel_of_point[n] = static_cast<std::size_t>(found - voxels.begin());
   });
   return voxel_of_point;
 }
@@ -122,19 +120,17 @@ std::vector<std::uint8_t> find_tilted_edges(const std::vector<Voxel>& voxels,
   const int reach = tilted_reach_voxels(mask);
   VoxelGrid pivot_grid;  // the pivots, to be split by tiles
   pivot_grid.voxels = voxels;
-  libmap::parallel_for(tiles.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t t = begin; t < end; ++t) {
-      std::vector<std::size_t> here;
-      std::vector<TiltedPivot> pivots_here;
-      visit_columns(pivot_grid, tiles[t], [&](std::size_t n) {
-        here.push_back(n);
-        pivots_here.push_back(pivots[n]);
-      });
-      if (here.empty()) continue;
-      const std::vector<std::uint8_t> found = terrain.find_border_pivots(
-          pivots_here, unscanned_columns(grid, expanded(tiles[t], reach, reach)));
-      for (std::size_t n = 0; n < here.size(); ++n) edges[here[n]] = found[n];
-    }
+  libmap::parallel_each(tiles.size(), [&](std::size_t t) {
+    std::vector<std::size_t> here;
+    std::vector<TiltedPivot> pivots_here;
+    visit_columns(pivot_grid, tiles[t], [&](std::size_t n) {
+      here.push_back(n);
+      pivots_here.push_back(pivots[n]);
+    });
+    if (here.empty()) return;
+    const std::vector<std::uint8_t> found = terrain.find_border_pivots(
+        pivots_here, unscanned_columns(grid, expanded(tiles[t], reach, reach)));
+    for (std::size_t n = 0; n < here.size(); ++n) edges[here[n]] = found[n];
   });
   return edges;
 }

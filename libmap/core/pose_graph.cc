@@ -1,33 +1,17 @@
 #include "libmap/core/pose_graph.h"
 
 #include <algorithm>
+#include <array>
 
 namespace libmap {
 
 std::string to_text(LinkType type) {
-  switch (type) {
-    case LinkType::neighbor:
-      return "neighbor";
-    case LinkType::global_closure:
-      return "global closure";
-    case LinkType::local_space_closure:
-      return "local space closure";
-    case LinkType::local_time_closure:
-      return "local time closure";
-    case LinkType::user_closure:
-      return "user closure";
-    case LinkType::virtual_closure:
-      return "virtual closure";
-    case LinkType::neighbor_merged:
-      return "neighbor merged";
-    case LinkType::pose_prior:
-      return "pose prior";
-    case LinkType::landmark:
-      return "landmark";
-    case LinkType::gravity:
-      return "gravity";
-  }
-  return "type " + std::to_string(static_cast<int>(type));
+  constexpr std::array names = {
+      "neighbor",     "global closure",  "local space closure", "local time closure",
+      "user closure", "virtual closure", "neighbor merged",     "pose prior",
+      "landmark",     "gravity"};
+  const auto number = static_cast<std::size_t>(type);
+  return number < names.size() ? names[number] : "type " + std::to_string(static_cast<int>(type));
 }
 
 bool is_absolute(const PoseLink& link) {
@@ -35,15 +19,8 @@ bool is_absolute(const PoseLink& link) {
 }
 
 std::string to_text(PoseSource source) {
-  switch (source) {
-    case PoseSource::odometry:
-      return "odometry";
-    case PoseSource::optimized:
-      return "optimized";
-    case PoseSource::ground_truth:
-      return "ground-truth";
-  }
-  return {};
+  constexpr std::array names = {"odometry", "optimized", "ground-truth"};
+  return names.at(static_cast<std::size_t>(source));
 }
 
 const GraphNode* PoseGraph::find_node(int id) const {

@@ -177,9 +177,8 @@ double area_spacing(const PointTree& tree, const std::vector<Eigen::Vector3d>& p
   constexpr std::size_t most = 2000;
   std::vector<double> squares(std::min(points.size(), most));
   const std::size_t count = std::min(area_neighbors, points.size());
-  parallel_for(squares.size(), 64, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n)
-      squares[n] = tree.nearest(points[n * points.size() / squares.size()], count).back().square_m2;
+  parallel_each(squares.size(), 64, [&](std::size_t n) {
+    squares[n] = tree.nearest(points[n * points.size() / squares.size()], count).back().square_m2;
   });
   return std::sqrt(std::numbers::pi * median(std::move(squares)) / static_cast<double>(count - 1));
 }

@@ -102,23 +102,21 @@ std::vector<FramePair> overlapping_pairs(const std::vector<FrameFeatures>& frame
   if (posed.empty()) return {};
   const PointTree neighbors(positions);
   std::vector<std::vector<FramePair>> of_frame(posed.size());
-  parallel_for(posed.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n) {
-      const PosedFrame& frame = posed[n];
-      const std::vector<PlacedElement> few =
-          surface_samples(frames[frame.index], overlap_samples, SampleUse::estimation);
-      std::vector<std::pair<double, std::size_t>> ranked;
-      for (const std::size_t candidate : candidates_of(neighbors, posed, component_of, n)) {
-        const PosedFrame& other = posed[candidate];
-        const double fraction = overlap_of(few, frames[other.index],
-                                           other.map_from_base.inverse() * frame.map_from_base);
-        if (fraction >= options.min_overlap) ranked.emplace_back(-fraction, other.index);
-      }
-      std::sort(ranked.begin(), ranked.end());
-      ranked.resize(std::min(ranked.size(), static_cast<std::size_t>(options.pairs_per_frame)));
-      for (const auto& [fraction, other] : ranked)
-        of_frame[n].push_back(std::minmax(frame.index, other));
+  parallel_each(posed.size(), [&](std::size_t n) {
+    const PosedFrame& frame = posed[n];
+    const std::vector<PlacedElement> few =
+        surface_samples(frames[frame.index], overlap_samples, SampleUse::estimation);
+    std::vector<std::pair<double, std::size_t>> ranked;
+    for (const std::size_t candidate : candidates_of(neighbors, posed, component_of, n)) {
+      const PosedFrame& other = posed[candidate];
+      const double fraction =
+          overlap_of(few, frames[other.index], other.map_from_base.inverse() * frame.map_from_base);
+      if (fraction >= options.min_overlap) ranked.emplace_back(-fraction, other.index);
     }
+    std::sort(ranked.begin(), ranked.end());
+    ranked.resize(std::min(ranked.size(), static_cast<std::size_t>(options.pairs_per_frame)));
+    for (const auto& [fraction, other] : ranked)
+      of_frame[n].push_back(std::minmax(frame.index, other));
   });
   std::set<FramePair> pairs;
   for (const auto& some : of_frame) pairs.insert(some.begin(), some.end());

@@ -229,10 +229,9 @@ void JointSolver::linearize() {
 
 void JointSolver::optimize_points(JointState& state, int point_iterations) const {
   const BundleView view = view_of(state);
-  parallel_for(problem_.points(), points_per_task, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t point = begin; point < end; ++point)
-      optimize_point(problem_.observations_of(point), view, problem_.robust_scale, point_iterations,
-                     state.points[point]);
+  parallel_each(problem_.points(), points_per_task, [&](std::size_t point) {
+    optimize_point(problem_.observations_of(point), view, problem_.robust_scale, point_iterations,
+                   state.points[point]);
   });
 }
 

@@ -1,17 +1,131 @@
-// Bundle adjustment with free camera parameters: one dense system of poses, motions and camera
-// parameters, from which points are eliminated. Private to libmap/optimize.
+// Bundle adjustment in one dense system of poses, motions and camera parameters, with points
+// optimized at given poses and cameras and eliminated from the normal equations (Schur complement).
+// Private to libmap/optimize.
 #pragma once
 
+#include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <Eigen/LU>
+#include <cmath>
 #include <cstddef>
 #include <map>
 #include <span>
 #include <vector>
 
-#include "libmap/optimize/bundle_points.h"
+#include "libmap/core/parallel.h"
+#include "libmap/features/bundle_residuals.h"
+#include "libmap/geometry/least_squares.h"
+#include "libmap/geometry/robust.h"
 #include "libmap/optimize/pose_graph_optimization.h"
 
 namespace libmap {
+
+struct BundleObservation {
+  std::size_t node = 0;          // row of the pose
+  Eigen::Index first_param = 0;  // first parameter of the camera
+  CalibratedFeature feature;
+};
+
+// Weight of a residual for Cauchy's loss of width `scale`.
+inline double robust_weight(const Eigen::Vector3d& residual, double scale) {
+  return cauchy_weight(residual.squaredNorm() / (scale * scale));
+}
+
+// State at which observations are evaluated. Does not own the data that it points to.
+struct BundleView {
+  std::vector<const Pose*> poses;                  // by row
+  const std::vector<Vector6d>* motions = nullptr;  // by row; nullptr: no motion
+  const double* camera_params = nullptr;
+
+  explicit BundleView(const std::map<int, Pose>& map_from_base) {
+    for (const auto& [node, pose] : map_from_base) poses.push_back(&pose);
+  }
+  bool evaluate(const BundleObservation& seen, const Eigen::Vector3d& point,
+                CalibratedResidual& result, bool with_derivatives) const {
+    return seen.feature.evaluate(*poses[seen.node],
+                                 motions != nullptr ? (*motions)[seen.node] : Vector6d::Zero(),
+                                 camera_params + seen.first_param, point, result, with_derivatives);
+  }
+  // Cauchy's loss. Sets a very large residual if the point is not in front of the camera.
+  double cost(const BundleObservation& seen, const Eigen::Vector3d& point, double robust_scale,
+              CalibratedResidual& result) const {
+    constexpr double behind = 1e6;
+    if (!evaluate(seen, point, result, false)) result.residual.setConstant(behind);
+    const double square = robust_scale * robust_scale;
+    return 0.5 * square * std::log1p(result.residual.squaredNorm() / square);
+  }
+};
+
+// Optimizes the position of one point (map frame) by Gauss-Newton.
+inline void optimize_point(std::span<const BundleObservation> observations, const BundleView& view,
+                           double robust_scale, int point_iterations, Eigen::Vector3d& point) {
+  gauss_newton(point_iterations, [&] {
+    NormalEquations<3> equations;
+    CalibratedResidual seen;
+    for (const BundleObservation& observation : observations)
+      if (view.evaluate(observation, point, seen, true))
+        equations.add(seen.by_point, seen.residual, robust_weight(seen.residual, robust_scale));
+    const Eigen::Vector3d step = equations.matrix.ldlt().solve(equations.rhs);
+    if (!step.allFinite()) return StepState::failed;
+    point += step;
+    return StepState::moving;
+  });
+}
+
+// Collects the observations of one point and eliminates the point. `System` provides
+//   add(row, column, block)  for two nodes, row >= column
+//   add_rhs(row, vector)
+template <int node_size, typename System>
+class PointSchur {
+ public:
+  using ByNode = Eigen::Matrix<double, 3, node_size>;
+  using Mixed = Eigen::Matrix<double, node_size, 3>;
+
+  static ByNode by_node(const CalibratedResidual& seen) {
+    ByNode by_node;
+    by_node.template leftCols<6>() = seen.by_pose;
+    if constexpr (node_size == 12) by_node.template rightCols<6>() = seen.by_motion;
+    return by_node;
+  }
+
+  // Adds the terms of the node to the system. Observations must be added by ascending node.
+  void add(const BundleObservation& observation, const CalibratedResidual& seen, double weight,
+           System& system) {
+    const ByNode jacobian = by_node(seen);
+    const Mixed weighted = weight * jacobian.transpose();
+    system.add(observation.node, observation.node, weighted * jacobian);
+    system.add_rhs(observation.node, -weighted * seen.residual);
+    views_.push_back({observation.node, weighted * seen.by_point, Mixed::Zero()});
+    const Eigen::Matrix3d weighted_point = weight * seen.by_point.transpose();
+    hessian_.noalias() += weighted_point * seen.by_point;
+    rhs_.noalias() -= weighted_point * seen.residual;
+  }
+
+  void eliminate(System& system) {
+    if (views_.empty()) return;
+    inverse_ = hessian_.inverse();
+    step_ = inverse_ * rhs_;
+    for (std::size_t a = 0; a < views_.size(); ++a) {
+      View& view = views_[a];
+      view.reduced = view.mixed * inverse_;
+      system.add_rhs(view.node, -view.mixed * step_);
+      for (std::size_t b = 0; b <= a; ++b)
+        system.add(view.node, views_[b].node, -view.reduced * views_[b].mixed.transpose());
+    }
+  }
+
+ protected:
+  struct View {
+    std::size_t node;
+    Mixed mixed;    // second derivatives by node and point
+    Mixed reduced;  // mixed times the inverse Hessian of the point
+  };
+  std::vector<View> views_;
+  Eigen::Matrix3d hessian_ = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d rhs_ = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d inverse_ = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d step_ = Eigen::Vector3d::Zero();
+};
 
 struct JointProblem {
   std::vector<BundleObservation> observations;  // grouped by point

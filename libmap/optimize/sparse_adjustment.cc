@@ -7,9 +7,9 @@
 #include <utility>
 
 #include "libmap/core/parallel.h"
-#include "libmap/optimize/bundle_points.h"
 #include "libmap/optimize/graph_covariance.h"
 #include "libmap/optimize/graph_links.h"
+#include "libmap/optimize/joint_adjustment.h"
 
 namespace libmap {
 
@@ -87,9 +87,8 @@ std::vector<Eigen::Vector3d> TrackSystem::points_at(
 void TrackSystem::optimize_points(const std::map<int, Pose>& map_from_base,
                                   std::vector<Eigen::Vector3d>& points) const {
   const TrackObservations seen(frames_, map_from_base);
-  parallel_for(tracks_.size(), tracks_per_task, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t t = begin; t < end; ++t)
-      optimize_point(seen.of(tracks_[t]), seen.view(), robust_scale_, point_iterations, points[t]);
+  parallel_each(tracks_.size(), tracks_per_task, [&](std::size_t t) {
+    optimize_point(seen.of(tracks_[t]), seen.view(), robust_scale_, point_iterations, points[t]);
   });
 }
 

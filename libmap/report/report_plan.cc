@@ -1,4 +1,3 @@
-#include "libmap/report/report_plan.h"
 
 #include <algorithm>
 #include <cstring>

@@ -1,5 +1,5 @@
-// Encodes and decodes the binary columns (blobs) of an RTAB-Map database: poses, information
-// matrices, velocities, GPS. All are little-endian.
+// Little-endian binary formats of an RTAB-Map database, and the reader of its nodes, links and
+// optimized poses.
 #pragma once
 
 #include <array>
@@ -8,8 +8,10 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "libmap/core/pose_graph.h"
+#include "libmap/scan/rtabmap_schema.h"
 
 namespace libmap {
 
@@ -50,5 +52,17 @@ OptimizedPoseBlobs to_blobs(const std::map<int, Pose>& map_from_base);
 // Throws Error unless Admin.opt_ids and Admin.opt_poses are matrices of int32 and of 12 float32 per
 // id. Checks the headers of the blobs without inflating them.
 void require_optimized_poses(const std::string& ids_blob, const std::string& poses_blob);
+
+class SqliteFile;
+
+struct RtabmapGraph {
+  PoseGraph graph;
+  // Dropped nodes, links and poses with the reason; at most 100, then the number of further ones.
+  std::vector<std::string> warnings;
+};
+
+// Reads the graph. Each link is contained once; if both directions are stored, the one from the
+// lower node. Throws Error naming the file if a table cannot be read.
+RtabmapGraph read_rtabmap_graph(const SqliteFile& file, const RtabmapColumns& columns);
 
 }  // namespace libmap

@@ -1,4 +1,4 @@
-#include "libmap/scan/rtabmap_graph.h"
+#include "libmap/scan/rtabmap_blobs.h"
 
 #include <algorithm>
 #include <array>
@@ -11,7 +11,6 @@
 
 #include "libmap/camera/matrix_codec.h"
 #include "libmap/core/error.h"
-#include "libmap/scan/rtabmap_blobs.h"
 #include "libmap/scan/sqlite_file.h"
 
 namespace libmap {

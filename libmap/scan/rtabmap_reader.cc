@@ -9,7 +9,6 @@
 #include "libmap/camera/matrix_codec.h"
 #include "libmap/core/error.h"
 #include "libmap/scan/rtabmap_blobs.h"
-#include "libmap/scan/rtabmap_graph.h"
 #include "libmap/scan/sqlite_file.h"
 
 namespace libmap {

@@ -1,4 +1,4 @@
-#include "libmap/texture/mesh_subdivision.h"
+#include "libmap/texture/texture_steps.h"
 
 #include <algorithm>
 #include <array>

@@ -10,7 +10,7 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
-#include "libmap/texture/texture_labeling.h"
+#include "libmap/texture/texture_steps.h"
 
 namespace libmap {
 

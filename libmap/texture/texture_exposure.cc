@@ -1,4 +1,4 @@
-#include "libmap/texture/texture_exposure.h"
+#include "libmap/texture/texture_steps.h"
 
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>

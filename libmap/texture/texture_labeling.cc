@@ -1,4 +1,4 @@
-#include "libmap/texture/texture_labeling.h"
+#include "libmap/texture/texture_steps.h"
 
 #include <algorithm>
 #include <cstddef>

@@ -8,9 +8,8 @@
 #include "libmap/core/error.h"
 #include "libmap/mesh/mesh_adjacency.h"
 #include "libmap/mesh/mesh_parts.h"
-#include "libmap/texture/mesh_subdivision.h"
-#include "libmap/texture/texture_painting.h"
 #include "libmap/texture/texture_photos.h"
+#include "libmap/texture/texture_steps.h"
 
 namespace libmap {
 

@@ -21,8 +21,7 @@
 #include "libmap/mesh/mesh_tile_index.h"
 #include "libmap/scan/scan_source.h"
 #include "libmap/texture/texture_atlas.h"
-#include "libmap/texture/texture_exposure.h"
-#include "libmap/texture/texture_labeling.h"
+#include "libmap/texture/texture_steps.h"
 #include "libmap/texture/texture_views.h"
 
 namespace libmap {

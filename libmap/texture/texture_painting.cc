@@ -1,4 +1,4 @@
-#include "libmap/texture/texture_painting.h"
+#include "libmap/texture/texture_steps.h"
 
 #include <algorithm>
 #include <array>

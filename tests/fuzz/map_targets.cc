@@ -66,8 +66,6 @@ bool run_map(std::string_view bytes) {
     accepts([&] { look_up_all(small_index(), map); });
     accepts([&] { libgtd::voxel_downsample_map(map, 1 << 20); });
     accepts([&] { libmap::make_map_view(map, {}); });
-    libmap::PointCloud evaluated = map;
-    accepts([&] { libgtd::add_obstacles(evaluated, graspmap_test::test_voxel_m, {}); });
     libgtd::restore_positions(small_index(), map);
   });
 }

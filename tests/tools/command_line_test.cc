@@ -258,7 +258,7 @@ TEST(CommandLine, PathsThatLeadNowhere) {
   EXPECT_TRUE(bad_input(graspmap({"convert", "loop.pcd", "-o", "a.ply"}),
                         {.file = "loop.pcd", .about = "symbolic links"}));
   EXPECT_TRUE(bad_input(graspmap({"convert", std::string(300, 'n') + ".pcd", "-o", "a.ply"}),
-                        {.file = std::string(300, 'n') + ".pcd.json", .about = "too long"}));
+                        {.file = std::string(300, 'n') + ".pcd", .about = "too long"}));
 }
 
 TEST(CommandLine, WhatCannotBePrintedIsAnError) {

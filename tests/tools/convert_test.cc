@@ -112,7 +112,7 @@ TEST(Convert, AMapTakesEveryEncoding) {
   ASSERT_TRUE(succeeded(graspmap({"convert", "map.pcd", "-o", "same.pcd"})));
   EXPECT_EQ(content("same.pcd"), content("map.pcd"));
   EXPECT_TRUE(bad_input(graspmap({"convert", "map.pcd", "same.pcd", "-o", "two.pcd"}),
-                        {.file = "map.pcd", .about = "a share"}));
+                        {.file = "same.pcd", .about = "MAP.tiles"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("two.pcd")));
 }
 

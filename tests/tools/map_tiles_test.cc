@@ -179,7 +179,7 @@ TEST(MapTiles, DamageIsNamed) {
   EXPECT_TRUE(
       bad_input(graspmap({"info", "none.tiles"}), {.file = "none.tiles", .about = "no such"}));
   EXPECT_TRUE(bad_input(graspmap({"convert", "map.tiles", "map.pcd", "-o", "merged.pcd"}),
-                        {.file = "map.tiles", .about = "merged"}));
+                        {.file = "map.pcd", .about = "second input"}));
 }
 
 // Its positions are made from its voxels.

@@ -234,6 +234,8 @@ TEST_F(ScoreBadInput, FlagsOutOfTheirBounds) {
   graspmap_test::write_terrain();
   for (const char* share : {"3/2", "0/2", "-1/2", "1", "1/", "/2", "a/b", "1/2/3", "1/0", ""})
     EXPECT_TRUE(bad_input(score({"terrain.pcd", "--tile", share}), {.field = "--tile"})) << share;
+  EXPECT_TRUE(bad_input(score({"terrain.pcd", "--tile", "1/2"}),
+                        {.field = "--tile", .about = "MAP.tiles"}));
   EXPECT_TRUE(bad_input(score({"terrain.pcd", "--up", "0,0"}),
                         {.field = "--up", .value = "0,0", .bound = "X,Y,Z"}));
   EXPECT_TRUE(

@@ -53,28 +53,6 @@ Words joined(Words words, const Words& more) {
   return words;
 }
 
-TEST(ScoreOrientation, SharesMergedAreTheWholeMap) {
-  write_block();
-  for (const std::string format : {".pcd", ".csv"}) {
-    ASSERT_TRUE(succeeded(score("whole" + format, both)));
-    for (const char* number : {"1", "2", "3"})
-      ASSERT_TRUE(succeeded(score("part" + std::string(number) + format,
-                                  joined(both, {"--tile", std::string(number) + "/3"}))));
-    ASSERT_TRUE(succeeded(graspmap({"convert", "part2" + format, "part3" + format, "part1" + format,
-                                    "-o", "merged" + format})));
-    EXPECT_EQ(content("merged" + format), content("whole" + format));
-    const auto whole = json_of("whole" + format + ".json").at("results");
-    const auto merged = json_of("merged" + format + ".json").at("results");
-    EXPECT_GT(whole.at("obstacle_voxels"), 500);
-    EXPECT_EQ(merged.at("obstacle_voxels"), whole.at("obstacle_voxels"));
-    EXPECT_EQ(merged.at("normal_radius_m"), 0.071);
-  }
-  const PointCloud map = libmap::read_cloud(scratch("whole.pcd")).cloud;
-  EXPECT_TRUE(map.has_normals());
-  const PointCloud part = libmap::read_cloud(scratch("part1.pcd")).cloud;
-  EXPECT_EQ(part.find_field("obstacle"), nullptr);
-}
-
 TEST(ScoreOrientation, TileStoreHoldsTheSameMap) {
   write_block();
   const Words surface = {"--orientation", "surface"};

@@ -1,4 +1,4 @@
-#include "tools/support/analysis_images.h"
+#include "tools/support/analysis_outputs.h"
 
 #include <algorithm>
 #include <cmath>

@@ -66,12 +66,6 @@ std::string sentence(std::string_view summary) {
   return text + ".";
 }
 
-class Silent : public libmap::Progress {
-  void begin(std::string_view, std::size_t) override {}
-  void advance(std::size_t) override {}
-  void end() override {}
-};
-
 // Minimum elapsed time for an estimate of the remaining time.
 constexpr double min_elapsed_s = 2.0;
 
@@ -154,13 +148,13 @@ class JsonLines : public Counting {
   }
 };
 
-// Returns the progress display of a style. "auto": a bar if stderr is a terminal, else nothing;
+// Returns the progress display of a style, nullptr for none. "auto": a bar if stderr is a terminal;
 // "json": one JSON line per step; "none". Stages of more than a few seconds show the remaining
 // time. Throws Error for another style.
 std::unique_ptr<libmap::Progress> make_progress(const std::string& style) {
   if (style == "json") return std::make_unique<JsonLines>();
   if (style == "auto" && isatty(STDERR_FILENO) == 1) return std::make_unique<Bar>();
-  if (style == "auto" || style == "none") return std::make_unique<Silent>();
+  if (style == "auto" || style == "none") return nullptr;
   throw libmap::Error("not a style of progress display",
                       {.field = "--progress", .value = style, .bound = "one of auto, json, none"});
 }
@@ -445,12 +439,12 @@ void Command::Parts::work(const std::function<void(Run&)>& body) {
   start_log(name, run_options);
   const std::unique_ptr<libmap::Progress> bar =
       make_progress(run_options.quiet ? "none" : progress);
-  Run run(name, run_options, *bar);
+  Run run(name, run_options, bar ? *bar : libmap::no_progress());
   run.manifest().add_parameters(table);
   if (!config.empty()) run.add_input(config_file());
   if (const auto preset = preset_file()) run.add_input(*preset);
   body(run);
-  bar->end();
+  run.progress().end();
   require_printed();
   exit_if_signaled();
 }

@@ -1,4 +1,4 @@
-#include "tools/support/map_table.h"
+#include "tools/support/analysis_outputs.h"
 
 #include "libgtd/evaluate/map_summary.h"
 #include "libmap/core/table.h"

@@ -1,7 +1,6 @@
 #include "tools/support/map_tiles.h"
 
 #include "libgtd/evaluate/voxel_map.h"
-#include "libgtd/score/map_shares.h"
 #include "libgtd/tile_detection.h"
 #include "libmap/core/file_output.h"
 #include "libmap/core/parallel.h"
@@ -108,17 +107,18 @@ libmap::PointCloud MapTiles::load_checked(std::size_t tile) const {
 
 namespace {
 
-libmap::Manifest manifest_of(const std::string& tile) {
-  const auto manifest = libmap::read_manifest_of(tile);
-  if (!manifest)
-    throw libmap::Error("has no manifest, so `graspmap score` did not write this tile",
-                        {.file = tile});
-  return *manifest;
-}
-
-// Recomputes positions on the lattice, because shares may differ in precision.
-void restore_full_precision(const libmap::Manifest& part, libmap::PointCloud& whole) {
-  if (const auto index = index_of(part)) libgtd::restore_positions(*index, whole);
+// Copies parameters, frame, transforms and those results of a store that are valid for its merged
+// map.
+void copy_common_entries(const libmap::Manifest& store, libmap::Manifest& whole) {
+  for (const auto& parameter : store.parameters)
+    if (parameter.first != "tile") whole.parameters.push_back(parameter);
+  whole.frame = store.frame;
+  whole.transforms = store.transforms;
+  whole.georeference = store.georeference;
+  for (const char* name : {"lattice_origin_m", "plane_rmse_m", "up_source", "input_points",
+                           "occupied_voxels", "mask_side_voxels", "mask_layers", "normal_radius_m"})
+    if (const libmap::ManifestValue* value = store.find_result(name))
+      whole.results.emplace_back(name, *value);
 }
 
 // Range of tiles with the same i, which are consecutive in the map's order.
@@ -135,44 +135,11 @@ std::vector<TileRow> rows_of(const libgtd::TileStoreIndex& index) {
   return rows;
 }
 
-libmap::PointCloud joined(const std::vector<libmap::PointCloud>& parts, const std::string& name) {
-  return in_file(name, [&] { return libgtd::merge_map_clouds(parts); });
-}
-
 libmap::PointCloud load_row(const MapTiles& tiles, const std::string& store, const TileRow& row) {
   std::vector<libmap::PointCloud> parts(row.end - row.begin);
   libmap::parallel_each(parts.size(),
                         [&](std::size_t n) { parts[n] = tiles.load_checked(row.begin + n); });
-  return joined(parts, store);
-}
-
-void merge_store(const std::string& store, const std::string& output, const MergeOptions& options,
-                 Run& run) {
-  const libmap::GeometryWriteOptions& writing = options.writing;
-  if (libmap::format_of(output) == ".pcd" && writing.encoding != libmap::FileEncoding::binary)
-    throw libmap::Error("a tile store can be merged only as binary .pcd",
-                        {.file = output, .field = "--encoding"});
-  const MapTiles tiles(store);
-  const libgtd::TileStoreIndex& index = tiles.index();
-  libgtd::copy_common_entries(index.manifest, run.manifest());
-  run.manifest().inputs = index.manifest.inputs;
-  run.add_input(store_index_path(store));
-  run.add_results({{"scored_voxels", index.voxels()},
-                   {"border_voxels", index.border_voxels()},
-                   {"graspable_voxels", index.graspable_voxels()}});
-  const auto tell = [&] {
-    run.info("{} scored voxels from {} tiles", index.voxels(), index.tiles.size());
-  };
-  if (libmap::is_dem_path(output)) {
-    const auto visit_rows = [&](const auto& visit) {
-      for (const TileRow& row : rows_of(index)) visit(load_row(tiles, store, row));
-    };
-    write_raster(output, raster_of(visit_rows, index.manifest, options.pixel_size_m), run);
-    return tell();
-  }
-  run.write_output(
-      output, [&](const auto& temporary) { write_merged(tiles, store, temporary, writing, run); });
-  tell();
+  return in_file(store, [&] { return libgtd::merge_map_clouds(parts); });
 }
 
 }  // namespace
@@ -196,54 +163,35 @@ void write_merged(const MapTiles& tiles, const std::string& store,
   run.progress().end();
 }
 
-bool is_part_of_map(const std::string& file) {
-  if (is_tile_store(file)) return true;
-  const auto manifest = libmap::read_manifest_of(file);
-  return manifest && libgtd::is_map_share(*manifest);
-}
-
-void merge_tiles(const std::vector<std::string>& tiles, const std::string& output,
-                 const MergeOptions& options, Run& run) {
+void merge_store(const std::string& store, const std::string& output, const MergeOptions& options,
+                 Run& run) {
   if (!libmap::is_dem_path(output)) libmap::require_cloud_format(output);
-  run.claim_output(output, tiles);
-  const auto store = std::find_if(tiles.begin(), tiles.end(), is_tile_store);
-  if (store != tiles.end()) {
-    if (tiles.size() > 1)
-      throw libmap::Error("a tile store cannot be merged with other files", {.file = *store});
-    return merge_store(*store, output, options, run);
-  }
-  std::vector<libmap::Manifest> manifests;
-  for (const std::string& tile : tiles) manifests.push_back(manifest_of(tile));
-  libgtd::require_shares_of_one_map(manifests, tiles);
-  std::vector<libmap::PointCloud> parts;
-  parts.reserve(tiles.size());
-  for (const std::string& tile : tiles) parts.push_back(libmap::read_cloud(tile).cloud);
-  libmap::PointCloud whole = joined(parts, tiles.front());
-  restore_full_precision(manifests.front(), whole);
-  libgtd::copy_common_entries(manifests.front(), run.manifest());
-  // The inputs are those of the shares, then the shares.
-  run.manifest().inputs = manifests.front().inputs;
-  for (const std::string& tile : tiles) run.add_input(tile);
-  run.add_results({{"scored_voxels", whole.size()},
-                   {"border_voxels", libgtd::count_set(whole, "border")},
-                   {"graspable_voxels", libgtd::count_set(whole, "graspable")}});
-  run.info("{} scored voxels from {} files", whole.size(), parts.size());
-  // Shares have slopes only, because obstacles depend on the whole map.
-  if (whole.find_field("slope_deg") != nullptr) {
-    const std::size_t obstacles = in_file(libmap::manifest_path(tiles.front()).string(), [&] {
-      return libgtd::add_obstacles_of(manifests.front(), whole);
-    });
-    run.add_results({{"obstacle_voxels", obstacles}});
-    run.info("{} voxels are obstacles", obstacles);
-  }
+  run.claim_output(output, {store});
+  const libmap::GeometryWriteOptions& writing = options.writing;
+  if (libmap::format_of(output) == ".pcd" && writing.encoding != libmap::FileEncoding::binary)
+    throw libmap::Error("a tile store can be merged only as binary .pcd",
+                        {.file = output, .field = "--encoding"});
+  const MapTiles tiles(store);
+  const libgtd::TileStoreIndex& index = tiles.index();
+  copy_common_entries(index.manifest, run.manifest());
+  run.manifest().inputs = index.manifest.inputs;
+  run.add_input(store_index_path(store));
+  run.add_results({{"scored_voxels", index.voxels()},
+                   {"border_voxels", index.border_voxels()},
+                   {"graspable_voxels", index.graspable_voxels()}});
+  const auto tell = [&] {
+    run.info("{} scored voxels from {} tiles", index.voxels(), index.tiles.size());
+  };
   if (libmap::is_dem_path(output)) {
-    const auto visit_whole = [&](const auto& visit) { visit(whole); };
-    write_raster(output, raster_of(visit_whole, manifests.front(), options.pixel_size_m), run);
-    return;
+    const auto visit_rows = [&](const auto& visit) {
+      for (const TileRow& row : rows_of(index)) visit(load_row(tiles, store, row));
+    };
+    write_raster(output, raster_of(visit_rows, index.manifest, options.pixel_size_m), run);
+    return tell();
   }
-  run.write_output(output, [&](const auto& temporary) {
-    libmap::write_cloud(temporary, whole, options.writing);
-  });
+  run.write_output(
+      output, [&](const auto& temporary) { write_merged(tiles, store, temporary, writing, run); });
+  tell();
 }
 
 namespace {

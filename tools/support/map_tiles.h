@@ -1,5 +1,4 @@
-// Reads and merges the parts of a map: tile stores, and the shares that several runs wrote. Writes
-// maps and clouds as GeoTIFF.
+// Reads, fills and merges tile stores, and writes maps and clouds as GeoTIFF.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -62,9 +61,6 @@ class MapTiles {
   bool float64_positions_ = false;
 };
 
-// Returns true for a tile store, or if the manifest of `file` describes one of several shares.
-bool is_part_of_map(const std::string& file);
-
 // Writes the tiles of a store as one map. PCD files are written by rows of tiles; other formats
 // need the whole map in memory. Errors name `store`.
 void write_merged(const MapTiles& tiles, const std::string& store,
@@ -76,12 +72,11 @@ struct MergeOptions {
   double pixel_size_m = 0.0;  // of a raster, .tif; 0: the voxel size
 };
 
-// Merges tiles to the same bytes as scoring in one run. `tiles` are all shares that `score --tile
-// K/N` wrote, in any order, or one tile store. A store is written as binary .pcd by rows of tiles,
-// in another cloud format, or as .tif with only the raster in memory. Throws Error if a share is
-// missing, given twice, or of another map.
-void merge_tiles(const std::vector<std::string>& tiles, const std::string& output,
-                 const MergeOptions& options, Run& run);
+// Merges a tile store to the same bytes as scoring into one file: as binary .pcd by rows of tiles,
+// in another cloud format, or as .tif with only the raster in memory. Claims the output. Throws
+// Error if the store is incomplete.
+void merge_store(const std::string& store, const std::string& output, const MergeOptions& options,
+                 Run& run);
 
 // Returns the raster of a map or cloud, whose points `parts` visits.
 //

@@ -31,28 +31,6 @@ INSTANTIATE_TEST_SUITE_P(All, Detection,
                                          Method::corrected, Method::calibrated),
                          [](const auto& given) { return name_of(given.param); });
 
-TEST_P(Detection, SharesYieldTheVoxelsOfTheWholeMap) {
-  const PointCloud cloud = bumpy_cloud(0.8, 0.009);
-  DetectionOptions options = options_for(GetParam());
-  options.scenario.tile_size_m = 0.25;
-  const auto whole = detect(cloud, options);
-  ASSERT_GT(whole.map.voxels.size(), 1000U);
-  std::size_t at = 0;
-  std::vector<PointCloud> parts;
-  for (int number = 1; number <= 3; ++number) {
-    options.share = {number, 3};
-    const auto part = detect(cloud, options);
-    at += part.map.voxels.size();
-    parts.push_back(to_cloud(part.map, MapFrame::terrain));
-  }
-  EXPECT_EQ(at, whole.map.voxels.size());
-  const PointCloud merged = merge_map_clouds(parts);
-  const PointCloud expected = to_cloud(whole.map, MapFrame::terrain);
-  EXPECT_EQ(merged.positions, expected.positions);
-  EXPECT_EQ(merged.colors, expected.colors);
-  EXPECT_EQ(merged.fields, expected.fields);
-}
-
 TEST_P(Detection, TileSizeChangesNothing) {
   const PointCloud cloud = bumpy_cloud(0.7, 0.009);
   DetectionOptions options = options_for(GetParam());

@@ -77,22 +77,13 @@ TEST(Merge, RefusesPartsOfWhichOnlySomeHaveColorsOrNormals) {
                        {.about = "normals"}));
 }
 
-TEST(Obstacles, AreNotFoundInAMapWithoutSlopes) {
-  PointCloud cloud = to_cloud(small_map(), MapFrame::terrain);
-  const libmap::Error error = error_of([&] { add_obstacles(cloud, 0.01, {}); });
-  EXPECT_TRUE(is_error(error, {.field = "slope_deg"}));
-  EXPECT_EQ(error.context().field, "slope_deg");
-}
-
 // Values that have no order or do not fit an integer.
 TEST(Merge, RefusesIndicesThatAreNone) {
   for (const double index : {std::nan(""), HUGE_VAL, 1e300, 0.5, 0x1p29 + 1}) {
     PointCloud cloud = to_cloud(small_map(), MapFrame::terrain);
-    cloud.add_field("slope_deg", libmap::ScalarType::float32);
     for (libmap::ScalarField& field : cloud.fields)
       if (field.name == "j") field.values[1] = index;
     EXPECT_EQ(error_of([&] { merge_map_clouds({cloud}); }).context().field, "j");
-    EXPECT_EQ(error_of([&] { add_obstacles(cloud, 0.01, {}); }).context().field, "j");
   }
 }
 

@@ -261,7 +261,6 @@ TEST(Obstacles, NeedAMapInOrder) {
                        {.field = "slopes_deg", .value = "0", .bound = "1"}));
 }
 
-// Parameters as in manifests of shares of a map.
 TEST(Obstacles, NeedPossibleLengths) {
   const std::vector<Voxel> far = {{0, 0, 0}, {300'000'000, 0, 0}};
   const std::vector<float> slopes = {80.0F, 80.0F};

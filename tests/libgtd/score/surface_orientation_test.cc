@@ -271,17 +271,6 @@ TEST(SurfaceOrientation, TilesThreadsAndSharesChangeNothing) {
     EXPECT_EQ(other.fields, expected.fields);
     EXPECT_EQ(other.normals, expected.normals);
   }
-  std::vector<PointCloud> parts;
-  options.scenario.tile_size_m = 0.25;
-  for (int number = 1; number <= 3; ++number) {
-    options.share = {number, 3};
-    parts.push_back(to_cloud(detect(cloud, options).map, MapFrame::terrain));
-    EXPECT_EQ(parts.back().find_field("obstacle"), nullptr);
-  }
-  PointCloud merged = merge_map_clouds(parts);
-  add_obstacles(merged, 0.01, {.slope_deg = 60.0, .height_m = 0.1, .normal_radius_m = 0.071});
-  EXPECT_EQ(with_comparable_slopes(merged).fields, expected.fields);
-  EXPECT_EQ(merged.normals, expected.normals);
 }
 
 TEST(SurfaceOrientation, PlacesWithoutANormalAreEvaluatedUpright) {

@@ -1,4 +1,4 @@
-#include "libmap/report/report_plan.h"
+#include "libmap/report/report_reader.h"
 
 #include <gtest/gtest.h>
 

@@ -6,12 +6,9 @@
 #include <utility>
 
 #include "libmap/mesh/mesh_adjacency.h"
-#include "libmap/texture/mesh_subdivision.h"
 #include "libmap/texture/texture_atlas.h"
-#include "libmap/texture/texture_exposure.h"
-#include "libmap/texture/texture_labeling.h"
-#include "libmap/texture/texture_painting.h"
 #include "libmap/texture/texture_photos.h"
+#include "libmap/texture/texture_steps.h"
 #include "libmap/texture/texture_views.h"
 #include "tests/libmap/mesh/mesh_samples.h"
 #include "tests/libmap/texture/painted_scan.h"

@@ -1,4 +1,5 @@
-// Images and charts of `graspmap analyze`.
+// Outputs of `graspmap analyze`: images and charts of the analysis of a map, and a table of several
+// maps with one row per map.
 #pragma once
 
 #include <string>
@@ -8,7 +9,9 @@
 #include "libgtd/evaluate/map_change.h"
 #include "libgtd/evaluate/map_regions.h"
 #include "libmap/core/image.h"
+#include "libmap/core/parameters.h"
 #include "libmap/view/charts.h"
+#include "tools/support/map_frame.h"
 
 namespace graspmap_tools {
 
@@ -39,5 +42,25 @@ libmap::ColorImage draw_change(const MapImage& image, const libgtd::MapChange& c
 // Draws the map from above, colored by the difference of both scores.
 libmap::ColorImage draw_score_change(const MapImage& image, const libgtd::MapChange& change,
                                      const libgtd::VoxelMap& other);
+
+struct MapTableOptions {
+  std::string expected;  // CSV of regions of expected graspability; empty: none
+  PointFrame points_frame = PointFrame::input;  // frame of these regions
+  std::string cutoff = "auto";                  // minimum score, or each map's own threshold
+  std::string names;                            // separated by '|'
+  bool pairs = false;
+  std::string varied;  // column of maps.csv, the horizontal axis of charts; empty: no such charts
+  std::string series;  // columns of maps.csv, separated by ',': one curve per combination
+  bool images = true;
+};
+
+// Binds all options except `expected`, `points_frame` and `images`.
+void bind(libmap::ParameterTable& table, MapTableOptions& options);
+
+// Writes maps.csv, histograms.csv with a chart and, if requested, pairs.csv, regions.csv and charts
+// of graspable_share, voxel_youden and place_youden against the varied parameter into `folder`.
+// Throws Error naming the invalid map or table.
+void tabulate_maps(const std::vector<std::string>& map_files, const std::string& folder,
+                   const MapTableOptions& options, Run& run);
 
 }  // namespace graspmap_tools
