@@ -14,7 +14,7 @@ struct CollisionBall {
 };
 
 struct CollisionBallOptions {
-  double max_radius_m = 0.1;       // > 0
+  double max_radius_m = 0.05;      // > 0
   double max_deviation_m = 0.002;  // > 0
 };
 

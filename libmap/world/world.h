@@ -31,7 +31,7 @@ namespace libmap {
 struct WorldOptions {
   double collision_error_m = 0.0014;  // > 0: between the collision mesh and the visual one
   HeightFieldOptions field{};
-  double ball_radius_m = 0.1;     // > 0: maximum radius of the balls where the field is left out
+  double ball_radius_m = 0.05;    // > 0: maximum radius of the balls where the field is left out
   std::string gravity = "earth";  // m/s2 downwards, or earth, moon, mars
   double friction = 0.8;          // >= 0: Coulomb's coefficient
   double restitution = 0.0;       // 0 to 1

@@ -159,11 +159,10 @@ TEST(WorldCommand, AKilledRunLeavesNoWorld) {
                                          "convert", "site.ply", "-o", "killed.world"};
   int killed = 0;
   for (int ms = 5; ms < 3000; ms = ms * 3 / 2) {
-    graspmap_test::RunningProgram running(line, {.folder = scratch("")}, true);
-    const pid_t process = running.process();
+    graspmap_test::RunningProgram running(line, {.folder = scratch("")});
     std::this_thread::sleep_for(std::chrono::milliseconds(ms));
     if (running.has_ended()) break;
-    kill(-process, SIGKILL);
+    kill(running.process(), SIGKILL);
     running.wait();
     ++killed;
     EXPECT_FALSE(fs::exists(scratch("killed.world"))) << ms;
