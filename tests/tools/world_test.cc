@@ -1,8 +1,4 @@
 #include <gtest/gtest.h>
-#include <signal.h>
-
-#include <chrono>
-#include <thread>
 
 #include "libmap/core/file_output.h"
 #include "libmap/core/manifest.h"
@@ -10,7 +6,6 @@
 #include "libmap/io/mesh_io.h"
 #include "libmap/texture/textured_mesh_io.h"
 #include "tests/libmap/world/world_samples.h"
-#include "tests/support/running_program.h"
 #include "tests/tools/tool_test_support.h"
 
 namespace world_tool_test {
@@ -148,32 +143,6 @@ TEST(WorldCommand, Georeference) {
                   .find("georeference: offset 500000.25 4000000.5 -3 m, CRS LOCAL_CS[\"a- -b\"]"),
               std::string::npos)
         << file;
-}
-
-// A run that is killed leaves nothing that looks like a world, and the next one is undisturbed.
-TEST(WorldCommand, AKilledRunLeavesNoWorld) {
-  write_site();
-  ASSERT_TRUE(succeeded(graspmap({"convert", "site.ply", "-o", "whole.world"})));
-  const auto expected = files_of(scratch("whole.world"));
-  const std::vector<std::string> line = {(graspmap_test::build_folder() / "graspmap").string(),
-                                         "convert", "site.ply", "-o", "killed.world"};
-  int killed = 0;
-  for (int ms = 5; ms < 3000; ms = ms * 3 / 2) {
-    graspmap_test::RunningProgram running(line, {.folder = scratch("")});
-    std::this_thread::sleep_for(std::chrono::milliseconds(ms));
-    if (running.has_ended()) break;
-    kill(running.process(), SIGKILL);
-    running.wait();
-    ++killed;
-    EXPECT_FALSE(fs::exists(scratch("killed.world"))) << ms;
-    EXPECT_FALSE(fs::exists(scratch("killed.world.json"))) << ms;
-  }
-  EXPECT_GT(killed, 2);
-  fs::remove_all(scratch("killed.world"));
-  ASSERT_TRUE(succeeded(graspmap({"convert", "site.ply", "-o", "killed.world"})));
-  EXPECT_EQ(files_of(scratch("killed.world")), expected);
-  for (const std::string& name : names_in_scratch())
-    EXPECT_EQ(name.find(".partial"), std::string::npos) << name;
 }
 
 TEST(WorldCommand, FramesAreNamed) {
