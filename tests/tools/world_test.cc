@@ -1,4 +1,8 @@
 #include <gtest/gtest.h>
+#include <signal.h>
+
+#include <chrono>
+#include <thread>
 
 #include "libmap/core/file_output.h"
 #include "libmap/core/manifest.h"
@@ -6,6 +10,7 @@
 #include "libmap/io/mesh_io.h"
 #include "libmap/texture/textured_mesh_io.h"
 #include "tests/libmap/world/world_samples.h"
+#include "tests/support/running_program.h"
 #include "tests/tools/tool_test_support.h"
 
 namespace world_tool_test {
@@ -143,6 +148,31 @@ TEST(WorldCommand, Georeference) {
                   .find("georeference: offset 500000.25 4000000.5 -3 m, CRS LOCAL_CS[\"a- -b\"]"),
               std::string::npos)
         << file;
+}
+
+// A killed run leaves nothing that looks like a world and does not disturb the next run.
+TEST(WorldCommand, KilledRunLeavesNoWorld) {
+  write_site();
+  ASSERT_TRUE(succeeded(graspmap({"convert", "site.ply", "-o", "whole.world"})));
+  int killed = 0;
+  for (int wait_ms = 5; wait_ms < 1000; wait_ms *= 2) {
+    graspmap_test::RunningProgram running({(graspmap_test::build_folder() / "graspmap").string(),
+                                           "convert", "site.ply", "-o", "killed.world"},
+                                          {.folder = scratch("")});
+    std::this_thread::sleep_for(std::chrono::milliseconds(wait_ms));
+    if (running.has_ended()) break;
+    kill(running.process(), SIGKILL);
+    running.wait();
+    ++killed;
+    EXPECT_FALSE(fs::exists(scratch("killed.world"))) << wait_ms;
+    EXPECT_FALSE(fs::exists(scratch("killed.world.json"))) << wait_ms;
+  }
+  EXPECT_GT(killed, 0);
+  fs::remove_all(scratch("killed.world"));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "site.ply", "-o", "killed.world", "--force"})));
+  EXPECT_EQ(files_of(scratch("killed.world")), files_of(scratch("whole.world")));
+  for (const std::string& name : names_in_scratch())
+    EXPECT_EQ(name.find(".partial"), std::string::npos) << name;
 }
 
 TEST(WorldCommand, FramesAreNamed) {
