@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "libmap/camera/depth_correction.h"
-#include "libmap/fusion/edge_agreement.h"
+#include "libmap/consistency/edge_agreement.h"
 #include "tests/libmap/refine/textured_scan.h"
 #include "tests/support/test_support.h"
 

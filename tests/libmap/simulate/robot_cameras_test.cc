@@ -120,7 +120,7 @@ TEST(SimulateRobotCameras, NoiseIsSeededAndUnitsThatDoNotFitAreNone) {
   rig.cameras.resize(1);
   const Pose pose = libmap::make_pose_from_rpy({0, 0, 0.3}, {0, 0, 0});
   libmap::RobotCamerasOptions options;
-  options.sensor.noise_m = 0.002;
+  options.depth.noise_m = 0.002;
   const auto image = [&] {
     return libmap::simulate_robot_cameras(square_mesh(0.0, 5.0), rig, pose, options)[0].depth;
   };
@@ -133,7 +133,7 @@ TEST(SimulateRobotCameras, NoiseIsSeededAndUnitsThatDoNotFitAreNone) {
   EXPECT_NE(image(), first);
   // 65535 units of 0.01 mm are 0.655 m.
   rig.cameras[0].depth_scale_m = 1e-5;
-  options.sensor.noise_m = 0;
+  options.depth.noise_m = 0;
   const auto fine = image();
   EXPECT_EQ(fine.at(300, 179 + 100), 0);  // 0.98 m
   EXPECT_NEAR(fine.at(300, 179 + 170), 0.3 * 324.729 / 169.5 * 1e5, 1.0);
