@@ -594,7 +594,7 @@ void describe(ResultTable& table, const RefinementResult& result) {
     rmse_m = result.stages.back().error->absolute.rmse_m;
     rotation_deg = result.stages.back().error->absolute.mean_rotation_deg;
   }
-  table.add("number of poses", result.poses.size(), "number of poses");
+  table.add("poses", result.poses.size(), "number of poses");
   table.add("links", result.links.size(), "number of links between poses");
   table.add("closures_found", result.closures.size(), "number of links found by refinement");
   table.add("parts", result.components.size(), "number of connected components of the pose graph");

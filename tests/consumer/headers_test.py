@@ -33,7 +33,7 @@ HEADERS = {
     "bit": "bit_cast",
     "exception": "exception",
     "fstream": "ofstream",
-    "functional": "function",
+    "functional": "function less",
     "iterator": "iterator_traits",
     "limits": "numeric_limits",
     "memory": "allocator shared_ptr unique_ptr",

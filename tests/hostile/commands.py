@@ -80,7 +80,7 @@ USES = [
     use(f"score {{good}}/terrain.pcd {SCORE} --gripper {{x}} -o out.pcd", "gripper", "gripper.yaml", main=True),
     use("mask --gripper {x} -o out.txt", "gripper urdf", "gripper.yaml", main=True),
     use("convert {x} -o out.pcd", "tiles", "map.tiles", main=True),
-    use("convert {x} {good}/share_2.pcd -o out.pcd", "map", "share_1.pcd"),
+    use("convert {x} -o out.vtp", "map", "map.pcd"),
     use("grasp {x} --points {good}/points.csv --trials 1 --draws 1 --max-distance 10 --prefix t_ -o out.csv", "mesh", "mesh.ply", main=True),
     use("grasp {good}/mesh.ply --points {x} --trials 1 --draws 1 --max-distance 10 --prefix t_ -o out.csv", "points", "points.csv", main=True),
     use("grasp {good}/mesh.ply --points {good}/points.csv --gripper {x} --trials 1 --draws 1 --max-distance 10 --prefix t_ -o out.csv", "gripper", "gripper.yaml"),

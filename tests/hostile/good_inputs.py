@@ -94,8 +94,6 @@ COMMANDS = [
     SCORE + ["-o", "map.pcd"],
     ["convert", "map.pcd", "-o", "dem.tif"],
     SCORE + ["--tile-size", "0.2", "-o", "map.tiles"],
-    SCORE + ["--tile-size", "0.2", "--tile", "1/2", "-o", "share_1.pcd"],
-    SCORE + ["--tile-size", "0.2", "--tile", "2/2", "-o", "share_2.pcd"],
     ["footholds", "map.pcd", "--border", "--no-graspable-only", "-o", "footholds.csv"],
     ["lookup", "map.pcd", "points.csv", "-o", "lookup.csv"],
     ["convert", "map.pcd", "--terrain", "terrain.pcd", "--footholds", "footholds.csv", "-o", "map.bag"],

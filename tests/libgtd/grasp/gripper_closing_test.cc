@@ -249,7 +249,7 @@ TEST(GroundPatch, BadMeshes) {
   mesh = height_mesh(0.1, 2, flat);
   mesh.triangles[0][1] = 1000;
   EXPECT_TRUE(is_error(error_of([&] { libgtd::Ground ground(mesh); }),
-                       {.field = "triangle 0", .value = "vertex 1000", .bound = "< 25"}));
+                       {.field = "vertex of triangle 0", .value = "1000", .bound = "< 25"}));
 }
 
 }  // namespace gripper_closing_test

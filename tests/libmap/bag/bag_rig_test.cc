@@ -260,7 +260,7 @@ TEST(BagRig, OddStampsAndCalibrationsAreLeftOut) {
   ASSERT_EQ(result.images.size(), 3U);
   EXPECT_EQ(result.images[2].stamp_ns, 5300000000);
   EXPECT_THAT(result.warnings, ElementsAre(HasSubstr("1 images are dropped because an earlier"),
-                                           HasSubstr("1 images are dropped because their cal"),
+                                           HasSubstr("1 images are dropped because the cal"),
                                            HasSubstr("no stamp")));
   for (const std::string& warning : result.warnings)
     EXPECT_TRUE(is_error_text(warning, {.field = "/a/image_raw"}));

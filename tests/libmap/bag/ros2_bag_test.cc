@@ -399,14 +399,15 @@ TEST(Mcap, ChunksThatPromiseMore) {
       return error_of([&] { libmap::decompress_chunk(compression, chunk, size); }).context();
     };
     for (const std::uint64_t size : {1001UL, 1UL << 29}) {
-      EXPECT_EQ(fields_of(bytes, size).field, "chunk");
+      EXPECT_EQ(fields_of(bytes, size).field, "decompressed chunk");
       EXPECT_EQ(fields_of(bytes, size).value, "1000 bytes");
-      EXPECT_EQ(fields_of(bytes, size).bound, std::to_string(size));
+      EXPECT_EQ(fields_of(bytes, size).bound, std::to_string(size) + " bytes");
     }
     EXPECT_EQ(fields_of(bytes, ~0UL).field, "size of a chunk");
     EXPECT_EQ(fields_of(bytes, ~0UL).bound, "<= 1 GiB");
     // The libraries notice chunks that are larger than declared, and truncated chunks.
-    const std::string field = compression.empty() ? "chunk" : "chunk of " + compression;
+    const std::string field =
+        compression.empty() ? "decompressed chunk" : "chunk of " + compression;
     EXPECT_EQ(fields_of(bytes, 999).field, field);
     EXPECT_EQ(fields_of(std::string_view(bytes).substr(0, bytes.size() - 1), 1000).field, field);
   }

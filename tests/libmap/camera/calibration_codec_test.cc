@@ -250,9 +250,9 @@ TEST(CalibrationCodec, TruncationsAndLyingCounts) {
     for (const std::int32_t count : {-1, 1, 0x7fffffff}) {
       std::string lying = whole;
       std::memcpy(lying.data() + 4 * place, &count, 4);
-      EXPECT_TRUE(
-          is_error(error_of([&] { libmap::decode_calibration(lying); }), {.about = "calibration"}))
-          << place << " " << count;
+      const std::string field =
+          error_of([&] { libmap::decode_calibration(lying); }).context().field;
+      EXPECT_TRUE(field.empty() || field.starts_with("number of elements of")) << field;
     }
   const std::string stereo = stereo_record({.k = k}, {.k = k}, eye, {-0.1, 0, 0});
   for (std::size_t size = 0; size < stereo.size(); ++size)

@@ -120,7 +120,7 @@ TEST(MatrixCodec, TruncationsAndFlips) {
   const std::string whole = encode_matrix(example(MatrixElement::uint8, 4, 5, 1));
   for (std::size_t size = 0; size < whole.size(); ++size)
     EXPECT_TRUE(is_error(error_of([&] { libmap::decode_matrix(whole.substr(0, size)); }),
-                         {.about = "compressed matrix"}))
+                         {.about = "compressed"}))
         << size;
   for (std::size_t at = 0; at < whole.size(); ++at) {
     std::string broken = whole;

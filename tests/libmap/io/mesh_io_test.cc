@@ -228,7 +228,7 @@ TEST_P(MeshFormat, IndicesOutOfRangeAreNotWritten) {
   TriangleMesh mesh = sheet(3);
   mesh.triangles[1][2] = 9;
   EXPECT_TRUE(is_error(error_of([&] { write_sample(GetParam(), mesh); }),
-                       {.field = "triangle 1", .value = "vertex 9", .bound = "< 9"}));
+                       {.field = "vertex of triangle 1", .value = "9", .bound = "< 9"}));
 }
 
 TEST_P(MeshFormat, VerticesThatAreNotFiniteAreNotWritten) {

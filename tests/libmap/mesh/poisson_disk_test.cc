@@ -442,7 +442,7 @@ TEST(PoissonDisk, BadInput) {
   EXPECT_TRUE(is_error(refusal(broken), {.about = "not finite"}));
   broken = mesh;
   broken.triangles[1][2] = 4;
-  EXPECT_TRUE(is_error(refusal(broken), {.field = "triangle 1", .value = "vertex 4"}));
+  EXPECT_TRUE(is_error(refusal(broken), {.field = "vertex of triangle 1", .value = "4"}));
   // A thin triangle with hardly any area, too long for the radius.
   TriangleMesh thread;
   thread.vertices = {{0, 0, 0}, {1e6, 0, 0}, {0, 1e-12, 0}};

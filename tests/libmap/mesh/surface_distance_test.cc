@@ -114,7 +114,7 @@ TEST(SurfaceDistance, MeshesThatCannotBe) {
   TriangleMesh mesh = unit_square();
   mesh.triangles[0][1] = 9;
   EXPECT_TRUE(is_error(error_of([&] { SurfaceDistance{mesh}; }),
-                       {.field = "triangle 0", .value = "vertex 9", .bound = "< 4"}));
+                       {.field = "vertex of triangle 0", .value = "9", .bound = "< 4"}));
   mesh = unit_square();
   mesh.vertices[2].y() = std::numeric_limits<double>::quiet_NaN();
   EXPECT_TRUE(is_error(error_of([&] { SurfaceDistance{mesh}; }), {.about = "not finite"}));

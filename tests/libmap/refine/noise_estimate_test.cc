@@ -117,7 +117,7 @@ TEST(SensorModel, ShippedSensorsAreReadAndUnknownOnesAreNamed) {
 TEST(SensorModel, EarlierKeysAreRead) {
   const std::string path = (graspmap_test::scratch_folder() / "earlier.yaml").string();
   graspmap_test::write_text(
-      path, "noise_m: 0.001\nrefine.max_bend_m: 0.02\nrefine.bend_of_range: 0.004\n");
+      path, "noise_m: 0.001\nfar_m: 4\nrefine.max_bend_m: 0.02\nrefine.bend_of_range: 0.004\n");
   const libmap::SensorModel model = libmap::read_sensor_model(path);
   EXPECT_EQ(model.max_depth_correction_m, 0.02);
   EXPECT_EQ(model.max_depth_correction_of_range, 0.004);

@@ -193,7 +193,7 @@ TEST(Image, BrokenOnesAreErrors) {
   EXPECT_EQ(libmap::read_image_bytes(whole).height, 30);
   EXPECT_TRUE(
       is_error(error_of([&] { libmap::read_image_bytes(whole.substr(0, whole.size() / 2)); }),
-               {.about = "PNG is broken"}));
+               {.about = "PNG is damaged"}));
   EXPECT_TRUE(
       is_error(error_of([&] { libmap::read_image_bytes("no picture"); }), {.about = "not a PNG"}));
   EXPECT_TRUE(is_error(error_of([&] { libmap::read_image_bytes(""); }), {.about = "not a PNG"}));

@@ -338,7 +338,7 @@ TEST_F(TumFolder, RegistersADepthCameraToColor) {
   const FrameFolder other_size(folder_);
   libmap::Error error = graspmap_test::error_of([&] { other_size.read_frame(1); });
   EXPECT_EQ(error.context().file, (folder_ / "depth/1.png").string());
-  EXPECT_EQ(error.context().field, "node 1: depth");
+  EXPECT_EQ(error.context().field, "node 1: depth: size of the depth image");
   EXPECT_EQ(error.context().bound, "40 x 15");
   fs::remove(folder_ / "infrared.yaml");
   error = graspmap_test::error_of([&] { FrameFolder missing(folder_); });
@@ -351,7 +351,7 @@ TEST_F(TumFolder, NamesTheCalibrationThatItMisses) {
   fs::remove(folder_ / "calibration.yaml");
   const libmap::Error error = graspmap_test::error_of([&] { FrameFolder read(folder_); });
   EXPECT_EQ(error.context().file, (folder_ / "calibration.yaml").string());
-  EXPECT_TRUE(graspmap_test::is_error(error, {.about = "intrinsics"}));
+  EXPECT_TRUE(graspmap_test::is_error(error, {.about = "'calibration'"}));
 }
 
 TEST_F(TumFolder, NamesWhatIsBroken) {
@@ -381,7 +381,7 @@ TEST_F(TumFolder, RefusesDepthOfAnotherAspectRatio) {
   const FrameFolder read(folder_);
   const libmap::Error error = graspmap_test::error_of([&] { read.read_frame(1); });
   EXPECT_EQ(error.context().file, (folder_ / "depth/1.png").string());
-  EXPECT_EQ(error.context().field, "node 1: depth");
+  EXPECT_EQ(error.context().field, "node 1: depth: size of the depth image");
   EXPECT_EQ(error.context().value, "30 x 40");
   EXPECT_NE(error.context().bound.find("40 x 30"), std::string::npos);
   // Another size of the same aspect ratio within rounding is valid.

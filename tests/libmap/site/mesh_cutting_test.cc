@@ -331,7 +331,7 @@ TEST(MeshCutting, AllOrNothing) {
   broken.triangles[3][1] = 1000;
   EXPECT_TRUE(
       graspmap_test::is_error(error_of([&] { cut_mesh(broken, {}); }),
-                              {.field = "triangle 3", .value = "vertex 1000", .bound = "< 81"}));
+                              {.field = "vertex of triangle 3", .value = "1000", .bound = "< 81"}));
 }
 
 TEST(MeshCutting, ThreadsMakeNoDifference) {

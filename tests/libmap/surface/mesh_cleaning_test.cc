@@ -145,7 +145,7 @@ TEST(MeshCleaning, HostileMeshes) {
             })
                 .context()
                 .field,
-            "triangle 0");
+            "vertex of triangle 0");
   for (const double bad : {std::nan(""), std::numeric_limits<double>::infinity(), 1e300})
     EXPECT_EQ(error_of([&] {
                 clean_mesh(mesh_of({{0, 0, 0}, {0, bad, 0}, {1, 0, 0}}, {{0, 1, 2}}));

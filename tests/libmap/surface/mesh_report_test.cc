@@ -227,7 +227,7 @@ TEST(MeshReport, HostileMeshes) {
             })
                 .context()
                 .field,
-            "triangle 0");
+            "vertex of triangle 0");
   for (const double bad : {std::nan(""), inf, 1e200})
     EXPECT_EQ(error_of([&] {
                 report_mesh(mesh_of({{0, 0, 0}, {0, bad, 0}, {1, 0, 0}}, {{0, 1, 2}}));

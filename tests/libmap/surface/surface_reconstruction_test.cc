@@ -390,7 +390,7 @@ TEST_P(Reconstruction, CloudsThatAreTooThin) {
   PointCloud two;
   two.positions = {{0, 0, 0}, {1, 0, 0}, {1, 0, 0}};
   two.normals.assign(3, Eigen::Vector3f::UnitZ());
-  EXPECT_EQ(refusal(two).context().field, "points");
+  EXPECT_EQ(refusal(two).context().field, "number of distinct points");
   PointCloud line;
   for (int n = 0; n < 100; ++n) line.positions.emplace_back(0.01 * n, 1.0, 2.0);
   line.normals.assign(100, Eigen::Vector3f::UnitZ());

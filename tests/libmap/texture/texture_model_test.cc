@@ -353,7 +353,7 @@ TEST(TextureModel, FramesThatCannotBeUsed) {
   EXPECT_TRUE(is_error(error_of([&] { libmap::texture_mesh(mesh, scan, scan.poses()); }),
                        {.file = "painted", .about = "4 frames"}));
   EXPECT_TRUE(is_error(error_of([&] { libmap::texture_mesh(mesh, scan, {}); }),
-                       {.file = "painted", .about = "no poses"}));
+                       {.file = "painted", .about = "no frame has a pose"}));
 }
 
 TEST(TextureModel, MeshesThatCannotBeTextured) {

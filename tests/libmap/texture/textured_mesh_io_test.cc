@@ -277,7 +277,7 @@ TEST(TexturedMeshIo, FilesThatAreBroken) {
   EXPECT_EQ(error_of([&] { graspmap_test::write_textured_mesh(folder / "w.glb", wrong); })
                 .context()
                 .field,
-            "triangle 3");
+            "texture page of triangle 3");
   wrong = model;
   wrong.texture_coordinates.pop_back();
   EXPECT_TRUE(

@@ -126,9 +126,9 @@ TEST(SceneTexture, WhatHasNone) {
   model = two_pages();
   model.page_of_triangle[0] = 5;
   layer.shape = model;
-  EXPECT_TRUE(
-      graspmap_test::is_error(error_of([&] { prepare_layers(layer, Pose::Identity()); }),
-                              {.field = "triangle 0", .value = "5", .bound = "0 to 2 - 1"}));
+  EXPECT_TRUE(graspmap_test::is_error(
+      error_of([&] { prepare_layers(layer, Pose::Identity()); }),
+      {.field = "texture page of triangle 0", .value = "5", .bound = "< 2"}));
 }
 
 }  // namespace scene_texture_test
