@@ -56,6 +56,7 @@ void bind(libmap::ParameterTable& table, AnalyzeOptions& options) {
   table.add("points_frame", options.points_frame, point_frame_names(),
             "frame of the start position and of the expected regions; input: scored cloud; "
             "terrain: terrain frame; map: map before cropping");
+  table.add_former_key("pictures", "images");
   table.add("images", options.images, "draw images and charts");
   bind(table, options.table);
 }

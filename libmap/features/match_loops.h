@@ -33,6 +33,7 @@ struct MatchLoops {
   void (*find_nearest)(const Input& input, const Output& output);
 };
 
+// Returns the loops for an instruction set, which the processor must have.
 const MatchLoops& match_loops_of(InstructionSet instructions);
 
 }  // namespace libmap

@@ -115,7 +115,7 @@ constexpr Dialect mjcf{
     .world = R"(<?xml version="1.0"?>
 {notes}<mujoco model="{name}">
 <compiler angle="degree" balanceinertia="true" meshdir="meshes" texturedir="meshes"/>
-<option gravity="0 0 {gravity}"/>
+<option gravity="0 0 {gravity}" cone="elliptic" impratio="10"/>
 <default>
 <default class="visual"><geom type="mesh" contype="0" conaffinity="0" group="2"/></default>
 <default class="ground"><geom group="3" friction="{friction} 0.005 0.0001" solref="0.02 {damping}"/></default>

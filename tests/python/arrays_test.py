@@ -148,7 +148,7 @@ class Errors(unittest.TestCase):
         self.assertEqual((error.field, error.value), ("normals", "3 values long"))
         self.assertEqual(self.error(graspmap.Mesh, points, [[0, 1, -1]]).field, "triangles")
         error = self.error(graspmap.Mesh, points, [[0, 1, 2]])
-        self.assertEqual((error.field, error.value, error.bound), ("triangle 0", "vertex 2", "< 2"))
+        self.assertEqual((error.field, error.value, error.bound), ("vertex of triangle 0", "2", "< 2"))
         self.assertEqual(self.error(plain().transformed, 2 * np.eye(4)).field, "target_from_source")
         error = self.error(graspmap.Poses, [1, 2], np.eye(4)[None])
         self.assertEqual(error.field, "world_from_base")
@@ -318,7 +318,7 @@ class Arguments(unittest.TestCase):
                              ((vertices, triangles[:, :2]), "mesh: triangles"),
                              ((vertices, triangles + 0.5), "mesh: triangles"),
                              ((vertices, [[0, 1, -1]]), "mesh: triangles"),
-                             ((vertices, [[0, 1, 2], [0, 1, 4]]), "mesh: triangle 1"),
+                             ((vertices, [[0, 1, 2], [0, 1, 4]]), "mesh: vertex of triangle 1"),
                              ((vertices + np.inf, triangles), "mesh: vertices, row 0")]:
             self.assertEqual(self.field_of_error(graspmap.resample, wrong), field)
         self.assertEqual(self.field_of_error(graspmap.grasp, square(), [[0, 0, 0]],

@@ -436,8 +436,7 @@ TEST(BagCommand, WhatIsABagIsDecidedByInputAndOutput) {
   says({"rig", "-o", "out.pcd"}, {.file = "out.pcd", .field = "extension", .value = ".pcd"});
   // Without an extension: one map becomes a bag; several files and poses do not.
   says({"cloud.csv", "-o", "out"}, {.file = "cloud.csv", .field = "score"});
-  says({"map.csv", "map.ply", "-o", "out"},
-       {.file = "out", .field = "extension", .value = "missing"});
+  says({"map.csv", "map.ply", "-o", "out"}, {.file = "map.ply", .about = "second"});
   says({"map.csv", "-o", "out", "--encoding", "ascii"}, {.file = "out", .field = "extension"});
   says({"poses.csv", "-o", "out", "--poses-format", "tum"},
        {.file = "out", .field = "extension", .bound = "one of .tum .kitti .g2o .toro"});
@@ -506,7 +505,7 @@ TEST(BagCommand, BadInputIsOneLineAndLeavesNothing) {
         .bound = "one of /graspability_map, /curvature_map",
         .about = "'/graspability_map'"});
   says({"good.bag", "-o", "out.pcd", "--topic", "/graspability_map", "--topic", "/curvature_map"},
-       {.field = "--topic", .about = "single"});
+       {.field = "--topic", .about = "one topic"});
   says({"good.bag", "-o", "out.xyz"}, {.file = "out.xyz",
                                        .field = "extension",
                                        .value = ".xyz",

@@ -128,7 +128,7 @@ TEST(Calibrate, GoesOnWithoutImagesThatItCannotRead) {
       graspmap({"calibrate", "shots/00a.png", "shots/01.png", "shots/02.jpg", "-o", "few.yaml"});
   EXPECT_TRUE(warned(few, {"shots/00a.png"}));
   EXPECT_TRUE(
-      ended_with(few, {.field = "pictures", .value = "2", .bound = ">= 3, better 15 and more"}));
+      ended_with(few, {.field = "images", .value = "2", .bound = ">= 3, better 15 and more"}));
 }
 
 TEST(Calibrate, BadInputIsOneLineAndLeavesNothing) {

@@ -299,7 +299,7 @@ TEST(RefineCalibration, IsWrittenAndApplied) {
   libmap::write_text(scratch("other.yaml"), libmap::to_yaml({.camera = camera}));
   EXPECT_TRUE(bad_input(
       graspmap({"fuse", "scan.db", "--calibration", "other.yaml", "-o", "c.ply", "--quiet"}),
-      {.file = "scan.db", .about = "camera is 320 x 264"}));
+      {.file = "scan.db", .about = "image is 320 x 264"}));
 }
 
 // Invalid links and nodes without a calibration do not end refinement.

@@ -76,7 +76,7 @@ TEST_F(ScoreBadInput, OnePointTwoPointsOnePlace) {
     if (std::string(method) == "thesis")
       EXPECT_TRUE(bad_input(in_one_place, {.field = "points", .value = "1", .bound = ">= 3"}));
     else
-      EXPECT_TRUE(bad_input(in_one_place, {.about = "one place"}));
+      EXPECT_TRUE(bad_input(in_one_place, {.about = "coincide"}));
   }
 }
 

@@ -18,8 +18,8 @@ constexpr double mujoco_fall_s = 1.5;
 // Friction against sliding and rolling keeps balls where they fall. They do not meet each other.
 std::string scene_text() {
   std::string text =
-      "<mujoco><include file=\"world.xml\"/><option cone=\"elliptic\"/><size njmax=\"3000\" "
-      "nconmax=\"500\"/><worldbody>";
+      "<mujoco><include file=\"world.xml\"/><size njmax=\"6000\" "
+      "nconmax=\"1000\"/><worldbody>";
   for (std::size_t n = 0; n < balls_at_once; ++n)
     text +=
         "<body><freejoint/><geom size=\"0.01\" contype=\"1\" conaffinity=\"0\" condim=\"6\" "
