@@ -272,6 +272,7 @@ struct FieldTest {
       : file((run.claim_output(options.output, {options.mesh, table}),
               libmap::find_data_file("grippers", options.gripper))),
         gripper(read_with_fingers(file, options)),
+        rows(libmap::read_csv(table)),
         mesh(options.mesh == level_mesh ? libgtd::level_ground()
                                         : libmap::read_mesh(options.mesh).mesh),
         ground(ground_of(mesh, options)) {
@@ -282,6 +283,7 @@ struct FieldTest {
 
   std::filesystem::path file;
   libgtd::Gripper gripper;
+  libmap::Table rows;  // of `table`
   libmap::TriangleMesh mesh;
   libgtd::Ground ground;
 };
@@ -326,8 +328,8 @@ void grasp_places(GraspCommandOptions& options, Run& run) {
   }
   claim_scenes(options.scenes, run);
   options.grasp.sequential = options.sequential == SequentialTest::on;
-  const FieldTest test(options, options.points, run);
-  libmap::Table table = libmap::read_csv(options.points);
+  FieldTest test(options, options.points, run);
+  libmap::Table& table = test.rows;
   const std::vector<Eigen::Vector3d> locations = positions_of(table);
   if (locations.empty()) throw libmap::Error("contains no locations", {.file = options.points});
   const auto scenes = scenes_of(table, options.scenes);
@@ -410,7 +412,7 @@ void say_fit(const libgtd::PullFit& fit, std::size_t tests, Run& run) {
 
 void fit_gripper(const GraspCommandOptions& options, Run& run) {
   FieldTest test(options, options.pulls, run);
-  const auto tests = libgtd::pull_tests_of(libmap::read_csv(options.pulls));
+  const auto tests = libgtd::pull_tests_of(test.rows);
   const libgtd::PullFit fit = run.timed("fit", [&] {
     return in_file(options.pulls, [&] {
       return libgtd::fit_pulls(options.mesh == level_mesh ? nullptr : &test.ground, test.gripper,
@@ -428,7 +430,7 @@ void plan_next_pulls(const GraspCommandOptions& options, Run& run) {
     throw libmap::Error("not a number of pull tests",
                         {.field = "--plan", .value = options.plan, .bound = ">= 1"});
   const FieldTest test(options, options.points, run);
-  const libmap::Table table = libmap::read_csv(options.points);
+  const libmap::Table& table = test.rows;
   const std::vector<Eigen::Vector3d> locations = positions_of(table);
   const auto plans = run.timed("plan", [&] {
     return libgtd::plan_pulls(test.ground, test.gripper, locations,

@@ -86,7 +86,7 @@ TEST(VoxelMap, HostileMapsAreSaid) {
   EXPECT_EQ(field_of(cloud), "j");
   cloud = graded_floor();
   cloud.positions[17].x() += 0.004;
-  EXPECT_EQ(field_of(cloud, {.lattice = lattice}), "point 18");
+  EXPECT_EQ(field_of(cloud, {.lattice = lattice}), "distance of point 18 from a voxel center");
   cloud = graded_floor();
   EXPECT_EQ(field_of(libmap::transform_cloud(
                 cloud, libmap::Pose(Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitZ())))),
