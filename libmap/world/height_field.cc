@@ -113,7 +113,7 @@ void extend_border(HeightField& field) {
     }
 }
 
-// Where a segment crosses the borders and diagonals of cells, from 0 to 1 with both ends.
+// Finds where a segment crosses borders and diagonals of cells, as fractions 0 to 1 with both ends.
 void find_crossings(const Eigen::Vector2d& from, const Eigen::Vector2d& to,
                     std::vector<double>& crossings) {
   crossings = {0.0, 1.0};
