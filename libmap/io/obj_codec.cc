@@ -126,21 +126,22 @@ class ObjReader {
     return values;
   }
 
-  // Adds x y z, x y z w, x y z r g b or x y z w r g b.
+  // Adds x y z, x y z w, x y z r g b or x y z w r g b. Of eight columns or more, x y z are read.
   void add_position(const TextLine& line) {
     const Numbers values = numbers(line, 3);
     const std::size_t count = line.words.size() - 1;
     const bool has_weight = count == 4 || count == 7;
+    const bool has_color = count == 6 || count == 7;
     positions_.push_back(values.head<3>() / (has_weight ? values[3] : 1.0));
     if (!positions_.back().allFinite())
       throw Error("position is not finite",
                   {.field = "vertex " + std::to_string(positions_.size() - 1)});
     Color color{};
-    for (std::size_t channel = 0; channel < 3 && count >= 6; ++channel)
+    for (std::size_t channel = 0; channel < 3 && has_color; ++channel)
       color[channel] = static_cast<std::uint8_t>(std::lround(
           255.0 * std::clamp(values[static_cast<Eigen::Index>(count - 3 + channel)], 0.0, 1.0)));
     colors_.push_back(color);
-    has_colors_ = has_colors_ && count >= 6;
+    has_colors_ = has_colors_ && has_color;
     normal_of_.push_back(none);
     mixed_.push_back(Eigen::Vector3f::Zero());
   }

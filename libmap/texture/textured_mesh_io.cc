@@ -198,7 +198,8 @@ ColorImage read_image(const TextureImage& image, const fs::path& model) {
 DecodedModel read_obj_model(const fs::path& path) {
   return decode_obj_model(read_whole_file(path), [&](const std::string& name) {
     const fs::path library = path.parent_path() / name;
-    return fs::is_regular_file(library) ? read_whole_file(library) : std::string();
+    std::error_code code;  // a name that no file can have is a missing library
+    return fs::is_regular_file(library, code) ? read_whole_file(library) : std::string();
   });
 }
 

@@ -433,6 +433,23 @@ TEST(MeshFiles, ObjWithQuadsAndGroups) {
   EXPECT_NEAR(surface_area(read.mesh), 1.5, 1e-12);
 }
 
+// OBJ 3.0 has x y z w; colors after the position are a convention of MeshLab and others.
+TEST(MeshFiles, ObjColumnsOfAVertex) {
+  const auto read = [](const std::string& columns) {
+    return read_as(".obj", "v 2 0 0" + columns + "\nv 0 2 0" + columns + "\nv 0 0 2" + columns +
+                               "\nf 1 2 3\n")
+        .mesh;
+  };
+  const std::vector<libmap::Color> orange(3, libmap::Color{255, 128, 0});
+  for (const std::string columns : {"", " 1", " 1 0.5 0", " 1 1 0.5 0", " 1 1 1 1 1"})
+    EXPECT_EQ(read(columns).vertices[0], Eigen::Vector3d(2, 0, 0)) << columns;
+  EXPECT_EQ(read(" 2").vertices[0], Eigen::Vector3d(1, 0, 0));
+  EXPECT_EQ(read(" 1 0.5 0").vertex_colors, orange);
+  EXPECT_EQ(read(" 1 1 0.5 0").vertex_colors, orange);
+  for (const std::string columns : {"", " 1", " 1 1", " 1 1 1 1 1", " 1 1 1 1 1 1 1 1"})
+    EXPECT_TRUE(read(columns).vertex_colors.empty()) << columns;
+}
+
 TEST(MeshFiles, OffOfOtherPrograms) {
   const MeshReadResult read =
       read_as(".off",
