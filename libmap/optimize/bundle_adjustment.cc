@@ -169,6 +169,9 @@ Adjustment::Adjustment(const std::vector<FrameFeatures>& frames,
   Priors priors(state_.camera_params.size());
   for (std::size_t n = 0; n < cameras_; ++n) add_camera_priors(n, priors);
   priors.add_to(problem_);
+  const auto [first, last] = std::minmax_element(free_.begin(), free_.end());
+  problem_.first_param = free_.empty() ? 0 : *first;
+  problem_.end_param = free_.empty() ? 0 : *last + 1;
 }
 
 void Adjustment::init_params(const SensorCalibration& start,

@@ -1,6 +1,7 @@
 #include "libmap/optimize/joint_adjustment.h"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <limits>
 #include <utility>
 
@@ -33,23 +34,29 @@ class CameraPointSchur : public PointSchur<node_size, JointSystem> {
  public:
   using Base = PointSchur<node_size, JointSystem>;
 
-  CameraPointSchur(Eigen::Index cameras_at, Eigen::Index params)
-      : cameras_(cameras_at), params_(params), mixed_params_(MixedParams::Zero(params, 3)) {}
+  // `first` to `end`: free camera parameters
+  CameraPointSchur(Eigen::Index cameras_at, Eigen::Index first, Eigen::Index end)
+      : cameras_(cameras_at),
+        first_(first),
+        end_(end),
+        mixed_params_(MixedParams::Zero(std::max<Eigen::Index>(end - first, 0), 3)) {}
 
   void add(const BundleObservation& observation, const CalibratedResidual& seen, double weight,
            JointSystem& system) {
     Base::add(observation, seen, weight, system);
-    if (params_ > 0) add_camera(observation, seen, weight, system);
+    if (first_ < end_) add_camera(observation, seen, weight, system);
   }
   void eliminate(JointSystem& system) {
     Base::eliminate(system);
-    if (params_ == 0 || this->views_.empty()) return;
+    if (first_ >= end_ || this->views_.empty()) return;
+    const Eigen::Index at = cameras_ + first_;
+    const Eigen::Index count = end_ - first_;
     for (const auto& view : this->views_)
       subtract_product(mixed_params_, view.reduced,
-                       system.matrix.block(cameras_, row_of(view.node), params_, node_size));
-    system.rhs.tail(params_).noalias() -= mixed_params_ * this->step_;
+                       system.matrix.block(at, row_of(view.node), count, node_size));
+    system.rhs.segment(at, count).noalias() -= mixed_params_ * this->step_;
     const MixedParams reduced = mixed_params_.lazyProduct(this->inverse_);
-    subtract_product(mixed_params_, reduced, system.matrix.bottomRightCorner(params_, params_));
+    subtract_product(mixed_params_, reduced, system.matrix.block(at, at, count, count));
   }
 
  private:
@@ -62,8 +69,9 @@ class CameraPointSchur : public PointSchur<node_size, JointSystem> {
                   double weight, JointSystem& system);
 
   Eigen::Index cameras_;
-  Eigen::Index params_;
-  MixedParams mixed_params_;  // second derivatives by parameters and point
+  Eigen::Index first_;
+  Eigen::Index end_;
+  MixedParams mixed_params_;  // second derivatives by free parameters and point
 };
 
 template <int node_size>
@@ -71,27 +79,30 @@ void CameraPointSchur<node_size>::add_camera(const BundleObservation& observatio
                                              const CalibratedResidual& seen, double weight,
                                              JointSystem& system) {
   const typename Base::ByNode by_node = Base::by_node(seen);
-  const Eigen::Index first = cameras_ + observation.first_param;
   const Eigen::Index row = row_of(observation.node);
   Eigen::MatrixXd& matrix = system.matrix;
-  const Eigen::Matrix<double, spline_at, 3> camera = weight * seen.by_camera.transpose();
-  add_product(camera, by_node, matrix.template block<spline_at, node_size>(first, row));
-  add_product(camera, seen.by_camera, matrix.template block<spline_at, spline_at>(first, first));
-  system.rhs.template segment<spline_at>(first).noalias() -= camera * seen.residual;
-  add_product(camera, seen.by_point,
-              mixed_params_.template middleRows<spline_at>(observation.first_param));
+  const Eigen::Index first = std::max(first_, observation.first_param);
+  const Eigen::Index count = std::min(end_, observation.first_param + spline_at) - first;
+  if (count <= 0) return;
+  const auto by_camera = seen.by_camera.middleCols(first - observation.first_param, count);
+  const Eigen::Matrix<double, Eigen::Dynamic, 3, 0, spline_at, 3> camera =
+      weight * by_camera.transpose();
+  const Eigen::Index at = cameras_ + first;
+  add_product(camera, by_node, matrix.block(at, row, count, node_size));
+  add_product(camera, by_camera, matrix.block(at, at, count, count));
+  system.rhs.segment(at, count).noalias() -= camera * seen.residual;
+  add_product(camera, seen.by_point, mixed_params_.middleRows(first - first_, count));
   const CalibratedObservation& calibrated = observation.feature.calibrated();
   if (!calibrated.depth) return;
-  const Eigen::Index spline = spline_at + static_cast<Eigen::Index>(calibrated.terms.first);
+  const Eigen::Index spline =
+      observation.first_param + spline_at + static_cast<Eigen::Index>(calibrated.terms.first);
   const Eigen::Vector4d depth = weight * seen.depth_by_spline.transpose();
-  matrix.template block<4, node_size>(first + spline, row).noalias() += depth * by_node.row(2);
-  matrix.template block<4, spline_at>(first + spline, first).noalias() +=
-      depth * seen.by_camera.row(2);
-  matrix.template block<4, 4>(first + spline, first + spline).noalias() +=
+  matrix.template block<4, node_size>(cameras_ + spline, row).noalias() += depth * by_node.row(2);
+  matrix.block(cameras_ + spline, at, 4, count).noalias() += depth * by_camera.row(2);
+  matrix.template block<4, 4>(cameras_ + spline, cameras_ + spline).noalias() +=
       depth * seen.depth_by_spline;
-  system.rhs.template segment<4>(first + spline) -= depth * seen.residual.z();
-  mixed_params_.template middleRows<4>(observation.first_param + spline).noalias() +=
-      depth * seen.by_point.row(2);
+  system.rhs.template segment<4>(cameras_ + spline) -= depth * seen.residual.z();
+  mixed_params_.template middleRows<4>(spline - first_).noalias() += depth * seen.by_point.row(2);
 }
 
 // Problem for levenberg_marquardt.
@@ -160,7 +171,9 @@ double JointSolver::cost(const JointState& state) const {
 
 template <int node_size>
 void JointSolver::add_point(const BundleView& view, std::size_t point, JointSystem& system) const {
-  CameraPointSchur<node_size> schur(cameras_at_, params_);
+  CameraPointSchur<node_size> schur(
+      cameras_at_, problem_.first_param,
+      problem_.fix_cameras ? 0 : std::min(problem_.end_param, params_));
   CalibratedResidual seen;
   for (const BundleObservation& observation : problem_.observations_of(point))
     if (view.evaluate(observation, state_.points[point], seen, true))

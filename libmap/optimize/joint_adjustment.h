@@ -8,6 +8,7 @@
 #include <Eigen/LU>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <map>
 #include <span>
 #include <vector>
@@ -93,7 +94,7 @@ class PointSchur {
            System& system) {
     const ByNode jacobian = by_node(seen);
     const Mixed weighted = weight * jacobian.transpose();
-    system.add(observation.node, observation.node, weighted * jacobian);
+    system.add(observation.node, observation.node, weighted.lazyProduct(jacobian));
     system.add_rhs(observation.node, -weighted * seen.residual);
     views_.push_back({observation.node, weighted * seen.by_point, Mixed::Zero()});
     const Eigen::Matrix3d weighted_point = weight * seen.by_point.transpose();
@@ -101,6 +102,7 @@ class PointSchur {
     rhs_.noalias() -= weighted_point * seen.residual;
   }
 
+  // Lazy products, because Eigen's general product copies blocks of this size first.
   void eliminate(System& system) {
     if (views_.empty()) return;
     inverse_ = hessian_.inverse();
@@ -110,7 +112,8 @@ class PointSchur {
       view.reduced = view.mixed * inverse_;
       system.add_rhs(view.node, -view.mixed * step_);
       for (std::size_t b = 0; b <= a; ++b)
-        system.add(view.node, views_[b].node, -view.reduced * views_[b].mixed.transpose());
+        system.add(view.node, views_[b].node,
+                   -view.reduced.lazyProduct(views_[b].mixed.transpose()));
     }
   }
 
@@ -133,6 +136,9 @@ struct JointProblem {
   double robust_scale = 3.0;                    // width of Cauchy's loss, standard deviations
   std::vector<bool> fixed;                      // by pose
   bool fix_cameras = false;
+  // Camera parameters outside this range have no influence on the residuals.
+  Eigen::Index first_param = 0;
+  Eigen::Index end_param = std::numeric_limits<Eigen::Index>::max();
   bool has_motion = false;            // true: motions are unknown
   std::vector<Vector6d> motion_mean;  // prior of the motions
   std::vector<Vector6d> motion_deviation;
