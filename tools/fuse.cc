@@ -176,6 +176,7 @@ void make_tiles(const FuseOptions& options, const libmap::ScanSource& scan,
     const auto known = found.get<libmap::FusionPlan>();
     fusion.emplace(scan, poses, options.fusion, tile_m, run.progress(), &known);
   }
+  run.add_results({{"noise", describe(fusion->plan().noise)}});
   libmap::DepthFusionResult result = fusion->report();
   const libmap::Pose wanted_from_tile = wanted_from_cloud(options, scan, poses, result, run);
   const auto make = [&](std::size_t n) {

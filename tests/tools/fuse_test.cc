@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <fstream>
+#include <numeric>
 #include <sstream>
 
 #include "libmap/core/text.h"
@@ -113,6 +114,34 @@ TEST(Fuse, SameBytesForAnyNumberOfThreads) {
     if (first.empty()) first = content(threads + ".ply");
     EXPECT_TRUE(content(threads + ".ply") == first) << threads;
   }
+}
+
+// Rocky terrain, measured with the default noise and with 12 mm of noise.
+TEST(Fuse, EstimatesTheNoiseOfTheSensor) {
+  ASSERT_TRUE(succeeded(graspmap({"simulate", "site", "--edge-length", "0.02", "-o", "site"})));
+  for (const std::string noise_m : {"0.002", "0.012"})
+    ASSERT_TRUE(succeeded(graspmap({"simulate", "scan", "site/mesh.ply", "-o", noise_m + ".db",
+                                    "--frames", "40", "--noise", noise_m, "--seed", "5"})));
+  struct Fused {
+    std::string noise;
+    double error_m = 0.0;  // mean of the stated errors
+  };
+  const auto fused = [](const std::string& scan, const std::string& sensor) {
+    EXPECT_TRUE(succeeded(graspmap({"fuse", scan, "--poses", "ground-truth", "--sensor", sensor,
+                                    "-o", "cloud.ply", "--force"})));
+    const std::vector<double> errors =
+        libmap::read_cloud(scratch("cloud.ply")).cloud.find_field("expected_error")->values;
+    return Fused{
+        json_of("cloud.ply.json").at("results").at("noise"),
+        std::accumulate(errors.begin(), errors.end(), 0.0) / static_cast<double>(errors.size())};
+  };
+  const Fused usual = fused("0.002.db", "auto");
+  const Fused noisy = fused("0.012.db", "auto");
+  const Fused given = fused("0.012.db", "kinect-v2");
+  EXPECT_EQ(usual.noise, given.noise) << "both are those of a Kinect v2";
+  EXPECT_NE(noisy.noise, given.noise);
+  EXPECT_GT(noisy.error_m, 1.3 * given.error_m);
+  EXPECT_GT(noisy.error_m, 2.0 * usual.error_m);
 }
 
 TEST(Fuse, PosesOfAFile) {
