@@ -58,8 +58,10 @@ void add_figures(const CalibrationEstimate& estimate, StageReport& report) {
 
 // The stored camera is kept unless the held-out data fit another one clearly better. For example,
 // RTAB-Map's downsampling shifts images by a fraction of a pixel.
-CalibrationChoice choice_of(const RefinementOptions& options, const SensorCalibration& known) {
+CalibrationChoice choice_of(const RefinementInput& input, const SensorCalibration& known) {
+  const RefinementOptions& options = input.options;
   CalibrationChoice choice;
+  choice.keeps_registration = !input.color_from_depth.matrix().isIdentity();
   choice.only_if_better = options.intrinsics != IntrinsicsMode::refined;
   choice.converge = !known.empty();  // the first calibration only initializes the next
   choice.start = known;
@@ -135,8 +137,7 @@ SharedFrames calibrated(const std::vector<FrameFeatures>& stored,
 StageResult calibrate_stage(const RefinementInput& input, const RefinementState& state) {
   const std::vector<GraphLinkResult> others = state.results_of_other_links();
   const CalibrationInput data = calibration_input(input, state, others);
-  CalibrationEstimate estimate =
-      estimate_calibration(data, choice_of(input.options, state.calibration));
+  CalibrationEstimate estimate = estimate_calibration(data, choice_of(input, state.calibration));
   StageResult result{.state = state};
   RefinementState& next = result.state;
   add_figures(estimate, result.report);

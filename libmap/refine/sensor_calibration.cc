@@ -262,6 +262,9 @@ class ModelSearch {
   void simplify_to(const CalibrationParts& simpler);
   void drop_unneeded();
   void settle_motions();
+  CalibrationParts timing_alone() const {
+    return {.registration = choice_.keeps_registration, .timing = true};
+  }
   bool is_timing_enough(const CalibrationParts& others);
   void use_timing_alone();
   void try_timing();
@@ -297,9 +300,10 @@ void ModelSearch::simplify_to(const CalibrationParts& simpler) {
 
 void ModelSearch::drop_unneeded() {
   if (!choice_.only_if_better || !choice_.drop_unneeded) return;
-  if (best_.model.timing) simplify_to({.timing = true});
+  if (best_.model.timing) simplify_to(timing_alone());
   for (bool CalibrationParts::*const part_of :
        {&CalibrationParts::registration, &CalibrationParts::depth, &CalibrationParts::intrinsics}) {
+    if (part_of == &CalibrationParts::registration && choice_.keeps_registration) continue;
     CalibrationParts simpler = best_.model;
     simpler.*part_of = false;
     simplify_to(simpler);
@@ -315,8 +319,11 @@ void ModelSearch::settle_motions() {
 // Tries timing alone, because a depth correction also fits distortions by late depth and a rolling
 // shutter. Returns true if timing fits and all parts together are not clearly better.
 bool ModelSearch::is_timing_enough(const CalibrationParts& others) {
-  timed_ = attempt({.timing = true}, {}, part_.poses, max_rounds - 1);
-  const HeldOutEvaluation change = evaluate_held_out(before_, timed_->costs);
+  HeldOutCosts without = before_;
+  if (choice_.keeps_registration)
+    without = attempt({.registration = true}, {}, part_.poses, max_rounds - 1).costs;
+  timed_ = attempt(timing_alone(), {}, part_.poses, max_rounds - 1);
+  const HeldOutEvaluation change = evaluate_held_out(without, timed_->costs);
   if (!is_good(*timed_) || change.change() > -min_timing_gain * change.before()) {
     timed_.reset();
     return false;
@@ -326,7 +333,7 @@ bool ModelSearch::is_timing_enough(const CalibrationParts& others) {
   if (all == timed_->model) return true;
   const Candidate candidate =
       attempt(all, timed_->adjustment.calibration, timed_->adjustment.map_from_base, 1);
-  return !is_good(candidate) || !is_needed(timed_->costs, candidate.costs);
+  return is_good(candidate) && !is_needed(timed_->costs, candidate.costs);
 }
 
 // Takes timing alone as the model.
@@ -358,7 +365,8 @@ CalibrationEstimate ModelSearch::run() {
     // With little data, too many free parameters may fit worse than intrinsics alone.
     if (!is_good(best_) && choice_.drop_unneeded && all.intrinsics &&
         (all.depth || all.registration))
-      best_ = attempt({.intrinsics = true}, {}, part_.poses, 1);
+      best_ = attempt({.intrinsics = true, .registration = choice_.keeps_registration}, {},
+                      part_.poses, 1);
     drop_unneeded();
     if (may_time) try_timing();
     if (timed_ && (!is_good(best_) || is_needed(best_.costs, timed_->costs, min_timing_gain)))

@@ -42,8 +42,11 @@ struct CalibrationChoice {
   CalibrationParts parts{true, true, true, true};  // parts that may be estimated
   bool only_if_better = true;  // require that the held-out data fit clearly better
   bool drop_unneeded = true;   // drop parts that are not needed
-  bool converge = true;        // iterate the best model to the tolerance of the options
-  SensorCalibration start;     // initial values of registration and timing
+  // Estimate the registration with every model, because depth has been registered coarsely. Other
+  // parts would absorb the error of that registration.
+  bool keeps_registration = false;
+  bool converge = true;     // iterate the best model to the tolerance of the options
+  SensorCalibration start;  // initial values of registration and timing
 };
 
 struct CalibrationEstimate {
