@@ -333,7 +333,11 @@ bool ModelSearch::is_timing_enough(const CalibrationParts& others) {
   if (all == timed_->model) return true;
   const Candidate candidate =
       attempt(all, timed_->adjustment.calibration, timed_->adjustment.map_from_base, 1);
-  return is_good(candidate) && !is_needed(timed_->costs, candidate.costs);
+  if (is_good(candidate)) return !is_needed(timed_->costs, candidate.costs);
+  // If only its timing is impossible, the other parts are tried without it.
+  SensorCalibration without_timing = candidate.adjustment.calibration;
+  without_timing.timing.clear();
+  return candidate.possible || exceeded_bound(without_timing, options_);
 }
 
 // Takes timing alone as the model.
