@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
+#include <string>
 
 #include "tests/libmap/optimize/bundle_scenes.h"
 
@@ -48,20 +50,26 @@ TEST(SensorCalibration, AllFramesHaveMotions) {
   }
 }
 
-// Rows of 60 ms are longer than a frame.
-TEST(SensorCalibration, AModelBeyondItsBoundIsNotAccepted) {
-  const auto points = random_points(200);
-  const Way way = way_with_rows(points, 0.06, 12);
+// Links of each frame to the next three, one match in ten held out.
+std::vector<libmap::FeatureLink> links_of(const Way& way, std::size_t points) {
   std::vector<libmap::FeatureLink> links;
   for (std::size_t a = 0; a < way.frames.size(); ++a)
     for (std::size_t b = a + 1; b < std::min(way.frames.size(), a + 4); ++b) {
       libmap::FeatureLink link;
       link.frames = {a, b};
-      link.matches = graspmap_test::same_numbers(points.size());
+      link.matches = graspmap_test::same_numbers(points);
       for (std::size_t n = 0; n < link.matches.size(); n += 10)
         link.held_out.push_back(link.matches[n]);
       links.push_back(link);
     }
+  return links;
+}
+
+// Rows of 60 ms are longer than a frame.
+TEST(SensorCalibration, AModelBeyondItsBoundIsNotAccepted) {
+  const auto points = random_points(200);
+  const Way way = way_with_rows(points, 0.06, 12);
+  const auto links = links_of(way, points.size());
   libmap::BundleAdjustmentOptions options;
   options.max_iterations = 100;
   const libmap::CalibrationChoice choice{.parts = {.timing = true}, .start = {}};
@@ -76,6 +84,24 @@ TEST(SensorCalibration, AModelBeyondItsBoundIsNotAccepted) {
       ASSERT_FALSE(estimate.impossible.empty());
       EXPECT_EQ(estimate.impossible.front().first, "timing");
     }
+  }
+}
+
+// Timing would absorb the error of a coarse registration.
+TEST(SensorCalibration, ACoarseRegistrationIsPartOfEachModel) {
+  const auto points = random_points(200);
+  const Way way = way_with_rows(points, 0.02, 12);
+  const auto links = links_of(way, points.size());
+  for (const bool is_coarse : {false, true}) {
+    const libmap::CalibrationEstimate estimate =
+        libmap::estimate_calibration({way.frames, links, way.truth, {}, way.components, {}},
+                                     {.keeps_registration = is_coarse, .start = {}});
+    std::set<std::string> models;
+    for (const auto& [model, change] : estimate.evaluated_models) models.insert(model);
+    EXPECT_EQ(models.contains("timing"), !is_coarse);
+    EXPECT_EQ(models.contains("intrinsics"), !is_coarse);
+    EXPECT_EQ(models.contains("registration_timing"), is_coarse);
+    EXPECT_EQ(models.contains("intrinsics_registration"), is_coarse);
   }
 }
 
