@@ -301,7 +301,9 @@ void write_tables(const fs::path& folder, const AnalyzeOptions& options, const R
 void analyze(AnalyzeOptions& options, Run& run) {
   if (options.maps.size() > 1 || !options.table.expected.empty()) {
     if (!options.other.empty())
-      throw UsageError("--against requires one MAP without --expected; --pairs compares several");
+      throw UsageError(
+          "--against requires exactly one MAP and cannot be used with --expected; use --pairs to "
+          "compare several maps");
     reject_changed(options, bind_one, "requires one map without --expected");
     options.table.points_frame = options.points_frame;
     options.table.images = options.images;

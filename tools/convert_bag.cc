@@ -470,7 +470,8 @@ int graspmap_tools::convert_bag(int argc, char** argv) {
       "clouds (.pcd, .ply, .vtp, .csv); bag to write: OUT.bag (ROS 1), OUT.mcap, or a folder (no "
       "extension) of .db3 (ROS 2)");
   command.option("--topic", "[NAME=]TOPIC", options.topics,
-                 "topic of a camera's depth images, or of the cloud (repeatable); default: all");
+                 "topic of a camera's depth images, NAME: the camera's name (repeatable; default: "
+                 "all), or of the cloud (default: the only topic of clouds)");
   command.option(
       "--rig", "FILE|NAME", options.rig,
       "camera rig; default: from the bag's camera infos and transforms, or DIR/rig.yaml");

@@ -23,7 +23,7 @@ struct SimulateSiteOptions {
 
 void bind(libmap::ParameterTable& table, SimulateSiteOptions& options) {
   using libmap::not_negative;
-  table.add("site", options.site, "site of the toolkit, or a site file");
+  table.add("site", options.site, "test site: a name in data/sites, or a site file (.yaml)");
   table.add("seed", options.seed, not_negative, "random seed of the site; 0: as in the site file");
   table.add("edge_length_m", options.meshing.edge_length_m, libmap::positive,
             "approximate edge length of the mesh, m");
@@ -31,7 +31,7 @@ void bind(libmap::ParameterTable& table, SimulateSiteOptions& options) {
             "add the sides and base of the ground, so that the mesh is closed");
   table.add_former_key("places", "field_points");
   table.add("field_points", options.field_points, libmap::Range{0.0, 10'000.0},
-            "number of field points; 0: as in the site file");
+            "number of locations for the field test; 0: as in the site file");
 }
 
 libmap::RockSite load(const SimulateSiteOptions& options, const std::filesystem::path& file) {

@@ -12,8 +12,8 @@
 
 namespace libgtd {
 
-// Returns one row per bin; the column `bins` is "class" for bins of the legend and "width" for the
-// finer bins.
+// Returns one row per bin of the score histogram; the column `bins` is "class" for the score
+// classes of the map's legend and "width" for bins of equal width.
 libmap::Table histogram_table(const MapAnalysis& analysis);
 
 // Returns one row per bin; `unit` is the unit of the bounds, "m" or "deg".
@@ -26,8 +26,8 @@ libmap::Table regions_table(const VoxelMap& map, const MapRegionResult& regions,
 // Returns one row per pair of regions that is linked within the stride or by the spanning tree.
 libmap::Table region_links_table(const VoxelMap& map, const RegionReach& reach);
 
-// Returns a row for all common voxels, a row for the evaluated ones, and rows for these by height
-// and by slope.
+// Returns one row for all common voxels, one row for the evaluated common voxels, and one row per
+// height bin and per slope bin of the evaluated common voxels.
 libmap::Table change_table(const MapChange& change);
 
 // Returns counts, areas, regions and reach as JSON; `change` may be null.

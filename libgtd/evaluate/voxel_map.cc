@@ -89,7 +89,7 @@ void require_on_lattice(const PointCloud& map, const VoxelMap& result,
     if (!((point - center).cwiseAbs().array() <= bound_m).all())
       throw libmap::Error(
           "too large for the lattice of the map",
-          {.field = "distance of point " + std::to_string(kept[n] + 1) + " from a voxel center",
+          {.field = "distance of point " + std::to_string(kept[n]) + " from a voxel center",
            .value =
                libmap::to_text(static_cast<float>((point - center).cwiseAbs().maxCoeff())) + " m",
            .bound = "<= " + libmap::to_text(static_cast<float>(bound_m)) + " m"});
@@ -190,7 +190,7 @@ VoxelMap voxel_map_of(const PointCloud& map, const MapInfo& info) {
           result.lattice.cell_of(result.terrain_from_map * map.positions[n]);
       if (!(cell.cwiseAbs().array() <= max_voxel_index).all())
         throw libmap::Error("a point is too far from the origin for this voxel size",
-                            {.field = "point " + std::to_string(n + 1)});
+                            {.field = "point " + std::to_string(n)});
       voxels.push_back(result.lattice.voxel_of(result.terrain_from_map * map.positions[n]));
     }
   require_on_lattice(map, result, kept, voxels);

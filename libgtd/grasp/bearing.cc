@@ -92,9 +92,9 @@ void bind(libmap::ParameterTable& table, EngagementOptions& options) {
   table.add("adhesion_limit_n", options.adhesion_limit_n, positive,
             "law adhesion: maximum total tension of all fingers, N");
   table.add("adhesion_lateral_deg", options.adhesion_lateral_deg, cone,
-            "law adhesion: maximum angle between lateral force and tension, degrees");
+            "law adhesion: arctangent of the maximum ratio of lateral force to tension, degrees");
   table.add("adhesion_pull_deg", options.adhesion_pull_deg, cone,
-            "law adhesion: maximum angle between pull-off force and tension, degrees");
+            "law adhesion: arctangent of the maximum ratio of pull-off force to tension, degrees");
 }
 
 // Edge of a pyramid: its product with `objective`, and the edge in normal, drag and lateral.

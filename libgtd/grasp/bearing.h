@@ -33,9 +33,9 @@ void bind(libmap::ParameterTable& table, EngagementOptions& options);
 enum class SpineSharing { best, equally };
 
 // Convex set of forces that a contact can exert on the gripper; it contains 0. A spine touches both
-// the ground and a facet. The force is the sum of one force from the ground plane and one from the
-// facet, both at most `limit_n` and inside a pyramid with eight edges that approximates Coulomb's
-// friction cone. Forces in N, directions in the frame of the contacts.
+// the ground and a facet. The force is the sum of one force from the ground plane and one force
+// from the facet, both at most `limit_n` and inside a pyramid with eight edges that approximates
+// Coulomb's friction cone. Forces in N, directions in the frame of the contacts.
 class BearingContact {
  public:
   // Law `asperities`: `facet_angles_rad` are the inclinations of the engaged facets, or one 0 for a
@@ -67,7 +67,7 @@ class BearingContact {
   double max_local_product(const Eigen::Vector3d& local, SpineSharing sharing) const;
   Eigen::Vector3d best_local_force(const Eigen::Vector3d& local, SpineSharing sharing) const;
   // Returns the edges of the cone of forces on the steepest facet (adhesion: of all forces), as
-  // unit vectors in order around it, for images.
+  // unit vectors in order around the cone, for images.
   std::vector<Eigen::Vector3d> cone() const;
 
  private:
@@ -91,7 +91,7 @@ class BearingContact {
   std::vector<Eigen::Vector3d> adhesion_;  // edges for `limit_n_`; empty for asperities
 };
 
-// Draws at random which spines of a closed gripper's contacts engage, and the facets. Contacts
+// Draws at random the spines of a closed gripper's contacts that engage, and the facets. Contacts
 // without an engaged spine are skipped. Law `adhesion` draws no random numbers.
 std::vector<BearingContact> draw_bearing(const std::vector<GripContact>& contacts,
                                          const Gripper& gripper, const EngagementOptions& options,

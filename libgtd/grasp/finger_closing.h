@@ -1,6 +1,6 @@
 // Closes one finger of a gripper, two links in a plane, on the profile of the ground until it makes
-// contact. The plane contains the palm's axis; its coordinates (r, z) are in meters: r away from
-// the axis, z away from the ground, palm at z = 0. Contacts are computed in closed form, so that no
+// contact. The plane contains the palm's axis and has coordinates (r, z) in meters: r away from the
+// axis, z away from the ground, palm at z = 0. Contacts are computed in closed form, so that no
 // ridge is missed.
 #pragma once
 
@@ -34,7 +34,7 @@ struct FingerGeometry {
 // Returns the geometry of a finger. Throws Error if the gripper has no `fingers`.
 FingerGeometry finger_geometry(const Gripper& gripper);
 
-// Segment of the ground profile and the triangle that it is cut from.
+// Segment of the ground profile, with the triangle from which the segment is cut.
 struct GroundSegment {
   Eigen::Vector2d a;
   Eigen::Vector2d b;
@@ -52,7 +52,7 @@ struct FingerClosing {
   double curl_rad = 0.0;
   // Contact points on the profile; nullopt without contact.
   std::optional<Eigen::Vector2d> spines;
-  std::optional<Eigen::Vector2d> link;  // on the proximal link or the inner half of the distal one
+  std::optional<Eigen::Vector2d> link;  // on the proximal link or the inner half of the distal link
 };
 
 // Closes a finger that is open and does not touch the profile. The proximal link turns inward, with

@@ -400,7 +400,8 @@ void bind(libmap::ParameterTable& table, GraspOptions& options) {
   table.add("trials", options.poses, {1, 100000}, "number of gripper poses at each location");
   table.add("draws", options.draws, {1, 100000}, "number of draws of asperities at each pose");
   table.add("best_draws", options.best_draws, {0, 100000},
-            "number of asperity draws per pose that are also evaluated with optimal load sharing");
+            "number of draws of asperities at each pose for which the force with the best "
+            "distribution over the spines is also computed");
   table.add("seed", options.seed, not_negative, "random seed");
   table.add("offset_m", options.offset_m, {0.0, 1.0},
             "standard deviation of the random palm position in x and in y, m");

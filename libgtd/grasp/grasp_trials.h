@@ -1,5 +1,5 @@
 // Virtual field test: closes a gripper many times on the ground at each location, with random yaw,
-// offset, tilt and asperities, and pulls it in 17 directions.
+// offset, tilt and asperities, and pulls the gripper in 17 directions.
 #pragma once
 
 #include <Eigen/Core>
@@ -31,9 +31,9 @@ struct GraspOptions {
   int draws = 32;  // draws of asperities per pose
   // Number of draws per pose for which the force with SpineSharing::best is also computed.
   int best_draws = 2;
-  // Computes LocationResult::pull_limits_n. Not bound to a key.
+  // Computes LocationResult::pull_limits_n. No parameter of commands.
   bool pull_limits = false;
-  // Ends a location's test when the verdict is certain, see sequential_rounds. Not bound to a key.
+  // Ends a test when the verdict is certain (sequential_rounds). No parameter of commands.
   bool sequential = false;
   std::uint64_t seed = 1;
   double offset_m = 0.005;       // standard deviation of the palm position in x and y
@@ -45,15 +45,15 @@ struct GraspOptions {
   EngagementOptions engagement;
   SurfaceErrorOptions surface;  // ground with errors: random surface for each pose
 
-  // Throws Error naming field, value and bound.
+  // Throws Error naming field, value and bound if an option is out of range.
   void check() const;
 };
 void bind(libmap::ParameterTable& table, GraspOptions& options);
 
 // Outcome of a trial. Causes of failure: approach: no ground below, or the approach starts inside
 // the ground. contact: fewer than two contacts. engagement: in some direction, the contacts balance
-// no pull at all. load: they balance a smaller pull than the load. unseen: a failure of any kind
-// but approach while too much of the ground below a finger is unseen.
+// no pull at all. load: the contacts balance a smaller pull than the load. unseen: a failure of any
+// kind except approach while too much of the ground below a finger is unseen.
 enum class TrialOutcome { holds, approach, contact, engagement, load, unseen };
 const std::vector<std::pair<std::string, TrialOutcome>>& trial_outcome_names();
 
@@ -102,11 +102,11 @@ struct LocationResult {
 };
 
 // Round of a sequential test of a location: numbers of poses, and of draws per pose, that are
-// completed after it. Rounds first increase the poses (4, 8, 16, ... to all) with a quarter of the
-// draws, then double the draws until all are used, because further draws of a pose add little
-// information. The test ends after a round if the Wilson interval of 90 %, with poses as the count,
-// excludes 0.5. It also ends if all poses are done and the distance of the holding fraction from
-// 0.5 exceeds 1.645 standard deviations of the change that the remaining draws may cause (beta
+// completed after the round. Rounds first increase the poses (4, 8, 16, ... to all) with a quarter
+// of the draws, then double the draws until all are used, because further draws of a pose add
+// little information. The test ends after a round if the Wilson interval of 90 %, with poses as the
+// count, excludes 0.5. It also ends if all poses are done and the distance of the holding fraction
+// from 0.5 exceeds 1.645 standard deviations of the change that the remaining draws may cause (beta
 // distribution, Jeffreys prior). A test that reaches the last round has all trials.
 struct SequentialRound {
   int poses = 0;
@@ -128,10 +128,10 @@ Trial repeat_trial(const Ground& ground, const Gripper& gripper, const Eigen::Ve
                    const GraspOptions& options, int pose, int draw);
 
 // Gripper closed in random poses at one location (GraspOptions::poses). Computes pulls for any
-// force parameters without closing it again, for fits to pull tests.
+// force parameters without closing the gripper again, for fits to pull tests.
 class ClosedPoses {
  public:
-  // Does not throw if the location has no ground, see touch_ground().
+  // Does not throw if the location has no ground; then touch_ground() is false.
   ClosedPoses(const Ground& ground, const Gripper& gripper, const Eigen::Vector3d& location,
               const GraspOptions& options);
 

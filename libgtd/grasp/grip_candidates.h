@@ -21,7 +21,7 @@ struct CandidateOptions {
 };
 
 // Heights of the ground in columns. At least 99.8 % of the voxels that hold in 32 x 8 trials are
-// candidates (1500 voxels of each of three simulated sites, one of them not used to choose the
+// candidates (1500 voxels of each of three simulated sites; one site was not used to choose the
 // bounds).
 class GripCandidates {
  public:
@@ -29,7 +29,7 @@ class GripCandidates {
   GripCandidates(const libmap::TriangleMesh& mesh, const Gripper& gripper,
                  const CandidateOptions& options);
 
-  // Returns false if the ground in the location's own column, or in too many columns around it, is
+  // Returns false if the ground in the column of the location, or in too many columns around it, is
   // above the start of the approach. For ApproachDirection::up only.
   bool may_hold(const Eigen::Vector3d& location) const;
 

@@ -244,7 +244,8 @@ void bind(libmap::ParameterTable& table, ClosingOptions& options) {
   table.add("normal_radius_m", options.normal_radius_m, {1e-5, 0.1},
             "radius within which the ground normal at a contact is averaged, m");
   table.add("max_unseen", options.max_unseen, libmap::zero_to_one,
-            "maximum share of unseen ground below a finger that has contacts");
+            "maximum share of unseen ground below a finger; a finger above more unseen ground has "
+            "no contacts");
 }
 
 GroundPatch patch_around(const Ground& ground, const Eigen::Vector3d& location,

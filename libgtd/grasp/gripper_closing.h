@@ -51,13 +51,13 @@ struct ClosedGripper {
   Eigen::Isometry3d patch_from_gripper = Eigen::Isometry3d::Identity();  // palm at z = 0, axis z
   std::vector<ClosedFinger> fingers;
   std::vector<GripContact> contacts;  // by finger; contact of the link before contacts of spines
-  double unseen = 0.0;                // mean over the fingers; 1 without ground
+  double unseen = 0.0;                // mean over the fingers; 1 if there is no ground
 };
 
 struct ClosingOptions {
-  double start_height_m = 0.15;    // start of the approach above the location
+  double start_height_m = 0.15;    // height of the approach's start above the location
   double normal_radius_m = 0.002;  // radius of the mean ground normal at a contact
-  double max_unseen = 0.1;         // maximum ClosedFinger::unseen of a finger with contacts
+  double max_unseen = 0.1;         // a finger with a larger ClosedFinger::unseen has no contacts
 };
 void bind(libmap::ParameterTable& table, ClosingOptions& options);
 

@@ -1,4 +1,4 @@
-// Ground of the virtual field test: a triangle mesh, and a patch of the mesh around a location.
+// Ground of the virtual field test: a triangle mesh, and patches of the mesh around locations.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,7 +13,7 @@
 namespace libgtd {
 
 // Triangles near a location, in the frame of the patch, m: location at the origin, z opposite to
-// the approach, x as near as possible to the x axis of the mesh (else the y axis).
+// the approach, x is the projection of the mesh's x axis (or y axis if z is nearly parallel to x).
 struct GroundPatch {
   Eigen::Isometry3d mesh_from_patch = Eigen::Isometry3d::Identity();
   std::vector<Eigen::Vector3d> vertices;
@@ -21,7 +21,7 @@ struct GroundPatch {
   std::vector<Eigen::Vector3d> area_normals;  // length: twice the area
   std::vector<Eigen::Vector3d> centers;       // centers of bounding spheres of the triangles
   std::vector<double> radii;                  // radii of these spheres
-  // See GroundErrors; empty without errors.
+  // Errors as in GroundErrors, and unit vertex normals; all three are empty for exact ground.
   std::vector<double> vertex_errors_m;
   std::vector<Eigen::Vector3d> vertex_normals;
   std::vector<std::uint8_t> is_unscanned;
@@ -34,7 +34,7 @@ struct GroundPatch {
   std::optional<Eigen::Vector3d> normal_at(const Eigen::Vector3d& point, double radius_m) const;
 };
 
-// Errors of the ground of a mesh; empty: exact ground.
+// Errors of a mesh as a model of the real ground. Both lists are empty for exact ground.
 struct GroundErrors {
   std::vector<double> vertex_errors_m;     // standard deviations along the vertex normals
   std::vector<std::uint8_t> is_unscanned;  // per triangle: 1 if insufficiently scanned
@@ -52,15 +52,15 @@ class Ground {
   Ground(Ground&&) noexcept;
   Ground& operator=(Ground&&) noexcept;
 
-  // Returns all triangles that intersect the cylinder around the location along `away` (a direction
-  // out of the ground), from `above_m` down to the lowest part of the mesh, and some outside it.
-  // Its radius is enlarged by `widening` times the maximum of `above_m` and the depth below the
-  // location. Thread-safe.
+  // Returns all triangles that intersect a cylinder, and some other triangles. The axis passes
+  // through `location` along `away`, which points out of the ground (both in the mesh frame). The
+  // cylinder extends from `above_m` above the location to the lowest point of the mesh. At depth d
+  // below the location, the radius is radius_m + widening * max(above_m, d). Thread-safe.
   GroundPatch patch(const Eigen::Vector3d& location, const Eigen::Vector3d& away, double radius_m,
                     double above_m, double widening = 0.0) const;
 
-  // Returns the distance from a point to the nearest triangle within `radius_m`, m; nullopt if
-  // there is none.
+  // Returns the distance from a point in the mesh frame to the nearest triangle within `radius_m`,
+  // m; nullopt if there is none.
   std::optional<double> distance(const Eigen::Vector3d& point, double radius_m) const;
 
   // Returns the maximum vertex error, m; 0 without errors.

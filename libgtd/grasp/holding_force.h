@@ -14,15 +14,15 @@ struct HoldingOptions {
   // Point at which the pull acts (m), without a moment.
   Eigen::Vector3d load_point{0.0, 0.0, 0.0};
   // Maximum force of a finger toward the palm's axis. If the drives resist opening, a finger is
-  // rigid and converts part of the pull into such a force; see holding_force.
+  // rigid and converts part of the pull into a force toward the axis; see holding_force.
   double closing_force_n = 10.0;
   bool holds_when_closed = true;
   Eigen::Vector3d axis{0.0, 0.0, 1.0};  // axis of the palm, away from the ground
   SpineSharing sharing = SpineSharing::best;
 };
 
-// Returns the maximum F (N) for which forces f_i of the contacts, each in its set, balance the pull
-// F w:
+// Returns the maximum F (N) for which forces f_i of the contacts (BearingContact) at points p_i
+// balance the pull F w at p:
 //   sum f_i + F w = 0,  sum (p_i - p) x f_i = 0,  sum over finger k of r_k . f_i <= P + c_k F / m
 // (Kumar and Waldron 1988), with r_k outward and m fingers with contacts. c_k is 0, or, if the
 // drives resist opening, sin g cos g / (1 + sin^2 g) of the finger's steepest contact on ground
@@ -50,11 +50,11 @@ const std::vector<PullDirection>& pull_directions();
 // Minimum holding force over pull_directions().
 struct WeakestDirection {
   double force_n = 0.0;
-  std::size_t direction = 0;  // index in pull_directions(); any of equal ones
+  std::size_t direction = 0;  // index in pull_directions(); any of equal minima
 };
 
-// Computes the minimum. Direction `first` is tested first; a good guess saves time and only affects
-// the choice among equal directions.
+// Computes the minimum holding force. Direction `first` is tested first; a good guess saves time
+// and only affects the choice among equal directions.
 WeakestDirection min_holding_force(const std::vector<BearingContact>& contacts,
                                    const HoldingOptions& options, std::size_t first = 0);
 

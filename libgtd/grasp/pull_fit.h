@@ -20,7 +20,7 @@ namespace libgtd {
 struct PullTest {
   std::size_t row = 0;  // row of the table, from 1
   Eigen::Vector3d location = Eigen::Vector3d::Zero();
-  bool on_level_ground = false;  // replaces the location
+  bool on_level_ground = false;  // true: the location is not used
   double tilt_deg = 0.0;
   double azimuth_deg = 0.0;
   std::optional<double> force_n;  // force at which the gripper slipped; nullopt: verdict only
@@ -38,8 +38,8 @@ struct PullFitOptions {
   GraspOptions grasp;              // `poses` and `draws` apply to each pull
   double force_noise = 0.15;       // standard deviation of the logarithm of a measured force
   double outlier_fraction = 0.05;  // prior fraction of uninformative tests
-  int sets = 256;                  // per round
-  int rounds = 8;                  // maximum; fewer if a quarter of the sets are effective
+  int sets = 256;                  // number of parameter sets per round
+  int rounds = 8;                  // maximum; the fit ends if a quarter of the sets are effective
 };
 
 // Median and 90 % interval.
@@ -53,8 +53,8 @@ struct FittedParameter {
   std::string name;
   double prior[3] = {};  // quantiles 0.05, 0.5, 0.95
   double fitted[3] = {};
-  // Standard deviation of the parameter's quantile in the prior, relative to that before the tests.
-  // The tests determine the parameter if it is below 0.6.
+  // Standard deviation of the parameter's quantile in the prior, relative to the value before the
+  // tests. The tests determine the parameter if the ratio is below 0.6.
   double spread_ratio = 1.0;
 
   bool is_determined() const { return spread_ratio < 0.6; }
@@ -66,7 +66,7 @@ struct PullFit {
   PredictedForce level_before, level_after;  // holding force on level ground
   std::vector<FittedParameter> parameters;   // parameters with a range
   // Mean squared standard score of each test predicted from all others (leave-one-out weights),
-  // about 1 if the model explains the tests; and the probability of a value at least as large by
+  // about 1 if the model explains the tests. p_value: probability of a value at least as large by
   // chance.
   double mean_squared_score = 0.0;
   double p_value = 1.0;
@@ -81,7 +81,7 @@ struct PullFit {
 PullFit fit_pulls(const Ground* ground, const Gripper& gripper, const std::vector<PullTest>& tests,
                   const PullFitOptions& options, libmap::Progress& progress);
 
-// Returns level ground: a square around the origin with this half side.
+// Returns level ground: a square around the origin with half the side `half_m`.
 libmap::TriangleMesh level_ground(double half_m = 0.4);
 
 // Pull with an outcome that differs between the parameter sets.

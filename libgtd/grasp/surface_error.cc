@@ -50,11 +50,14 @@ GroundErrors errors_of(const libmap::TriangleMesh& mesh, const SurfaceErrorOptio
   mesh.check();
   const libmap::ScalarField* expected = field_of(mesh.vertex_fields, "expected_error");
   if (expected == nullptr)
-    throw libmap::Error("the mesh has no such field at its vertices", {.field = "expected_error"});
+    throw libmap::Error(
+        "the mesh has no such vertex field; use a mesh of graspmap mesh from a cloud of graspmap "
+        "fuse, or set surface_error to a number",
+        {.field = "expected_error"});
   for (std::size_t n = 0; n < expected->values.size(); ++n)
     if (expected->values[n] < 0.0)
       throw libmap::Error("a standard deviation cannot be negative",
-                          {.field = "expected_error of vertex " + std::to_string(n + 1),
+                          {.field = "expected_error of vertex " + std::to_string(n),
                            .value = libmap::to_text(expected->values[n]),
                            .bound = ">= 0"});
   GroundErrors errors = bounded(mesh, expected->values, options.max_error_m);

@@ -16,15 +16,15 @@ struct SurfaceErrorOptions {
   // Correlation length of the displacement: along an axis, the correlation is 0.285 at this
   // distance and 0 from twice this distance.
   double correlation_m = 0.025;
-  // Maximum standard deviation of seen ground. Where it is larger, ground is unseen; this is used.
+  // Maximum standard deviation; ground with a larger one is unseen and has this value.
   double max_error_m = 0.005;
 };
 void bind(libmap::ParameterTable& table, SurfaceErrorOptions& options);
 
 // Reads the vertex field `expected_error` of a mesh as written by `graspmap fuse` and `mesh` (m,
 // one standard deviation along the normal). A triangle counts as unseen if the error of a vertex
-// exceeds the bound or is not finite, or if the face field `filled` marks it as closing a hole of
-// the scan. Throws Error if the field is missing or an error is negative.
+// exceeds the bound or is not finite, or if the face field `filled` marks the triangle as closing a
+// hole of the scan. Throws Error if the field is missing or an error is negative.
 GroundErrors errors_of(const libmap::TriangleMesh& mesh, const SurfaceErrorOptions& options);
 // Returns the same standard deviation `error_m` for all vertices.
 GroundErrors constant_error(const libmap::TriangleMesh& mesh, double error_m,

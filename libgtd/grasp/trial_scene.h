@@ -20,17 +20,17 @@ enum class ScenePart { ground, gripper, engaged, link, idle, cone, pull, load };
 struct ScenePartStyle {
   ScenePart part;
   libmap::Color color;
-  std::string text;  // label in a legend; empty: not in the legend
+  std::string text;  // label in the legend of an image; empty: not in the legend
 };
 
 // Returns one style per part, in order. The ground has this color if the mesh has none.
 const std::vector<ScenePartStyle>& scene_parts();
 
 // Returns the scene in the frame of the mesh, with vertex colors and the vertex field `scene_part`.
-// There is a sphere at each contact that bears a force and at the tip of each finger that does not,
-// or one at the location if the gripper does not reach the ground. The arrow of the pull starts at
-// the middle of the palm. The length is proportional to the force, up to three times the length of
-// the arrow of `load_n`, which ends with a disc.
+// There is a sphere at each contact that bears a force and at the tip of each finger that bears no
+// force, or one sphere at the location if the gripper does not reach the ground. The arrow of the
+// pull starts at the middle of the palm. The length is proportional to the force, up to three times
+// the length of the arrow of `load_n`, which ends with a disc.
 libmap::TriangleMesh trial_scene(const libmap::TriangleMesh& mesh, const Gripper& gripper,
                                  const Trial& trial, double load_n);
 

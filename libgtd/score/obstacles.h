@@ -15,8 +15,8 @@ namespace libgtd {
 enum class Obstacle : std::uint8_t { none = 0, face = 1, unreachable = 2 };
 
 struct ObstacleOptions {
-  double slope_deg = 60.0;  // minimum slope of a steep voxel
-  double height_m = 0.3;    // maximum rise of a face that is no obstacle
+  double slope_deg = 60.0;  // voxels with a larger slope are steep
+  double height_m = 0.3;    // a face with a larger rise is an obstacle
   // Radius of the slope fits. A fit mixes a face with the ground at the foot and top of the face;
   // the rise is therefore measured up to this distance from the steep voxels.
   double normal_radius_m = 0.07;
@@ -25,15 +25,16 @@ struct ObstacleOptions {
 // Maximum index difference of connected voxels along each axis. It bridges gaps of a cloud.
 inline constexpr int obstacle_link_voxels = 2;
 
-// Classifies the voxels of a complete map (faces may cross tiles), which must ascend.
+// Returns the class of each voxel. The voxels must ascend by i, j, k and form a complete map,
+// because a face may cross tiles.
 // - Connected steep voxels form a face. Its foot and top are the lowest and highest voxel within
-//   the normal radius of its voxels. It is an obstacle if its top is more than height_m above its
-//   foot.
-// - Connected other voxels form a region. The region with the most voxels is the ground (of equals,
-//   the region of the first voxel). Another region is unreachable if it meets a face that is an
-//   obstacle in the upper half of its rise, or more than height_m above its foot. A region that
-//   meets faces only at their feet is not: a path may exist in the area that the sensor did not
-//   see.
+//   the normal radius of its voxels. The face is an obstacle if the top is more than height_m above
+//   the foot.
+// - Connected voxels outside obstacle faces form a region. The region with the most voxels is the
+//   ground (of equal ones, the region of the first voxel). Another region is unreachable if one of
+//   the voxels is connected to an obstacle face in the upper half of the face, or more than
+//   height_m above the foot. A region that is connected only to the lower parts of faces remains
+//   reachable, because a path may exist in an area that the sensor did not see.
 // Slopes that are NaN are not steep. Throws Error if the numbers of slopes and voxels differ, the
 // voxels do not ascend, or an option is out of range.
 std::vector<Obstacle> find_obstacles(const std::vector<Voxel>& voxels,

@@ -19,15 +19,16 @@ struct BagRigOptions {
   // "TOPIC" or "NAME=TOPIC"; empty: all topics of depth images, compressed ones only if there is no
   // raw one.
   std::vector<std::string> topics{};
-  // Replaces camera infos and transforms. A topic belongs to the camera that is given for the
-  // topic, or that is named by a part of the topic between slashes.
+  // Replaces the bag's camera infos and transforms. A topic belongs to the camera NAME of
+  // "NAME=TOPIC"; without NAME, to the camera whose name is a part of the topic between slashes.
   std::optional<CameraRig> rig{};
   std::string base_frame = "auto";  // robot frame; auto: base_link, or the root of all transforms
   std::string transform_topic = "/tf_static";
   double depth_unit_m = 0.001;  // > 0, meters per unit of 16-bit images in the bag
-  double depth_scale_m = 0.0;   // meters per unit of the written images; 0: the rig's, or as in the
-                                // bag, 0.1 mm for 32FC1
-  double near_m = 0.0;          // depth range of the rig; 0 and infinity: the given rig's own
+  // Meters per unit of the written images; 0: as in `rig`; without `rig`, depth_unit_m, or 0.1 mm
+  // for images in 32FC1.
+  double depth_scale_m = 0.0;
+  double near_m = 0.0;  // depth range of the written rig; 0 and infinity: as in `rig`
   double far_m = std::numeric_limits<double>::infinity();
   double tolerance_s = 0.02;  // maximum time between an image and the stamp of the set
   int every = 1;              // >= 1; only every N-th set is exported
@@ -69,15 +70,15 @@ std::vector<std::string> names_in_rig_folder(const BagRigPlan& plan);
 
 struct BagRigExport {
   std::size_t images = 0;
-  std::vector<SynchronizedSet> sets{};  // sets of the plan without unusable images
-  std::size_t overflow_pixels =
-      0;  // pixels with a depth beyond 16 bits at the camera's depth scale
+  std::vector<SynchronizedSet> sets{};  // synchronized sets of the written images
+  // Pixels with a depth beyond 16 bits at the camera's depth scale.
+  std::size_t overflow_pixels = 0;
   // Number of unusable images, and the reason for the first one of each camera.
   std::size_t undecodable_images = 0;
   std::vector<std::string> warnings{};
 };
 
-// Writes the plan's images on all threads into `folder`, which must exist. Needs memory for some
+// Writes the plan's images on all threads into `folder`, which must exist. Needs memory for a few
 // dozen images. Throws Error for a damaged bag, no usable image, or a failed write.
 BagRigExport export_bag_rig(const std::filesystem::path& bag, const BagRigPlan& plan,
                             const std::filesystem::path& folder);

@@ -121,13 +121,13 @@ constexpr const char* db3_name = "bag_0.db3";
 void require_columns(const SqliteFile& file, const std::string& table,
                      const std::vector<std::string>& names) {
   if (!file.tables().contains(table))
-    throw Error("no such table; a bag of ROS 2 is required",
-                {.file = file.path().string(), .field = "table", .value = table});
+    throw Error("does not exist; a bag of ROS 2 is required",
+                {.file = file.path().string(), .field = "table " + table});
   const std::set<std::string> columns = file.columns(table);
   for (const std::string& name : names)
     if (!columns.contains(name))
-      throw Error("no such column; a bag of ROS 2 is required",
-                  {.file = file.path().string(), .field = "table " + table, .value = name});
+      throw Error("does not exist; a bag of ROS 2 is required",
+                  {.file = file.path().string(), .field = "column " + name + " of table " + table});
 }
 
 // Returns the topics by their id in the file.

@@ -72,7 +72,8 @@ StoredMatrix read_matrix_header(std::string_view blob) {
                 {.value = std::to_string(rows) + " x " + std::to_string(columns)});
   if (type < 0 || (type & 7) > static_cast<int>(MatrixElement::float64) ||
       (type >> 3) + 1 > max_channels)
-    throw Error("compressed matrix has an unknown type of number", {.value = std::to_string(type)});
+    throw Error("compressed matrix has an unsupported element type or too many channels",
+                {.value = std::to_string(type), .bound = "CV_8U to CV_64F, at most 512 channels"});
   return {.rows = rows,
           .columns = columns,
           .channels = (type >> 3) + 1,

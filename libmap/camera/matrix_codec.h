@@ -12,7 +12,7 @@
 
 namespace libmap {
 
-// OpenCV's depth numbers.
+// Type of an element, with OpenCV's codes (CV_8U to CV_64F).
 enum class MatrixElement {
   uint8 = 0,
   int8 = 1,

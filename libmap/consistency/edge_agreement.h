@@ -12,16 +12,17 @@ namespace libmap {
 // Agreement of the edges of depth images with the edges of color images.
 struct EdgeAgreement {
   std::size_t frames = 0;
-  std::size_t edges = 0;  // pixels
-  // Mean contrast of the color images at the edges of depth, 0 to 1: as stored, and with the best
-  // other pose and focal length of the depth camera ("the alternative").
+  std::size_t edges = 0;  // number of edge pixels
+  // Mean contrast of the color images at the edges of depth, 0 to 1: with the stored calibration,
+  // and with the best other pose and focal length of the depth camera ("the alternative").
   double stored = 0.0;
   double aligned = 0.0;
-  // Gain of the alternative in frames that were not used to estimate it, in standard errors.
+  // Increase of the contrast by the alternative, in standard errors, in frames that were not used
+  // to estimate the alternative.
   double significance = 0.0;
   double displacement_px = 0.0;      // RMS displacement of the edges, pixels of depth
-  double uncertainty_px = 0.0;       // RMS difference of the alternatives by halves of the frames
-  double min_displacement_px = 0.0;  // smaller displacements: the images agree
+  double uncertainty_px = 0.0;       // RMS difference of alternatives from two halves of frames
+  double min_displacement_px = 0.0;  // the images agree if the displacement is smaller
   Pose color_from_depth = Pose::Identity();  // the alternative, without a shift along the axis
   double focal_factor = 1.0;                 // focal length of depth, relative to the stored one
 

@@ -1,5 +1,5 @@
 // Checks that the depth images of a scan agree with given poses, to detect poses in a wrong format.
-// If not, finds a convention of poses or depth with which depth images and poses agree.
+// If they disagree, finds a convention of poses or depth with which they agree.
 #pragma once
 
 #include <cstddef>
@@ -15,14 +15,15 @@ namespace libmap {
 // Agreement of depth between pairs of frames.
 struct DepthAgreement {
   std::size_t measurements = 0;  // measurements common to both frames of a pair
-  double contradicted = 0.0;     // share with a relative difference above 5 %; 1 if there are none
-  double difference = 0.0;       // median relative difference; 1 if there are none
+  double contradicted = 0.0;     // share that differs by more than 5 %; 1 without measurements
+  double difference = 0.0;       // median relative difference; 1 without measurements
 };
 
 struct PoseConsistency {
   std::size_t pairs = 0;
   DepthAgreement given;
-  // Agreement with the best other convention if that fits much better; empty otherwise.
+  // Agreement with the best other convention, and the convention's name; both are empty unless this
+  // convention fits much better.
   DepthAgreement best{};
   std::string convention{};
 
@@ -30,7 +31,7 @@ struct PoseConsistency {
   std::string warning() const;
 };
 
-// Returns indices of up to 24 poses, each with that of the next pose that has moved by 8 degrees or
+// Returns pairs of indices: up to 24 poses, each with the next pose that differs by 8 degrees or
 // 0.1 m.
 std::vector<std::pair<std::size_t, std::size_t>> near_pairs_of(const Trajectory& poses);
 

@@ -124,7 +124,8 @@ Georeference georeference_from(const Json& json) {
     throw Error("origin_m must have 3 numbers and unit_m must be > 0", {.field = "georeference"});
   georeference.origin_m = Eigen::Vector3d(origin.data());
   if (!(georeference.origin_m.cwiseAbs().maxCoeff() <= max_position_m))
-    throw Error("origin_m must be at most 1e8 m", {.field = "georeference"});
+    throw Error("a coordinate is not finite or too large",
+                {.field = "georeference.origin_m", .bound = "-1e8 to 1e8 m"});
   return georeference;
 }
 

@@ -32,7 +32,7 @@ struct Manifest {
   std::vector<ManifestInput> inputs;
   std::string frame;                                     // frame of the output's coordinates (m)
   std::vector<std::pair<std::string, Pose>> transforms;  // by name, e.g. "terrain_from_input"
-  // Georeference of the frame before site_from_map and terrain_from_input.
+  // Georeference of the source coordinates, before site_from_map and terrain_from_input.
   std::optional<Georeference> georeference;
   std::vector<std::pair<std::string, ManifestValue>> results;  // counts, residuals
   std::vector<std::pair<std::string, double>> timings_s;       // in the section "run"

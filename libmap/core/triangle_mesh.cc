@@ -109,7 +109,7 @@ void TexturedMesh::check() const {
     if (page != no_page && (page < 0 || static_cast<std::size_t>(page) >= pages.size()))
       throw Error("does not exist", {.field = "texture page of triangle " + std::to_string(t),
                                      .value = std::to_string(page),
-                                     .bound = "< " + std::to_string(pages.size())});
+                                     .bound = ">= -1 and < " + std::to_string(pages.size())});
     for (const Eigen::Vector2f& corner : texture_coordinates[t])
       if (!corner.allFinite())
         throw Error("texture coordinate is not finite", {.field = "triangle " + std::to_string(t)});

@@ -24,7 +24,8 @@ inline constexpr std::uint64_t max_yaml_bytes = std::uint64_t{16} << 20;
 void read_yaml(const std::string& text, const std::string& file,
                const std::function<void(const YAML::Node&)>& read);
 
-// Returns the error "unknown key" + `whose`, with the nearest known key.
+// Returns the error "unknown key" + `whose` (e.g. " of camera front"), with a suggestion of the
+// nearest known key.
 Error unknown_key(std::string_view key, const std::vector<std::string>& known,
                   const std::string& whose = "");
 
@@ -33,7 +34,8 @@ Error unknown_key(std::string_view key, const std::vector<std::string>& known,
 void check_keys(const YAML::Node& map, const std::vector<std::string>& known,
                 const std::string& whose = "");
 
-// Returns a copy of `error` with the field "PLACE.FIELD (line N)", where N is the line of `node`.
+// Returns a copy of `error` with the field "POSITION.FIELD (line N)": `position`, the field of
+// `error`, and the line of `node`.
 Error at_node(const Error& error, const std::string& position, const YAML::Node& node);
 
 }  // namespace libmap

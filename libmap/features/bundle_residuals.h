@@ -21,14 +21,14 @@ Projection project(const Eigen::Vector3d& point, const Eigen::Vector2d& focal_px
 
 // Effect of camera calibration on one observation, linearized at a known calibration.
 struct CalibratedObservation {
-  bool intrinsics = false;  // true for the parameters that are unknown
+  bool intrinsics = false;  // this and the following: true for unknown parameters
   bool depth = false;
   bool registration = false;
   bool timing = false;
   DepthCorrection::Terms terms{};
   bool has_depth = true;
-  double added_m = 0.0;                 // change of the depth by the known registration and timing
-  Vector6d by_step = Vector6d::Zero();  // derivative of the depth by a registration step
+  double added_m = 0.0;                    // change of depth by the known registration and timing
+  Vector6d by_step = Vector6d::Zero();     // derivative of the depth by a registration step
   Vector6d known_step = Vector6d::Zero();  // registration step equal to the known timing
   double image_row_fraction = 0.0;         // row_fraction
   double depth_stamp_offset_s = 0.0;       // FrameFeatures::depth_stamp_offset_s

@@ -1,4 +1,4 @@
-// A depth image downsampled to a grid of small planes, with lookup by rays.
+// Downsamples a depth image to a grid of small planes, which can be looked up by rays.
 #pragma once
 
 #include <Eigen/Core>
@@ -58,8 +58,8 @@ class DepthSurface {
   const std::vector<Cell>& cells() const { return cells_; }
   int columns() const { return columns_; }
   int rows() const { return rows_; }
-  // The lookups return false, and leave `element` unchanged, if nothing was measured there.
-  // Element at a grid position, which must be inside the grid.
+  // The lookups return false, and leave `element` unchanged, if nothing was measured at the
+  // position. Element at a grid position, which must be inside the grid.
   bool at(int column, int row, SurfacePatch& element) const;
   // Element nearest to the projection of `point_in_camera`.
   bool nearest_to(const Eigen::Vector3d& point_in_camera, SurfacePatch& element) const;

@@ -1,5 +1,5 @@
-// Matches between pairs of frames, verified by a rigid motion, and tracks: the observations of one
-// point in several frames.
+// Finds matches between pairs of frames, verified by a rigid motion, and joins them into tracks. A
+// track contains the observations of one point in several frames.
 #pragma once
 
 #include <cstddef>
@@ -16,7 +16,7 @@ namespace libmap {
 
 // Options for matching the features of two frames.
 struct MatchingOptions {
-  double max_ratio = 0.8;  // > 0: maximum ratio of descriptor distances (match_features)
+  double max_ratio = 0.8;  // > 0: see match_features
   int held_out = 10;       // >= 2: one in this many features is used for evaluation only
   RelativePoseOptions estimate{};
 };
@@ -27,8 +27,8 @@ using FramePair = std::pair<std::size_t, std::size_t>;
 // One verified link between two frames.
 struct FeatureLink {
   FramePair frames;
-  PoseLink link{};                       // from node to node
-  std::vector<FeatureMatch> matches{};   // inliers of the estimate; a is in the link's `from`
+  PoseLink link{};                       // between the nodes of the frames
+  std::vector<FeatureMatch> matches{};   // inliers of the estimate; a is in the frame of link.from
   std::vector<FeatureMatch> held_out{};  // consistent matches that the estimate did not use
   double chi_square_per_freedom = 0.0;
 };
@@ -61,8 +61,8 @@ PairVerification verify_pairs(const std::vector<FrameFeatures>& frames,
                               std::uint64_t seed, Progress& progress = no_progress(),
                               KnownMatches* known = nullptr);
 
-// Initial guess of first_from_second for a pair, from as few as six consistent matches; nullopt if
-// there are fewer. Throws as verify_pairs.
+// Returns an initial guess of first_from_second for a pair, from as few as six consistent matches;
+// nullopt if there are fewer. Throws Error as verify_pairs does.
 std::optional<Pose> guess_motion(const std::vector<FrameFeatures>& frames, const FramePair& pair,
                                  const MatchingOptions& options, std::uint64_t seed);
 
@@ -79,8 +79,8 @@ struct FeatureTrack {
 
 struct FeatureTracks {
   std::vector<FeatureTrack> tracks;  // two or more observations each
-  std::size_t conflicts = 0;         // matches dropped: a track would have two features of a frame
-  std::size_t split = 0;             // matches dropped: a track would join frames without a link
+  std::size_t conflicts = 0;         // dropped matches: a track would have two features of a frame
+  std::size_t split = 0;             // dropped matches: a track would join frames without a link
 };
 
 // linked: all frames of a track are linked pairwise, and a point with many observations becomes

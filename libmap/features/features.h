@@ -29,17 +29,18 @@ std::size_t descriptor_bytes(FeatureType type);
 
 struct FeatureOptions {
   FeatureType type = FeatureType::sift;
-  int max_features = 800;         // >= 1: per image, the strongest are kept
-  double min_contrast = 0.02;     // > 0: of SIFT, for image values from 0 to 1
-  double pixel_noise_px = 0.15;   // > 0: deviation of a feature's position at the finest scale
-  double scale_noise = 0.06;      // >= 0: deviation per pixel of feature size, added in squares
-  double surface_noise_m = 5e-4;  // >= 0: part of a plane's deviation that averaging leaves
+  int max_features = 800;         // >= 1: maximum per image; the strongest are kept
+  double min_contrast = 0.02;     // > 0: minimum for SIFT, image values from 0 to 1
+  double pixel_noise_px = 0.15;   // > 0: standard deviation of position at the finest scale
+  double scale_noise = 0.06;      // >= 0: standard deviation per pixel of size, in quadrature
+  double surface_noise_m = 5e-4;  // >= 0: standard deviation of depth, not reduced by averaging
   int surface_step_px = 3;        // 1 to 32: minimum step of the grid of planes
   DepthPlaneOptions planes{};     // planes of the depth images
-  bool surfaces_only = false;     // not bound: color is not read, and frames have no features
-  // Not bound, for long scans: memory of the surfaces of all frames.
+  // The following fields are no parameters of commands.
+  bool surfaces_only = false;  // true: color is not read, and frames have no features
+  // Limit for the memory of the surfaces of all frames, for long scans.
   std::size_t max_surface_bytes = std::size_t{256} << 20U;
-  std::size_t max_frames_in_memory = 300;  // not bound; with more, descriptors are stored on disk
+  std::size_t max_frames_in_memory = 300;  // with more, descriptors are stored on disk
 };
 void bind(ParameterTable& table, FeatureOptions& options);
 
@@ -60,15 +61,15 @@ struct FrameFeatures {
   int node = 0;
   double stamp_s = 0.0;               // time of the color images
   double depth_stamp_offset_s = 0.0;  // RgbdFrame::depth_stamp_offset_s
-  std::vector<Camera> cameras;        // of the color images
+  std::vector<Camera> cameras;        // cameras of the color images
   std::vector<Feature> features;
   FeatureType type = FeatureType::sift;
   // 128 (SIFT) or 32 (ORB) bytes per feature; may be dropped after the search for similar frames.
   std::vector<std::uint8_t> descriptors;
-  std::shared_ptr<const TempFile> descriptor_file;  // contains the descriptors instead, if set
+  std::shared_ptr<const TempFile> descriptor_file;  // if set, contains the descriptors
   std::uint64_t descriptors_begin = 0;              // byte offset in descriptor_file
   std::vector<DepthSurface> surfaces;               // one per camera
-  std::size_t without_depth = 0;                    // features dropped for lack of depth
+  std::size_t without_depth = 0;  // number of features without depth, which are dropped
 
   // Position of feature n from ray and depth, in the camera's optical frame or the base frame.
   Eigen::Vector3d point_in_camera(std::size_t n) const;
@@ -78,14 +79,14 @@ struct FrameFeatures {
 struct FeatureResult {
   std::vector<FrameFeatures> frames;           // by ascending node
   std::vector<std::pair<int, Error>> skipped;  // node and reason
-  std::size_t from_cache = 0;                  // number of frames
+  std::size_t from_cache = 0;                  // number of frames read from the cache
 };
 
 class FeatureCache;
 
 // Finds the features of `nodes`. The result does not depend on the number of threads or the cache.
 // Frames that cannot be read or have no depth are in `skipped`. A frame without color has surfaces
-// only. Throws Error: options out of range.
+// only. Throws Error if an option is out of range.
 FeatureResult find_features(const ScanSource& scan, const std::vector<int>& nodes,
                             const FeatureOptions& options = {}, Progress& progress = no_progress(),
                             const FeatureCache* cache = nullptr);

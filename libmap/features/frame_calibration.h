@@ -29,13 +29,14 @@ struct CameraTiming {
   double rolling_shutter_s = 0.0;  // time from the first to the last image row
 };
 
-// Differences from the stored calibration, one element per camera of the rig. Empty: no difference.
+// Differences from the stored calibration, one element per camera of the rig. An empty list means
+// no difference.
 struct SensorCalibration {
   std::vector<IntrinsicsStep> intrinsics{};
   std::vector<DepthCorrection> depth{};
-  std::vector<Pose> color_from_depth{};  // true pose of the depth camera of registered depth
+  std::vector<Pose> color_from_depth{};  // true pose of the depth camera if depth is registered
   std::vector<CameraTiming> timing{};
-  // With timing only: velocity of the base by node, in the base frame, m/s and rad/s.
+  // Used only with `timing`: velocity of the base by node, in the base frame, m/s and rad/s.
   std::map<int, Vector6d> motion{};
 
   bool empty() const {
@@ -55,7 +56,7 @@ FrameFeatures calibrated_features(const FrameFeatures& frame, const SensorCalibr
 // Returns the camera with changed intrinsics.
 Camera moved(Camera camera, const IntrinsicsStep& step);
 
-// Squared image radius of a feature, as squared_image_radius.
+// Squared distance of a feature from the image center, 1 at the corner pixels.
 double squared_radius_of(const Feature& feature, const Camera& camera);
 // Image row of a feature from -0.5 (first row) to 0.5 (last row). The row is exposed this share of
 // CameraTiming::rolling_shutter_s after the middle row.
@@ -69,8 +70,8 @@ Pose color_from_depth_of(const FrameFeatures& frame, const Feature& feature,
 
 // Change of a feature's depth if the depth camera is at `color_from_depth` instead of the stored
 // registration, and the derivative by the step s in moved(Pose::Identity(), s) * color_from_depth
-// (rigid_motion.h). Unknown, with zeros, if there is no plane at the feature: the depth is then
-// measured on another surface.
+// (rigid_motion.h). If no plane contains the feature, `known` is false and the values are 0: the
+// depth was measured on another surface.
 struct RegisteredDepth {
   bool known = false;
   double added_m = 0.0;
@@ -85,8 +86,9 @@ bool has_plane(const FrameFeatures& frame, const Feature& feature);
 // True if both splines have the same knots, so that coefficients can be exchanged.
 bool has_same_knots(const DepthCorrection& a, const DepthCorrection& b);
 
-// Zero corrections, one per camera, with knots over the depths of the camera's features at a
-// distance of at most `knot_m` (100 intervals or fewer). Empty for a camera without a depth range.
+// Zero corrections, one per camera. The knots cover the depths of the camera's features from the
+// 1st to the 99th percentile, in at most 100 equal intervals, of at most `knot_m` if 100 suffice. A
+// correction is empty if the camera's depths are equal or there are none.
 std::vector<DepthCorrection> corrections_for(const std::vector<FrameFeatures>& frames,
                                              std::size_t cameras, double knot_m);
 

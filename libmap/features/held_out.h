@@ -40,7 +40,7 @@ struct SurfaceResidual {
   double noise_m = 0.0;     // standard deviation of the distance
   double range_m = 0.0;     // larger range of the two measurements
 };
-inline constexpr int held_out_samples = 60;  // about, per frame
+inline constexpr int held_out_samples = 60;  // approximate number per frame
 // Returns the residuals from which surface_costs computes costs, in the same order.
 std::vector<SurfaceResidual> surface_residuals(const std::vector<FrameFeatures>& frames,
                                                const std::vector<FeatureLink>& links,
@@ -72,7 +72,7 @@ struct HeldOutEvaluation {
   // True if not worse, and the matches improve by more than two standard errors.
   bool is_clearly_better() const;
 };
-inline constexpr double surface_weight = 1.0 / 3.0;  // of a sample relative to a match
+inline constexpr double surface_weight = 1.0 / 3.0;  // weight of a sample relative to a match
 HeldOutEvaluation evaluate_held_out(const HeldOutCosts& before, const HeldOutCosts& after);
 
 }  // namespace libmap

@@ -1,5 +1,6 @@
-// Nearest descriptors of two sets, for several instruction sets. All sets compute the same bits,
-// because each sum is in one lane. Only plain pointers are used, as in depth_plane_loops.h.
+// Finds nearest descriptors of two sets of descriptors, for several instruction sets. All
+// instruction sets compute the same bits, because each sum is in one lane. Only plain pointers are
+// used, as in depth_plane_loops.h.
 #pragma once
 
 #include "libmap/core/instruction_set.h"
@@ -7,8 +8,8 @@
 namespace libmap {
 
 struct MatchLoops {
-  static constexpr int group = 4;   // descriptors of a per step; their number is a multiple of it
-  static constexpr int lanes = 32;  // the padded number of descriptors of b is a multiple of it
+  static constexpr int group = 4;   // descriptors of a per step; a_count is a multiple of `group`
+  static constexpr int lanes = 32;  // b_count, with padding, is a multiple of `lanes`
 
   // Descriptors of both sets, which have `size` values each. b is transposed: value k of descriptor
   // n is b[k * b_count + n]. bias_of_b is 0 for a descriptor, -4 for padding.
@@ -20,9 +21,9 @@ struct MatchLoops {
     int a_count;
     int b_count;
   };
-  // Largest and second largest product of each descriptor of a with those of b, and the index of
-  // the largest; for each descriptor of b the largest product, -2 before the call, and its index.
-  // The first index counts for equal products.
+  // For each descriptor of a: largest and second largest product with descriptors of b, and the
+  // index of the largest. For each descriptor of b: largest product, -2 before the call, and the
+  // index of the descriptor of a. The first index counts for equal products.
   struct Output {
     float* first_of_a;
     float* second_of_a;

@@ -1,4 +1,4 @@
-// Functions of match_loops.h, included by match_loops.cc once per instruction set.
+// Implements match_loops.h; included by match_loops.cc once per instruction set.
 
 constexpr int width = GRASPMAP_REGISTER / static_cast<int>(sizeof(float));
 

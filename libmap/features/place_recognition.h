@@ -21,10 +21,11 @@ struct SimilarFrame {
   double similarity = 0.0;  // cosine of the tf-idf weighted words, 0 to 1
 };
 
-// Returns for each frame the `count` most similar other frames, best first, followed by the `count`
-// most similar frames of other parts if `parts` contains a part number per frame. Frames without a
-// common word are never returned. The result does not depend on the number of threads. `seed`
-// selects the training samples. Throws Error if a descriptor file cannot be read.
+// Returns for each frame the `count` most similar other frames, best first. `parts` may contain for
+// each frame the number of its part of the scan (a connected component of the pose graph); then the
+// `count` most similar frames of other parts follow. Frames without a common word are never
+// returned. The result does not depend on the number of threads. `seed` selects the training
+// samples. Throws Error if a descriptor file cannot be read.
 std::vector<std::vector<SimilarFrame>> find_similar_frames(
     const std::vector<FrameFeatures>& frames, std::size_t count,
     const PlaceRecognitionOptions& options, std::uint64_t seed,

@@ -1,4 +1,4 @@
-// Relative pose of two frames, estimated from features.
+// Estimates the relative pose of two frames from matches of features.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,15 +16,15 @@ struct FeatureMatch {
   bool operator==(const FeatureMatch&) const = default;
 };
 
-// Mutual nearest neighbors with a descriptor distance below `max_ratio` times the distance of the
-// second nearest (Lowe 2004), by ascending a. `a` and `b` are descriptor_vectors.
+// Returns mutual nearest neighbors with a descriptor distance below `max_ratio` times the distance
+// of the second nearest descriptor (Lowe 2004), by ascending a. `a` and `b` are descriptor_vectors.
 std::vector<FeatureMatch> match_features(const Eigen::MatrixXf& a, const Eigen::MatrixXf& b,
                                          double max_ratio);
 
 // Residual of a feature of b, transformed to a by `a_from_b`, against the match: x and y (px),
 // depth (m), and the covariance from the noise of both features.
 struct MatchResidual {
-  bool in_front = false;  // of the camera in a; if false, the residual is not set
+  bool in_front = false;  // in front of the camera in a; if false, the residual is not set
   Eigen::Vector3d residual = Eigen::Vector3d::Zero();
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();
   Eigen::Matrix<double, 3, 6> jacobian;  // by a step of a_from_b (rigid_motion.h)
@@ -39,8 +39,8 @@ struct RelativePoseOptions {
   int ransac_iterations = 400;        // >= 1
   int min_inliers = 25;               // >= 6
   double min_inlier_fraction = 0.25;  // >= 0: minimum share of the matches
-  double max_chi_square = 14.16;  // of a match's three residuals; 99.7 % of true matches are below
-  double min_spread = 0.06;       // of RelativePose::spread
+  double max_chi_square = 14.16;      // maximum for a match; 99.7 % of true matches have less
+  double min_spread = 0.06;           // minimum RelativePose::spread
 };
 
 // Outcome of the estimation. degenerate: the inliers are in one spot or on one line of the image.

@@ -1,5 +1,6 @@
 // Named columns of numbers: the common format between the file codecs and clouds or meshes. A
-// column is a view on memory with another owner, so that reading and writing do not copy a cloud.
+// column refers to memory that another object owns, so that reading and writing do not copy a
+// cloud.
 #pragma once
 
 #include <array>
@@ -39,10 +40,10 @@ enum class StoredType {
   uint64
 };
 
-// Conversions between types in memory and in files (64-bit integers become float64), and the size
-// of a number in bytes.
+// Conversions between types in memory and in files (64-bit integers become float64).
 StoredType stored_as(ScalarType type);
 ScalarType scalar_type_of(StoredType type);
+// Size of a number in bytes.
 std::size_t size_of(StoredType type);
 
 struct Column {
@@ -98,11 +99,11 @@ void for_each_value(const Column& column, std::size_t rows, const Body& body);
 template <typename Body>
 void for_each_value_in_parallel(const Column& column, std::size_t rows, const Body& body);
 
-// Appends rows begin..end-1 as packed records, each column as Column::type.
+// Appends rows begin..end-1 as packed records, each column converted to Column::type.
 void append_records(const std::vector<Column>& columns, std::size_t begin, std::size_t end,
                     bool swap_bytes, std::string& out);
 std::size_t record_size(const std::vector<Column>& columns);
-// Appends rows begin..end-1 as text, each number in the shortest form that parses to it.
+// Appends rows begin..end-1 as text, each number in the shortest form that is read back exactly.
 void append_rows_of_text(const std::vector<Column>& columns, std::size_t begin, std::size_t end,
                          char separator, std::string& out);
 // Writes all rows in blocks. append(begin, end, text) appends the bytes of rows begin..end-1.
@@ -110,8 +111,8 @@ void write_rows(
     std::size_t rows, std::ostream& out,
     const std::function<void(std::size_t begin, std::size_t end, std::string& text)>& append);
 
-// cloud_from_sensor in the order of files, tx ty tz qw qx qy qz, as numbers and as words with a
-// space before each.
+// Returns the pose cloud_from_sensor as tx ty tz (m) qw qx qy qz, the order of PCD files: as
+// numbers, or as text with a space before each number.
 std::array<double, 7> viewpoint_numbers(const Pose& viewpoint);
 std::string viewpoint_words(const Pose& viewpoint);
 // Inverse of viewpoint_numbers; nullopt if the quaternion is zero.

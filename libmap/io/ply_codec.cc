@@ -141,7 +141,7 @@ PlyHeader read_ply_header(std::string_view text) {
     const std::size_t end = text.find('\n', position);
     if (line == 1 && trim(text.substr(0, std::min<std::size_t>(end, 5))) != "ply")
       throw Error("not a PLY file");
-    if (end == std::string_view::npos) throw Error("the PLY header has no line end_header");
+    if (end == std::string_view::npos) throw Error("the PLY header has no line 'end_header'");
     const std::string_view content = text.substr(position, end - position);
     position = end + 1;
     const Words words = words_of(content);
@@ -156,7 +156,7 @@ PlyHeader read_ply_header(std::string_view text) {
     } else if (words[0] == "property") {
       add_property(property_of(words, line), line, header);
     } else if (words[0] == "end_header") {
-      if (!has_format) throw Error("the PLY header has no line format");
+      if (!has_format) throw Error("the PLY header has no line 'format ENCODING 1.0'");
       header.data_begin = position;
       header.data_line = line + 1;
       return header;

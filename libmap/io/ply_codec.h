@@ -16,16 +16,18 @@
 
 namespace libmap {
 
-// Reads the header only; `file_bytes` is the size of the whole file. Throws as decode_ply does.
+// Reads the header only; `head` is the beginning of the file with the whole header, `file_bytes`
+// the size of the file. Throws as decode_ply does.
 GeometryFileInfo ply_info(std::string_view head, std::uint64_t file_bytes);
 
-// Returns the vertices of a binary file without lists in or before them, with columns that view
-// records at `block`; nullopt for other files. Throws Error as decode_ply does.
+// Returns the layout of the vertices in a binary file, with columns that refer to records at
+// `block`; nullopt if the file is ascii, or if the vertices or an element before them contain a
+// list. Throws Error as decode_ply does.
 std::optional<BinaryRecords> ply_records(std::string_view head, std::uint64_t file_bytes,
                                          const std::byte* block);
 
 // Decodes a file. Throws Error (without the file's name) for an invalid header line, truncated data
-// (checked before memory is allocated), and a face with less than three corners or an index out of
+// (checked before memory is allocated), and a face with fewer than three corners or an index out of
 // range.
 GeometryColumns decode_ply(const std::shared_ptr<const std::string>& bytes);
 

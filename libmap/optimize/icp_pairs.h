@@ -19,9 +19,9 @@ std::vector<FramePair> linked_pairs(const std::vector<FrameFeatures>& frames,
                                     const std::vector<PoseLink>& links);
 
 // Pairs of each frame with the `pairs_per_frame` frames of the same component whose surfaces have
-// the largest overlap (share >= `min_overlap`), in ascending order, smaller index first. Frames
-// more than 2.5 m or 100 degrees apart are not considered. The result does not depend on the number
-// of threads.
+// the largest overlap (share >= `min_overlap`), in ascending order, smaller index first. Only the
+// 24 nearest candidates of a frame are compared, by distance (up to 2.5 m) and angle (up to 100
+// degrees). The result does not depend on the number of threads.
 std::vector<FramePair> overlapping_pairs(const std::vector<FrameFeatures>& frames,
                                          const std::map<int, Pose>& map_from_base,
                                          const std::vector<GraphComponent>& components,

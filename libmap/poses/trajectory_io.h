@@ -31,14 +31,14 @@ enum class TrajectoryFormat {
 const std::vector<std::pair<std::string, TrajectoryFormat>>& trajectory_format_names();
 
 struct TrajectoryFile {
-  Trajectory poses;                 // node 0 and stamp 0 if the format has none
+  Trajectory poses;                 // world_from_base; node and stamp are 0 if the format has none
   std::vector<PoseLink> links;      // g2o and TORO only
   std::vector<ImagePose> images{};  // COLMAP and nerfstudio, instead of poses
   bool of_cameras = false;          // true if the poses are of the first camera (Open3D)
 };
 
-// True if write_trajectory supports the extension: .tum, .kitti, .g2o, .toro. The second function
-// throws Error with these extensions otherwise.
+// True if write_trajectory supports the extension: .tum, .kitti, .g2o, .toro. Otherwise
+// require_trajectory_format throws Error, which lists these extensions.
 bool is_trajectory_path(const std::filesystem::path& path);
 void require_trajectory_format(const std::filesystem::path& path);
 
@@ -49,9 +49,10 @@ TrajectoryFile read_trajectory(const std::filesystem::path& path,
 // Returns the file that read_trajectory reads: `path` itself, or the images.txt of a COLMAP model.
 std::filesystem::path file_of_trajectory(const std::filesystem::path& path);
 
-// Writes in the format of the extension, directly to `path` (the temporary of an OutputFile). Links
-// and nodes are written to .g2o and .toro, with nodes 1, 2, ... if unknown. With `nodes`, .tum has
-// the node as a ninth column, which not all readers support.
+// Writes in the format of the extension, directly to `path` (the temporary of an OutputFile).
+// Throws Error for any other extension. .g2o and .toro also contain links, and node ids (1, 2, ...
+// if unknown). .tum has the node id as a ninth column if `nodes` is true or stamps repeat; not all
+// readers support this.
 void write_trajectory(const std::filesystem::path& path, const TrajectoryFile& trajectory,
                       bool nodes = false);
 // Writes in a given format. Throws Error for automatic, colmap and read-only formats.
@@ -64,9 +65,10 @@ struct NodeTrajectory {
   std::size_t unmatched = 0;  // number of dropped poses without a node
 };
 
-// Assigns poses to nodes: by node if all poses have one, else by stamp within 20 ms, else by order.
-// By order, the number of poses must equal the number of valid nodes or of nodes with a stored
-// pose. Throws Error (without the file's name) if no pose matches or a node has two poses.
+// Assigns poses to nodes: by node id if all poses have one, else by stamp within 20 ms if any pose
+// has a stamp, else by order. The assignment by order requires as many poses as the scan has valid
+// nodes, or valid nodes with an optimized pose. Throws Error (without the file's name) if no pose
+// matches or a node has two poses.
 NodeTrajectory assign_nodes(const Trajectory& trajectory, const PoseGraph& graph);
 
 }  // namespace libmap

@@ -68,7 +68,8 @@ class Rasterizer {
         raster_.rows > 0x7fffffff)
       throw Error("the raster of " + std::to_string(raster_.columns) + " x " +
                       std::to_string(raster_.rows) +
-                      " pixels needs more than half of the machine's memory",
+                      " pixels is too large for the machine's memory or for GeoTIFF; use a larger "
+                      "pixel size",
                   {.field = "pixel_size_m", .value = to_text(grid_.pixel_size_m)});
     raster_.heights_m.assign(static_cast<std::size_t>(pixels), no_height);
     for (RasterBand& band : raster_.bands)

@@ -44,7 +44,8 @@ using CloudParts = std::function<void(const std::function<void(const PointCloud&
 
 // Returns a raster in which each pixel has the height and fields of the topmost point, the first
 // one for equal heights. Bands are the scalar fields of the first part except i, j and k. Throws
-// Error if there are no points or the raster needs more than half of the machine's memory.
+// Error if there are no points or the raster needs more than half of the machine's memory or has
+// 2^31 columns or rows.
 MapRaster make_map_raster(const CloudParts& parts, const RasterGrid& grid);
 
 // Writes a tiled GeoTIFF (256 x 256 pixels, deflate) with overviews above 512 pixels: band 1

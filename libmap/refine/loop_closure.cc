@@ -89,8 +89,9 @@ void bind(ParameterTable& table, LoopClosureDetectionOptions& options) {
   table.add(
       "angle_deg", options.angle_deg, {0.0, 180.0},
       "maximum angle between the viewing directions of candidates for a loop closure, degrees");
-  table.add("near_candidates", options.near_candidates, not_negative,
-            "maximum number of loop closure candidates per frame by distance");
+  table.add(
+      "near_candidates", options.near_candidates, not_negative,
+      "maximum number of loop closure candidates per frame by distance and viewing direction");
   table.add("similar_candidates", options.similar_candidates, not_negative,
             "number of loop closure candidates per frame by appearance, from the whole scan");
   table.add("neighbors", options.neighbors, not_negative,

@@ -1,4 +1,5 @@
-// Finds candidates for loop closures, and rejects closures that contradict the pose graph.
+// Finds candidates for loop closures (links between frames that see the same ground at different
+// times), and rejects closures that contradict the pose graph.
 #pragma once
 
 #include <cstddef>
@@ -17,7 +18,7 @@ namespace libmap {
 struct LoopClosureDetectionOptions : MatchingOptions {
   double radius_m = 1.0;       // >= 0: maximum distance of near candidates
   double angle_deg = 60.0;     // >= 0: maximum angle between viewing directions
-  int near_candidates = 10;    // >= 0: maximum number of near candidates per frame
+  int near_candidates = 10;    // >= 0: maximum number per frame, by distance and angle
   int similar_candidates = 4;  // >= 0: maximum number of candidates by appearance per frame
   int neighbors = 2;           // >= 0: number of following frames with which a frame is matched
   double max_graph_chi_square = 22.5;  // > 0: maximum of a closure against the graph; 99.9 %

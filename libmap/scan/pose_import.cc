@@ -190,7 +190,9 @@ double fitting_scale(const std::vector<CameraPose>& poses, const std::map<int, P
                  .value = std::to_string(given.size()),
                  .bound = ">= 3"});
   if (!(scale > 0.0) || !std::isfinite(scale))
-    throw Error("common positions do not determine the scale, e.g. all coincide; set poses_scale");
+    throw Error(
+        "the positions of the given poses and of the scan's poses do not determine the scale, for "
+        "example because they coincide; set poses_scale");
   return scale;
 }
 

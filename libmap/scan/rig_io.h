@@ -12,8 +12,8 @@
 //       robot_from_camera: [0, 0, 1, 0.2, -1, 0, 0, 0, 0, -1, 0, 0.1]   # 3 x 4, row by row
 //     - name: left
 //       calibration: left.yaml            # ... or a file, relative to this one
-//       position_m: [0.1, 0.17, 0.1]      # robot_from_camera by the camera's housing: x forward,
-//       roll_pitch_yaw_deg: [0, 0, 60]    # z up (REP-103), not by the optical frame
+//       position_m: [0.1, 0.17, 0.1]      # instead of robot_from_camera: pose of the camera's body
+//       roll_pitch_yaw_deg: [0, 0, 60]    # frame (x forward, z up, REP-103; about fixed axes)
 //       far_m: 2.0                        # overrides the rig's; so do depth_scale_m and near_m
 //
 // robot_from_camera refers to the optical frame (z forward). A camera without any of these poses
@@ -50,7 +50,7 @@ struct RigCamera {
 struct CameraRig {
   std::vector<RigCamera> cameras{};
 
-  // Throws Error naming camera, field, value and bound.
+  // Throws Error naming camera, field, value and bound if a value is invalid.
   void check() const;
 };
 
@@ -93,10 +93,11 @@ struct SynchronizedSet {
   double stamp_s = 0.0;
   struct Camera {
     enum class State { seen, late, missing };  // state of the camera's image in the set
-    State state = State::missing;  // late: the nearest image is outside the tolerance; missing: the
-                                   // camera has no image at all
-    std::size_t image = 0;         // index of the image nearest to stamp_s, unless missing
-    double offset_s = 0.0;         // stamp of the image minus stamp_s
+    // late: the nearest image, earlier or later, is outside the tolerance (not in the sets of
+    // synchronized_sets). missing: no image of the camera is available for the set.
+    State state = State::missing;
+    std::size_t image = 0;  // index of the image nearest to stamp_s, unless missing
+    double offset_s = 0.0;  // stamp of the image minus stamp_s
   };
   std::vector<Camera> cameras{};  // one per camera of the rig
 
@@ -109,14 +110,14 @@ SynchronizedSet synchronized_set_at(const std::vector<RigImage>& images, std::si
                                     double stamp_s, double tolerance_s);
 
 // Returns the set with the most cameras among the sets at all images' stamps; ties are resolved by
-// the smallest sum of offsets, then the earliest stamp. Throws Error if `images` is empty.
+// the smallest sum of absolute offsets, then the earliest stamp. Throws Error if `images` is empty.
 SynchronizedSet fullest_synchronized_set(const std::vector<RigImage>& images,
                                          std::size_t camera_count, double tolerance_s);
 
 // Splits a recording into sets in ascending order; each image is in exactly one. The earliest
-// unassigned image begins a set. The stamp of the set is the stamp of an image at most
-// `tolerance_s` later, with the most cameras among unassigned images; ties are resolved as above. A
-// camera without an image in a set is `missing`.
+// unassigned image begins a set and is part of it. Of the stamps of the unassigned images at most
+// `tolerance_s` later, the set has the stamp at which it contains the most cameras; ties are
+// resolved as in fullest_synchronized_set.
 std::vector<SynchronizedSet> synchronized_sets(const std::vector<RigImage>& images,
                                                std::size_t camera_count, double tolerance_s);
 

@@ -140,7 +140,7 @@ std::optional<GpsFix> decode_gps(std::string_view bytes) {
   if (std::all_of(numbers.begin(), numbers.end(), [](double number) { return number == 0; }))
     return std::nullopt;
   if (!std::all_of(numbers.begin(), numbers.end(), [](double n) { return std::isfinite(n); }))
-    throw Error("gps is not finite");
+    throw Error("a number is not finite");
   return GpsFix{numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], numbers[5]};
 }
 

@@ -36,7 +36,7 @@ class RtabmapWriter {
   RtabmapWriter(const RtabmapWriter&) = delete;
   RtabmapWriter& operator=(const RtabmapWriter&) = delete;
 
-  // Adds a node with images, in any order of ids; poses are stored as float32.
+  // Adds a node with images. Nodes can be added in any order of ids. Poses are stored as float32.
   void add_node(const GraphNode& node, const RgbdFrame& frame);
   // Adds a link in both directions with the same information matrix, as RTAB-Map does; priors,
   // gravity and landmarks in one direction. The nodes can be added later.
@@ -50,13 +50,16 @@ class RtabmapWriter {
   std::unique_ptr<Parts> parts_;
 };
 
-// Copies `source` to `target`, replacing it, with new optimized poses (Admin.opt_ids, opt_poses).
-// All other rows are unchanged, except:
-//   - A last localization at an optimized pose moves with the node; otherwise, it is dropped.
-//     Optimized landmarks move with the first node that sees them.
-//   - A grid, cloud or mesh of the earlier poses is removed; RTAB-Map computes it again.
+// Copies `source` to `target`, replacing it, with the optimized poses `map_from_base` of nodes
+// (Admin.opt_ids, opt_poses); other nodes have none. All other rows are unchanged, except:
+//   - The last localization (Admin.opt_last_localization) moves with the node whose optimized pose
+//     it equals; otherwise, it is removed. Optimized landmarks move with the first node that sees
+//     them.
+//   - The stored grid, cloud and mesh, which belong to the earlier poses, are removed; RTAB-Map
+//     computes them again.
 //   - `links` are added in both directions between nodes that have no link yet.
-//   - With a calibration, apply_calibration changes cameras and depth images; formats are kept.
+//   - With a calibration, cameras and depth images are changed as by apply_calibration
+//     (scan_source.h); depth formats are kept.
 // `source` can be open in other programs. Throws Error if it is not a database of RTAB-Map 0.13 or
 // later, or the calibration does not fit a node.
 void copy_with_optimized_poses(const std::filesystem::path& source,

@@ -124,7 +124,8 @@ Solid convex_solid(const std::vector<HalfSpace>& half_spaces, double bound_m) {
   Solid solid = body.solid();
   if (solid.triangles.empty()) throw Error("the intersection of the half-spaces is empty");
   if (std::find(solid.labels.begin(), solid.labels.end(), -1) != solid.labels.end())
-    throw Error("the intersection of the half-spaces exceeds " + to_text(bound_m) + " m");
+    throw Error("the intersection of the half-spaces extends more than " + to_text(bound_m) +
+                " m from the origin along an axis");
   return solid;
 }
 

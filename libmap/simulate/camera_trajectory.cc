@@ -265,8 +265,8 @@ void bind(ParameterTable& table, CameraTrajectoryOptions& options) {
   table.add("last_radius_m", options.last_radius_m, not_negative,
             "radius of the last loop, m; 0: 0.7 times the first radius");
   table.add("height_m", options.height_m, not_negative,
-            "camera height above the ground on the first loop, m; 0: 0.6 times the radius of the "
-            "loop");
+            "camera height above the ground on the first loop or the serpentine path, m; 0: 0.6 "
+            "times the radius of the loop, or 1.4 m");
   table.add("last_height_m", options.last_height_m, not_negative,
             "camera height on the last loop, m; 0: 0.8 times the first radius");
   table.add("start_deg", options.start_deg, any_number,

@@ -1,4 +1,4 @@
-// Chooses locations for a field test on the rocks of a site, by shape alone.
+// Chooses locations for a field test (field points) on the rocks of a site, by shape alone.
 #pragma once
 
 #include <Eigen/Core>

@@ -65,7 +65,7 @@ void bind(ParameterTable& table, RobotCamerasOptions& options) {
             "its noise if no other option sets it; auto: no noise, and the range of the rig");
   bind_noise(table, options.depth);
   bind(table, options.faults);
-  table.add("stamp_s", options.stamp_s, not_negative, "time of the images, s");
+  table.add("stamp_s", options.stamp_s, not_negative, "earliest possible stamp of the images, s");
   table.add("stamp_spread_s", options.stamp_spread_s, not_negative,
             "maximum difference between the stamps of the cameras, s");
   table.add("seed", options.seed, not_negative, "random seed of noise and stamps");

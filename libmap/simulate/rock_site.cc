@@ -129,7 +129,7 @@ ParameterTable layout_parameters(SiteLayout& layout) {
 
 ParameterTable field_point_parameters(FieldPointOptions& options) {
   ParameterTable table;
-  table.add("count", options.count, Range{1.0, 10'000.0}, "number of field points");
+  table.add("count", options.count, Range{1.0, 10'000.0}, "number of locations for the field test");
   table.add("min_height_m", options.min_height_m, not_negative,
             "minimum height of field points above the ground, m");
   table.add("radius_m", options.radius_m, Range{0.005, 1.0},

@@ -243,17 +243,17 @@ void bind(ParameterTable& table, OdometryOptions& options) {
 void bind(ParameterTable& table, LoopClosureOptions& options) {
   table.add("closures", options.closures, "add loop closures between poses that are close");
   table.add("closure_distance_m", options.distance_m, not_negative,
-            "maximum distance between the poses of a closure, m");
+            "maximum distance between the two poses of a loop closure, m");
   table.add("closure_angle_deg", options.angle_deg, {0.0, 180.0},
-            "maximum angle between the poses of a closure, degrees");
+            "maximum angle between the two poses of a loop closure, degrees");
   table.add("closure_node_gap", options.node_gap, {2.0, 1e6},
-            "minimum difference between the indices of the two nodes of a closure");
+            "minimum difference between the indices of the two nodes of a loop closure");
   table.add("closures_per_node", options.closures_per_node, {1.0, 1e6},
             "maximum number of loop closures from each node to the nearest earlier nodes");
   table.add("closure_shift_error_m", options.shift_error_m, positive,
-            "standard deviation of a closure along each axis, m");
+            "standard deviation of a loop closure along each axis, m");
   table.add("closure_turn_error_deg", options.turn_error_deg, positive,
-            "standard deviation of a closure about each axis, degrees");
+            "standard deviation of a loop closure about each axis, degrees");
 }
 
 PoseGraph simulate_odometry(const Trajectory& truth, const OdometryOptions& odometry,

@@ -184,7 +184,7 @@ void bind(ParameterTable& table, DepthFaults& faults) {
       "fault: amplitude of a periodic depth error (time of flight: Lindner and Kolb 2006), m");
   table.add_former_key("depth_wiggle_period_m", "depth_error_period_m");
   table.add("depth_error_period_m", faults.error_period_m, positive,
-            "period, in depth, of the periodic depth error, m");
+            "depth difference over which the periodic depth error repeats, m");
   table.add("depth_corner_m", faults.corner_m, any_number,
             "fault: depth error in the image corners, proportional to the squared radius "
             "(Teichman et al. 2013), m");

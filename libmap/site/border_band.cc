@@ -363,7 +363,7 @@ void bind(ParameterTable& table, BorderBandOptions& options) {
   table.add("min_band_seen", options.min_seen, {0.0, 1.0, true, false},
             "border: minimum share of each side's length along which the band is visible");
   table.add("band_cell_m", options.cell_m, positive,
-            "border: cell size of the image from above, m");
+            "border: cell size of the top view in which the band is detected, m");
   table.add("min_band_z_m", options.min_z_m, any_number, "border: minimum height of the band, m");
   table.add("max_band_z_m", options.max_z_m, any_number, "border: maximum height of the band, m");
 }

@@ -236,7 +236,7 @@ void require_ranges(const Vector2d& size_m, const SiteRectangleOptions& options)
   check_parameters(options);
   if (!size_m.allFinite() || (size_m.array() <= 0.0).any())
     throw Error("not a size", {.field = "size",
-                               .value = to_text(size_m.x()) + " x " + to_text(size_m.y()),
+                               .value = to_text(size_m.x()) + " x " + to_text(size_m.y()) + " m",
                                .bound = "> 0 and finite"});
 }
 

@@ -13,7 +13,7 @@ struct MeshReportOptions {
   bool self_intersections = true;  // true: counts them, which takes most of the time
 };
 
-// Closed chain of edges with one triangle.
+// Closed chain of edges that belong to one triangle only.
 struct MeshBoundary {
   std::size_t edges = 0;
   double length_m = 0.0;
@@ -40,9 +40,10 @@ struct MeshReport {
   EdgeLengths edge_lengths;
 
   std::size_t edges = 0;
-  std::size_t non_manifold_edges = 0;     // with more than two triangles
-  std::size_t non_manifold_vertices = 0;  // with more than one fan, not counting such edges
-  std::size_t misoriented_edges = 0;      // with two triangles of the same direction
+  std::size_t non_manifold_edges = 0;  // with more than two triangles
+  // More than one fan of triangles; not at non-manifold edges.
+  std::size_t non_manifold_vertices = 0;
+  std::size_t misoriented_edges = 0;  // two triangles run along the edge in the same direction
   std::size_t boundary_edges = 0;
   std::vector<MeshBoundary> boundaries;  // longest first
   // Pairs of triangles that intersect in more than common corners or edges; 0 if not counted.

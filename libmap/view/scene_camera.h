@@ -11,7 +11,7 @@ namespace libmap {
 // top:     orthographic along -z; x to the right, y up.
 // front:   orthographic along +y; x to the right, z up.
 // side:    orthographic along -x; y to the right, z up.
-// oblique: perspective from the front left above.
+// oblique: perspective from the front, left and above.
 // camera:  perspective from a given position.
 enum class Viewpoint { top, oblique, front, side, camera };
 std::vector<std::pair<std::string, Viewpoint>> viewpoint_names();
@@ -36,7 +36,7 @@ struct PixelRect {
 
 // Pose of Viewpoint::camera in the frame of the points. `up` need not be orthogonal to the view.
 struct CameraPlacement {
-  Eigen::Vector3d position{-2.0, -4.0, 3.0};
+  Eigen::Vector3d position{-2.0, -4.0, 3.0};  // m
   Eigen::Vector3d focal_point = Eigen::Vector3d::Zero();
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
   double field_of_view_deg = 30.0;  // vertical, > 0 and < 180
@@ -49,7 +49,7 @@ struct SceneCamera {
   Eigen::Vector3d forward = -Eigen::Vector3d::UnitZ();
   bool perspective = false;
   double scale_px = 1.0;  // orthographic: pixels per meter; perspective: focal length in pixels
-  PixelRect plot;         // centered on the optical axis
+  PixelRect plot;         // part of the image that shows the scene, centered on the optical axis
 
   // Depth in meters; negative behind the camera.
   double depth_of(const Eigen::Vector3d& point) const { return (point - position).dot(forward); }

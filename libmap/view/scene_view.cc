@@ -43,7 +43,7 @@ void check(const SceneViewOptions& options) {
   check_side("height", options.height);
   parse_color(options.background, "background");
   if (options.extent && !((options.extent->max - options.extent->min).minCoeff() >= 0.0))
-    throw Error("the box contains no point", {.field = "extent"});
+    throw Error("not a box", {.field = "extent", .bound = "minimum <= maximum on each axis"});
 }
 
 // A scene ready to be drawn, in the terrain frame.

@@ -1,4 +1,4 @@
-// Balls behind a surface, for simulators that collide meshes only by their convex hulls.
+// Covers a surface from behind with spheres (balls), for simulators that collide only convex hulls.
 #pragma once
 
 #include <Eigen/Core>
@@ -20,7 +20,7 @@ struct CollisionBallOptions {
 
 // Covers the marked triangles with balls inside of `body`, in the order of the triangles. No point
 // of a marked triangle is farther than `max_deviation_m` from a ball, and no point of a ball is
-// farther than that outside of the body. Triangles without area have no balls of their own.
+// more than `max_deviation_m` outside the body. Triangles without area get no balls of their own.
 // Coordinates and radii are whole multiples of 10 micrometers.
 std::vector<CollisionBall> cover_with_balls(const TriangleMesh& mesh,
                                             const std::vector<bool>& marks,

@@ -1,4 +1,4 @@
-// A site as a world for simulators: a folder that they load as it is.
+// Writes a site as a world for robot simulators: a folder that each simulator loads unchanged.
 //
 //   world.sdf                 Gazebo, CoppeliaSim
 //   world.xml                 MuJoCo
@@ -29,9 +29,9 @@
 namespace libmap {
 
 struct WorldOptions {
-  double collision_error_m = 0.0014;  // > 0: between the collision mesh and the visual one
+  double collision_error_m = 0.0014;  // > 0: maximum distance between collision and visual mesh
   HeightFieldOptions field{};
-  double ball_radius_m = 0.05;    // > 0: maximum radius of the balls where the field is left out
+  double ball_radius_m = 0.05;    // > 0: maximum radius of balls (collision_balls.h)
   std::string gravity = "earth";  // m/s2 downwards, or earth, moon, mars
   double friction = 0.8;          // >= 0: Coulomb's coefficient
   double restitution = 0.0;       // 0 to 1
@@ -39,7 +39,7 @@ struct WorldOptions {
 };
 void bind(ParameterTable& table, WorldOptions& options);
 
-// Throws Error for a text that is neither a number >= 0 nor a known body.
+// Returns m/s2 (downwards) for a number >= 0, earth, moon or mars. Throws Error for other texts.
 double gravity_of(const std::string& text);
 
 // Throws Error naming `field` for a name that SDF, MJCF or URDF forbids: empty, "world", with
@@ -49,32 +49,33 @@ void require_world_name(const std::string& name, const std::string& field);
 struct WorldReport {
   std::size_t visual_triangles = 0;
   std::size_t collision_triangles = 0;
-  // No point of either mesh is farther than this from the other.
+  // Maximum distance between collision mesh and visual mesh, in both directions.
   double collision_deviation_m = 0.0;
   std::size_t field_nodes = 0;
-  double field_deviation_m = 0.0;  // of HeightField
-  std::size_t missing_cells = 0;
+  double field_deviation_m = 0.0;  // maximum of HeightField::deviation_m
+  std::size_t missing_cells = 0;   // cells of the height fields that balls replace
   std::size_t balls = 0;
-  std::size_t collision_bytes = 0;  // of collision meshes and height fields
-  std::size_t score_points = 0;     // of the map, on the surface
+  std::size_t collision_bytes = 0;  // size of collision meshes and height fields
+  std::size_t score_points = 0;     // number of map points on the surface
 };
 void describe(ResultTable& table, const WorldReport& report);
 
-// A mesh to look at.
+// A mesh that is displayed but does not collide.
 struct WorldVisual {
   std::string file;     // .obj in the folder of meshes
-  std::string texture;  // image beside it; empty: none
+  std::string texture;  // image in the same folder; empty: none
   Color color{160, 160, 160};
 };
 
 // A site, or one tile of it.
 struct WorldModel {
   std::string name;
-  std::vector<WorldVisual> visuals;  // first the surface, then the scores of a map
-  HeightField field;                 // without the cells
+  std::vector<WorldVisual> visuals;  // first the surface, then the squares of a map's scores
+  HeightField field;                 // is_missing is empty
   std::vector<CollisionBall> balls;
 };
 
+// Position (m) and direction are in the frame of the world.
 struct WorldFoothold {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   Eigen::Vector3d approach = Eigen::Vector3d::UnitZ();  // unit length, away from the surface
@@ -95,34 +96,35 @@ struct WorldScene {
   std::vector<WorldFoothold> footholds;
 };
 
-// Texts of the descriptions by their file names.
+// Returns the contents of world.sdf, world.xml and world.urdf by file name.
 std::map<std::string, std::string> world_texts(const WorldScene& scene);
 
-// The contents of the folder.
+// Returns the names of the files and the folder that a world contains.
 std::vector<std::string> world_file_names();
 
-// The points of a map and their colors.
+// Points of a map with one color each, which are shown as squares on the surface.
 struct WorldScores {
   std::vector<Eigen::Vector3d> points;
   std::vector<Color> colors;
-  double size_m = 0.0;  // of a square
+  double size_m = 0.0;  // side length of a square
 };
 
 struct WorldModelInput {
   std::string name;
   TexturedMesh visual;
-  // That of `visual` and around it, up to twice the radius of the balls.
+  // The surface of `visual` and of the surroundings within twice ball_radius_m.
   TriangleMesh surface;
 };
 
-// Makes the collision shapes of a model, and writes its meshes to `folder`, unless that is empty.
-// Output bytes do not depend on the number of threads. Throws Error: no triangle, or none that
-// faces up.
+// Makes the collision shapes of a model, and writes its meshes to `folder`, unless `folder` is
+// empty. Output bytes do not depend on the number of threads. Throws Error if an option is out of
+// range, no triangle faces up, or the height field has more than 2^26 nodes.
 WorldModel write_world_model(const std::filesystem::path& folder, const WorldModelInput& input,
                              const WorldScores& scores, const WorldOptions& options,
                              WorldReport& report);
 
-// Writes the descriptions. Throws Error for a name that simulators forbid.
+// Writes the files of world_texts to `folder`; only checks names if `folder` is empty. Throws Error
+// for a name that simulators forbid or that two models have ("rig" and "footholds" are reserved).
 void write_world(const std::filesystem::path& folder, const WorldScene& scene);
 
 }  // namespace libmap

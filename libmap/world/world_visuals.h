@@ -1,4 +1,5 @@
-// Meshes that a world shows: a surface by the pages of its texture, and the scores of a map on it.
+// Makes the visual meshes of a world: one mesh per texture page of the surface, and one mesh per
+// color of a map's scores.
 #pragma once
 
 #include <cstddef>
@@ -9,17 +10,19 @@
 
 namespace libmap {
 
-// Unit of the coordinates in OBJ files, far below float32's resolution at 16 m.
+// Unit to which coordinates in OBJ files are rounded; float32 resolves 2e-6 m at 16 m.
 constexpr double mesh_unit_m = 1e-6;
 // Rounds vertices to this unit, and normals to three decimals, for short files.
 void round_vertices(TriangleMesh& mesh);
 
-// The mesh with its vertex colors as a texture: each triangle has 2 x 2 texels, between whose
-// centers bilinear interpolation is that of the colors. Without colors there is no page.
+// Returns the mesh with the vertex colors as a texture, in which each triangle has 2 x 2 texels;
+// bilinear interpolation between the texels gives the linear interpolation of the vertex colors.
+// Without vertex colors, the result has no page.
 TexturedMesh bake_vertex_colors(TriangleMesh mesh);
 
-// The triangles of one page (no_page: without texture), with this page alone, rounded. No two of
-// them run along an edge in the same sense.
+// Returns the triangles of one page (no_page: the triangles without texture), with this page alone
+// and rounded vertices. Vertices are duplicated so that no two triangles run along an edge in the
+// same direction, which MuJoCo requires.
 TexturedMesh page_of(const TexturedMesh& model, std::int32_t page);
 
 struct ColoredMesh {
@@ -27,11 +30,11 @@ struct ColoredMesh {
   TriangleMesh mesh;
 };
 
-// A square on the surface for each point of a map, one mesh per color. Points farther from the
-// surface than the size of a square have none.
+// A square on the surface for each point of a map, one mesh per color. Points farther than size_m
+// from the surface are omitted.
 struct ScoreSquares {
   std::vector<ColoredMesh> meshes;
-  std::size_t on_surface = 0;
+  std::size_t on_surface = 0;  // number of points within size_m of the surface
 };
 ScoreSquares score_squares(const std::vector<Eigen::Vector3d>& points,
                            const std::vector<Color>& colors, double size_m,

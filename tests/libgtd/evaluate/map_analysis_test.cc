@@ -86,11 +86,11 @@ TEST(VoxelMap, HostileMapsAreSaid) {
   EXPECT_EQ(field_of(cloud), "j");
   cloud = graded_floor();
   cloud.positions[17].x() += 0.004;
-  EXPECT_EQ(field_of(cloud, {.lattice = lattice}), "distance of point 18 from a voxel center");
+  EXPECT_EQ(field_of(cloud, {.lattice = lattice}), "distance of point 17 from a voxel center");
   cloud = graded_floor();
   EXPECT_EQ(field_of(libmap::transform_cloud(
                 cloud, libmap::Pose(Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitZ())))),
-            "distance of point 1 from a voxel center");
+            "distance of point 0 from a voxel center");
   for (const char* name : {"i", "j", "k"})
     cloud.find_field(name)->values[1] = cloud.find_field(name)->values[0];
   cloud.positions[1] = cloud.positions[0];
@@ -99,8 +99,8 @@ TEST(VoxelMap, HostileMapsAreSaid) {
   std::erase_if(cloud.fields, [](const auto& field) { return field.name == "i"; });
   cloud.positions[17].x() = 1e9;
   const libmap::Error far = error_of([&] { libgtd::voxel_map_of(cloud, {.lattice = lattice}); });
-  EXPECT_TRUE(is_error(far, {.field = "point 18"}));
-  EXPECT_EQ(far.context().field, "point 18");
+  EXPECT_TRUE(is_error(far, {.field = "point 17"}));
+  EXPECT_EQ(far.context().field, "point 17");
   const PointCloud one = map_cloud({{3, 4, 5}}, [](const Voxel&) { return 1.0; });
   EXPECT_EQ(field_of(one), "voxel_size_m");
   EXPECT_EQ(libgtd::voxel_map_of(one, {.lattice = lattice}).size(), 1U);
@@ -131,7 +131,7 @@ TEST(VoxelMap, LatticesThatAreNotFinite) {
                          {.field = "lattice_origin_m or voxel_size_m"}));
     MapInfo info;
     info.lattice = libgtd::VoxelLattice{{origin[0], origin[1], origin[2]}, 0.01};
-    EXPECT_TRUE(is_error(error_of([&] { libgtd::voxel_map_of(map, info); }), {.field = "point 1"}));
+    EXPECT_TRUE(is_error(error_of([&] { libgtd::voxel_map_of(map, info); }), {.field = "point 0"}));
   }
 }
 

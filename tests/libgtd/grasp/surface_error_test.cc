@@ -193,7 +193,7 @@ TEST(SurfaceError, UnsureGroundIsUnseen) {
   mesh.face_fields.clear();
   of_vertex[7] = -1e-9;
   EXPECT_EQ(error_of([&] { libgtd::errors_of(mesh, {}); }).context().field,
-            "expected_error of vertex 8");
+            "expected_error of vertex 7");
   EXPECT_TRUE(is_error(error_of([&] {
                          Ground(mesh, {{0.1}, {}});
                        }),

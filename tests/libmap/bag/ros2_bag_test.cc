@@ -371,14 +371,14 @@ TEST(Ros2Bag, ForeignDatabases) {
     SQLite::Database(path.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE).exec(statements);
     return error_of([&] { libmap::list_bag(path); });
   };
-  EXPECT_EQ(said("CREATE TABLE other(id)").context().value, "topics");
-  EXPECT_EQ(said("CREATE TABLE topics(id, name, type); CREATE TABLE messages(id)").context().value,
-            "serialization_format");
+  EXPECT_EQ(said("CREATE TABLE other(id)").context().field, "table topics");
+  EXPECT_EQ(said("CREATE TABLE topics(id, name, type); CREATE TABLE messages(id)").context().field,
+            "column serialization_format of table topics");
   EXPECT_EQ(said("CREATE TABLE topics(id, name, type, serialization_format);"
                  "CREATE VIEW messages AS SELECT 1 AS topic_id, 2 AS timestamp, 3 AS data")
                 .context()
-                .value,
-            "messages");
+                .field,
+            "table messages");
   EXPECT_EQ(said("CREATE TABLE topics(id, name, type, serialization_format);"
                  "CREATE TABLE messages(topic_id, timestamp, data);"
                  "INSERT INTO messages VALUES (7, 0, x'00')")

@@ -128,7 +128,7 @@ TEST(SceneTexture, WhatHasNone) {
   layer.shape = model;
   EXPECT_TRUE(graspmap_test::is_error(
       error_of([&] { prepare_layers(layer, Pose::Identity()); }),
-      {.field = "texture page of triangle 0", .value = "5", .bound = "< 2"}));
+      {.field = "texture page of triangle 0", .value = "5", .bound = ">= -1 and < 2"}));
 }
 
 }  // namespace scene_texture_test
