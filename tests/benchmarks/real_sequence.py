@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """`graspmap refine` on a real sequence with measured truth, whole and in parts.
 
-usage: real_sequence.py BUILD_FOLDER --folder FOLDER [--parts whole,third 1,...] [--threads N] [--page README.md]
+usage: real_sequence.py BUILD_FOLDER --folder FOLDER [--threads N] [--page README.md]
 
 Reads $GRASPMAP_DATA/sequences/tum_fr1_rpy. What a run gave is kept in FOLDER as one file .json; such
 runs are not repeated. Prints a Markdown table; with --page, puts it between the marks of that page.
