@@ -44,7 +44,7 @@ constexpr double quick_fraction = 0.7;
 constexpr double min_displacement_rad = 0.5 * std::numbers::pi / 180.0;
 constexpr double smallest_displacement_px = 3.0;
 constexpr double min_significance = 3.0;
-constexpr double min_uncertainties = 2.5;
+constexpr double min_uncertainties = 4.0;
 constexpr double max_focal_error = 0.03;
 
 // A pixel of the nearer surface at an edge.
