@@ -3,17 +3,16 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
-#include <cstdint>
 #include <limits>
 #include <map>
 #include <numbers>
-#include <numeric>
 #include <optional>
 #include <utility>
 
 #include "libgtd/gripper/target_clones.h"
+#include "libgtd/score/column_heights.h"
+#include "libgtd/score/force_distribution.h"
 #include "libgtd/score/scanned_area.h"
 #include "libmap/core/angle.h"
 #include "libmap/core/parallel.h"
@@ -23,42 +22,16 @@ namespace libgtd {
 namespace {
 
 constexpr int azimuths = 16;
-constexpr int gap_columns = 3;
 constexpr int closing_block_columns = 64;
 // The open finger rests on the ground. Only ground that is higher by more than rounding is in its
 // way.
 constexpr double palm_clearance_m = 1e-5;
-constexpr double unknown = -std::numeric_limits<double>::infinity();
 // Standard deviation of the resting position, in finger lengths, of a normal distribution truncated
 // at twice this value. It covers pose and tilt of the palm, azimuths of the fingers and width of a
 // column. With this value the verdicts of the virtual field test on the fitted sites are nearly as
 // likely as with any larger one.
 constexpr double spread = 0.25;
 constexpr double max_deviations = 2.0;
-
-// Coefficients fitted to trials of the virtual field test (grasp) on simulated rocks, slopes, walls
-// and shapes with the three grippers and 16 parameter sets of each, by the likelihood that a trial
-// reaches each of nine loads. With the mean c of C, of the columns whose C is above
-// `floor_of_capacity` the mean of ln C, its spread and their fraction p, and the spread v of a
-// finger's pull on level ground (FingerPulls::spreads):
-//   P(force > 0) = logistic(1.234 + 1.623 p + 3.988 contact + 0.679 ln(c + offset) - 1.203 v),
-//   mean ln(force / closing forces) = 0.293 + 1.006 ln C - 0.446 rise + 0.663 tilt - 0.537 v,
-//   ln(spread of ln force) = -1.540 + 1.056 spread(ln C) + 0.745 v.
-// contact: fraction of the azimuths with spine contact on the weakest side; rise of the palm above
-// the voxel; tilt: imbalance of the depths of the contacts. Both in finger lengths. The weakest of
-// several random pulls decreases with their spread, hence v.
-constexpr float floor_of_capacity = 0.0005F;
-constexpr float offset_of_capacity = 0.003F;
-constexpr float largest_capacity = 0.55F;
-// Distribution of ln(force) between trials: beta(4, 2), skewed to small forces. Its standard
-// deviation, and its mean from the upper end.
-constexpr float beta_spread = 0.17817416F;
-constexpr float beta_mean = 1.0F / 3.0F;
-// Number of forces at which the distribution over all sets is computed: from 0.2 N to 1.3 kN, and
-// the load.
-constexpr std::size_t force_steps = 48;
-constexpr float first_log_force = -1.6F;
-constexpr float log_force_step = 0.19F;
 
 constexpr std::array<double, 5> dual_steps{0.0, 0.5, 1.0, 2.0, 4.0};  // u
 
@@ -144,214 +117,10 @@ Rays make_rays(const ClosingPath& path, double voxel_size_m) {
   return rays;
 }
 
-// Heights and gradients of a rectangle of columns.
-class Heights {
- public:
-  Heights(const VoxelGrid& grid, const TileBounds& bounds)
-      : bounds_(bounds), width_(bounds.j_end - bounds.j_begin) {
-    const auto size =
-        static_cast<std::size_t>(bounds.i_end - bounds.i_begin) * static_cast<std::size_t>(width_);
-    heights_.assign(size, unknown);
-    // In voxels from the origin of the lattice. Voxels ascend, so that the highest of a column is
-    // last.
-    visit_columns(grid, bounds, [&](std::size_t at) {
-      const Voxel& voxel = grid.voxels[at];
-      heights_[index(voxel.i, voxel.j)] = (voxel.k + 0.5) * grid.lattice.voxel_size_m;
-    });
-    for (int round = 0; round < gap_columns; ++round) fill_gaps();
-    find_falls(grid.lattice.voxel_size_m);
-  }
-
-  std::size_t index(int i, int j) const {
-    return static_cast<std::size_t>(i - bounds_.i_begin) * static_cast<std::size_t>(width_) +
-           static_cast<std::size_t>(j - bounds_.j_begin);
-  }
-  std::ptrdiff_t step(const RayCell& cell) const {
-    return static_cast<std::ptrdiff_t>(cell.i) * width_ + cell.j;
-  }
-  std::size_t size() const { return heights_.size(); }
-  double height(std::size_t at) const { return heights_[at]; }
-  // Fall from the first cell with ground around a column to the lowest cell.
-  double fall(std::size_t at, const std::vector<RayCell>& cells) const {
-    double first = unknown;
-    double lowest = std::numeric_limits<double>::infinity();
-    for (const RayCell& cell : cells) {
-      const double height = heights_[at + static_cast<std::size_t>(step(cell))];
-      if (height == unknown) continue;
-      if (first == unknown) first = height;
-      lowest = std::min(lowest, height);
-    }
-    return first == unknown ? 0.0 : first - lowest;
-  }
-  // dz/dx and dz/dy
-  const std::array<double, 2>& rise(std::size_t at) const { return rises_[at]; }
-
- private:
-  void fill_gaps() {
-    std::vector<double> filled = heights_;
-    const int rows = bounds_.i_end - bounds_.i_begin;
-    for (int i = 0; i < rows; ++i)
-      for (int j = 0; j < width_; ++j) {
-        const auto at = static_cast<std::size_t>(i) * static_cast<std::size_t>(width_) +
-                        static_cast<std::size_t>(j);
-        if (heights_[at] != unknown) continue;
-        double sum = 0.0;
-        int count = 0;
-        for (int di = std::max(i - 1, 0); di <= std::min(i + 1, rows - 1); ++di)
-          for (int dj = std::max(j - 1, 0); dj <= std::min(j + 1, width_ - 1); ++dj) {
-            const double height =
-                heights_[static_cast<std::size_t>(di) * static_cast<std::size_t>(width_) +
-                         static_cast<std::size_t>(dj)];
-            if (height == unknown) continue;
-            sum += height;
-            ++count;
-          }
-        if (count > 0) filled[at] = sum / count;
-      }
-    heights_ = std::move(filled);
-  }
-
-  void find_falls(double voxel_size_m) {
-    rises_.assign(heights_.size(), {0.0, 0.0});
-    const auto between = [&](std::size_t low, std::size_t high) {
-      if (heights_[low] == unknown || heights_[high] == unknown) return 0.0;
-      return (heights_[high] - heights_[low]) / (2.0 * voxel_size_m);
-    };
-    const auto width = static_cast<std::size_t>(width_);
-    for (std::size_t at = width + 1; at + width + 1 < heights_.size(); ++at)
-      rises_[at] = {between(at - width, at + width), between(at - 1, at + 1)};
-  }
-
-  TileBounds bounds_;
-  int width_ = 0;
-  std::vector<double> heights_;
-  std::vector<std::array<double, 2>> rises_;
-};
-
 // sums += weight * values
 GRASPMAP_CLONED void add_scaled(const float* __restrict values, float weight,
                                 float* __restrict sums, std::size_t count) {
   for (std::size_t n = 0; n < count; ++n) sums[n] += weight * values[n];
-}
-
-// Sums over columns per parameter set: weights, ln C and its square of columns with a capacity, and
-// C of all columns.
-struct SetSums {
-  std::vector<float> weights, logs, squares, capacities;
-
-  explicit SetSums(std::size_t sets) : weights(sets), logs(sets), squares(sets), capacities(sets) {}
-  void clear() {
-    for (auto* sums : {&weights, &logs, &squares, &capacities})
-      std::fill(sums->begin(), sums->end(), 0.0F);
-  }
-};
-
-// Adds a column. `logs` is 0 if a capacity is not above the floor.
-GRASPMAP_CLONED_CHOICE void add_column(const float* __restrict capacities,
-                                       const float* __restrict logs, float weight, SetSums& sums) {
-  float* __restrict weights = sums.weights.data();
-  float* __restrict sum = sums.logs.data();
-  float* __restrict squares = sums.squares.data();
-  float* __restrict all = sums.capacities.data();
-  const std::size_t sets = sums.weights.size();
-  for (std::size_t s = 0; s < sets; ++s) {
-    weights[s] += capacities[s] > floor_of_capacity ? weight : 0.0F;
-    sum[s] += weight * logs[s];
-    squares[s] += weight * logs[s] * logs[s];
-    all[s] += weight * capacities[s];
-  }
-}
-
-// Distribution of a force: > 0 with this probability, its logarithm then beta(4, 2).
-struct SetForces {
-  std::vector<float> probability, log_force, spread, scale;  // scale: beta_spread / spread
-};
-
-// exp and ln with error 2e-4, vectorizable.
-[[gnu::always_inline]] inline float quick_exp(float x) {
-  const float power = x * 1.44269504F + 127.0F;  // power of 2, biased
-  const auto whole = static_cast<std::int32_t>(power);
-  const float part = power - static_cast<float>(whole);
-  const float scale = std::bit_cast<float>(whole << 23);
-  return scale * (1.0F + part * (0.6957F + part * (0.2261F + part * 0.0782F)));
-}
-[[gnu::always_inline]] inline float quick_log(float x) {
-  const auto bits = std::bit_cast<std::int32_t>(x);
-  const auto power = static_cast<float>((bits >> 23) - 127);
-  const float part = std::bit_cast<float>((bits & 0x7fffff) | 0x3f800000) - 1.0F;
-  return 0.69314718F * power +
-         part * (0.99949F +
-                 part * (-0.49190F + part * (0.28947F + part * (-0.13606F + part * 0.03215F))));
-}
-
-// Applies the bound of lateral pulls to capacities and computes their logarithms, 0 up to the
-// floor.
-GRASPMAP_CLONED_CHOICE void bound_capacities(float* __restrict capacities, float* __restrict logs,
-                                             std::size_t sets) {
-  for (std::size_t s = 0; s < sets; ++s) {
-    const float ratio = capacities[s] / largest_capacity;
-    const float bounded = capacities[s] / std::sqrt(1.0F + ratio * ratio);
-    capacities[s] = bounded;
-    logs[s] = bounded > floor_of_capacity ? quick_log(bounded) : 0.0F;
-  }
-}
-
-// Computes the distribution of the force of each set by the coefficients; `mean` in finger lengths.
-struct MeanTerms {
-  float contact = 0.0F;
-  float bias = 0.0F;     // terms of rise and tilt in ln(force)
-  float weights = 0.0F;  // sum over all columns
-};
-GRASPMAP_CLONED_CHOICE void find_forces(const SetSums& sums, const MeanTerms& mean,
-                                        const float* __restrict log_scale,
-                                        const float* __restrict pull_spreads, SetForces& forces) {
-  const float* __restrict weights = sums.weights.data();
-  const float* __restrict logs = sums.logs.data();
-  const float* __restrict squares = sums.squares.data();
-  const float* __restrict capacities = sums.capacities.data();
-  float* __restrict probability = forces.probability.data();
-  float* __restrict log_force = forces.log_force.data();
-  float* __restrict level_spreads = forces.spread.data();
-  float* __restrict scale = forces.scale.data();
-  const std::size_t sets = sums.weights.size();
-  for (std::size_t s = 0; s < sets; ++s) {
-    const bool has_force = weights[s] > 0.0F;
-    const float count = has_force ? weights[s] : 1.0F;
-    const float log = logs[s] / count;
-    const float variance = squares[s] / count - log * log;
-    const float spread = std::sqrt(variance > 0.0F ? variance : 0.0F);
-    const float logit = 1.234F + 1.623F * count / mean.weights + 3.988F * mean.contact +
-                        0.679F * quick_log(capacities[s] / mean.weights + offset_of_capacity) -
-                        1.203F * pull_spreads[s];
-    probability[s] = has_force ? 1.0F / (1.0F + quick_exp(-logit)) : 0.0F;
-    log_force[s] = log_scale[s] + mean.bias + 1.006F * log - 0.537F * pull_spreads[s];
-    const float log_spread = -1.540F + 1.056F * spread + 0.745F * pull_spreads[s];
-    const float low = log_spread > -3.0F ? log_spread : -3.0F;
-    level_spreads[s] = quick_exp(low < 1.0F ? low : 1.0F);
-    scale[s] = beta_spread / level_spreads[s];
-  }
-}
-
-// P(force >= exp(log_forces[n])) over all sets, for each n.
-using ForceGrid = std::array<float, force_steps>;
-GRASPMAP_CLONED_CHOICE void find_survivals(const float* weights, const SetForces& forces,
-                                           const ForceGrid& log_forces, ForceGrid& survivals) {
-  float sums[force_steps] = {};
-  float at[force_steps];
-  std::copy(log_forces.begin(), log_forces.end(), std::begin(at));
-  const std::size_t sets = forces.probability.size();
-  for (std::size_t s = 0; s < sets; ++s) {
-    const float weight = weights[s] * forces.probability[s];
-    const float scale = forces.scale[s];
-    const float start = beta_mean + forces.log_force[s] * scale;
-    for (std::size_t n = 0; n < force_steps; ++n) {
-      const float fraction = start - at[n] * scale;
-      const float below_one = fraction < 1.0F ? fraction : 1.0F;
-      const float t = below_one > 0.0F ? below_one : 0.0F;
-      sums[n] += weight * t * t * (10.0F + t * (-20.0F + t * (15.0F - 4.0F * t)));
-    }
-  }
-  std::copy(std::begin(sums), std::end(sums), survivals.begin());
 }
 
 // sums[side] += sum over the azimuths of values * weights
@@ -365,51 +134,36 @@ void add_side_values(const std::array<SideValues, azimuths>& weights, const Side
 // Follows the fingers at the pivots of one block.
 class BlockCloser {
  public:
-  BlockCloser(const Heights& heights, const Rays& rays, const ClosingPath& path)
+  BlockCloser(const ColumnHeights& heights, const Rays& rays, const ClosingPath& path)
       : heights_(heights),
         rays_(rays),
         path_(path),
         sets_(path.pulls.sets),
         met_(heights.size()),
-        sums_(sets_) {
-    for (const RayCell& cell : rays.palm) palm_.push_back(heights.step(cell));
-    for (const RayCell& cell : rays.open) open_.push_back(heights.step(cell));
+        distribution_(path),
+        scratch_(sets_) {
+    for (const RayCell& cell : rays.palm) palm_.push_back(step(cell));
+    for (const RayCell& cell : rays.open) open_.push_back(step(cell));
     for (std::size_t a = 0; a < azimuths; ++a)
-      for (const RayCell& cell : rays.closing[a]) closing_[a].push_back(heights.step(cell));
-    for (auto* values : {&forces_.probability, &forces_.log_force, &forces_.spread, &forces_.scale})
-      values->resize(sets_);
-    scratch_.resize(sets_);
-    for (const double force : path.pulls.total_closing_forces_n)
-      log_scale_.push_back(static_cast<float>(std::log(force)));
-    for (std::size_t n = 0; n < force_steps; ++n)
-      log_forces_[n] = first_log_force + static_cast<float>(n) * log_force_step;
-    log_forces_.back() = static_cast<float>(std::log(path.load_n));
-    for (const ParameterSet& set : path.sets) weights_.push_back(static_cast<float>(set.weight));
+      for (const RayCell& cell : rays.closing[a]) closing_[a].push_back(step(cell));
   }
 
   // Requires ground in the column of the pivot.
   ForceEstimate force(std::size_t pivot, double pivot_height) {
-    Met mean;
-    double weights = 0.0;
-    sums_.clear();
+    RestSums sums;
+    distribution_.clear();
     for (const Rest& rest : rays_.rests) {
-      const std::size_t at = pivot + static_cast<std::size_t>(heights_.step(rest.cell));
-      if (heights_.height(at) == unknown) continue;
+      const std::size_t at = pivot + static_cast<std::size_t>(step(rest.cell));
+      if (heights_.height(at) == ColumnHeights::unknown) continue;
       const Met& met = met_at(at);
-      mean.contact += rest.weight * met.contact;
-      mean.palm += rest.weight * (met.palm - pivot_height);
-      mean.tilt += rest.weight * met.tilt;
-      add_column(&capacities_[met.at], &logs_[met.at], static_cast<float>(rest.weight), sums_);
-      weights += rest.weight;
+      sums.contact += rest.weight * met.contact;
+      sums.rise_m += rest.weight * (met.palm - pivot_height);
+      sums.tilt_m += rest.weight * met.tilt;
+      sums.weights += rest.weight;
+      distribution_.add_column(&capacities_[met.at], &logs_[met.at],
+                               static_cast<float>(rest.weight));
     }
-    const double lengths = weights * path_.finger_length_m;
-    find_forces(
-        sums_,
-        {.contact = static_cast<float>(mean.contact / weights),
-         .bias = static_cast<float>(0.293 + (0.663 * mean.tilt - 0.446 * mean.palm) / lengths),
-         .weights = static_cast<float>(weights)},
-        log_scale_.data(), path_.pulls.level_spreads.data(), forces_);
-    return estimate();
+    return distribution_.estimate(sums);
   }
 
  private:
@@ -425,6 +179,8 @@ class BlockCloser {
     std::array<int, azimuths> fall_deg{};
     SideValues upright{};  // cosine of the fall
   };
+
+  std::ptrdiff_t step(const RayCell& cell) const { return heights_.step(cell.i, cell.j); }
 
   const Met& met_at(std::size_t at) {
     std::optional<Met>& met = met_[at];
@@ -446,7 +202,7 @@ class BlockCloser {
       touching += 1.0;
       const Eigen::Vector2d& outward = rays_.outward[a];
       moment += cell->depth * outward;
-      const auto& [along_x, along_y] = heights_.rise(at);
+      const auto& [along_x, along_y] = heights_.gradient(at);
       const double fall = std::atan(-outward.dot(Eigen::Vector2d(along_x, along_y)));
       contacts.fall_deg[a] = static_cast<int>(std::lround(fall / libmap::radians_per_degree));
       contacts.upright[a] = static_cast<float>(std::cos(fall));
@@ -506,43 +262,8 @@ class BlockCloser {
     bound_capacities(capacities, logs, sets_);
   }
 
-  ForceEstimate estimate() {
-    ForceEstimate result;
-    ForceGrid survivals;
-    find_survivals(weights_.data(), forces_, log_forces_, survivals);
-    result.hold_probability = std::min(1.0F, survivals.back());
-    const auto quantile = [&](float above) {
-      if (survivals.front() <= above) return 0.0F;
-      std::size_t n = 1;
-      while (n + 2 < force_steps && survivals[n] > above) ++n;
-      const float fraction = std::min(
-          1.0F, (survivals[n - 1] - above) / std::max(1e-9F, survivals[n - 1] - survivals[n]));
-      return std::exp(log_forces_[n - 1] + fraction * log_force_step);
-    };
-    result.median_n = quantile(0.5F);
-    result.low_n = quantile(0.95F);
-    result.high_n = quantile(0.05F);
-    float weight = 0.0F;
-    float log = 0.0F;
-    float square = 0.0F;
-    for (std::size_t s = 0; s < sets_; ++s) {
-      const float set_weight = weights_[s] * forces_.probability[s];
-      if (set_weight <= 0.0F) continue;
-      weight += set_weight;
-      log += set_weight * forces_.log_force[s];
-      square += set_weight * forces_.log_force[s] * forces_.log_force[s];
-      result.trial_spread += set_weight * forces_.spread[s];
-    }
-    if (weight > 0.0F) {
-      result.trial_spread /= weight;
-      log /= weight;
-      result.parameter_spread = std::sqrt(std::max(0.0F, square / weight - log * log));
-    }
-    return result;
-  }
-
   double palm_height(std::size_t pivot) const {
-    double palm = unknown;
+    double palm = ColumnHeights::unknown;
     for (const std::ptrdiff_t step : palm_)
       palm = std::max(palm, heights_.height(pivot + static_cast<std::size_t>(step)));
     for (std::size_t n = 0; n < open_.size(); ++n)
@@ -563,7 +284,7 @@ class BlockCloser {
     return pivot;
   }
 
-  const Heights& heights_;
+  const ColumnHeights& heights_;
   const Rays& rays_;
   const ClosingPath& path_;
   const std::size_t sets_;
@@ -573,11 +294,7 @@ class BlockCloser {
   std::vector<std::optional<Met>> met_;  // per column, computed on demand
   std::vector<float> capacities_;        // per computed column, in closing forces of all fingers
   std::vector<float> logs_;
-  std::vector<float> weights_;    // of the parameter sets
-  ForceGrid log_forces_{};        // a grid, then the load
-  std::vector<float> log_scale_;  // ln of the closing force of all fingers, N
-  SetSums sums_;
-  SetForces forces_;
+  ForceDistribution distribution_;
   std::vector<float> scratch_;
 };
 
@@ -594,6 +311,20 @@ std::vector<RayCell> outward_cells(const GripperMask& mask, double angle) {
       cells.push_back(cell);
   }
   return cells;
+}
+
+// Returns the fall from the first cell with ground around a column to the lowest cell.
+double fall_along(const ColumnHeights& heights, std::size_t at, const std::vector<RayCell>& cells) {
+  double first = ColumnHeights::unknown;
+  double lowest = std::numeric_limits<double>::infinity();
+  for (const RayCell& cell : cells) {
+    const double height =
+        heights.height(at + static_cast<std::size_t>(heights.step(cell.i, cell.j)));
+    if (height == ColumnHeights::unknown) continue;
+    if (first == ColumnHeights::unknown) first = height;
+    lowest = std::min(lowest, height);
+  }
+  return first == ColumnHeights::unknown ? 0.0 : first - lowest;
 }
 
 // Calls use(members, heights) in parallel for each block of pivots. `members` are indices in
@@ -616,8 +347,8 @@ void for_each_block(const VoxelGrid& grid, const std::vector<std::size_t>& pivot
       const int i = block.first * closing_block_columns;
       const int j = block.second * closing_block_columns;
       use(members,
-          Heights(grid, expanded({i, i + closing_block_columns, j, j + closing_block_columns},
-                                 reach, reach)));
+          ColumnHeights(grid, expanded({i, i + closing_block_columns, j, j + closing_block_columns},
+                                       reach, reach)));
     }
   });
 }
@@ -627,8 +358,8 @@ void for_each_block(const VoxelGrid& grid, const std::vector<std::size_t>& pivot
 int closing_reach_voxels(const ClosingPath& path, double voxel_size_m) {
   // A position may be rounded half a column outward, its fall uses one more column, and gaps are
   // filled.
-  return static_cast<int>(std::ceil(path.reach_m() / voxel_size_m + 0.5)) + 1 + gap_columns +
-         rest_columns(path, voxel_size_m);
+  return static_cast<int>(std::ceil(path.reach_m() / voxel_size_m + 0.5)) + 1 +
+         ColumnHeights::gap_columns + rest_columns(path, voxel_size_m);
 }
 
 std::vector<ForceEstimate> closing_forces(const VoxelGrid& grid, const ClosingPath& path,
@@ -637,7 +368,7 @@ std::vector<ForceEstimate> closing_forces(const VoxelGrid& grid, const ClosingPa
   const Rays rays = make_rays(path, voxel_size_m);
   std::vector<ForceEstimate> forces(pivots.size());
   for_each_block(grid, pivots, closing_reach_voxels(path, voxel_size_m),
-                 [&](const std::vector<std::size_t>& members, const Heights& heights) {
+                 [&](const std::vector<std::size_t>& members, const ColumnHeights& heights) {
                    BlockCloser closer(heights, rays, path);
                    for (const std::size_t n : members) {
                      const Voxel& voxel = grid.voxels[pivots[n]];
@@ -654,14 +385,15 @@ std::vector<double> outward_fall_fractions(const VoxelGrid& grid, const GripperM
   for (std::size_t a = 0; a < azimuths; ++a)
     rays[a] = outward_cells(mask, 2.0 * std::numbers::pi * static_cast<double>(a) / azimuths);
   std::vector<double> fractions(pivots.size(), 0.0);
-  for_each_block(grid, pivots, mask.pivot_xy + gap_columns,
-                 [&](const std::vector<std::size_t>& members, const Heights& heights) {
+  for_each_block(grid, pivots, mask.pivot_xy + ColumnHeights::gap_columns,
+                 [&](const std::vector<std::size_t>& members, const ColumnHeights& heights) {
                    for (const std::size_t n : members) {
                      const Voxel& voxel = grid.voxels[pivots[n]];
                      const std::size_t at = heights.index(voxel.i, voxel.j);
-                     const auto falling = std::count_if(
-                         rays.begin(), rays.end(),
-                         [&](const auto& ray) { return heights.fall(at, ray) > mask.min_fall_m; });
+                     const auto falling =
+                         std::count_if(rays.begin(), rays.end(), [&](const auto& ray) {
+                           return fall_along(heights, at, ray) > mask.min_fall_m;
+                         });
                      fractions[n] = static_cast<double>(falling) / azimuths;
                    }
                  });
