@@ -29,8 +29,8 @@ std::string lower_case(std::string_view text);  // converts ASCII letters only
 // Splits at commas and drops empty parts: "a, b,,c" -> a, b, c.
 std::vector<std::string> split_list(std::string_view text);
 
-// Returns the candidate with the smallest Levenshtein distance to `name`, at most half the length
-// of `name`; else the first candidate that begins with `name`; else nullopt. Ignores the case.
+// Returns the candidate with the smallest Levenshtein distance to `name`, at most half its length;
+// else the first that begins with `name`, if 3 letters or longer; else nullopt. Ignores the case.
 std::optional<std::string> nearest_name(std::string_view name,
                                         const std::vector<std::string>& candidates);
 

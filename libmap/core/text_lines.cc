@@ -101,7 +101,7 @@ Error in_line(const std::string& reason, const TextLine& line, const std::string
 
 Error wrong_columns(const std::string& reason, const TextLine& line, const std::string& file,
                     std::string bound) {
-  return in_line(reason, line, file, std::to_string(line.words.size()) + " columns",
+  return in_line(reason, line, file, std::to_string(line.words.size()) + " columns long",
                  std::move(bound));
 }
 
@@ -123,10 +123,10 @@ Pose pose_of(const TextLine& line, const Eigen::Vector3d& translation,
   constexpr double length_tolerance = 0.05;
   const double length = rotation.norm();
   if (!(std::abs(length - 1.0) <= length_tolerance))
-    throw in_line("not a rotation", line, file, to_text(length), "a quaternion of length 1");
+    throw in_line("not the length of a unit quaternion", line, file, to_text(length), "1 +- 5 %");
   const double distance = translation.cwiseAbs().maxCoeff();
   if (!(distance <= max_position_m))
-    throw in_line("position out of range", line, file, to_text(distance), "<= 1e8 m");
+    throw in_line("a coordinate is too large", line, file, to_text(distance), "<= 1e8 m");
   return make_pose(translation, rotation);
 }
 
