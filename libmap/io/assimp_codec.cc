@@ -361,7 +361,7 @@ auto decode(const std::string& format, const Read& read, const Take& take) {
 DecodedModel decode_guarded(std::uint64_t file_bytes, const std::function<DecodedModel()>& decode) {
   // Memory for assimp's scene, the mesh and its bytes; a line of OBJ needs some hundred bytes.
   const std::uint64_t memory = (std::uint64_t{1} << 30) + 100 * file_bytes;
-  return run_sandboxed<DecodedModel>(memory, "is broken: the library for its format crashed on it",
+  return run_sandboxed<DecodedModel>(memory, "is damaged: assimp crashed while it read the file",
                                      decode, [](auto& pipe, DecodedModel& decoded) {
                                        TexturedMesh& model = decoded.model;
                                        pipe.array(model.mesh.vertices);

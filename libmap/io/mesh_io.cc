@@ -56,7 +56,7 @@ Error bad_line(const TextLine& line, const std::string& reason) {
 std::uint64_t index_of(const TextLine& line, std::size_t word, std::uint64_t limit) {
   const std::optional<std::int64_t> index = parse_integer(line.words[word]);
   if (!index || *index < 0 || static_cast<std::uint64_t>(*index) >= limit)
-    throw Error("not an index", {.field = name_of(line),
+    throw Error("not in range", {.field = name_of(line),
                                  .value = "'" + std::string(line.words[word].substr(0, 40)) + "'",
                                  .bound = "0 to " + std::to_string(limit) + " - 1"});
   return static_cast<std::uint64_t>(*index);
