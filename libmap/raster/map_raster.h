@@ -29,8 +29,7 @@ struct RasterBand {
   std::vector<float> values;  // NaN: no data
 };
 
-// Raster in row-major order. Columns increase along RasterGrid::column_axis, rows to its right,
-// i.e. southward if the axis points east.
+// Raster in row-major order. Columns increase along RasterGrid::column_axis, rows to its right.
 struct MapRaster {
   std::int64_t columns = 0;
   std::int64_t rows = 0;
