@@ -38,8 +38,8 @@ struct ReportTable {
 
 struct ReportMap {
   MapView view{};
-  std::optional<ReportTable> locations{};  // row n corresponds to marker n
-  std::optional<ReportImage> preview{};
+  std::optional<ReportTable> locations{};  // look-ups; row n corresponds to marker n
+  std::optional<ReportImage> preview{};    // shown where there is no 3-D view
 };
 
 // A colored mesh and the meaning of the colors.
@@ -48,7 +48,7 @@ struct ReportScene {
   std::vector<std::pair<Color, std::string>> legend{};
 };
 
-struct ReportParameters {
+struct ReportParameters {                                   // to be compared
   std::vector<std::pair<std::string, Manifest>> outputs{};  // column heading and manifest
 };
 
@@ -60,14 +60,14 @@ struct TimingRow {
 };
 
 struct TimingTable {
-  std::vector<std::string> cases;
+  std::vector<std::string> cases;              // column headings
   std::vector<TimingRow> rows;                 // by command and step, in order of appearance
   std::vector<std::vector<unsigned>> threads;  // distinct numbers of threads per case
   // True if a step that occurs in several manifests of a case was summed.
   bool sums = false;
 };
 
-struct ReportListing {
+struct ReportListing {  // first lines of a text file
   std::string text{};
   std::size_t omitted_lines = 0;
 };
@@ -96,11 +96,11 @@ struct ReportSection {
   std::vector<ReportSection> sections{};
 };
 
-// An output of the run with manifest, or the error if the manifest cannot be read.
+// An output of the run with its manifest, or the error if the manifest cannot be read.
 struct ReportSource {
-  std::string output{};
+  std::string output{};  // path
   Manifest manifest{};
-  std::string error{};
+  std::string error{};  // empty if the manifest was read
 };
 
 // The heading is the report's title.
