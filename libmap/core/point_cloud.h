@@ -78,8 +78,8 @@ void append_fields(const std::vector<ScalarField>& more, std::vector<ScalarField
 // vp_z) in fields are transformed; normals and the vectors (approach_x, _y, _z) are only rotated.
 PointCloud transform_cloud(const PointCloud& cloud, const Pose& target_from_source);
 
-struct Bounds3d {  // axis-aligned box, m
-  Eigen::Vector3d min = Eigen::Vector3d::Zero();
+struct Bounds3d {
+  Eigen::Vector3d min = Eigen::Vector3d::Zero();  // corners of an axis-aligned box, m
   Eigen::Vector3d max = Eigen::Vector3d::Zero();
 };
 

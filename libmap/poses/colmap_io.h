@@ -47,7 +47,7 @@ struct ColmapImage {
   std::vector<ColmapObservation> observations{};
 };
 
-struct ColmapTrackElement {     // observation of a point
+struct ColmapTrackElement {
   int image = 0;                // IMAGE_ID
   std::size_t observation = 0;  // index among the image's features
 };

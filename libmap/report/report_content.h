@@ -48,7 +48,7 @@ struct ReportScene {
   std::vector<std::pair<Color, std::string>> legend{};
 };
 
-struct ReportParameters {                                   // to be compared
+struct ReportParameters {
   std::vector<std::pair<std::string, Manifest>> outputs{};  // column heading and manifest
 };
 
@@ -67,8 +67,8 @@ struct TimingTable {
   bool sums = false;
 };
 
-struct ReportListing {  // first lines of a text file
-  std::string text{};
+struct ReportListing {
+  std::string text{};  // first lines of a file
   std::size_t omitted_lines = 0;
 };
 
