@@ -232,7 +232,7 @@ std::vector<std::string> set_from_yaml(const ParameterTable& table, const std::s
           if (!table.knows(key)) throw unknown_key(key, known);
           const Parameter* parameter = table.find(key);
           if (!seen.insert(parameter == nullptr ? key : parameter->key).second)
-            throw Error("is a duplicate", {.field = key});
+            throw Error("occurs twice", {.field = key});
           if (!entry.second.IsScalar()) throw Error("is not a single value", {.field = key});
           values.emplace_back(key, entry.second.as<std::string>());
         }

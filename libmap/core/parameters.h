@@ -114,7 +114,7 @@ std::optional<std::string> changed_key(Options options, void (*bind)(ParameterTa
   return table.first_difference(defaults);
 }
 
-// Returns the flag of a key, without unit: "voxel_size_m" -> "--voxel-size".
+// Returns the flag of a key, without _m, _mm, _deg, _px, _s or _n: "voxel_size_m": "--voxel-size".
 std::string flag_of(std::string_view key);
 
 // Sets the table from YAML `text`, a map of scalars; a section "a: {b: 1}" contains the key "a.b".

@@ -65,13 +65,13 @@ PointCloud select_points(const PointCloud& cloud, const std::vector<std::size_t>
 // Appends the points of `more`. Keeps normals, colors and fields that both clouds have; keeps
 // everything if one cloud is empty. The viewpoint is the identity if the viewpoints differ.
 void append_cloud(const PointCloud& more, PointCloud& cloud);
-// Appends values per point; the result is empty if either vector is empty.
+// Appends the values of further points; the result is empty if either vector is empty.
 template <typename T>
 void append_values(const std::vector<T>& more, std::vector<T>& values) {
   if (more.empty()) values.clear();
   if (!values.empty()) values.insert(values.end(), more.begin(), more.end());
 }
-// Appends the values of fields; keeps fields that both have with equal name and type.
+// Appends the values of fields; keeps only fields that both lists have, of equal name and type.
 void append_fields(const std::vector<ScalarField>& more, std::vector<ScalarField>& fields);
 
 // Returns the cloud in the target frame. Positions, a known viewpoint and the points (vp_x, vp_y,

@@ -30,7 +30,7 @@ std::string to_text(LinkType type);
 
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
-// Relative pose between two nodes: pose_to = pose_from * from_from_to.
+// Relative pose between two nodes, given by their ids: pose_to = pose_from * from_from_to.
 struct PoseLink {
   int from = 0;
   int to = 0;
@@ -64,7 +64,7 @@ struct GraphNode {
   int session = 0;  // odometry does not connect nodes of different sessions
   int weight = 0;   // >= 0 normal, -1 intermediate, -9 invalid
   double stamp_s = 0.0;
-  std::string label{};
+  std::string label{};  // name by the user; mostly empty
   std::optional<Pose> odometry_from_base{};
   std::optional<Pose> truth_from_base{};            // ground truth, in a separate frame
   std::optional<std::array<double, 6>> velocity{};  // x y z roll pitch yaw, m/s and rad/s

@@ -18,7 +18,7 @@ struct Table {
   std::optional<std::size_t> find_column(std::string_view name) const;  // index or nullopt
   // Returns the index of a column. Throws Error naming file, column and the nearest known column.
   std::size_t column(std::string_view name) const;
-  // Returns a cell as a number. Throws Error naming file, row and column if it is not a number.
+  // Returns a cell as a number. Throws Error naming file, row (from 1) and column if it is none.
   double number(std::size_t row, std::size_t column) const;
   // Returns a cell as a number, or nullopt if it is empty. Throws as number() does.
   std::optional<double> optional_number(std::size_t row, std::size_t column) const;

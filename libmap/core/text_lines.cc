@@ -106,7 +106,7 @@ Error wrong_columns(const std::string& reason, const TextLine& line, const std::
 }
 
 Error duplicate(const TextLine& line, const std::string& record, const std::string& file) {
-  return in_line("is a duplicate", line, file, record);
+  return in_line("occurs twice", line, file, record);
 }
 
 void require_room_for_text(std::uint64_t rows, std::uint64_t words, std::uint64_t bytes,

@@ -15,7 +15,7 @@
 namespace libmap {
 
 struct TextLine {
-  std::size_t number = 0;  // from 1
+  std::size_t number = 0;  // number of the line in its file, from 1
   std::string_view text{};
   std::vector<std::string_view> words{};
 };
@@ -58,10 +58,10 @@ std::int64_t large_integer_of(const TextLine& line, std::size_t word, const std:
 // Returns the error "FILE: line N is VALUE: REASON (must be BOUND)".
 Error in_line(const std::string& reason, const TextLine& line, const std::string& file,
               std::string value, std::string bound = {});
-// Returns an error for a line with a wrong number of words, which is the value; `bound` is right.
+// Returns the error "FILE: line N is 7 columns long: REASON (must be BOUND)" for 7 words.
 Error wrong_columns(const std::string& reason, const TextLine& line, const std::string& file,
                     std::string bound);
-// Returns an error for a record that an earlier line has already defined.
+// Returns an error for a record, e.g. "node 7", that an earlier line has already defined.
 Error duplicate(const TextLine& line, const std::string& record, const std::string& file);
 
 // Throws Error if `bytes` bytes are too few for `rows` lines of `words` words each. `what` names

@@ -104,7 +104,7 @@ void check_keys(const YAML::Node& map, const std::vector<std::string>& known,
     const std::string& key = entry.first.Scalar();
     if (std::find(known.begin(), known.end(), key) == known.end())
       throw unknown_key(key, known, whose);
-    if (!seen.insert(key).second) throw Error("is a duplicate", {.field = key});
+    if (!seen.insert(key).second) throw Error("occurs twice", {.field = key});
   }
 }
 

@@ -80,7 +80,7 @@ HeaderLines read_lines(std::string_view file, PcdHeader& header) {
                   {.field = "line " + std::to_string(header.data_line - 1)});
     if (key == "COLUMNS") key = "FIELDS";
     if (!lines.try_emplace(key, words.begin() + 1, words.end()).second)
-      throw bad_header("is a duplicate", key);
+      throw bad_header("occurs twice", key);
     if (is_data) {
       header.data_begin = position;
       return lines;
