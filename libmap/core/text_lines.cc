@@ -80,7 +80,7 @@ std::int64_t large_integer_of(const TextLine& line, std::size_t word, const std:
   require_word(line, word, file);
   const std::optional<std::int64_t> value = parse_integer(line.words[word]);
   if (!value)
-    throw in_line("not a whole number", line, file, std::string(line.words[word]), "of 64 bits");
+    throw in_line("not a whole number of 64 bits", line, file, std::string(line.words[word]));
   return *value;
 }
 
@@ -88,7 +88,7 @@ int integer_of(const TextLine& line, std::size_t word, const std::string& file) 
   require_word(line, word, file);
   const std::optional<int> value = parse_int(line.words[word]);
   if (!value)
-    throw in_line("not a whole number", line, file, std::string(line.words[word]), "of 32 bits");
+    throw in_line("not a whole number of 32 bits", line, file, std::string(line.words[word]));
   return *value;
 }
 

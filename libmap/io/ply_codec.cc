@@ -293,14 +293,15 @@ void add_fan(const std::vector<double>& corners, std::uint64_t face, std::uint64
              GeometryColumns& content) {
   const std::string name = "face " + std::to_string(face);
   if (corners.size() < 3)
-    throw Error("too few corners",
+    throw Error("the number of corners is too small",
                 {.field = name, .value = std::to_string(corners.size()), .bound = ">= 3"});
   for (const double corner : corners)
     if (!(corner >= 0.0) || corner >= static_cast<double>(vertices) ||
         corner > std::numeric_limits<std::uint32_t>::max())
-      throw Error("no such vertex", {.field = name,
-                                     .value = to_text(corner),
-                                     .bound = "0 to " + std::to_string(vertices) + " - 1"});
+      throw Error("no vertex has this index",
+                  {.field = name,
+                   .value = to_text(corner),
+                   .bound = "0 to " + std::to_string(vertices) + " - 1"});
   for (std::size_t i = 2; i < corners.size(); ++i) {
     content.triangles.push_back({static_cast<std::uint32_t>(corners[0]),
                                  static_cast<std::uint32_t>(corners[i - 1]),
