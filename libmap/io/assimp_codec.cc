@@ -114,8 +114,8 @@ class MeshBuilder {
       corners.clear();
       for (unsigned k = 0; k < face.mNumIndices; ++k) {
         if (face.mIndices[k] >= part.mNumVertices)
-          throw Error("no vertex has this index", {.field = "face " + std::to_string(i),
-                                                   .value = std::to_string(face.mIndices[k])});
+          throw Error("not a vertex index", {.field = "face " + std::to_string(i),
+                                             .value = std::to_string(face.mIndices[k])});
         corners.push_back(vertex(part, face.mIndices[k], root_from_node, normal_matrix));
       }
       std::vector<unsigned> indices(face.mIndices, face.mIndices + face.mNumIndices);
