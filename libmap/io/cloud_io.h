@@ -69,7 +69,7 @@ std::string format_of(const std::filesystem::path& path);
 // Returns the first MiB of a file, or all of a shorter file; headers are shorter.
 std::string read_head(const std::filesystem::path& path);
 
-// Returns the content of a file. Throws Error if it is missing, no file, unreadable or empty.
+// Returns the content of a file. Throws Error if it is missing, a folder, unreadable or empty.
 std::shared_ptr<const std::string> read_geometry_bytes(const std::filesystem::path& path);
 
 // Creates the file `path` and calls write(stream). Adds the file to Errors of `write`. Throws Error

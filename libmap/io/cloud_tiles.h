@@ -29,7 +29,7 @@ class TileStream : public PointStream {
 
   const std::vector<std::filesystem::path>& tiles() const { return tiles_; }
   bool has_normals() const { return has_normals_; }
-  const Pose& viewpoint() const { return viewpoint_; }  // the identity if the files' ones differ
+  const Pose& viewpoint() const { return viewpoint_; }  // the identity if those of the files differ
   // Georeference of the first DEM; nullopt without DEMs.
   const std::optional<Georeference>& georeference() const { return georeference_; }
   void for_each_block(Need need, const Visit& visit) const override;

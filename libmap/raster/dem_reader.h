@@ -41,8 +41,8 @@ struct DemBlock {
   std::vector<double> heights_m;
 };
 
-// Reads a file sequentially in blocks of one or several tiles or strips of the file, with at least
-// 65536 pixels. Memory is proportional to a block. GDAL runs in a child process.
+// Reads a file sequentially in blocks: one tile or strip of the file, or several small ones with
+// about 65536 pixels. Memory is proportional to a block. GDAL runs in a child process.
 //
 // The height band is the band named height, elevation, dem, dsm, dtm or z, else the only band.
 // Scale, offset, unit (m, ft, us-ft), nodata and mask of the band are applied. The local origin is
