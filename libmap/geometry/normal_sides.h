@@ -39,7 +39,7 @@ struct NormalVotes {
 };
 
 // Returns the share of pairs of neighbors whose normals point to opposite sides, among the first
-// 65536 points: 0.5 for random sides, 0 for less than 100 pairs. Skips pairs at creases, and NaN.
+// 65536 points: 0.5 for random sides, 0 for fewer than 100 pairs. Skips pairs at creases and NaN.
 double opposing_fraction(const std::vector<Eigen::Vector3d>& positions,
                          const std::vector<Eigen::Vector3f>& normals);
 

@@ -35,7 +35,7 @@ ColmapCamera to_colmap(const Camera& camera);
 
 // A feature of an image.
 struct ColmapObservation {
-  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  // COLMAP's: centers at halves
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  // in COLMAP: pixel centers at 0.5
   std::int64_t point = -1;                          // POINT3D_ID; -1: no point
 };
 

@@ -13,7 +13,7 @@
 namespace libmap {
 
 // Returns text that parses to the same stamp, or to within 1e-9 s if that needs more decimals.
-// Without an exponent, which not all readers support.
+// The text has no exponent, which not all readers support.
 std::string stamp_text(double stamp_s);
 
 // TUM RGB-D benchmark: "stamp x y z qx qy qz qw", s and m (RTAB-Map's formats 1 and 10). With
@@ -48,7 +48,7 @@ struct PoseGraphText {
 // In g2o, the rotation error is the vector part of a quaternion, half the rotation vector: for
 // small angles q = (roll, pitch, yaw) / 2. A PoseLink's information refers to the angles, so rows
 // and columns of the rotation are multiplied by 2 in the file (the 3 x 3 block by 4) and divided by
-// 2 on reading. (RTAB-Map writes the matrix unchanged, so its files have too small an information
+// 2 on reading. (RTAB-Map writes the matrix unchanged, so its files underestimate the information
 // of rotations.)
 //
 // g2o has no types of links. Types are written as comments, "# graspmap:type 1 global closure",

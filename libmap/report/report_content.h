@@ -1,4 +1,4 @@
-// Data of a report: what report_reader.h reads from files and report_page.h writes.
+// Data of a report, which report_reader.h reads from files and report_page.h writes.
 #pragma once
 
 #include <cstddef>
