@@ -18,7 +18,7 @@ class ByteReader {
   explicit ByteReader(std::string_view bytes) : bytes_(bytes) {}
 
   bool empty() const { return bytes_.empty(); }
-  std::string_view rest() const { return bytes_; }
+  std::string_view rest() const { return bytes_; }  // bytes that are not read yet
   std::string_view take(std::uint64_t count) {
     if (count > bytes_.size()) throw std::length_error("too few bytes");
     const std::string_view taken = bytes_.substr(0, count);
@@ -32,9 +32,9 @@ class ByteReader {
     std::memcpy(&value, take(sizeof value).data(), sizeof value);
     return value;
   }
+  // Reads `count` numbers; the length is checked before the allocation.
   template <typename T>
   std::vector<T> numbers(std::int64_t count) {
-    // The check precedes the allocation.
     if (count < 0 || static_cast<std::uint64_t>(count) > bytes_.size() / sizeof(T))
       throw std::length_error("too few bytes");
     std::vector<T> values(static_cast<std::size_t>(count));
@@ -52,7 +52,7 @@ class ByteReader {
   std::string_view bytes_;
 };
 
-// Appends numbers in the format of ByteReader.
+// Appends numbers and texts to a byte string, in the format that ByteReader reads.
 class ByteWriter {
  public:
   template <typename T>

@@ -16,7 +16,7 @@ namespace libmap {
 // radial part and thin prisms). equidistant: OpenCV's fisheye k1..k4 (Kannala and Brandt 2006).
 enum class DistortionModel { none, radial_tangential, equidistant };
 
-// Rotation from an optical frame to a body frame (x forward, y left, z up).
+// Returns the rotation body_from_optical; the axes of a body frame are x forward, y left, z up.
 Pose optical_to_body_rotation();
 
 struct Camera {
@@ -27,21 +27,21 @@ struct Camera {
   double cx = 0.0;
   double cy = 0.0;
   DistortionModel distortion_model = DistortionModel::none;
-  std::vector<double> distortion{};  // 4, 5, 8 or 12 coefficients; equidistant: 4
-  Pose base_from_camera = optical_to_body_rotation();
+  std::vector<double> distortion{};                    // 4, 5, 8 or 12 coefficients; equidistant: 4
+  Pose base_from_camera = optical_to_body_rotation();  // pose of the optical frame
 
-  // True if a distortion coefficient is not 0 or the model is equidistant.
+  // True if the model is equidistant, or radial_tangential with a coefficient other than 0.
   bool is_distorted() const;
-  // Throws Error naming field, value and bound: size > 0, focal lengths 1e-6 to 1e9 px, principal
-  // point within 1e9 px, valid number of coefficients, each at most 1e12, position within 1e8 m.
+  // Throws Error naming field, value and bound, unless: size > 0, focal lengths 1e-6 to 1e9 px,
+  // |cx|, |cy| <= 1e9 px, valid number of coefficients, each within 1e12, position within 1e8 m.
   void check() const;
 };
 
 // Returns the camera with the model `none` and no coefficients.
 Camera without_distortion(Camera camera);
 
-// Conversion between rays (x/z, y/z) and distorted pixel positions; the inverse uses Newton's
-// method with a tolerance of 1e-9 focal lengths. pixel_to_ray returns nullopt if no ray exists.
+// Convert between rays (x/z, y/z) in the optical frame and distorted pixel positions. pixel_to_ray
+// uses Newton's method (tolerance 1e-9 focal lengths); it returns nullopt if no ray is found.
 Eigen::Vector2d distort_to_pixel(const Camera& camera, const Eigen::Vector2d& ray);
 std::optional<Eigen::Vector2d> pixel_to_ray(const Camera& camera, const Eigen::Vector2d& pixel);
 
@@ -50,7 +50,7 @@ std::optional<Eigen::Vector2d> pixel_to_ray(const Camera& camera, const Eigen::V
 std::optional<Eigen::Vector2d> project_point(const Camera& camera,
                                              const Eigen::Vector3d& point_in_camera);
 
-// Rays (x/z, y/z) of all pixels, width * height in row-major order; NaN if a pixel has no ray.
+// Returns the rays (x/z, y/z) of all pixels in row-major order; NaN if a pixel has no ray.
 std::vector<Eigen::Vector2d> ray_table(const Camera& camera);
 
 }  // namespace libmap

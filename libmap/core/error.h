@@ -9,7 +9,7 @@
 namespace libmap {
 
 // bad_input: a file, an option or data is invalid (exit code 3).
-// failed: the run itself failed, for example because of a full disk (exit code 1).
+// failed: the run itself failed, e.g. the disk is full (exit code 1); in comments "Error (failed)".
 enum class ErrorKind { bad_input, failed };
 
 struct ErrorContext {
@@ -21,7 +21,8 @@ struct ErrorContext {
 
 class Error : public std::runtime_error {
  public:
-  // what() is "FILE: FIELD is VALUE: REASON (must be BOUND)", without the empty parts.
+  // what() is "FILE: FIELD is VALUE: REASON (must be BOUND)", without the empty parts; without a
+  // field, "FILE: 'VALUE': REASON (must be BOUND)".
   explicit Error(std::string reason, ErrorContext context = {},
                  ErrorKind kind = ErrorKind::bad_input);
 
@@ -31,8 +32,7 @@ class Error : public std::runtime_error {
 
   // Returns a copy that names `file`, unless the error names a file already.
   Error in_file(const std::string& file) const;
-  // Returns a copy with field `prefix`, followed by `joint` and the old field if there is one:
-  // "rig: width".
+  // Returns a copy with the field `prefix`, joined to the present field if any: "rig: width".
   Error in_field(const std::string& prefix, const char* joint = ": ") const;
 
  private:

@@ -76,7 +76,7 @@ int lock_temporary(const fs::path& temporary, const fs::path& final_path,
       const int code = errno;
       close(lock);
       if (code != EWOULDBLOCK) throw system_failure(final_path, "cannot be locked", code);
-      throw Error("another process is writing this file", {.file = final_path.string()},
+      throw Error("another process is writing this output", {.file = final_path.string()},
                   ErrorKind::failed);
     }
     // Between opening and locking, another process can have committed this file.
@@ -129,7 +129,7 @@ fs::path without_slash(const fs::path& path) {
 fs::path checked_folder(const fs::path& given, const std::vector<std::string>& names) {
   fs::path final_path = without_slash(given);
   if (final_path.filename() == "." || final_path.filename() == "..")
-    throw Error("the output folder must have a name", {.file = final_path.string()});
+    throw Error("cannot be replaced; give a folder by its name", {.file = final_path.string()});
   require_folder_of(final_path);
   require_own_content(final_path, names);
   return final_path;

@@ -20,22 +20,22 @@ void require_readable_file(const std::filesystem::path& path);
 // Throws Error if the file `path` is larger than `max_bytes`, or missing.
 void require_file_size(const std::filesystem::path& path, std::uint64_t max_bytes);
 
-// Returns the file's content. Throws Error for a folder, and a missing, unreadable or larger file.
+// Returns the file's content. Throws Error unless it is readable and at most `max_bytes` long.
 std::string read_whole_file(const std::filesystem::path& path,
                             std::uint64_t max_bytes = std::uint64_t{1} << 30);
 
 // Returns the first bytes of a file, at most `max_bytes`; empty if it cannot be read.
 std::string file_head(const std::filesystem::path& path, std::size_t max_bytes);
 
-// Writes `content` directly to `path`, the temporary of an OutputFile. Throws Error (failed).
+// Writes `content` to `path`, not atomically: for temporary_path() below. Throws Error (failed).
 void write_text(const std::filesystem::path& path, std::string_view content);
 
 // Writes `content` atomically through an OutputFile, and throws as it does.
 void write_whole_file(const std::filesystem::path& path, std::string_view content);
 
 // An uncommitted output, stored under a temporary name in the folder of the final output. Without a
-// commit, the temporary is removed and an earlier output is unchanged. While this object exists, a
-// second process that writes the same output gets an Error.
+// commit, the destructor removes the temporary, and an earlier output is unchanged. While this
+// object exists, a second one for the same output, in any process, throws Error (failed).
 class PendingOutput {
  public:
   ~PendingOutput();
@@ -49,9 +49,9 @@ class PendingOutput {
   // `open_temporary` creates and opens the temporary. It returns a descriptor, or -1 with errno.
   PendingOutput(std::filesystem::path final_path, const std::string& temporary_name,
                 int (*open_temporary)(const char* path));
-  // Unlocks the temporary and forgets the name.
+  // Unlocks the temporary and removes its path from the list of uncommitted outputs.
   void release();
-  int lock() const { return lock_; }
+  int lock() const { return lock_; }  // descriptor of the temporary
 
  private:
   std::filesystem::path final_path_;
@@ -72,19 +72,18 @@ class OutputFile : public PendingOutput {
 // An output folder. Write into temporary_path().
 class OutputFolder : public PendingOutput {
  public:
-  // `names` lists the permitted entries: an earlier folder with any other entry is not replaced.
-  // Throws Error if the path is not a folder, contains other entries or is not writable.
+  // `names` lists the entries that an earlier folder may contain. Throws Error if it contains any
+  // other entry, is not a folder or cannot be written.
   OutputFolder(const std::filesystem::path& final_path, const std::vector<std::string>& names);
   // Syncs the temporary and replaces the complete final folder. Throws Error (failed).
   void commit();
 };
 
-// Syncs all `outputs`, then commits them in order. abandon_unfinished_outputs() runs before or
-// after all commits. Throws Error (failed) as OutputFile::commit() does.
+// Syncs all `outputs`, then commits them in order; abandon_unfinished_outputs() cannot run between
+// the commits. Throws Error (failed) as OutputFile::commit() does.
 void commit_together(std::vector<OutputFile>& outputs);
 
-// Blocks abandon_unfinished_outputs() while it exists, so that related outputs are committed
-// together.
+// Delays abandon_unfinished_outputs() while it exists: related outputs are committed together.
 class CommitGuard {
  public:
   CommitGuard();
@@ -98,10 +97,10 @@ class CommitGuard {
 // exits.
 void abandon_unfinished_outputs();
 
-// True for names of uncommitted files and folders, as a killed run leaves behind.
+// True for the temporary path of an uncommitted file or folder, which a killed run leaves behind.
 bool is_named_unfinished(const std::filesystem::path& path);
 
-// Returns a copy of the error that names `file`.
+// Returns a copy of the error that names `file` instead of the present file.
 Error naming(const Error& error, const std::filesystem::path& file);
 
 // Calls `write` with `temporary`. In Errors that name `temporary`, or a file in it, replaces the

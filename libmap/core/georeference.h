@@ -13,7 +13,7 @@ namespace libmap {
 struct Georeference {
   std::string crs_wkt;  // WKT 2 (ISO 19162:2019); empty: unknown reference system
   double unit_m = 1.0;  // meters per unit of eastings and northings
-  Eigen::Vector3d origin_m = Eigen::Vector3d::Zero();
+  Eigen::Vector3d origin_m = Eigen::Vector3d::Zero();  // subtracted offset: east, north, up
 
   bool operator==(const Georeference&) const = default;
 };

@@ -41,12 +41,12 @@ using GrayImage = Image<std::uint8_t>;
 // Depth z in the camera's optical frame, m; 0 for pixels without a measurement.
 using DepthImage = Image<float>;
 
-// "640 x 480".
+// Returns a size as text, e.g. "640 x 480".
 inline std::string size_text(std::int64_t width, std::int64_t height) {
   return std::to_string(width) + " x " + std::to_string(height);
 }
 
-// Returns columns `x` to `x + width - 1`, one of several images stored side by side.
+// Returns columns `x` to `x + width - 1`, e.g. one of several images that are stored side by side.
 template <typename T>
 Image<T> crop_columns(const Image<T>& image, int x, int width) {
   Image<T> part(width, image.height);
@@ -55,7 +55,7 @@ Image<T> crop_columns(const Image<T>& image, int x, int width) {
   return part;
 }
 
-// Bilinear interpolation of the color at a pixel position; positions outside the image are clamped.
+// Returns the bilinearly interpolated color at a pixel position, which is clamped to the image.
 template <typename Pixel>
 Eigen::Vector3f bilinear_color(const Image<Pixel>& image, double x, double y) {
   const double within_x = std::clamp(x, 0.0, image.width - 1.0);

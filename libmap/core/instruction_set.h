@@ -4,7 +4,7 @@
 
 namespace libmap {
 
-// avx2: with POPCNT. avx512: F, BW, VL and VPOPCNTDQ.
+// avx2: AVX2 and POPCNT. avx512: also AVX-512 F, BW, VL and VPOPCNTDQ.
 enum class InstructionSet { portable, avx2, avx512 };
 
 // True if this processor supports `set` and loops for it were built; always true for `portable`.

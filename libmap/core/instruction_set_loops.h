@@ -1,7 +1,7 @@
 // Compiles inner loops once per instruction set. GRASPMAP_LOOPS: path of a file that defines
 // functions and, at its end, `all`, a table of them. GRASPMAP_REGISTER: size of the vector
 // registers, bytes. Include this in an anonymous namespace of a source that is compiled alone.
-// GRASPMAP_LOOPS must not use inline functions of other sources: the linker could keep AVX copies.
+// The file must not use inline functions of other sources: the linker could keep only AVX copies.
 
 #define GRASPMAP_REGISTER 16
 namespace portable {

@@ -12,8 +12,8 @@
 
 namespace libmap {
 
-// Throws Error if arrays and objects are nested deeper than 64 levels or an object has more than
-// 10,000 members (ordered_json searches them linearly), and the exceptions of Json::parse.
+// Parses `text`. Throws Error if arrays and objects are nested deeper than 64 levels or an object
+// has more than 10,000 members (ordered_json searches linearly), and exceptions of Json::parse.
 template <typename Json>
 Json parse_json(const std::string& text) {
   constexpr int max_depth = 64;

@@ -104,7 +104,7 @@ Pose from_numbers(const std::vector<double>& numbers) {
   const double error = (nearest_rotation(pose.linear()) - pose.linear()).norm();
   if (!(error <= max_rotation_error) ||
       !(pose.translation().cwiseAbs().maxCoeff() <= max_position_m))
-    throw Error("not a rotation and a translation of at most 1e8 m", {.field = "transforms"});
+    throw Error("not a rotation with a translation within 1e8 m", {.field = "transforms"});
   return pose;
 }
 

@@ -16,7 +16,7 @@
 
 namespace libmap {
 
-// Returns a real or whole number as double; nullopt for other types and nullptr.
+// Returns the value as double if it is a real or whole number; nullopt for other types and nullptr.
 std::optional<double> number_of(const ManifestValue* value);
 
 struct ManifestInput {
@@ -30,13 +30,13 @@ struct Manifest {
   std::string version;
   std::vector<std::pair<std::string, ManifestValue>> parameters;
   std::vector<ManifestInput> inputs;
-  std::string frame;                                     // frame of the output's coordinates (m)
+  std::string frame;                                     // frame of the output's coordinates
   std::vector<std::pair<std::string, Pose>> transforms;  // by name, e.g. "terrain_from_input"
-  // Georeference of the source coordinates, before site_from_map and terrain_from_input.
+  // Georeference of the coordinates before the transforms site_from_map and terrain_from_input.
   std::optional<Georeference> georeference;
   std::vector<std::pair<std::string, ManifestValue>> results;  // counts, residuals
-  std::vector<std::pair<std::string, double>> timings_s;       // in the section "run"
-  unsigned threads = 0;                                        // in the section "run"
+  std::vector<std::pair<std::string, double>> timings_s;       // by step, in the section "run"
+  unsigned threads = 0;                                        // of the run, in the section "run"
 
   void add_parameters(const ParameterTable& table);   // all keys with current values
   void add_results(const ResultTable& table);         // skips results without a value
@@ -46,17 +46,17 @@ struct Manifest {
   const Pose* find_transform(std::string_view name) const;           // or nullptr
 };
 
-// "map.pcd" -> "map.pcd.json".
+// Returns the path of an output's manifest: "map.pcd" -> "map.pcd.json".
 std::filesystem::path manifest_path(const std::filesystem::path& output);
 
-std::string to_json(const Manifest& manifest);  // fixed order; numbers read back the same
+std::string to_json(const Manifest& manifest);  // in fixed order; infinity is read back as NaN
 // Parses the output of to_json; the section "run" is optional. Throws Error naming `file`.
 Manifest parse_manifest(const std::string& json, const std::string& file);
 // Reads the manifest next to `output`. Returns nullopt if there is none. Throws Error naming file
 // and field if it is invalid.
 std::optional<Manifest> read_manifest_of(const std::filesystem::path& output);
 
-// Return the SHA-256 (FIPS 180-4), 64 hexadecimal digits. Throw Error if the file cannot be read.
+// Return the SHA-256 (FIPS 180-4) as 64 hexadecimal digits. Throw Error if the file is unreadable.
 std::string sha256_of_file(const std::filesystem::path& path);
 std::string sha256_of(std::string_view bytes);
 

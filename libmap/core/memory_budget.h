@@ -10,19 +10,19 @@ namespace libmap {
 // Returns the physical memory of the machine in bytes.
 std::uint64_t machine_memory();
 
-// Memory budget of several threads. A thread takes a share before work that needs much memory, and
-// waits while too little is free. Results do not depend on the budget.
+// Memory budget of several threads. A thread reserves memory before work that needs much memory,
+// and waits while too little is free. Results do not depend on the budget.
 //
-// A thread that owns a share must not run a parallel loop: while it waits for the loop, it can
-// start other work that waits for the same share (deadlock).
+// A thread that holds a Reservation must not run a parallel loop: while the thread waits for the
+// loop, oneTBB can run a task on it that waits for the reserved memory (deadlock).
 class MemoryBudget {
  public:
-  // Uses an eighth of the machine's memory.
-  MemoryBudget();
+  MemoryBudget();  // an eighth of the machine's memory
   explicit MemoryBudget(std::uint64_t bytes) : free_(bytes), bytes_(bytes) {}
   MemoryBudget(const MemoryBudget&) = delete;
   MemoryBudget& operator=(const MemoryBudget&) = delete;
 
+  // Reserved memory, which the destructor returns to the budget.
   class Reservation {
    public:
     ~Reservation();

@@ -9,17 +9,17 @@
 
 namespace libmap {
 
-// Returns the error "WHAT: system message" of kind failed. `code` is an errno; 0: no message.
+// Returns the Error (failed) "PATH: WHAT: system message". `code` is an errno; 0: no message.
 Error system_failure(const std::filesystem::path& path, const std::string& what, int code);
 
-// Writes a file or folder to disk (fsync). Throws Error (failed) naming `path`.
+// Waits until a file or folder is stored on disk (fsync). Throws Error (failed) naming `path`.
 void sync_file(const std::filesystem::path& path);
 
 // Returns the parent folder; "." if the path has none.
 std::filesystem::path folder_of(const std::filesystem::path& path);
 
-// Exclusive lock of one process or object on a file. A missing file is created; it is not removed.
-// Throws Error (failed) if the file cannot be created.
+// Exclusive lock on a file, which one object of one process holds at a time. A missing file is
+// created; it is not removed. Throws Error (failed) if the file cannot be created or locked.
 class FileLock {
  public:
   // Waits until the lock is free.

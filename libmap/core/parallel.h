@@ -28,7 +28,8 @@ void parallel_each(std::size_t count, const Step& step) {
   parallel_each(count, 1, step);
 }
 
-// Returns the results of chunk(begin, end) for all ranges, joined left to right with join(a, b).
+// Returns the results of chunk(begin, end) for ranges as in parallel_for, joined left to right with
+// join(a, b), beginning with `identity`.
 template <typename T, typename Chunk, typename Join>
 T parallel_reduce(std::size_t count, std::size_t grain, T identity, const Chunk& chunk,
                   const Join& join) {

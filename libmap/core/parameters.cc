@@ -41,7 +41,7 @@ Number parse_number(const std::string& key, std::string_view text, const Range& 
   require_in_range(key, text, static_cast<double>(*value), range);
   if constexpr (sizeof(Number) < sizeof(std::int64_t)) {
     if (*value > std::numeric_limits<Number>::max() || *value < std::numeric_limits<Number>::min())
-      throw wrong_value(key, text, "too large", describe(range));
+      throw wrong_value(key, text, "too large for 32 bits", describe(range));
   }
   return static_cast<Number>(*value);
 }
@@ -232,14 +232,14 @@ std::vector<std::string> set_from_yaml(const ParameterTable& table, const std::s
           if (!table.knows(key)) throw unknown_key(key, known);
           const Parameter* parameter = table.find(key);
           if (!seen.insert(parameter == nullptr ? key : parameter->key).second)
-            throw Error("is a duplicate", {.field = key});
+            throw Error("occurs twice", {.field = key});
           if (!entry.second.IsScalar()) throw Error("is not a single value", {.field = key});
           values.emplace_back(key, entry.second.as<std::string>());
         }
       };
   read_yaml(text, file, [&](const YAML::Node& root) {
     if (root.IsNull()) return;
-    if (!root.IsMap()) throw Error("not a YAML mapping");
+    if (!root.IsMap()) throw Error("not a YAML mapping of keys to values");
     collect(root, "");
     for (const auto& [key, value] : values) table.set(key, value);
   });

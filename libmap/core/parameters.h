@@ -36,8 +36,8 @@ struct Parameter {
   std::string key;          // as in YAML, with unit: "voxel_size_m"
   std::string description;  // one line
   ParameterType type = ParameterType::text;
-  std::vector<std::string> choices{};  // for enumerations
-  std::function<std::string()> get;
+  std::vector<std::string> choices{};         // names of an enumeration's values; else empty
+  std::function<std::string()> get;           // returns the value as text, which `set` accepts
   std::function<void(std::string_view)> set;  // throws Error naming key, value and bound
   std::function<void()> check{};  // checks the field; throws as `set` does; empty: no bound
 };
@@ -63,7 +63,7 @@ class ParameterTable {
   }
 
   // Collects values of keys "PREFIX.KEY" as text, e.g. "gripper.opening_angle_deg", to override the
-  // values of a file that is read later. The last text counts; the caller checks the names.
+  // values of a file that is read later. The last text of a key counts; the caller checks the keys.
   void add_overrides(std::string prefix, std::vector<std::pair<std::string, std::string>>& texts);
 
   const std::vector<Parameter>& parameters() const { return parameters_; }
@@ -72,11 +72,10 @@ class ParameterTable {
   const Parameter* find(std::string_view key) const;
   // True if set() accepts this key: a parameter, or a key with the prefix of overrides.
   bool knows(std::string_view key) const;
-  // Keys and values as text in the format of set_from_yaml, overrides included.
+  // Returns all keys with their values as text, overrides included.
   std::vector<std::pair<std::string, std::string>> values() const;
 
-  // Returns the first key with different values in both tables, which have equal keys; else
-  // nullopt.
+  // Returns the first key whose values differ, or nullopt. Both tables must have the same keys.
   std::optional<std::string> first_difference(const ParameterTable& other) const;
 
   // Sets one parameter from text. Throws Error if the key is unknown (with the nearest known key),
@@ -115,12 +114,12 @@ std::optional<std::string> changed_key(Options options, void (*bind)(ParameterTa
   return table.first_difference(defaults);
 }
 
-// Returns the flag of a key, without unit: "voxel_size_m" -> "--voxel-size".
+// Returns the flag of a key, without _m, _mm, _deg, _px, _s or _n: "voxel_size_m": "--voxel-size".
 std::string flag_of(std::string_view key);
 
 // Sets the table from YAML `text`, a map of scalars; a section "a: {b: 1}" contains the key "a.b".
 // Throws Error naming `file` for unknown keys, duplicates and values that are not scalars (before
-// any field is set), and for invalid values. Returns the keys of the text.
+// any field is set), and for invalid values. Returns the keys of the text, sorted.
 std::vector<std::string> set_from_yaml(const ParameterTable& table, const std::string& text,
                                        const std::string& file);
 

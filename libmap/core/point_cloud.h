@@ -16,11 +16,11 @@ namespace libmap {
 // Type of a scalar field in files; in memory, all values are doubles.
 enum class ScalarType { int8, uint8, int16, uint16, int32, uint32, float32, float64 };
 
-// One number per point or face, for example "score" or "curvature". Names are unique.
+// Named number of each point, vertex or face, e.g. "score". A cloud or mesh has no name twice.
 struct ScalarField {
   std::string name;
   ScalarType type = ScalarType::float32;
-  std::vector<double> values;
+  std::vector<double> values;  // one per point, vertex or face
 
   bool operator==(const ScalarField&) const = default;
 };
@@ -65,25 +65,25 @@ PointCloud select_points(const PointCloud& cloud, const std::vector<std::size_t>
 // Appends the points of `more`. Keeps normals, colors and fields that both clouds have; keeps
 // everything if one cloud is empty. The viewpoint is the identity if the viewpoints differ.
 void append_cloud(const PointCloud& more, PointCloud& cloud);
-// Appends values per point; the result is empty if either vector is empty.
+// Appends the values of further points; the result is empty if either vector is empty.
 template <typename T>
 void append_values(const std::vector<T>& more, std::vector<T>& values) {
   if (more.empty()) values.clear();
   if (!values.empty()) values.insert(values.end(), more.begin(), more.end());
 }
-// Appends the values of fields; keeps fields that both have with equal name and type.
+// Appends the values of fields; keeps only fields that both lists have, of equal name and type.
 void append_fields(const std::vector<ScalarField>& more, std::vector<ScalarField>& fields);
 
-// Returns the transformed cloud: positions, a known viewpoint and the fields vp_x, vp_y, vp_z by
-// `target_from_source`; normals and the fields approach_x, approach_y, approach_z by the rotation.
+// Returns the cloud in the target frame. Positions, a known viewpoint and the points (vp_x, vp_y,
+// vp_z) in fields are transformed; normals and the vectors (approach_x, _y, _z) are only rotated.
 PointCloud transform_cloud(const PointCloud& cloud, const Pose& target_from_source);
 
 struct Bounds3d {
-  Eigen::Vector3d min = Eigen::Vector3d::Zero();
+  Eigen::Vector3d min = Eigen::Vector3d::Zero();  // corners of an axis-aligned box, m
   Eigen::Vector3d max = Eigen::Vector3d::Zero();
 };
 
-// Axis-aligned bounding box of the points; zeros if there are none.
+// Returns the axis-aligned bounding box of the points; zeros if there are none.
 Bounds3d bounds_of(const std::vector<Eigen::Vector3d>& positions);
 
 }  // namespace libmap

@@ -30,7 +30,7 @@ Eigen::Matrix4d align_points(const Eigen::Matrix3Xd& source, const Eigen::Matrix
 // directions, it is a half turn about an arbitrary perpendicular axis.
 Eigen::Matrix3d shortest_rotation(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
 
-// Returns the nearest rotation in the least-squares sense (Kabsch 1976), for matrices from text.
+// Returns the nearest rotation in the least-squares sense (Kabsch 1976), e.g. of a rounded matrix.
 Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& matrix);
 
 }  // namespace libmap

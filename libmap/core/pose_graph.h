@@ -30,7 +30,7 @@ std::string to_text(LinkType type);
 
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
-// Relative pose between two nodes: pose_to = pose_from * from_from_to.
+// Relative pose between two nodes, given by their ids: pose_to = pose_from * from_from_to.
 struct PoseLink {
   int from = 0;
   int to = 0;
@@ -52,28 +52,28 @@ struct GpsFix {
   double longitude_deg = 0.0;
   double latitude_deg = 0.0;
   double altitude_m = 0.0;
-  double error_m = 0.0;
+  double error_m = 0.0;      // accuracy that the receiver reports
   double bearing_deg = 0.0;  // clockwise from north
 };
 
 // Node of the pose graph: one frame of the scan.
 struct GraphNode {
-  static constexpr int invalid_weight = -9;  // RTAB-Map's, of nodes without a usable signature
+  static constexpr int invalid_weight = -9;  // RTAB-Map's weight of nodes without usable data
 
   int id = 0;       // > 0
-  int session = 0;  // odometry does not connect different sessions
+  int session = 0;  // odometry does not connect nodes of different sessions
   int weight = 0;   // >= 0 normal, -1 intermediate, -9 invalid
   double stamp_s = 0.0;
-  std::string label{};
+  std::string label{};  // name by the user; mostly empty
   std::optional<Pose> odometry_from_base{};
   std::optional<Pose> truth_from_base{};            // ground truth, in a separate frame
-  std::optional<std::array<double, 6>> velocity{};  // m/s and rad/s: x y z roll pitch yaw
+  std::optional<std::array<double, 6>> velocity{};  // x y z roll pitch yaw, m/s and rad/s
   std::optional<GpsFix> gps{};
 };
 
 struct PoseGraph {
   std::vector<GraphNode> nodes;                 // by ascending id
-  std::vector<PoseLink> links;                  // each once, in either direction
+  std::vector<PoseLink> links;                  // each link once, in one of its directions
   std::map<int, Pose> optimized_map_from_base;  // poses stored with the scan; can be empty
 
   // Returns nullptr if there is no such node.
@@ -96,12 +96,12 @@ std::string to_text(PoseSource source);  // "odometry", "optimized", "ground-tru
 // have no such pose.
 Trajectory trajectory_of(const PoseGraph& graph, PoseSource source);
 
-// Sum of the distances between consecutive poses, m.
+// Returns the sum of the distances between consecutive poses, m.
 double path_length(const Trajectory& trajectory);
 
 // Camera pose of an image.
 struct ImagePose {
-  std::string image{};                        // image name in the pose file
+  std::string image{};                        // file name, as in the pose file
   Pose world_from_camera = Pose::Identity();  // optical frame: z forward, x right, y down
 };
 

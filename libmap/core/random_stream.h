@@ -9,7 +9,7 @@
 
 namespace libmap {
 
-// 64-bit hash of two numbers (the finaliser of SplitMix64, Steele et al. 2014).
+// Returns a 64-bit hash of two numbers (the finalizer of SplitMix64, Steele et al. 2014).
 inline std::uint64_t mix_bits(std::uint64_t a, std::uint64_t b) {
   std::uint64_t bits = a * 0x9e3779b97f4a7c15U + b + 0x9e3779b97f4a7c15U;
   bits = (bits ^ (bits >> 30)) * 0xbf58476d1ce4e5b9U;
@@ -17,7 +17,7 @@ inline std::uint64_t mix_bits(std::uint64_t a, std::uint64_t b) {
   return bits ^ (bits >> 31);
 }
 
-// mix_bits as a number in [0, 1).
+// Returns mix_bits(a, b) scaled to [0, 1).
 inline double unit_noise(std::uint64_t a, std::uint64_t b) {
   return static_cast<double>(mix_bits(a, b) >> 11) * 0x1p-53;
 }

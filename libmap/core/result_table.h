@@ -36,7 +36,7 @@ struct NamedResult {
   std::string description;             // one line
   ManifestValue type;                  // a default value of the type of `value`
   bool may_be_absent;                  // true for optionals
-  std::optional<ManifestValue> value;  // nullopt: null in JSON, omitted in the manifest
+  std::optional<ManifestValue> value;  // nullopt: null with --json, omitted in the manifest
 
  private:
   template <typename Found>
@@ -74,16 +74,16 @@ struct NamedResult {
   }
 };
 
-// Rule for combining a field of several tiles.
+// Rule for combining the values of a field from several tiles.
 enum class Merge { sum, max, min };
 
-// Field of a tile's result, stored in the progress of the tiles.
+// Field of a tile's result that is stored with the tile and merged over the tiles.
 struct TileField {
   std::string key;
   std::variant<const std::size_t*, const double*> field;
   Merge merge;
 
-  // Reads or sets the field. set() requires that the result is not constant.
+  // Returns or sets the value of the field. set() requires that the result struct is not const.
   ManifestValue value() const;
   void set(const ManifestValue& value) const;
 };
@@ -93,6 +93,7 @@ class ResultTable {
   ResultTable() = default;
   ResultTable(std::initializer_list<NamedResult> results) : results_(results) {}
 
+  // Adds a result; with `merge`, `field` (std::size_t or double) is also merged over tiles.
   template <typename Found>
   void add(std::string key, const Found& found, std::string description = {}) {
     results_.emplace_back(std::move(key), found, std::move(description));
@@ -108,13 +109,13 @@ class ResultTable {
     tile_fields_.push_back({std::move(key), &field, merge});
   }
 
-  // Adds the results of another table; keys begin with `prefix`.
+  // Adds the results of another table, not its tile fields, with `prefix` before each key.
   void append(const std::string& prefix, ResultTable table);
 
   const std::vector<NamedResult>& results() const { return results_; }
   const std::vector<TileField>& tile_fields() const { return tile_fields_; }
 
-  // Merges the fields of a tile, a table with the same keys, into the fields of this table.
+  // Merges the tile fields of `tile`, a table with the same keys, into those of this table.
   void merge(const ResultTable& tile) const;
 
  private:

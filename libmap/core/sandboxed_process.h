@@ -29,7 +29,7 @@ class SandboxedProcess {
 
   // Reads the next bytes. Returns false if the child ended before it had written `count` bytes.
   bool read(void* bytes, std::size_t count);
-  // Waits for the child and returns the cause of the end: "" or " (signal 11)".
+  // Closes the connection, waits for the child and returns " (signal 11)" after a crash, else "".
   std::string end();
 
  private:
@@ -105,8 +105,9 @@ class SandboxReader {
   std::string broken_;
 };
 
-// Calls make() in a child process and returns the result or throws the Error of make(). pass(end,
-// result) sends and receives the result. Throws Error with reason `broken` if the child crashes.
+// Calls make() in a child process and returns the result or throws the Error of make(). pass(io,
+// result) transfers the result: `io` is a SandboxWriter in the child and a SandboxReader in this
+// process. Throws Error with the reason `broken` if the child crashes.
 template <typename Result, typename Make, typename Pass>
 Result run_sandboxed(std::uint64_t max_data_bytes, const std::string& broken, const Make& make,
                      const Pass& pass) {

@@ -11,8 +11,7 @@ namespace libmap {
 
 using StageTimings = std::vector<std::pair<std::string, double>>;  // step, seconds
 
-// Adds the time from construction to destruction, also after an exception. Times of equal names are
-// summed.
+// Adds the time from its construction to its destruction to `timings_s`; sums times of equal names.
 class StageTimer {
  public:
   StageTimer(StageTimings& timings_s, std::string name)

@@ -80,7 +80,7 @@ std::int64_t large_integer_of(const TextLine& line, std::size_t word, const std:
   require_word(line, word, file);
   const std::optional<std::int64_t> value = parse_integer(line.words[word]);
   if (!value)
-    throw in_line("not a whole number", line, file, std::string(line.words[word]), "of 64 bits");
+    throw in_line("not a whole number of 64 bits", line, file, std::string(line.words[word]));
   return *value;
 }
 
@@ -88,7 +88,7 @@ int integer_of(const TextLine& line, std::size_t word, const std::string& file) 
   require_word(line, word, file);
   const std::optional<int> value = parse_int(line.words[word]);
   if (!value)
-    throw in_line("not a whole number", line, file, std::string(line.words[word]), "of 32 bits");
+    throw in_line("not a whole number of 32 bits", line, file, std::string(line.words[word]));
   return *value;
 }
 
@@ -101,12 +101,12 @@ Error in_line(const std::string& reason, const TextLine& line, const std::string
 
 Error wrong_columns(const std::string& reason, const TextLine& line, const std::string& file,
                     std::string bound) {
-  return in_line(reason, line, file, std::to_string(line.words.size()) + " columns",
+  return in_line(reason, line, file, std::to_string(line.words.size()) + " columns long",
                  std::move(bound));
 }
 
 Error duplicate(const TextLine& line, const std::string& record, const std::string& file) {
-  return in_line("is a duplicate", line, file, record);
+  return in_line("occurs twice", line, file, record);
 }
 
 void require_room_for_text(std::uint64_t rows, std::uint64_t words, std::uint64_t bytes,
@@ -123,10 +123,10 @@ Pose pose_of(const TextLine& line, const Eigen::Vector3d& translation,
   constexpr double length_tolerance = 0.05;
   const double length = rotation.norm();
   if (!(std::abs(length - 1.0) <= length_tolerance))
-    throw in_line("not a rotation", line, file, to_text(length), "a quaternion of length 1");
+    throw in_line("not the length of a unit quaternion", line, file, to_text(length), "1 +- 5 %");
   const double distance = translation.cwiseAbs().maxCoeff();
   if (!(distance <= max_position_m))
-    throw in_line("position out of range", line, file, to_text(distance), "<= 1e8 m");
+    throw in_line("a coordinate is too large", line, file, to_text(distance), "<= 1e8 m");
   return make_pose(translation, rotation);
 }
 

@@ -15,7 +15,7 @@
 namespace libmap {
 
 struct TextLine {
-  std::size_t number = 0;  // from 1
+  std::size_t number = 0;  // number of the line in its file, from 1
   std::string_view text{};
   std::vector<std::string_view> words{};
 };
@@ -36,45 +36,45 @@ class LineReader {
   std::array<bool, 256> is_separator_{};
 };
 
-// Returns the words of one line, separated by blanks.
+// Returns the words of one line, separated by white space.
 std::vector<std::string_view> words_of(std::string_view line);
 
 // Returns all lines with at least one word, including comments. Words are separated by spaces,
 // tabs, commas and semicolons. A byte order mark is skipped.
 std::vector<TextLine> split_lines(std::string_view text);
 
+// True for a line that begins with '#'. The line must have a word.
 inline bool is_comment(const TextLine& line) { return line.words.front().front() == '#'; }
-
-// Returns "line 12".
+// Returns "line 12", the field of errors.
 std::string name_of(const TextLine& line);
 
-// Returns words `first` to `first + count - 1` as finite numbers, or one word as an integer of 32
-// or 64 bits. Throws Error naming file and line if a word is missing or invalid.
+// Return the words from index `first` to `first + count - 1` as finite numbers, or the word at an
+// index as an integer of 32 or 64 bits. Throw Error naming file and line: missing or invalid word.
 std::vector<double> numbers_of(const TextLine& line, std::size_t first, std::size_t count,
                                const std::string& file);
 int integer_of(const TextLine& line, std::size_t word, const std::string& file);
 std::int64_t large_integer_of(const TextLine& line, std::size_t word, const std::string& file);
 
-// Returns an error with a reason in a line of `file`.
+// Returns the error "FILE: line N is VALUE: REASON (must be BOUND)".
 Error in_line(const std::string& reason, const TextLine& line, const std::string& file,
               std::string value, std::string bound = {});
-// Returns an error for a line with a wrong number of words.
+// Returns the error "FILE: line N is 7 columns long: REASON (must be BOUND)" for 7 words.
 Error wrong_columns(const std::string& reason, const TextLine& line, const std::string& file,
                     std::string bound);
-// Returns an error for a record that an earlier line has already defined.
+// Returns an error for a record, e.g. "node 7", that an earlier line has already defined.
 Error duplicate(const TextLine& line, const std::string& record, const std::string& file);
 
-// Throws Error if `bytes` bytes are too few for `rows` lines of `words` words each. `what` is the
-// plural name of the rows in the error.
+// Throws Error if `bytes` bytes are too few for `rows` lines of `words` words each. `what` names
+// the rows in the error, e.g. "points".
 void require_room_for_text(std::uint64_t rows, std::uint64_t words, std::uint64_t bytes,
                            const std::string& what);
 
-// Returns a pose read from a line. Throws Error if the quaternion's length differs from 1 by more
-// than 5 % or a coordinate exceeds 1e8 m.
+// Returns the pose of a translation (m) and a quaternion from a line. Throws Error if the length of
+// the quaternion differs from 1 by more than 5 % or a coordinate is outside -1e8 to 1e8 m.
 Pose pose_of(const TextLine& line, const Eigen::Vector3d& translation,
              const Eigen::Quaterniond& rotation, const std::string& file);
 
-// Returns numbers as words with a space before each.
+// Returns numbers as text, with a space before each.
 std::string to_words(std::initializer_list<double> numbers);
 // Returns the quaternion of a pose's rotation with qw >= 0.
 Eigen::Quaterniond quaternion_of(const Pose& pose);

@@ -12,7 +12,7 @@ namespace {
 
 void require_length(const std::string& what, std::size_t length, std::size_t wanted) {
   if (length == wanted) return;
-  throw Error("does not match the mesh, which needs " + std::to_string(wanted),
+  throw Error("does not match the mesh, which needs " + std::to_string(wanted) + " values",
               {.field = what, .value = std::to_string(length) + " values long"});
 }
 

@@ -31,16 +31,16 @@ struct TriangleMesh {
 // have; keeps everything if one mesh has no vertices. Throws Error for more than 2^32 - 1 vertices.
 void append_mesh(const TriangleMesh& more, TriangleMesh& mesh);
 
-// Normal of a triangle; the length is twice the triangle's area, m2.
+// Returns the normal of a triangle; its length is twice the triangle's area, m2.
 Eigen::Vector3d area_normal(const TriangleMesh& mesh, const Triangle& triangle);
 
-// Surface area in m2.
+// Returns the surface area in m2.
 double surface_area(const TriangleMesh& mesh);
 
-// Signed volume in m3 by the divergence theorem; for a closed mesh, the enclosed volume.
+// Returns the signed volume in m3 by the divergence theorem: the enclosed volume of a closed mesh.
 double signed_volume(const TriangleMesh& mesh);
 
-// Unit vertex normals, area-weighted means of the adjacent triangles' normals; 0 without triangles.
+// Returns unit vertex normals, area-weighted means of adjacent triangles' normals; 0 without any.
 std::vector<Eigen::Vector3f> estimate_vertex_normals(const TriangleMesh& mesh);
 
 // Texture coordinates of a triangle's corners: 0 to 1 over the width and height of the texture

@@ -19,8 +19,8 @@ namespace libmap {
 inline constexpr std::uint64_t max_yaml_bytes = std::uint64_t{16} << 20;
 
 // Calls `read` with the single document in `text`, a null node if the text is empty. Throws Error
-// naming `file` if the text is not YAML or contains several documents; adds `file` to Errors of
-// `read`.
+// naming `file` if the text is not YAML or contains several documents or more than 500,000 values;
+// adds `file` to Errors of `read`.
 void read_yaml(const std::string& text, const std::string& file,
                const std::function<void(const YAML::Node&)>& read);
 

@@ -8,8 +8,8 @@
 
 namespace libmap {
 
-// Disjoint sets of the numbers 0..count-1, initially one per number. find() returns the smallest
-// number of a set as the set's name; join() merges two sets.
+// Disjoint sets of the numbers 0..count-1, initially one per number. find(n) returns the smallest
+// number of the set that contains n; join(a, b) merges the sets that contain a and b.
 template <typename Index>
 class DisjointSets {
  public:

@@ -23,19 +23,19 @@ struct NormalEquations {
 
 struct LevenbergMarquardtOptions {
   int max_iterations = 100;
-  double tolerance = 1e-6;  // converged when a step lowers the cost by less than this share
-  double rounding = 1e-12;  // share by which rounding may raise the cost
-  int max_rejected = 8;     // consecutive steps that raise the cost
+  double tolerance = 1e-6;  // relative decrease of the cost below which the state has converged
+  double rounding = 1e-12;  // relative increase of the cost that is accepted as rounding
+  int max_rejected = 8;     // maximum number of consecutive rejected steps
   double first_damping = 1e-6;
-  double min_damping = 1e-9;     // divided by 10 after an accepted step
-  double raised_damping = 1e-4;  // minimum after a rejected step; multiplied by 100
+  double min_damping = 1e-9;     // minimum; an accepted step divides the damping by 10
+  double raised_damping = 1e-4;  // minimum after a rejected step, which multiplies it by 100
 };
 
 struct LeastSquaresSummary {
   double initial_cost = 0.0;
   double final_cost = 0.0;
-  int iterations = 0;  // accepted and rejected
-  int accepted = 0;
+  int iterations = 0;  // accepted and rejected steps
+  int accepted = 0;    // accepted steps
   bool converged = false;
 };
 
@@ -83,7 +83,7 @@ struct GaussNewtonSummary {
 
 // Gauss-Newton for problems with weights or correspondences that change in each step (ICP,
 // iteratively reweighted least squares), so that costs cannot be compared. `step()` linearizes,
-// moves the state and returns a StepState; it is called until that is not `moving`.
+// moves the state and returns a StepState; it is called while it returns `moving`.
 template <typename Step>
 GaussNewtonSummary gauss_newton(int max_iterations, const Step& step) {
   GaussNewtonSummary summary;

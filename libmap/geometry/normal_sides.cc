@@ -70,9 +70,10 @@ double opposing_fraction(const std::vector<Eigen::Vector3d>& positions,
 
 std::string disagreement_text(double fraction, double opposing) {
   const auto percent = [](double value) { return to_fixed_text(100.0 * value, 1) + " %"; };
-  return "its normals do not agree on a side: " + percent(fraction) + " are on the larger one (" +
-         percent(min_agreeing_fraction) + " decide), " + percent(opposing) +
-         " of neighbors face opposite sides";
+  return "its normals do not agree on an upper side: " + percent(fraction) +
+         " point to one side (minimum " + percent(min_agreeing_fraction) + "), and " +
+         percent(opposing) + " of neighbors to opposite sides (maximum " +
+         percent(max_opposing_fraction) + ")";
 }
 
 UpOfNormals up_of_normals(const std::vector<Eigen::Vector3d>& positions,

@@ -38,17 +38,17 @@ struct NormalVotes {
   bool agree() const { return fraction() >= min_agreeing_fraction; }
 };
 
-// Returns the share of neighboring points with normals on opposite sides, among the first 65536
-// points; 0.5 for random sides, 0 for too few points. Ignores neighbors across a crease, and NaN.
+// Returns the share of pairs of neighbors whose normals point to opposite sides, among the first
+// 65536 points: 0.5 for random sides, 0 for fewer than 100 pairs. Skips pairs at creases and NaN.
 double opposing_fraction(const std::vector<Eigen::Vector3d>& positions,
                          const std::vector<Eigen::Vector3f>& normals);
 
-// Returns the warning "its normals do not agree on a side: 52.0 % are on the larger one (...)".
+// Returns the warning "its normals do not agree on an upper side: 52.0 % point to one side (...".
 std::string disagreement_text(double fraction, double opposing);
 
 struct UpOfNormals {
   Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();  // unit
-  double fraction = 0.0;  // NormalVotes::share() of the normals; 0: no normals
+  double fraction = 0.0;  // NormalVotes::fraction() of the normals; 0: no normals
   double opposing = 0.0;  // opposing_fraction
   bool decided = false;   // true if the normals agree; else `direction` is +z
 };

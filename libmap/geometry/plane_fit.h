@@ -9,11 +9,11 @@
 
 namespace libmap {
 
-// Weighted sums over point offsets from a nearby origin.
+// Weighted sums over the offsets of points, m, from a nearby origin.
 struct PlaneMoments {
-  double weight = 0.0;
-  Eigen::Vector3d first = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
+  double weight = 0.0;                               // sum of the weights
+  Eigen::Vector3d first = Eigen::Vector3d::Zero();   // sum of weight * offset
+  Eigen::Matrix3d second = Eigen::Matrix3d::Zero();  // sum of weight * offset * offset^T
 
   void add(const Eigen::Vector3d& offset, double w) {
     weight += w;
@@ -31,8 +31,8 @@ struct PlaneMoments {
 // Principal axes of weighted points. The first axis is the plane normal, of either sign.
 struct PlaneSpread {
   Eigen::Vector3d center = Eigen::Vector3d::Zero();
-  Eigen::Vector3d variances = Eigen::Vector3d::Zero();  // ascending
-  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d variances = Eigen::Vector3d::Zero();  // along the axes, m2, ascending
+  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();   // unit vectors in columns
 
   // False for coincident points and for points with a second variance of at most `min_ratio` of the
   // largest: points on a line have no plane.

@@ -13,14 +13,14 @@ namespace libmap {
 
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
-// Matrix of the cross product: cross_matrix(a) * b = a x b.
+// Returns the matrix of the cross product: cross_matrix(a) * b = a x b.
 inline Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& a) {
   Eigen::Matrix3d matrix;
   matrix << 0.0, -a.z(), a.y(), a.z(), 0.0, -a.x(), -a.y(), a.x(), 0.0;
   return matrix;
 }
 
-// Exponential and logarithm of SO(3), rad; the logarithm has a length of at most pi.
+// Exponential and logarithm of SO(3): rotation of an axis * angle, rad, and back (angle 0 to pi).
 Eigen::Quaterniond rotation_of(const Eigen::Vector3d& rotation_vector);
 Eigen::Vector3d rotation_vector_of(const Eigen::Matrix3d& rotation);
 
@@ -28,7 +28,7 @@ Eigen::Vector3d rotation_vector_of(const Eigen::Matrix3d& rotation);
 // right Jacobian of SO(3). The derivative of rotation_vector_of(exp(r) * R) is the transpose.
 Eigen::Matrix3d rotation_vector_derivative(const Eigen::Vector3d& rotation_vector);
 
-Pose moved(const Pose& pose, const Vector6d& step);
+Pose moved(const Pose& pose, const Vector6d& step);  // moves a pose by a step in its own frame
 
 // Step from `from` to `to`, and the derivative of this step with respect to a step of `to`.
 Vector6d step_between(const Pose& from, const Pose& to);

@@ -35,8 +35,8 @@ class PointTree {
   NeighborPoint nearest(const Eigen::Vector3d& point) const;
   // Returns the nearest point with the lowest index. The tree must not be empty.
   NeighborPoint first_of_nearest(const Eigen::Vector3d& point) const;
-  // Returns the at most `count` points nearest to point n within `radius_m`, without point n, by
-  // ascending distance.
+  // Returns the points nearest to point n within `radius_m`, at most `count` and without point n,
+  // by ascending distance.
   std::vector<NeighborPoint> around(std::size_t n, std::size_t count, double radius_m) const;
   // Returns all points within `radius_m` by ascending index.
   std::vector<NeighborPoint> within(const Eigen::Vector3d& point, double radius_m) const;
@@ -46,17 +46,17 @@ class PointTree {
   std::unique_ptr<Index> index_;
 };
 
-// Median distance to the nearest point at another position, m, over at most 10000 points, spread
-// evenly over the list. If most points are near-duplicates (first and last returns, joined clouds),
-// they are merged and the result is by_area_m of the merged points. Returns 0 if all positions are
-// equal.
+// Returns the median distance, m, from a point to the nearest point at another position, over at
+// most 10000 points, spread evenly over the list. If most points are near-duplicates (first and
+// last returns, joined clouds), they are merged and the result is by_area_m of the merged points.
+// Returns 0 if all positions are equal.
 double median_spacing(const std::vector<Eigen::Vector3d>& points);
 
 struct CloudSpacing {
   double nearest_m = 0.0;  // median_spacing
   double by_area_m = 0.0;  // spacing of a square grid with as many points per area
 };
-// Both spacings of a cloud; 0 if all positions are equal.
+// Returns both spacings of a cloud, m; 0 if all positions are equal.
 CloudSpacing point_spacing(const std::vector<Eigen::Vector3d>& points);
 
 // Points in a hashed grid of cubes that starts at `origin`. nanoflann's dynamic tree takes 10 times
@@ -64,7 +64,7 @@ CloudSpacing point_spacing(const std::vector<Eigen::Vector3d>& points);
 // outside the box; the caller checks distances anyway.
 class GrowingGrid {
  public:
-  // Fastest for boxes of about `cell_m`.
+  // Searches are fastest in boxes with sides of about `cell_m`.
   GrowingGrid(const Eigen::Vector3d& origin, double cell_m, std::size_t expected_points)
       : origin_(origin), cells_per_m_(1.0 / cell_m) {
     std::size_t slots = 64;

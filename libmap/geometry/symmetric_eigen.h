@@ -12,7 +12,7 @@ struct SymmetricEigen {
   Eigen::Matrix<double, Size, Size> vectors;  // columns of unit length, one for each value
 };
 
-// Reads the lower triangle of `matrix`, which must be finite. Size is 3, 6 or Eigen::Dynamic.
+// Decomposes the lower triangle of `matrix`, which must be finite; Size is 3, 6 or Eigen::Dynamic.
 template <int Size>
 SymmetricEigen<Size> symmetric_eigen(const Eigen::Matrix<double, Size, Size>& matrix);
 

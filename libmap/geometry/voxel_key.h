@@ -17,7 +17,7 @@ struct VoxelSide {
   int side = 0;  // 0 or 1
 };
 
-// Cell indices are -limit..limit-1 along each axis.
+// pack() packs voxels with cell indices -limit..limit-1 along each axis; unpack() is its inverse.
 inline constexpr int voxel_cell_limit = 1 << 20;
 
 // Layout of a key: 21 bits per axis and one bit for the side.
@@ -47,7 +47,7 @@ inline std::size_t index_in_block(std::uint64_t key) {
                                   (key >> 43U & 3U) << 3U);
 }
 
-// The finaliser of SplitMix64 (Steele, Lea and Flood 2014).
+// The finalizer of SplitMix64 (Steele, Lea and Flood 2014).
 inline std::uint64_t scramble(std::uint64_t key) {
   key = (key ^ (key >> 30U)) * 0xbf58476d1ce4e5b9U;
   key = (key ^ (key >> 27U)) * 0x94d049bb133111ebU;
@@ -69,8 +69,7 @@ inline VoxelSide unpack(std::uint64_t key) {
   return {{cell(key >> 43U), cell(key >> 22U), cell(key >> 1U)}, static_cast<int>(key & 1U)};
 }
 
-// Position of a voxel on a Z-order curve (Morton 1966), with the side as the last bit. Neighbors in
-// space are close on the curve.
+// Returns the position of a key on a Z-order curve (Morton 1966), which keeps neighbors close.
 inline std::uint64_t z_order(std::uint64_t key) {
   return voxel_key::spread(key >> 43U) << 3U | voxel_key::spread(key >> 22U) << 2U |
          voxel_key::spread(key >> 1U) << 1U | (key & 1U);

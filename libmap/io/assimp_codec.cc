@@ -114,8 +114,8 @@ class MeshBuilder {
       corners.clear();
       for (unsigned k = 0; k < face.mNumIndices; ++k) {
         if (face.mIndices[k] >= part.mNumVertices)
-          throw Error("no such vertex", {.field = "face " + std::to_string(i),
-                                         .value = std::to_string(face.mIndices[k])});
+          throw Error("not a vertex index", {.field = "face " + std::to_string(i),
+                                             .value = std::to_string(face.mIndices[k])});
         corners.push_back(vertex(part, face.mIndices[k], root_from_node, normal_matrix));
       }
       std::vector<unsigned> indices(face.mIndices, face.mIndices + face.mNumIndices);
@@ -361,7 +361,7 @@ auto decode(const std::string& format, const Read& read, const Take& take) {
 DecodedModel decode_guarded(std::uint64_t file_bytes, const std::function<DecodedModel()>& decode) {
   // Memory for assimp's scene, the mesh and its bytes; a line of OBJ needs some hundred bytes.
   const std::uint64_t memory = (std::uint64_t{1} << 30) + 100 * file_bytes;
-  return run_sandboxed<DecodedModel>(memory, "is broken: the library for its format crashed on it",
+  return run_sandboxed<DecodedModel>(memory, "is damaged: assimp crashed while it read the file",
                                      decode, [](auto& pipe, DecodedModel& decoded) {
                                        TexturedMesh& model = decoded.model;
                                        pipe.array(model.mesh.vertices);

@@ -1,4 +1,4 @@
-// Reads and writes STL and GLB by assimp.
+// Reads and writes STL and GLB by the library assimp.
 #pragma once
 
 #include <cstdint>
@@ -11,17 +11,17 @@
 
 namespace libmap {
 
-// Decodes a mesh; `format` is "stl" or "glb". Equal corners become one vertex. Throws Error
-// (without the file's name) with assimp's reason.
+// Decodes the content of a file; `format` is "stl" or "glb". Equal corners become one vertex.
+// Throws Error without the file's name, with assimp's reason.
 TriangleMesh decode_by_assimp(const std::string& bytes, const std::string& format);
 
-// Texture image of a model: bytes of an embedded image, else the path as stored in the file.
+// Texture image of a model, embedded in the model's file or in a file of its own.
 struct TextureImage {
-  std::string bytes;
-  std::string path;
+  std::string bytes;  // file content of an embedded image; else empty
+  std::string path;   // as in the model's file; empty for an embedded image
 };
 
-// A mesh with undecoded texture pages: page_of_triangle contains indices of `images`.
+// A mesh whose texture pages are not decoded yet: page_of_triangle contains indices of `images`.
 struct DecodedModel {
   TexturedMesh model;
   std::vector<TextureImage> images;
@@ -30,16 +30,15 @@ struct DecodedModel {
 // Reads the .glb at `path`. Throws as decode_by_assimp does.
 DecodedModel decode_glb_model(const std::filesystem::path& path);
 
-// Encodes a mesh; `format` is "stl" or "glb". Throws Error if the mesh has no triangles, or if
-// assimp fails.
+// Returns the content of a file with the mesh; `format` is "stl" or "glb", `ascii` applies to STL.
+// Throws Error if the mesh has no triangles, or if assimp fails (failed).
 std::string encode_by_assimp(const TriangleMesh& mesh, const std::string& format, bool ascii);
 
-// Part of a model with one texture page. It has one texture coordinate per vertex, as in
-// TexturedMesh, or none without a page.
+// Part of a model with one texture page.
 struct ModelPart {
   TriangleMesh mesh;
-  std::vector<Eigen::Vector2f> texture_coordinates;
-  std::int32_t page = no_page;
+  std::vector<Eigen::Vector2f> texture_coordinates;  // per vertex, from the top left; or none
+  std::int32_t page = no_page;                       // index of an image
 };
 
 // Texture image as the bytes of a file; `format` is "png" or "jpg".

@@ -40,7 +40,7 @@ std::vector<std::string> names_of(const ColumnSet& set) {
 void require_unique(const std::vector<std::string>& names) {
   std::set<std::string_view> seen;
   for (const std::string& name : names)
-    if (!seen.insert(name).second) throw Error("is a duplicate", {.field = "field '" + name + "'"});
+    if (!seen.insert(name).second) throw Error("occurs twice", {.field = "field '" + name + "'"});
 }
 
 Triple require_positions(const ColumnSet& set) {

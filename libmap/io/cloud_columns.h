@@ -2,7 +2,7 @@
 //
 // Recognized names: x y z, X Y Z; normal_x .., nx .., Normals_0 ..; red green blue, r g b,
 // diffuse_red ... Three columns form a triple only if all three exist; all other columns become
-// scalar fields. Colors stored as fractions (float, none above 1) are scaled to 0-255.
+// scalar fields. Colors are scaled to 0-255 from 0-1 (floats, none above 1) or 0-65535 (uint16).
 #pragma once
 
 #include <cstddef>
@@ -22,8 +22,8 @@ struct CloudFromColumns {
   std::size_t dropped_points = 0;  // points with a position that is not finite
 };
 
-// Throws Error if x, y or z is missing, two fields have equal names, or a position is not finite
-// (with NotFinite::refuse).
+// Returns the columns as a cloud. Throws Error if x, y or z is missing, two columns have equal
+// names, or, with NotFinite::refuse, a position is not finite.
 CloudFromColumns cloud_from_columns(const ColumnSet& columns, NotFinite not_finite);
 
 // Returns the columns of the positions and, with `with_normals`, of the normals.
@@ -32,12 +32,12 @@ std::vector<Column> geometry_columns(const std::vector<Column>& columns, bool wi
 // Names of the normals' columns: nx ny nz (PLY, CSV) or normal_x normal_y normal_z (PCD).
 enum class NormalNames { short_names, long_names };
 
-// Returns views on `cloud`, which must outlive the views. Positions are declared float32, or
-// float64 if float32 would move a coordinate by more than 1e-5 m. Throws Error if a reader would
-// take fields for positions, normals or colors because of the names.
+// Returns columns that view `cloud`, which must outlive them. Positions are declared float32, or
+// float64 if float32 would move a coordinate by more than 1e-5 m. Throws Error if fields have the
+// recognized names of positions, normals or colors, as which they would be read back.
 ColumnSet columns_of_cloud(const PointCloud& cloud, NormalNames names);
 
-// Appends columns that view the given arrays, which must outlive `set`.
+// Append columns as columns_of_cloud does; they view the arrays, which must outlive `set`.
 void add_position_columns(const std::vector<Eigen::Vector3d>& positions, ColumnSet& set);
 void add_normal_columns(const std::vector<Eigen::Vector3f>& normals, NormalNames names,
                         ColumnSet& set);
@@ -47,10 +47,10 @@ void add_field_columns(const std::vector<ScalarField>& fields, ColumnSet& set);
 // Returns the columns as scalar fields. Throws Error if two columns have equal names.
 std::vector<ScalarField> fields_of_columns(const ColumnSet& columns);
 
-// Unpacks PCL's packed color 0xAARRGGBB (bytes from `first`) into columns red, green, blue;
-// with_packed_color packs these columns, if all three exist, into a column `rgb`.
+// Adds columns red, green, blue that view packed colors of PCL (0xAARRGGBB), the first at `first`.
 void add_packed_color_columns(const std::byte* first, std::size_t stride, bool big_endian,
                               ColumnSet& set);
+// Returns the columns with red, green, blue packed into a column `rgb`, if all three exist.
 ColumnSet with_packed_color(const ColumnSet& columns);
 
 // True if float32 would move a coordinate by more than 1e-5 m.

@@ -289,7 +289,7 @@ void PcdPartsWriter::append(const PointCloud& part) {
   if (header_.empty())
     file_ << header;
   else if (header != header_)
-    throw Error("the parts of the cloud have different fields", {.file = path_.string()});
+    throw Error("the parts have different fields or viewpoints", {.file = path_.string()});
   header_ = header;
   encode_pcd_points(set, FileEncoding::binary, file_);
   require_good();

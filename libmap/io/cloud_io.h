@@ -37,21 +37,20 @@ struct CloudReadResult {
 };
 
 // Returns the file itself, or the cloud files of a folder in the order of names, without hidden
-// files. Throws Error if the path does not exist or the folder contains no cloud file.
+// files. Throws Error if the file is missing or no cloud, or the folder contains no cloud file.
 std::vector<std::filesystem::path> cloud_tiles(const std::filesystem::path& file_or_folder);
 
 // Reads a file, or all files of a folder into one cloud with the info of the last file. A file
-// without points is an empty cloud. Throws Error naming the file if it cannot be read, is invalid
-// or truncated, or has no fields x, y and z.
+// without points is an empty cloud; each DEM is in its own local frame. Throws Error naming the
+// file if it cannot be read, is invalid or truncated, or has no fields x, y and z.
 CloudReadResult read_cloud(const std::filesystem::path& path);
 
-// Reads the header only if the format has one (PCD, PLY); CSV is read completely. Throws as
-// read_cloud does.
+// Reads the header only, except for CSV, which is read completely. Throws as read_cloud does.
 GeometryFileInfo read_cloud_info(const std::filesystem::path& path);
 
 // Writes directly to `path`; for atomic output, pass the temporary path of an OutputFile. Throws
-// Error for an unknown extension, a field name that the format does not support or a reader would
-// take for another attribute, and a failed write (ErrorKind::failed).
+// Error for an unknown extension, a field name that the format cannot store or that would be read
+// back as a position, normal or color, and a failed write (failed).
 void write_cloud(const std::filesystem::path& path, const PointCloud& cloud,
                  const GeometryWriteOptions& options = {});
 
@@ -67,33 +66,34 @@ void refuse_vtp(const std::filesystem::path& path);
 // Returns the extension in lower case, e.g. ".ply".
 std::string format_of(const std::filesystem::path& path);
 
-// Returns the first MiB of a file, which is longer than any header.
+// Returns the first MiB of a file, or all of a shorter file; headers are shorter.
 std::string read_head(const std::filesystem::path& path);
 
-// Returns the content of a file. Throws Error if it is missing, a folder, not readable or empty.
+// Returns the content of a file. Throws Error if it is missing, a folder, unreadable or empty.
 std::shared_ptr<const std::string> read_geometry_bytes(const std::filesystem::path& path);
 
-// Opens `path` and calls write(stream). Adds the file to Errors. Throws Error (failed) if the file
-// was not written completely.
+// Creates the file `path` and calls write(stream). Adds the file to Errors of `write`. Throws Error
+// (failed) if the file was not written completely.
 void write_geometry_file(const std::filesystem::path& path,
                          const std::function<void(std::ostream&)>& write);
 
 struct PcdPartsOptions {
   std::uint64_t points = 1;        // total of all parts, at least 1
-  bool float64_positions = false;  // else float32; write_cloud's choice for the whole cloud
+  bool float64_positions = false;  // else float32; need_float64 (cloud_columns.h) of all points
 };
 
-// Writer of a binary PCD in parts, so that only one part is in memory. The file is identical to the
-// file of write_cloud for all parts in one cloud.
+// Writes a binary PCD part by part, so that only one part is in memory. The file is identical to
+// the file that write_cloud writes for one cloud of all parts.
 class PcdPartsWriter {
  public:
-  // Opens `path`, to which it writes directly, as write_cloud does. Throws Error (failed).
+  // Creates the file and writes directly to it, as write_cloud does. Throws Error (failed).
   PcdPartsWriter(std::filesystem::path path, const PcdPartsOptions& options);
 
-  // Appends a part; empty parts are skipped. Throws Error if fields, normals or colors differ from
-  // the first part, the total exceeds `points`, or the write fails (ErrorKind::failed).
+  // Appends a part; empty parts are skipped. Throws Error if fields, normals, colors or viewpoint
+  // differ from the first part, the total exceeds `points`, or the write fails (failed).
   void append(const PointCloud& part);
-  // Call it after the last part. Throws Error if the total is below `points` or the write fails.
+  // Closes the file after the last part. Throws Error if the total is below `points`, or the write
+  // fails (failed).
   void finish();
 
  private:

@@ -1,7 +1,8 @@
-// Reads a terrain that is stored in one or many cloud files, in blocks. For binary PCD and binary
-// PLY without vertex lists, memory is proportional to the size of a block. Files of other encodings
-// are read completely, one at a time. Only positions and normals are read. All DEMs (.tif) are in
-// the local frame of the first DEM.
+// Reads a terrain that is stored in one or many cloud files ("tiles"), in blocks or by rectangle.
+//
+// In blocks, only positions and normals are read. For binary PCD and binary PLY without vertex
+// lists, memory is proportional to the size of a block. Files of other encodings are read
+// completely, one at a time. All DEMs (.tif) are in the local frame of the first DEM.
 #pragma once
 
 #include <cstddef>
@@ -22,15 +23,14 @@ namespace libmap {
 // Stream of all points of all files in order, in blocks of PointStream::block_points.
 class TileStream : public PointStream {
  public:
-  // Reads the headers. Throws Error naming the file if it cannot be read, or if only some files
-  // have normals or are DEMs. If the files' viewpoints differ, the viewpoint is the identity
-  // (unknown).
+  // Reads the headers. Throws Error naming the file if it cannot be read, if only some files have
+  // normals, or if only some are DEMs.
   explicit TileStream(std::vector<std::filesystem::path> tiles);
 
   const std::vector<std::filesystem::path>& tiles() const { return tiles_; }
   bool has_normals() const { return has_normals_; }
-  const Pose& viewpoint() const { return viewpoint_; }
-  // Georeference of the first DEM; nullopt for other files.
+  const Pose& viewpoint() const { return viewpoint_; }  // the identity if those of the files differ
+  // Georeference of the first DEM; nullopt without DEMs.
   const std::optional<Georeference>& georeference() const { return georeference_; }
   void for_each_block(Need need, const Visit& visit) const override;
 
@@ -42,36 +42,36 @@ class TileStream : public PointStream {
 };
 
 struct TileInfo {
-  std::size_t points = 0;  // points with a finite position
-  std::size_t dropped_points = 0;
-  Bounds3d box;
+  std::size_t points = 0;          // points with a finite position
+  std::size_t dropped_points = 0;  // other points
+  Bounds3d box;                    // of the finite positions, m; zeros without points
 };
-// Reads a file and returns the number and bounding box of the points. `georeference` is the
-// TileStream's. Throws Error naming the file if it cannot be read.
+// Reads a file and returns the number and bounding box of its points. DEMs are read in the frame of
+// `georeference`, that of the TileStream. Throws Error naming the file if it cannot be read.
 TileInfo read_tile_info(const std::filesystem::path& tile,
                         const std::optional<Georeference>& georeference = std::nullopt);
 
 struct TilesReadResult {
-  PointCloud cloud;
-  std::size_t dropped_points = 0;
+  PointCloud cloud;                // positions and normals
+  std::size_t dropped_points = 0;  // points whose position is not finite
 };
-// Reads all files into memory. Throws as TileStream does.
+// Reads all files into one cloud. Throws as TileStream does.
 TilesReadResult read_tiles(const std::vector<std::filesystem::path>& tiles);
 
-// Access to the points of a terrain in one or many cloud files by rectangle, with their normals,
-// colors and fields. Memory depends on the size of a file and of the result.
+// Reads the points in a rectangle from one or many cloud files, with normals, colors and fields.
+// Each DEM is in its own local frame. Memory depends on the size of a file and of the result.
 class TileIndex {
  public:
-  // Reads each file once and calls visit(cloud). Throws Error naming the file if it cannot be read,
-  // or if only some files have normals.
+  // Reads each file once and calls visit(cloud) unless it is empty. Throws Error naming the file if
+  // it cannot be read, or if only some files have normals.
   using Visit = std::function<void(const PointCloud& tile)>;
   TileIndex(std::vector<std::filesystem::path> tiles, const Visit& visit);
 
-  std::size_t points() const { return points_; }
-  std::size_t dropped_points() const { return dropped_; }  // points that are not finite
+  std::size_t points() const { return points_; }           // of all files, with finite positions
+  std::size_t dropped_points() const { return dropped_; }  // other points
 
-  // Returns the points with low <= (x, y) < high in the order of the files, with the colors and
-  // fields that all files in the rectangle have. Caches the last files, up to 4 million points.
+  // Returns the points with low <= (x, y) < high, m, in the order of the files, with the colors and
+  // fields that all files with such points have. Caches the last files, up to 4 million points.
   PointCloud points_in(const Eigen::Vector2d& low, const Eigen::Vector2d& high);
 
  private:

@@ -40,7 +40,7 @@ enum class StoredType {
   uint64
 };
 
-// Conversions between types in memory and in files (64-bit integers become float64).
+// Convert a type in a file to the type in memory and back (64-bit integers become float64).
 StoredType stored_as(ScalarType type);
 ScalarType scalar_type_of(StoredType type);
 // Size of a number in bytes.
@@ -52,7 +52,7 @@ struct Column {
   StoredType stored = StoredType::float32;  // type in memory
   const std::byte* first = nullptr;         // address of row 0
   std::size_t stride = 0;                   // bytes between rows
-  bool swapped = false;                     // true for the opposite byte order
+  bool swapped = false;                     // true: opposite of this machine's byte order
 };
 
 struct ColumnSet {
@@ -72,24 +72,25 @@ struct GeometryColumns {
   ColumnSet vertices;
   std::vector<Triangle> triangles;
   std::vector<std::uint32_t> face_of_triangle;  // row of `faces`
-  ColumnSet faces;
-  std::optional<Pose> viewpoint;
+  ColumnSet faces;                              // scalar fields of the faces
+  std::optional<Pose> viewpoint;                // cloud_from_sensor
 };
 
-// Content to encode; the pointers can be null.
+// Content to encode. Pointers other than `vertices` can be null.
 struct GeometryContent {
   const ColumnSet* vertices = nullptr;
-  const std::vector<Triangle>* triangles = nullptr;
-  const ColumnSet* faces = nullptr;  // one row per triangle
-  const Pose* viewpoint = nullptr;   // not written if it is the identity
+  const std::vector<Triangle>* triangles = nullptr;  // null for a cloud
+  const ColumnSet* faces = nullptr;                  // one row per triangle
+  const Pose* viewpoint = nullptr;  // cloud_from_sensor; not written if it is the identity
 };
 
-// Converts `value` to `type`: integers are rounded and clamped, NaN becomes 0.
+// Returns the value nearest to `value` that `type` can store. In integer types, NaN becomes 0.
 double as_type(double value, ScalarType type);
 // True if `type` can represent `value`; always true for float types.
 bool fits_type(double value, ScalarType type);
 
-// Returns word `word` of a line as a number of type `type`. Throws Error naming field and line.
+// Returns the word at an index as a number. Throws Error naming `field` and line if it is no number
+// that `type` can represent.
 double number_of(const TextLine& line, std::size_t word, const std::string& field, ScalarType type);
 
 // Calls body(row, value) for each row.
@@ -102,11 +103,11 @@ void for_each_value_in_parallel(const Column& column, std::size_t rows, const Bo
 // Appends rows begin..end-1 as packed records, each column converted to Column::type.
 void append_records(const std::vector<Column>& columns, std::size_t begin, std::size_t end,
                     bool swap_bytes, std::string& out);
-std::size_t record_size(const std::vector<Column>& columns);
+std::size_t record_size(const std::vector<Column>& columns);  // bytes per packed record
 // Appends rows begin..end-1 as text, each number in the shortest form that is read back exactly.
 void append_rows_of_text(const std::vector<Column>& columns, std::size_t begin, std::size_t end,
                          char separator, std::string& out);
-// Writes all rows in blocks. append(begin, end, text) appends the bytes of rows begin..end-1.
+// Writes all rows in blocks. append(begin, end, text) appends rows begin..end-1 to `text`.
 void write_rows(
     std::size_t rows, std::ostream& out,
     const std::function<void(std::size_t begin, std::size_t end, std::string& text)>& append);
@@ -176,13 +177,13 @@ void for_each_value_in_parallel(const Column& column, std::size_t rows, const Bo
   });
 }
 
-// Records of a binary file, for reading it in blocks.
+// Layout of the points in a binary file, for reading them in blocks.
 struct BinaryRecords {
-  std::uint64_t begin = 0;  // offset of the first record in the file
-  std::size_t bytes = 0;    // size of a record
-  std::uint64_t count = 0;
-  std::vector<Column> columns;  // views on a block of records that the caller owns
-  Pose viewpoint = Pose::Identity();
+  std::uint64_t begin = 0;            // offset of the first record in the file
+  std::size_t bytes = 0;              // size of a record
+  std::uint64_t count = 0;            // number of records
+  std::vector<Column> columns;        // views on a block of records that the caller owns
+  Pose viewpoint = Pose::Identity();  // cloud_from_sensor
 };
 
 }  // namespace libmap

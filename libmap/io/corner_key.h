@@ -12,7 +12,7 @@
 
 namespace libmap {
 
-// Bits of a corner's position (float64), normal (float32) and color.
+// Key of a corner: the bits of its position (float64), normal (float32) and color.
 using Corner = std::array<std::uint32_t, 6 + 3 + 1>;
 
 struct CornerHash {
@@ -40,8 +40,8 @@ inline Corner corner_of(const Eigen::Vector3d& position, const Eigen::Vector3f& 
 
 class CornerWelder {
  public:
-  // Adds a corner to the mesh, with its normal and its color if they are not nullptr. Returns its
-  // vertex: an equal one, or a new one.
+  // Adds a corner to the mesh, with its normal and its color if they are not nullptr. Returns the
+  // index of its vertex: that of an equal earlier corner, or of a new vertex.
   std::uint32_t vertex(const Eigen::Vector3d& position, const Eigen::Vector3f* normal,
                        const Color* color, TriangleMesh& mesh) {
     const Corner corner =

@@ -16,7 +16,7 @@ enum class FileEncoding { ascii, binary, binary_compressed };
 struct GeometryWriteOptions {
   FileEncoding encoding =
       FileEncoding::binary;  // a format without this encoding uses the nearest one
-  bool big_endian = false;   // PLY, binary
+  bool big_endian = false;   // byte order of a binary PLY; no effect on other files
 };
 
 struct FileField {
@@ -28,12 +28,12 @@ struct FileField {
 };
 
 struct GeometryFileInfo {
-  std::string format;  // "pcd", "ply", "csv", "obj", "stl", "off", "glb"
+  std::string format;  // "pcd", "ply", "csv", "tif", "obj", "stl", "off", "glb"
   FileEncoding encoding = FileEncoding::binary;
   bool big_endian = false;
   std::uint64_t bytes = 0;           // size of the file
   std::uint64_t points = 0;          // points in the file, before any is dropped
-  std::uint64_t faces = 0;           // polygons
+  std::uint64_t faces = 0;           // number of polygons
   std::vector<FileField> fields;     // point fields with the file's names and order
   std::vector<std::string> skipped;  // content of the file that the reader ignores
 };

@@ -56,7 +56,7 @@ Error bad_line(const TextLine& line, const std::string& reason) {
 std::uint64_t index_of(const TextLine& line, std::size_t word, std::uint64_t limit) {
   const std::optional<std::int64_t> index = parse_integer(line.words[word]);
   if (!index || *index < 0 || static_cast<std::uint64_t>(*index) >= limit)
-    throw Error("not an index", {.field = name_of(line),
+    throw Error("not in range", {.field = name_of(line),
                                  .value = "'" + std::string(line.words[word].substr(0, 40)) + "'",
                                  .bound = "0 to " + std::to_string(limit) + " - 1"});
   return static_cast<std::uint64_t>(*index);
@@ -75,7 +75,7 @@ OffCounts read_off_counts(LineReader& lines) {
     throw Error("not an OFF file");
   line.words.erase(line.words.begin());
   if (line.words.empty()) lines.next(line);
-  if (line.words.size() < 2) throw Error("the OFF file has no counts");
+  if (line.words.size() < 2) throw Error("the numbers of vertices and faces are missing");
   constexpr std::uint64_t most = std::numeric_limits<std::uint32_t>::max();
   OffCounts counts{index_of(line, 0, most), index_of(line, 1, most)};
   require_room_for_text(counts.vertices, 3, lines.remaining(), "vertices");
@@ -340,7 +340,7 @@ void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh,
   mesh.check();
   for (std::size_t n = 0; n < mesh.vertices.size(); ++n)
     if (!mesh.vertices[n].allFinite())
-      throw Error("position is not finite",
+      throw Error("the position of this vertex is not finite",
                   {.file = path.string(), .field = "vertex", .value = std::to_string(n)});
   const std::string format = format_of(path);
   if (format == ".obj" || format == ".stl" || format == ".glb")

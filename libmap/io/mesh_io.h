@@ -45,21 +45,21 @@ std::vector<std::filesystem::path> mesh_tiles(const std::filesystem::path& file_
 
 // Writes directly to `path`; for atomic output, pass the temporary path of an OutputFile. Omits
 // attributes that the format does not have (the table above). Throws Error for an unknown
-// extension, a vertex that is not finite, an index out of range and a failed write
-// (ErrorKind::failed).
+// extension, a vertex that is not finite or too far away (require_single_precision, for .obj, .stl
+// and .glb), an index out of range and a failed write (failed).
 void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh,
                 const GeometryWriteOptions& options = {});
 
 // Throws Error unless the extension is a format that write_mesh supports.
 void require_mesh_format(const std::filesystem::path& path);
 
-// Throws Error if a coordinate exceeds the range of float32, as which these formats store it or
-// assimp reads it.
+// Throws Error if a coordinate exceeds the range of float32, in which .stl and .glb store it and
+// many programs read .obj. The error names `format`, e.g. ".stl".
 void require_single_precision(const TriangleMesh& mesh, const std::string& format);
 
-// Returns mesh if the file, or a file of the folder, contains faces, else cloud. Decides by the
-// extension, and for .ply by the header. Throws Error if the extension is unknown or the file
-// cannot be read.
+// Returns `mesh` if the file, or a file of the folder, contains faces, else `cloud`: by the
+// extension, and for .ply by the header. Throws Error if the extension is unknown or the header of
+// a .ply cannot be read.
 FileKind file_kind(const std::filesystem::path& path);
 
 }  // namespace libmap

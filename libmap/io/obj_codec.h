@@ -1,4 +1,4 @@
-// Decoder of Wavefront OBJ and MTL.
+// Decodes Wavefront OBJ and its material libraries (MTL).
 #pragma once
 
 #include <functional>
@@ -14,7 +14,7 @@ namespace libmap {
 // corners of one `v` line are one vertex with the mean `vn` of the corners as normal; `v` lines
 // with equal position, color and normal are merged. Vertices are in the order of first use; unused
 // ones are dropped. Normals and colors are kept only if all corners have them. Throws Error naming
-// the line for an invalid number, an index out of range, or a face with less than three corners.
+// the line for an invalid number, an index out of range, or a face with fewer than three corners.
 TriangleMesh decode_obj(std::string_view text);
 
 // Returns the mesh as decode_obj does, with its texture coordinates and the images of its

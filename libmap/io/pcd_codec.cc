@@ -80,7 +80,7 @@ HeaderLines read_lines(std::string_view file, PcdHeader& header) {
                   {.field = "line " + std::to_string(header.data_line - 1)});
     if (key == "COLUMNS") key = "FIELDS";
     if (!lines.try_emplace(key, words.begin() + 1, words.end()).second)
-      throw bad_header("is a duplicate", key);
+      throw bad_header("occurs twice", key);
     if (is_data) {
       header.data_begin = position;
       return lines;
@@ -268,7 +268,7 @@ std::uint32_t little_endian_u32(std::string_view bytes) {
 void add_compressed(const PcdHeader& header, std::string_view data, ColumnSet& set) {
   if (data.size() < 8 && header.points == 0)
     return add_binary(header, reinterpret_cast<const std::byte*>(data.data()), set);
-  if (data.size() < 8) throw Error("the compressed data have no size");
+  if (data.size() < 8) throw Error("the data are too short: the compressed size is missing");
   const std::uint64_t compressed = little_endian_u32(data);
   const std::uint64_t uncompressed = little_endian_u32(data.substr(4));
   if (compressed > data.size() - 8)
@@ -285,7 +285,7 @@ void add_compressed(const PcdHeader& header, std::string_view data, ColumnSet& s
                 std::to_string(uncompressed) + " bytes");
   // LZF expands 3 bytes to at most 264.
   if (uncompressed / 88 > compressed)
-    throw Error("the compressed data cannot contain " + std::to_string(uncompressed) + " bytes");
+    throw Error("the compressed data are too few for " + std::to_string(uncompressed) + " bytes");
   auto buffer = std::make_shared<std::string>(uncompressed, '\0');
   if (uncompressed > 0 &&
       (compressed == 0 ||
@@ -332,8 +332,8 @@ void add_text(const PcdHeader& header, std::string_view text, ColumnSet& set) {
       throw Error("the header declares " + std::to_string(header.points) + " points, but only " +
                   std::to_string(row) + " lines of data follow");
     if (line.words.size() != targets.size())
-      throw Error(name_of(line) + " contains " + std::to_string(line.words.size()) + " of " +
-                  std::to_string(targets.size()) + " numbers");
+      throw Error(name_of(line) + " contains " + std::to_string(line.words.size()) +
+                  " numbers instead of " + std::to_string(targets.size()));
     for (std::size_t i = 0; i < targets.size(); ++i) {
       const Target& target = targets[i];
       if (target.values == nullptr && target.packed == nullptr) continue;
@@ -354,7 +354,7 @@ void add_text(const PcdHeader& header, std::string_view text, ColumnSet& set) {
 void require_name(const Column& column) {
   const bool reserved = column.name == "_" || column.name == "rgb" || column.name == "rgba";
   if (reserved || column.name.find_first_of(" \t\r\n\v\f") != std::string::npos)
-    throw Error("this name cannot be used in a PCD header",
+    throw Error("a PCD header cannot store white space and the names _, rgb, rgba; rename it",
                 {.field = "field '" + column.name + "'"});
 }
 

@@ -15,11 +15,11 @@
 
 namespace libmap {
 
-// Reads the header only; `file_bytes` is the size of the whole file. Throws as decode_pcd does.
+// Reads the header only: `head` begins a file of `file_bytes` bytes. Throws as decode_pcd does.
 GeometryFileInfo pcd_info(std::string_view head, std::uint64_t file_bytes);
 
-// Returns the records of a binary file, with columns that view records at `block`; nullopt if the
-// file has another encoding. Throws Error as decode_pcd does.
+// Returns the layout of the points in a binary file, with columns that view records at `block`;
+// nullopt if the file has another encoding. Throws Error as decode_pcd does.
 std::optional<BinaryRecords> pcd_records(std::string_view head, std::uint64_t file_bytes,
                                          const std::byte* block);
 
@@ -28,8 +28,8 @@ std::optional<BinaryRecords> pcd_records(std::string_view head, std::uint64_t fi
 // invalid compressed data. The sizes are checked before memory is allocated.
 GeometryColumns decode_pcd(std::string_view bytes, const std::shared_ptr<const void>& owner);
 
-// Encoders of the header, of the points, and of both. Colors are written as packed `rgb`, TYPE U.
-// Throws Error for a field name that is not valid in a header, or more than 4 GiB to compress.
+// Encode the header, the points, and both. Colors are written as packed `rgb`, TYPE U. Throw Error
+// for a field name that is not valid in a header, or more than 2.8 GB to compress.
 std::string pcd_header(const ColumnSet& columns, std::uint64_t points, const Pose& viewpoint,
                        FileEncoding encoding);
 void encode_pcd_points(const ColumnSet& columns, FileEncoding encoding, std::ostream& out);

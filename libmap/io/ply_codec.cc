@@ -227,8 +227,8 @@ class RowReader {
         ascii_ ? line_.words.size() - word_
                : (cursor_.bytes->size() - cursor_.position) / size_of(property.type);
     if (!(length >= 0.0) || length > static_cast<double>(left))
-      throw Error("row " + std::to_string(row_) + " of " + quoted_name(element_) +
-                      " has a list longer than the data",
+      throw Error("the length of the list in row " + std::to_string(row_) + " of " +
+                      quoted_name(element_) + " does not fit the data",
                   {.field = property.name, .value = to_text(length)});
     return static_cast<std::uint64_t>(length);
   }
@@ -240,7 +240,7 @@ class RowReader {
  private:
   double text_number(const PlyProperty& property, StoredType type) {
     if (word_ >= line_.words.size())
-      throw Error(name_of(line_) + " ends before the number", {.field = property.name});
+      throw Error(name_of(line_) + " ends before this number", {.field = property.name});
     return number_of(line_, word_++, property.name, scalar_type_of(type));
   }
   double binary_number(StoredType type) {
@@ -293,14 +293,14 @@ void add_fan(const std::vector<double>& corners, std::uint64_t face, std::uint64
              GeometryColumns& content) {
   const std::string name = "face " + std::to_string(face);
   if (corners.size() < 3)
-    throw Error("too few corners",
+    throw Error("the number of corners is too small",
                 {.field = name, .value = std::to_string(corners.size()), .bound = ">= 3"});
   for (const double corner : corners)
     if (!(corner >= 0.0) || corner >= static_cast<double>(vertices) ||
         corner > std::numeric_limits<std::uint32_t>::max())
-      throw Error("no such vertex", {.field = name,
-                                     .value = to_text(corner),
-                                     .bound = "0 to " + std::to_string(vertices) + " - 1"});
+      throw Error("not a vertex index", {.field = name,
+                                         .value = to_text(corner),
+                                         .bound = "0 to " + std::to_string(vertices) + " - 1"});
   for (std::size_t i = 2; i < corners.size(); ++i) {
     content.triangles.push_back({static_cast<std::uint32_t>(corners[0]),
                                  static_cast<std::uint32_t>(corners[i - 1]),
@@ -391,7 +391,7 @@ PlyHeader checked_header(std::string_view head, std::uint64_t file_bytes) {
 void write_property_lines(const ColumnSet& set, std::ostream& out) {
   for (const Column& column : set.columns) {
     if (column.name.find_first_of(" \t\r\n\v\f") != std::string::npos)
-      throw Error("this name cannot be used in a PLY header",
+      throw Error("a PLY header cannot store names with white space; rename it",
                   {.field = "field '" + column.name + "'"});
     out << "property " << ply_type_name(column.type) << ' ' << column.name << '\n';
   }
@@ -490,7 +490,7 @@ void encode_ply(const GeometryContent& content, const GeometryWriteOptions& opti
                 std::ostream& out) {
   if (content.triangles != nullptr &&
       content.vertices->rows > std::numeric_limits<std::int32_t>::max())
-    throw Error("too many vertices for a PLY mesh",
+    throw Error("too many for a PLY mesh",
                 {.field = "vertices", .value = std::to_string(content.vertices->rows)});
   write_header(content, options, out);
   write_rows(*content.vertices, options, out);

@@ -1,7 +1,6 @@
-// In-memory encoder of VTP, ParaView's polygonal data, by VTK. Points of a cloud are vertex cells,
-// so that ParaView shows them. Normals are point normals, colors a uint8 x 3 array "rgb", scalar
-// fields arrays of the field's type. The viewpoint is a field array "viewpoint" (tx ty tz qw qx qy
-// qz).
+// In-memory encoder of VTP, ParaView's polygonal data, by VTK. Normals are point normals, colors a
+// uint8 x 3 array "rgb", scalar fields arrays of the field's type. The viewpoint is a field array
+// "viewpoint" (tx ty tz qw qx qy qz).
 #pragma once
 
 #include <ostream>
@@ -10,8 +9,9 @@
 
 namespace libmap {
 
-// Without triangles, every point is a vertex cell. VTK cannot parse NaN and infinity: arrays that
-// contain such values are written as binary. Throws Error (failed) if VTK fails.
+// Writes a file to `out`. Without triangles, every point is a vertex cell, so that ParaView shows
+// it. VTK cannot parse NaN and infinity as text: content with such values is written as binary
+// instead of ascii. Throws Error (failed) if VTK fails.
 void encode_vtp(const GeometryContent& content, FileEncoding encoding, std::ostream& out);
 
 }  // namespace libmap

@@ -1,5 +1,5 @@
-// Reader and writer of sparse models in COLMAP's text format (Schoenberger and Frahm 2016): a
-// folder with cameras.txt, images.txt and points3D.txt (https://colmap.github.io/format.html).
+// Reads and writes sparse models in COLMAP's text format (Schoenberger and Frahm 2016): a folder
+// with cameras.txt, images.txt and points3D.txt (https://colmap.github.io/format.html).
 // Numbers are written with the fewest digits that parse to the same number.
 //
 // In COLMAP, the center of the first pixel has u = 0.5, in this project 0. The scale and the axes
@@ -30,12 +30,12 @@ struct ColmapCamera {
 };
 
 // Returns a PINHOLE, OPENCV, FULL_OPENCV or OPENCV_FISHEYE camera. Throws Error for thin prism
-// distortion.
+// distortion, which COLMAP does not have, and as Camera::check does.
 ColmapCamera to_colmap(const Camera& camera);
 
 // A feature of an image.
 struct ColmapObservation {
-  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  // COLMAP's: centers at halves
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  // in COLMAP: pixel centers at 0.5
   std::int64_t point = -1;                          // POINT3D_ID; -1: no point
 };
 
@@ -54,9 +54,9 @@ struct ColmapTrackElement {
 
 // A line of points3D.txt: "POINT3D_ID X Y Z R G B ERROR TRACK[]".
 struct ColmapPoint {
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  // in COLMAP's world
   Color color{};
-  double error_px = -1.0;  // -1: unknown
+  double error_px = -1.0;  // mean reprojection error; -1: unknown
   std::vector<ColmapTrackElement> track{};
 };
 
@@ -66,8 +66,8 @@ struct ColmapModel {
   std::map<std::int64_t, ColmapPoint> points{};  // by POINT3D_ID
 };
 
-// Texts of the three files. parse_colmap_images throws Error naming `file` and line for missing
-// columns, invalid numbers, quaternions not of unit length and duplicate ids.
+// Parse and write the content of the files. parse_colmap_images throws Error naming `file` and line
+// for missing columns, invalid numbers, quaternions not of unit length and duplicate ids.
 std::map<int, ColmapImage> parse_colmap_images(std::string_view text, const std::string& file);
 std::string to_colmap_cameras(const ColmapModel& model);
 std::string to_colmap_images(const ColmapModel& model);

@@ -7,7 +7,7 @@
 
 namespace libmap {
 
-// Default tolerance between the images of a camera, s.
+// Default tolerance between the stamps of data that belong together, s.
 inline constexpr double pairing_tolerance_s = 0.02;
 
 // Returns pairs (index in `a`, index in `b`) with stamps that differ by at most `tolerance_s`, by

@@ -1,5 +1,5 @@
-// Errors of a trajectory against ground truth (Sturm et al. 2012, "A benchmark for the evaluation
-// of RGB-D SLAM systems").
+// Computes errors of a trajectory against ground truth (Sturm et al. 2012, "A benchmark for the
+// evaluation of RGB-D SLAM systems").
 #pragma once
 
 #include <cstddef>
@@ -11,7 +11,7 @@ namespace libmap {
 
 struct TrajectoryError {
   std::size_t poses = 0;  // number of compared poses
-  double rmse_m = 0.0;
+  double rmse_m = 0.0;    // root mean square error of the positions
   double mean_m = 0.0;
   double median_m = 0.0;
   double max_m = 0.0;
@@ -24,16 +24,16 @@ struct AbsoluteTrajectoryError : TrajectoryError {
   Pose truth_from_estimate = Pose::Identity();  // applied alignment
 };
 
-// Errors after a least-squares rigid alignment of positions and rotations (Umeyama 1991, without
-// scale; chordal distance of rotations). The relative weight of rotations is estimated from the
-// residuals. If the RMS distance of the positions from the principal axis is >= 0.5 m, only
-// positions are aligned. Poses are paired by node, or by time (within 20 ms) if nodes are unknown.
-// Throws Error for fewer than 3 pairs.
+// Returns the errors after a least-squares rigid alignment of positions and rotations (Umeyama
+// 1991, without scale; chordal distance of rotations). The relative weight of rotations is
+// estimated from the residuals. If the RMS distance of the positions from their principal axis is
+// >= 0.5 m, only positions are aligned. Poses are paired by node, or by time (within 20 ms) if a
+// pose has no node; poses without a partner are ignored. Throws Error for fewer than 3 pairs.
 AbsoluteTrajectoryError absolute_trajectory_error(const Trajectory& estimate,
                                                   const Trajectory& truth);
 
-// Errors of the motion between consecutive poses, paired as above. Throws Error for fewer than 2
-// pairs.
+// Returns the errors of the motions between consecutive pairs of poses, paired as above. Throws
+// Error for fewer than 2 pairs.
 TrajectoryError relative_trajectory_error(const Trajectory& estimate, const Trajectory& truth);
 
 }  // namespace libmap

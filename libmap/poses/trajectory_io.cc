@@ -73,7 +73,7 @@ NodePairs pair_by_order(const Trajectory& trajectory, const PoseGraph& graph,
   if (trajectory.size() != valid)
     std::erase_if(nodes, [&](const GraphNode* node) { return !has_stored_pose(node); });
   if (trajectory.size() != nodes.size())
-    throw Error("has neither node ids nor stamps, and not one pose per node of the scan",
+    throw Error("without node ids and stamps, one pose per node of the scan is required",
                 {.field = "poses",
                  .value = std::to_string(trajectory.size()),
                  .bound = std::to_string(valid)});

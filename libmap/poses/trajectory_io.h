@@ -1,5 +1,5 @@
-// Reader and writer of trajectory and pose graph files (formats: trajectory_text.h, colmap_io.h),
-// and assignment of poses to the nodes of a scan.
+// Reads and writes trajectory and pose graph files (formats: trajectory_text.h, colmap_io.h), and
+// assigns poses to the nodes of a scan.
 #pragma once
 
 #include <cstddef>
@@ -12,9 +12,9 @@
 
 namespace libmap {
 
-// Formats, with RTAB-Map's numbers. `automatic` recognizes the extensions .tum, .kitti, .g2o,
-// .toro; a folder or images.txt as a COLMAP model; other files (.txt, .graph, .csv) by content.
-// Formats 1 and 2, which have other axes, cannot be recognized and must be given.
+// Formats, with RTAB-Map's numbers, and their names in options. `automatic` recognizes the
+// extensions .tum, .kitti, .g2o, .toro; a folder or images.txt as a COLMAP model; other files
+// (.txt, .graph, .csv) by content. Formats 1 and 2, which have other axes, must be given.
 enum class TrajectoryFormat {
   automatic,
   tum,                 // 10, 11
@@ -49,20 +49,20 @@ TrajectoryFile read_trajectory(const std::filesystem::path& path,
 // Returns the file that read_trajectory reads: `path` itself, or the images.txt of a COLMAP model.
 std::filesystem::path file_of_trajectory(const std::filesystem::path& path);
 
-// Writes in the format of the extension, directly to `path` (the temporary of an OutputFile).
-// Throws Error for any other extension. .g2o and .toro also contain links, and node ids (1, 2, ...
-// if unknown). .tum has the node id as a ninth column if `nodes` is true or stamps repeat; not all
-// readers support this.
+// Writes in the format of the extension, directly to `path`; for atomic output, pass the temporary
+// path of an OutputFile. Throws Error for any other extension. .g2o and .toro also contain links,
+// and node ids (1, 2, ... if unknown). .tum has the node id as a ninth column if `nodes` is true or
+// stamps repeat; not all readers support this.
 void write_trajectory(const std::filesystem::path& path, const TrajectoryFile& trajectory,
                       bool nodes = false);
-// Writes in a given format. Throws Error for automatic, colmap and read-only formats.
+// Writes in a given format, as above. Throws Error for automatic, colmap and read-only formats.
 void write_trajectory_as(TrajectoryFormat format, const std::filesystem::path& path,
                          const TrajectoryFile& trajectory, bool nodes = false);
 
 // A trajectory assigned to the nodes of a scan.
 struct NodeTrajectory {
   Trajectory poses;           // with node and stamp, by ascending node
-  std::size_t unmatched = 0;  // number of dropped poses without a node
+  std::size_t unmatched = 0;  // number of poses that match no node, and are dropped
 };
 
 // Assigns poses to nodes: by node id if all poses have one, else by stamp within 20 ms if any pose

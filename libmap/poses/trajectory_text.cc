@@ -30,7 +30,6 @@ Pose pose_from_words(const TextLine& line, std::size_t first, const std::string&
                  Eigen::Quaterniond(n[6], n[3], n[4], n[5]), file);
 }
 
-// Returns x y z qx qy qz qw with a space before each.
 std::string pose_to_words(const Pose& pose) {
   const Eigen::Quaterniond q = quaternion_of(pose);
   const Eigen::Vector3d t = pose.translation();
@@ -62,8 +61,9 @@ Pose pose_of_rows(const TextLine& line, const std::vector<double>& numbers,
   const double deviation =
       (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
   if (!(deviation <= rotation_tolerance) || rotation.determinant() <= 0.0)
-    throw in_line("not a rotation", line, file, to_text(rotation.determinant()),
-                  "a rotation matrix, determinant 1");
+    throw in_line("not a rotation", line, file,
+                  "a matrix with determinant " + to_text(rotation.determinant()),
+                  "orthogonal, determinant 1");
   const Eigen::Matrix3d nearest = nearest_rotation(rotation);
   Pose pose = pose_of(line, matrix.col(3), Eigen::Quaterniond(nearest), file);
   pose.linear() = nearest;
@@ -105,7 +105,7 @@ Matrix6d information_from_words(const GraphFormat& format, const TextLine& line,
     for (int column = row; column < 6; ++column) {
       const double value = numbers[next++] / factor_of(format, row, column);
       if (!(std::abs(value) <= max_information))
-        throw in_line("information out of range", line, file, to_text(value), "<= 1e300");
+        throw in_line("information entry is too large", line, file, to_text(value), "<= 1e300");
       information(row, column) = value;
       information(column, row) = value;
     }

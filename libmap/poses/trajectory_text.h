@@ -1,4 +1,4 @@
-// Parsers and writers of text formats of trajectories and pose graphs. Numbers are written with the
+// Parses and writes text formats of trajectories and pose graphs. Numbers are written with the
 // fewest digits that parse to the same number, in any locale. Lines that begin with '#' are
 // comments. The parsers throw Error naming `file` and line for a wrong number of columns, numbers
 // that are not finite, invalid rotations, positions beyond 1e8 m and duplicate nodes.
@@ -13,11 +13,11 @@
 namespace libmap {
 
 // Returns text that parses to the same stamp, or to within 1e-9 s if that needs more decimals.
-// Without an exponent, which not all readers support.
+// The text has no exponent, which not all readers support.
 std::string stamp_text(double stamp_s);
 
-// TUM RGB-D benchmark: "stamp x y z qx qy qz qw", s and m, RTAB-Map's formats 1 and 10; with
-// `nodes` and the node as a ninth column, format 11. The parser accepts both, and commas.
+// TUM RGB-D benchmark: "stamp x y z qx qy qz qw", s and m (RTAB-Map's formats 1 and 10). With
+// `nodes`, the node is a ninth column (format 11). The parser accepts both, and commas.
 Trajectory parse_tum(std::string_view text, const std::string& file);
 std::string to_tum(const Trajectory& trajectory, bool nodes = false);
 
@@ -37,7 +37,7 @@ Trajectory parse_euroc(std::string_view text, const std::string& file);
 std::vector<ImagePose> parse_nerfstudio(std::string_view text, const std::string& file);
 
 struct PoseGraphText {
-  Trajectory poses;  // without stamps
+  Trajectory poses;  // with nodes, without stamps
   std::vector<PoseLink> links;
 };
 
@@ -48,8 +48,8 @@ struct PoseGraphText {
 // In g2o, the rotation error is the vector part of a quaternion, half the rotation vector: for
 // small angles q = (roll, pitch, yaw) / 2. A PoseLink's information refers to the angles, so rows
 // and columns of the rotation are multiplied by 2 in the file (the 3 x 3 block by 4) and divided by
-// 2 on reading. (RTAB-Map writes the matrix unchanged, so exports underestimate the information of
-// rotations.)
+// 2 on reading. (RTAB-Map writes the matrix unchanged, so its files underestimate the information
+// of rotations.)
 //
 // g2o has no types of links. Types are written as comments, "# graspmap:type 1 global closure",
 // that apply to the following edges; without them, edges to the next vertex are neighbors, others
@@ -74,7 +74,7 @@ enum class PoseAxes {
   optical,        // format 2: z forward, x right, y down, for the world and the moving body
   motion_capture  // format 1: optical axes for the moving body, other axes for the world
 };
-Pose from_axes(PoseAxes axes, const Pose& pose_in_file);
+Pose from_axes(PoseAxes axes, const Pose& pose_in_file);  // returns world_from_base
 Pose to_axes(PoseAxes axes, const Pose& world_from_base);
 
 // Recognizes the format of a text by the tag or the number of columns of the first line that is not

@@ -136,7 +136,7 @@ PointCloud read_dem_cloud(const fs::path& path, std::size_t* undeclared) {
   if (reader.info().pixels() > machine_memory() / (2 * sizeof(Eigen::Vector3d)))
     throw Error(
         "the points need more than half of the machine's memory; use a tile store (score -o "
-        "MAP.tiles), which reads it in blocks",
+        "MAP.tiles), which reads the file in blocks",
         {.file = path.string(),
          .field = "pixels",
          .value = std::to_string(reader.info().pixels())});

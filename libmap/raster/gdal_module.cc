@@ -100,7 +100,7 @@ class Dem {
     info_.rows = GDALGetRasterYSize(dataset_.get());
     const double pixels = static_cast<double>(info_.columns) * static_cast<double>(info_.rows);
     if (pixels > max_pixels)
-      throw Error("too large; crop the raster (gdal_translate -srcwin)",
+      throw Error("too many; crop the raster (gdal_translate -srcwin)",
                   {.field = "pixels", .value = to_text(pixels), .bound = "<= 2^33"});
     choose_band();
     choose_window();
@@ -158,11 +158,10 @@ class Dem {
     window_columns_ = std::max(1, columns);
     window_rows_ = std::max(1, rows);
     if (window_columns_ * window_rows_ > max_block_pixels)
-      throw Error(
-          "too large; convert it to tiles (gdal_translate -co TILED=YES -co COMPRESS=DEFLATE)",
-          {.field = "pixels of a strip or tile",
-           .value = std::to_string(window_columns_ * window_rows_),
-           .bound = "<= 2^24"});
+      throw Error("too many; convert to tiles (gdal_translate -co TILED=YES -co COMPRESS=DEFLATE)",
+                  {.field = "pixels of a strip or tile",
+                   .value = std::to_string(window_columns_ * window_rows_),
+                   .bound = "<= 2^24"});
     window_rows_ *= std::max<std::int64_t>(1, min_window_pixels / (window_columns_ * window_rows_));
   }
 
@@ -207,7 +206,7 @@ class Dem {
 
   void read_crs(OGRSpatialReferenceH srs, const Eigen::Vector2d& center) {
     if (OSRIsGeographic(srs) != 0 || OSRIsGeocentric(srs) != 0)
-      throw Error("the coordinates are in degrees; " + utm_remedy(srs, center),
+      throw Error("not a projected CRS, e.g. in degrees; " + utm_remedy(srs, center),
                   {.field = "CRS", .value = OSRGetName(srs) == nullptr ? "" : OSRGetName(srs)});
     const char* const options[] = {"FORMAT=WKT2_2019", "MULTILINE=NO", nullptr};
     char* wkt = nullptr;
@@ -216,13 +215,13 @@ class Dem {
     CPLFree(wkt);
     info_.georeference.unit_m = OSRGetLinearUnits(srs, nullptr);
     if (!(info_.georeference.unit_m > 1e-6 && info_.georeference.unit_m < 1e6))
-      throw Error("not a valid length",
+      throw Error("not between 1e-6 and 1e6 m",
                   {.field = "unit of the CRS, m", .value = to_text(info_.georeference.unit_m)});
   }
 
   void require_same_crs(const Georeference& frame) const {
     if (info_.georeference.crs_wkt != frame.crs_wkt || info_.georeference.unit_m != frame.unit_m)
-      throw Error("differs from the first file of the terrain", {.field = "CRS"});
+      throw Error("differs from that of the first file of the terrain", {.field = "CRS"});
   }
 
   double first_height() const {

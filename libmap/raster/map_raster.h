@@ -1,4 +1,4 @@
-// Converts clouds and maps to rasters (GeoTIFF): one band per field, one pixel per column.
+// Converts clouds and maps to rasters (GeoTIFF): one band per field, one pixel per vertical column.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,8 +16,8 @@ namespace libmap {
 
 // Grid of square pixels on the horizontal plane of a frame with z up.
 struct RasterGrid {
-  double pixel_size_m = 0.0;
-  Pose frame_from_points = Pose::Identity();
+  double pixel_size_m = 0.0;                  // > 0
+  Pose frame_from_points = Pose::Identity();  // from the frame of the clouds
   // In the frame: a corner of a pixel, and the unit direction of increasing columns.
   Eigen::Vector2d corner_m = Eigen::Vector2d::Zero();
   Eigen::Vector2d column_axis = Eigen::Vector2d::UnitX();
@@ -29,28 +29,29 @@ struct RasterBand {
   std::vector<float> values;  // NaN: no data
 };
 
-// Row-major raster from the north. Columns increase along `column_axis`, rows to the right of it.
+// Raster in row-major order. Columns increase along RasterGrid::column_axis, rows to its right.
 struct MapRaster {
   std::int64_t columns = 0;
   std::int64_t rows = 0;
-  Eigen::Matrix<double, 2, 3> frame_from_pixel;  // (column, row, 1) to m; corners are whole numbers
+  Eigen::Matrix<double, 2, 3> frame_from_pixel;  // (column, row, 1) to m; pixel corners are whole
   std::vector<double> heights_m;                 // z in the frame; NaN: no data
   std::vector<RasterBand> bands;                 // bands other than the height
   Georeference georeference;                     // georeference of the frame
 };
 
-// Calls the visitor with each part of a cloud. make_map_raster calls it twice.
+// Calls `visit` with each part of a cloud. make_map_raster calls a CloudParts function twice.
 using CloudParts = std::function<void(const std::function<void(const PointCloud&)>& visit)>;
 
 // Returns a raster in which each pixel has the height and fields of the topmost point, the first
 // one for equal heights. Bands are the scalar fields of the first part except i, j and k. Throws
-// Error if there are no points or the raster needs more than half of the machine's memory or has
-// 2^31 columns or rows.
+// Error if there are no points, the pixels are too small for their extent, or the raster needs more
+// than half of the machine's memory or has 2^31 columns or rows.
 MapRaster make_map_raster(const CloudParts& parts, const RasterGrid& grid);
 
 // Writes a tiled GeoTIFF (256 x 256 pixels, deflate) with overviews above 512 pixels: band 1
 // `height`, then the others; nodata is NaN. Values are float32, or float64 if float32 would move a
-// height by more than 1e-5 m. Throws Error (failed), also if graspmap was built without GDAL.
+// height by more than 1e-5 m. Throws Error if the WKT of the CRS is invalid; Error (failed) if the
+// file cannot be written, or if graspmap was built without GDAL.
 void write_map_raster(const std::filesystem::path& path, const MapRaster& raster);
 
 }  // namespace libmap

@@ -1,5 +1,5 @@
-// Interface of libgraspmap_raster_gdal.so, the only library that links GDAL with 140 dependencies.
-// This library is loaded on the first access to a GeoTIFF.
+// Interface of libgraspmap_raster_gdal.so, the only library that links GDAL, with its 140
+// dependencies. It is loaded on the first access to a GeoTIFF.
 #pragma once
 
 #include <filesystem>
@@ -12,11 +12,11 @@
 namespace libmap {
 
 struct RasterModule {
-  // Calls `head` once, then `block` for each block. Throws Error as DemReader does.
+  // Reads a DEM as DemReader does: calls head(info), then block(pixels) for each block.
   void (*read_dem)(const std::filesystem::path& path, const std::optional<Georeference>& frame,
                    const std::function<void(const DemInfo&)>& head,
                    const std::function<void(const DemBlock&)>& block);
-  // Throws Error (failed).
+  // Writes a GeoTIFF as write_map_raster does.
   void (*write_raster)(const std::filesystem::path& path, const MapRaster& raster);
 };
 

@@ -121,7 +121,7 @@ std::string side_by_side(const ReportParameters& parameters) {
   html += "</tr></thead><tbody>\n" + differ + "</tbody></table>\n";
   html = differ.empty() ? "" : scroll_box(html, "Differences");
   return html + "<details class=\"more\"><summary>Equal in all " +
-         std::to_string(parameters.outputs.size()) + "</summary>\n" +
+         std::to_string(parameters.outputs.size()) + " outputs</summary>\n" +
          scroll_box(pair_table("", same), "Equal in all") + "</details>\n";
 }
 

@@ -19,10 +19,11 @@ struct MapLattice {
   Eigen::Vector3d origin_in_terrain = Eigen::Vector3d::Zero();  // lower corner of voxel (0, 0, 0)
 };
 
+// Marked location, from a table of look-ups.
 struct MapMarker {
   std::string label{};
   Eigen::Vector3d point_in_terrain = Eigen::Vector3d::Zero();
-  std::optional<bool> verdict{};
+  std::optional<bool> verdict{};  // true if the table lists it as graspable; nullopt: unknown
 };
 
 // A cell of the view.
@@ -31,7 +32,7 @@ struct MapCell {
   std::uint8_t colors_and_flags = 0;     // color class in the lower four bits, flags above
 };
 
-// Color classes after the classes of core/score_color.h, and flags.
+// Color classes 0 to 6 are score_classes (core/score_color.h), followed by these; and flags.
 inline constexpr std::uint8_t no_value_class = 7;
 inline constexpr std::uint8_t below_plane_class = 8;
 inline constexpr std::uint8_t convex_flag = 16;
@@ -58,22 +59,22 @@ struct MapView {
   bool has_graspable = false;
   bool has_obstacle = false;
   std::vector<CellForce> forces;  // one per cell; empty: the map has no holding forces
-  double load_n = 0.0;            // load of the probabilities
-  double max_force_n = 0.0;       // quantile 0.995 of the medians
+  double load_n = 0.0;            // load that CellForce::probability refers to
+  double max_force_n = 0.0;       // quantile 0.995 of the median forces, at least 1 N
   int voxels_per_cell = 1;        // voxels per cell along one axis
   std::uint64_t voxels = 0;       // number of voxels of the map
   std::vector<MapMarker> markers;
 };
 
 struct MapViewOptions {
-  int voxels_per_cell = 1;
-  std::optional<double> zero_plane_m{};
-  std::optional<double> load_n{};       // nullopt: forces are not shown
-  std::optional<MapLattice> lattice{};  // nullopt: estimated from the points
+  int voxels_per_cell = 1;               // along one axis
+  std::optional<double> zero_plane_m{};  // cells with a lower z have below_plane_class
+  std::optional<double> load_n{};        // nullopt: forces are not shown
+  std::optional<MapLattice> lattice{};   // nullopt: estimated from the points
 };
 
-// Estimates the lattice from the positions and the fields i, j, k of a map. Throws Error: a missing
-// field, or points that are not on a lattice along the axes.
+// Estimates the lattice from the positions and the fields i, j, k of a map; one point has voxels of
+// 0.01 m. Throws Error: a missing field, or points that are not on a lattice along the axes.
 MapLattice lattice_of(const PointCloud& map_in_terrain);
 
 // Creates one cell per point, colored by hold_probability if there is this field, else by score.

@@ -1,4 +1,4 @@
-// Data of a report: what report_reader.h reads from files and report_page.h writes.
+// Data of a report, which report_reader.h reads from files and report_page.h writes.
 #pragma once
 
 #include <cstddef>
@@ -38,8 +38,8 @@ struct ReportTable {
 
 struct ReportMap {
   MapView view{};
-  std::optional<ReportTable> locations{};  // row n corresponds to marker n
-  std::optional<ReportImage> preview{};
+  std::optional<ReportTable> locations{};  // look-ups; row n corresponds to marker n
+  std::optional<ReportImage> preview{};    // shown where there is no 3-D view
 };
 
 // A colored mesh and the meaning of the colors.
@@ -60,7 +60,7 @@ struct TimingRow {
 };
 
 struct TimingTable {
-  std::vector<std::string> cases;
+  std::vector<std::string> cases;              // column headings
   std::vector<TimingRow> rows;                 // by command and step, in order of appearance
   std::vector<std::vector<unsigned>> threads;  // distinct numbers of threads per case
   // True if a step that occurs in several manifests of a case was summed.
@@ -68,7 +68,7 @@ struct TimingTable {
 };
 
 struct ReportListing {
-  std::string text{};
+  std::string text{};  // first lines of a file
   std::size_t omitted_lines = 0;
 };
 
@@ -96,11 +96,11 @@ struct ReportSection {
   std::vector<ReportSection> sections{};
 };
 
-// An output of the run with manifest, or the error if the manifest cannot be read.
+// An output of the run with its manifest, or the error if the manifest cannot be read.
 struct ReportSource {
-  std::string output{};
+  std::string output{};  // path
   Manifest manifest{};
-  std::string error{};
+  std::string error{};  // empty if the manifest was read
 };
 
 // The heading is the report's title.

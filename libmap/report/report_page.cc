@@ -64,7 +64,7 @@ class PageWriter {
     return "<section aria-labeledby=\"provenance\" class=\"provenance\">\n"
            "<h2 id=\"provenance\">Provenance</h2>\n<p>Every output of this run with the command "
            "that "
-           "made it, its parameters, its inputs with their SHA-256, and what it counted.</p>\n" +
+           "made it, its parameters, its inputs with their SHA-256, and its results.</p>\n" +
            sources_html(content) + "</section>\n";
   }
 
@@ -152,13 +152,11 @@ class PageWriter {
 
   std::string body_html(const TimingTable& table, const ReportItem& item) {
     std::string html = scroll_box(timings_html(table), "Running times");
-    html +=
-        "<p class=\"changed\">Wall time in milliseconds, read off the manifests beside the "
-        "outputs.";
+    html += "<p class=\"changed\">Wall time in milliseconds, from the manifests of the outputs.";
     if (table.sums)
       html +=
-          " Steps that several outputs of a column name, such as the shares of one map, are "
-          "added up.";
+          " If several outputs of a column have the same step, such as the shares of one map, "
+          "their times are summed.";
     return figure("table", table_number(), item, html + "</p>\n", "Running times.");
   }
 
@@ -290,7 +288,7 @@ FittedPage fit_report_page(ReportContent content, const PageAssets& assets, std:
       if (images.empty()) break;  // higher levels change nothing
     }
   } while (cut_tables(content, short_table_rows));
-  throw Error("the report is too large even with reduced images and tables",
+  throw Error("the report is too large, even with reduced images and tables",
               {.field = "size",
                .value = fmt::format("{:.1f} MB", static_cast<double>(page.html.size()) / 1e6),
                .bound = fmt::format("<= {:.1f} MB", static_cast<double>(max_bytes) / 1e6)});

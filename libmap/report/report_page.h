@@ -26,8 +26,8 @@ std::string report_page(const ReportContent& content, const PageAssets& assets);
 // if the page is still too large.
 struct FittedPage {
   std::string html;
-  int image_level = 0;
-  std::size_t changed_images = 0;
+  int image_level = 0;             // level of fit_image; 0: images are unchanged
+  std::size_t changed_images = 0;  // number of reduced images
 };
 FittedPage fit_report_page(ReportContent content, const PageAssets& assets, std::size_t max_bytes);
 

@@ -184,7 +184,7 @@ class Reader {
     std::optional<ReportTable> table;
     fill(item, plan.lookup, [&] {
       table = read_report_table(plan.lookup, plan.columns, options_.max_rows);
-      if (table->lines) throw Error("the map has too many points for a 3-D view");
+      if (table->lines) throw Error("too many rows; only the map is shown");
       use(plan.lookup);
     });
     if (table && table->lines) table.reset();

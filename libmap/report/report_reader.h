@@ -1,5 +1,4 @@
-// Finds the content of a report in the folder of a run, sections and their files, and reads the
-// files.
+// Plans a report (its sections and their files) on the folder of a run, and reads the files.
 #pragma once
 
 #include <filesystem>
@@ -44,11 +43,11 @@ struct PlannedSection {
 // Throws Error if the folder does not exist or contains nothing to show.
 PlannedSection plan_report(const std::filesystem::path& folder);
 
-// Outputs with a manifest in `folder` and subfolders (12 levels), in natural order. Folders of
-// tiles are included only with `tiles`, tile stores never.
+// Returns the outputs with a manifest in `folder` and subfolders (12 levels), in natural order.
+// Folders of tiles are included only with `tiles`, tile stores never.
 std::vector<ReportSource> manifests_below(const std::filesystem::path& folder, bool tiles);
 
-// Natural order: digits are compared as numbers, "2_slopes" comes before "10_walls".
+// True if `a` is before `b` in natural order, with digits as numbers: "2_slopes", "10_walls".
 bool natural_less(const std::string& a, const std::string& b);
 
 struct ReportReadOptions {
@@ -81,7 +80,7 @@ ReportReadResult read_report_content(const PlannedSection& plan, const ReportRea
 ReportTable read_report_table(const std::filesystem::path& path, const TableColumns& columns,
                               std::size_t max_rows);
 
-// Running times of each case's manifests; steps of equal command and name are summed.
+// Returns the running times of each case's manifests. Equal steps of a command are summed.
 TimingTable timing_table(const std::vector<std::pair<std::string, std::vector<Manifest>>>& cases);
 
 }  // namespace libmap

@@ -169,8 +169,9 @@ std::string description(const MapView& view) {
   std::string text =
       fmt::format("{} cells of {} mm", view.cells.size(), short_number(view.cell_size_m * 1e3));
   if (view.cells.size() < view.voxels || view.voxels_per_cell > 1)
-    text += fmt::format(", one voxel shown for each cube of {0} x {0} x {0} of the map's {1}",
-                        view.voxels_per_cell, view.voxels);
+    text +=
+        fmt::format(", one voxel shown for each cube of {0} x {0} x {0} of the map's {1} voxels",
+                    view.voxels_per_cell, view.voxels);
   return text + ".";
 }
 

@@ -1,5 +1,5 @@
 // JSON conversion (nlohmann) of Eigen vectors, matrices, poses and boxes, and of error messages,
-// for the JSON files of tile stores. Numbers are preserved bit for bit.
+// for the JSON files of tile stores. Finite numbers are preserved bit for bit.
 #pragma once
 
 #include <Eigen/Geometry>

@@ -1,4 +1,4 @@
-// Temporary store of a large terrain's points on disk, sorted into tiles, from which the points of
+// Temporary store of a large terrain's points on disk, sorted into tiles, from which the points in
 // a rectangle can be read without the others.
 #pragma once
 
@@ -17,29 +17,29 @@
 namespace libmap {
 
 struct PointTileStoreOptions {
-  double tile_m = 1.0;                                // side of a tile
+  double tile_m = 1.0;                                // side of a tile; > 0
   bool has_normals = false;                           // true to store the points' normals
-  std::size_t buffer_bytes = std::size_t{64} << 20U;  // memory for unwritten points
+  std::size_t buffer_bytes = std::size_t{64} << 20U;  // points beyond it are written to disk
 };
 
 class PointTileStore {
  public:
   // Uses 32 bytes of disk per point, 44 with normals, in a TempFile in `folder`. All functions
-  // throw Error (failed) if it cannot be created, written or read.
+  // throw Error (failed) if the file cannot be created, written or read.
   PointTileStore(const std::filesystem::path& folder, const PointTileStoreOptions& options);
 
   // Adds points. Positions must be finite and less than 2^40 tiles away from the origin.
   void add(const PointCloud& cloud);
-  // Writes the buffered points after the last add().
+  // Writes the buffered points. Call it after the last add(), to release memory.
   void finish() { flush(); }
 
-  // Returns the points with low <= (x, y) <= high in the order of add(). Reads the tiles that
-  // intersect the rectangle.
+  // Returns the points (positions and normals) with low <= (x, y) <= high, m, in the order of
+  // add(). Reads the tiles that intersect the rectangle.
   PointCloud points_in(const Eigen::Vector2d& low, const Eigen::Vector2d& high) const;
-  // Returns an upper bound of the number of points in the rectangle: all points of tiles that meet
-  // it.
+  // Returns the number of points of all tiles that intersect the rectangle, an upper bound of the
+  // number of points in the rectangle.
   std::size_t count_in(const Eigen::Vector2d& low, const Eigen::Vector2d& high) const;
-  std::size_t size() const { return size_; }
+  std::size_t size() const { return size_; }  // number of points
 
  private:
   struct Extent {

@@ -12,7 +12,7 @@ TileShare parse_share(const std::string& text) {
       slash == std::string::npos ? std::nullopt : parse_integer(text.substr(slash + 1));
   if (!number || !count || *count < 1 || *number < 1 || *number > *count || *count > 1000000)
     throw Error("not a share of the tiles",
-                {.field = "--tile", .value = text, .bound = "K/N with 1 <= K <= N"});
+                {.field = "--tile", .value = text, .bound = "K/N with 1 <= K <= N <= 1000000"});
   return {static_cast<int>(*number), static_cast<int>(*count)};
 }
 

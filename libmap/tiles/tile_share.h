@@ -8,17 +8,17 @@
 
 namespace libmap {
 
-// Share `number` (from 1) of `count`. The shares are disjoint and cover all tiles.
+// Share number 1, 2, ... of `count` shares, which are disjoint and together contain all tiles.
 struct TileShare {
   int number = 1;
   int count = 1;
 };
 
-// Converts from and to "K/N". parse_share throws Error naming --tile for any other text.
+// Convert from and to "K/N" with 1 <= K <= N <= 10^6. parse_share throws Error naming --tile.
 TileShare parse_share(const std::string& text);
 std::string to_text(const TileShare& share);
 
-// Returns a share's range [begin, end) of `tiles` tiles. Throws Error unless 1 <= number <= count.
+// Returns a share's index range [begin, end) of `tiles` tiles. Throws Error unless number <= count.
 std::pair<std::size_t, std::size_t> share_range(std::size_t tiles, const TileShare& share);
 
 // Returns the consecutive tiles of a share. Throws as share_range does.

@@ -4,10 +4,10 @@
 //   STORE/tiles/*               the file of each tile that is not empty
 //   STORE/progress/plan.json    common data of all runs, with a key of parameters and inputs
 //   STORE/progress/K_of_N.jsonl journal of share K/N: one line per finished tile
-//   STORE/progress/lock         held while the plan is made and the store is completed
+//   STORE/progress/lock         locked while a run makes the plan or completes the store
 //
-// A tile is done if a line with the plan's key lists it; the file is then complete. Truncated lines
-// of a killed run are ignored.
+// A tile is finished if a journal line with the plan's key lists it; its file is then complete.
+// Truncated lines of a killed run are ignored.
 #pragma once
 
 #include <cstddef>
@@ -23,7 +23,7 @@
 
 namespace libmap {
 
-// Returns the SHA-256 of version, parameters and input hashes of the manifest.
+// Returns the plan's key: the SHA-256 of version, parameters and input hashes of the manifest.
 std::string key_of(const Manifest& manifest);
 
 // Journal of one share, locked by one process at a time.
@@ -34,7 +34,7 @@ class TileJournal {
   ~TileJournal();
   TileJournal(TileJournal&& other) noexcept;
   TileJournal& operator=(TileJournal&&) = delete;
-  // Appends one line of JSON per finished tile; the tile's file must exist. Throws Error (failed).
+  // Appends one line of JSON per finished tile, whose file must exist. Throws Error (failed).
   void add(const std::vector<std::string>& lines);
 
  private:
@@ -56,29 +56,29 @@ class TileStore {
   std::filesystem::path plan_path() const { return progress() / "plan.json"; }
 
   // Begins the run of a share: creates missing folders, calls check_plan() while the store is
-  // locked, and locks the journal. Throws Error if the folder is not a tile store, and the errors
-  // of check_plan(); a new folder is then removed again.
+  // locked, and locks the journal. Throws Error if the folder is not a tile store, the errors of
+  // check_plan() and of TileJournal; a new folder is then removed again.
   TileJournal begin(const TileShare& share, const std::function<void()>& check_plan) const;
-  void open() const;  // creates missing folders only; throws as begin() does
+  void open() const;  // creates missing folders only; throws Error if it is not a tile store
 
   // Returns the plan as text, or nullopt if there is none.
   std::optional<std::string> plan_text() const;
-  void write_plan(const std::string& text) const;
+  void write_plan(const std::string& text) const;  // atomically
 
   // Position of a line in a journal.
   struct Line {
     std::filesystem::path journal;
-    std::size_t begin = 0;
+    std::size_t begin = 0;  // offset of the first byte
   };
   // Calls visit(text, line) for each line of all journals. Throws Error (failed) on a read error.
   void each_line(const std::function<void(const std::string& text, const Line& line)>& visit) const;
-  static std::string read_line(const Line& line);
+  static std::string read_line(const Line& line);  // throws Error (failed)
 
-  // Locks the plan; waits until it is free.
+  // Locks the store (progress/lock). Waits until the lock is free.
   FileLock lock() const;
-  // Throws Error (failed) if a process works on a share. Call it under lock().
+  // Throws Error (failed) if a process works on a share. Call it while you hold lock().
   void require_idle() const;
-  // Removes plan, journals, tiles and index. Call it under lock().
+  // Removes plan, journals, tiles and index. Call it while you hold lock().
   void clear() const;
   // Removes the folder if it contains no plan and no tiles.
   void remove_if_bare() const;

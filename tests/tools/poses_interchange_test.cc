@@ -272,7 +272,7 @@ TEST(PosesOfFiles, OddOnesAreNamed) {
   const std::vector<Case> cases = {
       {"a.tum",
        bom + "# x\r\n1" + pose + "\r\n2 0 0\r\n",
-       {.field = "line 3", .value = "3 columns"}},
+       {.field = "line 3", .value = "3 columns long"}},
       {"b.tum", "1 0 nan 0 0 0 0 1\n", {.field = "line 1", .value = "nan"}},
       {"c.tum",
        "1 0 1e300 0 0 0 0 1\n",
@@ -281,15 +281,17 @@ TEST(PosesOfFiles, OddOnesAreNamed) {
       {"e.tum", "1" + pose + " 7\n2" + pose + " 7\n", {.field = "line 2", .value = "node 7"}},
       {"f.tum", "timestamp,x,y,z,qx,qy,qz,qw\n", {.field = "line 1", .value = "timestamp"}},
       {"g.kitti", "1 0 0 0 0 1 0 0 0 0 1 0\n", {.field = "poses", .value = "1", .bound = "6"}},
-      {"h.kitti", "1 0 0 0 0 1 0 0 0 0 -1 0\n", {.field = "line 1", .value = "-1"}},
+      {"h.kitti",
+       "1 0 0 0 0 1 0 0 0 0 -1 0\n",
+       {.field = "line 1", .value = "a matrix with determinant -1"}},
       {"i.g2o",
        "VERTEX_SE3:QUAT 1" + pose + "\nVERTEX_SE3:QUAT 1" + pose + "\n",
        {.field = "line 2", .value = "vertex 1"}},
       {"j.g2o", "VERTEX_SE2 1 0 0 0\n", {.field = "line 1", .value = "VERTEX_SE2"}},
       {"k.toro",
        "VERTEX3 1 0 0 0 0 0\n",
-       {.field = "line 1", .value = "7 columns", .bound = ">= 8"}},
-      {"l.txt", "1 2 3\n", {.field = "line 1", .value = "3 columns"}},
+       {.field = "line 1", .value = "7 columns long", .bound = ">= 8"}},
+      {"l.txt", "1 2 3\n", {.field = "line 1", .value = "3 columns long"}},
       {"m.txt", "\n\n", {.about = "no pose"}},
       {"n.tum", "12345678901234567890123" + pose + "\n", {.about = "within 20 ms"}},
       {"o.tum", "1" + pose + " 99\n", {.about = "none of the poses"}},
@@ -307,8 +309,9 @@ TEST(PosesOfFiles, OddOnesAreNamed) {
                         {.file = "empty", .about = ".txt"}));
   fs::create_directory(scratch("model"));
   write_text(scratch("model/images.txt"), "1 1 0 0 0 0 0 0 1 a.jpg\n\n2 1 0 0 0 0 0\n");
-  EXPECT_TRUE(bad_input(graspmap({"fuse", scan, "--poses", "model", "-o", "cloud.ply"}),
-                        {.file = "model/images.txt", .field = "line 3", .value = "7 columns"}));
+  EXPECT_TRUE(
+      bad_input(graspmap({"fuse", scan, "--poses", "model", "-o", "cloud.ply"}),
+                {.file = "model/images.txt", .field = "line 3", .value = "7 columns long"}));
 }
 
 // Commas, CRLF, a byte order mark, quaternions of six digits, another order.

@@ -79,8 +79,8 @@ TEST_F(OutputFolderTest, RefusesPathsOfNoUse) {
   for (const auto& [name, fault] : {std::pair{"file", "a folder"},
                                     {"link", "a folder"},
                                     {"missing/out", "no such"},
-                                    {".", "a name"},
-                                    {"..", "a name"}}) {
+                                    {".", "by its name"},
+                                    {"..", "by its name"}}) {
     const fs::path path = scratch_ / name;
     EXPECT_TRUE(graspmap_test::is_error(graspmap_test::error_of([&] { OutputFolder(path, names); }),
                                         {.file = path, .about = fault}));

@@ -65,9 +65,9 @@ TEST_F(ParametersYaml, UnknownKeyNamesTheNearest) {
 
 TEST_F(ParametersYaml, KeyThatStandsTwice) {
   EXPECT_TRUE(is_error(refusal("layers: 1\nfill: no\nlayers: 2\n"),
-                       {.file = "s.yaml", .field = "layers", .about = "duplicate"}));
+                       {.file = "s.yaml", .field = "layers", .about = "twice"}));
   EXPECT_TRUE(is_error(refusal("gripper.a: 1\ngripper.a: 2\n"),
-                       {.file = "s.yaml", .field = "gripper.a", .about = "duplicate"}));
+                       {.file = "s.yaml", .field = "gripper.a", .about = "twice"}));
 }
 
 TEST_F(ParametersYaml, ValueThatIsNoScalar) {

@@ -319,7 +319,7 @@ TEST(MeshFiles, WhatAssimpFallsOverIsAnError) {
       graspmap_test::source_folder() / "tests/fuzz/findings/glb/primitive_without_attributes",
       path);
   EXPECT_TRUE(is_error(error_of([&] { read_mesh(path); }),
-                       {.file = graspmap_test::scratch_folder() / "mesh.glb", .about = "library"}));
+                       {.file = graspmap_test::scratch_folder() / "mesh.glb", .about = "assimp"}));
 }
 
 // Errors reported by assimp, and numbers that it accepts.

@@ -116,7 +116,7 @@ TEST(PcdFiles, HeadersThatLie) {
   EXPECT_TRUE(
       is_error(error_as(".pcd", pcd_header("11", "binary") + ten), {.about = "declares 11"}));
   EXPECT_TRUE(is_error(error_as(".pcd", pcd_header("3", "ascii") + "1 2 3\n4 5 6\n7777777 8\n"),
-                       {.about = "3 numbers"}));
+                       {.about = "instead of 3"}));
   EXPECT_TRUE(
       is_error(error_as(".pcd", pcd_header("3", "ascii") + "1.25 2.25 3.25\n4.25 5.25 6.25\n"),
                {.about = "2 lines"}));
@@ -145,13 +145,13 @@ TEST(PcdFiles, CompressedSizesThatLie) {
   };
   EXPECT_TRUE(is_error(error_as(".pcd", header + sizes(1000, 120) + "abc"), {.about = "of 1000"}));
   EXPECT_TRUE(is_error(error_as(".pcd", header + sizes(3, 119) + "abc"), {.about = "contain 119"}));
-  EXPECT_TRUE(is_error(error_as(".pcd", header + sizes(0, 120)), {.about = "cannot contain"}));
+  EXPECT_TRUE(is_error(error_as(".pcd", header + sizes(0, 120)), {.about = "too few for"}));
   EXPECT_TRUE(
       is_error(error_as(".pcd", header + sizes(3, 120) + "\xff\xff\xff"), {.about = "broken"}));
-  EXPECT_TRUE(is_error(error_as(".pcd", header + "abc"), {.about = "no size"}));
+  EXPECT_TRUE(is_error(error_as(".pcd", header + "abc"), {.about = "size is missing"}));
   EXPECT_TRUE(is_error(error_as(".pcd", pcd_header("300000000", "binary_compressed") +
                                             sizes(3, 3600000000U) + "abc"),
-                       {.about = "cannot contain"}));
+                       {.about = "too few for"}));
 }
 
 TEST(PcdFiles, HeaderLinesThatDoNotFit) {

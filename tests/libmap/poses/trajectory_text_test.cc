@@ -448,7 +448,7 @@ TEST(Euroc, GroundTruth) {
   EXPECT_EQ(poses[0].world_from_base.translation(), Eigen::Vector3d(1, 2, 3));
   EXPECT_TRUE(graspmap_test::is_error(
       graspmap_test::error_of([&] { libmap::parse_euroc("1,2,3\n", "data.csv"); }),
-      {.file = "data.csv", .field = "line 1", .value = "3 columns"}));
+      {.file = "data.csv", .field = "line 1", .value = "3 columns long"}));
 }
 
 TEST(RecognizePoses, ByTagOrColumns) {
@@ -465,7 +465,7 @@ TEST(RecognizePoses, ByTagOrColumns) {
   EXPECT_EQ(format("FIX 1"), ".g2o");
   const libmap::Error error = graspmap_test::error_of([&] { format("1 2 3 4 5 6 7"); });
   EXPECT_EQ(error.context().field, "line 3");
-  EXPECT_EQ(error.context().value, "7 columns");
+  EXPECT_EQ(error.context().value, "7 columns long");
   EXPECT_TRUE(graspmap_test::is_error(graspmap_test::error_of([&] { format(""); }),
                                       {.file = "poses.txt", .about = "no pose"}));
 }

@@ -104,17 +104,17 @@ TEST(ColmapText, NamesTheLineThatIsBroken) {
     graspmap_test::ExpectedError expected;
   };
   const Case cases[] = {
-      {"1 1 0 0 0 0 0 0 1\n", {.file = "model.txt", .field = "line 1", .value = "9 columns"}},
+      {"1 1 0 0 0 0 0 0 1\n", {.file = "model.txt", .field = "line 1", .value = "9 columns long"}},
       {"1 0.5 0 0 0 0 0 0 1 a.jpg\n", {.file = "model.txt", .field = "line 1", .value = "0.5"}},
       {"1 1 0 0 0 0 1e300 0 1 a.jpg\n",
        {.file = "model.txt", .field = "line 1", .value = "1e+300", .bound = "<= 1e8 m"}},
       {"1 1 0 0 0 0 inf 0 1 a.jpg\n", {.file = "model.txt", .field = "line 1", .value = "inf"}},
       {"1 1 0 0 0 0 0 0 1 a.jpg\n1 2\n",
-       {.file = "model.txt", .field = "line 2", .value = "2 columns"}},
+       {.file = "model.txt", .field = "line 2", .value = "2 columns long"}},
       {"1 1 0 0 0 0 0 0 1 a.jpg\n1 2 x\n", {.file = "model.txt", .field = "line 2", .value = "x"}},
       // The empty line of the features is missing.
       {"1 1 0 0 0 0 0 0 1 a.jpg\n2 1 0 0 0 0 0 0 1 b.jpg\n",
-       {.file = "model.txt", .field = "line 2", .value = "10 columns"}},
+       {.file = "model.txt", .field = "line 2", .value = "10 columns long"}},
       {"1 1 0 0 0 0 0 0 1 a.jpg\n\n1 1 0 0 0 0 0 0 1 b.jpg\n",
        {.file = "model.txt", .field = "line 3", .value = "image 1"}},
       {"99999999999 1 0 0 0 0 0 0 1 a.jpg\n",
