@@ -36,8 +36,7 @@ const std::vector<std::string> camera_keys = split_list(
 double rig_number(const YAML::Node& node, const std::string& field) {
   if (!node.IsScalar()) throw Error("must be a single number", {.field = field});
   const std::optional<double> value = parse_double(node.Scalar());
-  if (!value)
-    throw Error("not a number", {.field = field, .value = node.Scalar(), .bound = "a number"});
+  if (!value) throw Error("not a number", {.field = field, .value = node.Scalar()});
   return *value;
 }
 
@@ -66,7 +65,8 @@ Camera intrinsics_of(const YAML::Node& map, const fs::path& folder) {
   for (const char* key : {"image_width", "image_height", "camera_matrix", "distortion_model",
                           "distortion_coefficients"})
     if (map[key])
-      throw Error("is also in the calibration file; remove it from one of them", {.field = key});
+      throw Error("is read from the file that 'calibration' names; remove this key",
+                  {.field = key});
   return read_camera(folder / map["calibration"].Scalar()).camera;
 }
 
@@ -143,7 +143,7 @@ void check_camera(const RigCamera& camera) {
   if (name.empty() || name == "." || name == ".." || name.find('/') != std::string::npos ||
       name.find('\0') != std::string::npos)
     throw Error("not a valid folder name",
-                {.field = "name", .value = name, .bound = "a name without '/'"});
+                {.field = "name", .value = name, .bound = "a name without '/', not '.' or '..'"});
   if (!(camera.depth_scale_m > 0) || !std::isfinite(camera.depth_scale_m))
     refuse("depth_scale_m", camera.depth_scale_m, "> 0");
   if (!(camera.near_m >= 0) || !std::isfinite(camera.near_m))

@@ -1,4 +1,4 @@
-// Writer of scans as RTAB-Map databases of schema 0.23 for RTAB-Map's own tools.
+// Writes scans as RTAB-Map databases of schema 0.23 for RTAB-Map's own tools.
 #pragma once
 
 #include <filesystem>

@@ -105,7 +105,7 @@ void JoinedScan::find_step() {
   if (step > most)
     throw Error("node ids are too large for joining this many scans",
                 {.file = path().string(),
-                 .field = "node",
+                 .field = "largest node id",
                  .value = std::to_string(largest),
                  .bound = "< " + std::to_string(most / 10)});
   step_ = static_cast<int>(step);
@@ -264,7 +264,7 @@ void apply(RgbdFrame& frame, const CameraFile& calibration, LensRays& rays) {
   if (frame.cameras.empty() && frame.stereo.empty()) return;
   if (frame.cameras.size() != 1 || !frame.stereo.empty())
     throw Error("a calibration file describes one camera, but the frame has several",
-                {.field = "cameras",
+                {.field = "number of cameras",
                  .value = std::to_string(frame.cameras.size() + 2 * frame.stereo.size()),
                  .bound = "1"});
   Camera& camera = frame.cameras.front();

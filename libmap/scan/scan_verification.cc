@@ -288,7 +288,8 @@ class DatabaseVerification {
       if (size > 0 && (bytes == size || (bytes % 4 == 0 && bytes / 4 == size))) return;
       findings_.add(node_in(row, 0), part_of(table, "descriptor"),
                     Error("does not match descriptor_size",
-                          {.value = std::to_string(bytes) + " bytes",
+                          {.field = "length",
+                           .value = std::to_string(bytes) + " bytes",
                            .bound = std::to_string(size) + ", or 4 times as many"}));
     };
     scan_.file().each_row("SELECT " + node + ", descriptor_size, length(descriptor) FROM " + table,
