@@ -43,8 +43,8 @@ struct BagListing {
   std::string storage{};  // "bag of ROS 1", "bag of ROS 2 (sqlite3)" or "bag of ROS 2 (mcap)"
   std::vector<BagTopic> topics{};  // topics with messages, in the order of recording
   std::size_t messages = 0;
-  double start_s = 0.0;  // recording times of the first and the last message
-  double end_s = 0.0;
+  double start_s = 0.0;  // recording time of the first message; 0 without messages
+  double end_s = 0.0;    // recording time of the last message
 };
 
 // True for *.bag, *.mcap and *.db3.

@@ -29,7 +29,7 @@ struct BagRigOptions {
   double depth_scale_m = 0.0;
   double near_m = 0.0;  // depth range of the written rig; 0 and infinity: as in `rig`, if given
   double far_m = std::numeric_limits<double>::infinity();
-  double tolerance_s = 0.02;  // >= 0, maximum time between an image and the stamp of the set
+  double tolerance_s = 0.02;  // >= 0, maximum time between an image and the stamp of its set
   int every = 1;              // >= 1; only every N-th set is exported
 };
 void bind(ParameterTable& table, BagRigOptions& options);

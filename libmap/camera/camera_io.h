@@ -66,7 +66,7 @@ struct CameraFile {
   // Delay of depth after the middle row of color, in addition to the difference of the stamps.
   double depth_delay_s = 0.0;
   double rolling_shutter_s = 0.0;       // time from the first to the last row of the color image
-  std::vector<FrameMotion> motions{};   // of the frames from which the times were estimated, sorted
+  std::vector<FrameMotion> motions{};   // of frames from which the delay was estimated, by stamp
   std::vector<std::string> findings{};  // results of the estimation, one sentence each
 
   // Pose of the depth camera for the frame with this stamp, including the motion during the delay;

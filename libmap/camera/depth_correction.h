@@ -15,7 +15,7 @@ namespace libmap {
 
 struct DepthCorrection {
   double first_m = 0.0;            // the offset is constant below first_m and above last_m()
-  double step_m = 0.0;             // > 0, distance of the spline's knots
+  double step_m = 0.0;             // distance of the spline's knots; > 0 if there is a spline
   std::vector<double> spline_m{};  // coefficients, at least 4; empty: scale only
   std::array<double, 3> radial{};  // factors of r^2 and r^4 (m), and depth r^2; r is 1 in corners
   double scale = 1.0;              // factor of the sum of depth and offset
@@ -39,7 +39,7 @@ struct DepthCorrection {
     return at(depth_m, radius2) - (scale - 1.0) * depth_m;
   }
   // Throws Error naming the field unless the scale is from 0.5 to 2, and the spline is empty or has
-  // 4 to 1000 coefficients and step_m > 0. Coefficients and radial factors are from -1 to 1.
+  // 4 to 1000 coefficients and step_m > 0. Coefficients and radial factors must be from -1 to 1.
   void check() const;
   bool operator==(const DepthCorrection&) const = default;
 };

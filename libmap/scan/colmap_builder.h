@@ -21,8 +21,8 @@ struct ColmapBuilderOptions {
 void bind(ParameterTable& table, ColmapBuilderOptions& options);
 
 // An image observes each earlier point whose depth it measures at the point's projection, so that
-// reprojection errors are 0 by construction (stored as -1, unknown). In cells of a pixel grid
-// without such a point or a depth edge, it adds a point. Images of equal lenses share a camera.
+// reprojection errors are 0 by construction (stored as -1, unknown). It adds a point in each cell
+// of a pixel grid without such a point or a depth edge. Images of equal lenses share a camera.
 class ColmapBuilder {
  public:
   explicit ColmapBuilder(const ColmapBuilderOptions& options = {});  // an empty model

@@ -18,7 +18,7 @@
 // Without nodes.csv, color and depth are paired by stamp; nodes are numbered from 1 in the order of
 // time and have the stamp of the depth image. Poses are assigned by node if all poses of a file
 // have one, else by stamp: interpolated if a pose before and one after the stamp are both within
-// pairing_tolerance_s, else the only pose within it.
+// pairing_tolerance_s, else the only pose within this tolerance.
 #pragma once
 
 #include <filesystem>
@@ -67,7 +67,7 @@ struct FrameFolderOptions {
   // then registered to color on reading. Empty: depth is already registered.
   std::string depth_calibration{};
   PoseFrame pose_frame = PoseFrame::camera;  // frame of the poses in the files
-  double pairing_tolerance_s = 0.02;         // >= 0: between color and depth, pose and node
+  double pairing_tolerance_s = 0.02;         // >= 0: maximum difference of paired stamps
 };
 void bind(ParameterTable& table, FrameFolderOptions& options);
 

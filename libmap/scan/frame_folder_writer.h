@@ -23,6 +23,7 @@ struct StoredImages {
   std::string right{};  // JPEG or PNG
 };
 
+// Numbers of written images, calibrations and associations.
 struct FrameFolderCounts {
   std::size_t color_images = 0;
   std::size_t depth_images = 0;

@@ -29,7 +29,7 @@ ImageFile image_file_of(const ScanSource& scan, int node, const std::vector<Came
 std::vector<CameraView> read_views(const ScanSource& scan, int node, FrameParts parts);
 
 struct ViewSelectionOptions {
-  double radius_m = 0.5;    // >= 0: distance between similar views is smaller; 0: all are kept
+  double radius_m = 0.5;    // >= 0: only views at a smaller distance are similar; 0: all are kept
   double angle_deg = 30.0;  // 0..180: maximum angle between the optical axes of similar views
 };
 void bind(ParameterTable& table, ViewSelectionOptions& options);

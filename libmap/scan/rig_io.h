@@ -85,8 +85,8 @@ std::vector<RigImage> list_rig_images(const std::filesystem::path& folder, const
 // 16-bit gray PNG or the size differs from the camera's calibration.
 Image<std::uint16_t> read_rig_units(const RigImage& image, const RigCamera& camera);
 
-// Reads an image in meters; 0 for the units 0 and 65535 (saturated). Depths outside near_m..far_m
-// are kept. Throws as read_rig_units does.
+// Reads an image in meters; 0 for the units 0 and 65535 (saturated). The caller applies near_m and
+// far_m. Throws as read_rig_units does.
 DepthImage read_rig_depth(const RigImage& image, const RigCamera& camera);
 
 // Images of a rig at one time, at most one per camera.

@@ -40,7 +40,7 @@ Matrix6d decode_information(std::string_view bytes);
 // Decodes 6 float32; nullopt if the velocity is unknown (all zeros or not finite). Throws Error if
 // the length is not 24 bytes.
 std::optional<std::array<double, 6>> decode_velocity(std::string_view bytes);
-// Decodes 6 float64; nullopt for all zeros. Throws Error unless 48 bytes with finite numbers.
+// Decodes 6 float64; nullopt for all zeros. Throws Error unless `bytes` has 6 finite numbers.
 std::optional<GpsFix> decode_gps(std::string_view bytes);
 
 // Contents of the columns opt_ids and opt_poses of table Admin.

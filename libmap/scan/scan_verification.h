@@ -20,7 +20,7 @@ void check_laser_scan(std::string_view scan, std::string_view info);
 
 struct ScanFault {
   int node = 0;        // 0: the whole file
-  std::string part{};  // table and column, e.g. "Data.depth"
+  std::string part{};  // table and column, e.g. "Data.depth"; or "frame", "graph" or "file"
   std::string reason{};
 };
 
