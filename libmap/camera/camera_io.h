@@ -32,8 +32,8 @@
 // distortion_model  plumb_bob: k1 k2 p1 p2 [k3]; rational_polynomial: 8 or 12 terms in OpenCV's
 // order; equidistant or fisheye: k1 k2 k3 k4, or RTAB-Map's k1 k2 0 0 k3 k4. Without this key, the
 // model follows from the number of terms and from `fisheye_model: 1` of OpenCV's calibration
-// sample. A camera with all terms 0 is read as undistorted. Other keys, such as projection_matrix
-// and avg_reprojection_error, are ignored.
+// sample. A camera with all terms 0 is read as undistorted unless it is a fisheye. Other keys, such
+// as projection_matrix and avg_reprojection_error, are ignored.
 #pragma once
 
 #include <Eigen/Core>
