@@ -40,7 +40,7 @@ StoredType type_of(const PointField& field) {
                                          .bound = "1 to 8"});
 }
 
-// Returns the number of a type; all types have one.
+// Returns the datatype number of a type in PointField; all types have one.
 std::uint8_t number_of(ScalarType type) {
   return std::find_if(std::begin(field_types), std::end(field_types),
                       [&](const auto& known) { return known.second == stored_as(type); })

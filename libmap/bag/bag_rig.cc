@@ -28,7 +28,7 @@ struct ImageTopic {
   bool unstamped = false;  // true if headers have no stamp and recording times replace it
 
   std::string info_topic{};
-  std::vector<Camera> calibrations{};                         // different ones
+  std::vector<Camera> calibrations{};                         // without duplicates
   std::vector<std::pair<std::int64_t, std::size_t>> infos{};  // stamp and calibration, ascending
   std::string info_error{};  // reason for the first unusable camera info
 
@@ -69,7 +69,7 @@ void take_image(const BagMessage& message, ImageTopic& images) {
   try {
     head = read_image_head(message.topic.encoding, message.bytes, images.compressed);
   } catch (const Error&) {
-    return;  // reading the image reports the error again
+    return;  // the error is reported when the image is decoded
   }
   if (images.encoding.empty()) {
     images.encoding = head.encoding;

@@ -25,7 +25,7 @@ struct CompressionHeader {
   float depth_quantization_b = 0;
 };
 
-// Image that converts depths to its units.
+// Image of 16-bit units, which converts depths in meters to these units.
 class UnitImage {
  public:
   UnitImage(int width, int height, double unit_m) : unit_m_(unit_m) {

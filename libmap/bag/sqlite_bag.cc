@@ -233,7 +233,7 @@ class SqliteSink : public BagSink {
   }
 
   void write(const StoredMessage& message) override {
-    constexpr std::size_t max_bytes = 1'000'000'000;  // SQLite's own
+    constexpr std::size_t max_bytes = 1'000'000'000;  // SQLite's limit
     if (message.bytes.size() > max_bytes)
       throw Error("too large for a .db3; use .mcap",
                   {.field = "size of a message on " + message.topic,

@@ -116,7 +116,7 @@ std::vector<double> image_errors(const BoardFit& fit, const BoardCorners& corner
   return errors;
 }
 
-// Sum over the best three quarters of the images, to be robust against bad images.
+// Sums squared errors over the best three quarters of the images, to be robust against bad ones.
 double robust_error(const BoardFit& fit, const BoardCorners& corners) {
   std::vector<double> errors = image_errors(fit, corners);
   std::sort(errors.begin(), errors.end());

@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t trailer_bytes = 12;
 constexpr std::size_t piece_bytes = std::size_t{1} << 16;
-constexpr int max_channels = 512;  // OpenCV's
+constexpr int max_channels = 512;  // OpenCV's limit
 
 void append_int32(std::string& bytes, std::int32_t value) {
   bytes.append(reinterpret_cast<const char*>(&value), sizeof value);

@@ -15,7 +15,7 @@ namespace libmap {
 
 namespace {
 
-constexpr double disparity_unit = 1.0 / 16;  // of cv::StereoSGBM
+constexpr double disparity_unit = 1.0 / 16;  // pixels per unit of cv::StereoSGBM
 
 const std::vector<std::pair<std::string, StereoDirections>> direction_names = {
     {"three", StereoDirections::three},

@@ -107,7 +107,7 @@ bool is_depth_image(const fs::path& file) {
   return info && info->channels == 1 && info->bits == 16;
 }
 
-// Spherical interpolation of the rotation, linear of the position.
+// Interpolates the rotation spherically, and the position linearly.
 Pose between(const Pose& a, const Pose& b, double fraction) {
   return make_pose((1.0 - fraction) * a.translation() + fraction * b.translation(),
                    Eigen::Quaterniond(a.linear()).slerp(fraction, Eigen::Quaterniond(b.linear())));
@@ -158,7 +158,7 @@ void register_to_color(RgbdFrame& frame, const Camera& depth_camera) {
                                target.base_from_camera.inverse() * depth_camera.base_from_camera);
 }
 
-// Throws Error if the aspect ratios differ: registered depth covers the same view as color.
+// Throws Error if the aspect ratios of depth and color differ; registered depth has color's view.
 void require_aspect_of_color(const RgbdFrame& frame) {
   constexpr double max_difference = 0.03;
   double width = frame.color.width;

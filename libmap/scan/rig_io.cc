@@ -157,7 +157,7 @@ std::string number_text(double value) {
   return std::isinf(value) ? (value > 0 ? ".inf" : "-.inf") : to_text(value);
 }
 
-// Returns the lines of a camera file without its head, as an entry of the list.
+// Returns the lines of a camera file after the YAML header, as an entry of the list `cameras`.
 std::string camera_entry(const RigCamera& camera) {
   std::istringstream lines(to_yaml(CameraFile{camera.name, camera.camera}));
   std::string text;
@@ -418,7 +418,7 @@ std::vector<SynchronizedSet> synchronized_sets(const std::vector<RigImage>& imag
       if (images[waiting[n]].stamp_s > start + 2 * reach) break;
       if (!taken[waiting[n]]) near.push_back(waiting[n]);
     }
-    // The first image belongs to the set, even if its camera has others.
+    // The first image belongs to the set, even if the camera has other images near.
     ImagesByCamera candidates = by_camera(images, near, camera_count);
     candidates[images[near.front()].camera].resize(1);
     SynchronizedSet best;

@@ -152,7 +152,7 @@ std::unique_ptr<ScanSource> open_scans(const std::vector<std::filesystem::path>&
 
 namespace {
 
-constexpr double max_step = 0.03;  // share of depth between pixels of one surface
+constexpr double max_step = 0.03;  // maximum relative depth difference of pixels of one surface
 constexpr double max_miss_px = 0.5;
 constexpr double close_px = 0.03;
 constexpr int search_rounds = 5;
