@@ -1,8 +1,8 @@
 // Decodes and encodes images in memory: JPEG (libjpeg-turbo) and PNG (libpng).
 //
-// Sizes are read from the header and checked before memory is allocated: at most 2^27 pixels, and
-// no more than the file size permits. Decoding throws Error if an image is truncated, has a wrong
-// checksum or causes a warning of the decoder; what() does not name the file.
+// Sizes are read from the header and checked before memory is allocated: at most max_frame_pixels
+// or `max_pixels`, and no more than the file size permits. Decoding throws Error if an image is
+// truncated, has a wrong checksum or causes a decoder's warning; what() does not name the file.
 #pragma once
 
 #include <array>

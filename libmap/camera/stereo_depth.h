@@ -18,7 +18,7 @@ struct StereoDepthOptions {
   int uniqueness_percent = 10;  // minimum cost difference of best and second-best match, 0 to 100
   int left_right_px = 1;        // maximum difference of the left-right check; -1: disabled
   int speckle_px = 100;         // smaller connected patches of disparity are dropped
-  int min_contrast = 2;         // minimum gray-level range of the left window, 0 to 255; uniform
+  int min_contrast = 2;         // minimum gray-level range of the left image's window; uniform
                                 // areas, such as overexposed ones, match anywhere
   StereoDirections directions = StereoDirections::five;
   double max_depth_m = 0.0;  // larger depths are dropped; 0: no limit

@@ -50,8 +50,8 @@ HeightField make_grid(const TriangleMesh& mesh, double cell_size_m) {
   return field;
 }
 
-// Calls visit(column, row) for the cells that the box of a triangle touches in plan, or for their
-// nodes, one more in each direction.
+// Calls visit(column, row) for the cells that the bounding box of a triangle touches in plan; with
+// more = 1, for the nodes of these cells.
 template <typename Visit>
 void for_box(const HeightField& field, const TriangleCorners& corners, std::size_t more,
              const Visit& visit) {

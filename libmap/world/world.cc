@@ -28,7 +28,7 @@ namespace {
 // Accelerations at the surface, m/s2.
 constexpr std::array<std::pair<const char*, double>, 3> bodies{
     {{"earth", 9.81}, {"moon", 1.62}, {"mars", 3.71}}};
-// Vertices this near to each other, of the mesh's size, are one.
+// Vertices within this fraction of the mesh's size are merged.
 constexpr double weld_fraction = 1e-7;
 
 struct CollisionMesh {
