@@ -89,8 +89,7 @@ class BagSink {
 };
 std::unique_ptr<BagSink> new_ros1_bag(const std::filesystem::path& path,
                                       BagCompression compression);
-std::unique_ptr<BagSink> new_sqlite_bag(
-    const std::filesystem::path& folder);  // `folder` must exist
+std::unique_ptr<BagSink> new_sqlite_bag(const std::filesystem::path& folder);  // folder exists
 std::unique_ptr<BagSink> new_mcap(const std::filesystem::path& path, BagCompression compression);
 
 // Compressed chunks of MCAP (https://mcap.dev/spec/registry#well-known-compression-formats): frames

@@ -53,7 +53,7 @@ struct ParameterAdder {
     table.add(
         "profile", bump.profile,
         {{"cosine", BumpProfile::cosine}, {"gaussian", BumpProfile::gaussian}},
-        "profile of a bump; cosine: cos^2 up to the radius; gaussian: radius is 3 deviations");
+        "bump profile; cosine: cos^2 up to the radius; gaussian: radius is 3 standard deviations");
   }
 };
 
