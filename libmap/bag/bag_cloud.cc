@@ -40,7 +40,7 @@ StoredType type_of(const PointField& field) {
                                          .bound = "1 to 8"});
 }
 
-// Returns the number of a type; all types have one.
+// Returns the datatype number of a type in PointField; all types have one.
 std::uint8_t number_of(ScalarType type) {
   return std::find_if(std::begin(field_types), std::end(field_types),
                       [&](const auto& known) { return known.second == stored_as(type); })
@@ -85,13 +85,13 @@ void add_columns(const PointField& field, const PointCloud2& message, const std:
   const std::size_t count = std::max<std::uint32_t>(field.count, 1);
   const bool swapped = message.is_bigendian != (std::endian::native == std::endian::big);
   if (message.point_step < std::uint64_t{field.offset} + bytes * count)
-    throw does_not_fit("point_step, of field " + name, message.point_step,
+    throw does_not_fit("point_step for field " + name, message.point_step,
                        std::uint64_t{field.offset} + bytes * count);
   if ((name == "rgb" || name == "rgba") && bytes == 4 && count == 1 && !set.find("red"))
     return add_packed_color_columns(first + field.offset, message.point_step, message.is_bigendian,
                                     set);
   if (count > max_columns || set.columns.size() + count > max_columns)
-    throw Error("has more than 1024 numbers per point", {.field = "field " + name});
+    throw Error("increases a point to more than 1024 numbers", {.field = "field " + name});
   for (std::size_t n = 0; n < count; ++n)
     set.columns.push_back({count == 1 ? name : name + "_" + std::to_string(n), scalar_type_of(type),
                            type, first + field.offset + n * bytes, message.point_step, swapped});
@@ -137,7 +137,7 @@ PointCloud2 encode_cloud(const PointCloud& cloud) {
   constexpr std::uint64_t most = 0xFFFF0000;
   if (set.rows > most / std::max<std::size_t>(offset, 1))
     throw Error("too many for a ROS message, which can contain at most 4 GiB",
-                {.field = "points", .value = std::to_string(set.rows)});
+                {.field = "number of points", .value = std::to_string(set.rows)});
   std::string records;
   append_records(set.columns, 0, set.rows, false, records);
   // With PCL's alpha of 255, colors are NaN as float32, and Python's readers skip such points.
@@ -167,7 +167,7 @@ std::string only_cloud_topic(const BagListing& listing) {
   throw Error(count == 0 ? "no topic contains clouds" : "several topics contain clouds",
               {.field = std::string("topics of ") + PointCloud2::type.name,
                .value = count == 0 ? "none" : names,
-               .bound = count == 0 ? "" : "one of them, named as the topic"});
+               .bound = count == 0 ? "" : "a single topic; select one by name"});
 }
 
 BagCloudResult read(const std::filesystem::path& bag, const std::string& wanted,

@@ -28,7 +28,7 @@ struct ImageTopic {
   bool unstamped = false;  // true if headers have no stamp and recording times replace it
 
   std::string info_topic{};
-  std::vector<Camera> calibrations{};                         // different ones
+  std::vector<Camera> calibrations{};                         // without duplicates
   std::vector<std::pair<std::int64_t, std::size_t>> infos{};  // stamp and calibration, ascending
   std::string info_error{};  // reason for the first unusable camera info
 
@@ -69,7 +69,7 @@ void take_image(const BagMessage& message, ImageTopic& images) {
   try {
     head = read_image_head(message.topic.encoding, message.bytes, images.compressed);
   } catch (const Error&) {
-    return;  // reading the image reports the error again
+    return;  // the error is reported when the image is decoded
   }
   if (images.encoding.empty()) {
     images.encoding = head.encoding;
@@ -142,6 +142,7 @@ BagTopics read_bag_topics(const std::filesystem::path& bag,
 }
 
 constexpr double float_unit_m = 1e-4;  // unit of images of 32FC1: up to 6.5 m
+constexpr const char* depth_encodings = "16UC1, mono16, 32FC1 or compressedDepth";
 
 // A topic given by the user, or a candidate for depth images, with its given name, if any.
 struct Choice {
@@ -313,8 +314,7 @@ void set_limits(const BagTopics& bag_topics, const BagRigOptions& options, BagRi
   }
 }
 
-// Adds the camera's images in ascending order, at most one per microsecond, and only those with its
-// first calibration.
+// Adds the camera's images of its first calibration, ascending, at most one per microsecond.
 void add_images(const ImageTopic& images, std::size_t camera, bool calibrated, BagRigPlan& plan) {
   std::vector<std::int64_t> stamps = images.stamps_ns;
   std::sort(stamps.begin(), stamps.end());
@@ -336,7 +336,7 @@ void add_images(const ImageTopic& images, std::size_t camera, bool calibrated, B
       plan.warnings.push_back(images.topic + ": " + std::to_string(count) + " images " + text);
   };
   warn(twice, "are dropped because an earlier image has the same stamp");
-  warn(otherwise, "are dropped because the calibration differs from the first message");
+  warn(otherwise, "are dropped because the calibration differs from that of the first image");
   if (images.unstamped)
     plan.warnings.push_back(images.topic + ": images have no stamp; the recording times are used");
 }
@@ -389,12 +389,12 @@ BagRigPlan plan_of(const fs::path& bag, const BagRigOptions& options,
   if (choices.empty())
     throw Error("no topic contains depth images", {.field = "topics of images",
                                                    .value = found.empty() ? "none" : found,
-                                                   .bound = "16UC1, 32FC1 or compressedDepth"});
+                                                   .bound = depth_encodings});
   for (const ImageTopic& images : bag_topics.images)
     if (!is_depth_encoding(images.encoding, images.compressed))
-      throw Error("contains no depth images", {.field = "encoding of " + images.topic,
-                                               .value = images.encoding,
-                                               .bound = "16UC1, 32FC1 or compressedDepth"});
+      throw Error("not an encoding of depth images", {.field = "encoding of " + images.topic,
+                                                      .value = images.encoding,
+                                                      .bound = depth_encodings});
   const std::vector<std::string> names = names_by_difference(bag_topics.images);
   BagRigPlan plan;
   plan.depth_unit_m = options.depth_unit_m;
@@ -427,16 +427,18 @@ BagRigPlan plan_of(const fs::path& bag, const BagRigOptions& options,
 
 void bind(ParameterTable& table, BagRigOptions& options) {
   table.add("base_frame", options.base_frame,
-            "frame of the robot; auto: base_link, or the root of all transforms");
-  table.add("transform_topic", options.transform_topic, "topic of the static transforms");
+            "frame of the robot in the bag; auto: base_link, else the root of the transforms");
+  table.add("transform_topic", options.transform_topic,
+            "topic of the static transforms between the cameras and the robot");
   table.add("depth_unit_m", options.depth_unit_m, positive,
-            "meters per unit of 16-bit images in the bag");
+            "meters per unit of the 16-bit depth images in the bag");
   table.add("depth_scale_m", options.depth_scale_m, not_negative,
             "meters per unit of the written depth images; 0: as in the rig file, else as in the "
             "bag (0.0001 m for floating-point images)");
   table.add("near_m", options.near_m, not_negative,
-            "minimum depth of the rig, m; 0: the rig's own");
-  table.add("far_m", options.far_m, positive, "maximum depth of the rig, m; inf: the rig's own");
+            "minimum valid depth in the written rig, m; 0: as in the rig file, if given");
+  table.add("far_m", options.far_m, positive,
+            "maximum valid depth in the written rig, m; inf: as in the rig file, if given");
   table.add("tolerance_s", options.tolerance_s, not_negative,
             "maximum time between an image and the stamp of its synchronized set, s");
   table.add("every", options.every, {1.0},

@@ -90,7 +90,7 @@ class ImageWriter {
                                                    {plan_.depth_unit_m, camera.depth_scale_m});
       if (depth.image.width != camera.camera.width || depth.image.height != camera.camera.height)
         throw Error("does not match the calibration",
-                    {.field = "size",
+                    {.field = "image size",
                      .value = size_text(depth.image.width, depth.image.height),
                      .bound = size_text(camera.camera.width, camera.camera.height)});
       one.overflow_pixels = depth.overflow_pixels;

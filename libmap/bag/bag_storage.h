@@ -1,9 +1,9 @@
-// Storages of bags, which read and write encoded messages:
+// Reads and writes encoded messages in the storages of bags:
 //   ros1     http://wiki.ros.org/Bags/Format/2.0, by librosbag
 //   sqlite3  rosbag2's default up to ROS 2 Humble: .db3 files and metadata.yaml in a folder
 //            (https://github.com/ros2/rosbag2: sqlite_storage.cpp, rosbag2_storage/yaml.hpp)
 //   mcap     rosbag2's default since Iron: https://mcap.dev/spec
-// Inner part of bag_reader and bag_writer.
+// Private to bag_reader and bag_writer.
 #pragma once
 
 #include <cstdint>
@@ -28,8 +28,9 @@ struct RecordedTopics {
   std::int64_t first_ns = std::numeric_limits<std::int64_t>::max();
   std::int64_t last_ns = std::numeric_limits<std::int64_t>::min();
 
-  // Returns the index of the topic of that name, type, definition and encoding; appends a new one.
+  // Returns the index of the topic with equal name, type, md5sum and encoding; appends a new topic.
   std::size_t index_of(const BagTopic& topic);
+  // Adds a number of messages with recording times from `first` to `last`, in ns, to a topic.
   void add(std::size_t index, std::size_t messages, std::int64_t first, std::int64_t last);
 
   std::map<std::tuple<std::string, std::string, std::string, MessageEncoding>, std::size_t> known{};
@@ -37,8 +38,8 @@ struct RecordedTopics {
 
 using TakeMessage = std::function<void(const BagMessage&)>;
 
-// Functions of a storage throw Error naming the file; functions of ROS 1, in builds without ROS 1's
-// libraries, throw Error (failed) with the missing packages.
+// `list` adds the topics of a file, `read` reads a file as read_bag does. Both throw Error naming
+// the file; for ROS 1, builds without its libraries throw Error (failed) with the missing packages.
 struct BagStorage {
   const char* name = "";
   void (*list)(const std::filesystem::path& file, RecordedTopics& topics) = nullptr;
@@ -53,17 +54,18 @@ extern const BagStorage mcap_storage;
 // rosbag2_storage/include/rosbag2_storage/yaml.hpp).
 inline constexpr const char* rosbag2_metadata_name = "metadata.yaml";
 
-// Returns the names of the bag's files. Versions 1 to 9 store them alike; all other content is in
-// the files too. Throws Error for a missing or invalid file, a missing name, and compressed bags.
+// Returns the names of the bag's files, which versions 1 to 9 of metadata.yaml store alike. Throws
+// Error for a missing or invalid metadata.yaml, a missing name, and compressed bags.
 std::vector<std::string> read_rosbag2_metadata(const std::filesystem::path& path);
 
-// Returns the text for one file of `storage` in version 5 (Humble), which later versions read too.
+// Returns metadata.yaml for a single file, in version 5 (Humble), which later versions read too.
 std::string rosbag2_metadata(const RecordedTopics& topics, const std::string& storage,
                              const std::string& file);
 
-// Quality of service (rmw's enumerations in Humble's format) of a latched topic, whose last message
-// is sent to late subscribers; "" for other topics. is_latching is true for such a recorded one.
+// Returns the quality of service (rmw's enumerations in Humble's format) of a latched topic, whose
+// last message is sent to late subscribers; "" for other topics.
 std::string quality_of_service(bool latching);
+// True if a recorded quality of service is that of a latched topic.
 bool is_latching(std::string_view quality_of_service);
 
 // A message to write.
@@ -87,13 +89,12 @@ class BagSink {
 };
 std::unique_ptr<BagSink> new_ros1_bag(const std::filesystem::path& path,
                                       BagCompression compression);
-// `folder` must exist.
-std::unique_ptr<BagSink> new_sqlite_bag(const std::filesystem::path& folder);
+std::unique_ptr<BagSink> new_sqlite_bag(const std::filesystem::path& folder);  // folder exists
 std::unique_ptr<BagSink> new_mcap(const std::filesystem::path& path, BagCompression compression);
 
 // Compressed chunks of MCAP (https://mcap.dev/spec/registry#well-known-compression-formats): frames
 // of LZ4 and Zstandard, by the official libraries; "": no compression. `size` is the declared
-// decompressed size; memory is proportional to the actual one. Throws Error for an unknown
+// decompressed size; memory is proportional to the actual size. Throws Error for an unknown
 // compression, damaged data, a wrong size, or more than 1 GiB.
 std::string decompress_chunk(const std::string& compression, std::string_view bytes,
                              std::uint64_t size);

@@ -27,7 +27,9 @@ void require_topic_name(const std::string& topic) {
   if (topic.size() < 2 || topic.front() != '/' || topic.back() == '/' ||
       !std::all_of(topic.begin(), topic.end(), allowed))
     throw Error("not a ROS topic name",
-                {.field = "topic", .value = topic, .bound = "'/', letters, digits and '_'"});
+                {.field = "topic",
+                 .value = topic,
+                 .bound = "names of letters, digits and '_', each after a '/'"});
 }
 
 std::unique_ptr<BagSink> new_bag(const fs::path& path, BagFormat format,

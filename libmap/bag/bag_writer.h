@@ -1,5 +1,4 @@
-// Writer of bags of ROS 1 and ROS 2 for RViz. Equal content gives equal bytes, because all stamps
-// are from the content.
+// Writes bags of ROS 1 and ROS 2 for RViz. Equal content with equal stamps results in equal bytes.
 #pragma once
 
 #include <filesystem>
@@ -20,11 +19,11 @@ struct BagCloud {
   PointCloud cloud{};
 };
 
-// Position with an approach direction.
+// Position with an approach direction, in the frame of BagTargets.
 struct BagTarget {
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();    // m
   Eigen::Vector3d direction = Eigen::Vector3d::UnitX();  // any length > 0
-  Color color{};
+  Color color{};                                         // of the ball and the arrow
   std::string text{};
 };
 
@@ -43,14 +42,14 @@ struct BagTargets {
 };
 
 // Grid of square cells in a frame's x-y plane as grid_map_msgs/GridMap and nav_msgs/OccupancyGrid.
-// Arrays contain rows * columns values from the corner of smallest x and y, x first; NaN is
-// unknown.
+// Arrays contain rows * columns values, row by row from the smallest y; a row begins with the
+// smallest x. NaN is unknown.
 struct BagGrid {
   std::string grid_map_topic{};
   std::string occupancy_topic{};
   std::string frame{};
-  double cell_m = 0.0;
-  Eigen::Vector2d corner_m = Eigen::Vector2d::Zero();
+  double cell_m = 0.0;                                 // edge length of a cell
+  Eigen::Vector2d corner_m = Eigen::Vector2d::Zero();  // corner with the smallest x and y
   std::size_t columns = 0;
   std::size_t rows = 0;
 
@@ -58,7 +57,7 @@ struct BagGrid {
     std::string name{};
     std::vector<float> values{};
   };
-  std::vector<Layer> layers{};     // GridMap; a cell is valid if the value in the first layer is
+  std::vector<Layer> layers{};     // GridMap, >= 1; a cell is valid if the first layer is not NaN
   std::vector<float> occupancy{};  // OccupancyGrid, 0 to 1
 };
 
@@ -69,19 +68,18 @@ struct BagTransform {
   Pose parent_from_child = Pose::Identity();
 };
 
-// ros1: a file, .bag; mcap: a file, .mcap; sqlite: an existing folder in the format of Humble's
-// rosbag2.
+// ros1: a .bag file; mcap: a .mcap file; sqlite: an existing folder in Humble's rosbag2 format.
 enum class BagFormat { ros1, mcap, sqlite };
-// Returns the format of an extension; no extension is sqlite. Throws Error for unknown extensions.
+// Returns the format by the extension; sqlite without one. Throws Error for unknown extensions.
 BagFormat bag_format_of(const std::filesystem::path& path);
 // Names of the files in a folder of BagFormat::sqlite.
 std::vector<std::string> names_in_bag_folder();
 
-// Compression of chunks. bz2: ROS 1 only; zstd: MCAP only; sqlite: none only.
+// Compression of chunks. bz2: ROS 1 only; zstd: MCAP only. BagFormat::sqlite supports none only.
 enum class BagCompression { none, bz2, lz4, zstd };
 
 struct BagContent {
-  double stamp_s = 1.0;                    // stamp of all messages, 1e-9 to 2^32 - 1 (ROS 2: 2^31)
+  double stamp_s = 1.0;                    // of all messages; >= 1e-9, < 2^32 - 1 (ROS 2: 2^31)
   std::vector<BagTransform> transforms{};  // /tf_static
   std::vector<BagCloud> clouds{};
   std::vector<BagTargets> targets{};
@@ -96,15 +94,15 @@ void write_bag(const std::filesystem::path& path, BagFormat format, const BagCon
                BagCompression compression = BagCompression::none);
 
 struct RigBagOptions {
-  std::string base_frame = "base_link";
-  double stamp_offset_s = 0.0;  // offset added to the stamps of the images
+  std::string base_frame = "base_link";  // frame of the robot
+  double stamp_offset_s = 0.0;           // offset added to the stamps of the images
   BagCompression compression = BagCompression::none;
 };
 
-// Writes the images of a rig in the topics of a camera driver, in the order of stamps:
-// /NAME/depth/image_raw and /NAME/depth/camera_info in the frame NAME_depth_optical_frame, which
-// /tf_static connects to the base frame. One image is in memory at a time. Throws Error as
-// write_bag does, and for damaged images.
+// Writes the images of a rig in the topics of a camera driver: /NAME/depth/image_raw and
+// /NAME/depth/camera_info in the frame NAME_depth_optical_frame, which /tf_static connects to the
+// base frame. The order is by stamp, after the first image of each camera. One image is in memory
+// at a time. Throws Error as write_bag does, and for no or damaged images.
 void write_rig_bag(const std::filesystem::path& path, BagFormat format, const CameraRig& rig,
                    const std::vector<RigImage>& images, const RigBagOptions& options = {});
 

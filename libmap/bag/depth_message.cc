@@ -25,7 +25,7 @@ struct CompressionHeader {
   float depth_quantization_b = 0;
 };
 
-// Image that converts depths to its units.
+// Image of 16-bit units, which converts depths in meters to these units.
 class UnitImage {
  public:
   UnitImage(int width, int height, double unit_m) : unit_m_(unit_m) {
@@ -66,7 +66,7 @@ DepthMessageImage decode_raw(const ros_message::Image& message, const DepthUnits
   const std::string& encoding = message.encoding;
   if (!is_depth_encoding(encoding, false))
     throw Error("not a depth image",
-                {.field = "encoding", .value = encoding, .bound = "16UC1 or 32FC1"});
+                {.field = "encoding", .value = encoding, .bound = "16UC1, mono16 or 32FC1"});
   const bool is_float = encoding == "32FC1";
   const std::uint64_t width = message.width;
   const std::uint64_t height = message.height;
@@ -108,7 +108,7 @@ DepthMessageImage decode_compressed(const ros_message::CompressedImage& message,
                  .value = format,
                  .bound = "16UC1; compressedDepth or 32FC1; compressedDepth"});
   if (format.find("rvl") != std::string::npos)
-    throw Error("only PNG is supported", {.field = "format", .value = format});
+    throw Error("RVL is not supported, only PNG", {.field = "format", .value = format});
   CompressionHeader header;
   if (message.data.size() < sizeof header)
     throw Error("truncated", {.field = "data",

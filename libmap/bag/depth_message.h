@@ -1,5 +1,5 @@
-// Decoder of depth images and camera calibrations from messages (sensor_msgs/Image,
-// CompressedImage, CameraInfo).
+// Decodes depth images and camera calibrations from messages (sensor_msgs/Image, CompressedImage,
+// CameraInfo).
 #pragma once
 
 #include <cstdint>
@@ -15,13 +15,12 @@ namespace libmap {
 
 // Metadata in the first bytes of an image's message.
 struct DepthMessageHead {
-  std::int64_t stamp_ns = 0;
-  std::string frame{};     // optical frame of the camera
-  std::string encoding{};  // Image: "16UC1"; CompressedImage: format
+  std::int64_t stamp_ns = 0;  // 0: none
+  std::string frame{};        // optical frame of the camera
+  std::string encoding{};     // field encoding of an Image, e.g. "16UC1", or format if compressed
 };
 
-// Decodes the metadata; 1 KiB of the message is enough. Throws Error if `bytes` ends before the end
-// of the encoding.
+// Decodes the metadata; 1 KiB of the message is enough. Throws Error if `bytes` ends too early.
 DepthMessageHead read_image_head(MessageEncoding encoding, std::string_view bytes, bool compressed);
 
 // True for 16UC1, mono16, 32FC1; for a CompressedImage, formats of
@@ -29,9 +28,8 @@ DepthMessageHead read_image_head(MessageEncoding encoding, std::string_view byte
 bool is_depth_encoding(const std::string& encoding, bool compressed);
 
 struct DepthUnits {
-  // Meters per unit of 16-bit messages (REP-118: 0.001), and of the decoded images.
-  double message_unit_m = 0.001;
-  double image_unit_m = 0.001;
+  double message_unit_m = 0.001;  // meters per unit of 16-bit messages (REP-118: 0.001)
+  double image_unit_m = 0.001;    // meters per unit of the decoded images
 };
 
 struct DepthMessageImage {
@@ -39,8 +37,8 @@ struct DepthMessageImage {
   std::size_t overflow_pixels = 0;  // number of pixels that exceed 16 bits and are set to 0
 };
 
-// Decodes a depth image. Throws Error for an encoding other than depth, no size or more than 2^27
-// pixels, truncated data or rows, and a damaged PNG.
+// Decodes a depth image. Throws Error for an encoding that is not of depth, RVL compression, an
+// empty image or more than 2^27 pixels, truncated data or rows, and a damaged PNG.
 DepthMessageImage decode_depth(MessageEncoding encoding, std::string_view bytes, bool compressed,
                                const DepthUnits& units);
 
@@ -49,9 +47,9 @@ struct CameraInfoMessage {
   Camera camera{};  // base_from_camera is not set
 };
 
-// Decodes K and D, or P without distortion for `rectified` images. Applies binning and region of
-// interest as image_geometry does. Throws Error for an uncalibrated camera or an unknown distortion
-// model.
+// Decodes K and D; for `rectified` images P, if it is set, without distortion. Applies binning and
+// region of interest as image_geometry does. Throws Error for an uncalibrated camera or an unknown
+// distortion model.
 CameraInfoMessage decode_camera_info(MessageEncoding encoding, std::string_view bytes,
                                      bool rectified);
 

@@ -53,7 +53,7 @@ std::string as_record(Opcode opcode, const ByteWriter& content) {
 constexpr std::uint64_t max_chunk_bytes = std::uint64_t{1} << 30;
 
 Error broken_chunk(const std::string& compression) {
-  return Error("is damaged", {.field = "chunk of " + compression});
+  return Error("is damaged", {.field = compression + " chunk"});
 }
 
 // Calls step(input, input size, output, output size), which sets both sizes to the bytes consumed

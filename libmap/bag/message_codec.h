@@ -1,4 +1,4 @@
-// Codec of messages in the encodings of bags. Private to libmap/bag.
+// Encodes and decodes messages in the encodings of bags. Private to libmap/bag.
 //
 // ROS 1 (http://wiki.ros.org/msg#Fields): little-endian, without padding; a text or an array begins
 // with the length as uint32. ROS 2: CDR, version 1 (DDS-XTypes 7.4.1): 4 bytes with the byte order,
@@ -13,8 +13,8 @@
 
 namespace libmap::ros_message {
 
-// Decodes a message; ignores bytes after it. Texts become one line of ASCII, like ROS's names.
-// Throws Error for a truncated message, declared lengths beyond the end, or another encoding.
+// Decodes a message; ignores bytes after it. All characters of texts but printable ASCII become
+// '?'. Throws Error for a truncated message, declared lengths beyond the end, or another encoding.
 template <typename Message>
 Message decode(MessageEncoding encoding, std::string_view bytes);
 

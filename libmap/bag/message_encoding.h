@@ -1,4 +1,5 @@
-// Conversion of plain data to messages, most without headers. Private to libmap/bag.
+// Converts plain data to messages. Their headers are empty, except where a header is passed.
+// Private to libmap/bag.
 #pragma once
 
 #include <cstdint>
@@ -18,10 +19,11 @@ namespace libmap {
 // Throws Error for more than 4 GiB.
 ros_message::PointCloud2 encode_cloud(const PointCloud& cloud);
 
-// Encodes depth in meters (REP-118's 32FC1, 0: not measured) or millimeters (16UC1), whichever
-// represents the image's units exactly.
+// Encodes depth in millimeters (16UC1) if image_unit_m is 0.001, else in meters (REP-118's 32FC1,
+// 0: not measured).
 ros_message::Image encode_depth(const Image<std::uint16_t>& image, double image_unit_m);
 
+// Encodes size, K, D, and P = K without rectification.
 ros_message::CameraInfo encode_camera_info(const Camera& camera);
 
 ros_message::TransformStamped encode_transform(const BagTransform& transform);
@@ -29,7 +31,7 @@ ros_message::TransformStamped encode_transform(const BagTransform& transform);
 // Encodes poses with the direction as x axis.
 ros_message::PoseArray encode_poses(const std::vector<BagTarget>& targets);
 
-// Encodes, for each position, an arrow that ends there and a text, and one list of balls for all.
+// Encodes one list of balls at all positions and, for each, a text and an arrow that ends there.
 ros_message::MarkerArray encode_markers(const BagTargets& targets,
                                         const ros_message::Header& header);
 

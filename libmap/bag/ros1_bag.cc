@@ -307,7 +307,7 @@ std::string definition_of_type(const std::string& type) {
       {"visualization_msgs/MarkerArray", definition<visualization_msgs::MarkerArray>()}};
   const auto found = definitions.find(type);
   if (found == definitions.end())
-    throw Error("not supported in bags of ROS 1", {.field = "message", .value = type});
+    throw Error("not supported in bags of ROS 1", {.field = "message type", .value = type});
   return found->second;
 }
 
@@ -362,8 +362,7 @@ std::unique_ptr<rosbag::Bag> new_bag() {
   return std::make_unique<rosbag::Bag>();
 }
 
-// Converts librosbag's exceptions to Errors (failed) with the system's message: only writes can
-// fail.
+// Converts librosbag's exceptions, which only writes cause, to Errors (failed) by errno.
 template <typename Action>
 void guarded(const fs::path& path, const Action& action) {
   errno = 0;

@@ -1,9 +1,8 @@
 // ROS messages in bags as plain data, without encoding (message_codec.h). Private to libmap/bag.
 //
 // fields(message, visit) calls visit(name, field) for each field in the order of the definition;
-// visit.ros2 is true for ROS 2. Definitions of ROS 1 (Noetic):
-// http://docs.ros.org/en/noetic; of ROS 2 (Humble to Jazzy):
-// https://docs.ros.org/en/humble/p/sensor_msgs and the like,
+// visit.ros2 is true for ROS 2. Definitions: http://docs.ros.org/en/noetic (ROS 1),
+// https://docs.ros.org/en/humble/p/sensor_msgs and other packages (ROS 2, Humble to Jazzy),
 // https://docs.ros.org/en/jazzy/p/grid_map_msgs.
 #pragma once
 

@@ -233,12 +233,12 @@ class SqliteSink : public BagSink {
   }
 
   void write(const StoredMessage& message) override {
-    constexpr std::size_t max_bytes = 1'000'000'000;  // SQLite's own
+    constexpr std::size_t max_bytes = 1'000'000'000;  // SQLite's limit
     if (message.bytes.size() > max_bytes)
       throw Error("too large for a .db3; use .mcap",
-                  {.field = "bytes of a message on " + message.topic,
-                   .value = std::to_string(message.bytes.size()),
-                   .bound = "<= 10^9"});
+                  {.field = "size of a message on " + message.topic,
+                   .value = std::to_string(message.bytes.size()) + " bytes",
+                   .bound = "<= 10^9 bytes"});
     const BagTopic topic = {.name = message.topic,
                             .type = ros2_name(message.type),
                             .latching = message.latching,

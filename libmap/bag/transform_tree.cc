@@ -25,8 +25,8 @@ void TransformTree::add(const std::string& parent, const std::string& child,
   const std::string above = plain_frame(parent);
   const std::string frame = plain_frame(child);
   if (above.empty() || frame.empty() || above == frame)
-    throw Error("a transform must connect two different frames",
-                {.field = "frames", .value = above + " and " + frame});
+    throw Error("does not connect two different frames",
+                {.field = "transform", .value = "'" + above + "' from '" + frame + "'"});
   if (!parent_from_child.matrix().allFinite())
     throw Error("the transform of this frame is not finite", {.field = "frame", .value = frame});
   const auto found = links_.find(frame);
@@ -96,7 +96,7 @@ void add_transforms(MessageEncoding encoding, std::string_view bytes, TransformT
     const Eigen::Quaterniond rotation(q.w, q.x, q.y, q.z);
     const std::string& child = transform.child_frame_id;
     if (!(std::abs(rotation.norm() - 1.0) < 0.01))
-      throw Error("not a rotation", {.field = "quaternion of frame " + child});
+      throw Error("the norm is not 1", {.field = "quaternion of frame " + child});
     tree.add(transform.header.frame_id, child, make_pose({t.x, t.y, t.z}, rotation));
   }
 }

@@ -28,7 +28,8 @@ class TransformTree {
   // nearest known one) and for a cycle.
   std::string root_of(const std::string& frame) const;
 
-  // Throws Error as root_of does, and if no transforms connect the frames.
+  // Returns the pose of frame `source` in frame `target`. Throws Error as root_of does, and if no
+  // transforms connect the frames.
   Pose target_from_source(const std::string& target, const std::string& source) const;
 
  private:

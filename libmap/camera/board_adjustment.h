@@ -1,5 +1,4 @@
-// Least-squares adjustment of a camera and the poses of calibration boards, for
-// camera_calibration.h.
+// Adjusts a camera and the poses of calibration boards by least squares, for camera_calibration.h.
 #pragma once
 
 #include <Eigen/Core>
@@ -31,7 +30,7 @@ double squared_error(const BoardFit& fit, const BoardCorners& corners);
 double adjust_boards(BoardFit& fit, const BoardCorners& corners);
 
 // Covariance of the intrinsics (fx fy cx cy and distortion terms) for a noise of 1 px in each
-// coordinate, with the board poses marginalized. Empty if the intrinsics are not determined.
+// coordinate, with the board poses marginalized. Empty if the corners do not determine the camera.
 Eigen::MatrixXd unit_covariance(const BoardFit& fit, const BoardCorners& corners);
 
 }  // namespace libmap

@@ -107,8 +107,7 @@ void append_stereo_record(ByteWriter& bytes, const StereoCalibrationRecord& ster
   bytes.bytes(left.content()).bytes(right.content());
 }
 
-// Records begin with four small int32; float32 values interpreted as int32 are large unless they
-// are 0.
+// Records begin with four small int32; float32 values read as int32 are large unless they are 0.
 bool begins_with_record(std::string_view bytes) {
   if (bytes.size() < 4 * sizeof(std::int32_t)) return false;
   const auto numbers = ByteReader(bytes).number<std::array<std::int32_t, 4>>();

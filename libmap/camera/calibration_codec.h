@@ -1,4 +1,4 @@
-// Reads and writes the calibrations that RTAB-Map stores with each node, in all layouts.
+// Reads RTAB-Map's calibrations of nodes in all layouts, and writes them in the newest layout.
 #pragma once
 
 #include <array>
@@ -12,7 +12,7 @@
 
 namespace libmap {
 
-// Layout of Data.calibration by version of RTAB-Map.
+// Layout of column Data.calibration by version of RTAB-Map. L: base_from_camera, 12 numbers.
 enum class CalibrationLayout {
   records,           // since 0.18.0: one record per camera or stereo pair
   floats_with_size,  // 0.11.2 to 0.17: fx fy cx cy [baseline] width height L, float32
@@ -21,7 +21,7 @@ enum class CalibrationLayout {
 std::string to_text(CalibrationLayout layout);
 
 struct CalibrationRecord {
-  std::array<std::int32_t, 3> version{};  // of RTAB-Map
+  std::array<std::int32_t, 3> version{};  // version of RTAB-Map that wrote the record
   std::int32_t width = 0;                 // pixels; 0 if not stored
   std::int32_t height = 0;
   std::vector<double> k{};  // 3 x 3 or empty: camera matrix of the raw image
@@ -35,8 +35,8 @@ struct CalibrationRecord {
 
 struct StereoCalibrationRecord {
   std::array<std::int32_t, 3> version{};
-  std::vector<double> r{};  // 3 x 3 or empty: right_from_left
-  std::vector<double> t{};  // 3 or empty
+  std::vector<double> r{};  // 3 x 3 or empty: rotation of right_from_left
+  std::vector<double> t{};  // 3 or empty: translation of right_from_left, m
   std::vector<double> e{};  // 3 x 3 or empty: essential matrix
   std::vector<double> f{};  // 3 x 3 or empty: fundamental matrix
   CalibrationRecord left{};
@@ -61,10 +61,10 @@ Calibration decode_calibration(std::string_view bytes);
 // Encodes a calibration in layout `records`. Decoded records are reproduced exactly.
 std::string encode_calibration(const Calibration& calibration);
 
-// Cameras of the stored images: from P if it is stored (images are rectified), else from K and D.
-// A camera without a stored size has an equal share of an image of `image_width` x `image_height`.
-// D of 6 terms is equidistant: k1 k2 0 0 k3 k4. Throws Error naming the field, e.g. without K and
-// P.
+// Return the cameras of the stored images (left ones of stereo pairs), and the stereo pairs: from P
+// if it is stored (rectified images), else from K and D; 6 terms of D are equidistant: k1 k2 0 0 k3
+// k4. A camera without a stored size has an equal share of `image_width` and all of `image_height`.
+// Throw Error if K and P are missing, or a camera or a baseline is invalid.
 std::vector<Camera> cameras_of(const Calibration& calibration, int image_width, int image_height);
 std::vector<StereoCamera> stereo_cameras_of(const Calibration& calibration, int image_width,
                                             int image_height);

@@ -116,7 +116,7 @@ std::vector<double> image_errors(const BoardFit& fit, const BoardCorners& corner
   return errors;
 }
 
-// Sum over the best three quarters of the images, to be robust against bad images.
+// Sums squared errors over the best three quarters of the images, to be robust against bad ones.
 double robust_error(const BoardFit& fit, const BoardCorners& corners) {
   std::vector<double> errors = image_errors(fit, corners);
   std::sort(errors.begin(), errors.end());
@@ -207,7 +207,7 @@ CameraCalibrationResult calibrate_once(const std::vector<BoardImage>& images, in
                                        const CameraCalibrationOptions& options) {
   if (images.size() < min_images)
     throw Error("too few distinct images of the board",
-                {.field = "images",
+                {.field = "number of images",
                  .value = std::to_string(images.size()),
                  .bound = ">= " + std::to_string(min_images) + ", better 15 and more"});
   const BoardCorners corners = corners_of(images, options.board);
@@ -316,7 +316,7 @@ std::vector<std::pair<std::string, LensModel>> lens_model_names() {
 }
 
 void bind(ParameterTable& table, CameraCalibrationOptions& options) {
-  table.add("square_mm", options.board.square_mm, positive, "side of the board's squares, mm");
+  table.add("square_mm", options.board.square_mm, positive, "side of a chessboard square, mm");
   table.add("lens", options.lens, lens_model_names(),
             "distortion model; none; plumb_bob: k1 k2 p1 p2 k3; rational: k1 k2 p1 p2 k3 k4 k5 "
             "k6; equidistant: k1 k2 k3 k4 of a fisheye lens");

@@ -16,20 +16,20 @@ namespace libmap {
 
 // Size of a chessboard in inner corners: a board of 9 x 7 squares has 8 x 6.
 struct Chessboard {
-  int columns = 8;          // >= 3
-  int rows = 6;             // >= 3
+  int columns = 8;          // 3 to 100
+  int rows = 6;             // 3 to 100
   double square_mm = 30.0;  // > 0
 };
 
-// Parses a board size such as "8x6". Throws Error naming `field`.
+// Parses columns and rows such as "8x6". Throws Error naming `field` if they are out of range.
 Chessboard parse_chessboard(const std::string& text, const std::string& field);
 
 // Distortion: none; k1 k2 p1 p2 k3; k1 k2 p1 p2 k3 k4 k5 k6; k1 to k4 of a fisheye lens.
 enum class LensModel { none, plumb_bob, rational, equidistant };
 std::vector<std::pair<std::string, LensModel>> lens_model_names();
 
-// Detects the corners with subpixel accuracy, row by row; pixel centers have integer coordinates.
-// Returns nullopt unless the complete board is visible. The board's orientation is
+// Detects the corners with subpixel accuracy, row by row, px; pixel centers have integer
+// coordinates. Returns nullopt unless the complete board is visible. The board's orientation is
 // ambiguous: the first detected corner can be at the other end of the board.
 std::optional<std::vector<Eigen::Vector2d>> find_chessboard(const GrayImage& image,
                                                             const Chessboard& board);
@@ -63,12 +63,12 @@ void bind(ParameterTable& table, CameraCalibrationOptions& options);
 
 struct CalibratedImage {
   std::string name{};
-  Pose camera_from_board = Pose::Identity();  // board frame: as in corners_on_board
-  double rms_px = 0.0;                        // RMS of the residuals' lengths
-  double max_px = 0.0;
-  double tilt_deg = 0.0;  // between the board's normal and the optical axis
-  std::vector<Eigen::Vector2d> corners{};
-  std::vector<Eigen::Vector2d> residuals_px{};  // detected minus projected
+  Pose camera_from_board = Pose::Identity();    // board frame: as in corners_on_board
+  double rms_px = 0.0;                          // RMS of the residuals' lengths
+  double max_px = 0.0;                          // maximum length of a residual
+  double tilt_deg = 0.0;                        // angle of the board's normal to the optical axis
+  std::vector<Eigen::Vector2d> corners{};       // detected corners, px
+  std::vector<Eigen::Vector2d> residuals_px{};  // detected minus projected corners
 };
 
 struct CameraCalibrationResult {
@@ -77,11 +77,11 @@ struct CameraCalibrationResult {
   // estimated from the residuals.
   std::vector<double> deviations{};
   double rms_px = 0.0;          // RMS distance between detected and projected corners
-  double sigma_px = 0.0;        // noise of one coordinate of a corner
-  double width_coverage = 0.0;  // share of the image's width and height spanned by the corners
+  double sigma_px = 0.0;        // standard deviation of one coordinate of a corner
+  double width_coverage = 0.0;  // fraction of the image's width and height spanned by the corners
   double height_coverage = 0.0;
   std::vector<CalibratedImage> images{};
-  std::vector<std::string> rejected{};  // above max_image_error_px
+  std::vector<std::string> rejected{};  // images above max_image_error_px or inconsistent
   std::vector<std::string> repeated{};  // duplicates of earlier images
 
   // Relative standard deviation of fx or fy, whichever is larger.
@@ -89,8 +89,8 @@ struct CameraCalibrationResult {
 };
 
 // Calibrates the camera. Images with corners within 1 px (RMS) of an earlier image are ignored,
-// because the errors are not independent. Throws Error: fewer than 3 images remain, or the images
-// do not determine the camera (for example if all boards are seen frontally).
+// because their errors are not independent. Throws Error if fewer than 3 images remain, or if they
+// do not determine the camera, for example because all boards are seen frontally.
 CameraCalibrationResult calibrate_camera(const std::vector<BoardImage>& images, int width,
                                          int height, const CameraCalibrationOptions& options = {});
 

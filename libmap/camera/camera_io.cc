@@ -86,7 +86,7 @@ void read_matrix(const YAML::Node& root, Camera& camera) {
   if (!root[field]) throw Error("is missing", {.field = field});
   const std::vector<double> k = matrix_of(root[field], field);
   if (k.size() != 9) refuse(field, std::to_string(k.size()) + " numbers", "wrong size", "3 x 3");
-  if (k[1] != 0) refuse(field, to_text(k[1]), "skewed pixels are not supported", "no skew");
+  if (k[1] != 0) refuse("skew of " + field, to_text(k[1]), "not supported", "0");
   if (k[3] != 0 || k[6] != 0 || k[7] != 0 || k[8] != 1)
     throw Error("not a camera matrix: must be fx 0 cx, 0 fy cy, 0 0 1", {.field = field});
   camera.fx = k[0];
@@ -165,7 +165,7 @@ void read_timing(const YAML::Node& root, CameraFile& file) {
     const std::vector<double> timing = sized_matrix(root, "camera_timing", 2);
     for (const double seconds : timing)
       if (!(std::abs(seconds) <= max_timing_s))
-        refuse("camera_timing", to_text(seconds), "not a time within a frame", "-10 to 10");
+        refuse("camera_timing", to_text(seconds), "not a time within a frame", "-10 to 10 s");
     file.depth_delay_s = timing[0];
     file.rolling_shutter_s = timing[1];
   }

@@ -23,6 +23,7 @@
 //   depth_correction_radial: !!opencv-matrix  # radial
 //     {rows: 1, cols: 3, dt: d, data: [...]}
 //   depth_scale: 1.008                        # scale
+//   depth_registration: [1, 0, 0, 0.05, ...]  # color_from_depth, 3 x 4
 //   camera_timing: [0.01, 0.02]               # depth_delay_s, rolling_shutter_s
 //   frame_motions: !!opencv-matrix            # FrameMotion of each frame
 //     {rows: 60, cols: 7, dt: d, data: [...]}
@@ -31,8 +32,8 @@
 // distortion_model  plumb_bob: k1 k2 p1 p2 [k3]; rational_polynomial: 8 or 12 terms in OpenCV's
 // order; equidistant or fisheye: k1 k2 k3 k4, or RTAB-Map's k1 k2 0 0 k3 k4. Without this key, the
 // model follows from the number of terms and from `fisheye_model: 1` of OpenCV's calibration
-// sample. A camera with all terms 0 is read as undistorted. Other keys, such as projection_matrix
-// and avg_reprojection_error, are ignored.
+// sample. A camera with all terms 0 is read as undistorted unless it is a fisheye. Other keys, such
+// as projection_matrix and avg_reprojection_error, are ignored.
 #pragma once
 
 #include <Eigen/Core>
@@ -59,37 +60,36 @@ struct FrameMotion {
 struct CameraFile {
   std::string name{};  // may be empty
   Camera camera{};
-  // Correction of depth that is registered to the camera: pose of the depth camera
-  // (depth_registration, 3 x 4, optional), and correction of the depth values.
+  // Corrections of depth that is registered to this camera: pose and depth values.
   Pose color_from_depth = Pose::Identity();
   DepthCorrection depth{};
-  // Delay of depth after the middle row of the color image, in addition to the difference of the
-  // stamps, and time from the first to the last row of the color image. `motions`: camera motions
-  // of the scan from which the delays were estimated.
+  // Delay of depth after the middle row of color, in addition to the difference of the stamps.
   double depth_delay_s = 0.0;
-  double rolling_shutter_s = 0.0;
-  std::vector<FrameMotion> motions{};   // by ascending stamp
+  double rolling_shutter_s = 0.0;       // time from the first to the last row of the color image
+  std::vector<FrameMotion> motions{};   // of frames from which the delay was estimated, by stamp
   std::vector<std::string> findings{};  // results of the estimation, one sentence each
 
-  // Pose of the depth camera in the frame of this stamp, including the motion during the delay. The
-  // base does not move in frames that are not in `motions`. `depth_stamp_offset_s` as in RgbdFrame.
+  // Pose of the depth camera for the frame with this stamp, including the motion during the delay;
+  // color_from_depth for stamps that are not in `motions`. `depth_stamp_offset_s` as in RgbdFrame.
   Pose color_from_depth_at(double stamp_s, double depth_stamp_offset_s = 0.0) const;
+  // True if the depth of a frame can change.
   bool changes_depth() const {
     return !depth.empty() || !color_from_depth.matrix().isIdentity(0.0) ||
            (depth_delay_s != 0.0 && !motions.empty());
   }
 };
 
-// Read a camera. Throw Error naming `file`, key, value and bound: invalid YAML, a missing key,
-// wrong matrix size, skew, a transform without a valid rotation, an unknown distortion model.
+// Read a camera. Throw Error naming `file`, key, value and bound for invalid YAML, a missing key, a
+// wrong matrix size, skew, a transform without a valid rotation, or an unknown distortion model.
+// camera_from_yaml does not name the file.
 CameraFile parse_camera(const std::string& text, const std::string& file);
 CameraFile read_camera(const std::filesystem::path& path);
 CameraFile camera_from_yaml(const YAML::Node& root);
-// Reads a pose from a matrix of 3 x 4 or 4 x 4. Throws Error naming `field`.
+// Reads a pose from a matrix of 3 x 4 or 4 x 4. Throws Error naming `field` if it is not a pose.
 Pose pose_from_yaml(const YAML::Node& matrix, const std::string& field);
 
-// YAML that parse_camera reads back exactly, and that cv::FileStorage and RTAB-Map can read. The
-// lines of `comment` are written first, as comments.
+// Returns YAML that parse_camera reads back exactly, and that cv::FileStorage and RTAB-Map can
+// read. The lines of `comment` are first, as comments.
 std::string to_yaml(const CameraFile& camera, const std::string& comment = {});
 
 }  // namespace libmap

@@ -55,7 +55,7 @@ void DepthCorrection::check() const {
   if (!(step_m > 0.0 && std::isfinite(step_m) && std::isfinite(first_m)))
     throw Error("out of range", {.field = "depth_correction_range",
                                  .value = to_text(first_m) + ", " + to_text(step_m),
-                                 .bound = "first depth and step > 0"});
+                                 .bound = "a finite first depth, and a step > 0"});
   const auto is_small = [](double number) { return std::abs(number) <= max_correction_m; };
   for (const double number : spline_m)
     if (!is_small(number))

@@ -306,11 +306,11 @@ Image<Pixel> decode_png_as(std::string_view bytes, const ImageInfo& info, PngWan
 ImageInfo require_png(std::string_view bytes, int channels, int bits) {
   const ImageInfo info = checked_info(bytes);
   if (info.format != ImageFormat::png || info.channels != channels || info.bits != bits)
-    throw Error(
-        "unsupported",
-        {.value = to_text(info.format) + " of " + std::to_string(info.channels) + " x " +
-                  std::to_string(info.bits) + " bits",
-         .bound = "PNG of " + std::to_string(channels) + " x " + std::to_string(bits) + " bits"});
+    throw Error("unsupported image",
+                {.value = to_text(info.format) + " of " + std::to_string(info.channels) + " x " +
+                          std::to_string(info.bits) + " bits per pixel",
+                 .bound = "a PNG of " + std::to_string(channels) + " x " + std::to_string(bits) +
+                          " bits per pixel"});
   return info;
 }
 

@@ -1,8 +1,8 @@
 // Decodes and encodes images in memory: JPEG (libjpeg-turbo) and PNG (libpng).
 //
-// Sizes are read from the header and checked before memory is allocated: at most 2^27 pixels, and
-// no more than the file size permits. Decoding throws Error if an image is truncated, has a wrong
-// checksum or causes a warning of the decoder; what() does not name the file.
+// Sizes are read from the header and checked before memory is allocated: at most max_frame_pixels
+// or `max_pixels`, and no more than the file size permits. Decoding throws Error if an image is
+// truncated, has a wrong checksum or causes a decoder's warning; what() does not name the file.
 #pragma once
 
 #include <array>
@@ -19,7 +19,7 @@ enum class ImageFormat { jpeg, png };            // storage format of an image
 std::string to_text(ImageFormat format);         // "JPEG", "PNG"
 std::string file_extension(ImageFormat format);  // ".jpg", ".png"
 
-// Format according to the first bytes; nullopt if it is neither.
+// Returns the format by the first bytes; nullopt if it is neither JPEG nor PNG.
 std::optional<ImageFormat> image_format(std::string_view bytes);
 
 struct ImageInfo {
@@ -31,7 +31,7 @@ struct ImageInfo {
 };
 
 // Reads the header; `bytes` may end after it. Returns nullopt if the bytes end before the size is
-// known. Throws Error if this is not a JPEG or PNG.
+// known. Throws Error if this is neither a JPEG nor a PNG, or if the header is damaged.
 std::optional<ImageInfo> read_image_info(std::string_view bytes);
 
 // Limit for frames of a scan, which several threads decode at once, with up to ten bytes per pixel.

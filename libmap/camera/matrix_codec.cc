@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t trailer_bytes = 12;
 constexpr std::size_t piece_bytes = std::size_t{1} << 16;
-constexpr int max_channels = 512;  // OpenCV's
+constexpr int max_channels = 512;  // OpenCV's limit
 
 void append_int32(std::string& bytes, std::int32_t value) {
   bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
@@ -113,7 +113,7 @@ StoredMatrix decode_matrix(std::string_view blob) {
   StoredMatrix matrix = read_matrix_header(blob);
   const std::uint64_t wanted = checked_bytes(matrix, blob.size() - trailer_bytes);
   if (wanted > max_matrix_bytes)
-    throw Error("compressed matrix too large",
+    throw Error("compressed matrix is too large",
                 {.value = matrix_size_text(matrix),
                  .bound = "<= " + std::to_string(max_matrix_bytes) + " bytes"});
   matrix.bytes.reserve(wanted);
@@ -127,7 +127,9 @@ std::string encode_matrix(const StoredMatrix& matrix) {
   std::string blob(size, '\0');
   const int result = compress(reinterpret_cast<Bytef*>(blob.data()), &size,
                               reinterpret_cast<const Bytef*>(matrix.bytes.data()), wanted);
-  if (result != Z_OK) throw Error(zError(result), {}, ErrorKind::failed);
+  if (result != Z_OK)
+    throw Error(std::string("matrix cannot be compressed: ") + zError(result), {},
+                ErrorKind::failed);
   blob.resize(size);
   append_int32(blob, matrix.rows);
   append_int32(blob, matrix.columns);

@@ -42,7 +42,7 @@ struct StoredMatrix {
   bool operator==(const StoredMatrix&) const = default;
 };
 
-// Reads sizes and type from a blob's end; `bytes` is empty. Throws Error if invalid.
+// Reads sizes and type from the end of a blob, without `bytes`. Throws Error if they are invalid.
 StoredMatrix read_matrix_header(std::string_view blob);
 
 // Maximum compression ratio of deflate (RFC 1951: 258 bytes in two bits).
@@ -58,10 +58,10 @@ StoredMatrix decode_matrix(std::string_view blob);
 // multiple of 8 bytes. Throws Error as decode_matrix does.
 void for_each_matrix_chunk(std::string_view blob,
                            const std::function<void(std::string_view bytes)>& use);
+// Encodes a matrix as the blob that decode_matrix reads.
 std::string encode_matrix(const StoredMatrix& matrix);
 
-// Decodes a text, stored as a matrix of one row of int8 ending with NUL. Throws Error for any other
-// matrix.
+// Decodes a text, which is one row of int8 ending with NUL. Throws Error for any other matrix.
 std::string decode_compressed_text(std::string_view blob);
 
 }  // namespace libmap

@@ -1,4 +1,4 @@
-// RGB-D frame: color and depth images and cameras of one node of a scan.
+// Stores an RGB-D frame (color and depth images and cameras of a node), and splits it by camera.
 #pragma once
 
 #include <cstddef>
@@ -10,11 +10,11 @@
 
 namespace libmap {
 
-// A rectified pair: the right camera is at `baseline_m` on the x axis of the left camera.
+// A stereo pair. If it is rectified, right_from_left is a translation by -baseline_m along x.
 struct StereoCamera {
   Camera left;
   Camera right;
-  double baseline_m = 0.0;
+  double baseline_m = 0.0;  // > 0: distance between the cameras
   Pose right_from_left = Pose::Identity();
 };
 
@@ -28,15 +28,14 @@ struct RgbdFrame {
   std::vector<Camera> cameras;  // of the color images; of the depth images if there is no color
   ColorImage color;             // empty if not stored or not requested
   DepthImage depth;
-  GrayImage right;  // right image of a stereo pair
-  std::vector<StereoCamera> stereo;
+  GrayImage right;                   // right images of stereo pairs, side by side
+  std::vector<StereoCamera> stereo;  // empty without stereo; left cameras are also in `cameras`
 };
 
 // One camera's part of a frame.
 struct CameraView {
   Camera color_camera;
-  // color_camera at the size of `depth`; the principal point is scaled with the size, as in
-  // RTAB-Map.
+  // color_camera at the size of `depth`; as in RTAB-Map, the principal point is scaled too.
   Camera depth_camera;
   ColorImage color;
   DepthImage depth;
@@ -46,7 +45,7 @@ struct CameraView {
 // is not a multiple of the number of cameras.
 std::vector<CameraView> camera_views(const RgbdFrame& frame);
 
-// Returns the number of pixels of the largest of: all cameras, the color image, the depth image.
+// Returns the largest number of pixels: all cameras together, color image, or depth image.
 std::size_t image_pixels(const RgbdFrame& frame);
 
 // Returns the number of frames to keep in memory at a time: 8 of up to 2 megapixels, fewer of

@@ -57,8 +57,7 @@ SensorModel read_sensor_model(const std::string& name) {
         table.set(key, entry.second.as<std::string>());
     table.check();
     if (!(model.noise_m + model.noise_of_range + model.noise_of_square > 0.0))
-      throw Error("the sensor has no noise: at least one noise key must be > 0",
-                  {.field = "noise_m"});
+      throw Error("noise_m, noise_of_range or noise_of_square must be > 0");
   });
   return model;
 }

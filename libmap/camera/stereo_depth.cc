@@ -15,7 +15,7 @@ namespace libmap {
 
 namespace {
 
-constexpr double disparity_unit = 1.0 / 16;  // of cv::StereoSGBM
+constexpr double disparity_unit = 1.0 / 16;  // pixels per unit of cv::StereoSGBM
 
 const std::vector<std::pair<std::string, StereoDirections>> direction_names = {
     {"three", StereoDirections::three},
@@ -49,7 +49,7 @@ void check(const StereoCamera& cameras) {
 StereoDepthOptions checked(StereoDepthOptions options) {
   check_parameters(options);
   if (options.block_px % 2 == 0)
-    refuse_pair("out of range", "block_px", std::to_string(options.block_px), "odd");
+    refuse_pair("an even number", "block_px", std::to_string(options.block_px), "odd");
   options.disparities_px = (options.disparities_px + 15) / 16 * 16;
   return options;
 }
@@ -99,9 +99,9 @@ void bind(ParameterTable& table, StereoDepthOptions& options) {
       "left_right_px", options.left_right_px, Range{-1, 1024},
       "maximum difference between the disparities of the left-right check, pixels; -1: disabled");
   table.add("speckle_px", options.speckle_px, Range{0, 1e6},
-            "minimum area of a connected patch of disparity, pixels; 0: no limit");
+            "minimum area of a connected patch of similar disparities, pixels; 0: no limit");
   table.add("min_contrast", options.min_contrast, Range{0, 255},
-            "minimum gray-level range of the matched window, 0 to 255");
+            "minimum range of gray levels in the matched window of the left image");
   table.add("directions", options.directions, direction_names,
             "number of directions along which matching costs are summed");
   table.add("max_depth_m", options.max_depth_m, not_negative, "maximum depth, m; 0: no limit");
@@ -151,8 +151,8 @@ DepthImage stereo_depth(const RgbdFrame& frame, const StereoDepthOptions& option
   const auto pairs = static_cast<int>(frame.stereo.size());
   if (frame.right.width % pairs != 0 || frame.color.width % pairs != 0 ||
       frame.color.height != frame.right.height || frame.color.width != frame.right.width)
-    refuse_pair("left and right image differ in size", node + ": right image",
-                size_text(frame.right.width, frame.right.height),
+    refuse_pair("left and right images differ in size or are not of several pairs side by side",
+                node + ": right image", size_text(frame.right.width, frame.right.height),
                 size_text(frame.color.width, frame.color.height));
   const GrayImage left = luminance(frame.color);
   const int width = left.width / pairs;

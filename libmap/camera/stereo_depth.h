@@ -15,10 +15,10 @@ struct StereoDepthOptions {
   int min_disparity_px = 0;     // < 0 only for converging cameras
   int disparities_px = 128;     // range of disparities, 16 to 1024, rounded up to a multiple of 16
   int block_px = 5;             // side of the matched window, odd, 1 to 31
-  int uniqueness_percent = 10;  // minimum margin between best and second-best match, 0 to 100
+  int uniqueness_percent = 10;  // minimum cost difference of best and second-best match, 0 to 100
   int left_right_px = 1;        // maximum difference of the left-right check; -1: disabled
-  int speckle_px = 100;         // minimum area of a connected patch of disparity; 0: no limit
-  int min_contrast = 2;         // minimum gray-level range of the left window, 0 to 255; uniform
+  int speckle_px = 100;         // smaller connected patches of disparity are dropped
+  int min_contrast = 2;         // minimum gray-level range of the left image's window; uniform
                                 // areas, such as overexposed ones, match anywhere
   StereoDirections directions = StereoDirections::five;
   double max_depth_m = 0.0;  // larger depths are dropped; 0: no limit
@@ -26,18 +26,17 @@ struct StereoDepthOptions {
 void bind(ParameterTable& table, StereoDepthOptions& options);
 
 // Returns the depth of the left image's pixels, meters; 0 without a match. z = fx b / (d - (cx_left
-// - cx_right)) with the disparity d = x_left - x_right. Throws Error naming the field: images that
-// do not have the cameras' sizes, cameras that are not rectified (distorted, or with different fx),
-// no baseline, options out of range.
+// - cx_right)) with the disparity d = x_left - x_right. Throws Error naming the field if an image
+// does not have the size of its camera, the cameras are not rectified (distorted, or with different
+// fx), the baseline is not > 0, or an option is out of range.
 DepthImage stereo_depth(const GrayImage& left, const GrayImage& right, const StereoCamera& cameras,
                         const StereoDepthOptions& options = {});
 
 // Returns the depth image of a frame with one or several stereo pairs, side by side like the
-// frame's images. Throws Error naming the node if the frame has no pair, or as the function above
-// does.
+// frame's images. Throws Error naming the node if the frame has no pair or images, or as above.
 DepthImage stereo_depth(const RgbdFrame& frame, const StereoDepthOptions& options = {});
 
-// 8-bit luminance by ITU-R BT.601.
+// Returns the 8-bit luminance by ITU-R BT.601.
 GrayImage luminance(const ColorImage& image);
 
 }  // namespace libmap

@@ -65,7 +65,7 @@ std::optional<Eigen::Vector2d> observe(const CameraView& view, const Eigen::Vect
 
 void bind(ParameterTable& table, ColmapBuilderOptions& options) {
   table.add("point_spacing_px", options.point_spacing_px, {1.0, 10000.0},
-            "spacing of the COLMAP model's points in each depth image, pixels");
+            "spacing of the COLMAP model's points in each color image, pixels");
   table.add("point_depth_tolerance", options.depth_tolerance, {0.0, 1.0, true, false},
             "maximum relative depth difference at which two images observe the same COLMAP point");
 }

@@ -1,4 +1,4 @@
-// Converts a scan to a COLMAP model; the points are from the scan's depth images.
+// Converts the images of a scan to a COLMAP model with points from the scan's depth images.
 #pragma once
 
 #include <cstddef>
@@ -15,20 +15,20 @@
 namespace libmap {
 
 struct ColmapBuilderOptions {
-  int point_spacing_px = 16;      // > 0, spacing of an image's points in both directions
-  double depth_tolerance = 0.02;  // > 0, share of the depth within which points are identical
+  int point_spacing_px = 16;      // > 0: spacing of an image's points in x and in y
+  double depth_tolerance = 0.02;  // > 0: maximum relative depth difference of identical points
 };
 void bind(ParameterTable& table, ColmapBuilderOptions& options);
 
-// Each image adds points on a pixel grid, in cells with smooth depth that observe no earlier point.
-// Later images observe a point at its projection if their depth agrees, so that reprojection errors
-// are 0 by construction (ERROR is -1: unknown). Images with equal cameras share a camera.
+// An image observes each earlier point whose depth it measures at the point's projection, so that
+// reprojection errors are 0 by construction (stored as -1, unknown). It adds a point in each cell
+// of a pixel grid without such a point or a depth edge. Images of equal lenses share a camera.
 class ColmapBuilder {
  public:
   explicit ColmapBuilder(const ColmapBuilderOptions& options = {});  // an empty model
 
-  // Adds an image; ids start at 1 in the order of calls. An image without depth gets no points and
-  // no features. Throws Error if COLMAP has no equivalent camera model.
+  // Adds an image; ids start at 1 in the order of calls. An image without depth has no points and
+  // observations. Throws Error if COLMAP has no model that is equivalent to the color camera.
   void add_image(const std::string& name, const CameraView& view, const Pose& world_from_camera);
 
   const ColmapModel& model() const { return model_; }
@@ -36,8 +36,7 @@ class ColmapBuilder {
  private:
   int add_camera(const ColmapCamera& camera);
   void add_observation(int id, std::int64_t point, const Eigen::Vector2d& pixel);
-  // Sets the pixels of `taken` (one per cell of the grid) to non-zero for cells with an
-  // observation.
+  // Sets the pixels of `taken` (one per cell of the grid) to 1 for cells with an observation.
   void observe_points(int id, const CameraView& view, GrayImage& taken);
   void add_points(int id, const CameraView& view, const Pose& world_from_camera,
                   const GrayImage& taken);

@@ -48,7 +48,7 @@ int integer_in(const Table& table, std::size_t row, const char* column, int miss
   const std::string cell = cell_of(table, row, column);
   if (cell.empty()) return missing;
   const std::optional<int> value = parse_int(cell);
-  if (!value) throw wrong_cell("not a whole number", table, row, column, "of 32 bits");
+  if (!value) throw wrong_cell("invalid", table, row, column, "a whole number of 32 bits");
   return *value;
 }
 
@@ -70,7 +70,7 @@ std::optional<std::array<double, 6>> six_in(const Table& table, std::size_t row,
                                             const char* column) {
   const std::vector<double> numbers = numbers_in(table, row, column);
   if (numbers.empty()) return std::nullopt;
-  if (numbers.size() != 6) throw wrong_cell("must have six numbers", table, row, column);
+  if (numbers.size() != 6) throw wrong_cell("not a list of six numbers", table, row, column);
   std::array<double, 6> six{};
   std::copy(numbers.begin(), numbers.end(), six.begin());
   return six;
@@ -84,7 +84,7 @@ GraphNode node_in(const Table& table, std::size_t row) {
   node.weight = integer_in(table, row, "weight", 0);
   node.stamp_s = table.optional_number(row, table.column("stamp_s")).value_or(0.0);
   if (!std::isfinite(node.stamp_s))
-    throw wrong_cell("not a number of seconds", table, row, "stamp_s");
+    throw wrong_cell("not a finite number of seconds", table, row, "stamp_s");
   node.label = cell_of(table, row, "label");
   node.velocity = six_in(table, row, "velocity");
   if (const auto gps = six_in(table, row, "gps")) {
@@ -107,14 +107,13 @@ bool is_depth_image(const fs::path& file) {
   return info && info->channels == 1 && info->bits == 16;
 }
 
-// Spherical interpolation of the rotation, linear of the position.
+// Interpolates the rotation spherically, and the position linearly.
 Pose between(const Pose& a, const Pose& b, double fraction) {
   return make_pose((1.0 - fraction) * a.translation() + fraction * b.translation(),
                    Eigen::Quaterniond(a.linear()).slerp(fraction, Eigen::Quaterniond(b.linear())));
 }
 
-// Returns the pose at a stamp; nullopt if none is near. `trajectory` is in ascending order of
-// stamps.
+// Returns the pose at a stamp; nullopt if none is near. `trajectory` is sorted by stamp.
 std::optional<Pose> pose_at(const Trajectory& trajectory, double stamp_s, double tolerance_s) {
   const auto after = std::lower_bound(
       trajectory.begin(), trajectory.end(), stamp_s,
@@ -144,10 +143,10 @@ DepthImage read_depth(const std::string& bytes, double depth_unit_m) {
 // Registers depth to the color camera, at the size of the depth image.
 void register_to_color(RgbdFrame& frame, const Camera& depth_camera) {
   if (frame.cameras.size() != 1 || !frame.stereo.empty())
-    throw Error("depth_calibration requires one camera without stereo",
-                {.field = "cameras", .value = std::to_string(frame.cameras.size())});
+    throw Error("depth_calibration requires a single camera that is not part of a stereo pair",
+                {.field = "number of cameras", .value = std::to_string(frame.cameras.size())});
   if (frame.depth.width != depth_camera.width || frame.depth.height != depth_camera.height)
-    throw Error("differs from the calibration",
+    throw Error("differs from the image size of depth_calibration",
                 {.field = "size of the depth image",
                  .value = size_text(frame.depth.width, frame.depth.height),
                  .bound = size_text(depth_camera.width, depth_camera.height)});
@@ -159,7 +158,7 @@ void register_to_color(RgbdFrame& frame, const Camera& depth_camera) {
                                target.base_from_camera.inverse() * depth_camera.base_from_camera);
 }
 
-// Throws Error if the aspect ratios differ: registered depth covers the same view as color.
+// Throws Error if the aspect ratios of depth and color differ; registered depth has color's view.
 void require_aspect_of_color(const RgbdFrame& frame) {
   constexpr double max_difference = 0.03;
   double width = frame.color.width;
@@ -174,8 +173,8 @@ void require_aspect_of_color(const RgbdFrame& frame) {
   const double ratio = frame.depth.width * height / (frame.depth.height * width);
   if (width > 0.0 && std::abs(std::log(ratio)) > max_difference)
     throw Error(
-        "the aspect ratio differs from the color image; the depth image is rotated or requires "
-        "depth_calibration in " +
+        "the aspect ratio differs from that of the color image; if the depth image is not rotated "
+        "but from a separate camera, set depth_calibration in " +
             std::string(frame_folder_files::options),
         {.field = "size of the depth image",
          .value = size_text(frame.depth.width, frame.depth.height),
@@ -217,13 +216,13 @@ std::vector<std::pair<std::string, PoseFrame>> pose_frame_names() {
 void bind(ParameterTable& table, FrameFolderOptions& options) {
   table.add("depth_unit_m", options.depth_unit_m, positive,
             "meters per unit of the depth images; 0.0002: TUM RGB-D, 0.001: millimeters");
-  table.add("calibration", options.calibration, "camera file with the intrinsics");
+  table.add("calibration", options.calibration, "camera file of the color images");
   table.add("depth_calibration", options.depth_calibration,
             "camera file of a separate depth camera; empty: depth is already registered to color");
   table.add("pose_frame", options.pose_frame, pose_frame_names(),
             "frame of the poses in the pose files; camera: optical frame; base: robot's base");
   table.add("pairing_tolerance_s", options.pairing_tolerance_s, not_negative,
-            "maximum time difference between paired color, depth and poses, s");
+            "maximum time difference between color and depth, and between image and pose, s");
 }
 
 FrameFolder::FrameFolder(const fs::path& path, const FrameFolderOptions& defaults)
@@ -277,9 +276,9 @@ void FrameFolder::read_nodes() {
     for (const std::string& name : split_names(cell_of(table, row, "calibration")))
       of_node.cameras.push_back(add_camera(name));
     if (!of_node.baselines_m.empty() && of_node.cameras.size() != 2 * of_node.baselines_m.size())
-      throw wrong_cell("each stereo pair needs two cameras", table, row, "calibration");
+      throw wrong_cell("not two camera files per baseline", table, row, "calibration");
     if (!files_.emplace(node.id, std::move(of_node)).second)
-      throw wrong_cell("is a duplicate", table, row, "node");
+      throw wrong_cell("another row has the same node number", table, row, "node");
     graph_.nodes.push_back(std::move(node));
   }
   std::sort(graph_.nodes.begin(), graph_.nodes.end(),
@@ -347,7 +346,7 @@ std::vector<double> smoothed_differences(const std::vector<double>& stamps,
 }  // namespace
 
 void FrameFolder::add_images(const Listing& color, const Listing& depth) {
-  if (depth.names.empty()) throw Error("lists no depth image", {.file = path_.string()});
+  if (depth.names.empty()) throw Error("no depth image is listed", {.file = path_.string()});
   std::vector<std::string> color_of_depth(depth.names.size());
   const auto pairs = pair_by_stamp(color.stamps, depth.stamps, options_.pairing_tolerance_s);
   std::vector<double> paired_stamps;
@@ -365,7 +364,8 @@ void FrameFolder::add_images(const Listing& color, const Listing& depth) {
     if (color.names.empty() || !color_of_depth[j].empty()) order.push_back(j);
   const std::string tolerance = to_text(options_.pairing_tolerance_s) + " s";
   if (order.empty())
-    throw Error("no color image is within " + tolerance + " of a depth image",
+    throw Error("no color image is within " + tolerance +
+                    " of a depth image; check the stamps or increase pairing_tolerance_s",
                 {.file = path_.string()});
   if (order.size() < depth.names.size())
     warnings_.push_back("skipped " + count_of(depth.names.size() - order.size(), "depth image") +
@@ -440,7 +440,7 @@ void FrameFolder::read_links() {
   if (!fs::exists(file)) return;
   if (options_.pose_frame != PoseFrame::base) {
     warnings_.push_back(std::string(files::links) +
-                        ": ignored: links connect bases, but the folder's poses are of cameras");
+                        ": ignored, because links connect base poses and pose_frame is camera");
     return;
   }
   std::size_t dangling = 0;

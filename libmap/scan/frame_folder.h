@@ -1,23 +1,24 @@
 // Reader of a scan stored as a folder of plain files, in the layout of the TUM RGB-D benchmark
 // (Sturm et al. 2012) or the complete layout of FrameFolderWriter.
 //
-//   scan.yaml               FrameFolderOptions; optional
-//   associations.txt        lines "stamp color stamp depth", or depth before color; else
-//   rgb.txt, depth.txt      lines "stamp file", paired by time; rgb.txt is optional
+//   scan.yaml               keys of FrameFolderOptions; optional
+//   associations.txt        lines "stamp color stamp depth", or depth before color; if missing:
+//   rgb.txt, depth.txt      lines "stamp file"; rgb.txt is optional
 //   calibration.yaml        the camera (camera_io.h)
-//   groundtruth.txt         true poses as TUM lines, or poses_ground_truth.tum
-//   poses.tum               odometry, or poses_odometry.tum
-//   poses_stored.tum        optimized poses
-//   links.g2o               links between nodes; vertices are not used
+//   groundtruth.txt         true poses as TUM lines; or poses_ground_truth.tum
+//   poses.tum               odometry as TUM lines; or poses_odometry.tum
+//   poses_stored.tum        optimized poses as TUM lines
+//   links.g2o               links between nodes; the file's vertices are not used
 //   nodes.csv               instead of associations.txt: node, session, weight, stamp_s, label,
-//                           color, depth, right, calibration, baseline_m, velocity, gps; files
-//                           relative to the folder; several calibrations separated by spaces, and
-//                           one baseline per stereo pair
+//                           color, depth, right, calibration, baseline_m, velocity, gps. Files are
+//                           relative to the folder. A node's calibrations are separated by spaces:
+//                           one per camera, or left and right of each pair with one baseline_m.
 //   color/ depth/ right/ calibration/
 //
-// Without nodes.csv, nodes are numbered from 1 in the order of time and have the stamp of the depth
-// image. Poses are assigned by node or, without nodes, by stamp: a pose is interpolated between two
-// poses within the tolerance, else the nearest pose within the tolerance is used.
+// Without nodes.csv, color and depth are paired by stamp; nodes are numbered from 1 in the order of
+// time and have the stamp of the depth image. Poses are assigned by node if all poses of a file
+// have one, else by stamp: interpolated if a pose before and one after the stamp are both within
+// pairing_tolerance_s, else the only pose within this tolerance.
 #pragma once
 
 #include <filesystem>
@@ -33,7 +34,7 @@
 
 namespace libmap {
 
-// Names of the files.
+// Names of these files and folders.
 namespace frame_folder_files {
 
 inline constexpr const char* options = "scan.yaml";
@@ -54,26 +55,26 @@ inline constexpr const char* calibration_folder = "calibration";
 
 }  // namespace frame_folder_files
 
-// Frame of the poses in a file: the camera's optical frame, or the base.
+// Frame of the poses in a file: the camera's optical frame, or the robot's base.
 enum class PoseFrame { camera, base };
 std::vector<std::pair<std::string, PoseFrame>> pose_frame_names();
 
-// Defaults of the TUM benchmark.
+// The defaults describe folders of the TUM benchmark. Camera files are relative to the folder.
 struct FrameFolderOptions {
-  double depth_unit_m = 0.0002;  // meters per unit of the 16-bit depth images
-  std::string calibration = "calibration.yaml";
-  // Calibration of a separate depth camera; images are registered to color on reading, and
-  // local_transform is base_from_depth. Empty: the images are registered already.
+  double depth_unit_m = 0.0002;                  // > 0: meters per unit of the 16-bit depth images
+  std::string calibration = "calibration.yaml";  // camera file of the color camera
+  // Camera file of a separate depth camera, in which local_transform is base_from_depth; depth is
+  // then registered to color on reading. Empty: depth is already registered.
   std::string depth_calibration{};
   PoseFrame pose_frame = PoseFrame::camera;  // frame of the poses in the files
-  double pairing_tolerance_s = 0.02;
+  double pairing_tolerance_s = 0.02;         // >= 0: maximum difference of paired stamps
 };
 void bind(ParameterTable& table, FrameFolderOptions& options);
 
 class FrameFolder : public ScanSource {
  public:
-  // scan.yaml overrides `defaults`. Throws Error if the folder, the list of images or the
-  // calibration is missing, or a list is invalid.
+  // scan.yaml overrides `defaults`. Throws Error if the folder, the list of images or a camera file
+  // is missing, or a file is invalid.
   explicit FrameFolder(const std::filesystem::path& path, const FrameFolderOptions& defaults = {});
 
   const std::filesystem::path& path() const override { return path_; }
@@ -82,7 +83,7 @@ class FrameFolder : public ScanSource {
   RgbdFrame read_frame(int node, FrameParts parts = {}) const override;
 
   const FrameFolderOptions& options() const { return options_; }
-  // Reports unpaired images, and poses and links without a node.
+  // Reports unpaired images, pose files in which no pose matches a node, and ignored links.
   const std::vector<std::string>& warnings() const override { return warnings_; }
 
  private:

@@ -1,5 +1,5 @@
-// Writer of a scan as a folder of plain files for FrameFolder (frame_folder.h): color and depth
-// images, calibrations, poses, links.
+// Writes a scan as a folder of plain files that FrameFolder (frame_folder.h) reads: images,
+// calibrations, poses, links.
 #pragma once
 
 #include <cstddef>
@@ -16,13 +16,14 @@ namespace libmap {
 // Names of all files and folders that the writer can create.
 std::vector<std::string> frame_folder_names();
 
-// Encoded images to store unchanged; empty: the frame's image is encoded as PNG.
+// Encoded images of a frame to store unchanged. Empty: the frame's image is encoded as PNG.
 struct StoredImages {
   std::string color{};  // JPEG or PNG
   std::string depth{};  // PNG of 16-bit millimeters
   std::string right{};  // JPEG or PNG
 };
 
+// Numbers of written images, calibrations and associations.
 struct FrameFolderCounts {
   std::size_t color_images = 0;
   std::size_t depth_images = 0;
@@ -37,12 +38,11 @@ class FrameFolderWriter {
   // `failed` if a file or folder cannot be written.
   explicit FrameFolderWriter(std::filesystem::path folder);
 
-  // Writes the images and calibrations of a frame, e.g. color/000012.jpg for node 12. Depth is
-  // rounded to whole millimeters; 0 beyond 65.534 m.
+  // Writes the images and calibrations of a frame, e.g. color/000012.jpg for node 12. Depth that is
+  // encoded here is rounded to whole millimeters, and 0 beyond 65.534 m.
   void add_frame(const RgbdFrame& frame, const StoredImages& stored = {});
 
-  // Writes nodes, poses, links and scan.yaml. Returns numbers of images, calibrations and
-  // associations.
+  // Writes nodes, poses and links of `graph`, associations and scan.yaml. Called once, at the end.
   FrameFolderCounts finish(const PoseGraph& graph);
 
  private:

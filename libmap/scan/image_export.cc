@@ -42,10 +42,10 @@ std::vector<CameraView> read_views(const ScanSource& scan, int node, FrameParts 
 
 void bind(ParameterTable& table, ViewSelectionOptions& options) {
   table.add("radius_m", options.radius_m, not_negative,
-            "distance between camera positions within which only one of several similar images is "
-            "kept, m");
+            "with --bundler: distance between camera positions below which only one of several "
+            "images with similar viewing directions is kept, m; 0: all images are kept");
   table.add("angle_deg", options.angle_deg, {0.0, 180.0},
-            "maximum angle between the optical axes of similar images, degrees");
+            "with --bundler: maximum angle between the optical axes of similar images, degrees");
 }
 
 namespace {

@@ -13,38 +13,37 @@
 
 namespace libmap {
 
-// Returns "000012.jpg" for camera 0 of node 12, "000012_1.png" for camera 1.
+// Returns the file name "000012.jpg" for node 12, camera 0 and ".jpg"; "000012_1.png" for camera 1.
 std::string image_file_name(int node, std::size_t camera, const std::string& extension);
 
 struct ImageFile {
   std::string name{};
-  std::string bytes{};  // the stored bytes if they contain this image only; else a PNG
+  std::string bytes{};  // as stored in an RTAB-Map database for a single camera; else a PNG
 };
 
 // Returns the image file of one camera; `views` are the views of the node's frame, with color.
 ImageFile image_file_of(const ScanSource& scan, int node, const std::vector<CameraView>& views,
                         std::size_t camera);
 
-// Reads the views of a node's frame. Throws Error naming the node if it has no color image or no
-// calibration.
+// Reads one view per camera of a node. Throws Error naming a node without color or calibration.
 std::vector<CameraView> read_views(const ScanSource& scan, int node, FrameParts parts);
 
 struct ViewSelectionOptions {
-  double radius_m = 0.5;    // >= 0, distance of the camera positions; 0: all views are kept
-  double angle_deg = 30.0;  // 0..180, angle between the optical axes
+  double radius_m = 0.5;    // >= 0: only views at a smaller distance are similar; 0: all are kept
+  double angle_deg = 30.0;  // 0..180: maximum angle between the optical axes of similar views
 };
 void bind(ParameterTable& table, ViewSelectionOptions& options);
 
-// Selects views greedily by descending quality and returns their indices in ascending order. Two
-// views are similar if the distance is below the radius and the angle between the axes is below the
-// limit. No two selected views are similar; each other view is similar to a better selected view.
-// `qualities` has one value per view; the first of equal views is better. Poses are optical.
+// Selects views greedily by descending quality and returns their indices in ascending order. Views
+// are similar if their distance is less than radius_m and the angle between their optical axes is
+// at most angle_deg. No two selected views are similar; each other view is similar to a better
+// selected view. `qualities` has one value per view; the first of equal views is better.
 std::vector<std::size_t> select_views(const std::vector<Pose>& world_from_camera,
                                       const std::vector<double>& qualities,
                                       const ViewSelectionOptions& options = {});
 
-// Image with camera for Bundler v0.3 (Snavely, Seitz and Szeliski 2006). MeshLab imports
-// bundle.out, list.txt and the images as "registered rasters".
+// Image and camera of a Bundler v0.3 model (Snavely, Seitz and Szeliski 2006): bundle.out, list.txt
+// and the images, which MeshLab imports as "registered rasters".
 struct BundlerView {
   std::string image{};  // name in list.txt, relative to the folder of list.txt
   Camera camera{};      // centered pinhole without distortion; base_from_camera is not used

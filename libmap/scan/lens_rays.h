@@ -22,7 +22,7 @@ class LensRays {
  public:
   using Table = std::vector<Eigen::Vector2d>;
 
-  // Returns ray_table(camera).
+  // Returns ray_table(camera) (camera.h): the rays of all pixels, row by row.
   std::shared_ptr<const Table> rays_of(const Camera& camera) {
     const std::lock_guard lock(mutex_);
     if (rays_ == nullptr || !same_lens(camera, lens_)) {

@@ -95,8 +95,8 @@ Pose base_from_camera(const ScanSource& scan, int node, std::size_t camera) {
       scan.read_frame(node, {.color = false, .depth = false}).cameras;
   if (camera >= cameras.size())
     throw Error("no such camera", {.file = scan.path().string(),
-                                   .field = "node " + std::to_string(node),
-                                   .value = "camera " + std::to_string(camera),
+                                   .field = "camera of node " + std::to_string(node),
+                                   .value = std::to_string(camera),
                                    .bound = "< " + std::to_string(cameras.size())});
   return cameras[camera].base_from_camera;
 }
@@ -121,8 +121,8 @@ std::vector<CameraPose> poses_of_images(const std::vector<ImagePose>& images,
     const auto& [node, camera] = node_camera;
     const auto [earlier, is_new] = known.emplace(node_camera, images[index].image);
     if (!is_new)
-      throw Error("two images match the same camera of node " + std::to_string(node),
-                  {.field = "image", .value = earlier->second + " and " + images[index].image});
+      throw Error(earlier->second + " is of the same camera",
+                  {.field = "image of node " + std::to_string(node), .value = images[index].image});
     add_camera(
         scan,
         {node, scan.graph().find_node(node)->stamp_s, camera, images[index].world_from_camera},
@@ -130,7 +130,7 @@ std::vector<CameraPose> poses_of_images(const std::vector<ImagePose>& images,
   }
   if (known.empty())
     throw Error("no image name matches a node of the scan",
-                {.field = "image",
+                {.field = "first image",
                  .value = images.front().image,
                  .bound = "the scan's file name, a node number or a stamp"});
   return poses;
@@ -186,7 +186,7 @@ double fitting_scale(const std::vector<CameraPose>& poses, const std::map<int, P
   }
   if (given.size() < 3)
     throw Error("too few to determine the scale; set poses_scale",
-                {.field = "number of common positions",
+                {.field = "number of poses that the scan also has",
                  .value = std::to_string(given.size()),
                  .bound = ">= 3"});
   if (!(scale > 0.0) || !std::isfinite(scale))
@@ -255,13 +255,14 @@ void check_motion(const std::map<int, Pose>& own, ImportedPoses& result) {
   if (steps < fewest_steps) return;
   const auto mean = [&](double sum) { return sum / static_cast<double>(steps); };
   if (length_m > largest_ratio * own_length_m || own_length_m > largest_ratio * length_m)
-    result.warnings.push_back("the mean step is " + to_fixed_text(1e3 * mean(length_m), 0) +
-                              " mm, but " + to_fixed_text(1e3 * mean(own_length_m), 0) +
-                              " mm by the scan's poses; check the unit (poses_scale)");
+    result.warnings.push_back("the mean distance between successive poses is " +
+                              to_fixed_text(1e3 * mean(length_m), 0) + " mm, but " +
+                              to_fixed_text(1e3 * mean(own_length_m), 0) +
+                              " mm in the scan; check the unit (poses_scale)");
   if (mean(turn_rad) > smallest_turn_rad && difference_rad > 0.5 * turn_rad)
-    result.warnings.push_back("the mean rotation per step differs from the scan's poses by " +
-                              to_fixed_text(degrees * mean(difference_rad), 1) + " of " +
-                              to_fixed_text(degrees * mean(turn_rad), 1) +
+    result.warnings.push_back("rotations between successive poses differ from those in the scan, " +
+                              to_fixed_text(degrees * mean(turn_rad), 1) + " deg on average, by " +
+                              to_fixed_text(degrees * mean(difference_rad), 1) +
                               " deg; check the axes (poses_format, poses_of)");
 }
 
@@ -281,13 +282,13 @@ void bind(ParameterTable& table, PoseImportOptions& options) {
             "kitti-optical: RTAB-Map's export formats 1 and 2 with special axes");
   table.add("poses_quaternion", options.quaternion,
             {{"xyzw", QuaternionOrder::xyzw}, {"wxyz", QuaternionOrder::wxyz}},
-            "order of the quaternions in the pose file (TUM, g2o); xyzw: w last; wxyz: w first");
+            "order of the components of quaternions in the pose file, for TUM and g2o");
   table.add("poses_of", options.frame, pose_frame_names(),
             "frame of the poses in the pose file; base: robot's base; camera: optical frame of "
             "the first camera, always used for COLMAP, nerfstudio and Open3D");
   table.add("poses_scale", options.scale, not_negative,
-            "meters per unit of the positions in the pose file (arbitrary for COLMAP); 0: "
-            "determined by the best fit to the scan's odometry");
+            "meters per unit of the positions in the pose file (COLMAP's unit is arbitrary); 0: "
+            "from the best fit to the scan's odometry");
 }
 
 ImportedPoses import_poses(const fs::path& path, const ScanSource& scan,

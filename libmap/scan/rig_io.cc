@@ -36,8 +36,7 @@ const std::vector<std::string> camera_keys = split_list(
 double rig_number(const YAML::Node& node, const std::string& field) {
   if (!node.IsScalar()) throw Error("must be a single number", {.field = field});
   const std::optional<double> value = parse_double(node.Scalar());
-  if (!value)
-    throw Error("not a number", {.field = field, .value = node.Scalar(), .bound = "a number"});
+  if (!value) throw Error("not a number", {.field = field, .value = node.Scalar()});
   return *value;
 }
 
@@ -66,7 +65,8 @@ Camera intrinsics_of(const YAML::Node& map, const fs::path& folder) {
   for (const char* key : {"image_width", "image_height", "camera_matrix", "distortion_model",
                           "distortion_coefficients"})
     if (map[key])
-      throw Error("is also in the calibration file; remove it from one of them", {.field = key});
+      throw Error("is read from the file that 'calibration' names; remove this key",
+                  {.field = key});
   return read_camera(folder / map["calibration"].Scalar()).camera;
 }
 
@@ -143,7 +143,7 @@ void check_camera(const RigCamera& camera) {
   if (name.empty() || name == "." || name == ".." || name.find('/') != std::string::npos ||
       name.find('\0') != std::string::npos)
     throw Error("not a valid folder name",
-                {.field = "name", .value = name, .bound = "a name without '/'"});
+                {.field = "name", .value = name, .bound = "a name without '/', not '.' or '..'"});
   if (!(camera.depth_scale_m > 0) || !std::isfinite(camera.depth_scale_m))
     refuse("depth_scale_m", camera.depth_scale_m, "> 0");
   if (!(camera.near_m >= 0) || !std::isfinite(camera.near_m))
@@ -157,7 +157,7 @@ std::string number_text(double value) {
   return std::isinf(value) ? (value > 0 ? ".inf" : "-.inf") : to_text(value);
 }
 
-// Returns the lines of a camera file without its head, as an entry of the list.
+// Returns the lines of a camera file after the YAML header, as an entry of the list `cameras`.
 std::string camera_entry(const RigCamera& camera) {
   std::istringstream lines(to_yaml(CameraFile{camera.name, camera.camera}));
   std::string text;
@@ -418,7 +418,7 @@ std::vector<SynchronizedSet> synchronized_sets(const std::vector<RigImage>& imag
       if (images[waiting[n]].stamp_s > start + 2 * reach) break;
       if (!taken[waiting[n]]) near.push_back(waiting[n]);
     }
-    // The first image belongs to the set, even if its camera has others.
+    // The first image belongs to the set, even if the camera has other images near.
     ImagesByCamera candidates = by_camera(images, near, camera_count);
     candidates[images[near.front()].camera].resize(1);
     SynchronizedSet best;

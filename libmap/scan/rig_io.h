@@ -1,5 +1,5 @@
-// Rigs of several depth cameras on one robot, images, and sets of synchronized images. A rig is
-// YAML:
+// Reads and writes rigs of several depth cameras on one robot, reads their images, and finds sets
+// of synchronized images. A rig is a YAML file:
 //
 //   depth_scale_m: 0.001       # meters per unit of the depth images
 //   near_m: 0.28               # measurements outside near..far are dropped
@@ -14,7 +14,7 @@
 //       calibration: left.yaml            # ... or a file, relative to this one
 //       position_m: [0.1, 0.17, 0.1]      # instead of robot_from_camera: pose of the camera's body
 //       roll_pitch_yaw_deg: [0, 0, 60]    # frame (x forward, z up, REP-103; about fixed axes)
-//       far_m: 2.0                        # overrides the rig's; so do depth_scale_m and near_m
+//       far_m: 2.0                        # replaces the rig's far_m (also depth_scale_m, near_m)
 //
 // robot_from_camera refers to the optical frame (z forward). A camera without any of these poses
 // has the local_transform of the calibration.
@@ -42,9 +42,9 @@ namespace libmap {
 struct RigCamera {
   std::string name{};                                      // folder name: no '/', unique in the rig
   Camera camera{};                                         // base_from_camera is robot_from_camera
-  double depth_scale_m = 0.001;                            // > 0
-  double near_m = 0.0;                                     // >= 0
-  double far_m = std::numeric_limits<double>::infinity();  // > near_m
+  double depth_scale_m = 0.001;                            // > 0: meters per unit of the images
+  double near_m = 0.0;                                     // >= 0: minimum valid depth
+  double far_m = std::numeric_limits<double>::infinity();  // > near_m: maximum valid depth
 };
 
 struct CameraRig {
@@ -85,16 +85,17 @@ std::vector<RigImage> list_rig_images(const std::filesystem::path& folder, const
 // 16-bit gray PNG or the size differs from the camera's calibration.
 Image<std::uint16_t> read_rig_units(const RigImage& image, const RigCamera& camera);
 
-// Reads an image in meters; 0 for the units 0 and 65535 (saturated). Throws as read_rig_units does.
+// Reads an image in meters; 0 for the units 0 and 65535 (saturated). The caller applies near_m and
+// far_m. Throws as read_rig_units does.
 DepthImage read_rig_depth(const RigImage& image, const RigCamera& camera);
 
-// Images of all cameras at one time.
+// Images of a rig at one time, at most one per camera.
 struct SynchronizedSet {
   double stamp_s = 0.0;
   struct Camera {
-    enum class State { seen, late, missing };  // state of the camera's image in the set
-    // late: the nearest image, earlier or later, is outside the tolerance (not in the sets of
-    // synchronized_sets). missing: no image of the camera is available for the set.
+    enum class State { seen, late, missing };
+    // seen: the set has an image of the camera. late: the nearest image, earlier or later, is not
+    // within the tolerance (not in results of synchronized_sets). missing: no image is available.
     State state = State::missing;
     std::size_t image = 0;  // index of the image nearest to stamp_s, unless missing
     double offset_s = 0.0;  // stamp of the image minus stamp_s

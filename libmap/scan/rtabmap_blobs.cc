@@ -93,9 +93,9 @@ void require_optimized_poses(const std::string& ids_blob, const std::string& pos
   constexpr std::uint64_t pose_numbers = pose_bytes / sizeof(float);
   if (elements_of(poses) % pose_numbers != 0 ||
       elements_of(poses) / pose_numbers != elements_of(ids))
-    throw Error("not equal", {.field = "numbers of ids and poses",
-                              .value = std::to_string(elements_of(ids)) + " and " +
-                                       std::to_string(elements_of(poses) / pose_numbers)});
+    throw Error("ids and poses do not match; their numbers are " +
+                std::to_string(elements_of(ids)) + " and " +
+                std::to_string(elements_of(poses) / pose_numbers));
 }
 
 std::optional<Pose> decode_pose(std::string_view bytes) {

@@ -1,5 +1,5 @@
-// Little-endian binary formats of an RTAB-Map database, and the reader of its nodes, links and
-// optimized poses.
+// Encodes and decodes the little-endian blobs of an RTAB-Map database, and reads its nodes, links
+// and optimized poses.
 #pragma once
 
 #include <array>
@@ -19,31 +19,31 @@ namespace libmap {
 inline constexpr std::size_t absent_blob_bytes = 4;
 inline bool is_absent(std::string_view blob) { return blob.size() <= absent_blob_bytes; }
 
-// Format of a pose: 12 float32, the rows of [R|t].
+// A pose is encoded as 12 float32, the rows of [R|t]. The null pose, all zeros, is an unknown pose.
 inline constexpr std::size_t pose_bytes = 48;
 std::string to_blob(const Pose& pose);
 std::string null_pose_blob();
-// Encodes the symmetric part as 36 float64 in row-major order. g2o rejects a whole graph for one
-// asymmetric bit.
+// Encodes the symmetric part of a matrix as 36 float64 in row-major order, because g2o rejects a
+// whole graph for one asymmetric bit.
 std::string to_blob(const Matrix6d& information);
 // Encodes a velocity as 6 float32.
 std::string to_blob(const std::array<double, 6>& velocity);
 // Encodes a fix as 6 float64: stamp, longitude, latitude, altitude, error, bearing.
 std::string to_blob(const GpsFix& fix);
 
-// Decodes a pose with the nearest proper rotation; nullopt for all zeros, RTAB-Map's null. Throws
-// Error if the length is not 48 bytes, or the numbers are not finite or far from a rotation.
+// Decodes a pose with the nearest proper rotation; nullopt for the null pose. Throws Error if the
+// length is not 48 bytes, a number is not finite, the position is more than 1e8 m from the origin
+// along an axis, or the matrix is not nearly a rotation.
 std::optional<Pose> decode_pose(std::string_view bytes);
-// Decodes 36 float64. Throws Error if the length is not 288 bytes or a number is not finite.
+// Decodes 36 float64. Throws Error if the length is not 288 bytes or a magnitude exceeds 1e300.
 Matrix6d decode_information(std::string_view bytes);
 // Decodes 6 float32; nullopt if the velocity is unknown (all zeros or not finite). Throws Error if
 // the length is not 24 bytes.
 std::optional<std::array<double, 6>> decode_velocity(std::string_view bytes);
-// Decodes 6 float64; nullopt for all zeros. Throws Error if the length is not 48 bytes or a number
-// is not finite.
+// Decodes 6 float64; nullopt for all zeros. Throws Error unless `bytes` has 6 finite numbers.
 std::optional<GpsFix> decode_gps(std::string_view bytes);
 
-// Content of Admin.opt_ids and Admin.opt_poses.
+// Contents of the columns opt_ids and opt_poses of table Admin.
 struct OptimizedPoseBlobs {
   std::string ids;
   std::string poses;
@@ -57,12 +57,12 @@ class SqliteFile;
 
 struct RtabmapGraph {
   PoseGraph graph;
-  // Dropped nodes, links and poses with the reason; at most 100, then the number of further ones.
+  // Dropped nodes, links and poses with the reason: at most 100, then the number of the others.
   std::vector<std::string> warnings;
 };
 
-// Reads the graph. Each link is contained once; if both directions are stored, the one from the
-// lower node. Throws Error naming the file if a table cannot be read.
+// Reads the graph. If both directions of a link are stored, the graph contains the one from the
+// lower node id. Throws Error naming the file if a table cannot be read.
 RtabmapGraph read_rtabmap_graph(const SqliteFile& file, const RtabmapColumns& columns);
 
 }  // namespace libmap

@@ -101,7 +101,7 @@ void read_nodes(const SqliteFile& file, const RtabmapColumns& columns, PoseGraph
                    [](const GraphNode& a, const GraphNode& b) { return a.id < b.id; });
   const auto is_again = [&](const GraphNode& a, const GraphNode& b) {
     if (a.id != b.id) return false;
-    warnings.add(node_text(a.id) + ": occurs more than once; the first is used");
+    warnings.add(node_text(a.id) + ": occurs more than once; the first row is used");
     return true;
   };
   graph.nodes.erase(std::unique(graph.nodes.begin(), graph.nodes.end(), is_again),
@@ -185,7 +185,7 @@ class LinkReader {
     if (link.type != LinkType::landmark && graph_.find_node(link.to) == nullptr)
       throw Error(node_text(link.to) + " is missing");
     if (link.from == link.to && !is_absolute(link))
-      throw Error("a " + to_text(link.type) + " link to itself");
+      throw Error("a " + to_text(link.type) + " link from a node to itself");
   }
 
   // Rows are in ascending order of `from`, so the direction from the lower node is first.
@@ -202,8 +202,7 @@ class LinkReader {
   std::map<std::tuple<int, int, int>, PoseLink> links_;
 };
 
-// ---------------------------------------------------------------------------------- optimized
-// poses
+// -------------------------------------------------------------------------------- optimized poses
 
 std::map<int, Pose> decode_optimized_poses(const std::string& ids_blob,
                                            const std::string& poses_blob, const PoseGraph& graph,

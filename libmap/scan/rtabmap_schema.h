@@ -34,8 +34,7 @@ class RtabmapColumns {
 // Schema version of written files, which RTAB-Map 0.23 and later can open.
 inline constexpr const char* rtabmap_schema_version = "0.23.0";
 
-// CREATE statements of the tables, indices and triggers. The triggers set the current time in
-// inserted rows.
+// CREATE statements of tables, indices and triggers. The triggers set the current time in new rows.
 std::string rtabmap_table_statements();
 std::string rtabmap_index_statements();
 std::string rtabmap_trigger_statements();

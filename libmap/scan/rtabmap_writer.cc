@@ -43,8 +43,7 @@ void run_once(SQLite::Statement& statement) {
 constexpr const char* rtabmap_link_insert =
     "INSERT INTO Link (from_id, to_id, type, information_matrix, transform) VALUES (?,?,?,?,?)";
 
-// Inserts both directions with the same matrix, as RTAB-Map does; priors, gravity and landmarks
-// once.
+// Inserts both directions with one matrix, as RTAB-Map does; priors, gravity and landmarks once.
 void insert_link(SQLite::Statement& insert, const PoseLink& link) {
   const auto run = [&](int from, int to, const Pose& from_from_to) {
     const std::string information = to_blob(link.information);
@@ -329,7 +328,7 @@ void require_columns(const RtabmapDatabase& scan, bool adds_links) {
                        [&](const SqliteRow& row) { rows = row.integer(0); });
   if (rows != 1)
     throw Error("not an RTAB-Map database", {.file = file.file,
-                                             .field = "rows of table Admin",
+                                             .field = "number of rows of table Admin",
                                              .value = std::to_string(rows),
                                              .bound = "1"});
 }
@@ -377,7 +376,7 @@ void add_links(SQLite::Database& database, const std::vector<PoseLink>& links) {
 void write_calibration(SQLite::Database& database, const RtabmapDatabase& scan,
                        const CameraFile& calibration) {
   if (!scan.columns().has("Data", "calibration"))
-    throw Error("this kind of scan cannot store calibrations", {.file = scan.path().string()});
+    throw Error("table Data has no column calibration", {.file = scan.path().string()});
   SQLite::Statement update(database, "UPDATE Data SET depth = ?, calibration = ? WHERE id = ?");
   for (const GraphNode& node : scan.graph().nodes) {
     const FrameBlobs blobs = scan.read_blobs(node.id);

@@ -1,4 +1,4 @@
-// Writer of scans as RTAB-Map databases of schema 0.23 for RTAB-Map's own tools.
+// Writes scans as RTAB-Map databases of schema 0.23 for RTAB-Map's own tools.
 #pragma once
 
 #include <filesystem>
@@ -28,8 +28,8 @@ std::string encode_depth(const DepthImage& depth, DepthFormat format);
 // that RTAB-Map writes.
 class RtabmapWriter {
  public:
-  // Creates or replaces the file `path`; pass the temporary path of an OutputFile. Throws Error
-  // (failed), as all calls do if the file cannot be written.
+  // Creates or replaces the file `path`; pass the temporary path of an OutputFile. This and all
+  // other calls throw Error (failed) if the file cannot be written.
   explicit RtabmapWriter(const std::filesystem::path& path,
                          const RtabmapWriterOptions& options = {});
   ~RtabmapWriter();

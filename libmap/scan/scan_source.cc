@@ -105,7 +105,7 @@ void JoinedScan::find_step() {
   if (step > most)
     throw Error("node ids are too large for joining this many scans",
                 {.file = path().string(),
-                 .field = "node",
+                 .field = "largest node id",
                  .value = std::to_string(largest),
                  .bound = "< " + std::to_string(most / 10)});
   step_ = static_cast<int>(step);
@@ -152,7 +152,7 @@ std::unique_ptr<ScanSource> open_scans(const std::vector<std::filesystem::path>&
 
 namespace {
 
-constexpr double max_step = 0.03;  // share of depth between pixels of one surface
+constexpr double max_step = 0.03;  // maximum relative depth difference of pixels of one surface
 constexpr double max_miss_px = 0.5;
 constexpr double close_px = 0.03;
 constexpr int search_rounds = 5;
@@ -264,7 +264,7 @@ void apply(RgbdFrame& frame, const CameraFile& calibration, LensRays& rays) {
   if (frame.cameras.empty() && frame.stereo.empty()) return;
   if (frame.cameras.size() != 1 || !frame.stereo.empty())
     throw Error("a calibration file describes one camera, but the frame has several",
-                {.field = "cameras",
+                {.field = "number of cameras",
                  .value = std::to_string(frame.cameras.size() + 2 * frame.stereo.size()),
                  .bound = "1"});
   Camera& camera = frame.cameras.front();

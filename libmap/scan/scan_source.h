@@ -1,4 +1,4 @@
-// Format-independent access to a scan: poses and links on opening, frames one at a time.
+// Opens scans of any format; reads poses and links on opening, frames one at a time.
 #pragma once
 
 #include <filesystem>
@@ -15,7 +15,7 @@ namespace libmap {
 // Images of a frame to decode. Cameras are always read.
 struct FrameParts {
   bool color = true;
-  bool depth = true;
+  bool depth = true;  // also the right image of a stereo pair
 };
 
 // File of a node and the node's number in the file.
@@ -28,7 +28,7 @@ class ScanSource {
  public:
   virtual ~ScanSource() = default;
 
-  // Path as given by the user.
+  // Path as given by the user; for joined scans, that of the first scan.
   virtual const std::filesystem::path& path() const = 0;
   // Poses and links, read on opening.
   virtual const PoseGraph& graph() const = 0;
@@ -37,7 +37,7 @@ class ScanSource {
     static const std::vector<std::string> none;
     return none;
   }
-  // Returns the file and original number of a node of joined scans.
+  // Returns the file and, in the file, the number of a node; both differ only in joined scans.
   virtual SourceNode source_of(int node) const { return {path(), node}; }
   // Returns the file name of the node's color image without folder; empty if images are not files.
   virtual std::string image_name([[maybe_unused]] int node) const { return {}; }
@@ -61,8 +61,9 @@ std::unique_ptr<ScanSource> join_scans(std::vector<std::unique_ptr<ScanSource>> 
 std::unique_ptr<ScanSource> open_scans(const std::vector<std::filesystem::path>& paths);
 
 // Replaces the focal lengths, principal point and distortion of the frame's camera, and corrects
-// and registers the depth. The mounting pose and the rolling shutter are unchanged. Throws Error
-// for a frame of several cameras or a stereo pair, or if the image size differs.
+// and registers the depth. The mounting pose is kept, color is not corrected for a rolling shutter,
+// and a frame without cameras is unchanged. Throws Error for a frame of several cameras or a stereo
+// pair, or if the image size differs.
 void apply_calibration(RgbdFrame& frame, const CameraFile& calibration);
 
 // Returns `scan` with the calibration applied to each frame; read_frame throws Error naming the

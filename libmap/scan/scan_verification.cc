@@ -52,7 +52,7 @@ std::size_t format_of(float number) {
   return static_cast<std::size_t>(number);
 }
 
-// Checks the description and returns its format.
+// Checks the column scan_info and returns the scan's format.
 std::size_t format_of_info(std::string_view info) {
   if (info.empty()) return unknown_format;
   if (info.size() != 76 && info.size() != 60 && info.size() != 56)
@@ -288,7 +288,8 @@ class DatabaseVerification {
       if (size > 0 && (bytes == size || (bytes % 4 == 0 && bytes / 4 == size))) return;
       findings_.add(node_in(row, 0), part_of(table, "descriptor"),
                     Error("does not match descriptor_size",
-                          {.value = std::to_string(bytes) + " bytes",
+                          {.field = "length",
+                           .value = std::to_string(bytes) + " bytes",
                            .bound = std::to_string(size) + ", or 4 times as many"}));
     };
     scan_.file().each_row("SELECT " + node + ", descriptor_size, length(descriptor) FROM " + table,
@@ -392,7 +393,7 @@ ScanVerificationResult verify_scan(const ScanSource& scan, Progress& progress) {
     DatabaseVerification(*database, result, progress).run();
   else
     verify_frames(scan, result, progress);
-  // Data that the graph dropped, unless the blob is listed.
+  // Adds warnings about data that the graph dropped, unless the fault is listed.
   for (const std::string& warning : scan.warnings()) {
     if (is_about_unknown_part(warning)) continue;
     const bool is_listed =

@@ -88,7 +88,7 @@ struct SqliteFile::Connection {
                  mode.file_system == nullptr ? "" : mode.file_system) {
     // No value is longer than the file, except results of expressions in its schema.
     constexpr std::uint64_t min_length = 1U << 20U;
-    constexpr std::uint64_t max_length = 1'000'000'000;  // SQLite's own
+    constexpr std::uint64_t max_length = 1'000'000'000;  // SQLite's limit
     sqlite3_limit(database.getHandle(), SQLITE_LIMIT_LENGTH,
                   static_cast<int>(std::min(file_bytes + min_length, max_length)));
     // Restricts the effects of an untrusted schema.

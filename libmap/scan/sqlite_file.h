@@ -25,7 +25,7 @@ class SqliteRow {
   bool is_null(int column) const;          // true for NULL
   std::int64_t integer(int column) const;  // 0 for NULL
   double real(int column) const;           // NaN for NULL
-  std::string bytes(int column) const;     // bytes of a blob or a text
+  std::string bytes(int column) const;     // bytes of a blob or a text; empty for NULL
   bool is_text(int column) const;          // false for numbers, blobs and NULL
 
  private:
@@ -33,11 +33,11 @@ class SqliteRow {
 };
 
 // Opens a file read-only and creates no files next to it (no journal, -wal or -shm). In rollback
-// mode, the file is read with SQLite's locks, after waiting up to 10 s for a writer. In WAL mode
-// with a -wal and a -shm, both are used, so that data committed by another program are visible;
-// with a -wal only (after a crash), the -wal is read into memory; with neither, no program has the
-// file open, and it is read as an unchanging file. A journal of an interrupted write is an Error:
-// only a program with write access can roll it back.
+// mode, the file is read with SQLite's locks, after waiting up to 10 s for a writer. In WAL mode,
+// a -wal and a -shm next to the file are both used, so that data committed by another program are
+// visible. With a -wal only (after a crash), the -wal's index is kept in memory. With neither, no
+// program has the file open, and it is read as an unchanging file. A journal of an interrupted
+// write is an Error, because only a program with write access can roll it back.
 class SqliteFile {
  public:
   // Throws Error if the file is not an SQLite file, damaged or not readable.

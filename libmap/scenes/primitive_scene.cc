@@ -28,7 +28,7 @@ struct ParameterAdder {
   void operator()(Capsule& capsule) const {
     table.add("radius_m", capsule.radius_m, size_range, "radius of the capsule, m");
     table.add("length_m", capsule.length_m, size_range,
-              "length along x including the round ends, m");
+              "length of the capsule along x including the round ends, m");
   }
   void operator()(Cone& cone) const {
     table.add("radius_m", cone.radius_m, size_range, "radius of the base, m");
@@ -48,7 +48,7 @@ struct ParameterAdder {
     table.add("size_y_m", plane.size_y_m, size_range, "length of the shape along y, m");
   }
   void operator()(Bump& bump) const {
-    table.add("height_m", bump.height_m, Range{-1e4, 1e4}, "bump height, m; negative: hollow");
+    table.add("height_m", bump.height_m, Range{-1e4, 1e4}, "height of a bump, m; < 0: a hollow");
     table.add("radius_m", bump.radius_m, size_range, "radius of the shape, m");
     table.add(
         "profile", bump.profile,
@@ -58,17 +58,16 @@ struct ParameterAdder {
 };
 
 Error shape_error(std::size_t i, const SceneShape& shape, const Error& error) {
-  return Error(error.reason() + " in " + shape_kind(shape),
+  return Error(error.reason() + " (" + shape_kind(shape) + ")",
                error.in_field("shapes[" + std::to_string(i) + "]", ".").context());
 }
 
 void check_shape(const SceneShape& shape) {
   if (const auto* capsule = std::get_if<Capsule>(&shape.geometry)) {
     if (capsule->length_m < 2.0 * capsule->radius_m)
-      throw Error("less than the capsule's diameter",
-                  {.field = "length_m",
-                   .value = to_text(capsule->length_m),
-                   .bound = ">= " + to_text(2.0 * capsule->radius_m)});
+      throw Error("less than the diameter", {.field = "length_m",
+                                             .value = to_text(capsule->length_m),
+                                             .bound = ">= " + to_text(2.0 * capsule->radius_m)});
   }
   if (std::holds_alternative<Plane>(shape.geometry)) {
     const double up = shape.placement.pose().linear()(2, 2);
@@ -77,7 +76,7 @@ void check_shape(const SceneShape& shape) {
           "the plane does not face up; use a box for a vertical or overhanging face",
           {.field = "roll_deg, pitch_deg",
            .value = to_text(shape.placement.roll_deg) + ", " + to_text(shape.placement.pitch_deg),
-           .bound = "tilt < 90 degrees"});
+           .bound = "a tilt of less than 90 degrees"});
   }
 }
 
@@ -116,10 +115,12 @@ ParameterTable shape_parameters(SceneShape& shape) {
   table.add("x_m", placement.x_m, position_range, "x of the shape's origin in the scene, m");
   table.add("y_m", placement.y_m, position_range, "y of the shape's origin in the scene, m");
   table.add("z_m", placement.z_m, position_range, "z of the shape's origin in the scene, m");
-  table.add("roll_deg", placement.roll_deg, angle_range, "first rotation, about fixed x, degrees");
+  table.add("roll_deg", placement.roll_deg, angle_range,
+            "first rotation of the shape, about the scene's x axis, degrees");
   table.add("pitch_deg", placement.pitch_deg, angle_range,
-            "second rotation, about fixed y, degrees");
-  table.add("yaw_deg", placement.yaw_deg, angle_range, "third rotation, about fixed z, degrees");
+            "second rotation of the shape, about the scene's y axis, degrees");
+  table.add("yaw_deg", placement.yaw_deg, angle_range,
+            "third rotation of the shape, about the scene's z axis, degrees");
   return table;
 }
 

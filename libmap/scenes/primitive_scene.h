@@ -1,4 +1,4 @@
-// Test scenes of primitive shapes (spheres, boxes, ...) with exact geometry and ground truth.
+// Describes test scenes of primitive shapes (spheres, boxes, ...), and reads them from YAML.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,30 +11,30 @@
 
 namespace libmap {
 
-// Centered on the shape's origin.
+// A sphere, centered on the shape's origin. All sizes except the height of a bump are > 0.
 struct Sphere {
   double radius_m = 0.0;
   bool operator==(const Sphere&) const = default;
 };
-// Centered on the shape's origin, along the shape's x axis; `length_m` includes the round ends.
+// A capsule along the x axis, centered on the shape's origin; `length_m` includes the round ends.
 struct Capsule {
   double radius_m = 0.0;
   double length_m = 0.0;
   bool operator==(const Capsule&) const = default;
 };
-// The base is centered on the shape's origin; the apex is on the z axis.
+// A cone. The base is centered on the shape's origin; the apex is on the z axis.
 struct Cone {
   double radius_m = 0.0;
   double height_m = 0.0;
   bool operator==(const Cone&) const = default;
 };
-// The base is centered on the shape's origin; the axis is z.
+// A cylinder along the z axis. The base is centered on the shape's origin.
 struct Cylinder {
   double radius_m = 0.0;
   double height_m = 0.0;
   bool operator==(const Cylinder&) const = default;
 };
-// The base is centered on the shape's origin.
+// A box. The base, at z = 0, is centered on the shape's origin.
 struct Box {
   double size_x_m = 0.0;
   double size_y_m = 0.0;
@@ -61,7 +61,7 @@ struct Bump {
 
 using ShapeGeometry = std::variant<Sphere, Capsule, Cone, Cylinder, Box, Plane, Bump>;
 
-// Position and angles of a shape, with the convention of make_pose_from_rpy.
+// Position and angles of a shape in the scene, with the convention of make_pose_from_rpy (pose.h).
 struct Placement {
   double x_m = 0.0;
   double y_m = 0.0;
@@ -84,7 +84,8 @@ struct PrimitiveScene {
   std::vector<SceneShape> shapes;
   bool operator==(const PrimitiveScene&) const = default;
 
-  // Throws Error naming shape, parameter, value and bound.
+  // Throws Error naming shape, parameter, value and bound if there is no shape, a capsule is
+  // shorter than its diameter, a plane does not face up, or a bump has no plane.
   void check() const;
 };
 
@@ -93,7 +94,7 @@ const std::vector<std::string>& shape_kinds();
 const std::string& shape_kind(const SceneShape& shape);
 // Returns the shape of a kind with default sizes. Throws Error naming the nearest known kind.
 ShapeGeometry make_shape_geometry(const std::string& kind);
-// Parameters of one shape: sizes, placement and name. The table refers to `shape`.
+// Returns the parameters of a shape: sizes, placement and name. The table refers to `shape`.
 ParameterTable shape_parameters(SceneShape& shape);
 
 struct SurfaceTruth {
@@ -101,13 +102,13 @@ struct SurfaceTruth {
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();   // outward, unit length
   double curvature_min = 0.0;                          // signed principal curvatures, 1/m
   double curvature_max = 0.0;
-  double height =
-      0.0;  // m above the first plane without bumps, along the plane's normal; z without a plane
-  int shape = 0;  // index in the scene; on the ground within the radius of bumps, the bump
-                  // with the largest displacement
+  // Height above the first plane without bumps, along its normal, m; z without a plane.
+  double height = 0.0;
+  // Index in the scene; on the ground within the radius of bumps, the bump with the largest height.
+  int shape = 0;
 };
 
-// Scenes as YAML:
+// Parses a scene in YAML:
 //
 //   shapes:
 //     - {shape: plane, size_x_m: 3, size_y_m: 3}

@@ -406,8 +406,8 @@ void require_count(double count, std::uint64_t max_count, const std::string& wha
   };
   const auto limit = static_cast<double>(max_count);
   if (count > limit)
-    throw Error("would create about " + text(count) + " " + what + "; the limit is " + text(limit) +
-                    " (max_" + what + ")",
+    throw Error("would create about " + text(count) + " " + what + "; the limit max_" + what +
+                    " is " + text(limit),
                 {.field = field, .value = value});
 }
 

@@ -10,8 +10,8 @@
 
 namespace libmap {
 
-// A segment of a profile in coordinates (rho, a): distance from the axis, and along it. Segments
-// are ordered from the top (large a) down, so that the outside is on the left of a segment.
+// A segment of the profile of a solid of revolution in (rho, a): distance from the axis, position
+// along the axis. Segments are ordered from the top (large a) down; the outside is on their left.
 struct ProfileSegment {
   bool is_arc = false;
   Eigen::Vector2d start = Eigen::Vector2d::Zero();  // line
@@ -25,14 +25,14 @@ struct ProfileSegment {
   static ProfileSegment line(Eigen::Vector2d start, Eigen::Vector2d end);
   static ProfileSegment arc(double center_a, double radius, double angle_start, double angle_end);
 
-  double length() const;  // of the segment
-  double area() const;    // of the surface of revolution
-  // Area between two parameters, t0 <= t1.
+  double length() const;  // length of the segment
+  double area() const;    // area of the surface of revolution
+  // Area of the surface of revolution between two parameters, t0 <= t1.
   double area_between(double t0, double t1) const;
   Eigen::Vector2d point(double t) const;  // t from 0 to 1 along the length
   // Outward unit normal at a point of the segment.
   Eigen::Vector2d normal_at(const Eigen::Vector2d& point) const;
-  double curvature_along() const;  // of the profile, 1/m
+  double curvature_along() const;  // curvature of the profile, 1/m
   // Curvature of the surface around the axis (Meusnier), 1/m.
   double curvature_around(const Eigen::Vector2d& point) const;
   // Returns t such that area_between(t0, t) is `fraction` of area_between(t0, t1).
@@ -83,11 +83,10 @@ class SceneGeometry {
 
   const std::vector<SceneSolid>& solids() const { return solids_; }
   const SceneSolid* ground() const { return ground_ < 0 ? nullptr : &solids_[index(ground_)]; }
-  // A bump in the ground's frame.
   struct PlacedBump {
     Bump bump;
-    Eigen::Vector2d center;
-    int shape = 0;
+    Eigen::Vector2d center;  // in the ground's frame
+    int shape = 0;           // index in the scene
   };
   const std::vector<PlacedBump>& bumps() const { return bumps_; }
   bool has_bumps() const { return !bumps_.empty(); }
@@ -97,7 +96,8 @@ class SceneGeometry {
   // Signed distance to one solid; negative inside. First order for ground with bumps.
   double signed_distance(const SceneSolid& solid, const Eigen::Vector3d& point) const;
 
-  // Surface point, normal and curvatures at the parameters of a face.
+  // Return the surface at a position on a solid: on a segment of the profile at its parameter t and
+  // the angle about the axis, or on a face at x, y in the face frame (with bumps on the ground).
   SurfaceTruth on_profile(const SceneSolid& solid, std::size_t segment, double t,
                           double angle) const;
   SurfaceTruth on_face(const SceneSolid& solid, const FlatFace& face, double x, double y) const;
@@ -122,8 +122,8 @@ class SceneGeometry {
   int ground_ = -1;
 };
 
-// Throws Error naming `field` and `value` if `count` exceeds `max_count`; `what` is the counted
-// element, e.g. "triangles" for an option max_triangles.
+// Throws Error naming `field` and `value` if `count` exceeds `max_count`; `what` is the name of the
+// counted elements, e.g. "triangles" for an option max_triangles.
 void require_count(double count, std::uint64_t max_count, const std::string& what,
                    const std::string& field, const std::string& value);
 

@@ -236,8 +236,7 @@ SceneSamples sample_scene(const PrimitiveScene& scene, const SceneSamplingOption
   double spacing = options.spacing_m;
   const PatchAreas areas = measure_areas(geometry, patches, 20'000.0);
   if (options.count > 0) spacing = std::sqrt(areas.visible / wanted);
-  // Hidden points are drawn before they are dropped, so their number is limited, too: to ten times
-  // max_points.
+  // Hidden points are drawn and then dropped, so all are limited to ten times max_points.
   const double points = areas.visible / spacing / spacing;
   const double drawn = 0.1 * areas.whole / spacing / spacing;
   require_count(std::max(points, drawn), options.max_points, "points",

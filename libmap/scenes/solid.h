@@ -1,4 +1,4 @@
-// Solids as closed triangle surfaces, and Boolean operations on solids, for building test sites.
+// Makes solids, which are closed triangle surfaces, and combines them, for building test sites.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,29 +16,29 @@ struct Solid {
   std::vector<int> labels;
 };
 
-// The points with normal . p <= offset_m; `normal` is of unit length.
+// A half-space: the points p with normal . p <= offset_m; `normal` is of unit length.
 struct HalfSpace {
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
   double offset_m = 0.0;
 };
 
-// Intersection of half-spaces; the label of a face is the index of the face's half-space. Throws
-// Error if it is empty, degenerate or extends farther than `bound_m` from the origin along an axis.
+// Intersects half-spaces; the label of a triangle is the index of its half-space. Throws Error if
+// the result is empty, degenerate or extends more than `bound_m` from the origin along an axis.
 Solid convex_solid(const std::vector<HalfSpace>& half_spaces, double bound_m);
 
-// An ellipsoid around the origin with edges of about `edge_length_m` and label 0.
+// Makes an ellipsoid around the origin with edges of about `edge_length_m` and label 0.
 Solid ellipsoid_solid(const Eigen::Vector3d& radii_m, double edge_length_m);
 
 // Heights z(x, y) on a grid, row by row, x fastest. x and y range from -size/2 to size/2.
 struct HeightGrid {
   double size_x_m = 0.0;
   double size_y_m = 0.0;
-  std::size_t columns = 0;  // of points
-  std::size_t rows = 0;
+  std::size_t columns = 0;  // number of points along x
+  std::size_t rows = 0;     // number of points along y
   std::vector<double> heights_m;
   Eigen::Vector2d at(std::size_t column, std::size_t row) const;  // x and y of a grid point
 };
-// A block below a height grid with a flat base at z = base_m. Label 0 on top, -1 on sides and base.
+// Makes a block below a height grid with a flat base at base_m; label 0 on top, -1 elsewhere.
 Solid block_solid(const HeightGrid& top, double base_m);
 
 // Removes vertices that no triangle uses; the others are in the order of first use.
@@ -52,9 +52,9 @@ Solid sort_solid(const Solid& solid);
 // regions do not change. Throws Error if corners coincide because a region is not flat.
 Solid refine_facets(const Solid& solid, double edge_length_m);
 
-// Union and difference of solids in general position (CGAL's corefinement with exact predicates).
-// Edges of a union that are shorter than `min_edge_m` are collapsed unless that would flip a
-// triangle or make the surface non-manifold. Throws Error if the result is not a manifold.
+// Union and difference of solids in general position (CGAL's corefinement, exact predicates). A
+// union's edges shorter than `min_edge_m` are collapsed unless that turns a triangle by more than
+// 30 degrees or makes the surface non-manifold. Throw Error if the result is not a manifold.
 Solid unite(const std::vector<Solid>& solids, double min_edge_m = 0.0);
 Solid subtract(const Solid& solid, const Solid& removed);
 

@@ -18,7 +18,7 @@ constexpr double units_per_m = 1e5;
 // A ball is accepted if it reaches the surface within this share of the bound, else it shrinks.
 constexpr double tangent_share = 0.5;
 constexpr double next_radius = 0.8;
-// Parts of a triangle may be in different balls: 4^n of them.
+// A triangle is divided into 4 parts up to this many times; the parts may be in different balls.
 constexpr int max_divisions = 2;
 // Rays begin this far behind the surface.
 constexpr double ray_start_m = 1e-6;
@@ -28,8 +28,8 @@ class BallCover {
   BallCover(const TriangleMesh& body, const CollisionBallOptions& options)
       : rays_(body), surface_(body), options_(options) {}
 
-  // Adds balls until one is within the bound of each part of the triangle, by convexity of all of
-  // its points. Parts smaller than the bound always are.
+  // Adds balls until each part of the triangle is within the bound of one ball; by convexity, its
+  // corners are sufficient. Parts smaller than the bound always are.
   void cover(const TriangleCorners& part, const Eigen::Vector3d& inward) {
     if (is_covered(part, max_divisions)) return;
     add_ball((part[0] + part[1] + part[2]) / 3.0, inward);

@@ -40,8 +40,8 @@ HeightField make_grid(const TriangleMesh& mesh, double cell_size_m) {
   const Eigen::Array2d high = (bounds.max.head<2>() / cell_size_m).array().ceil() + 1;
   const Eigen::Array2d nodes = high - low + 1;
   if (!(nodes.prod() <= max_nodes))
-    throw Error("makes too many nodes",
-                {.field = "cell_size_m", .value = to_text(cell_size_m), .bound = "<= 2^26 nodes"});
+    throw Error("the height field has more than 2^26 nodes; use larger cells",
+                {.field = "cell_size_m", .value = to_text(cell_size_m)});
   field.corner_m = low * cell_size_m;
   field.base_m = bounds.min.z() - sink_m;
   field.columns = static_cast<std::size_t>(nodes.x());
@@ -50,8 +50,8 @@ HeightField make_grid(const TriangleMesh& mesh, double cell_size_m) {
   return field;
 }
 
-// Calls visit(column, row) for the cells that the box of a triangle touches in plan, or for their
-// nodes, one more in each direction.
+// Calls visit(column, row) for the cells that the bounding box of a triangle touches in plan; with
+// more = 1, for the nodes of these cells.
 template <typename Visit>
 void for_box(const HeightField& field, const TriangleCorners& corners, std::size_t more,
              const Visit& visit) {
@@ -87,7 +87,7 @@ void for_nodes(const HeightField& field, const TriangleCorners& corners, const V
   });
 }
 
-// Missing nodes beside others continue their slopes, so that cells on the border are whole.
+// Extrapolates heights to missing nodes next to others, so that cells on the border are complete.
 void extend_border(HeightField& field) {
   const std::vector<float> heights = field.heights_m;
   const auto columns = static_cast<std::ptrdiff_t>(field.columns);

@@ -18,13 +18,13 @@ struct HeightFieldOptions {
 // the highest indices.
 struct HeightField {
   double cell_size_m = 0.0;
-  Eigen::Vector2d corner_m = Eigen::Vector2d::Zero();  // node (0, 0)
+  Eigen::Vector2d corner_m = Eigen::Vector2d::Zero();  // x and y of node (0, 0)
   std::size_t columns = 0;                             // nodes along x
   std::size_t rows = 0;                                // nodes along y
   double base_m = 0.0;                                 // z of height 0
   std::vector<float> heights_m;                        // above base_m, row by row; the lowest is 0
-  // True for the cells, of (columns - 1) x (rows - 1), that another shape must replace: where the
-  // surface overhangs or the field deviates from the surface, and the cells around. Nodes between
+  // True for the cells, (columns - 1) x (rows - 1) row by row, that another shape must replace: the
+  // surface overhangs or the field deviates from it there or in a neighboring cell. Nodes between
   // missing cells are below the surface.
   std::vector<bool> is_missing;
   // Maximum distance between the field and the surface in cells that are not missing, in both
@@ -32,8 +32,8 @@ struct HeightField {
   double deviation_m = 0.0;
 };
 
-// Samples the lowest surface that faces up. Throws Error if no triangle faces up, or there are more
-// than 2^26 nodes.
+// Samples the lowest surface that faces up (z) at each node. Throws Error if no triangle faces up,
+// or the grid has more than 2^26 nodes.
 HeightField make_height_field(const TriangleMesh& mesh, const HeightFieldOptions& options);
 
 // Returns false only if no point of the triangle is above or below a missing cell.

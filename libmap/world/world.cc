@@ -28,7 +28,7 @@ namespace {
 // Accelerations at the surface, m/s2.
 constexpr std::array<std::pair<const char*, double>, 3> bodies{
     {{"earth", 9.81}, {"moon", 1.62}, {"mars", 3.71}}};
-// Vertices this near to each other, of the mesh's size, are one.
+// Vertices within this fraction of the mesh's size are merged.
 constexpr double weld_fraction = 1e-7;
 
 struct CollisionMesh {
@@ -122,17 +122,17 @@ void bind(ParameterTable& table, WorldOptions& options) {
   table.add("field_error_m", options.field.max_deviation_m, positive,
             "maximum distance of MuJoCo's height field and balls from the surface, m");
   table.add("ball_radius_m", options.ball_radius_m, positive,
-            "maximum radius of the balls where the height field is left out, m");
-  table.add("gravity", options.gravity, "gravity, m/s2, or earth, moon, mars");
+            "maximum radius of the balls that replace cells of MuJoCo's height field, m");
+  table.add("gravity", options.gravity, "downward gravity in m/s2, or of earth, moon or mars");
   table.add("friction", options.friction, not_negative, "coefficient of friction of the ground");
   table.add("restitution", options.restitution, zero_to_one,
             "coefficient of restitution of the ground");
   table.add("sensor_noise_m", options.sensor_noise_m, not_negative,
-            "standard deviation of the depth of the rig's cameras, m");
+            "standard deviation of the depth noise of the rig's cameras in world.sdf, m");
 }
 
 void describe(ResultTable& table, const WorldReport& report) {
-  table.add("visual_triangles", report.visual_triangles, Merge::sum, "triangles of the visuals");
+  table.add("visual_triangles", report.visual_triangles, Merge::sum, "triangles of visual meshes");
   table.add("collision_triangles", report.collision_triangles, Merge::sum,
             "triangles of the collision meshes");
   table.add("collision_deviation_m", report.collision_deviation_m, Merge::max,
@@ -154,7 +154,7 @@ double gravity_of(const std::string& text) {
   const std::optional<double> gravity = parse_double(text);
   if (gravity && *gravity >= 0 && *gravity < 1e6) return *gravity;
   throw Error("unknown gravity" + did_you_mean(text, {"earth", "moon", "mars"}),
-              {.field = "--gravity", .value = text, .bound = "m/s2 >= 0, earth, moon or mars"});
+              {.field = "--gravity", .value = text, .bound = "0 to 1e6 m/s2, earth, moon or mars"});
 }
 
 void require_world_name(const std::string& name, const std::string& field) {
@@ -213,7 +213,7 @@ void write_world(const fs::path& folder, const WorldScene& scene) {
   for (const WorldModel& model : scene.models) {
     require_world_name(model.name, "name");
     if (!names.insert(model.name).second)
-      throw Error("is the name of two models", {.field = "name", .value = model.name});
+      throw Error("is reserved or used twice", {.field = "name of a model", .value = model.name});
   }
   if (folder.empty()) return;
   for (const auto& [name, text] : world_texts(scene)) write_text(folder / name, text);

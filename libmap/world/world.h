@@ -31,7 +31,7 @@ namespace libmap {
 struct WorldOptions {
   double collision_error_m = 0.0014;  // > 0: maximum distance between collision and visual mesh
   HeightFieldOptions field{};
-  double ball_radius_m = 0.05;    // > 0: maximum radius of balls (collision_balls.h)
+  double ball_radius_m = 0.05;    // > 0: CollisionBallOptions::max_radius_m
   std::string gravity = "earth";  // m/s2 downwards, or earth, moon, mars
   double friction = 0.8;          // >= 0: Coulomb's coefficient
   double restitution = 0.0;       // 0 to 1
@@ -39,7 +39,7 @@ struct WorldOptions {
 };
 void bind(ParameterTable& table, WorldOptions& options);
 
-// Returns m/s2 (downwards) for a number >= 0, earth, moon or mars. Throws Error for other texts.
+// Returns m/s2 (downwards) for a number >= 0 and < 1e6, or earth, moon, mars; else throws Error.
 double gravity_of(const std::string& text);
 
 // Throws Error naming `field` for a name that SDF, MJCF or URDF forbids: empty, "world", with
@@ -124,7 +124,7 @@ WorldModel write_world_model(const std::filesystem::path& folder, const WorldMod
                              WorldReport& report);
 
 // Writes the files of world_texts to `folder`; only checks names if `folder` is empty. Throws Error
-// for a name that simulators forbid or that two models have ("rig" and "footholds" are reserved).
+// for a name that simulators forbid, that two models have, or that is reserved (rig, footholds).
 void write_world(const std::filesystem::path& folder, const WorldScene& scene);
 
 }  // namespace libmap

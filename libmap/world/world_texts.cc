@@ -82,7 +82,7 @@ constexpr Dialect sdf{
 {cameras}</link>
 </model>
 )",
-    // Cameras look along x, with z up. Pixels count from the corner of the first one.
+    // Cameras look along x, with z up. Image coordinates begin at the first pixel's corner.
     .camera = R"(<sensor name="{name}" type="depth_camera">
 <pose>{pose}</pose>
 <update_rate>15</update_rate>
@@ -255,7 +255,7 @@ ModelText model_text(const Dialect& dialect, const WorldModel& model, const Worl
     balls +=
         fill(dialect.ball, "position"_a = number_text(ball.center), "radius"_a = ball.radius_m);
   const HeightField& field = model.field;
-  constexpr double base_m = 0.1;  // of solid ground below height 0
+  constexpr double base_m = 0.1;  // thickness of solid ground below height 0
   const Eigen::Vector2d half_m =
       0.5 * field.cell_size_m *
       Eigen::Vector2d(static_cast<double>(field.columns) - 1, static_cast<double>(field.rows) - 1);

@@ -19,8 +19,8 @@ constexpr std::size_t points_grain = 1024;
 // Squares are this far above the surface, so that it does not hide them.
 constexpr double lift_m = 0.001;
 
-// MuJoCo rejects meshes in which two triangles run along an edge in the same sense: the later one
-// gets vertices of its own.
+// MuJoCo rejects meshes in which two triangles run along an edge in the same direction. The later
+// triangle gets separate vertices.
 void detach_repeated_edges(TriangleMesh& mesh) {
   std::set<std::pair<std::uint32_t, std::uint32_t>> edges;
   for (Triangle& t : mesh.triangles) {

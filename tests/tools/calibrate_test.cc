@@ -127,8 +127,8 @@ TEST(Calibrate, GoesOnWithoutImagesThatItCannotRead) {
   const auto few =
       graspmap({"calibrate", "shots/00a.png", "shots/01.png", "shots/02.jpg", "-o", "few.yaml"});
   EXPECT_TRUE(warned(few, {"shots/00a.png"}));
-  EXPECT_TRUE(
-      ended_with(few, {.field = "images", .value = "2", .bound = ">= 3, better 15 and more"}));
+  EXPECT_TRUE(ended_with(
+      few, {.field = "number of images", .value = "2", .bound = ">= 3, better 15 and more"}));
 }
 
 TEST(Calibrate, BadInputIsOneLineAndLeavesNothing) {
@@ -139,7 +139,8 @@ TEST(Calibrate, BadInputIsOneLineAndLeavesNothing) {
     return graspmap(words);
   };
   EXPECT_TRUE(bad_input(run({"none.png"}), {.file = "none.png", .about = "no such"}));
-  EXPECT_TRUE(bad_input(run({"shots/00.png", "shots/01.png"}), {.field = "images", .value = "2"}));
+  EXPECT_TRUE(bad_input(run({"shots/00.png", "shots/01.png"}),
+                        {.field = "number of images", .value = "2"}));
   EXPECT_TRUE(bad_input(run({"shots", "--board", "9x7"}), {.field = "--board", .value = "9x7"}));
   EXPECT_TRUE(bad_input(run({"shots", "--board", "9"}), {.field = "--board", .value = "9"}));
   EXPECT_TRUE(bad_input(run({"shots", "--square-mm", "0"}),
@@ -163,7 +164,7 @@ TEST(Calibrate, BadInputIsOneLineAndLeavesNothing) {
                         {.file = "camera.txt", .about = "YAML"}));
   // Repeated images add no information.
   EXPECT_TRUE(bad_input(run({"shots/00.png", "shots/00.png", "shots/00.png", "shots/00.png"}),
-                        {.field = "images", .value = "1"}));
+                        {.field = "number of images", .value = "1"}));
   EXPECT_TRUE(bad_input(graspmap({"calibrate", "shots", "-o", "shots/00.png"}),
                         {.file = "shots/00.png", .about = "is the input"}));
   EXPECT_FALSE(fs::exists(scratch("camera.yaml")));

@@ -187,8 +187,9 @@ TEST(PanoramaCommand, BadInputIsOneLineAndLeavesNothing) {
     EXPECT_TRUE(bad_input(strict("run"), {.file = image, .about = fault})) << length;
   }
   graspmap_test::write_text(scratch(image), libmap::encode_png(libmap::GrayImage(width, height)));
-  EXPECT_TRUE(bad_input(
-      strict("run"), {.file = image, .bound = "PNG of 1 x 16 bits", .about = "PNG of 1 x 8 bits"}));
+  EXPECT_TRUE(bad_input(strict("run"), {.file = image,
+                                        .bound = "a PNG of 1 x 16 bits per pixel",
+                                        .about = "PNG of 1 x 8 bits per pixel"}));
   graspmap_test::write_text(scratch(image), libmap::encode_png(libmap::Image<std::uint16_t>(8, 8)));
   EXPECT_TRUE(bad_input(
       strict("run"), {.file = image, .field = "image size", .value = "8 x 8", .bound = "48 x 27"}));

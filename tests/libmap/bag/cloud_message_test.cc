@@ -99,13 +99,13 @@ TEST(CloudMessage, WhatDoesNotFitIsSaid) {
                        {.field = "row_step", .value = "79", .bound = ">= 80"}));
   EXPECT_TRUE(
       is_error(said([](auto& m) { m.fields[5].offset = 37; }),
-               {.field = "point_step, of field intensity", .value = "40", .bound = ">= 41"}));
+               {.field = "point_step for field intensity", .value = "40", .bound = ">= 41"}));
   EXPECT_TRUE(is_error(
       said([](auto& m) { m.fields[5].offset = 0xffffffff; }),
-      {.field = "point_step, of field intensity", .value = "40", .bound = ">= 4294967299"}));
+      {.field = "point_step for field intensity", .value = "40", .bound = ">= 4294967299"}));
   EXPECT_TRUE(is_error(
       said([](auto& m) { m.fields[5].count = 0xffffffff; }),
-      {.field = "point_step, of field intensity", .value = "40", .bound = ">= 17179869212"}));
+      {.field = "point_step for field intensity", .value = "40", .bound = ">= 17179869212"}));
   EXPECT_TRUE(is_error(said([](auto& m) { m.fields[5].datatype = 9; }),
                        {.field = "datatype of field intensity", .value = "9", .bound = "1 to 8"}));
   EXPECT_TRUE(

@@ -406,8 +406,7 @@ TEST(Mcap, ChunksThatPromiseMore) {
     EXPECT_EQ(fields_of(bytes, ~0UL).field, "size of a chunk");
     EXPECT_EQ(fields_of(bytes, ~0UL).bound, "<= 1 GiB");
     // The libraries notice chunks that are larger than declared, and truncated chunks.
-    const std::string field =
-        compression.empty() ? "decompressed chunk" : "chunk of " + compression;
+    const std::string field = compression.empty() ? "decompressed chunk" : compression + " chunk";
     EXPECT_EQ(fields_of(bytes, 999).field, field);
     EXPECT_EQ(fields_of(std::string_view(bytes).substr(0, bytes.size() - 1), 1000).field, field);
   }

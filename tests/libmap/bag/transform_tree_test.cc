@@ -59,7 +59,7 @@ TEST(TransformTree, CirclesEnd) {
   EXPECT_TRUE(is_error(error_of([&] { tree.root_of("b"); }),
                        {.field = "frame", .value = "b", .about = "cycle"}));
   EXPECT_TRUE(is_error(error_of([&] { tree.add("e", "e", Pose::Identity()); }),
-                       {.field = "frames", .value = "e and e"}));
+                       {.field = "transform", .value = "'e' from 'e'"}));
 }
 
 TEST(TransformTree, FramesStandStill) {
@@ -76,7 +76,7 @@ TEST(TransformTree, FramesStandStill) {
   EXPECT_TRUE(is_error(error_of([&] { tree.add("a", "d", pose); }),
                        {.field = "frame", .value = "d", .about = "finite"}));
   EXPECT_TRUE(is_error(error_of([&] { tree.add("", "d", Pose::Identity()); }),
-                       {.field = "frames", .value = " and d"}));
+                       {.field = "transform", .value = "'' from 'd'"}));
 }
 
 }  // namespace transform_tree_test

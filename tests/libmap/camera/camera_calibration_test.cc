@@ -256,8 +256,9 @@ TEST(CameraCalibration, ImagesThatTellNothingAreRefused) {
         [&] { calibrate_camera(noisy_corners(camera, chosen, noise), 512, 424, options); });
   };
   EXPECT_TRUE(is_error(refused({poses[0], poses[1]}, 0.1, LensModel::none),
-                       {.field = "images", .value = "2"}));
-  EXPECT_TRUE(is_error(refused({}, 0.1, LensModel::none), {.field = "images", .value = "0"}));
+                       {.field = "number of images", .value = "2"}));
+  EXPECT_TRUE(
+      is_error(refused({}, 0.1, LensModel::none), {.field = "number of images", .value = "0"}));
   // Seen straight on, near and far look alike: a longer focal length is a longer distance.
   std::vector<Pose> straight;
   for (int n = 0; n < 8; ++n) {
@@ -270,7 +271,7 @@ TEST(CameraCalibration, ImagesThatTellNothingAreRefused) {
       EXPECT_TRUE(is_error(refused(straight, noise, lens), {.about = "not determine"}));
   // One image several times; one pose with noise.
   EXPECT_TRUE(is_error(refused(std::vector<Pose>(8, poses[0]), 0.0, LensModel::plumb_bob),
-                       {.field = "images", .value = "1"}));
+                       {.field = "number of images", .value = "1"}));
   EXPECT_TRUE(is_error(refused(std::vector<Pose>(8, straight[0]), 2.0, LensModel::none),
                        {.about = "not determine"}));
 }

@@ -229,7 +229,7 @@ TEST(CameraIo, BadFilesAreNamed) {
       {"image_width: 3\nimage_height: 480\ncamera_matrix: [1, 2]",
        {.file = "bad.yaml", .field = "camera_matrix", .value = "2 numbers", .bound = "3 x 3"}},
       {"image_width: 3\nimage_height: 480\ncamera_matrix: [1, 1, 2, 0, 1, 2, 0, 0, 1]",
-       {.file = "bad.yaml", .field = "camera_matrix", .value = "1"}},
+       {.file = "bad.yaml", .field = "skew of camera_matrix", .value = "1"}},
       {"image_width: 3\nimage_height: 480\ncamera_matrix: [0, 0, 2, 0, 1, 2, 0, 0, 1]",
        {.file = "bad.yaml", .field = "fx", .value = "0", .bound = "1e-06 to 1e+09"}},
       {"image_width: 3\nimage_height: 480\ncamera_matrix: [1, 0, 2, 0, 1, 2, 0, 0, 2]",

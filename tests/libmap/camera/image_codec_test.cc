@@ -174,10 +174,10 @@ TEST(ImageCodec, ImagesThatNoFileCanHold) {
 
 TEST(ImageCodec, OnlyWhatWasAskedForIsTaken) {
   const std::string color = encode_png(sample_color(1));
-  EXPECT_TRUE(
-      is_error(error_of([&] { libmap::decode_gray16(color); }), {.value = "PNG of 3 x 8 bits"}));
-  EXPECT_TRUE(
-      is_error(error_of([&] { libmap::decode_rgba(color); }), {.value = "PNG of 3 x 8 bits"}));
+  EXPECT_TRUE(is_error(error_of([&] { libmap::decode_gray16(color); }),
+                       {.value = "PNG of 3 x 8 bits per pixel"}));
+  EXPECT_TRUE(is_error(error_of([&] { libmap::decode_rgba(color); }),
+                       {.value = "PNG of 3 x 8 bits per pixel"}));
   EXPECT_TRUE(
       is_error(error_of([] { libmap::encode_png(ColorImage()); }), {.about = "empty image"}));
   EXPECT_TRUE(

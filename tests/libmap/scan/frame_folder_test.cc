@@ -398,9 +398,13 @@ TEST_F(TumFolder, NamesTheCellThatIsNoNumber) {
       {"node,stamp_s\n7,5\n0,6\n", {.field = "row 2, column node", .value = "0", .bound = "> 0"}},
       {"node,stamp_s\n1,nan\n", {.field = "row 1, column stamp_s", .value = "nan"}},
       {"node,stamp_s,session\n1,5,2147483648\n",
-       {.field = "row 1, column session", .value = "2147483648", .bound = "of 32 bits"}},
+       {.field = "row 1, column session",
+        .value = "2147483648",
+        .bound = "a whole number of 32 bits"}},
       {"node,stamp_s,session\n1,5,-9223372036854775808\n",
-       {.field = "row 1, column session", .value = "-9223372036854775808", .bound = "of 32 bits"}}};
+       {.field = "row 1, column session",
+        .value = "-9223372036854775808",
+        .bound = "a whole number of 32 bits"}}};
   for (const auto& [text, expected] : refusals) {
     write_text(folder_ / "nodes.csv", text);
     const libmap::Error error = graspmap_test::error_of([&] { FrameFolder read(folder_); });

@@ -94,7 +94,7 @@ TEST(JoinedScan, NumbersThatAreTooLargeAreNamed) {
   const libmap::Error error = error_of([&] {
     libmap::open_scans({folder / "a.db", folder / "b.db"});
   });
-  EXPECT_EQ(error.context().field, "node");
+  EXPECT_EQ(error.context().field, "largest node id");
   EXPECT_EQ(error.context().value, std::to_string(std::numeric_limits<int>::max() - 1));
 }
 

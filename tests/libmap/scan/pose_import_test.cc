@@ -129,7 +129,7 @@ TEST(PoseImport, ImagesOfColmapByTheScansOwnNamesAndByStamps) {
   EXPECT_THAT(nodes_of(libmap::import_poses(folder, scan)), ElementsAre(3, 4, 12));
   const fs::path late = write_model({{"1700000006.021.png", random_pose()}});
   EXPECT_TRUE(is_error(error_of([&] { libmap::import_poses(late, scan); }),
-                       {.field = "image", .value = "1700000006.021.png"}));
+                       {.field = "first image", .value = "1700000006.021.png"}));
 }
 
 TEST(PoseImport, CamerasThatTheRigHasNotAreLeftOut) {
@@ -139,7 +139,7 @@ TEST(PoseImport, CamerasThatTheRigHasNotAreLeftOut) {
   EXPECT_THAT(nodes_of(imported), ElementsAre(3));
   ASSERT_EQ(imported.warnings.size(), 1U);
   EXPECT_TRUE(is_error_text(imported.warnings[0],
-                            {.file = "scan", .field = "node 4", .value = "camera 2"}));
+                            {.file = "scan", .field = "camera of node 4", .value = "2"}));
 }
 
 TEST(PoseImport, CamerasOfOneNodeGiveTheMean) {

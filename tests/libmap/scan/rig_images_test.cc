@@ -193,11 +193,11 @@ TEST(RigDepth, UnitsBecomeMeters) {
                         .value = "4 x 3",
                         .bound = "5 x 3"}));
   write_text(file, libmap::encode_png(libmap::GrayImage(4, 3)));
-  EXPECT_TRUE(
-      is_error(error_of([&] {
-                 read_rig_depth({0, 1.0, file}, camera);
-               }),
-               {.file = graspmap_test::scratch_folder() / "1.png", .value = "PNG of 1 x 8 bits"}));
+  EXPECT_TRUE(is_error(
+      error_of([&] {
+        read_rig_depth({0, 1.0, file}, camera);
+      }),
+      {.file = graspmap_test::scratch_folder() / "1.png", .value = "PNG of 1 x 8 bits per pixel"}));
   write_text(file, "");
   EXPECT_TRUE(is_error(error_of([&] {
                          read_rig_depth({0, 1.0, file}, camera);

@@ -260,12 +260,12 @@ TEST(CopyWithOptimizedPoses, RefusesTablesOfAnotherForm) {
     EXPECT_EQ(error.context().file, scratch("a.db").string());
     return error;
   };
-  EXPECT_TRUE(
-      graspmap_test::is_error(refusal_of("INSERT INTO Admin (version) VALUES ('0.23.0')"),
-                              {.field = "rows of table Admin", .value = "2", .bound = "1"}));
-  EXPECT_TRUE(
-      graspmap_test::is_error(refusal_of("DELETE FROM Admin"),
-                              {.field = "rows of table Admin", .value = "0", .bound = "1"}));
+  EXPECT_TRUE(graspmap_test::is_error(
+      refusal_of("INSERT INTO Admin (version) VALUES ('0.23.0')"),
+      {.field = "number of rows of table Admin", .value = "2", .bound = "1"}));
+  EXPECT_TRUE(graspmap_test::is_error(
+      refusal_of("DELETE FROM Admin"),
+      {.field = "number of rows of table Admin", .value = "0", .bound = "1"}));
   EXPECT_TRUE(graspmap_test::is_error(
       refusal_of("DROP TABLE Link; CREATE TABLE Link (from_id INTEGER, to_id INTEGER, "
                  "type INTEGER, variance FLOAT, transform BLOB)"),
