@@ -14,13 +14,13 @@ namespace libmap {
 namespace {
 
 constexpr double degree = std::numbers::pi / 180.0;
-constexpr double confirmed_m = 0.1;  // between two links of the same two components
+constexpr double confirmed_m = 0.1;  // maximum difference of two links between two components
 constexpr double confirmed_rad = 5.0 * degree;
 constexpr std::size_t considered_per_pair = 8;  // candidates per pair, before the angle's test
 
 FramePair ordered(std::size_t a, std::size_t b) { return {std::min(a, b), std::max(a, b)}; }
 
-// Adds the pairs of one component: each frame with the nearest frames of similar direction.
+// Adds pairs of one component: each frame with the nearest frames of similar rotation.
 void add_near_pairs(const std::vector<std::size_t>& members, const std::vector<const Pose*>& poses,
                     const LoopClosureDetectionOptions& options, std::set<FramePair>& pairs) {
   std::vector<Eigen::Vector3d> positions;
@@ -85,15 +85,14 @@ bool agree(const FeatureLink& one, const FeatureLink& other, const PoseGraphResu
 
 void bind(ParameterTable& table, LoopClosureDetectionOptions& options) {
   table.add("radius_m", options.radius_m, not_negative,
-            "maximum distance between candidates for a loop closure, m");
-  table.add(
-      "angle_deg", options.angle_deg, {0.0, 180.0},
-      "maximum angle between the viewing directions of candidates for a loop closure, degrees");
+            "maximum distance between the poses of loop closure candidates that are near, m");
+  table.add("angle_deg", options.angle_deg, {0.0, 180.0},
+            "maximum rotation between the poses of loop closure candidates that are near, degrees");
   table.add(
       "near_candidates", options.near_candidates, not_negative,
-      "maximum number of loop closure candidates per frame by distance and viewing direction");
+      "maximum number of loop closure candidates per frame by distance and rotation between poses");
   table.add("similar_candidates", options.similar_candidates, not_negative,
-            "number of loop closure candidates per frame by appearance, from the whole scan");
+            "maximum number of loop closure candidates per frame by appearance, whole scan");
   table.add("neighbors", options.neighbors, not_negative,
             "number of following frames with which a frame is matched");
   table.add("max_ratio", options.max_ratio, {0.0, 1.0, true, false},
@@ -104,9 +103,10 @@ void bind(ParameterTable& table, LoopClosureDetectionOptions& options) {
   table.add("min_spread", options.estimate.min_spread, not_negative,
             "minimum spread of agreeing matches in the image, in focal lengths");
   table.add("max_graph_chi_square", options.max_graph_chi_square, positive,
-            "maximum chi-square of a loop closure's deviation from the pose graph");
+            "maximum chi-square of a loop closure's deviation from the pose graph; other closures "
+            "are dropped");
   table.add("words", options.appearance.words, {1, 65536},
-            "number of visual words in the vocabulary for appearance");
+            "number of visual words in the vocabulary that describes frames");
 }
 
 std::set<FramePair> consecutive_pairs(const std::vector<FrameFeatures>& frames, int neighbors) {
