@@ -229,8 +229,8 @@ InitialPoses initial_poses(const PoseGraph& graph, StartPoses start) {
   for (auto& [number, nodes] : parts) result.parts.push_back(std::move(nodes));
   if (result.map_from_base.empty()) {
     if (start != StartPoses::automatic)
-      throw Error("the scan has no such poses",
-                  {.field = "start", .value = result.source, .bound = "auto or visual"});
+      throw Error("the scan has no poses from this source; use start auto or visual",
+                  {.field = "poses", .value = result.source});
     result.parts = begin_by_links(graph, wanted, result.map_from_base);
     result.source = result.parts.empty() ? "visual" : "links";
   }
