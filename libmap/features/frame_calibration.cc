@@ -8,8 +8,8 @@ namespace libmap {
 
 namespace {
 
-constexpr double plane_radius_px = 3.0;       // of the disc that a plane is fitted to
-constexpr double unmeasured_fraction = 0.01;  // of the depths, ignored at either end of the range
+constexpr double plane_radius_px = 3.0;       // radius of the disc to which a plane is fitted
+constexpr double unmeasured_fraction = 0.01;  // ignored share of the depths at either end
 
 // Finds the depth plane that a feature's ray intersects if the depth camera is at
 // `color_from_depth`. Returns false if there is none.

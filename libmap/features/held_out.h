@@ -1,5 +1,5 @@
-// Evaluates refinement stages by held-out observations, which are never used to estimate poses:
-// residuals before and after a stage.
+// Evaluates refinement stages by the residuals of held-out observations, which are never used to
+// estimate poses, before and after a stage.
 #pragma once
 
 #include <cstddef>
@@ -22,14 +22,14 @@ struct HeldOutChange {
 // vector are ignored. All zero if the sizes differ.
 HeldOutChange compare_held_out(const std::vector<double>& before, const std::vector<double>& after);
 
-// Costs of the held-out matches, in the order of the links. NaN if a node has no pose or a feature
-// no known depth.
+// Returns the costs of the held-out matches, in the order of the links; NaN if a node has no pose
+// or a feature has no known depth.
 std::vector<double> match_costs(const std::vector<FrameFeatures>& frames,
                                 const std::vector<FeatureLink>& links,
                                 const std::map<int, Pose>& map_from_base);
 
-// Costs of held-out depth samples (SampleUse::checks) of both frames of each link against the
-// planes of the other frame. NaN if the other frame does not observe the sample.
+// Returns the costs of held-out depth samples (SampleUse::checks) of both frames of each link
+// against the planes of the other frame; NaN if it does not observe the sample or has no pose.
 std::vector<double> surface_costs(const std::vector<FrameFeatures>& frames,
                                   const std::vector<FeatureLink>& links,
                                   const std::map<int, Pose>& map_from_base);
@@ -51,13 +51,13 @@ struct HeldOutCosts {
   std::vector<double> matches;
   std::vector<double> surfaces;
 };
-// Costs of all held-out observations at the given poses.
+// Returns the costs of all held-out observations at the given poses.
 HeldOutCosts held_out_costs(const std::vector<FrameFeatures>& frames,
                             const std::vector<FeatureLink>& links,
                             const std::map<int, Pose>& map_from_base);
 
 // Change of both kinds of costs. Weights are proportional to the number of residuals: three per
-// match, one per sample. The discs that the samples' planes are fitted to hardly overlap.
+// match, one per sample. Samples are nearly independent.
 struct HeldOutEvaluation {
   HeldOutChange matches;
   HeldOutChange surfaces;
