@@ -13,7 +13,7 @@ namespace libmap {
 struct TileMask {
   Eigen::Array2i low = Eigen::Array2i::Constant(-voxel_cell_limit);
   Eigen::Array2i high = Eigen::Array2i::Constant(voxel_cell_limit);  // excluded
-  // Selects one in 2^subsampling_level blocks of 4 x 4 columns at random; a larger level, a subset.
+  // Selects one in 2^level random blocks of 4 x 4 columns; a larger level selects a subset.
   unsigned subsampling_level = 0;
 
   bool has_cell(const Eigen::Array2i& cell) const {
