@@ -163,14 +163,14 @@ struct FoundFeatures {
 FoundFeatures features_of(const ScanSource& scan, int node, const FeatureOptions& options,
                           PixelRayCache& rays, const FeatureCache& cache, MemoryBudget& memory) {
   const RgbdFrame read = scan.read_frame(node, {.color = !options.surfaces_only, .depth = true});
-  if (read.depth.empty()) throw Error("has no depth");
+  if (read.depth.empty()) throw Error("the frame has no depth image");
   FoundFeatures result;
   FrameFeatures& frame = result.frame;
   frame.node = node;
   frame.type = options.type;
   const std::vector<CameraView> views = camera_views(read);
   if (views.empty() && read.cameras.empty() && !(read.color.empty() && read.depth.empty()))
-    throw Error("has no calibration");
+    throw Error("the frame has no calibration");
   std::string key;
   if (cache.enabled()) {
     std::vector<Camera> depth_cameras;

@@ -13,7 +13,7 @@ namespace libmap {
 struct CoarseRegistration {
   std::unique_ptr<ScanSource>
       scan{};  // scan with registered depth; nullptr: the given scan is used
-  Pose color_from_depth = Pose::Identity();  // identity if `scan` is nullptr
+  Pose color_from_depth = Pose::Identity();  // true pose of depth; identity without `scan`
   std::string finding{};                     // displacement of depth; empty if there is none
 };
 

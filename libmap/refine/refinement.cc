@@ -158,7 +158,7 @@ void warn_of_contradictions(Run& run) {
     });
   const PoseConsistency found = check_pose_consistency(run.input.scan, poses);
   if (std::string warning = found.warning(); !warning.empty())
-    run.state.warnings.push_back("stored poses: " + std::move(warning));
+    run.state.warnings.push_back("initial poses: " + std::move(warning));
 }
 
 void start(Run& run) {
@@ -598,7 +598,8 @@ void describe(ResultTable& table, const RefinementResult& result) {
   table.add("parts", result.components.size(), "number of connected components of the pose graph");
   table.add("nodes_without_pose", result.without_pose.size(), "number of nodes without a pose");
   table.add("nodes_without_links", result.without_links.size(), "number of nodes without links");
-  table.add("frames_skipped", result.skipped.size(), "number of frames without features");
+  table.add("frames_skipped", result.skipped.size(),
+            "number of frames that cannot be read or have no depth");
   table.add("features", result.features, "number of features of all frames");
   table.add("sensor", sensor, "findings about the sensor, such as calibration errors");
   table.add("noise", result.noise, "depth noise and its source");

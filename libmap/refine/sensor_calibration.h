@@ -46,7 +46,7 @@ struct CalibrationChoice {
   // because other parts would absorb the error of that registration.
   bool keeps_registration = false;
   bool converge = true;     // iterate the best model to the tolerance of the options
-  SensorCalibration start;  // initial values of registration and timing
+  SensorCalibration start;  // initial values; empty: the stored cameras
 };
 
 struct CalibrationEstimate {
@@ -68,7 +68,7 @@ struct CalibrationEstimate {
 CalibrationEstimate estimate_calibration(const CalibrationInput& input,
                                          const CalibrationChoice& choice);
 
-// Repeats the calibration from the values of `known`, with `count` alternatives.
+// Repeats the adjustment of the parts of `known` from their values, with `count` alternatives.
 BundleAdjustmentResult vary_calibration(const CalibrationInput& input,
                                         const SensorCalibration& known, std::size_t count);
 
@@ -87,8 +87,7 @@ bool is_similar_registration(const SensorCalibration& a, const SensorCalibration
 CameraFile calibrated_camera(const Camera& stored, const Camera& image,
                              const SensorCalibration& calibration, const PoseGraph& graph);
 
-// Returns one sentence per corrected fault of a camera; `deviations` are
-// BundleAdjustmentResult::deviations.
+// Returns one sentence per corrected fault of a camera; `deviations` are standard deviations.
 std::vector<std::string> findings(const SensorCalibration& calibration,
                                   const SensorCalibration& deviations,
                                   const std::vector<Camera>& cameras);
