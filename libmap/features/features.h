@@ -52,9 +52,9 @@ int surface_step(std::size_t frames, const std::vector<Camera>& cameras,
 struct Feature {
   Eigen::Vector2f ray = Eigen::Vector2f::Zero();  // x/z and y/z in the camera's optical frame
   float depth_m = 0.0F;                           // depth of the plane at the pixel, > 0
-  float depth_noise_m = 0.0F;                     // standard deviation
-  float pixel_noise_px = 0.0F;                    // standard deviation
-  std::uint16_t camera = 0;
+  float depth_noise_m = 0.0F;                     // standard deviation of depth_m
+  float pixel_noise_px = 0.0F;                    // standard deviation of the image position
+  std::uint16_t camera = 0;                       // index of the camera
 };
 
 struct FrameFeatures {

@@ -50,7 +50,7 @@ void calibrate(FrameFeatures& frame, const SensorCalibration& calibration);
 // Rescales the depth noise of features and surfaces from the model `before` to `after`.
 void set_depth_noise(FrameFeatures& frame, const DepthNoise& before, const DepthNoise& after);
 
-// Returns a calibrated copy of the frame's cameras and features, without surfaces, descriptors.
+// Returns a calibrated copy of the frame's cameras and features, without surfaces.
 FrameFeatures calibrated_features(const FrameFeatures& frame, const SensorCalibration& calibration);
 
 // Returns the camera with changed intrinsics.

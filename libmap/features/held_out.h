@@ -66,13 +66,14 @@ struct HeldOutEvaluation {
   double change() const;     // change of the weighted mean cost; below 0: improved
   double deviation() const;  // standard error of change()
   bool any() const { return matches.count + surfaces.count > 0; }
-  // True if the weighted mean increases beyond rounding, or if one kind increases by more than two
-  // standard errors and half a percent, so that neither kind improves at the cost of the other.
+  // Returns true if the weighted mean increases beyond rounding, or if one kind increases by more
+  // than two standard errors and half a percent; no kind may improve at the cost of the other.
   bool is_worse() const;
-  // True if not worse, and the matches improve by more than two standard errors.
+  // Returns true if not worse, and the matches improve by more than two standard errors.
   bool is_clearly_better() const;
 };
 inline constexpr double surface_weight = 1.0 / 3.0;  // weight of a sample relative to a match
+// Compares all costs before and after a stage.
 HeldOutEvaluation evaluate_held_out(const HeldOutCosts& before, const HeldOutCosts& after);
 
 }  // namespace libmap

@@ -3,12 +3,12 @@
 // Frames are first registered to each other (frame_registration), by surface elements in random
 // blocks of the x-y plane. Two passes over the frames follow. The first fits a plane to the pixels
 // around each pixel (depth_planes) and averages positions and normals in a hashed voxel grid
-// (surface_voxels): a coarse surface, one element per voxel. The second moves each element along
-// the normal to the weighted mean of the measurements of all frames within a disc around it
-// (surface_refinement). Both passes average the intersections of rays with the surface instead of
-// the noisy points, which makes the means unbiased. Memory is proportional to the occupied voxels
-// of a tile. Up to 256 MB of decoded depth is cached (300 frames of 512 x 424); other frames are
-// decoded once per pass.
+// (surface_voxels): a coarse surface, one element per column of voxels and surface. The second
+// moves each element along the normal to the weighted mean of the measurements of all frames within
+// a disc around it (surface_refinement). Both passes average the intersections of rays with the
+// surface instead of the noisy points, which makes the means unbiased. Memory is proportional to
+// the occupied voxels of a tile. Up to 256 MB of decoded depth is cached (300 frames of 512 x 424);
+// other frames are decoded once per pass.
 #pragma once
 
 #include <cstddef>
@@ -75,7 +75,7 @@ struct PairCosts {
   double after = 0.0;
   double deviation = 0.0;  // standard error of after - before, from the scatter of pairs
 
-  // Return true if the difference exceeds two standard errors and half a percent.
+  // Both return true if the difference exceeds two standard errors and half a percent.
   bool is_clearly_worse() const;
   bool is_clearly_better() const;
 };

@@ -74,6 +74,7 @@ struct DepthPlaneLoops {
     int flying;
     int grazing;
   };
+  // Converts fitted planes to the optical frame; returns numbers of pixels by outcome.
   PlaneCounts (*finish)(const float* inverse, const InversePlanes& fitted, const Rays& rays,
                         int count, float min_cosine, const Planes& planes);
 

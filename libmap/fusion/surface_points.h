@@ -11,8 +11,8 @@
 
 namespace libmap {
 
-// Side, in voxels, of blocks of the x-y plane. Points of a block that only one or two frames
-// measured are kept or dropped together, by the block and its eight neighbors.
+// Side, in voxels, of blocks of the x-y plane. Points that only one or two frames measured are
+// dropped if others contradict at least half of such points in the block and its eight neighbors.
 inline constexpr int contradiction_block = 16;
 
 struct SurfacePointOptions {
@@ -30,10 +30,10 @@ struct SurfacePointCounts {
   std::size_t max_views = 0;        // maximum number of frames that measured one element
   std::size_t seen_through = 0;     // dropped: views see through the points
   std::size_t missed = 0;           // dropped: views measured nothing at the points
-  std::size_t contradicted = 0;     // dropped: measured by one or two frames, in a square where
-                                    // others contradict most measurements of such frames
+  std::size_t contradicted = 0;     // dropped: measured by one or two frames, in a block where
+                                    // others contradict at least half of such points
   std::size_t beyond_edge = 0;      // dropped: beyond an edge where the surface bends
-  std::size_t merged = 0;           // merged with, or an echo of, another point
+  std::size_t merged = 0;           // merged with another point, or an echo of one
   std::size_t extended_points = 0;  // points of the cloud beyond measured edges
 };
 

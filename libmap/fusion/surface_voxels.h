@@ -59,8 +59,7 @@ struct SurfaceElement {
 // Returns one element per column of voxels and surface in the column. Columns are parallel to the
 // axis nearest to the normal; elements are on their center lines. If noise spreads a surface over
 // two voxels of a column, the voxel with more weight is used. With `extend`, adjacent empty columns
-// get an element too. The order of elements depends on the voxels only; neighbors are near in
-// memory.
+// get an element too. The order depends on the voxels only.
 std::vector<SurfaceElement> surface_elements(const SurfaceVoxels& voxels, bool extend);
 
 }  // namespace libmap

@@ -16,6 +16,7 @@ struct TileMask {
   // Selects one in 2^level random blocks of 4 x 4 columns; a larger level selects a subset.
   unsigned subsampling_level = 0;
 
+  // Returns true if the column is selected.
   bool has_cell(const Eigen::Array2i& cell) const {
     if (!((cell >= low).all() && (cell < high).all())) return false;
     if (subsampling_level == 0) return true;
@@ -37,6 +38,7 @@ struct TileMask {
            has_cell(position.array().floor().cast<int>());
   }
 
+  // Returns the mask with a margin of `cells` columns.
   TileMask grown(int cells) const { return {low - cells, high + cells, subsampling_level}; }
 };
 

@@ -24,8 +24,8 @@ struct FrameCoverage {
 
 class ViewCoverage {
  public:
-  // Returns true if the frame adds more than 1/views to the information of the cells of more than 5
-  // % of the frame's pixels.
+  // Returns true if, at over 5 % of its pixels, the frame adds more than 1/views to the information
+  // of the pixel's cell.
   bool is_improved_by(const FrameCoverage& frame, double views) const;
   void add(const FrameCoverage& frame);
 

@@ -34,7 +34,7 @@ class BlockSystem {
   std::vector<Vector6d> rhs_;
 };
 
-// Sparse LDL^T factorization with a fill-reducing order of the blocks. The result is deterministic.
+// Solves a BlockSystem by sparse LDL^T factorization in a fill-reducing order of the blocks.
 class BlockSolver {
  public:
   // `damping` is added to the diagonal.

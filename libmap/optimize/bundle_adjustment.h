@@ -1,5 +1,5 @@
-// Bundle adjustment (Triggs et al. 2000) of poses, points and optionally camera parameters, from
-// image positions and depths of the points. Points are eliminated by the Schur complement.
+// Optimizes poses, points and optionally camera parameters by bundle adjustment (Triggs et al.
+// 2000) of the points' image positions and depths. Points are eliminated by the Schur complement.
 #pragma once
 
 #include <cstddef>
@@ -23,13 +23,12 @@ struct CalibrationBounds {
   double frame_time_s = 0.033;                  // > 0: maximum depth delay and rolling shutter time
   double max_depth_correction_m = 0.01;         // >= 0: maximum depth correction: constant term
   double max_depth_correction_of_range = 0.02;  // >= 0: term proportional to range, m/m
-  double deviations =
-      4.0;  // bound of other parameters, deviations of the prior; no parameter of commands
+  double deviations = 4.0;  // for other parameters, in prior deviations; no parameter of commands
 };
 
 struct BundleAdjustmentOptions {
   double robust_scale = 3.0;         // > 0: width of Cauchy's loss, standard deviations
-  int max_iterations = 30;           // >= 1
+  int max_iterations = 30;           // >= 1: maximum number of iterations
   bool refine_intrinsics = false;    // focal length, principal point; distortion is fixed
   bool refine_depth = false;         // a DepthCorrection per camera
   bool refine_registration = false;  // pose of the depth camera relative to the color camera
@@ -72,7 +71,7 @@ struct BundleAdjustmentResult {
   // Calibrations that differ from `calibration` by one standard deviation, along the independent
   // directions that change positions most.
   std::vector<SensorCalibration> alternatives;
-  SensorCalibration deviations;  // for intrinsics and timing; set if alternatives are requested
+  SensorCalibration deviations;  // standard deviations of intrinsics and timing, with alternatives
   // Information of steps of the poses (rigid_motion.h) at the optimum, in the order of
   // map_from_base, including the links. Points are eliminated (Schur complement).
   BlockSystem information{0};
@@ -86,7 +85,7 @@ struct BundleAdjustmentResult {
   double depth_rms_m = 0.0;
   std::size_t outliers = 0;  // observations with a weight below one half
   int iterations = 0;
-  bool converged = false;
+  bool converged = false;  // the result is usable
 };
 
 // Adjusts poses, points and free camera parameters. The resulting poses fit frames with the

@@ -1,4 +1,4 @@
-// Covariances of the poses of a graph, from the information of the links at the optimum.
+// Computes covariances of a graph's poses from the information of the links at the optimum.
 #pragma once
 
 #include <map>

@@ -21,9 +21,9 @@ enum class IcpMode { off, links, global };
 
 struct IcpOptions {
   IcpMode mode = IcpMode::global;
-  int iterations = 12;           // >= 1
+  int iterations = 12;           // >= 1: maximum number of iterations
   int pairs_per_frame = 8;       // >= 1: for global, frames with the largest overlap per frame
-  double min_overlap = 0.25;     // 0 to 1: for global, minimum shared part of a frame's samples
+  double min_overlap = 0.25;     // 0 to 1: for global, minimum overlap as a share of samples
   int samples = 1500;            // >= 1: approximate number of samples per frame
   double max_distance_m = 0.03;  // > 0: initial maximum distance between a sample and the plane
   double max_normal_angle_deg = 35.0;   // maximum angle between normals of sample and plane
@@ -43,8 +43,8 @@ struct IcpResult {
   std::size_t pairs = 0;
   std::size_t samples = 0;                // matched samples in the last iteration
   std::size_t degenerate_directions = 0;  // number of ignored directions of all pairs
-  double initial_rms_m = 0.0;             // of distances along normals, first iteration
-  double final_rms_m = 0.0;               // last iteration
+  double initial_rms_m = 0.0;             // RMS distance along normals, first iteration
+  double final_rms_m = 0.0;               // RMS distance along normals, last iteration
   int iterations = 0;
   bool converged = false;
   std::vector<FramePair> frame_pairs;  // aligned pairs; empty if the alignment failed

@@ -23,11 +23,11 @@ namespace libmap {
 
 struct BundleObservation {
   std::size_t node = 0;          // row of the pose
-  Eigen::Index first_param = 0;  // first parameter of the camera
+  Eigen::Index first_param = 0;  // index of the camera's first parameter
   CalibratedFeature feature;
 };
 
-// Weight of a residual for Cauchy's loss of width `scale`.
+// Returns the weight of a residual for Cauchy's loss of width `scale`.
 inline double robust_weight(const Eigen::Vector3d& residual, double scale) {
   return cauchy_weight(residual.squaredNorm() / (scale * scale));
 }
@@ -102,7 +102,7 @@ class PointSchur {
     rhs_.noalias() -= weighted_point * seen.residual;
   }
 
-  // Lazy products, because Eigen's general product copies blocks of this size first.
+  // Eliminates the point. Lazy products, because Eigen's general product copies such blocks first.
   void eliminate(System& system) {
     if (views_.empty()) return;
     inverse_ = hessian_.inverse();
@@ -134,7 +134,7 @@ struct JointProblem {
   std::vector<BundleObservation> observations;  // grouped by point
   std::vector<std::size_t> begin = {0};         // first observation by point; one more than points
   double robust_scale = 3.0;                    // width of Cauchy's loss, standard deviations
-  std::vector<bool> fixed;                      // by pose
+  std::vector<bool> fixed;                      // by pose; true: the pose is constant
   bool fix_cameras = false;
   // Camera parameters outside this range have no influence on the residuals.
   Eigen::Index first_param = 0;

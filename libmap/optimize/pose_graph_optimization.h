@@ -19,7 +19,7 @@ struct PoseGraphOptions {
   // translation, to match the residuals of the group (variance components, Foerstner 1979).
   bool recalibrate = true;
   int recalibrations = 6;        // >= 1: maximum number of recalibration rounds
-  double robust_scale = 4.1;     // >= 0: width of Cauchy's loss, standard deviations; 0: squares
+  double robust_scale = 4.1;     // >= 0: width of Cauchy's loss, standard deviations; 0: not robust
   double max_chi_square = 40.0;  // > 0: of a closure's six residuals; closures above are rejected
   int gauge_node = 0;            // fixed node; 0: the first node of each component
 };

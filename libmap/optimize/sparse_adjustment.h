@@ -39,8 +39,7 @@ class TrackSystem {
   Totals totals(const std::map<int, Pose>& map_from_base,
                 const std::vector<Eigen::Vector3d>& points) const;
 
-  // Returns the normal equations of steps of the poses, in the order of `map_from_base`, without
-  // points.
+  // Returns the normal equations of steps of the poses in the order of `map_from_base`.
   BlockSystem system(const std::map<int, Pose>& map_from_base,
                      const std::vector<Eigen::Vector3d>& points) const;
 
