@@ -17,7 +17,7 @@ void describe_surface(ResultTable& table, const FusionCounts& counts) {
   table.add("dropped_missed", points.missed, Merge::sum,
             "number of elements dropped: too many views have no depth at the elements");
   table.add("dropped_contradicted", points.contradicted, Merge::sum,
-            "number of elements dropped: few views, and most such neighbors are contradicted");
+            "number of elements dropped: seen by one or two frames near contradicted elements");
   table.add("dropped_beyond_edges", points.beyond_edge, Merge::sum,
             "number of elements dropped: beyond an edge at which the surface bends");
   table.add("merged", points.merged, Merge::sum,
@@ -41,7 +41,7 @@ void bind(ParameterTable& table, DepthFusionOptions& options) {
   table.add("min_depth_m", planes.min_depth_m, positive, "minimum depth of used measurements, m");
   table.add("max_depth_m", planes.max_depth_m, positive, "maximum depth of used measurements, m");
   table.add("max_incidence_deg", planes.max_incidence_deg, {0, 89.5, true, false},
-            "maximum angle between line of sight and normal of a measured surface, degrees");
+            "maximum angle between line of sight and surface normal of a measurement, degrees");
   table.add("axial_noise_m", planes.noise.axial_m, positive,
             "standard deviation of depth: constant term, m");
   table.add("range_noise", planes.noise.axial_of_range, not_negative,
@@ -54,9 +54,9 @@ void bind(ParameterTable& table, DepthFusionOptions& options) {
             "radius of the disc of pixels to which a plane is fitted, pixels");
   table.add_former_key("min_pair_share", "min_pair_fraction");
   table.add("min_pair_fraction", planes.min_pair_fraction, zero_to_one,
-            "minimum share of pairs of opposite neighbors that agree with a pixel with a plane");
+            "minimum share of pairs of opposite neighbors that agree with a pixel, to fit a plane");
   table.add("disc_radius_voxels", options.disc_radius_voxels, positive,
-            "radius of the disc in which measurements are averaged, in voxels");
+            "radius of the disc around a point in which measurements are averaged, in voxels");
   table.add(
       "pose_error_m", options.pose_error_m, not_negative,
       "standard deviation of a frame's position along the surface normal due to pose errors, m");

@@ -419,8 +419,9 @@ void bind(ParameterTable& table, IcpOptions& options) {
             "number of frames with the largest overlap to which global ICP aligns each frame");
   table.add("icp_samples", options.samples, {1, 1000000},
             "approximate number of surface samples per frame for ICP");
-  table.add("icp_distance_m", options.max_distance_m, positive,
-            "maximum distance between ICP sample and other surface in the first iteration, m");
+  table.add(
+      "icp_distance_m", options.max_distance_m, positive,
+      "first ICP iteration: maximum distance between a sample and another frame's surface, m");
   table.add("icp_degenerate", options.max_degenerate_ratio, zero_to_one,
             "minimum ratio of an eigenvalue to the largest eigenvalue of an ICP information "
             "matrix; directions below are ignored");
