@@ -54,7 +54,7 @@ struct DepthEdge {
   double inverse_depth = 0.0;
 };
 
-// Edges of one frame, and how strongly its color image changes there: [0] along rows, [1] along
+// Edges of one frame, and the strength of changes in its color image: [0] along rows, [1] along
 // columns. The color image is reduced to the size of depth and then by `reduction`.
 struct EdgeFrame {
   std::array<std::vector<DepthEdge>, 2> edges;
@@ -112,8 +112,8 @@ cv::Mat1f gray_of(const ColorImage& color, cv::Size size) {
   return reduced;
 }
 
-// Returns true if the surface at a pixel ends there: beyond pixels without depth it is farther away
-// by a jump, and on the other side the surface goes on.
+// Returns true if a surface ends at the pixel: on one side, beyond pixels without depth, the depth
+// is larger by a jump; on the opposite side, the surface continues.
 bool is_edge(const DepthImage& depth, int x, int y, int dx, int dy) {
   const auto depth_at = [&](int column, int row) {
     return column < 0 || row < 0 || column >= depth.width || row >= depth.height

@@ -136,7 +136,7 @@ DepthAgreement agreement_of(const std::vector<ViewedPair>& pairs, const Conventi
   return agreement;
 }
 
-// The next frame that has moved enough to reveal a wrong convention; nullopt if there is none.
+// Returns the next frame that has moved enough to reveal a wrong convention, or nullopt.
 std::optional<std::size_t> partner_of(std::size_t first, const Trajectory& poses) {
   for (std::size_t n = first + 1; n < std::min(first + max_gap, poses.size()); ++n) {
     const Pose motion = poses[first].world_from_base.inverse() * poses[n].world_from_base;

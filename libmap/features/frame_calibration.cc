@@ -149,7 +149,7 @@ FrameFeatures calibrated_features(const FrameFeatures& frame,
   result.depth_stamp_offset_s = frame.depth_stamp_offset_s;
   result.cameras = frame.cameras;
   result.features = frame.features;
-  // Pixels are those of the stored camera.
+  // Pixels refer to the stored camera.
   const std::vector<Pose> motions = row_motions(frame, calibration);
   if (!calibration.color_from_depth.empty() || !motions.empty())
     for (Feature& feature : result.features) {

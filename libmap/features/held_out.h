@@ -29,7 +29,7 @@ std::vector<double> match_costs(const std::vector<FrameFeatures>& frames,
                                 const std::map<int, Pose>& map_from_base);
 
 // Returns the costs of held-out depth samples (SampleUse::checks) of both frames of each link
-// against the planes of the other frame; NaN if it does not observe the sample or has no pose.
+// against the planes of the other frame; NaN if the sample is not observed or a pose is missing.
 std::vector<double> surface_costs(const std::vector<FrameFeatures>& frames,
                                   const std::vector<FeatureLink>& links,
                                   const std::map<int, Pose>& map_from_base);

@@ -22,8 +22,8 @@ enum class SampleUse { estimation, checks };
 // Returns about `count` elements, evenly distributed over the images.
 std::vector<PlacedElement> surface_samples(const FrameFeatures& frame, int count, SampleUse use);
 
-// Finds the element at the projection of the point, in the first camera that has an element there.
-// Returns false if there is none.
+// Finds the element at the projection of the point, in the first camera that has an element at this
+// pixel. Returns false if no camera has one.
 bool element_at(const FrameFeatures& frame, const Eigen::Vector3d& point_in_base,
                 PlacedElement& element);
 

@@ -273,7 +273,7 @@ double max_plane_distance_m(const DepthPlaneOptions& options) {
 }
 
 // Returns the marked pixels (not 0) and all pixels that affect their planes. With the result as
-// `only`, the planes of the marked pixels equal those of the whole image.
+// `only`, the marked pixels have the same planes as with the whole image.
 std::vector<std::uint8_t> dilate_mask(const std::vector<std::uint8_t>& marks, int width,
                                       int height) {
   std::vector<std::uint8_t> grown(marks.size(), 0);

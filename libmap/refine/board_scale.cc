@@ -27,7 +27,7 @@ constexpr double min_noise_px = 0.01;  // minimum standard deviation of a corner
 constexpr int max_iterations = 50;
 constexpr double settled_step = 1e-10;
 constexpr double max_deviation = 0.03;  // of the scale; above the error of any depth camera
-// Maximum ratio of a view's chi-square against the others to the median of all views.
+// Maximum chi-square of a view against the board, relative to the median of the views.
 constexpr double max_disagreement = 9.0;
 constexpr std::size_t max_pairs = 200;
 constexpr double freedom_of_pose = 6.0;
@@ -162,8 +162,8 @@ AgreeingSights sights_that_agree(const std::vector<BoardObservation>& observatio
   return agreeing;
 }
 
-// Sums over residuals r = projected minus found, px. J (7 columns) are their derivatives by a step
-// of the board and its size, H (6 columns) those by a step of the base.
+// Sums over residuals r = projected minus found, px. J (7 columns) contains the derivatives by a
+// step of the board and the board's size, H (6 columns) the derivatives by a step of the base.
 using Sums = Eigen::Matrix<double, 14, 14>;  // [J r H]^T [J r H]
 using System = Eigen::Matrix<double, 8, 8>;  // [J r]^T [J r], weighted
 
