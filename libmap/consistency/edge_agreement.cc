@@ -23,12 +23,12 @@ namespace {
 
 constexpr std::size_t max_frames = 24;
 constexpr std::size_t min_frames = 6;
-constexpr int max_width_px = 640;        // larger images are reduced
-constexpr float min_jump = 0.06F;        // of depth at an edge, in depths
-constexpr float max_step = 0.02F;        // to the next pixel of a surface, in depths
-constexpr int max_shadow_px = 12;        // beside an edge, without depth
-constexpr std::size_t max_edges = 1000;  // of a frame and direction
-constexpr std::size_t min_edges = 2000;  // of all frames
+constexpr int max_width_px = 640;  // larger images are reduced
+constexpr float min_jump = 0.06F;  // minimum depth step at an edge, relative to depth
+constexpr float max_step = 0.02F;  // maximum step between pixels of a surface, relative to depth
+constexpr int max_shadow_px = 12;  // maximum gap without depth beside an edge
+constexpr std::size_t max_edges = 1000;  // maximum number of a frame and direction
+constexpr std::size_t min_edges = 2000;  // minimum number in all frames
 constexpr double rough_blur_px = 3.0;
 constexpr double fine_blur_px = 1.0;
 // Grid of the first search.
@@ -54,7 +54,7 @@ struct DepthEdge {
   double inverse_depth = 0.0;
 };
 
-// Edges of one frame, and how strongly its color image changes there: [0] along rows, [1] along
+// Edges of one frame, and the strength of changes in its color image: [0] along rows, [1] along
 // columns. The color image is reduced to the size of depth and then by `reduction`.
 struct EdgeFrame {
   std::array<std::vector<DepthEdge>, 2> edges;
@@ -78,7 +78,7 @@ Pose pose_of(const Alternative& alternative) {
   return pose;
 }
 
-// Where the alternative puts an edge. Lens distortion is taken to be the same there.
+// Position of an edge by the alternative, with the lens distortion at the stored position.
 Eigen::Vector2d moved_pixel(const DepthEdge& edge, const EdgeFrame& frame, const Pose& pose,
                             double inverse_focal_factor) {
   const Eigen::Vector3d direction =
@@ -112,8 +112,8 @@ cv::Mat1f gray_of(const ColorImage& color, cv::Size size) {
   return reduced;
 }
 
-// Returns true if the surface at a pixel ends there: beyond pixels without depth it is farther away
-// by a jump, and on the other side the surface goes on.
+// Returns true if a surface ends at the pixel: on one side, beyond pixels without depth, the depth
+// is larger by a jump; on the opposite side, the surface continues.
 bool is_edge(const DepthImage& depth, int x, int y, int dx, int dy) {
   const auto depth_at = [&](int column, int row) {
     return column < 0 || row < 0 || column >= depth.width || row >= depth.height
@@ -168,7 +168,7 @@ std::optional<EdgeFrame> read_edges(const ScanSource& scan, int node) {
 // Mean response at the edges of some frames.
 class EdgeScore {
  public:
-  // Every `stride`-th edge, and images that are blurred.
+  // Uses every `stride`-th edge, and blurred images.
   EdgeScore(std::vector<const EdgeFrame*> frames, double blur_px, std::size_t stride)
       : frames_(std::move(frames)), stride_(stride), blurred_(frames_.size()) {
     parallel_each(frames_.size(), [&](std::size_t f) {
@@ -309,7 +309,7 @@ Alternative coarse_search(const EdgeScore& score, const Alternative& pixel) {
   return best;
 }
 
-// By every `stride`-th edge.
+// Aligns by every `stride`-th edge.
 Alternative roughly_aligned(const std::vector<const EdgeFrame*>& frames, std::size_t stride) {
   const Alternative pixel = pixel_steps(frames);
   const EdgeScore score(frames, rough_blur_px, stride);
@@ -354,7 +354,7 @@ std::vector<EdgeFrame> read_frames(const ScanSource& scan) {
   return frames;
 }
 
-// Responses of the frames of one half by the alternative of the other half, less the stored ones.
+// Gains of the frames of each half in mean response by the alternative of the other half.
 std::vector<double> held_out_gains(const std::array<std::vector<const EdgeFrame*>, 2>& halves,
                                    const std::array<Alternative, 2>& by_half) {
   std::vector<double> gains;

@@ -84,7 +84,7 @@ std::vector<Convention> conventions() {
       {"inverted, as poses of the camera's optical frame",
        [=](const Pose& pose, const Pose& camera) { return as_camera(pose.inverse(), camera); }}};
   for (const auto& [text, rotation] : axis_changes())
-    all.push_back({"with positions as " + text + ", in the axes of the rotations",
+    all.push_back({"with positions x y z changed to " + text + ", the axes of the rotations",
                    [rotation = rotation](const Pose& pose, const Pose&) {
                      Pose moved = pose;
                      moved.translation() = rotation * pose.translation();
@@ -136,7 +136,7 @@ DepthAgreement agreement_of(const std::vector<ViewedPair>& pairs, const Conventi
   return agreement;
 }
 
-// The next frame that has moved enough to reveal a wrong convention; nullopt if there is none.
+// Returns the next frame that has moved enough to reveal a wrong convention, or nullopt.
 std::optional<std::size_t> partner_of(std::size_t first, const Trajectory& poses) {
   for (std::size_t n = first + 1; n < std::min(first + max_gap, poses.size()); ++n) {
     const Pose motion = poses[first].world_from_base.inverse() * poses[n].world_from_base;
@@ -183,8 +183,8 @@ std::string PoseConsistency::warning() const {
                                       " pairs of frames have in common is contradictory";
   if (!convention.empty())
     return "the poses fit " + to_fixed_text(given.difference / best.difference, 0) +
-           " times better " + convention + "; " + found + ", and " + percent(best.contradicted) +
-           " with it";
+           " times better " + convention + "; " + found + ", but only " +
+           percent(best.contradicted) + " with this convention";
   if (given.measurements < min_measurements || given.contradicted < contradictory_fraction)
     return {};
   return found + ": poses, depth unit or calibration are wrong, and no usual convention fits";

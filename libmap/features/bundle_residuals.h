@@ -1,4 +1,4 @@
-// Residuals of bundle adjustment, and derivatives by poses, points and camera parameters.
+// Computes residuals of bundle adjustment and derivatives by poses, points and camera parameters.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,8 +10,7 @@
 namespace libmap {
 
 // Residual fx (x/z - u), fy (y/z - v) (px) and z - depth (m) of a point (x, y, z) in the camera's
-// frame that was observed along the ray (u, v, 1), and its derivative by the point. z must not be
-// 0.
+// frame that was observed along the ray (u, v, 1), and derivative by the point. z must not be 0.
 struct Projection {
   Eigen::Vector3d residual;
   Eigen::Matrix3d by_point;
@@ -21,15 +20,15 @@ Projection project(const Eigen::Vector3d& point, const Eigen::Vector2d& focal_px
 
 // Effect of camera calibration on one observation, linearized at a known calibration.
 struct CalibratedObservation {
-  bool intrinsics = false;  // this and the following: true for unknown parameters
+  bool intrinsics = false;  // these four: true if the parameters are unknown
   bool depth = false;
   bool registration = false;
   bool timing = false;
-  DepthCorrection::Terms terms{};
-  bool has_depth = true;
+  DepthCorrection::Terms terms{};          // of the depth correction at the feature
+  bool has_depth = true;                   // false: the depth is of another surface
   double added_m = 0.0;                    // change of depth by the known registration and timing
   Vector6d by_step = Vector6d::Zero();     // derivative of the depth by a registration step
-  Vector6d known_step = Vector6d::Zero();  // registration step equal to the known timing
+  Vector6d known_step = Vector6d::Zero();  // registration step that the known timing causes
   double image_row_fraction = 0.0;         // row_fraction
   double depth_stamp_offset_s = 0.0;       // FrameFeatures::depth_stamp_offset_s
 };
@@ -49,7 +48,7 @@ struct CalibratedResidual {
   Eigen::Matrix<double, 3, 6> by_motion;  // set with timing only
   Eigen::Matrix3d by_point;
   Eigen::Matrix<double, 3, spline_at> by_camera;  // 0 for known parameters
-  Eigen::RowVector4d depth_by_spline;             // from spline_at + terms.first on
+  Eigen::RowVector4d depth_by_spline;  // by the coefficients from spline_at + terms.first on
 };
 
 // One observation of a point. Intrinsics parameters are steps from the intrinsics that determined

@@ -27,7 +27,7 @@ class DepthSurface {
   // One element in 10 bytes. The cells of all frames dominate the memory of a long scan.
   struct Cell {
     std::array<std::uint16_t, 2> depth_bits{};  // bits of a float, m; 0: no measurement
-    std::int16_t normal_x = 0;                  // in units of 1/32767
+    std::int16_t normal_x = 0;                  // unit normal, in units of 1/32767
     std::int16_t normal_y = 0;
     std::uint16_t noise = 0;  // in units of 1e-6 m
 
@@ -38,8 +38,8 @@ class DepthSurface {
   };
 
   DepthSurface() = default;
-  // Takes every step_px-th pixel of `planes`. Drops planes that are supported by less than a
-  // quarter of the pixels of a full disc, for example at edges.
+  // Takes every step_px-th pixel of `planes`. Drops planes, for example at edges, whose support is
+  // less than a quarter of the largest support in the image.
   DepthSurface(const DepthPlanes& planes, const Camera& depth_camera, const DepthNoise& noise,
                double surface_noise_m, int step_px);
   // Restores a stored surface. Throws Error unless there is one cell per step_px-th pixel.
@@ -58,13 +58,13 @@ class DepthSurface {
   const std::vector<Cell>& cells() const { return cells_; }
   int columns() const { return columns_; }
   int rows() const { return rows_; }
-  // The lookups return false, and leave `element` unchanged, if nothing was measured at the
-  // position. Element at a grid position, which must be inside the grid.
+  // The lookups set `element` (optical frame), or return false if nothing was measured there. at()
+  // looks up a grid position, which must be inside the grid.
   bool at(int column, int row, SurfacePatch& element) const;
-  // Element nearest to the projection of `point_in_camera`.
+  // Looks up the element nearest to the projection of `point_in_camera` (optical frame).
   bool nearest_to(const Eigen::Vector3d& point_in_camera, SurfacePatch& element) const;
-  // Surface on the ray through the point: bilinear mean of the four neighboring planes if all four
-  // were measured on one surface, otherwise the nearest plane.
+  // Looks up the surface on the point's ray: the bilinear mean of the four neighboring planes if
+  // they are on one surface, otherwise the nearest plane.
   bool interpolated_at(const Eigen::Vector3d& point_in_camera, SurfacePatch& element) const;
 
  private:

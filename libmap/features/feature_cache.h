@@ -1,5 +1,4 @@
-// Cache of image features on disk, so that later runs need not compute features again: one file per
-// frame in a folder, named by a hash of the inputs.
+// Caches image features on disk for later runs: one file per frame, named by a hash of the inputs.
 #pragma once
 
 #include <filesystem>
@@ -12,8 +11,8 @@
 
 namespace libmap {
 
-// SHA-256 of the frame's images and cameras, the options and the format version. Equal keys mean
-// equal features, independent of the file that contains the frame.
+// Returns the SHA-256 of the frame's images and cameras, the options and the format version. Equal
+// keys mean equal features, independent of the file that contains the frame.
 std::string feature_key(const RgbdFrame& frame, const FeatureOptions& options);
 
 // Safe for use by several threads and processes at once. A file contains one line with the SHA-256
@@ -25,11 +24,12 @@ class FeatureCache {
   explicit FeatureCache(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
   bool enabled() const { return !folder_.empty(); }
-  // Reads features, descriptors and surfaces into `frame`; `depth_cameras` has one camera per
-  // surface. Returns false and leaves `frame` unchanged if the key has no valid file.
+  // Reads features, descriptors and surfaces into `frame`, whose `type` must be set;
+  // `depth_cameras` has one camera per surface. Returns false and leaves `frame` unchanged if the
+  // key has no valid file.
   bool read(const std::string& key, const std::vector<Camera>& depth_cameras,
             FrameFeatures& frame) const;
-  // Temporary file in the folder; nullptr if the cache is disabled or the file cannot be created.
+  // Returns a temporary file in the folder; nullptr if disabled or the file cannot be created.
   std::shared_ptr<TempFile> temp_file() const;
   // Stores the frame. Returns false, without an error, if the file cannot be written.
   bool write(const std::string& key, const FrameFeatures& frame) const;

@@ -16,8 +16,7 @@ namespace libmap {
 
 namespace {
 
-// Features of all frames, numbered consecutively and joined into sets. Members of a set form a
-// ring.
+// Features of all frames, numbered consecutively, in sets whose members form a ring.
 class FeatureSets {
  public:
   explicit FeatureSets(const std::vector<FrameFeatures>& frames) {

@@ -30,7 +30,7 @@ struct FeatureLink {
   PoseLink link{};                       // between the nodes of the frames
   std::vector<FeatureMatch> matches{};   // inliers of the estimate; a is in the frame of link.from
   std::vector<FeatureMatch> held_out{};  // consistent matches that the estimate did not use
-  double chi_square_per_freedom = 0.0;
+  double chi_square_per_freedom = 0.0;   // of the inliers
 };
 
 // Numbers of pairs of frames by outcome.
@@ -50,11 +50,11 @@ struct PairVerification {
   RejectionCounts counts;
 };
 
-// Matches by pair of frames. They depend on the descriptors, not on the cameras.
+// Matches by pair of frames, which depend on the descriptors, not on the cameras.
 using KnownMatches = std::map<FramePair, std::vector<FeatureMatch>>;
 
-// Matches the features of each pair and estimates the relative pose. The result does not depend on
-// the number of threads. Pairs in `known` are not matched again; matches of other pairs are added.
+// Matches the features of each pair and estimates the relative pose; a pair without a valid
+// estimate has no link. Pairs in `known` are not matched again; matches of other pairs are added.
 // Throws Error if descriptors cannot be read from the temporary file.
 PairVerification verify_pairs(const std::vector<FrameFeatures>& frames,
                               const std::vector<FramePair>& pairs, const MatchingOptions& options,
@@ -88,7 +88,7 @@ struct FeatureTracks {
 enum class TrackFrames { any, linked };
 
 // Joins matches into tracks by union-find, in ascending order of chi-square. Drops a match that
-// would join two features of one frame.
+// would join two features of one frame, or unlinked frames for TrackFrames::linked.
 FeatureTracks build_tracks(const std::vector<FrameFeatures>& frames,
                            const std::vector<FeatureLink>& links,
                            TrackFrames together = TrackFrames::any);

@@ -163,14 +163,14 @@ struct FoundFeatures {
 FoundFeatures features_of(const ScanSource& scan, int node, const FeatureOptions& options,
                           PixelRayCache& rays, const FeatureCache& cache, MemoryBudget& memory) {
   const RgbdFrame read = scan.read_frame(node, {.color = !options.surfaces_only, .depth = true});
-  if (read.depth.empty()) throw Error("has no depth");
+  if (read.depth.empty()) throw Error("the frame has no depth image");
   FoundFeatures result;
   FrameFeatures& frame = result.frame;
   frame.node = node;
   frame.type = options.type;
   const std::vector<CameraView> views = camera_views(read);
   if (views.empty() && read.cameras.empty() && !(read.color.empty() && read.depth.empty()))
-    throw Error("has no calibration");
+    throw Error("the frame has no calibration");
   std::string key;
   if (cache.enabled()) {
     std::vector<Camera> depth_cameras;
@@ -220,7 +220,7 @@ void keep_descriptors(const std::shared_ptr<TempFile>& file, FrameFeatures& fram
 
 void bind(ParameterTable& table, FeatureOptions& options) {
   table.add("features", options.type, {{"sift", FeatureType::sift}, {"orb", FeatureType::orb}},
-            "type of image features; sift: SIFT; orb: ORB, binary");
+            "type of image features; sift: SIFT; orb: ORB (binary descriptors)");
   table.add("max_features", options.max_features, {1, 100000},
             "maximum number of features per image");
   table.add("min_contrast", options.min_contrast, positive,
@@ -231,13 +231,14 @@ void bind(ParameterTable& table, FeatureOptions& options) {
       "scale_noise", options.scale_noise, not_negative,
       "standard deviation of a feature's image position per pixel of the feature's size, px/px");
   table.add("surface_noise_m", options.surface_noise_m, not_negative,
-            "standard deviation of fitted depth that more pixels do not reduce, m");
-  table.add("surface_step_px", options.surface_step_px, {1, 32},
-            "step of the grid to which depth images are downsampled, pixels");
-  table.add("min_depth_m", options.planes.min_depth_m, positive, "minimum used depth, m");
-  table.add("max_depth_m", options.planes.max_depth_m, positive, "maximum used depth, m");
+            "standard deviation of a fitted plane's depth that averaging does not reduce, m");
+  table.add(
+      "surface_step_px", options.surface_step_px, {1, 32},
+      "step of the grid to which depth images are downsampled, pixels; larger for long scans");
+  table.add("min_depth_m", options.planes.min_depth_m, positive, "minimum depth that is used, m");
+  table.add("max_depth_m", options.planes.max_depth_m, positive, "maximum depth that is used, m");
   table.add("axial_noise_m", options.planes.noise.axial_m, positive,
-            "constant term of the standard deviation of depth, m");
+            "standard deviation of depth: constant term, m");
   table.add("range_noise", options.planes.noise.axial_of_range, not_negative,
             "standard deviation of depth: term proportional to range, m per m");
   table.add("square_noise", options.planes.noise.axial_of_square, not_negative,

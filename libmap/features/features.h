@@ -24,7 +24,7 @@ namespace libmap {
 // et al. 2011).
 enum class FeatureType { sift, orb };
 
-// Size of one descriptor in bytes.
+// Returns the size of one descriptor in bytes.
 std::size_t descriptor_bytes(FeatureType type);
 
 struct FeatureOptions {
@@ -44,17 +44,17 @@ struct FeatureOptions {
 };
 void bind(ParameterTable& table, FeatureOptions& options);
 
-// Smallest grid step (px), at least surface_step_px, for which the surfaces of `frames` frames with
-// these cameras need at most max_surface_bytes; 32 if no step suffices.
+// Returns the smallest grid step (px), at least surface_step_px, for which the surfaces of `frames`
+// frames with these cameras need at most max_surface_bytes; 32 if no step suffices.
 int surface_step(std::size_t frames, const std::vector<Camera>& cameras,
                  const FeatureOptions& options);
 
 struct Feature {
   Eigen::Vector2f ray = Eigen::Vector2f::Zero();  // x/z and y/z in the camera's optical frame
   float depth_m = 0.0F;                           // depth of the plane at the pixel, > 0
-  float depth_noise_m = 0.0F;                     // standard deviation
-  float pixel_noise_px = 0.0F;                    // standard deviation
-  std::uint16_t camera = 0;
+  float depth_noise_m = 0.0F;                     // standard deviation of depth_m
+  float pixel_noise_px = 0.0F;                    // standard deviation of the image position
+  std::uint16_t camera = 0;                       // index of the camera
 };
 
 struct FrameFeatures {
@@ -77,7 +77,7 @@ struct FrameFeatures {
 };
 
 struct FeatureResult {
-  std::vector<FrameFeatures> frames;           // by ascending node
+  std::vector<FrameFeatures> frames;           // in the order of the nodes
   std::vector<std::pair<int, Error>> skipped;  // node and reason
   std::size_t from_cache = 0;                  // number of frames read from the cache
 };
@@ -95,8 +95,8 @@ FeatureResult find_features(const ScanSource& scan, const std::vector<int>& node
 void add_features(const CameraView& view, const DepthPlanes& planes, const FeatureOptions& options,
                   FrameFeatures& frame);
 
-// Descriptors as unit vectors, one column per feature; products of columns measure similarity.
-// Throws Error if the descriptor file cannot be read.
+// Returns the descriptors as unit vectors, one column per feature, for cosine similarity. Throws
+// Error if the descriptor file cannot be read.
 Eigen::MatrixXf descriptor_vectors(const FrameFeatures& frame);
 
 }  // namespace libmap

@@ -8,8 +8,8 @@ namespace libmap {
 
 namespace {
 
-constexpr double plane_radius_px = 3.0;       // of the disc that a plane is fitted to
-constexpr double unmeasured_fraction = 0.01;  // of the depths, ignored at either end of the range
+constexpr double plane_radius_px = 3.0;       // radius of the disc to which a plane is fitted
+constexpr double unmeasured_fraction = 0.01;  // ignored share of the depths at either end
 
 // Finds the depth plane that a feature's ray intersects if the depth camera is at
 // `color_from_depth`. Returns false if there is none.
@@ -149,7 +149,7 @@ FrameFeatures calibrated_features(const FrameFeatures& frame,
   result.depth_stamp_offset_s = frame.depth_stamp_offset_s;
   result.cameras = frame.cameras;
   result.features = frame.features;
-  // Pixels are those of the stored camera.
+  // Pixels refer to the stored camera.
   const std::vector<Pose> motions = row_motions(frame, calibration);
   if (!calibration.color_from_depth.empty() || !motions.empty())
     for (Feature& feature : result.features) {

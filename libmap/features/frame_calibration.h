@@ -34,7 +34,7 @@ struct CameraTiming {
 struct SensorCalibration {
   std::vector<IntrinsicsStep> intrinsics{};
   std::vector<DepthCorrection> depth{};
-  std::vector<Pose> color_from_depth{};  // true pose of the depth camera if depth is registered
+  std::vector<Pose> color_from_depth{};  // true pose of the depth camera relative to the stored one
   std::vector<CameraTiming> timing{};
   // Used only with `timing`: velocity of the base by node, in the base frame, m/s and rad/s.
   std::map<int, Vector6d> motion{};
@@ -50,21 +50,21 @@ void calibrate(FrameFeatures& frame, const SensorCalibration& calibration);
 // Rescales the depth noise of features and surfaces from the model `before` to `after`.
 void set_depth_noise(FrameFeatures& frame, const DepthNoise& before, const DepthNoise& after);
 
-// Calibrated copy of the frame's cameras and features, without surfaces and descriptors.
+// Returns a calibrated copy of the frame's cameras and features, without surfaces.
 FrameFeatures calibrated_features(const FrameFeatures& frame, const SensorCalibration& calibration);
 
 // Returns the camera with changed intrinsics.
 Camera moved(Camera camera, const IntrinsicsStep& step);
 
-// Squared distance of a feature from the image center, 1 at the corner pixels.
+// Returns the squared distance of a feature from the image center, 1 at the corner pixels.
 double squared_radius_of(const Feature& feature, const Camera& camera);
-// Image row of a feature from -0.5 (first row) to 0.5 (last row). The row is exposed this share of
+// Returns a feature's row from -0.5 (first row) to 0.5 (last row), which is exposed this share of
 // CameraTiming::rolling_shutter_s after the middle row.
 double row_fraction(const Feature& feature, const Camera& camera);
 
 // Converts a velocity of the base (base frame) to the velocity of the camera (optical frame).
 Vector6d motion_in_camera(const Camera& camera, const Vector6d& base_motion);
-// Pose of the depth camera relative to the color camera at the exposure of the feature.
+// Returns the depth camera's pose relative to the color camera at the exposure of the feature.
 Pose color_from_depth_of(const FrameFeatures& frame, const Feature& feature,
                          const SensorCalibration& calibration);
 
@@ -80,15 +80,15 @@ struct RegisteredDepth {
 inline constexpr float unknown_depth_m = 1.0F;  // standard deviation of an unknown depth
 RegisteredDepth registered_depth(const FrameFeatures& frame, const Feature& feature,
                                  const Pose& color_from_depth);
-// True if there is a plane at the feature with the stored registration; false at edges.
+// Returns true if a plane is at the feature with the stored registration; false at edges.
 bool has_plane(const FrameFeatures& frame, const Feature& feature);
 
-// True if both splines have the same knots, so that coefficients can be exchanged.
+// Returns true if both splines have equal knots, so that coefficients can be exchanged.
 bool has_same_knots(const DepthCorrection& a, const DepthCorrection& b);
 
-// Zero corrections, one per camera. The knots cover the depths of the camera's features from the
-// 1st to the 99th percentile, in at most 100 equal intervals, of at most `knot_m` if 100 suffice. A
-// correction is empty if the camera's depths are equal or there are none.
+// Returns zero corrections, one per camera. The knots cover the depths of the camera's features
+// from the 1st to the 99th percentile, in at most 100 equal intervals, of at most `knot_m` if 100
+// suffice. A correction is empty if the camera's depths are equal or there are none.
 std::vector<DepthCorrection> corrections_for(const std::vector<FrameFeatures>& frames,
                                              std::size_t cameras, double knot_m);
 

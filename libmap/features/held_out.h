@@ -1,5 +1,5 @@
-// Evaluates refinement stages by held-out observations, which are never used to estimate poses:
-// residuals before and after a stage.
+// Evaluates refinement stages by the residuals of held-out observations, which are never used to
+// estimate poses, before and after a stage.
 #pragma once
 
 #include <cstddef>
@@ -22,14 +22,14 @@ struct HeldOutChange {
 // vector are ignored. All zero if the sizes differ.
 HeldOutChange compare_held_out(const std::vector<double>& before, const std::vector<double>& after);
 
-// Costs of the held-out matches, in the order of the links. NaN if a node has no pose or a feature
-// no known depth.
+// Returns the costs of the held-out matches, in the order of the links; NaN if a node has no pose
+// or a feature has no known depth.
 std::vector<double> match_costs(const std::vector<FrameFeatures>& frames,
                                 const std::vector<FeatureLink>& links,
                                 const std::map<int, Pose>& map_from_base);
 
-// Costs of held-out depth samples (SampleUse::checks) of both frames of each link against the
-// planes of the other frame. NaN if the other frame does not observe the sample.
+// Returns the costs of held-out depth samples (SampleUse::checks) of both frames of each link
+// against the planes of the other frame; NaN if the sample is not observed or a pose is missing.
 std::vector<double> surface_costs(const std::vector<FrameFeatures>& frames,
                                   const std::vector<FeatureLink>& links,
                                   const std::map<int, Pose>& map_from_base);
@@ -51,13 +51,13 @@ struct HeldOutCosts {
   std::vector<double> matches;
   std::vector<double> surfaces;
 };
-// Costs of all held-out observations at the given poses.
+// Returns the costs of all held-out observations at the given poses.
 HeldOutCosts held_out_costs(const std::vector<FrameFeatures>& frames,
                             const std::vector<FeatureLink>& links,
                             const std::map<int, Pose>& map_from_base);
 
 // Change of both kinds of costs. Weights are proportional to the number of residuals: three per
-// match, one per sample. The discs that the samples' planes are fitted to hardly overlap.
+// match, one per sample. Samples are nearly independent.
 struct HeldOutEvaluation {
   HeldOutChange matches;
   HeldOutChange surfaces;
@@ -66,13 +66,14 @@ struct HeldOutEvaluation {
   double change() const;     // change of the weighted mean cost; below 0: improved
   double deviation() const;  // standard error of change()
   bool any() const { return matches.count + surfaces.count > 0; }
-  // True if the weighted mean increases beyond rounding, or if one kind increases by more than two
-  // standard errors and half a percent, so that neither kind improves at the cost of the other.
+  // Returns true if the weighted mean increases beyond rounding, or if one kind increases by more
+  // than two standard errors and half a percent; no kind may improve at the cost of the other.
   bool is_worse() const;
-  // True if not worse, and the matches improve by more than two standard errors.
+  // Returns true if not worse, and the matches improve by more than two standard errors.
   bool is_clearly_better() const;
 };
 inline constexpr double surface_weight = 1.0 / 3.0;  // weight of a sample relative to a match
+// Compares all costs before and after a stage.
 HeldOutEvaluation evaluate_held_out(const HeldOutCosts& before, const HeldOutCosts& after);
 
 }  // namespace libmap

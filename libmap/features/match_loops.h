@@ -1,6 +1,6 @@
-// Finds nearest descriptors of two sets of descriptors, for several instruction sets. All
-// instruction sets compute the same bits, because each sum is in one lane. Only plain pointers are
-// used, as in depth_plane_loops.h.
+// Finds the nearest descriptors between two sets, for several instruction sets. All instruction
+// sets compute the same bits, because each sum is in one lane. Only plain pointers are used, as in
+// depth_plane_loops.h.
 #pragma once
 
 #include "libmap/core/instruction_set.h"

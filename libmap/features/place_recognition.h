@@ -24,8 +24,7 @@ struct SimilarFrame {
 // Returns for each frame the `count` most similar other frames, best first. `parts` may contain for
 // each frame the number of its part of the scan (a connected component of the pose graph); then the
 // `count` most similar frames of other parts follow. Frames without a common word are never
-// returned. The result does not depend on the number of threads. `seed` selects the training
-// samples. Throws Error if a descriptor file cannot be read.
+// returned. `seed` selects the training samples. Throws Error if a descriptor file cannot be read.
 std::vector<std::vector<SimilarFrame>> find_similar_frames(
     const std::vector<FrameFeatures>& frames, std::size_t count,
     const PlaceRecognitionOptions& options, std::uint64_t seed,

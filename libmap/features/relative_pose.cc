@@ -68,7 +68,7 @@ Pose motion_of(const std::array<const PointPair*, 3>& pairs) {
   return Pose(align_points(b, a, false));
 }
 
-// True if the triangles in a and b have equal side lengths within `slack_m`.
+// Returns true if the triangles in a and b have equal side lengths within `slack_m`.
 bool is_congruent(const std::array<const PointPair*, 3>& pairs, double slack_m) {
   for (int n = 0; n < 3; ++n) {
     const PointPair& p = *pairs[static_cast<std::size_t>(n)];

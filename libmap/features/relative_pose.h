@@ -17,12 +17,13 @@ struct FeatureMatch {
 };
 
 // Returns mutual nearest neighbors with a descriptor distance below `max_ratio` times the distance
-// of the second nearest descriptor (Lowe 2004), by ascending a. `a` and `b` are descriptor_vectors.
+// of the second nearest descriptor (Lowe 2004; 1: no limit), by ascending a. Inputs:
+// descriptor_vectors.
 std::vector<FeatureMatch> match_features(const Eigen::MatrixXf& a, const Eigen::MatrixXf& b,
                                          double max_ratio);
 
-// Residual of a feature of b, transformed to a by `a_from_b`, against the match: x and y (px),
-// depth (m), and the covariance from the noise of both features.
+// Residual of a feature of b, transformed to a by `a_from_b`, against the matched feature of a: x
+// and y (px), depth (m), with the covariance from the noise of both features.
 struct MatchResidual {
   bool in_front = false;  // in front of the camera in a; if false, the residual is not set
   Eigen::Vector3d residual = Eigen::Vector3d::Zero();
@@ -36,11 +37,11 @@ MatchResidual match_residual(const FrameFeatures& a, const FrameFeatures& b,
                              bool with_jacobian = false);
 
 struct RelativePoseOptions {
-  int ransac_iterations = 400;        // >= 1
-  int min_inliers = 25;               // >= 6
-  double min_inlier_fraction = 0.25;  // >= 0: minimum share of the matches
+  int ransac_iterations = 400;        // >= 1: maximum number of iterations
+  int min_inliers = 25;               // >= 6: minimum number of inliers
+  double min_inlier_fraction = 0.25;  // >= 0: minimum share of inliers among the matches
   double max_chi_square = 14.16;      // maximum for a match; 99.7 % of true matches have less
-  double min_spread = 0.06;           // minimum RelativePose::spread
+  double min_spread = 0.06;           // >= 0: minimum RelativePose::spread
 };
 
 // Outcome of the estimation. degenerate: the inliers are in one spot or on one line of the image.
@@ -57,14 +58,14 @@ struct RelativePose {
   Pose a_from_b = Pose::Identity();
   // Information of a step of a_from_b: J^T W J / max(1, chi_square_per_freedom).
   Matrix6d information = Matrix6d::Zero();
-  double chi_square_per_freedom = 0.0;
+  double chi_square_per_freedom = 0.0;  // of the inliers
   double spread = 0.0;  // twice the standard deviation of the inliers' rays along the narrow axis
   std::vector<FeatureMatch> inliers;
 };
 
-// Seeded RANSAC over the rigid motions of three matched points (Fischler and Bolles 1981; Umeyama
-// 1991), then Gauss-Newton over the match_residual of the inliers, which are selected again in each
-// step. a_from_b is valid only if `outcome` is found.
+// Estimates the pose by seeded RANSAC over the rigid motions of three matched points (Fischler and
+// Bolles 1981; Umeyama 1991), then Gauss-Newton over the match_residual of the inliers, which are
+// selected again in each step. a_from_b is valid only if `outcome` is found.
 RelativePose estimate_relative_pose(const FrameFeatures& a, const FrameFeatures& b,
                                     const std::vector<FeatureMatch>& matches,
                                     const RelativePoseOptions& options, std::uint64_t seed);

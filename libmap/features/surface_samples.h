@@ -11,9 +11,9 @@ namespace libmap {
 // Plane element in the base frame (m).
 struct PlacedElement {
   Eigen::Vector3d point = Eigen::Vector3d::Zero();
-  Eigen::Vector3d normal = Eigen::Vector3d::Zero();
-  double noise_m = 0.0;  // standard deviation along the normal
-  double range_m = 0.0;  // depth along the optical axis
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();  // unit, towards the camera
+  double noise_m = 0.0;                              // standard deviation along the normal
+  double range_m = 0.0;                              // depth along the optical axis
 };
 
 // One in ten patches of each depth image is held out for checks and never used for estimation.
@@ -22,8 +22,8 @@ enum class SampleUse { estimation, checks };
 // Returns about `count` elements, evenly distributed over the images.
 std::vector<PlacedElement> surface_samples(const FrameFeatures& frame, int count, SampleUse use);
 
-// Finds the element at the projection of the point, in the first camera that has an element there.
-// Returns false if no camera has one.
+// Finds the element at the projection of the point, in the first camera that has an element at this
+// pixel. Returns false if no camera has one.
 bool element_at(const FrameFeatures& frame, const Eigen::Vector3d& point_in_base,
                 PlacedElement& element);
 

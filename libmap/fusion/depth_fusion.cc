@@ -115,7 +115,7 @@ class Fusion {
       return Error(poses == 0 ? "no frame can be fused: there are no poses"
                               : "no frame can be fused: none has depth");
     return Error("none of " + std::to_string(poses) +
-                 " frames can be used; the first: " + plan_.skipped.front().second.what());
+                 " frames can be used; error of the first: " + plan_.skipped.front().second.what());
   }
 
   void skip(int node, const Error& fault) {
@@ -325,7 +325,7 @@ class Fusion {
     }
     const double unit = std::min(tile_m, options_.voxel_size_m);
     if (!(plan_.grid_origin.cwiseAbs().maxCoeff() / unit < 1e15))
-      throw Error("poses are too far from the origin for tiles",
+      throw Error("the pose is too far from the origin for tiles; move the origin to the scan",
                   {.field = node_name(frames().front().node)});
     return {tile_m, options_.voxel_size_m, plan_.grid_origin, shift_m, disc_m};
   }

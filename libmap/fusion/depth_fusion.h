@@ -3,12 +3,12 @@
 // Frames are first registered to each other (frame_registration), by surface elements in random
 // blocks of the x-y plane. Two passes over the frames follow. The first fits a plane to the pixels
 // around each pixel (depth_planes) and averages positions and normals in a hashed voxel grid
-// (surface_voxels): a coarse surface, one element per voxel. The second moves each element along
-// the normal to the weighted mean of the measurements of all frames within a disc around it
-// (surface_refinement). Both passes average the intersections of rays with the surface instead of
-// the noisy points, which makes the means unbiased. Memory is proportional to the occupied voxels
-// of a tile. Up to 256 MB of decoded depth is cached (300 frames of 512 x 424); other frames are
-// decoded once per pass.
+// (surface_voxels): a coarse surface, one element per column of voxels and surface. The second
+// moves each element along the normal to the weighted mean of the measurements of all frames within
+// a disc around it (surface_refinement). Both passes average the intersections of rays with the
+// surface instead of the noisy points, which makes the means unbiased. Memory is proportional to
+// the occupied voxels of a tile. Up to 256 MB of decoded depth is cached (300 frames of 512 x 424);
+// other frames are decoded once per pass.
 #pragma once
 
 #include <cstddef>
@@ -34,8 +34,8 @@ namespace libmap {
 
 struct DepthFusionOptions {
   double voxel_size_m = 0.01;  // > 0
-  // Depth camera: a name in data/sensors or a path. Its range and noise replace options that have
-  // their defaults. "auto": the noise of `planes`, which choose_noise (libmap/refine) estimates.
+  // Depth camera: a name in data/sensors or a path, whose depth range and noise replace default
+  // values. "auto": the noise of `planes`, which choose_noise (libmap/refine) estimates.
   std::string sensor = "auto";
   DepthPlaneOptions planes{};
   double disc_radius_voxels = 1.5;  // > 0: radius of the discs in which measurements are averaged
@@ -60,11 +60,11 @@ void bind(ParameterTable& table, DepthFusionOptions& options);
 
 // Counts for one tile, or sums over several.
 struct FusionCounts {
-  DepthPixelCounts pixels;  // each frame is counted in one tile only
-  std::size_t occupied_voxels = 0;
-  std::size_t elements = 0;  // surface elements, before points are selected
+  DepthPixelCounts pixels;          // each frame is counted in one tile only
+  std::size_t occupied_voxels = 0;  // with measurements
+  std::size_t elements = 0;         // surface elements, before points are selected
   SurfacePointCounts points;
-  std::size_t output_points = 0;
+  std::size_t output_points = 0;  // points of the cloud
 };
 void describe(ResultTable& table, const FusionCounts& counts);
 
@@ -73,7 +73,7 @@ struct PairCosts {
   std::size_t count = 0;
   double before = 0.0;
   double after = 0.0;
-  double deviation = 0.0;  // standard error of after - before, between pairs of frames
+  double deviation = 0.0;  // standard error of after - before, from the scatter of pairs
 
   // Both return true if the difference exceeds two standard errors and half a percent.
   bool is_clearly_worse() const;
@@ -84,8 +84,8 @@ struct RegistrationCheck {
   PairCosts depth;  // in held-out blocks of the x-y plane
   PairCosts color;  // everywhere, because registration uses depth only
 
-  // Returns true if neither is clearly worse and both together are better. Refined poses already
-  // use depth, so color must be clearly better.
+  // Returns true if neither is clearly worse and both together are better. For refined poses, which
+  // already use depth, color must be clearly better.
   bool is_accepted(bool refined_poses) const;
 };
 
@@ -95,15 +95,15 @@ struct FusionPlan {
   // precision is enough for scans at any offset.
   Eigen::Vector3d grid_origin = Eigen::Vector3d::Zero();
   std::vector<FusionFrame> frames;               // by ascending node
-  std::vector<std::pair<int, Error>> skipped{};  // nodes with the reason
+  std::vector<std::pair<int, Error>> skipped{};  // nodes of unusable frames, with the reason
   std::vector<int> redundant{};                  // nodes of frames without new information
   int registration_rounds = 0;                   // rounds that moved frames; 0: poses are unchanged
-  bool registration_rejected = false;            // the first round was rejected
-  RegistrationCheck registration_check{};        // of the first round
+  bool registration_rejected = false;      // first round rejected, or refined poses without color
+  RegistrationCheck registration_check{};  // of the first round
   // RMS deviation of single frames' heights from the mean height, with given and final poses.
   double disagreement_before_m = 0.0;
   double disagreement_after_m = 0.0;
-  DepthNoise noise{};  // noise of all passes
+  DepthNoise noise{};  // depth noise that all passes assume
 };
 
 struct DepthFusionResult : FusionCounts {
@@ -112,7 +112,7 @@ struct DepthFusionResult : FusionCounts {
   // normal, m. `expected_error` includes noise, disagreement of frames, and the difference between
   // both passes, which is large where the surface is curved within a disc.
   PointCloud cloud;
-  std::size_t frames = 0;  // used
+  std::size_t frames = 0;  // number of fused frames
   std::size_t redundant_frames = 0;
   // Registered poses of used and redundant frames, world from base, by ascending node.
   Trajectory poses;

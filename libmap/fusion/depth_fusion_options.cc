@@ -9,19 +9,19 @@ void describe_surface(ResultTable& table, const FusionCounts& counts) {
   table.add("occupied_voxels", counts.occupied_voxels, Merge::sum,
             "number of voxels with measurements");
   table.add("surface_elements", counts.elements, Merge::sum,
-            "number of surface elements, one per voxel and side of a surface");
+            "number of surface elements, from which points are selected");
   table.add("dropped_too_few_views", points.unconfirmed, Merge::sum,
             "number of elements dropped: measured by fewer than min_views frames");
   table.add("dropped_seen_through", points.seen_through, Merge::sum,
-            "number of elements dropped: too many views see through them");
+            "number of elements dropped: too many views see through the elements");
   table.add("dropped_missed", points.missed, Merge::sum,
-            "number of elements dropped: too many views have no depth there");
+            "number of elements dropped: too many views have no depth at the elements");
   table.add("dropped_contradicted", points.contradicted, Merge::sum,
-            "number of elements dropped: others around them are contradicted");
+            "number of elements dropped: seen by one or two frames near contradicted elements");
   table.add("dropped_beyond_edges", points.beyond_edge, Merge::sum,
-            "number of points dropped: beyond an edge of the surface");
+            "number of elements dropped: beyond an edge at which the surface bends");
   table.add("merged", points.merged, Merge::sum,
-            "number of elements merged with another one in the same voxel");
+            "number of elements merged with another element in the same or the next voxel");
   table.add("points", counts.output_points, Merge::sum, "number of points of the cloud");
   table.add("points_beyond_edges", points.extended_points, Merge::sum,
             "number of points added beyond measured edges");
@@ -36,14 +36,14 @@ void bind(ParameterTable& table, DepthFusionOptions& options) {
             "edge length of a voxel, m; the cloud contains at most one point per voxel");
   table.add("sensor", options.sensor,
             "depth camera: a name in data/sensors or a file, from which depth range and noise are "
-            "taken unless options set them; auto: the noise is estimated if it differs from a "
-            "Kinect v2's");
+            "taken unless options set them; auto: noise of a Kinect v2, or the estimated noise if "
+            "it differs clearly");
   table.add("min_depth_m", planes.min_depth_m, positive, "minimum depth of used measurements, m");
   table.add("max_depth_m", planes.max_depth_m, positive, "maximum depth of used measurements, m");
   table.add("max_incidence_deg", planes.max_incidence_deg, {0, 89.5, true, false},
-            "maximum angle between line of sight and surface normal, degrees");
+            "maximum angle between line of sight and surface normal of a measurement, degrees");
   table.add("axial_noise_m", planes.noise.axial_m, positive,
-            "constant term of the standard deviation of depth, m");
+            "standard deviation of depth: constant term, m");
   table.add("range_noise", planes.noise.axial_of_range, not_negative,
             "standard deviation of depth: term proportional to range, m per m");
   table.add("square_noise", planes.noise.axial_of_square, not_negative,
@@ -54,9 +54,9 @@ void bind(ParameterTable& table, DepthFusionOptions& options) {
             "radius of the disc of pixels to which a plane is fitted, pixels");
   table.add_former_key("min_pair_share", "min_pair_fraction");
   table.add("min_pair_fraction", planes.min_pair_fraction, zero_to_one,
-            "minimum share of agreeing pairs of opposite neighbors for fitting a plane to a pixel");
+            "minimum share of pairs of opposite neighbors that agree with a pixel, to fit a plane");
   table.add("disc_radius_voxels", options.disc_radius_voxels, positive,
-            "radius of the disc in which measurements are averaged, in voxels");
+            "radius of the disc around a point in which measurements are averaged, in voxels");
   table.add(
       "pose_error_m", options.pose_error_m, not_negative,
       "standard deviation of a frame's position along the surface normal due to pose errors, m");
@@ -87,7 +87,7 @@ void describe(ResultTable& table, const FusionCounts& counts) {
 void describe(ResultTable& table, const DepthFusionResult& result) {
   table.add("frames", result.frames, "number of fused frames");
   table.add("redundant_frames", result.redundant_frames,
-            "number of frames skipped because earlier frames measured their surface");
+            "number of frames skipped because earlier frames measured the same surface");
   table.add("skipped_frames", result.skipped.size(), "number of frames that could not be used");
   describe(table, result.pixels);
   table.add("axial_noise_m", result.noise.axial_m,
@@ -99,7 +99,7 @@ void describe(ResultTable& table, const DepthFusionResult& result) {
   table.add("registration_rounds", result.registration_rounds,
             "number of registration rounds that moved frames");
   table.add("registration_rejected", result.registration_rejected,
-            "true if held-out measurements rejected the registration");
+            "true if a registration was not confirmed, or could not be without color");
   const auto add_check = [&](const std::string& kind, const PairCosts& costs) {
     const auto if_measured = [&](double cost) {
       return costs.count > 0 ? std::optional(cost) : std::nullopt;
@@ -116,9 +116,10 @@ void describe(ResultTable& table, const DepthFusionResult& result) {
   table.add("registration_turn_deg", result.registration_turn_deg,
             "RMS rotation of the frames by registration, degrees");
   table.add("disagreement_before_m", result.disagreement_before_m,
-            "RMS deviation of frames' surface heights from their mean, given poses, m");
-  table.add("disagreement_after_m", result.disagreement_after_m,
-            "RMS deviation of frames' surface heights from their mean, registered poses, m");
+            "RMS deviation of frames' surface heights from the mean height with given poses, m");
+  table.add(
+      "disagreement_after_m", result.disagreement_after_m,
+      "RMS deviation of frames' surface heights from the mean height with registered poses, m");
   describe_surface(table, result);
 }
 

@@ -1,4 +1,4 @@
-// Range limits and noise model of a depth camera.
+// Provides range limits and noise model of a depth camera.
 #pragma once
 
 namespace libmap {
@@ -20,7 +20,7 @@ struct DepthNoise {
 };
 
 struct DepthSensor {
-  double min_depth_m = 0.1;
+  double min_depth_m = 0.1;  // other depths are ignored
   double max_depth_m = 4.0;
   double max_incidence_deg = 85.0;  // maximum angle between line of sight and normal
   DepthNoise noise{};

@@ -1,7 +1,6 @@
-// Inner loops of depth_planes.h over the pixels of one row, compiled for several instruction sets
-// with identical results, because no pixel depends on other lanes. Only plain pointers are used:
-// sources compiled for an extended instruction set must not include types with inline functions
-// that other sources compile, too.
+// Provides the inner loops of depth_planes.h over the pixels of one row, for several instruction
+// sets with identical results. Only plain pointers are used, because sources compiled for an
+// extended instruction set must not include inline functions that other sources compile, too.
 #pragma once
 
 #include <cstddef>
@@ -24,13 +23,13 @@ struct DepthPlaneLoops {
     float axial_of_range;
     float axial_of_square;
   };
-  // Numbers of pixels without depth and outside the limits.
+  // Numbers of pixels without depth and with depth outside the limits.
   struct MeasureCounts {
     int unmeasured;
     int out_of_range;
   };
-  // Computes inverse depth and the maximum difference of a pixel from the mean of two opposite
-  // ones; inverse depth is 0 if there is no depth within the limits.
+  // Computes each pixel's inverse depth (0 without depth within the limits) and its maximum
+  // difference from the mean of two opposite pixels.
   MeasureCounts (*measure)(const float* depth, int count, const Limits& limits, float* inverse,
                            float* tolerance);
 
@@ -41,7 +40,7 @@ struct DepthPlaneLoops {
     std::int32_t product;   // columns x rows
     float dx;
     float dy;
-    float steepest;  // maximum difference due to slope, per inverse depth
+    float steepest;  // maximum difference of the pair due to slope, per inverse depth
   };
   // Planes around each pixel; `support` is 0 without a plane.
   struct InversePlanes {
@@ -62,7 +61,8 @@ struct DepthPlaneLoops {
     std::ptrdiff_t above;
     std::ptrdiff_t below;
   };
-  // Planes of a row: z on the pixel's ray, normal, cosine of incidence, and support.
+  // Planes of a row in the optical frame: z on the pixel's ray, normal, cosine of incidence,
+  // support.
   struct Planes {
     float* depth_m;
     float* normal[3];
@@ -74,6 +74,7 @@ struct DepthPlaneLoops {
     int flying;
     int grazing;
   };
+  // Converts fitted planes to the optical frame; returns numbers of pixels by outcome.
   PlaneCounts (*finish)(const float* inverse, const InversePlanes& fitted, const Rays& rays,
                         int count, float min_cosine, const Planes& planes);
 

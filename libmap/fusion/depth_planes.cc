@@ -273,7 +273,7 @@ double max_plane_distance_m(const DepthPlaneOptions& options) {
 }
 
 // Returns the marked pixels (not 0) and all pixels that affect their planes. With the result as
-// `only`, the planes of the marked pixels equal those of the whole image.
+// `only`, the marked pixels have the same planes as with the whole image.
 std::vector<std::uint8_t> dilate_mask(const std::vector<std::uint8_t>& marks, int width,
                                       int height) {
   std::vector<std::uint8_t> grown(marks.size(), 0);
@@ -423,11 +423,11 @@ void describe(ResultTable& table, const DepthPixelCounts& counts) {
   table.add("rejected_out_of_range", counts.out_of_range, Merge::sum,
             "number of pixels outside the depth range");
   table.add("rejected_without_ray", counts.without_ray, Merge::sum,
-            "number of pixels outside the invertible lens distortion");
+            "number of pixels whose lens distortion cannot be inverted");
   table.add("rejected_flying", counts.flying, Merge::sum,
-            "number of pixels that are not on a surface of their neighbors");
+            "number of flying pixels, which are on no surface of their neighbors");
   table.add("rejected_grazing", counts.grazing, Merge::sum,
-            "number of pixels seen at a grazing angle");
+            "number of pixels with an incidence above max_incidence_deg");
 }
 
 }  // namespace libmap

@@ -30,9 +30,9 @@ struct DepthPixelCounts {
   std::size_t pixels = 0;
   std::size_t unmeasured = 0;  // no depth
   std::size_t out_of_range = 0;
-  std::size_t without_ray = 0;  // outside the invertible lens distortion
+  std::size_t without_ray = 0;  // lens distortion cannot be inverted
   std::size_t flying = 0;       // not on a surface of neighboring pixels
-  std::size_t grazing = 0;
+  std::size_t grazing = 0;      // incidence above the maximum
   std::size_t used = 0;
 };
 void describe(ResultTable& table, const DepthPixelCounts& counts);
@@ -55,8 +55,8 @@ struct DepthPlanes {
 DepthPlanes fit_depth_planes(const DepthImage& depth, const PixelRays& rays,
                              const DepthPlaneOptions& options = {});
 
-// Pixels that planes are fitted to. all: all pixels of the image. in_cells: only pixels that may be
-// in the cells; the counts are meaningless.
+// Pixels to which planes are fitted. all: all pixels. in_cells: only pixels whose planes may be in
+// the selected cells; the counts are then meaningless.
 enum class FittedPixels { all, in_cells };
 
 // Fits planes to the pixels of one depth image (m) and adds the planes in `cells` to the voxels of

@@ -1,4 +1,4 @@
-// Undistorted viewing rays of all pixels of a camera, with a cache.
+// Computes and caches the undistorted viewing rays of all pixels of a camera.
 #pragma once
 
 #include <Eigen/Core>
@@ -21,14 +21,14 @@ struct PixelRays {
   int height = 0;
   std::vector<float> x;
   std::vector<float> y;
-  std::vector<std::size_t> blind;  // pixels without a ray; x and y are 0
+  std::vector<std::size_t> blind;  // indices of pixels without a ray; x and y are 0
   // Bounds of all rays.
   Eigen::Vector2d min = Eigen::Vector2d::Zero();
   Eigen::Vector2d max = Eigen::Vector2d::Zero();
 };
 PixelRays pixel_rays(const Camera& camera);
 
-// Cache of the rays of each camera. Can be used from several threads.
+// Caches the rays of each camera. Can be used from several threads.
 class PixelRayCache {
  public:
   // Keeps the rays of the latest cameras with this total number of pixels (256 MB by default). The
@@ -36,7 +36,7 @@ class PixelRayCache {
   explicit PixelRayCache(std::size_t max_pixels = std::size_t{1} << 25U)
       : max_pixels_(max_pixels) {}
 
-  // Computed at the first call for this camera.
+  // Returns the rays, which the first call for a camera computes.
   std::shared_ptr<const PixelRays> rays_of(const Camera& camera);
 
  private:

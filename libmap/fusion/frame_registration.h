@@ -17,8 +17,8 @@ struct FrameRegistrationOptions {
   // > 0: heights that differ by more than this from the heights of other frames have less weight.
   double scatter_m = 0.005;
   // > 0: mean number of independent heights per frame, whatever the number of observations. Limits
-  // the weight of heights against the given poses: because of noisy normals, sliding along a plane
-  // seems to improve the fit.
+  // the weight of heights against the given poses, because noisy normals let motions along a plane
+  // seem to improve the fit.
   double independent_heights = 150.0;
 };
 
@@ -27,14 +27,14 @@ struct FrameRegistration {
   // Weighted RMS of frames' heights about the mean height of each element.
   double disagreement_before_m = 0.0;
   double disagreement_after_m = 0.0;  // to first order
-  double correction_m = 0.0;          // root mean square of the changes of heights
+  double correction_m = 0.0;          // RMS change of the heights
 };
 
 // Estimates small rotations and shifts of all frames jointly, which minimize the weighted squares
 // of the heights about each element's mean height (point to plane, Chen and Medioni 1991; all views
 // jointly, Bergevin et al. 1996), by conjugate gradients with robust weights (Geman and McClure
-// 1987). Elements and `centers`, the centers of rotation of the frames, are in meters. The result
-// does not depend on the number of threads.
+// 1987). Elements and `centers`, the centers of rotation of the frames, are in meters;
+// `observations` are sorted by element.
 FrameRegistration register_frames(std::span<const SurfaceElement> elements,
                                   std::span<const SurfaceObservation> observations,
                                   std::span<const Eigen::Vector3d> centers,

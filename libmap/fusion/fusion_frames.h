@@ -23,15 +23,15 @@ namespace libmap {
 struct FusionFrame {
   int node = 0;
   Pose grid_from_base = Pose::Identity();
-  std::size_t image_pixels = 0;
+  std::size_t image_pixels = 0;  // number of pixels of the frame's images
   // Box in the grid frame, m, around the cameras and all measured points.
   Eigen::AlignedBox3d reach;
-  double max_ray_length = 1.0;   // maximum length of a ray per depth
-  double max_pixel_pitch = 0.0;  // maximum distance of adjacent rays per depth
+  double max_ray_length = 1.0;   // maximum ratio of a ray's length to its depth
+  double max_pixel_pitch = 0.0;  // maximum distance of adjacent rays, relative to depth
 };
 
-// Returns the frame at its pose, without a reach. Throws Error if the pose or the maximum depth is
-// too far from the grid's origin for the voxel size.
+// Returns the frame at its pose; fields from image_pixels on are not set. Throws Error if the pose
+// or the maximum depth is too far from the grid's origin for the voxel size.
 FusionFrame frame_at(const TrajectoryPose& pose, const Eigen::Vector3d& grid_origin,
                      double voxel_size_m, double max_depth_m);
 
@@ -61,11 +61,11 @@ class FusionFrames {
   // for an invalid camera. Can be called from several threads.
   void measure_reach(const RgbdFrame& depth, double max_depth_m, FusionFrame& frame);
 
-  // Calls use(views, frames) for groups of frames, in order; views are numbered by frame.
+  // Calls use(views, number of frames) for groups of frames, in order; views are numbered by frame.
   using UseViews = std::function<void(std::span<const RefinementView> views, std::size_t frames)>;
   void each_view_group(std::span<const FusionFrame> frames, bool color, const UseViews& use);
 
-  // Returns one view per camera of the frame. Can be called from several threads.
+  // Returns one view per camera, with this frame number. Can be called from several threads.
   std::vector<RefinementView> views_of(const FusionFrame& frame, std::uint32_t number, bool color);
 
  private:

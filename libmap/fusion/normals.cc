@@ -18,8 +18,7 @@ namespace libmap {
 
 namespace {
 
-// Neighbors are collinear if the second eigenvalue of their covariance divided by the first is
-// smaller.
+// Neighbors with a smaller ratio of second to first eigenvalue of their covariance are collinear.
 constexpr double min_spread = 1e-6;
 // Number of neighbors per point in the graph of orientations.
 constexpr std::size_t graph_neighbors = 10;
@@ -220,7 +219,7 @@ std::string_view to_text(NormalOrientation orientation) {
 
 void bind(ParameterTable& table, NormalEstimationOptions& options) {
   table.add("normal_neighbors", options.neighbors, {3, 1000},
-            "number of nearest points that a plane is fitted to for estimating a normal");
+            "number of nearest points to which a plane is fitted to estimate a normal");
 }
 
 NormalEstimationResult estimate_normals(const PointCloud& cloud,

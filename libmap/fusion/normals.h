@@ -1,4 +1,4 @@
-// Estimates and orients normals of a cloud: planes through each point's neighbors, with normals
+// Estimates normals of a cloud from planes through each point's neighbors, and orients normals
 // towards the sensor.
 #pragma once
 
@@ -14,7 +14,7 @@
 namespace libmap {
 
 struct NormalEstimationOptions {
-  int neighbors = 16;  // 3 to 1000: nearest points that a plane is fitted to, including the point
+  int neighbors = 16;  // 3 to 1000: points to which a plane is fitted, with the point itself
 };
 void bind(ParameterTable& table, NormalEstimationOptions& options);
 
@@ -22,7 +22,7 @@ void bind(ParameterTable& table, NormalEstimationOptions& options);
 enum class NormalOrientation {
   view_fields,   // sensor position per point in the fields vp_x, vp_y, vp_z, as in PCL
   viewpoint,     // the cloud's viewpoint, if it is not the identity
-  spanning_tree  // consistent with neighbors; each component outwards or up
+  spanning_tree  // consistent between neighbors; each component outwards or up
 };
 std::string_view to_text(NormalOrientation orientation);
 

@@ -118,10 +118,10 @@ class ViewProjection {
 
 void bind(ParameterTable& table, PanoramaOptions& options) {
   table.add("stride_px", options.stride_px, Range{1, 1e6},
-            "step between used rows and columns, pixels");
+            "step between the rows and columns that are used, pixels");
   table.add("flying_pixel_jump_m", options.flying_pixel_jump_m, not_negative,
-            "maximum depth difference between a pixel and both neighbors in a row or column, "
-            "m; 0: no limit");
+            "depth difference from both neighbors in a row or column above which a pixel is "
+            "dropped, m; 0: no pixel is dropped");
   table.add("normals", options.normals, "add normals from neighboring pixels");
   table.add("normal_jump_m", options.normal_jump_m, positive,
             "maximum depth difference between neighboring pixels of one surface, m");
@@ -160,9 +160,9 @@ void describe(ResultTable& table, const PanoramaCounts& counts) {
   table.add("too_near", counts.too_near, Merge::sum, "number of pixels nearer than near_m");
   table.add("too_far", counts.too_far, Merge::sum, "number of pixels farther than far_m");
   table.add("flying", counts.flying, Merge::sum,
-            "number of flying pixels, which differ from both neighbors");
+            "number of flying pixels, whose depth differs from both neighbors");
   table.add("without_ray", counts.without_ray, Merge::sum,
-            "number of pixels outside the invertible lens distortion");
+            "number of pixels whose lens distortion cannot be inverted");
 }
 
 }  // namespace libmap

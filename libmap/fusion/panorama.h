@@ -20,7 +20,7 @@ struct PanoramaView {
   int index = 0;       // value of the field `camera`
   Camera camera{};     // same size as `depth`; base_from_camera is robot_from_camera
   DepthImage depth{};
-  double near_m = 0.0;  // z outside near..far is dropped
+  double near_m = 0.0;  // m; z outside near_m to far_m is dropped
   double far_m = std::numeric_limits<double>::infinity();
 };
 
@@ -32,17 +32,17 @@ struct PanoramaOptions {
   // Adds unit normals of the surface through a pixel and its four neighbors, towards the camera;
   // zero if neighbors are missing or neighboring depths differ by more than normal_jump_m.
   bool normals = false;
-  double normal_jump_m = 0.05;  // > 0
+  double normal_jump_m = 0.05;  // > 0: maximum depth difference of neighbors
 };
 void bind(ParameterTable& table, PanoramaOptions& options);
 
 struct PanoramaCounts {
-  std::size_t pixels = 0;      // examined, after the stride
+  std::size_t pixels = 0;      // examined pixels: every stride_px-th row and column
   std::size_t unmeasured = 0;  // no depth
   std::size_t too_near = 0;
   std::size_t too_far = 0;
   std::size_t flying = 0;
-  std::size_t without_ray = 0;  // outside the invertible lens distortion
+  std::size_t without_ray = 0;  // lens distortion cannot be inverted
   std::size_t points = 0;
 };
 void describe(ResultTable& table, const PanoramaCounts& counts);

@@ -8,7 +8,7 @@
 
 namespace libmap {
 
-// Compares up to 72 pairs of overlapping frames, with poses before and after a registration.
+// Returns the costs of up to 72 pairs of overlapping frames before and after a registration.
 RegistrationCheck check_registration(FusionFrames& images, std::span<const FusionFrame> before,
                                      std::span<const FusionFrame> after, const DepthSensor& sensor,
                                      double voxel_size_m);

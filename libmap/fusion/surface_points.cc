@@ -31,8 +31,7 @@ constexpr std::uint32_t weak_frames = 2;
 constexpr double contradicted_fraction = 0.5;
 
 constexpr float min_agreement = 0.7F;
-// Neighbors are collinear if the second eigenvalue of their covariance, in squared radii, is
-// smaller.
+// Neighbors with a smaller second eigenvalue of their covariance, in squared radii, are collinear.
 constexpr float min_spread_ratio = 0.02F;
 
 // A point of a fit; lengths are in radii.

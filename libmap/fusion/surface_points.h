@@ -1,5 +1,5 @@
-// Last step of fusion: converts refined surface elements to a cloud with one point per voxel, and
-// removes points that other views contradict.
+// Converts refined surface elements to a cloud with one point per voxel, and removes points that
+// other views contradict (last step of fusion).
 #pragma once
 
 #include <cstddef>
@@ -11,8 +11,8 @@
 
 namespace libmap {
 
-// Side, in voxels, of blocks of the x-y plane. Points of a block that only one or two frames
-// measured are kept or dropped together, by the block and its eight neighbors.
+// Side, in voxels, of blocks of the x-y plane. Points that only one or two frames measured are
+// dropped if others contradict at least half of such points in the block and its eight neighbors.
 inline constexpr int contradiction_block = 16;
 
 struct SurfacePointOptions {
@@ -20,8 +20,8 @@ struct SurfacePointOptions {
   // Maximum ratio of views that see through a point to views that see it, weighted by cosine
   // (Merrell et al. 2007).
   double max_seen_through = 0.3;
-  // Maximum ratio for views that measured nothing around a point, although it is in range and not
-  // oblique. Removes moving objects in front of an open background.
+  // Maximum ratio of views that measured nothing around a point, although the point is in range and
+  // not oblique, to views that see it. Removes moving objects in front of an open background.
   double max_missed = 1.5;
 };
 
@@ -29,11 +29,11 @@ struct SurfacePointCounts {
   std::size_t unconfirmed = 0;      // dropped: measured by too few frames
   std::size_t max_views = 0;        // maximum number of frames that measured one element
   std::size_t seen_through = 0;     // dropped: views see through the points
-  std::size_t missed = 0;           // dropped: views measured nothing there
-  std::size_t contradicted = 0;     // dropped: measured by one or two frames, in a square where
-                                    // others contradict most measurements of such frames
+  std::size_t missed = 0;           // dropped: views measured nothing at the points
+  std::size_t contradicted = 0;     // dropped: measured by one or two frames, in a block where
+                                    // others contradict at least half of such points
   std::size_t beyond_edge = 0;      // dropped: beyond an edge where the surface bends
-  std::size_t merged = 0;           // merged with, or an echo of, another point
+  std::size_t merged = 0;           // merged with another point, or an echo of one
   std::size_t extended_points = 0;  // points of the cloud beyond measured edges
 };
 
@@ -42,8 +42,8 @@ struct SurfacePoints {
   PointCloud cloud;
   SurfacePointCounts counts;
 };
-// Makes points of the refined elements: drops contradicted ones, keeps one per voxel and extends
-// edges. Returns and counts only points in the columns of voxels `cells`.
+// Makes points of the refined elements: drops contradicted elements, keeps one point per voxel and
+// extends edges. Returns and counts only points in the columns of voxels `cells`.
 SurfacePoints make_surface_points(const RefinedSurface& surface, double voxel_size_m,
                                   const TileMask& cells, const SurfacePointOptions& options);
 

@@ -1,4 +1,4 @@
-// Second pass of fusion: moves surface elements along the normals to the mean of all views.
+// Moves surface elements along their normals to the mean of all views (second pass of fusion).
 #pragma once
 
 #include <Eigen/Core>
@@ -25,15 +25,14 @@ struct SurfaceSearch {
   double search_m = 0.01;        // >= 0: maximum error of an element along the normal
 };
 
-// Maximum difference of a depth from an element's plane, over all ranges, m. Other depths have no
-// weight.
+// Returns the maximum difference of a used depth from an element's plane, over all ranges, m.
 double max_gate_m(const DepthSensor& sensor, const SurfaceSearch& search);
-// Radius of the smallest disc.
+// Minimum radius of a disc, in pixels at the depth of the element.
 inline constexpr double min_disc_pixels = 1.5;
 
 // One camera of one frame, prepared for refinement.
 struct RefinementView {
-  std::uint32_t frame = 0;  // ascending; views of one frame count as one
+  std::uint32_t frame = 0;  // ascending; all views of a frame have one number
   Camera depth_camera;
   Camera color_camera;
   std::vector<float> depth_m;  // 0 for pixels without a ray; four entries of padding at the end
@@ -47,9 +46,9 @@ RefinementView make_refinement_view(CameraView view, std::shared_ptr<const Pixel
                                     const Pose& camera_from_grid, std::uint32_t frame);
 
 struct RefinedElement {
-  float shift_m = 0.0F;  // along the normal
-  float expected_error_m = 0.0F;
-  std::uint32_t frames = 0;  // number of frames that measured it
+  float shift_m = 0.0F;           // along the normal
+  float expected_error_m = 0.0F;  // standard deviation along the normal
+  std::uint32_t frames = 0;       // number of frames that measured the element
   // Sums of the cosines of incidence of views with a depth at the element's pixel that agrees with
   // the element, is behind the element, or is missing although the element is in range.
   float seen = 0.0F;
@@ -72,7 +71,7 @@ RefinedSurface refine_surface(std::vector<SurfaceElement> elements, const DepthS
                               const SurfaceSearch& search, double pose_error_m,
                               const std::function<void(const AddViews&)>& each_group);
 
-// Mean height of one frame's measurements within the disc of an element.
+// Mean height of one frame's measurements in the disc around an element.
 struct SurfaceObservation {
   std::uint32_t element = 0;
   std::uint32_t frame = 0;
@@ -80,8 +79,8 @@ struct SurfaceObservation {
   float variance_m2 = 0.0F;  // due to noise
 };
 
-// Measures the height of each element, in meters, in each view. Returns the observations by
-// element, then by view, whatever the number of threads.
+// Measures the height of the surface above each element (in meters) in each view. Returns the
+// observations by element, then by view.
 std::vector<SurfaceObservation> observe_surface(std::span<const SurfaceElement> elements,
                                                 std::span<const RefinementView> views,
                                                 const DepthSensor& sensor,

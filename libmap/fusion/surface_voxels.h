@@ -1,5 +1,5 @@
-// First pass of fusion: a hashed voxel grid of the weighted means of measured positions and
-// normals, and the surface elements made from the grid. Only voxels with measurements are stored.
+// Averages measured positions and normals in a hashed voxel grid, and makes surface elements from
+// the grid (first pass of fusion). Only occupied voxels are stored.
 #pragma once
 
 #include <Eigen/Core>
@@ -21,7 +21,7 @@ class SurfaceVoxels {
     float weight = 0.0F;
     Eigen::Vector3f offset = Eigen::Vector3f::Zero();  // from the voxel's center
     Eigen::Vector3f normal = Eigen::Vector3f::Zero();
-    std::uint32_t frames = 0;
+    std::uint32_t frames = 0;  // number of frames
   };
 
   // Adds one measurement at `position`, in voxels; ignored beyond voxel_cell_limit. A voxel has two
@@ -53,13 +53,13 @@ class SurfaceVoxels {
 struct SurfaceElement {
   Eigen::Vector3f position = Eigen::Vector3f::Zero();  // voxels
   Eigen::Vector3f normal = Eigen::Vector3f::Zero();    // towards the cameras
-  bool extended = false;                               // one voxel beyond measured ones
+  bool extended = false;                               // one voxel beyond measured voxels
 };
 
-// Returns one element per column of voxels and surface in it. Columns are parallel to the axis
-// nearest to the normal; elements are on their center lines. If noise spreads a surface over two
-// voxels of a column, the voxel with more weight is used. With `extend`, adjacent empty columns get
-// an element too. The order of elements depends on the voxels only; neighbors are near in memory.
+// Returns one element per column of voxels and surface in the column. Columns are parallel to the
+// axis nearest to the normal; elements are on their center lines. If noise spreads a surface over
+// two voxels of a column, the voxel with more weight is used. With `extend`, adjacent empty columns
+// get an element too. The order depends on the voxels only.
 std::vector<SurfaceElement> surface_elements(const SurfaceVoxels& voxels, bool extend);
 
 }  // namespace libmap

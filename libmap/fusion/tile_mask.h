@@ -13,9 +13,10 @@ namespace libmap {
 struct TileMask {
   Eigen::Array2i low = Eigen::Array2i::Constant(-voxel_cell_limit);
   Eigen::Array2i high = Eigen::Array2i::Constant(voxel_cell_limit);  // excluded
-  // Selects one in 2^subsampling_level blocks of 4 x 4 columns at random; a larger level, a subset.
+  // Selects one in 2^level random blocks of 4 x 4 columns; a larger level selects a subset.
   unsigned subsampling_level = 0;
 
+  // Returns true if the column is selected.
   bool has_cell(const Eigen::Array2i& cell) const {
     if (!((cell >= low).all() && (cell < high).all())) return false;
     if (subsampling_level == 0) return true;
@@ -37,6 +38,7 @@ struct TileMask {
            has_cell(position.array().floor().cast<int>());
   }
 
+  // Returns the mask with a margin of `cells` columns.
   TileMask grown(int cells) const { return {low - cells, high + cells, subsampling_level}; }
 };
 

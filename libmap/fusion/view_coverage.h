@@ -1,4 +1,4 @@
-// Information of earlier frames about a surface, to skip redundant ones. Private to depth_fusion.
+// Finds redundant frames by the information of earlier frames. Private to depth_fusion.
 #pragma once
 
 #include <cstdint>
@@ -24,8 +24,8 @@ struct FrameCoverage {
 
 class ViewCoverage {
  public:
-  // Returns true if for more than 5 % of the frame's pixels, the frame adds more than 1/views to
-  // the information of the pixel's cell.
+  // Returns true if, at over 5 % of its pixels, the frame adds more than 1/views to the information
+  // of the pixel's cell.
   bool is_improved_by(const FrameCoverage& frame, double views) const;
   void add(const FrameCoverage& frame);
 

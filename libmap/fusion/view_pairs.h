@@ -15,9 +15,8 @@ struct ViewComparison {
   std::vector<float> color;             // 1 - correlation of the brightness of 5 x 5 pixels
 };
 
-// Samples the pixels of `from` on a grid, about 2000. Entries of `color` also require a
-// texture, depth without a jump, and depth of `onto` that is within `gate` (in depths) of the
-// expected depth.
+// Compares about 2000 pixels of `from`, sampled on a grid. Entries of `color` also require texture,
+// depth without a jump, and a relative difference of depth of at most `gate`.
 ViewComparison compare_views(const RefinementView& from, const RefinementView& onto,
                              const Pose& onto_from, float gate);
 

@@ -13,8 +13,7 @@ using Sparse = Eigen::SparseMatrix<double>;
 
 Eigen::Index row_of(std::size_t block) { return 6 * static_cast<Eigen::Index>(block); }
 
-// Order of the blocks for little fill-in: approximate minimum degree (Amestoy, Davis and Duff
-// 1996).
+// Order for little fill-in: approximate minimum degree (Amestoy, Davis and Duff 1996).
 std::vector<std::size_t> fill_reducing_positions(const BlockSystem& system) {
   const auto size = static_cast<Eigen::Index>(system.size());
   std::vector<Eigen::Triplet<double>> entries;

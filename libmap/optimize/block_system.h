@@ -1,4 +1,4 @@
-// Sparse normal equations of pose optimization, one block of six unknowns per pose; and a solver.
+// Provides sparse normal equations of poses, one block of six unknowns per pose, and their solver.
 #pragma once
 
 #include <cstddef>
@@ -19,10 +19,10 @@ class BlockSystem {
   // Adds to block (row, column) of the information matrix and adds the transpose at (column, row).
   void add(std::size_t row, std::size_t column, const Matrix6d& block);
   void add_rhs(std::size_t row, const Vector6d& rhs);
-  // Adds a residual with derivatives by two blocks, information and right-hand side.
+  // Adds a residual with derivatives by two blocks; `rhs` is -information * residual.
   void add_pair(std::size_t a, std::size_t b, const Matrix6d& by_a, const Matrix6d& by_b,
                 const Matrix6d& information, const Vector6d& rhs);
-  void add(const BlockSystem& other);                         // of equal size
+  void add(const BlockSystem& other);                         // `other` has the same size
   Matrix6d block(std::size_t row, std::size_t column) const;  // zero if none was added
   const std::map<std::pair<std::size_t, std::size_t>, Matrix6d>& blocks() const { return blocks_; }
   const std::vector<Vector6d>& rhs() const { return rhs_; }
@@ -34,7 +34,7 @@ class BlockSystem {
   std::vector<Vector6d> rhs_;
 };
 
-// Sparse LDL^T factorization with a fill-reducing order of the blocks. The result is deterministic.
+// Solves a BlockSystem by sparse LDL^T factorization in a fill-reducing order of the blocks.
 class BlockSolver {
  public:
   // `damping` is added to the diagonal.
@@ -44,13 +44,13 @@ class BlockSolver {
   BlockSolver& operator=(const BlockSolver&) = delete;
 
   bool valid() const;  // true if the system is positive definite; the methods below require it
-  // Solution for one right-hand side.
+  // Returns the solution for one right-hand side, by block.
   std::vector<Vector6d> solve(const std::vector<Vector6d>& rhs) const;
-  // Blocks of one column of the inverse, by row.
+  // Returns the blocks of one column of the inverse, by row.
   std::vector<Matrix6d> inverse_column(std::size_t column) const;
-  // Blocks of the inverse at the positions of the blocks of `wanted`. Blocks that the system has as
-  // well, even if zero, cost about one factorization in total (Takahashi, Fagan and Chin 1973).
-  // Each of the others costs one inverse_column.
+  // Returns the blocks of the inverse at the positions of the blocks of `wanted`. Positions that
+  // are also in the system cost about one factorization in total (Takahashi, Fagan and Chin 1973),
+  // each other position one inverse_column.
   BlockSystem selected_inverse(const BlockSystem& wanted) const;
 
  private:

@@ -24,7 +24,7 @@ constexpr double registration_prior_m = 0.02;
 constexpr double registration_prior_rad = 0.03;
 // Scatter of the stamps' depth delays from which on the scale of the motions is observable.
 constexpr double observable_delay_s = 0.005;
-// Keeps the system regular if a pose is not constrained.
+// Keeps the system regular for unconstrained poses.
 constexpr double pose_damping = 1e-6;
 
 std::size_t max_cameras(const std::vector<FrameFeatures>& frames) {
@@ -38,7 +38,7 @@ class Priors {
  public:
   explicit Priors(Eigen::Index numbers) : numbers_(numbers) {}
 
-  // Returns a row of zeros for the caller to fill.
+  // Returns a zero row that the caller fills.
   Eigen::VectorXd& add(double mean = 0.0) {
     means_.push_back(mean);
     return rows_.emplace_back(Eigen::VectorXd::Zero(numbers_));
@@ -462,8 +462,9 @@ void add_information(const std::vector<FrameFeatures>& frames,
 }
 
 void bind(ParameterTable& table, BundleAdjustmentOptions& options) {
-  table.add("observation_scale", options.robust_scale, positive,
-            "width of Cauchy's loss for observations, in standard deviations");
+  table.add(
+      "observation_scale", options.robust_scale, positive,
+      "width of Cauchy's loss for observed image positions and depths, in standard deviations");
   table.add("bundle_iterations", options.max_iterations, {1, 10000},
             "maximum number of bundle adjustment iterations");
   table.add("focal_prior", options.focal_prior, positive,
@@ -482,10 +483,11 @@ void bind(ParameterTable& table, BundleAdjustmentOptions& options) {
             "maximum depth delay and rolling shutter time that a calibration may contain, s");
   table.add_former_key("max_bend_m", "max_depth_correction_m");
   table.add("max_depth_correction_m", options.bounds.max_depth_correction_m, not_negative,
-            "maximum depth correction: constant term, m");
+            "maximum depth correction of a calibration: constant term, m");
   table.add_former_key("bend_of_range", "max_depth_correction_of_range");
   table.add("max_depth_correction_of_range", options.bounds.max_depth_correction_of_range,
-            not_negative, "maximum depth correction: term proportional to range, m per m");
+            not_negative,
+            "maximum depth correction of a calibration: term proportional to range, m per m");
 }
 
 namespace {

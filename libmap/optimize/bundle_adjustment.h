@@ -1,5 +1,5 @@
-// Bundle adjustment (Triggs et al. 2000) of poses, points and optionally camera parameters, from
-// image positions and depths of the points. Points are eliminated by the Schur complement.
+// Optimizes poses, points and optionally camera parameters by bundle adjustment (Triggs et al.
+// 2000) of the points' image positions and depths. Points are eliminated by the Schur complement.
 #pragma once
 
 #include <cstddef>
@@ -23,29 +23,28 @@ struct CalibrationBounds {
   double frame_time_s = 0.033;                  // > 0: maximum depth delay and rolling shutter time
   double max_depth_correction_m = 0.01;         // >= 0: maximum depth correction: constant term
   double max_depth_correction_of_range = 0.02;  // >= 0: term proportional to range, m/m
-  double deviations = 4.0;  // not bound; other parameters, in deviations of the prior
+  double deviations = 4.0;  // for other parameters, in prior deviations; no parameter of commands
 };
 
 struct BundleAdjustmentOptions {
   double robust_scale = 3.0;         // > 0: width of Cauchy's loss, standard deviations
-  int max_iterations = 30;           // >= 1
-  bool refine_intrinsics = false;    // of each camera, equal in all frames; distortion is fixed
+  int max_iterations = 30;           // >= 1: maximum number of iterations
+  bool refine_intrinsics = false;    // focal length, principal point; distortion is fixed
   bool refine_depth = false;         // a DepthCorrection per camera
   bool refine_registration = false;  // pose of the depth camera relative to the color camera
   bool refine_timing = false;        // a CameraTiming per camera and a velocity per node
   // Standard deviations of the priors.
-  double focal_prior = 0.02;     // > 0: of the focal length, relative
-  double center_prior_px = 8.0;  // > 0: of the principal point
-  double depth_prior = 4.0;      // > 0: of the depth correction, relative to the depth noise
-  double depth_smoothness_prior =
-      0.7;                    // > 0: of its second differences, relative to the depth noise
-  double depth_knot_m = 0.2;  // >= 0.02: distance of the knots of the correction's spline
+  double focal_prior = 0.02;            // > 0: of the focal length, relative
+  double center_prior_px = 8.0;         // > 0: of the principal point
+  double depth_prior = 4.0;             // > 0: of the depth correction, relative to the depth noise
+  double depth_smoothness_prior = 0.7;  // > 0: of the correction's second differences, likewise
+  double depth_knot_m = 0.2;            // >= 0.02: distance of the knots of the correction's spline
   CalibrationBounds bounds{};
-  // Not bound.
-  DepthNoise depth_noise{};
-  CameraTiming timing_mean{};    // mean of the prior; the deviation is frame_time_s
+  // No parameters of commands.
+  DepthNoise depth_noise{};      // depth noise, to which the depth priors are relative
+  CameraTiming timing_mean{};    // mean of the timing's prior; the deviation is frame_time_s
   double tolerance = 1e-6;       // converged if a step reduces the cost by less than this share
-  bool fixes_cameras = false;    // cameras stay at the start's calibration; velocities are free
+  bool fixes_cameras = false;    // cameras keep the calibration `start`; velocities are free
   bool fixes_poses = false;      // poses are fixed
   std::size_t alternatives = 0;  // maximum number of alternative calibrations in the result
   bool with_information = true;  // the result contains the information matrix
@@ -67,12 +66,12 @@ inline constexpr double depth_gauge = 1e-6;
 
 struct BundleAdjustmentResult {
   std::map<int, Pose> map_from_base;
-  std::vector<Eigen::Vector3d> points;  // in the map, one per track
-  SensorCalibration calibration;        // of the free parameters
-  // Calibrations at one standard deviation along the independent directions that change positions
-  // most.
+  std::vector<Eigen::Vector3d> points;  // in the map, one per track; 0 without two poses
+  SensorCalibration calibration;        // of the free parameters; empty without any
+  // Calibrations that differ from `calibration` by one standard deviation, along the independent
+  // directions that change positions most.
   std::vector<SensorCalibration> alternatives;
-  SensorCalibration deviations;  // of intrinsics and timing; set if alternatives are requested
+  SensorCalibration deviations;  // standard deviations of intrinsics and timing, with alternatives
   // Information of steps of the poses (rigid_motion.h) at the optimum, in the order of
   // map_from_base, including the links. Points are eliminated (Schur complement).
   BlockSystem information{0};
@@ -86,16 +85,16 @@ struct BundleAdjustmentResult {
   double depth_rms_m = 0.0;
   std::size_t outliers = 0;  // observations with a weight below one half
   int iterations = 0;
-  bool converged = false;
+  bool converged = false;  // the result is usable
 };
 
 // Adjusts poses, points and free camera parameters. The resulting poses fit frames with the
-// resulting calibration (calibrate()). `links` are the links of the graph at the optimum (odometry,
-// other closures, priors). The gauge node of each component is fixed. The information is computed
-// from `system_tracks` if there are any: with TrackFrames::linked tracks the information is sparse
-// and slightly smaller. `start` is the initial calibration; by default the stored cameras and the
-// motion between poses. Memory is proportional to (number of poses)^2. Throws Error: options out of
-// range.
+// resulting calibration (calibrate()). `links` are the graph's other links (odometry, other
+// closures, priors). The gauge node of each component is fixed. The information is computed from
+// `system_tracks` if there are any: with TrackFrames::linked tracks the information is sparse and
+// slightly smaller. `start` is the initial calibration; by default the stored cameras and the
+// motion between poses. Memory is proportional to (number of poses)^2. Throws Error if an option is
+// out of range.
 BundleAdjustmentResult adjust_bundle(
     const std::vector<FrameFeatures>& frames, const std::vector<FeatureTrack>& tracks,
     const std::map<int, Pose>& map_from_base, const std::vector<GraphLinkResult>& links,
@@ -118,7 +117,7 @@ void add_information(const std::vector<FrameFeatures>& frames,
                      const BundleAdjustmentOptions& options, BundleAdjustmentResult& result,
                      const std::vector<Eigen::Vector3d>& points = {});
 
-// Builds the tracks for the information of a result with `poses` poses: linked ones from 120 on.
+// Builds the tracks for the information of `poses` poses: TrackFrames::linked from 120 poses on.
 FeatureTracks information_tracks(const std::vector<FrameFeatures>& frames,
                                  const std::vector<FeatureLink>& feature_links, std::size_t poses);
 

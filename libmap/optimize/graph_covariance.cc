@@ -9,8 +9,7 @@ namespace libmap {
 
 namespace {
 
-// Keeps the system regular if unknowns are not constrained, for example the rotation of a landmark
-// that is a point. Negligible relative to the information of any link.
+// Keeps the system regular if unknowns, e.g. of a landmark, are not constrained; negligible.
 constexpr double damping = 1e-6;
 constexpr double gauge_weight = 1e12;
 

@@ -1,4 +1,4 @@
-// Covariances of the poses of a graph, from the information of the links at the optimum.
+// Computes covariances of a graph's poses from the information of the links at the optimum.
 #pragma once
 
 #include <map>
@@ -13,22 +13,22 @@ namespace libmap {
 
 class GraphCovariance {
  public:
-  // Uses links with robust weights; rejected links are ignored. The gauge node of each component is
-  // fixed. Covariances of all nodes, linked pairs and `pairs` are computed here, in the time of one
-  // factorization.
+  // Uses the graph's links with robust weights, without rejected links. The gauge node of each
+  // component is fixed. Covariances of all nodes, linked pairs and `pairs` are computed here, in
+  // the time of one factorization.
   explicit GraphCovariance(const PoseGraphResult& graph,
                            const std::vector<std::pair<int, int>>& pairs = {});
-  // Uses any system with one block per node of `map_from_base`, in the same order. The gauge node
-  // of each component is fixed.
+  // Uses a system with one block per node of `map_from_base`, in the same order. The gauge node of
+  // each component is fixed.
   GraphCovariance(const std::map<int, Pose>& map_from_base, const BlockSystem& information,
                   const std::vector<GraphComponent>& components);
 
   bool valid() const { return solver_->valid(); }  // true if the graph determines the poses
   bool connected(int a, int b) const;              // true if both are in one component
   // The covariances below are of steps (rigid_motion.h) and require valid() and nodes with a pose.
-  // Covariance of a node's pose relative to the gauge node of the component.
+  // Returns the covariance of a node's pose relative to the gauge node of the component.
   Matrix6d of_node(int node) const { return between(node, node); }
-  // Covariance of a_from_b for two connected nodes.
+  // Returns the covariance of a_from_b for two connected nodes.
   Matrix6d of_relative(int a, int b) const;
 
  private:
@@ -42,7 +42,7 @@ class GraphCovariance {
   BlockSystem inverse_{0};  // blocks of nodes and links
 };
 
-// Adds a large weight to the gauge node of each component, which fixes the node's pose.
+// Returns a copy of the system in which a large weight fixes the gauge node of each component.
 BlockSystem fix_gauges(const BlockSystem& system, const std::map<int, Pose>& map_from_base,
                        const std::vector<GraphComponent>& components);
 

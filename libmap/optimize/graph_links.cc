@@ -56,10 +56,10 @@ void require_usable(const PoseLink& link) {
   const Matrix6d& information = link.information;
   const std::string field = "link " + std::to_string(link.from) + " -> " + std::to_string(link.to);
   if (!information.allFinite() || !link.from_from_to.matrix().allFinite())
-    throw Error("is not finite", {.field = field});
+    throw Error("the pose or the information matrix is not finite", {.field = field});
   const Vector6d values = symmetric_eigen(information).values;
   if (values[5] <= 0.0 || values[0] < -1e-9 * values[5])
-    throw Error("the information matrix is not positive", {.field = field});
+    throw Error("the information matrix is zero or not positive semidefinite", {.field = field});
 }
 
 std::vector<GraphLink> stored_links(const PoseGraph& graph) {
@@ -85,7 +85,8 @@ void drop_invalid(std::vector<GraphLink>& links, std::vector<std::string>& warni
     }
   });
   if (dropped > 0)
-    warnings.push_back(std::to_string(dropped) + " stored links are skipped, the first: " + first);
+    warnings.push_back(std::to_string(dropped) +
+                       " invalid stored links are skipped; first: " + first);
 }
 
 std::vector<GraphLink> odometry_links(const PoseGraph& graph) {

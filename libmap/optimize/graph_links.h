@@ -1,4 +1,4 @@
-// Links of a pose graph and residuals of links, for all optimizations of poses and covariances.
+// Provides links of a pose graph and their residuals, for optimizations of poses and covariances.
 #pragma once
 
 #include <map>
@@ -20,27 +20,27 @@ struct GraphLink {
 struct GraphLinkResult {
   PoseLink link{};  // with the final, recalibrated information
   bool rejected = false;
-  double weight = 1.0;      // of the robust loss
-  double chi_square = 0.0;  // at the optimum
+  double weight = 1.0;      // weight by the robust loss, 0 to 1; 0 if rejected
+  double chi_square = 0.0;  // squared residual at the optimum, whitened
 };
 
 // Throws Error if the motion or the information matrix is not finite, or if the information matrix
 // is not positive semidefinite or is zero.
 void require_usable(const PoseLink& link);
 
-// Links of a stored graph, grouped by type.
+// Returns the links of a stored graph, grouped by type.
 std::vector<GraphLink> stored_links(const PoseGraph& graph);
 
-// Drops invalid links and appends a warning.
+// Drops links that require_usable rejects and appends one warning about them.
 void drop_invalid(std::vector<GraphLink>& links, std::vector<std::string>& warnings);
 
-// Links between consecutive odometry poses of each session, for scans with poses but without links,
-// such as a folder of images. Recalibration estimates standard deviations of these links.
+// Returns links between consecutive odometry poses of each session, for scans without links, such
+// as folders of images. Recalibration estimates standard deviations of these links.
 std::vector<GraphLink> odometry_links(const PoseGraph& graph);
 
-// Step (rigid_motion.h) from the measured to the actual relative pose; for a pose prior, from the
-// measured to the actual pose. For gravity, the rotation part is the cross product of both up
-// directions. Absolute links ignore `to`.
+// Returns the step (rigid_motion.h) from the measured to the actual relative pose; for a pose
+// prior, from the measured to the actual pose. For gravity, the rotation part is the cross product
+// of both up directions. Absolute links ignore `to`.
 Vector6d link_residual(const PoseLink& link, const Pose& from, const Pose& to);
 
 // Derivatives of link_residual by steps of both poses.
@@ -50,14 +50,14 @@ struct LinkJacobian {
 };
 LinkJacobian link_jacobian(const PoseLink& link, const Pose& from, const Pose& to);
 
-// Inverse covariance of the residual; isotropic for gravity.
+// Returns the inverse covariance of the residual; isotropic for gravity.
 Matrix6d link_information(const PoseLink& link);
 
-// Half the sum of weighted squares over the links in use: not rejected, and all nodes have a pose.
+// Returns half the sum of weighted squares over links that are not rejected and have all poses.
 double link_cost(const std::map<int, Pose>& map_from_base,
                  const std::vector<GraphLinkResult>& links);
 
-// Normal equations of the links in use over the nodes of `map_from_base`, in the same order.
+// Returns the normal equations of these links, with one block per node of `map_from_base`.
 // link_system contains the links between two nodes, all_link_system also the absolute links.
 BlockSystem link_system(const std::map<int, Pose>& map_from_base,
                         const std::vector<GraphLinkResult>& links);

@@ -41,7 +41,7 @@ double overlap_of(const std::vector<PlacedElement>& samples, const FrameFeatures
   return seen / static_cast<double>(samples.size());
 }
 
-// Frames whose field of view may overlap that of the n-th frame, nearest first.
+// Returns frames whose field of view may overlap the n-th frame's, nearest first.
 std::vector<std::size_t> candidates_of(const PointTree& neighbors,
                                        const std::vector<PosedFrame>& posed,
                                        const std::map<int, std::size_t>& component_of,

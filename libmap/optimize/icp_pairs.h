@@ -13,15 +13,15 @@
 
 namespace libmap {
 
-// Pairs of frames that are joined by links, in ascending order. Frames without a pose are ignored.
+// Returns linked pairs of frames in ascending order. Frames without a pose are ignored.
 std::vector<FramePair> linked_pairs(const std::vector<FrameFeatures>& frames,
                                     const std::map<int, Pose>& map_from_base,
                                     const std::vector<PoseLink>& links);
 
-// Pairs of each frame with the `pairs_per_frame` frames of the same component whose surfaces have
-// the largest overlap (share >= `min_overlap`), in ascending order, smaller index first. Only the
-// 24 nearest candidates of a frame are compared, by distance (up to 2.5 m) and angle (up to 100
-// degrees). The result does not depend on the number of threads.
+// Returns pairs of each frame with the `pairs_per_frame` frames of the same component whose
+// surfaces have the largest overlap (share >= `min_overlap`), in ascending order, smaller index
+// first. Only the 24 nearest frames are compared, by distance (up to 2.5 m) and rotation (up to 100
+// degrees).
 std::vector<FramePair> overlapping_pairs(const std::vector<FrameFeatures>& frames,
                                          const std::map<int, Pose>& map_from_base,
                                          const std::vector<GraphComponent>& components,

@@ -213,9 +213,8 @@ void Alignment::add_prior(BlockSystem& system) const {
   }
 }
 
-// Equations of all pairs. The work is done by frame, to limit the samples in memory; then both
-// halves of each pair are added. Right-hand sides by cell are set for one cell in cell_interval; 0:
-// none.
+// Returns the equations of all pairs, computed by frame to limit the samples in memory. Right-hand
+// sides by cell are set for one cell in cell_interval; 0: none.
 std::vector<PairEquations> Alignment::all_equations(double max_distance_m,
                                                     std::uint64_t cell_interval) const {
   std::vector<std::vector<std::size_t>> pairs_of_frame(frames_.size());
@@ -413,19 +412,21 @@ double agreement_of(const FrameFeatures& a, const FrameFeatures& b, const Pose& 
 void bind(ParameterTable& table, IcpOptions& options) {
   table.add("icp", options.mode,
             {{"off", IcpMode::off}, {"links", IcpMode::links}, {"global", IcpMode::global}},
-            "frame pairs aligned by ICP; off: none; links: joined by a link; global: overlapping");
+            "frame pairs that ICP aligns; off: none; links: pairs with a link; global: overlapping "
+            "pairs");
   table.add("icp_iterations", options.iterations, {1, 1000}, "maximum number of ICP iterations");
   table.add("icp_pairs", options.pairs_per_frame, {1, 1000},
-            "maximum number of other frames to which ICP aligns a frame");
+            "number of frames with the largest overlap to which global ICP aligns each frame");
   table.add("icp_samples", options.samples, {1, 1000000},
-            "approximate number of ICP samples per frame");
-  table.add("icp_distance_m", options.max_distance_m, positive,
-            "maximum distance between an ICP sample and the surface in the first iteration, m");
+            "approximate number of surface samples per frame for ICP");
+  table.add(
+      "icp_distance_m", options.max_distance_m, positive,
+      "first ICP iteration: maximum distance between a sample and another frame's surface, m");
   table.add("icp_degenerate", options.max_degenerate_ratio, zero_to_one,
-            "share of the largest eigenvalue of the ICP information matrix below which a direction "
-            "is ignored");
+            "minimum ratio of an eigenvalue to the largest eigenvalue of an ICP information "
+            "matrix; directions below are ignored");
   table.add("icp_correlation", options.correlation, {1.0},
-            "number of correlated ICP samples equivalent to one independent sample");
+            "number of correlated ICP samples that count as one independent sample");
 }
 
 IcpResult align_surfaces(const std::vector<FrameFeatures>& frames,
@@ -434,7 +435,7 @@ IcpResult align_surfaces(const std::vector<FrameFeatures>& frames,
                          const std::vector<PoseLink>& links, const IcpOptions& options,
                          Progress& progress) {
   if (prior.size() != map_from_base.size())
-    throw Error("differs from the number of frames with a pose",
+    throw Error("differs from the number of poses",
                 {.field = "blocks of the prior",
                  .value = std::to_string(prior.size()),
                  .bound = std::to_string(map_from_base.size())});

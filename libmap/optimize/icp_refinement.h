@@ -21,17 +21,16 @@ enum class IcpMode { off, links, global };
 
 struct IcpOptions {
   IcpMode mode = IcpMode::global;
-  int iterations = 12;           // >= 1
-  int pairs_per_frame = 8;       // >= 1: with global, frames with the largest overlap
-  double min_overlap = 0.25;     // 0 to 1: with global, share of a frame's samples
+  int iterations = 12;           // >= 1: maximum number of iterations
+  int pairs_per_frame = 8;       // >= 1: for global, frames with the largest overlap per frame
+  double min_overlap = 0.25;     // 0 to 1: for global, minimum overlap as a share of samples
   int samples = 1500;            // >= 1: approximate number of samples per frame
   double max_distance_m = 0.03;  // > 0: initial maximum distance between a sample and the plane
-  double max_normal_angle_deg = 35.0;
+  double max_normal_angle_deg = 35.0;   // maximum angle between normals of sample and plane
   double correlation = 4.0;             // >= 1: samples equivalent to one independent sample
-  double max_degenerate_ratio = 0.002;  // >= 0: share of the largest information; a pair's
-                                        // directions with less are ignored
-  // Not bound: for inaccurate initial poses, the width of the loss starts at the distance and
-  // decreases slowly (graduated non-convexity, Blake and Zisserman 1987).
+  double max_degenerate_ratio = 0.002;  // 0 to 1: minimum eigenvalue ratio of a used direction
+  // No parameter of commands: the width of the loss decreases slowly, for inaccurate initial poses
+  // (graduated non-convexity, Blake and Zisserman 1987).
   bool graduated = false;
 };
 void bind(ParameterTable& table, IcpOptions& options);
@@ -43,12 +42,12 @@ struct IcpResult {
   double deviation_scale = 1.0;  // >= 1: ratio of the errors to errors by independent noise
   std::size_t pairs = 0;
   std::size_t samples = 0;                // matched samples in the last iteration
-  std::size_t degenerate_directions = 0;  // of all pairs
-  double initial_rms_m = 0.0;             // distances along the normals
-  double final_rms_m = 0.0;
+  std::size_t degenerate_directions = 0;  // number of ignored directions of all pairs
+  double initial_rms_m = 0.0;             // RMS distance along normals, first iteration
+  double final_rms_m = 0.0;               // RMS distance along normals, last iteration
   int iterations = 0;
   bool converged = false;
-  std::vector<FramePair> frame_pairs;  // aligned pairs
+  std::vector<FramePair> frame_pairs;  // aligned pairs; empty if the alignment failed
   double max_distance_m = 0.0;         // final maximum distance between a sample and a plane
 };
 
@@ -64,8 +63,8 @@ IcpResult align_surfaces(const std::vector<FrameFeatures>& frames,
                          const std::vector<PoseLink>& links, const IcpOptions& options = {},
                          Progress& progress = no_progress());
 
-// Normal equations of the surfaces of `pairs` for steps of the poses. Each frame of a pair must
-// have a pose. The result does not depend on the number of threads.
+// Returns the normal equations of the surfaces of `pairs` for steps of the poses. Each frame of a
+// pair must have a pose.
 BlockSystem surface_system(const std::vector<FrameFeatures>& frames,
                            const std::map<int, Pose>& map_from_base,
                            const std::vector<FramePair>& pairs, double max_distance_m,

@@ -1,6 +1,6 @@
-// Bundle adjustment in one dense system of poses, motions and camera parameters, with points
-// optimized at given poses and cameras and eliminated from the normal equations (Schur complement).
-// Private to libmap/optimize.
+// Adjusts poses, motions and camera parameters in one dense system. Points are optimized at given
+// poses and cameras and eliminated from the normal equations (Schur complement). Private to
+// libmap/optimize.
 #pragma once
 
 #include <Eigen/Cholesky>
@@ -23,16 +23,16 @@ namespace libmap {
 
 struct BundleObservation {
   std::size_t node = 0;          // row of the pose
-  Eigen::Index first_param = 0;  // first parameter of the camera
+  Eigen::Index first_param = 0;  // index of the camera's first parameter
   CalibratedFeature feature;
 };
 
-// Weight of a residual for Cauchy's loss of width `scale`.
+// Returns the weight of a residual for Cauchy's loss of width `scale`.
 inline double robust_weight(const Eigen::Vector3d& residual, double scale) {
   return cauchy_weight(residual.squaredNorm() / (scale * scale));
 }
 
-// State at which observations are evaluated. Does not own the data that it points to.
+// Refers to a state at which observations are evaluated; does not own the data.
 struct BundleView {
   std::vector<const Pose*> poses;                  // by row
   const std::vector<Vector6d>* motions = nullptr;  // by row; nullptr: no motion
@@ -47,7 +47,7 @@ struct BundleView {
                                  motions != nullptr ? (*motions)[seen.node] : Vector6d::Zero(),
                                  camera_params + seen.first_param, point, result, with_derivatives);
   }
-  // Cauchy's loss. Sets a very large residual if the point is not in front of the camera.
+  // Returns Cauchy's loss; very large if the point is not in front of the camera.
   double cost(const BundleObservation& seen, const Eigen::Vector3d& point, double robust_scale,
               CalibratedResidual& result) const {
     constexpr double behind = 1e6;
@@ -102,7 +102,7 @@ class PointSchur {
     rhs_.noalias() -= weighted_point * seen.residual;
   }
 
-  // Lazy products, because Eigen's general product copies blocks of this size first.
+  // Eliminates the point. Lazy products, because Eigen's general product copies such blocks first.
   void eliminate(System& system) {
     if (views_.empty()) return;
     inverse_ = hessian_.inverse();
@@ -134,7 +134,7 @@ struct JointProblem {
   std::vector<BundleObservation> observations;  // grouped by point
   std::vector<std::size_t> begin = {0};         // first observation by point; one more than points
   double robust_scale = 3.0;                    // width of Cauchy's loss, standard deviations
-  std::vector<bool> fixed;                      // by pose
+  std::vector<bool> fixed;                      // by pose; true: the pose is constant
   bool fix_cameras = false;
   // Camera parameters outside this range have no influence on the residuals.
   Eigen::Index first_param = 0;
@@ -182,12 +182,12 @@ struct JointSystem {
   }
 };
 
-// Levenberg-Marquardt. Converges when a step reduces the cost by less than the share `tolerance`.
-// The cost of the state never increases. The result does not depend on the number of threads.
+// Optimizes by Levenberg-Marquardt. Converges when a step reduces the cost by less than the share
+// `tolerance`. The cost of the state never increases.
 LeastSquaresSummary adjust_jointly(const JointProblem& problem, JointState& state,
                                    int max_iterations, double tolerance);
 
-// Normal equations at a state. Fixed poses and unconstrained unknowns have a diagonal of 1.
+// Returns the normal equations at a state, with diagonal 1 for fixed and unconstrained unknowns.
 JointSystem joint_system(const JointProblem& problem, const JointState& state);
 
 }  // namespace libmap

@@ -132,8 +132,7 @@ class LinkCost : public ceres::CostFunction {
   Matrix6d whitening_;
 };
 
-// Fixes the position of a node and its rotation about the map's z axis, which gravity does not
-// constrain.
+// Fixes a node's position and rotation about the map's z axis; gravity does not constrain these.
 class YawGaugeCost : public ceres::SizedCostFunction<4, pose_size> {
  public:
   explicit YawGaugeCost(const Pose& fixed) : fixed_(fixed) {}
@@ -468,13 +467,13 @@ void bind(ParameterTable& table, PoseGraphOptions& options) {
   table.add("recalibrate", options.recalibrate,
             "scale the covariances of each group of links to match the residuals of the group");
   table.add("recalibrations", options.recalibrations, {1},
-            "maximum number of recalibration rounds of link covariances");
+            "maximum number of rounds in which the covariances of links are scaled");
   table.add("robust_scale", options.robust_scale, not_negative,
             "width of Cauchy's loss for links, in standard deviations; 0: plain least squares");
   table.add("max_chi_square", options.max_chi_square, positive,
-            "maximum chi-square of a loop closure's residuals; closures above are rejected");
+            "maximum chi-square of a loop closure's residuals; other closures are rejected");
   table.add("gauge_node", options.gauge_node, not_negative,
-            "id of the node with a fixed pose; 0: the first node");
+            "id of the node whose pose is fixed; 0: the first node of each connected component");
 }
 
 PoseGraphResult optimize_pose_graph(const std::map<int, Pose>& map_from_base,

@@ -1,5 +1,5 @@
-// Pose graph optimization (Lu and Milios 1997): least squares over all links, with residuals
-// whitened by L^T (information = L L^T), by Ceres.
+// Optimizes pose graphs (Lu and Milios 1997) by least squares over all links, with residuals
+// whitened by L^T (information = L L^T), with Ceres.
 #pragma once
 
 #include <cstddef>
@@ -19,7 +19,7 @@ struct PoseGraphOptions {
   // translation, to match the residuals of the group (variance components, Foerstner 1979).
   bool recalibrate = true;
   int recalibrations = 6;        // >= 1: maximum number of recalibration rounds
-  double robust_scale = 4.1;     // >= 0: width of Cauchy's loss, standard deviations; 0: squares
+  double robust_scale = 4.1;     // >= 0: width of Cauchy's loss, standard deviations; 0: not robust
   double max_chi_square = 40.0;  // > 0: of a closure's six residuals; closures above are rejected
   int gauge_node = 0;            // fixed node; 0: the first node of each component
 };
@@ -28,26 +28,26 @@ void bind(ParameterTable& table, PoseGraphOptions& options);
 struct LinkGroupResult {
   std::size_t links = 0;
   std::size_t rejected = 0;
-  double translation_scale = 1.0;  // factors of the standard deviations
+  double translation_scale = 1.0;  // factor of the standard deviations
   double rotation_scale = 1.0;
-  double redundancy = 0.0;                // residuals controlled by other links (redundancy number)
-  double translation_rms_before_m = 0.0;  // of the links kept, at the input poses
+  double redundancy = 0.0;                // sum of the redundancy numbers of the links
+  double translation_rms_before_m = 0.0;  // accepted links at the input poses
   double rotation_rms_before_deg = 0.0;
-  double translation_rms_m = 0.0;  // of the links kept, at the optimum
+  double translation_rms_m = 0.0;  // accepted links at the optimum
   double rotation_rms_deg = 0.0;
 };
 
-// Nodes that are connected by links. The gauge node is fixed; with gravity links, the tilt of the
-// gauge node is free, and with priors, the whole pose.
+// Nodes that are connected by links. The gauge node is fixed, but its tilt is free if the component
+// has gravity links, and its whole pose if it has priors.
 struct GraphComponent {
   std::vector<int> nodes;
   int gauge_node = 0;
 };
 
 struct PoseGraphResult {
-  std::map<int, Pose> map_from_base;   // nodes, and landmarks with negative numbers
-  std::vector<GraphLinkResult> links;  // in the order of the input
-  std::map<std::string, LinkGroupResult> groups;
+  std::map<int, Pose> map_from_base;              // nodes, and landmarks with negative numbers
+  std::vector<GraphLinkResult> links;             // in the order of the input
+  std::map<std::string, LinkGroupResult> groups;  // by GraphLink::group
   std::vector<GraphComponent> components;  // largest first; a node without links is a component
   std::vector<int> without_links;          // nodes
   double initial_cost = 0.0;  // half the robust sum of squares before the last optimization
@@ -58,8 +58,8 @@ struct PoseGraphResult {
 
 // Optimizes the poses from the initial `map_from_base`; links to nodes without a pose are ignored.
 // A prior constrains a node's pose in the map frame. Gravity aligns a node's up direction with the
-// map's z axis. Landmarks are points or poses observed from several nodes. Throws Error: a link
-// that require_usable rejects, options out of range.
+// map's z axis. Landmarks are points or poses observed from several nodes. Throws Error if
+// require_usable rejects a link or an option is out of range.
 PoseGraphResult optimize_pose_graph(const std::map<int, Pose>& map_from_base,
                                     const std::vector<GraphLink>& links,
                                     const PoseGraphOptions& options = {});

@@ -35,7 +35,7 @@ Vector6d slope_of(const std::vector<double>& times, const std::vector<Vector6d>&
 }
 
 // Uses one pose before and one after each frame, or two each if they follow closely. If one side
-// has no pose within max_motion_gap_s, the velocity is that to the other side, or zero.
+// has no pose within max_motion_gap_s, the velocity is from the other side only, or zero.
 void add_motions(std::vector<std::pair<double, int>> nodes, const std::map<int, Pose>& poses,
                  std::map<int, KnownMotion>& motions) {
   std::sort(nodes.begin(), nodes.end());

@@ -1,4 +1,4 @@
-// Velocities of the base at poses, estimated from neighboring poses. Private to bundle_adjustment.
+// Estimates velocities of the base from neighboring poses. Private to bundle_adjustment.
 #pragma once
 
 #include <map>
@@ -17,8 +17,8 @@ struct KnownMotion {
   Vector6d deviation = (Vector6d() << 0.15, 0.15, 0.15, 0.25, 0.25, 0.25).finished();
 };
 
-// Returns the velocity at each frame's node with a pose. Poses of different components are in
-// different frames; if `components` is empty, all are in one.
+// Returns the velocity by node, for each frame with a pose. Poses of different components are in
+// different frames; if `components` is empty, all poses are in one frame.
 std::map<int, KnownMotion> relative_motions(const std::vector<FrameFeatures>& frames,
                                             const std::map<int, Pose>& poses,
                                             const std::vector<GraphComponent>& components);

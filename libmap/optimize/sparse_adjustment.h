@@ -1,6 +1,6 @@
-// Bundle adjustment of long scans with fixed cameras: a sparse system of poses, with each point at
-// the optimum for the poses (variable projection). Memory and time are proportional to the number
-// of observations, plus the fill-in of the links' graph.
+// Adjusts long scans with fixed cameras by bundle adjustment with a sparse system of poses, each
+// point at the optimum for the poses (variable projection). Memory and time are proportional to the
+// number of observations, plus the fill-in of the links' graph.
 #pragma once
 
 #include <map>
@@ -10,15 +10,15 @@
 
 namespace libmap {
 
-// Normal equations of tracks over poses. Observations by frames without a pose are ignored, and so
-// are tracks with fewer than two others.
+// Normal equations of tracks over poses. Observations by frames without a pose are ignored, and
+// then tracks with fewer than two observations.
 class TrackSystem {
  public:
   // Keeps references to `frames` and `tracks`. `robust_scale` is the width of Cauchy's loss.
   TrackSystem(const std::vector<FrameFeatures>& frames, const std::vector<FeatureTrack>& tracks,
               double robust_scale);
 
-  // Points of the tracks (map frame): the mean of the measurements, then optimized.
+  // Returns the points of the tracks (map frame): means of the measurements, then optimized.
   std::vector<Eigen::Vector3d> points_at(const std::map<int, Pose>& map_from_base) const;
   // Optimizes the points at the given poses, from the current positions.
   void optimize_points(const std::map<int, Pose>& map_from_base,
@@ -35,11 +35,11 @@ class TrackSystem {
     // Sets counts and root mean squares of the result; the cost is not used.
     void add_to(BundleAdjustmentResult& result) const;
   };
-  // Cost and residuals at the given poses and points.
+  // Returns cost and residuals at the given poses and points.
   Totals totals(const std::map<int, Pose>& map_from_base,
                 const std::vector<Eigen::Vector3d>& points) const;
 
-  // Normal equations of steps of the poses, in the order of `map_from_base`, points eliminated.
+  // Returns the normal equations of steps of the poses in the order of `map_from_base`.
   BlockSystem system(const std::map<int, Pose>& map_from_base,
                      const std::vector<Eigen::Vector3d>& points) const;
 
@@ -49,8 +49,7 @@ class TrackSystem {
   double robust_scale_;
 };
 
-// Computes adjust_bundle for TrackFrames::linked tracks and fixed camera parameters. The result
-// does not depend on the number of threads.
+// Does the work of adjust_bundle for TrackFrames::linked tracks and fixed camera parameters.
 BundleAdjustmentResult adjust_sparse(const std::vector<FrameFeatures>& frames,
                                      const std::vector<FeatureTrack>& tracks,
                                      const std::map<int, Pose>& map_from_base,

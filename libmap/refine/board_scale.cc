@@ -27,7 +27,7 @@ constexpr double min_noise_px = 0.01;  // minimum standard deviation of a corner
 constexpr int max_iterations = 50;
 constexpr double settled_step = 1e-10;
 constexpr double max_deviation = 0.03;  // of the scale; above the error of any depth camera
-// Maximum chi-square of a view against the others, per degree of freedom.
+// Maximum chi-square of a view against the board, relative to the median of the views.
 constexpr double max_disagreement = 9.0;
 constexpr std::size_t max_pairs = 200;
 constexpr double freedom_of_pose = 6.0;
@@ -162,8 +162,8 @@ AgreeingSights sights_that_agree(const std::vector<BoardObservation>& observatio
   return agreeing;
 }
 
-// Sums over residuals r = projected minus found, px. J (7 columns) are their derivatives by a step
-// of the board and its size, H (6 columns) those by a step of the base.
+// Sums over residuals r = projected minus found, px. J (7 columns) contains the derivatives by a
+// step of the board and the board's size, H (6 columns) the derivatives by a step of the base.
 using Sums = Eigen::Matrix<double, 14, 14>;  // [J r H]^T [J r H]
 using System = Eigen::Matrix<double, 8, 8>;  // [J r]^T [J r], weighted
 
@@ -321,8 +321,8 @@ std::vector<BoardView> find_boards(const ScanSource& scan, const std::vector<Fra
     }
   if (nodes.size() < 2)
     refuse_board(board, "images of only " + std::to_string(nodes.size()) +
-                            " nodes, of the required 2, show the whole board; COLUMNSxROWS counts "
-                            "inner corners, one less than squares");
+                            " of the required 2 nodes show the whole board; COLUMNSxROWS counts "
+                            "inner corners, one fewer than squares in each direction");
   return views;
 }
 
@@ -364,10 +364,10 @@ ScaleEstimate scale_by_board(const std::vector<FrameFeatures>& frames,
       std::sqrt(found->size_variance * std::max(1.0, scale.chi_square));
   scale.deviation = scale.factor * relative_deviation;
   if (!(relative_deviation <= max_deviation))
-    refuse_board(board, "the images determine the scale only to " +
-                            to_fixed_text(100.0 * relative_deviation, 1) + " %, not to " +
-                            to_text(100.0 * max_deviation) +
-                            " %; show the board from locations farther apart");
+    refuse_board(board, "the standard deviation of the scale by the board is " +
+                            to_fixed_text(100.0 * relative_deviation, 1) +
+                            " %, more than the permitted " + to_text(100.0 * max_deviation) +
+                            " %; record the board from locations that are farther apart");
   return scale;
 }
 

@@ -12,17 +12,17 @@ namespace libmap {
 
 struct CoarseRegistration {
   std::unique_ptr<ScanSource>
-      scan{};  // scan with registered depth; nullptr: the given scan is registered
-  Pose color_from_depth = Pose::Identity();  // in the given scan
-  std::string finding{};                     // empty if depth is registered
+      scan{};  // scan with registered depth; nullptr: the given scan is used
+  Pose color_from_depth = Pose::Identity();  // true pose of depth; identity without `scan`
+  std::string finding{};                     // displacement of depth; empty if there is none
 };
 
 // Registers the depth of all frames if edges of depth are displaced (check_edge_agreement). Without
-// `may_register`, only states the displacement. The scan must outlive the result. Throws Error: the
-// depth camera has another focal length than the color camera.
+// `may_register`, only returns the finding. The scan must outlive the result. Throws Error if
+// `may_register` and the depth camera has another focal length than stored.
 CoarseRegistration register_coarsely(const ScanSource& scan, bool may_register);
 
-// Adds the coarse registration to a calibration of the registered scan.
+// Adds the coarse registration of all `cameras` to a calibration of the registered scan.
 void add_registration(const Pose& color_from_depth, std::size_t cameras,
                       SensorCalibration& calibration);
 

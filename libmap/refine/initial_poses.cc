@@ -27,8 +27,8 @@ bool is_between_nodes(const PoseLink& link) {
 }
 
 // Propagates values of nodes along links, in the order of repeated passes over the list until
-// nothing changes. known(node) returns true if the node has a value. tell(link, node) passes the
-// value of the link's other end to `node` and returns true if the node accepts it.
+// nothing changes. known(node) returns true if the node has a value. propagate(link, node) passes
+// the value of the link's other end to `node` and returns true if the node accepts it.
 template <typename Known, typename Propagate>
 void spread_by_links(const std::vector<PoseLink>& links, const Known& known,
                      const Propagate& propagate) {
@@ -229,7 +229,7 @@ InitialPoses initial_poses(const PoseGraph& graph, StartPoses start) {
   for (auto& [number, nodes] : parts) result.parts.push_back(std::move(nodes));
   if (result.map_from_base.empty()) {
     if (start != StartPoses::automatic)
-      throw Error("the scan has no poses from this source",
+      throw Error("the scan has no poses from this source; use start auto or visual",
                   {.field = "poses", .value = result.source});
     result.parts = begin_by_links(graph, wanted, result.map_from_base);
     result.source = result.parts.empty() ? "visual" : "links";

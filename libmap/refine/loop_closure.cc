@@ -14,13 +14,13 @@ namespace libmap {
 namespace {
 
 constexpr double degree = std::numbers::pi / 180.0;
-constexpr double confirmed_m = 0.1;  // between two links of the same two components
+constexpr double confirmed_m = 0.1;  // maximum difference of two links between two components
 constexpr double confirmed_rad = 5.0 * degree;
 constexpr std::size_t considered_per_pair = 8;  // candidates per pair, before the angle's test
 
 FramePair ordered(std::size_t a, std::size_t b) { return {std::min(a, b), std::max(a, b)}; }
 
-// Adds the pairs of one component: each frame with the nearest frames of similar direction.
+// Adds pairs of one component: each frame with the nearest frames of similar rotation.
 void add_near_pairs(const std::vector<std::size_t>& members, const std::vector<const Pose*>& poses,
                     const LoopClosureDetectionOptions& options, std::set<FramePair>& pairs) {
   std::vector<Eigen::Vector3d> positions;
@@ -85,28 +85,28 @@ bool agree(const FeatureLink& one, const FeatureLink& other, const PoseGraphResu
 
 void bind(ParameterTable& table, LoopClosureDetectionOptions& options) {
   table.add("radius_m", options.radius_m, not_negative,
-            "maximum distance between candidates for a loop closure, m");
+            "maximum distance between the two poses of a near loop closure candidate, m");
+  table.add("angle_deg", options.angle_deg, {0.0, 180.0},
+            "maximum rotation between the two poses of a near loop closure candidate, degrees");
+  table.add("near_candidates", options.near_candidates, not_negative,
+            "maximum number of near loop closure candidates per frame by distance and rotation");
   table.add(
-      "angle_deg", options.angle_deg, {0.0, 180.0},
-      "maximum angle between the viewing directions of candidates for a loop closure, degrees");
-  table.add(
-      "near_candidates", options.near_candidates, not_negative,
-      "maximum number of loop closure candidates per frame by distance and viewing direction");
-  table.add("similar_candidates", options.similar_candidates, not_negative,
-            "number of loop closure candidates per frame by appearance, from the whole scan");
+      "similar_candidates", options.similar_candidates, not_negative,
+      "maximum number of loop closure candidates per frame by appearance, from the whole scan");
   table.add("neighbors", options.neighbors, not_negative,
-            "number of following frames with which a frame is matched");
+            "number of following frames with which each frame is matched");
   table.add("max_ratio", options.max_ratio, {0.0, 1.0, true, false},
             "maximum ratio of the descriptor distances of the best and second-best match of a "
             "feature");
   table.add("min_inliers", options.estimate.min_inliers, {6, 100000},
             "minimum number of matches that agree with the relative pose of two frames");
   table.add("min_spread", options.estimate.min_spread, not_negative,
-            "minimum spread of agreeing matches in the image, in focal lengths");
+            "minimum spread in the image of matches that agree with a pose, in focal lengths");
   table.add("max_graph_chi_square", options.max_graph_chi_square, positive,
-            "maximum chi-square of a loop closure's deviation from the pose graph");
+            "maximum chi-square of a loop closure's deviation from the pose graph; other closures "
+            "are dropped");
   table.add("words", options.appearance.words, {1, 65536},
-            "number of visual words in the vocabulary for appearance");
+            "number of visual words by which the appearance of frames is compared");
 }
 
 std::set<FramePair> consecutive_pairs(const std::vector<FrameFeatures>& frames, int neighbors) {

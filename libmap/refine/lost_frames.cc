@@ -58,7 +58,7 @@ class LostFrames {
   }
   int session(std::size_t frame) const { return start_.session_of(node(frame)); }
 
-  // The nearest frame in this direction that is not lost; no_frame if there is none.
+  // Returns the nearest frame in this direction that is not lost; no_frame if there is none.
   std::size_t neighbor(std::size_t frame, std::size_t step) const {
     if (frame == no_frame) return no_frame;
     for (std::size_t n = 0, other = frame + step; n < farthest_neighbor; ++n, other += step) {
@@ -68,7 +68,7 @@ class LostFrames {
     return no_frame;
   }
 
-  // The pose by constant motion from `a` to `b`: interpolated, or extrapolated beyond b.
+  // Returns the pose by constant motion from a to b: interpolated, or extrapolated beyond b.
   std::optional<Pose> along(std::size_t a, std::size_t b, std::size_t frame) {
     if (a == no_frame || b == no_frame || part(a) != part(b) || stamp_s(a) == stamp_s(b))
       return std::nullopt;
@@ -103,7 +103,7 @@ class LostFrames {
     return true;
   }
 
-  // Aligns the frame with `other`, from `guess`, else from the motion that a few matches give.
+  // Aligns the frame with `other`, beginning at `guess`, else at the motion from a few matches.
   std::optional<PoseLink> align(std::size_t frame, std::size_t other,
                                 const std::optional<Pose>& guess) {
     std::optional<PoseLink> link;
@@ -114,7 +114,7 @@ class LostFrames {
     return link;
   }
 
-  // Joins the frame's part to that of the node `at`, moved so that the frame is at `place`.
+  // Joins the frame's part to the part of the node `at`, moved so that the frame is at `target`.
   void move_part(std::size_t frame, int at, const Pose& target) {
     const Pose move = target * pose(frame).inverse();
     const std::vector<int> nodes = std::exchange(result_.parts[part(frame)], {});

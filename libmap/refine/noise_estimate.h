@@ -15,14 +15,14 @@ namespace libmap {
 
 struct NoiseEstimate {
   DepthNoise noise{};
-  std::size_t residuals = 0;  // number of residuals used
-  double nearest_m = 0.0;     // minimum range of the residuals
-  double farthest_m = 0.0;
-  double largest_ratio = 1.0;  // >= 1: maximum of estimated / assumed noise or assumed / estimated
+  std::size_t residuals = 0;   // number of residuals used
+  double nearest_m = 0.0;      // median range of the nearest tenth of the residuals
+  double farthest_m = 0.0;     // median range of the farthest tenth
+  double largest_ratio = 1.0;  // >= 1: maximum of estimated / assumed noise and its inverse
 };
 
 // Fits non-negative constant, linear and quadratic terms to the robust spread of the residuals in
-// bins of range. Returns nullopt for fewer than a thousand residuals.
+// ten bins of range. Returns nullopt for fewer than a thousand finite residuals.
 std::optional<NoiseEstimate> estimate_noise(const std::vector<SurfaceResidual>& residuals,
                                             const DepthNoise& assumed);
 
@@ -30,19 +30,19 @@ std::optional<NoiseEstimate> estimate_noise(const std::vector<SurfaceResidual>& 
 struct ScanNoise {
   DepthNoise noise{};
   bool is_estimated = false;  // the estimate replaces the assumed noise
-  std::string sentence{};     // noise and source
+  std::string sentence{};     // noise and its source, for reports
 };
-// Replaces the assumed noise by an estimate that differs by a factor of 1.8.
+// Returns the estimate if it differs from the assumed noise by more than a factor of 1.8 at any
+// range, else the assumed noise.
 ScanNoise choose_noise(const std::vector<SurfaceResidual>& residuals, const DepthNoise& assumed);
 
-// Chooses the noise by held-out depth of up to 12 pairs of near frames, each aligned by the rest of
-// its depth. Noise that is given by a sensor or by other terms than the default ones is kept.
-// Frames that cannot be read are ignored.
+// Chooses the noise by the held-out depth of up to 12 pairs of near frames, which the other depth
+// aligns. The noise of `planes` is kept if is_noise_given. Frames that cannot be read are ignored.
 ScanNoise choose_noise(const ScanSource& scan, const Trajectory& world_from_base,
                        const std::string& sensor, const DepthPlaneOptions& planes,
                        Progress& progress = no_progress());
 
-// Returns true if the noise is not the default one, or a sensor has it.
+// Returns true if `sensor` is not "auto", or an axial term of the noise is not the default.
 bool is_noise_given(const std::string& sensor, const DepthNoise& noise);
 
 // Returns the terms as text, e.g. "1.2 mm + 0.10 % of range + 1.9 mm/m2 of range squared".

@@ -25,8 +25,7 @@ constexpr int max_calibrations = 3;
 constexpr double settled_m = 5e-4;
 constexpr double settled_rad = 3e-4;
 constexpr double settled_s = 1e-3;
-// Errors of features in images of one location are correlated, which residuals do not show.
-// Measured on simulated scans.
+// Features of one location have correlated errors. Measured on simulated scans.
 constexpr double min_deviation_scale = 1.3;
 constexpr double explained_cost = 0.35;  // of held-out matches; 0.26 for normal errors
 
@@ -64,8 +63,8 @@ bool is_all_tracked(const RefinementInput& input, const RefinementState& state) 
   });
 }
 
-// Nodes with undetermined poses: those of parts that visual odometry began and no link joins. With
-// one_map, all parts but the largest.
+// Returns nodes with undetermined poses: parts from visual odometry that no link joins to others.
+// With one_map, all parts but the largest.
 std::vector<int> unjoined(const RefinementInput& input, const RefinementState& state,
                           const std::vector<std::vector<int>>& parts) {
   std::vector<int> left;
@@ -144,8 +143,8 @@ struct Run {
   bool propose(StageResult stage) { return propose(std::move(stage), state); }
 };
 
-// Poses that the depth images contradict follow another convention or unit. Sessions are in frames
-// of their own, of which the largest is compared.
+// Warns if depth images contradict the poses, which then have another convention or unit. Only the
+// largest part is compared, because each part has its own frame.
 void warn_of_contradictions(Run& run) {
   const RefinementState& state = run.state;
   if (state.poses.empty()) return;
@@ -159,7 +158,7 @@ void warn_of_contradictions(Run& run) {
     });
   const PoseConsistency found = check_pose_consistency(run.input.scan, poses);
   if (std::string warning = found.warning(); !warning.empty())
-    run.state.warnings.push_back("stored poses: " + std::move(warning));
+    run.state.warnings.push_back("initial poses: " + std::move(warning));
 }
 
 void start(Run& run) {
@@ -185,7 +184,8 @@ void start(Run& run) {
     run.result.without_pose = std::move(initial.without_pose);
     if (!run.result.without_pose.empty())
       state.warnings.push_back(std::to_string(run.result.without_pose.size()) +
-                               " nodes have no pose from odometry or links and are skipped");
+                               " nodes have neither a pose of this source nor a link to a node "
+                               "with a pose; they are skipped");
   }
   warn_of_contradictions(run);
   run.report({.name = "start: " + initial.source});
@@ -232,8 +232,7 @@ void find_frames(Run& run, const FeatureCache& cache) {
   run.report({.name = "board", .metrics = {{"images", input.board_views.size()}}});
 }
 
-// Computes poses of all nodes by visual odometry and links, from the initial poses. The suffix is
-// added to the names of the stages.
+// Computes poses of all nodes by visual odometry and links; stage names end with the suffix.
 void link_frames(Run& run, const std::string& suffix = {}) {
   const RefinementInput& input = run.input;
   RefinementState& state = run.state;
@@ -263,8 +262,7 @@ void link_frames(Run& run, const std::string& suffix = {}) {
   state.information = link_system(state.poses, state.graph.links);
 }
 
-// Tracks and links frames again with the calibration. With a rolling shutter, few matches agree on
-// a rigid motion, so that frames are lost.
+// Tracks and links frames again, because an uncorrected rolling shutter causes lost frames.
 void link_again(Run& run) {
   RefinementState before = run.state;
   run.state.poses = run.input.start;
@@ -323,8 +321,7 @@ bool adapt_noise(Run& run) {
   return true;
 }
 
-// Repeats the calibration with features that are matched with it, because a wrong stored
-// calibration hides matches.
+// Repeats calibration and matching, because a wrong stored calibration hides matches.
 void calibrate_sensor(Run& run) {
   RefinementState& state = run.state;
   for (int pass = 1; pass <= max_calibrations; ++pass) {
@@ -404,8 +401,7 @@ std::map<int, Matrix6d> covariances(const RefinementInput& input, const Refineme
   return of_nodes;
 }
 
-// Drops components that are not connected to the largest one, because their poses are
-// undetermined.
+// Drops components without links to the largest one, because their poses are undetermined.
 void drop_unjoined(const RefinementInput& input, const RefinementState& state,
                    RefinementResult& result) {
   std::vector<std::vector<int>> parts;
@@ -415,9 +411,8 @@ void drop_unjoined(const RefinementInput& input, const RefinementState& state,
     return std::find(left.begin(), left.end(), part.front()) == left.end();
   });
   if (kept > 1)
-    result.warnings.push_back(
-        "the scan has " + std::to_string(kept) +
-        " parts of the scan are not connected by links; relative poses between parts are unknown");
+    result.warnings.push_back("no link connects " + std::to_string(kept) +
+                              " parts of the scan; the relative poses of these parts are unknown");
   if (input.odometry_nodes.empty() && !input.options.one_map) return;
   for (const int node : left) result.covariance.erase(node);
   std::sort(left.begin(), left.end());
@@ -509,37 +504,40 @@ void bind(ParameterTable& table, RefinementOptions& options) {
             "source of the initial poses; odometry, stored: poses of the scan; visual: images "
             "only; auto: odometry if complete, else stored poses, links or images");
   table.add("rounds", options.rounds, not_negative,
-            "maximum number of rounds in which loop closures are searched");
+            "maximum number of rounds in which loop closures are searched for; 0: only consecutive "
+            "frames are linked");
   bind(table, options.features);
   bind(table, options.odometry);
   bind(table, options.closures);
   bind(table, options.graph);
   table.add("bundle", options.bundle, "refine poses and landmarks by bundle adjustment");
   table.add("sensor", options.sensor,
-            "depth camera: a name in data/sensors or a file, from which noise, depth range, timing "
-            "and bounds are taken; auto: the noise is estimated");
+            "depth camera: a name in data/sensors or a file, from which depth noise, depth range, "
+            "timing and bounds of the calibration are taken unless options set them; auto: the "
+            "noise is estimated");
   table.add("intrinsics", options.intrinsics,
             {{"fixed", IntrinsicsMode::fixed},
              {"refined", IntrinsicsMode::refined},
              {"auto", IntrinsicsMode::automatic}},
-            "focal length and principal point; fixed: as stored; refined: estimated; auto: "
-            "estimated if held-out matches then fit better");
+            "treatment of focal length and principal point; fixed: as stored; refined: estimated; "
+            "auto: estimated if held-out data then fit better");
   table.add("correct_depth", options.correct_depth,
-            "estimate a correction of depth by range and radius if the held-out data fit better "
-            "with it");
-  table.add("register_depth", options.register_depth,
-            "estimate the registration of depth to color if the held-out data fit better with it; "
-            "otherwise displaced edges are only a warning");
+            "estimate a depth correction by depth and distance from the image center, and use it "
+            "if held-out data then fit better");
+  table.add(
+      "register_depth", options.register_depth,
+      "estimate the registration of depth to color, and use it if held-out data then fit better; "
+      "if false, depth edges that are displaced from color edges only cause a warning");
   table.add("estimate_timing", options.estimate_timing,
-            "estimate the depth delay and the rolling shutter time if the held-out data fit better "
-            "with them");
+            "estimate the delay of depth and the rolling shutter time, and use them if held-out "
+            "data then fit better");
   table.add("scale_from", options.scale_from,
             {{"depth", ScaleSource::depth}, {"odometry", ScaleSource::odometry}},
-            "source of the scale without a factor, length or board; depth: images; odometry: "
-            "links");
+            "source of the scale if no scale factor, known length or board is given; depth: depth "
+            "images; odometry: odometry links of the scan");
   table.add("scale", options.scale, {0.5, 2.0},
-            "known scale factor of the scan, e.g. as printed by crop --border-size; 1: no factor "
-            "is known");
+            "known factor by which poses and depth are multiplied, e.g. as printed by crop "
+            "--border-size; 1: no factor is known");
   bind(table, options.bundle_adjustment);
   bind(table, options.icp);
   table.add("seed", options.seed, not_negative, "random seed");
@@ -595,17 +593,18 @@ void describe(ResultTable& table, const RefinementResult& result) {
     rotation_deg = result.stages.back().error->absolute.mean_rotation_deg;
   }
   table.add("poses", result.poses.size(), "number of poses");
-  table.add("links", result.links.size(), "number of links between poses");
+  table.add("links", result.links.size(), "number of links between nodes");
   table.add("closures_found", result.closures.size(), "number of links found by refinement");
   table.add("parts", result.components.size(), "number of connected components of the pose graph");
   table.add("nodes_without_pose", result.without_pose.size(), "number of nodes without a pose");
   table.add("nodes_without_links", result.without_links.size(), "number of nodes without links");
-  table.add("frames_skipped", result.skipped.size(), "number of frames without features");
+  table.add("frames_skipped", result.skipped.size(),
+            "number of frames that cannot be read or have no depth");
   table.add("features", result.features, "number of features of all frames");
   table.add("sensor", sensor, "findings about the sensor, such as calibration errors");
   table.add("noise", result.noise, "depth noise and its source");
   table.add("scale", result.scale, "source and uncertainty of the scale");
-  table.add("rejected_stages", rejected, "names of rejected stages");
+  table.add("rejected_stages", rejected, "number of rejected stages");
   table.add("trajectory_rmse_m", rmse_m, "absolute trajectory error against true poses (RMS), m");
   table.add("trajectory_rotation_error_deg", rotation_deg,
             "mean rotation error against true poses, degrees");

@@ -35,7 +35,7 @@ namespace libmap {
 // held-out observations then fit significantly better.
 enum class IntrinsicsMode { fixed, refined, automatic };
 
-// Source of the scale if no factor, lengths or board are given.
+// Source of the scale if no factor, known length or board is given. odometry: links of the scan.
 enum class ScaleSource { depth, odometry };
 
 struct RefinementOptions {
@@ -43,13 +43,13 @@ struct RefinementOptions {
   int rounds = 5;  // >= 0: maximum number of rounds of loop closures
   bool bundle = true;
   IntrinsicsMode intrinsics = IntrinsicsMode::automatic;
-  // Name in data/sensors or a path. Noise, useful range, timing and bounds of the sensor replace
-  // options with default values. "auto": the noise is estimated.
+  // Name in data/sensors or path of a sensor, which replaces the defaults of noise, depth range,
+  // timing and bounds. "auto": the noise is estimated.
   std::string sensor = "auto";
   // Parts of a calibration that are estimated if the held-out data then fit better.
-  bool correct_depth = true;    // bend of depth by range and radius
+  bool correct_depth = true;    // correction by depth and distance from the image center
   bool register_depth = true;   // registration of depth to color
-  bool estimate_timing = true;  // delay of depth, and time of the rows of an image
+  bool estimate_timing = true;  // depth delay and rolling shutter time
   FeatureOptions features{};
   VisualOdometryOptions odometry{};
   LoopClosureDetectionOptions closures{};
@@ -57,10 +57,10 @@ struct RefinementOptions {
   BundleAdjustmentOptions bundle_adjustment{};
   IcpOptions icp{.iterations = 8};  // more do not change the results of simulated scans
   ScaleSource scale_from = ScaleSource::depth;
-  double scale = 1.0;  // 0.5..2: known factor of poses and depth; 1: none is known
-  std::vector<KnownLength> known_lengths{};  // not bound; determine the scale
-  std::optional<Chessboard> board{};         // not bound; a static board determines the scale
-  bool one_map = false;  // not bound: no poses for parts without links to the largest part
+  double scale = 1.0;  // 0.5..2: known factor for poses and depth; 1: no factor is known
+  std::vector<KnownLength> known_lengths{};  // no parameter of commands
+  std::optional<Chessboard> board{};         // no parameter of commands; must not move
+  bool one_map = false;  // no parameter of commands; only the largest linked part gets poses
   std::uint64_t seed = 1;
 };
 void bind(ParameterTable& table, RefinementOptions& options);
@@ -74,12 +74,12 @@ struct StageError {
 struct StageReport {
   std::string name{};
   bool rejected = false;
-  RejectionCounts closures{};                             // of this stage only
-  HeldOutEvaluation held_out{};                           // on the links of all stages so far
-  std::map<std::string, LinkGroupResult> groups{};        // of an optimized pose graph
-  std::vector<std::pair<std::string, double>> metrics{};  // metrics of the stage
+  RejectionCounts closures{};                             // counts of this stage's candidates
+  HeldOutEvaluation held_out{};                           // after against before, all links so far
+  std::map<std::string, LinkGroupResult> groups{};        // if the stage optimizes the pose graph
+  std::vector<std::pair<std::string, double>> metrics{};  // name and value
   std::vector<std::string> warnings{};
-  std::optional<StageError> error{};
+  std::optional<StageError> error{};           // nullopt without true poses
   std::optional<StageError> rejected_error{};  // of the poses of a rejected stage
   double seconds = 0.0;
   double processor_seconds = 0.0;
@@ -89,18 +89,19 @@ struct RefinementResult {
   Trajectory poses;                // map from base, by ascending node
   std::vector<PoseLink> links;     // accepted: stored links as recalibrated, then found links
   std::vector<PoseLink> closures;  // found links among `links`
-  // Covariance of a step of each pose relative to the component's gauge node, in units of the depth
-  // camera. Includes the uncertainty of the calibration, but not the depth camera's scale error.
+  // Covariance of a step of each node's pose (rigid_motion.h) relative to the component's gauge
+  // node, at the scale of the depth camera; empty if the poses are not determined. Includes the
+  // uncertainty of the calibration, but not the depth camera's scale error.
   std::map<int, Matrix6d> covariance;
   std::vector<GraphComponent> components;
   std::vector<StageReport> stages;             // "start" first
   std::vector<std::pair<int, Error>> skipped;  // nodes of frames without features, with the reason
-  std::vector<int> without_pose;
-  std::vector<TrackingLoss> losses;  // of visual odometry
-  std::vector<int> without_links;
-  std::vector<PoseLink> rejected_links;  // stored links that the optimization rejected
+  std::vector<int> without_pose;               // nodes
+  std::vector<TrackingLoss> losses;            // of visual odometry
+  std::vector<int> without_links;              // nodes
+  std::vector<PoseLink> rejected_links;        // stored links that the optimization rejected
   std::size_t features = 0;
-  SensorCalibration calibration;      // as estimated
+  SensorCalibration calibration;      // empty: the stored cameras are kept
   SensorCalibration deviations;       // BundleAdjustmentResult::deviations
   std::vector<Camera> cameras;        // of the images, as stored
   std::vector<std::string> findings;  // about the sensor, one sentence each
@@ -111,11 +112,11 @@ struct RefinementResult {
 void describe(ResultTable& table, const RefinementResult& result);
 
 // Refines the poses of a scan. Visual odometry estimates the poses of nodes that have neither a
-// pose nor links (StartPoses::automatic, visual). Its parts without links to the largest part get
-// no poses, because these would be undetermined. The output bytes do not depend on the number of
-// threads. Throws Error if an option is out of range, the requested poses are missing, no two
-// frames match and nothing else determines poses, the scale is determined twice, or known lengths,
-// board or odometry do not determine it.
+// pose nor links (StartPoses::automatic, visual). Parts of visual odometry without links to the
+// largest part get no poses, because these would be undetermined. The output bytes do not depend on
+// the number of threads. Throws Error if an option is out of range, the requested initial poses are
+// missing, no two frames match and the scan has no links, two options determine the scale, known
+// lengths, board or odometry do not determine it, or the focal length of depth is wrong.
 RefinementResult refine_poses(const ScanSource& scan, const RefinementOptions& options = {},
                               Progress& progress = no_progress(), const FeatureCache& cache = {});
 

@@ -48,7 +48,7 @@ void add_figures(const CalibrationEstimate& estimate, StageReport& report) {
     add(camera + "cy_px", found.intrinsics[n].cy_px);
   }
   for (const auto& [model, reason] : estimate.impossible)
-    report.warnings.push_back(model + " was not accepted: " + reason);
+    report.warnings.push_back("calibration " + model + " was not accepted: " + reason);
   for (std::size_t n = 0; n < found.timing.size(); ++n) {
     const std::string camera = "camera_" + std::to_string(n) + "_";
     add(camera + "depth_delay_s", found.timing[n].depth_delay_s);

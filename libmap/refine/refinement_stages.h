@@ -26,7 +26,7 @@ struct RefinementInput {
   std::vector<BoardView> board_views{};
   // Matches of pairs of frames, cached for matching with another calibration.
   KnownMatches* known_matches = nullptr;
-  Pose color_from_depth = Pose::Identity();  // by which the depth of `scan` has been registered
+  Pose color_from_depth = Pose::Identity();  // coarse registration that `scan` applies
 };
 
 // Frames are shared between states; a stage that changes frames creates new ones.
@@ -34,12 +34,12 @@ using SharedFrames = std::shared_ptr<std::vector<FrameFeatures>>;
 
 // State that stages change.
 struct RefinementState {
-  std::map<int, Pose> poses{};            // of nodes and, below 0, of landmarks
+  std::map<int, Pose> poses{};            // map_from_base by node; ids below 0: landmarks
   std::vector<std::vector<int>> parts{};  // nodes with poses in one frame
   SharedFrames frames{};                  // with the calibration applied
   SharedFrames stored_frames{};           // with the stored cameras
   SensorCalibration calibration{};
-  std::vector<GraphLink> other_links{};  // of the scan, and from alignment of depth images
+  std::vector<GraphLink> other_links{};  // links of the scan, and from ICP of lost frames
   std::vector<FeatureLink> feature_links{};
   std::set<FramePair> tried_pairs{};   // pairs of frames that have been compared
   PoseGraphResult graph{};             // links: other_links, then feature_links
@@ -59,9 +59,9 @@ struct RefinementState {
   }
 };
 
-inline constexpr const char* depth_link_group = "depth odometry";
+inline constexpr const char* depth_link_group = "depth odometry";  // links by ICP
 
-// Returns the input of a calibration. It refers to the state and to `other_links`.
+// Returns the input of a calibration, which contains references to the state and `other_links`.
 CalibrationInput calibration_input(const RefinementInput& input, const RefinementState& state,
                                    const std::vector<GraphLinkResult>& other_links);
 
@@ -75,14 +75,14 @@ struct StageResult {
   bool is_validated = false;  // the stage has compared held-out observations itself
 };
 
-// Estimates poses of nodes without a pose by visual odometry. Its motions become feature links.
+// Estimates poses of nodes without a pose by visual odometry, whose motions become feature links.
 StageResult track_stage(const RefinementInput& input, const RefinementState& state);
 
 // Optimizes the pose graph of all links without recalibration; closures are checked against it.
 PoseGraphResult graph_as_stored(const RefinementInput& input, const RefinementState& state);
 
-// Pairs of frames to match in a round. Round 0: consecutive frames, from which the noise of the
-// odometry is estimated. Round 1: similar and near frames. Later rounds: frames with near poses.
+// Returns pairs of frames to match in a round. Round 0: consecutive frames, from which the noise of
+// the odometry is estimated. Round 1: similar and near frames. Later: near frames.
 std::set<FramePair> candidate_pairs(const RefinementInput& input, const RefinementState& state,
                                     int round);
 // Links pairs of frames by features and optimizes the pose graph.
@@ -94,11 +94,11 @@ StageResult depth_link_stage(const RefinementInput& input, const RefinementState
 // Drops feature links that the pose graph has rejected. Returns the number of dropped links.
 std::size_t drop_rejected_links(RefinementState& state);
 
-// Bundle adjustment with the stored cameras.
+// Adjusts the poses by bundle adjustment with the cameras of `state.frames`.
 StageResult bundle_stage(const RefinementInput& input, const RefinementState& state);
 
-// Bundle adjustment with free intrinsics, depth correction, registration and timing. The frames of
-// `state` have stored cameras. The search begins at the calibration of `state`, if any, and
+// Estimates intrinsics, depth correction, registration and timing by bundle adjustment. The frames
+// of `state` have stored cameras. The search begins at the calibration of `state`, if any, and
 // estimates only the parts of that calibration.
 StageResult calibrate_stage(const RefinementInput& input, const RefinementState& state);
 // Matches linked frames again, because a false calibration causes missed and false matches.
@@ -108,7 +108,7 @@ std::vector<FeatureLink> rematched_links(const RefinementInput& input,
 // Returns the linear system of the poses at the state's calibration, for covariances.
 BlockSystem information_of(const RefinementInput& input, const RefinementState& state);
 
-// ICP of all overlapping depth images.
+// Aligns overlapping depth images by ICP, all or only linked ones (IcpOptions::mode).
 StageResult surface_stage(const RefinementInput& input, const RefinementState& state);
 
 // Steps of each node's pose, one per independent change of the calibration by one standard
@@ -124,7 +124,7 @@ struct ScaleResult {
   std::optional<StageResult> stage{};  // with the corrected scale
 };
 // Determines the scale from known lengths, a board, a given factor or odometry, else the depth
-// camera. Throws Error if the option's source does not determine it.
+// camera. Throws Error if the requested source does not determine the scale.
 ScaleResult scale_stage(const RefinementInput& input, const RefinementState& state,
                         const std::map<int, Matrix6d>& covariance, const CalibrationMoves& moves);
 

@@ -47,7 +47,7 @@ MeasuredEnd measured_end(const KnownLength::End& length_end,
   });
   const auto pose = map_from_base.find(length_end.node);
   if (found == frames.end() || found->cameras.empty() || pose == map_from_base.end())
-    refuse(length_end, "the node has no frame with a pose", "a node with a pose");
+    refuse(length_end, "the node has no usable images or no pose", "a node with images and a pose");
   FrameFeatures frame;
   frame.node = found->node;
   frame.cameras = found->cameras;
@@ -109,8 +109,8 @@ ScaleEstimate scale_by_lengths(const std::vector<FrameFeatures>& frames,
     const double distance = (to.in_map - from.in_map).norm();
     const double deviation = std::sqrt(from.variance + to.variance);
     if (!(distance > 3.0 * deviation))
-      refuse(known.to, "the other end is too near: the distance is within the noise of depth",
-             "> " + to_fixed_text(3e3 * deviation, 1) + " mm");
+      refuse(known.to, "the distance to the other end is within three times the depth noise",
+             "more than " + to_fixed_text(3e3 * deviation, 1) + " mm from the other end");
     const double ratio = known.length_m / distance;
     const double weight = std::pow(distance / (ratio * deviation), 2);
     ratios.push_back({ratio, weight});

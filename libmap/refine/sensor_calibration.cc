@@ -544,7 +544,7 @@ std::vector<std::string> findings(const SensorCalibration& calibration,
   for (std::size_t n = 0; n < std::min(calibration.color_from_depth.size(), cameras.size()); ++n) {
     const Pose& pose = calibration.color_from_depth[n];
     sentences.push_back(
-        of_camera(n) + "depth registered to color " +
+        of_camera(n) + "registration of depth to color " +
         to_fixed_text(1e3 * pose.translation().norm(), 1) + " mm and " +
         to_fixed_text(rotation_vector_of(pose.linear()).norm() * 180.0 / std::numbers::pi, 2) +
         " deg off: corrected");

@@ -33,7 +33,7 @@ struct CalibrationParts {
   bool timing = false;
 
   bool operator==(const CalibrationParts&) const = default;
-  std::string name() const;  // "intrinsics_depth"; empty for none
+  std::string name() const;  // names joined by _, e.g. "intrinsics_depth"; empty for none
 };
 // Returns the parts that the calibration contains.
 CalibrationParts parts_of(const SensorCalibration& calibration);
@@ -42,33 +42,33 @@ struct CalibrationChoice {
   CalibrationParts parts{true, true, true, true};  // parts that may be estimated
   bool only_if_better = true;  // require that the held-out data fit clearly better
   bool drop_unneeded = true;   // drop parts that are not needed
-  // Estimate the registration with every model, because depth has been registered coarsely. Other
-  // parts would absorb the error of that registration.
+  // Estimate the registration with every model. Required for depth that is registered coarsely,
+  // because other parts would absorb the error of that registration.
   bool keeps_registration = false;
   bool converge = true;     // iterate the best model to the tolerance of the options
-  SensorCalibration start;  // initial values of registration and timing
+  SensorCalibration start;  // initial values; empty: the stored cameras
 };
 
 struct CalibrationEstimate {
   std::size_t frames = 0;             // number of frames used
   SensorCalibration calibration;      // empty: the stored calibration remains
-  BundleAdjustmentResult adjustment;  // of these frames, best model; without information
-  HeldOutEvaluation held_out;         // of these frames: stored calibration against best model
+  BundleAdjustmentResult adjustment;  // best model on these frames, without information
+  HeldOutEvaluation held_out;         // best model against stored calibration, these frames
   std::vector<std::pair<std::string, HeldOutEvaluation>>
       evaluated_models;                                         // held_out of each model
-  std::vector<std::pair<std::string, std::string>> impossible;  // models, and exceeded bounds
+  std::vector<std::pair<std::string, std::string>> impossible;  // models and the bounds they exceed
 };
 
 // Selects a calibration by bundle adjustments. Timing alone is tried first; it is the result if the
 // other parts do not clearly improve the fit. Otherwise intrinsics, depth corrections and
-// registration are estimated together, because a false focal length absorbs depth errors. Each is
-// then dropped unless the held-out data fit clearly worse without it. If the joint model does not
-// fit clearly better, intrinsics alone are tried. Timing is then tried with the rest. A long scan
-// is represented by 80 linked frames. Throws Error if an option is out of range.
+// registration are estimated together, because a false focal length absorbs depth errors. Each of
+// these parts is then dropped unless the held-out data fit clearly worse without it. If the joint
+// model does not fit clearly better, intrinsics alone are tried. Timing is then tried with the
+// remaining parts. At most 80 linked frames are used. Throws Error if an option is out of range.
 CalibrationEstimate estimate_calibration(const CalibrationInput& input,
                                          const CalibrationChoice& choice);
 
-// Repeats the calibration from the values of `known`, with `count` alternatives.
+// Repeats the adjustment of the parts of `known` from their values, with `count` alternatives.
 BundleAdjustmentResult vary_calibration(const CalibrationInput& input,
                                         const SensorCalibration& known, std::size_t count);
 
@@ -78,7 +78,7 @@ BundleAdjustmentResult vary_calibration(const CalibrationInput& input,
 void estimate_motions(const CalibrationInput& input, bool fixes_poses,
                       SensorCalibration& calibration, const SensorCalibration& known = {});
 
-// Returns true if registrations and timings of all cameras differ by at most these bounds.
+// Returns true if registration and timing of each camera differ by at most these bounds.
 bool is_similar_registration(const SensorCalibration& a, const SensorCalibration& b, double shift_m,
                              double turn_rad, double time_s);
 
@@ -87,8 +87,7 @@ bool is_similar_registration(const SensorCalibration& a, const SensorCalibration
 CameraFile calibrated_camera(const Camera& stored, const Camera& image,
                              const SensorCalibration& calibration, const PoseGraph& graph);
 
-// Returns one sentence per fault that was corrected; `deviations` are
-// BundleAdjustmentResult::deviations.
+// Returns one sentence per corrected fault of a camera; `deviations` are standard deviations.
 std::vector<std::string> findings(const SensorCalibration& calibration,
                                   const SensorCalibration& deviations,
                                   const std::vector<Camera>& cameras);

@@ -20,10 +20,8 @@ constexpr std::size_t longest_gap = 4;      // maximum gap in frames that one ma
 constexpr std::size_t longest_run = 16;     // maximum number of pairs verified at once
 constexpr double motion_agreement_m = 0.1;  // between two motions to one frame
 constexpr double motion_agreement_rad = 5.0 * std::numbers::pi / 180.0;
-
 constexpr double max_extrapolation = 2.0;  // in lengths of the last motion
-
-constexpr double min_factor = 1e-3;  // minimum variance factor, for data without noise
+constexpr double min_factor = 1e-3;        // minimum variance factor, for data without noise
 
 struct Trial {
   RejectionCounts counts{};
@@ -37,8 +35,7 @@ std::string reason_of(const RejectionCounts& counts) {
   return "motion did not converge";
 }
 
-// Scales the link's covariance by the a posteriori variance factor of its matches: the sum of
-// chi-squares divided by the degrees of freedom.
+// Scales the link's covariance by the variance factor of its matches: chi-square per freedom.
 void calibrate(const FrameFeatures& a, const FrameFeatures& b, FeatureLink& link) {
   double squares = 0.0;
   for (const FeatureMatch& match : link.matches)
@@ -434,11 +431,14 @@ void bind(ParameterTable& table, VisualOdometryOptions& options) {
             "visual odometry: number of matches with the key frame below which a frame becomes the "
             "next key frame");
   table.add("keyframe_distance_m", options.keyframe_distance_m, positive,
-            "visual odometry: maximum distance between a frame and the key frame, m");
+            "visual odometry: distance from the key frame above which a frame becomes the next key "
+            "frame, m");
   table.add("keyframe_angle_deg", options.keyframe_angle_deg, positive,
-            "visual odometry: maximum rotation between a frame and the key frame, degrees");
+            "visual odometry: rotation from the key frame above which a frame becomes the next key "
+            "frame, degrees");
   table.add("relocalization_candidates", options.relocalization_candidates, not_negative,
-            "number of similar earlier frames with which a lost frame is compared");
+            "visual odometry: number of similar earlier frames with which a lost frame is "
+            "compared; 0: lost frames are not relocalized");
 }
 
 VisualOdometryResult track_frames(const std::vector<FrameFeatures>& frames,
@@ -476,9 +476,9 @@ std::string describe(const std::vector<TrackingLoss>& losses) {
     text +=
         (n > 0 ? "; " : "") + std::string("node ") + std::to_string(loss.node) + ", " + loss.reason;
     if (loss.relocalized_node == loss.node)
-      text += ", found again at node " + std::to_string(loss.relocalized_at);
+      text += ", relocalized at node " + std::to_string(loss.relocalized_at);
     else if (loss.relocalized_node > 0)
-      text += ", found again by node " + std::to_string(loss.relocalized_node) + " at node " +
+      text += ", relocalized by node " + std::to_string(loss.relocalized_node) + " at node " +
               std::to_string(loss.relocalized_at);
   }
   if (losses.size() > most) text += "; and " + std::to_string(losses.size() - most) + " more";

@@ -20,14 +20,14 @@ struct VisualOdometryOptions {
   int keyframe_inliers = 100;         // >= 0: fewer matches with the key frame
   double keyframe_distance_m = 0.3;   // > 0: larger distance from the key frame
   double keyframe_angle_deg = 20.0;   // > 0: larger rotation from the key frame
-  int relocalization_candidates = 8;  // >= 0: most similar earlier frames compared with a lost one
+  int relocalization_candidates = 8;  // >= 0: similar earlier frames compared with a lost one
 };
 void bind(ParameterTable& table, VisualOdometryOptions& options);
 
-// Known sessions and poses.
+// Sessions, and poses that are known before tracking.
 struct TrackingStart {
-  std::map<int, int> session;           // by node, 0 by default; tracks end with the session
-  std::map<int, Pose> map_from_base;    // known poses, which are not changed
+  std::map<int, int> session;           // by node; 0 by default; tracks end with their session
+  std::map<int, Pose> map_from_base;    // known poses by node, which are not changed
   std::vector<std::vector<int>> parts;  // disjoint groups of nodes with known poses in one frame
   std::map<int, Pose> first;            // pose of a new part's first node; the identity by default
 
@@ -40,33 +40,33 @@ struct TrackingStart {
 // A node that could not be tracked.
 struct TrackingLoss {
   int node = 0;
-  int key_frame = 0;  // node that it was compared with; 0: none
-  std::string reason{};
-  int relocalized_node = 0;  // relocalized node: this one or a later one of the part; 0: none
-  int relocalized_at = 0;    // earlier node that found_node was relocalized at
+  int key_frame = 0;         // node of the key frame that did not match; 0: none
+  std::string reason{};      // e.g. "too few matches"
+  int relocalized_node = 0;  // this node or a later one of its part, once relocalized; 0: none
+  int relocalized_at = 0;    // node with which relocalized_node was matched
 };
 
-// Returns text on the first losses: node, reason, and where it was found again.
+// Returns text on the first five losses: node, reason, and the nodes of the relocalization.
 std::string describe(const std::vector<TrackingLoss>& losses);
 
 struct VisualOdometryResult {
-  std::map<int, Pose> map_from_base;    // of all frames, and the known poses
+  std::map<int, Pose> map_from_base;    // by node: all frames, and the known poses
   std::vector<std::vector<int>> parts;  // nodes with poses in one frame; possibly a single node
-  // Tracked frames (LinkType::neighbor) and relocalized frames (local_space_closure).
+  // Links of tracked frames (LinkType::neighbor) and of relocalized frames (local_space_closure).
   std::vector<FeatureLink> links;
-  std::vector<PoseLink> depth_links;  // of frames tracked by depth only
+  std::vector<PoseLink> depth_links;  // links of frames tracked by depth only
   std::set<FramePair> tried_pairs;    // pairs that need not be tried again
-  std::vector<int> key_frames;
+  std::vector<int> key_frames;        // nodes, ascending
   std::vector<TrackingLoss> losses;
-  std::size_t relocalized = 0;  // parts joined to others, and frames found again
+  std::size_t relocalized = 0;  // number of relocalized frames, with or without a part
 };
 
 // Tracks frames in the order of the list. A frame that matches neither the key frame nor the last
 // frame (verify_pairs) is tracked by depth (align_pair), from the pose that constant motion or a
 // few matches (guess_motion) predict. If this fails too, the frame is lost. It is relocalized if
-// the motions to two earlier frames agree, else it begins a part, which a later key frame may join
-// to another. Covariances of motions (estimate_relative_pose) are scaled by the residuals. The
-// result does not depend on the number of threads. Throws Error if an option is out of range.
+// the motions to two earlier frames agree, else it begins a new part, which a later key frame may
+// join to another part. Covariances of motions (estimate_relative_pose) are scaled by the
+// residuals. Throws Error if an option is out of range.
 VisualOdometryResult track_frames(const std::vector<FrameFeatures>& frames,
                                   const TrackingStart& start,
                                   const LoopClosureDetectionOptions& matching,
@@ -78,7 +78,7 @@ VisualOdometryResult track_frames(const std::vector<FrameFeatures>& frames,
 // nearest frames of larger parts before and after them. The initial pose is from constant motion,
 // interpolated between both sides or extrapolated from one, else from a few matches (guess_motion).
 // Alignments with both sides must agree. In `result` the frame's part is then joined to the larger
-// parts, and the links are added to depth_links. `start` has sessions and nodes with known poses.
+// parts, and the links are added to depth_links. `start` contains sessions and known poses.
 void place_lost_frames(const std::vector<FrameFeatures>& frames, const TrackingStart& start,
                        const LoopClosureDetectionOptions& matching, std::uint64_t seed,
                        VisualOdometryResult& result);

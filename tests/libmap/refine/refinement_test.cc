@@ -146,7 +146,7 @@ std::string convention_warning(const TexturedScan& scan) {
   options.rounds = 0;
   options.icp.mode = libmap::IcpMode::off;
   for (const std::string& warning : libmap::refine_poses(scan, options).warnings)
-    if (warning.starts_with("stored poses: ")) return warning;
+    if (warning.starts_with("initial poses: ")) return warning;
   return {};
 }
 
