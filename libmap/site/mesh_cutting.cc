@@ -299,8 +299,8 @@ void require_finite(const TriangleMesh& mesh) {
   for (std::size_t n = 0; n < mesh.triangles.size(); ++n)
     for (const std::uint32_t v : mesh.triangles[n])
       if (!mesh.vertices[v].allFinite())
-        throw Error("the vertex is not finite", {.field = "triangle " + std::to_string(n),
-                                                 .value = "vertex " + std::to_string(v)});
+        throw Error("a coordinate is not finite",
+                    {.field = "vertex " + std::to_string(v) + " of triangle " + std::to_string(n)});
 }
 
 enum class Location : char { outside, inside, on_border };
