@@ -255,10 +255,10 @@ void bind(ParameterTable& table, CameraTrajectoryOptions& options) {
             {{"auto", CameraPath::automatic},
              {"loops", CameraPath::loops},
              {"serpentine", CameraPath::serpentine}},
-            "camera path; loops: around the site; serpentine: in lanes; auto: serpentine for "
-            "clouds");
+            "camera path; loops: around the site; serpentine: in parallel lanes; auto: loops for a "
+            "mesh, serpentine for a cloud");
   bind(table, options.serpentine);
-  table.add("frames", options.frames, {1.0, 1e6}, "number of poses");
+  table.add("frames", options.frames, {1.0, 1e6}, "number of frames along the camera path");
   table.add("loops", options.loops, {1.0, 1000.0}, "number of loops around the site");
   table.add("radius_m", options.radius_m, not_negative,
             "radius of the first loop around the site's center, m; 0: fitted to the mesh");

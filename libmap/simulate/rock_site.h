@@ -76,7 +76,7 @@ struct RockSite {
   std::vector<SceneShape> bumps;  // of kind Bump
   std::vector<SiteRock> rocks;
 
-  // Throws Error naming the entry, the value and the bound.
+  // Throws Error if a rock has a value out of range or extends beyond the ground.
   void check() const;
   Pose site_from_ground() const;
 };
@@ -91,12 +91,12 @@ ParameterTable field_point_parameters(FieldPointOptions& options);
 SiteRock draw_rock(RockShape shape, double height_m, std::uint64_t seed);
 
 struct RockToPlace {
-  std::size_t rock = 0;  // index in the site
-  bool keeps_yaw = false;
+  std::size_t rock = 0;    // index in the site
+  bool keeps_yaw = false;  // true: the yaw of the rock is given
 };
-// Draws positions, and yaw unless it is kept, for these rocks, widest first, such that footprints
-// satisfy the layout. Holds have a yaw of at most 25 degrees. Throws Error naming the first rock
-// that cannot be placed.
+// Draws positions, and yaw unless it is kept, for these rocks, largest footprint first, such that
+// the footprints satisfy the layout. Holds have a yaw of at most 25 degrees. Throws Error naming
+// the first rock that cannot be placed.
 void place_rocks(RockSite& site, std::vector<RockToPlace> rocks);
 
 // Height of the ground above z = 0 of the ground frame: bumps and random relief.
