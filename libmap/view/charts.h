@@ -32,7 +32,7 @@ struct ChartHistogram {
 
 struct ChartAxis {
   std::string title;                               // with unit
-  std::optional<std::pair<double, double>> range;  // default: round numbers around the data
+  std::optional<std::pair<double, double>> range;  // nullopt: round numbers around the data
 };
 
 // Position of the legend in the chart.

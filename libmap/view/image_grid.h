@@ -55,14 +55,13 @@ struct SheetLayout {
 };
 
 // Plans the layout. `aspect` is height / width of a cell, used if the options do not set the
-// height. Throws Error: no cell, columns, a size or the sheet out of bounds, an invalid background,
-// more titles than rows or columns.
+// height. Throws Error if there is no cell, a number of columns, a size or the sheet is out of
+// bounds, the background is invalid, or there are more titles than rows or columns.
 SheetLayout plan_sheet(const std::vector<SheetCell>& cells, const ImageGridOptions& options,
                        const std::vector<Legend>& legends, double aspect);
 
 // Draws the sheet. Continuous color scales with the same title share one range, which covers the
-// ranges of all scenes. Throws Error as plan_sheet and render_scene do, and what a cell's `scene`
-// throws; (failed) if rendering is not possible.
+// ranges of all scenes. Throws Error as plan_sheet, render_scene and the cells' `scene` do.
 ColorImage draw_sheet(const std::vector<SheetCell>& cells, const ImageGridOptions& options);
 
 }  // namespace libmap

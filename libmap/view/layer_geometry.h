@@ -32,7 +32,7 @@ struct PreparedLayer {
 
 // Prepares a layer. A textured mesh becomes one layer per page, which refers to the page in
 // `layer`; triangles without a page have untextured_color. Other shapes become one layer. Throws
-// Error: arrays of wrong length, mode `texture` without a texture, and as color_points does.
+// Error as color_points does, and if an array has a wrong length, or mode `texture` no texture.
 std::vector<PreparedLayer> prepare_layers(const SceneLayer& layer, const Pose& terrain_from_scene);
 
 inline constexpr Color untextured_color{128, 128, 128};

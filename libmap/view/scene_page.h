@@ -42,10 +42,10 @@ Eigen::Vector2d legends_size(const std::vector<Legend>& legends, int font_px);
 void draw_title(const ScenePage& page, const std::string& title, Canvas& canvas);
 void draw_legends(const ScenePage& page, const std::vector<Legend>& legends, Canvas& canvas);
 void draw_axes(const ScenePage& page, const SceneCamera& camera, Canvas& canvas);
-// In perspective, the scale is that at the depth of `reference`, and the bar is labeled
-// accordingly.
+// Draws the scale bar. In perspective, scale and label are for the depth of `reference`.
 void draw_scale_bar(const ScenePage& page, const SceneCamera& camera,
                     const Eigen::Vector3d& reference, Canvas& canvas);
+// Size of a label, and the point that it belongs to.
 struct LabelRequest {
   Eigen::Vector2d anchor = Eigen::Vector2d::Zero();  // pixel of the point
   double width_px = 0.0;
