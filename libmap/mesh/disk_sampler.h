@@ -51,13 +51,13 @@ class SurfaceFragments {
  public:
   // Takes all triangles of `mesh`, which must outlive this object.
   explicit SurfaceFragments(const TriangleMesh& mesh);
-  // Divides `triangles` until no side is longer than `longest_m`. Throws Error if there are more
-  // than `max_parts` parts.
+  // Copies `triangles`, divided until no side is longer than `longest_m`. Parts without area are
+  // dropped. Throws Error if there are more than `max_parts` parts.
   SurfaceFragments(const SurfaceFragments& triangles, double longest_m, std::size_t max_parts);
 
   const std::vector<SurfaceBlock>& blocks() const { return blocks_; }
   double area_m2() const;  // of all fragments
-  // Fragment with this index and the positions of the corners.
+  // Fragment with an index of a block: first the triangles, then the parts of triangles.
   PlacedFragment fragment_at(std::size_t number) const;
 
  private:
@@ -77,7 +77,7 @@ struct SampledSurface {
   double area_m2 = 0.0;  // > 0
   // Maximum displacement by rounding positions to single precision; 0: positions are not rounded.
   double rounding_m = 0.0;
-  // Samples of other surfaces, which keep the minimum distance and cover this surface as well.
+  // Samples of adjacent surfaces. New samples keep the minimum distance from these samples.
   std::vector<Eigen::Vector3d> neighbor_samples{};
 };
 
@@ -98,8 +98,7 @@ DiskSamples sample_disks(const SampledSurface& surface, double radius_m, std::ui
                          const std::function<bool(std::size_t thrown)>& goes_on,
                          Progress& progress);
 
-// Smallest distance between two positions, m; 0 if there are fewer than two. `expected_m` is an
-// estimate, for efficiency.
+// Smallest distance of two positions, m; 0 for fewer than two. `expected_m` (> 0): an estimate.
 double smallest_distance(const std::vector<Eigen::Vector3d>& positions, double expected_m);
 
 }  // namespace libmap

@@ -20,8 +20,7 @@ struct SurfacePoint {
 
 class SurfaceDistance {
  public:
-  // Throws Error if the mesh has no triangle, an index out of range or a vertex that is not finite.
-  // Copies the mesh.
+  // Copies the mesh. Throws Error if it has no triangle, an invalid index or a non-finite vertex.
   explicit SurfaceDistance(const TriangleMesh& mesh) : mesh_(mesh, false) {}
 
   // Nearest point of the surface to a finite point. Embree finds the candidates; distances are in
