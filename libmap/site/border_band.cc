@@ -58,7 +58,7 @@ struct TopView {
 };
 
 TopView make_top_view(const PointCloud& cloud, const BorderBandOptions& options) {
-  if (!cloud.has_colors()) throw Error("without colors, a white border cannot be detected");
+  if (!cloud.has_colors()) throw Error("the map has no colors, which a white border requires");
   std::vector<std::size_t> used;
   Vector2d low = Vector2d::Constant(std::numeric_limits<double>::infinity());
   Vector2d high = -low;
