@@ -273,8 +273,8 @@ void bind(ParameterTable& table, CameraTrajectoryOptions& options) {
             "direction from the site's center to the start of the first loop, degrees "
             "counter-clockwise from x; at a wall: offset from the default start");
   table.add("sweep_deg", options.sweep_deg, {-360.0, 360.0},
-            "angle swept by each loop, degrees; below 360, every second loop runs backwards; 0: "
-            "360, or 120 at a wall");
+            "angle swept by each loop, degrees; negative: clockwise; below 360, every second loop "
+            "runs backwards; 0: 360, or 120 at a wall");
   table.add("gaze_deg", options.gaze_deg, {0.0, 45.0},
             "standard deviation of the angle between view direction and target, degrees");
   table.add("sway_m", options.sway_m, not_negative,

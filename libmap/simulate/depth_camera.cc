@@ -135,7 +135,7 @@ VisibleSurface::VisibleSurface(const TriangleMesh& mesh, TextureSource texture,
   const auto part = std::make_shared<Part>(Part{RayCaster(mesh), mesh, texture_seed});
   std::vector<Color>& colors = part->mesh.vertex_colors;
   if (texture == TextureSource::mesh && colors.empty())
-    throw Error("the mesh has no vertex colors");
+    throw Error("the mesh has no vertex colors; use texture rock");
   const bool plain = std::all_of(colors.begin(), colors.end(),
                                  [&](const Color& color) { return color == colors.front(); });
   if (texture == TextureSource::rock || (texture == TextureSource::automatic && plain))

@@ -25,8 +25,8 @@ class RayCaster;
 
 // Rays (x/z, y/z) through the centers and corners of a camera's pixels; NaN if there is no ray.
 struct ViewRays {
-  int width = 0;
-  int height = 0;
+  int width = 0;                         // of the image, pixels
+  int height = 0;                        // of the image, pixels
   std::vector<Eigen::Vector2d> centers;  // width * height
   std::vector<Eigen::Vector2d> corners;  // (width + 1) * (height + 1); (0, 0) is at pixel -0.5 -0.5
 };
@@ -105,7 +105,7 @@ void bind_noise(ParameterTable& table, DepthSensorOptions& options);
 DepthSensorOptions ideal_depth_sensor(double near_m, double far_m);
 
 struct DepthMeasurement {
-  DepthImage depth;
+  DepthImage depth;          // m; 0: no measurement
   std::size_t measured = 0;  // pixels with a depth
   std::size_t edges = 0;     // pixels with a depth discontinuity
   std::size_t flying = 0;    // edge pixels measured between foreground and background

@@ -31,12 +31,12 @@ bool is_hold(RockShape shape);
 struct SiteRock {
   std::string name;
   RockShape shape = RockShape::block;
-  double x_m = 0.0;
+  double x_m = 0.0;  // center, in the ground frame
   double y_m = 0.0;
-  double height_m = 0.3;  // of the top above the ground at (x, y)
-  double width_m = 0.3;   // along the rock's x axis, above the ground
-  double depth_m = 0.3;   // along the rock's y axis
-  double yaw_deg = 0.0;
+  double height_m = 0.3;      // of the top above the ground at (x, y)
+  double width_m = 0.3;       // along the rock's x axis, above the ground
+  double depth_m = 0.3;       // along the rock's y axis
+  double yaw_deg = 0.0;       // rotation about z, counter-clockwise
   int sides = 6;              // walls of a block
   int ledges = 0;             // lower blocks that are merged with it
   double overhang_deg = 0.0;  // outward tilt of a third of a block's walls
@@ -48,10 +48,10 @@ struct SiteRock {
 enum class GroundTexture { soil, rock, panel };  // colors of the ground
 
 struct SiteGround {
-  double size_x_m = 4.0;
+  double size_x_m = 4.0;  // extent of the rectangle
   double size_y_m = 4.0;
   double relief_m = 0.02;  // maximum height of the random relief
-  double tilt_deg = 0.0;
+  double tilt_deg = 0.0;   // 0: level; 90: a wall
   GroundTexture texture = GroundTexture::soil;
 };
 
@@ -63,13 +63,13 @@ struct SiteLayout {
 };
 
 struct FieldPointOptions {
-  int count = 30;
+  int count = 30;             // number of locations
   double min_height_m = 0.1;  // above the ground
   double radius_m = 0.04;     // of the neighborhood that determines the kind
 };
 
 struct RockSite {
-  std::uint64_t seed = 1;
+  std::uint64_t seed = 1;  // of missing rock values, positions, relief and colors
   SiteGround ground;
   SiteLayout layout;
   FieldPointOptions field_points;

@@ -62,7 +62,7 @@ struct ScanSimulationOptions {
   ScanEvents events{};
   OdometryOptions odometry{};
   LoopClosureOptions closures{};
-  std::uint64_t seed = 1;
+  std::uint64_t seed = 1;       // random seed of path, errors and colors
   std::uint64_t rock_seed = 0;  // seed of rock colors, equal for scans of one ground; 0: `seed`
   std::uint64_t texture_seed() const { return rock_seed == 0 ? seed : rock_seed; }
 };
@@ -71,9 +71,9 @@ struct ScanSimulationResult {
   PoseGraph graph;                  // nodes as passed to the sink, and links
   std::size_t pixels = 0;           // depth pixels of all frames
   std::size_t measured_pixels = 0;  // pixels with a depth
-  std::size_t edge_pixels = 0;
-  std::size_t flying_pixels = 0;
-  std::size_t empty_frames = 0;  // frames without any depth
+  std::size_t edge_pixels = 0;      // as DepthMeasurement::edges
+  std::size_t flying_pixels = 0;    // as DepthMeasurement::flying
+  std::size_t empty_frames = 0;     // frames without any depth
   double path_length_m = 0.0;
 };
 

@@ -186,8 +186,8 @@ void bind(ParameterTable& table, DepthFaults& faults) {
   table.add("depth_error_period_m", faults.error_period_m, positive,
             "fault: depth difference over which the periodic depth error repeats, m");
   table.add("depth_corner_m", faults.corner_m, any_number,
-            "fault: depth error in the image corners, proportional to the squared radius "
-            "(Teichman et al. 2013), m");
+            "fault: depth error in the image corners, m; in the image, it is proportional to the "
+            "squared distance from the center (Teichman et al. 2013)");
   table.add("depth_holes", faults.holes, zero_to_one,
             "fault: share of the depth image covered by discs without depth");
   table.add("multipath", faults.multipath, zero_to_one,

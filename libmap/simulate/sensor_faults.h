@@ -92,7 +92,7 @@ Pose stored_color_from_depth(const CalibrationFaults& faults);
 struct RecordedFrame {
   std::size_t frame = 0;
   std::size_t image_frame = 0;
-  double stamp_error_s = 0.0;
+  double stamp_error_s = 0.0;  // added to the stamp
 };
 std::vector<RecordedFrame> recorded_frames(std::size_t frames, const RecordingFaults& faults,
                                            std::uint64_t seed);

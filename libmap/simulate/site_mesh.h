@@ -17,7 +17,7 @@ Solid rock_solid(const SiteRock& rock, double edge_length_m, double sink_m);
 struct SiteMeshOptions {
   double edge_length_m = 0.008;  // approximate; small rocks and holds have shorter edges
   bool closed = false;           // include the sides and the base of the ground
-  std::uint64_t max_triangles = 10'000'000;
+  std::uint64_t max_triangles = 10'000'000;  // limit of the estimated number
 };
 
 // Union of rocks and ground (CGAL) in the site frame, with vertex colors and the face field "rock":

@@ -19,8 +19,8 @@ namespace libmap {
 
 // View frustum of a camera: bounds of the rays (x/z, y/z), and maximum depth.
 struct ViewRange {
-  Eigen::AlignedBox2d rays;
-  double far_m = 0.0;
+  Eigen::AlignedBox2d rays;  // bounds of (x/z, y/z)
+  double far_m = 0.0;        // maximum z
 };
 ViewRange view_range(const ViewRays& rays, double far_m);
 
@@ -36,7 +36,7 @@ struct TerrainSurfaceOptions {
                                       // of GroundHeights::cell_m
   double gap_spacings = 5.0;          // maximum circumradius of triangles in point spacings
   std::size_t kept_points = 500'000;  // maximum in memory, unless more are in view at once
-  std::uint64_t texture_seed = 1;
+  std::uint64_t texture_seed = 1;     // seed of rock_color()
 };
 
 class TerrainSurface {

@@ -18,8 +18,8 @@ struct RockyTerrainOptions {
   double relief_m = 0.25;         // maximum height of the ground's relief
   double relief_length_m = 10.0;  // longest wavelength of the relief
   double roughness_m = 0.015;     // maximum height of the small-scale roughness
-  double rocks_per_m2 = 1.2;
-  double min_rock_m = 0.15;  // minimum and maximum height of the rocks
+  double rocks_per_m2 = 1.2;      // mean number of rocks
+  double min_rock_m = 0.15;       // minimum and maximum height of the rocks
   double max_rock_m = 0.7;
 
   // Throws Error if max_rock_m is less than min_rock_m.

@@ -172,7 +172,7 @@ void require_sound(const CropOptions& options) {
     throw Error("not a finite angle", {.field = "yaw", .value = to_text(*options.yaw_deg)});
   if (options.region == CropRegion::box &&
       !(options.box.min.array() < options.box.max.array()).all())
-    throw Error("a minimum of the box is not below its maximum", {.field = "box"});
+    throw Error("the minimum must be below the maximum on each axis", {.field = "box"});
 }
 
 Plan make_plan(const Source& source, const CropOptions& options) {

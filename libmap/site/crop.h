@@ -31,8 +31,8 @@ struct CropOptions {
   GroundPlaneOptions ground{};                       // `up` is ignored
   CropRegion region = CropRegion::whole;
   CropFrame frame = CropFrame::level;
-  Bounds3d box{};  // in `frame`; z may be infinite
-  std::vector<Eigen::Vector2d> polygon{};
+  Bounds3d box{};                          // in `frame`; z may be infinite
+  std::vector<Eigen::Vector2d> polygon{};  // corners in `frame`
   Eigen::Vector2d size_m = Eigen::Vector2d::Zero();
   SiteRectangleOptions rectangle{};  // margin_m also applies to the border
   BorderBandOptions band{};
@@ -41,7 +41,7 @@ struct CropOptions {
   // Counter-clockwise rotation about z. nullopt: with size and border, the smallest rotation that
   // makes the rectangle's sides parallel to x and y, otherwise no rotation.
   std::optional<double> yaw_deg = std::nullopt;
-  // true: x = y = 0 is the center of the outline's bounding box (whole, frame map: of the map's).
+  // true: x = y = 0 is the center of the outline's bounding box (whole or frame map: the map's).
   bool center = false;
 };
 // Binds ground, rectangle, band and center.

@@ -291,7 +291,7 @@ class Cleaning {
       }
     if (count_of(drop) > 0 || result_.merged_vertices > 0)
       mesh = select_triangles(mesh, inverse(drop));
-    require_triangles(mesh, {.field = "triangles without area",
+    require_triangles(mesh, {.field = "number of triangles without area",
                              .value = std::to_string(result_.degenerate_triangles)});
   }
 
@@ -301,7 +301,7 @@ class Cleaning {
     result_.degenerate_triangles += caps;
     // Dropping caps at a boundary may leave fans that share only a vertex.
     if (caps > 0) add(make_manifold(mesh_(), 2.0 * merge_distance()));
-    require_triangles(mesh_(), {.field = "triangles without area",
+    require_triangles(mesh_(), {.field = "number of triangles without area",
                                 .value = std::to_string(result_.degenerate_triangles)});
   }
 
@@ -340,7 +340,7 @@ class Cleaning {
 
   void remove_intersections() {
     repair_intersections(2.0 * merge_distance(), result_);
-    require_triangles(mesh_(), {.field = "intersecting triangles",
+    require_triangles(mesh_(), {.field = "number of intersecting triangles",
                                 .value = std::to_string(result_.intersecting_triangles)});
   }
 

@@ -47,7 +47,7 @@ struct MeshCleaningOptions {
 void bind(ParameterTable& table, MeshCleaningOptions& options);
 
 struct MeshDecimation {
-  std::size_t removed_triangles = 0;
+  std::size_t removed_triangles = 0;  // difference of the numbers of triangles
   // Proved bound of the distance between both surfaces, <= decimation_error_m.
   double deviation_m = 0.0;
 };
@@ -57,20 +57,21 @@ struct MeshCleaningResult {
   // Colors and fields are kept; new vertices take colors and fields from the hole's boundary.
   TriangleMesh mesh;
 
-  std::size_t merged_vertices = 0;
-  std::size_t unused_vertices = 0;
-  std::size_t degenerate_triangles = 0;
-  std::size_t duplicate_triangles = 0;
-  std::size_t cut_edges = 0;         // non-manifold, or without a consistent orientation
-  std::size_t split_vertices = 0;    // new copies of vertices with several fans of triangles
-  std::size_t turned_triangles = 0;  // triangles whose orientation was reversed
-  std::size_t islands = 0;
-  double island_area_m2 = 0.0;
+  std::size_t merged_vertices = 0;       // replaced by an earlier vertex
+  std::size_t unused_vertices = 0;       // vertices of no triangle, dropped
+  std::size_t degenerate_triangles = 0;  // removed, without area
+  std::size_t duplicate_triangles = 0;   // removed
+  std::size_t cut_edges = 0;             // non-manifold, or without a consistent orientation
+  std::size_t split_vertices = 0;        // new copies of vertices with several fans of triangles
+  std::size_t turned_triangles = 0;      // triangles whose orientation was reversed
+  std::size_t islands = 0;               // dropped components
+  double island_area_m2 = 0.0;           // area of these components
   // Removed because they intersect or are degenerate, not counting the triangles around them.
   std::size_t intersecting_triangles = 0;
   std::size_t closing_triangles = 0;  // new triangles in the resulting holes
   std::size_t unclosed_holes = 0;     // resulting holes that stay open
-  std::size_t remaining_intersecting_triangles = 0;
+  std::size_t remaining_intersecting_triangles =
+      0;                // triangles that still intersect; 0 without repair
   HoleFilling filling;  // in step 5
   MeshDecimation decimation;
   StageTimings timings_s;

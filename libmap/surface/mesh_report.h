@@ -29,7 +29,7 @@ struct EdgeLengths {
 // Triangles with a repeated vertex have no edges; edges, fans and used vertices do not count them.
 struct MeshReport {
   std::size_t vertices = 0;
-  std::size_t unused_vertices = 0;
+  std::size_t unused_vertices = 0;  // without an edge
   std::size_t triangles = 0;
   std::size_t filled_triangles = 0;      // face field `filled` is 1
   std::size_t degenerate_triangles = 0;  // repeated vertex, or height below 1e-9 of the mesh's size
@@ -39,12 +39,12 @@ struct MeshReport {
   std::size_t components = 0;  // connected by edges
   EdgeLengths edge_lengths;
 
-  std::size_t edges = 0;
+  std::size_t edges = 0;               // undirected
   std::size_t non_manifold_edges = 0;  // with more than two triangles
   // Vertices with more than one fan of triangles, without the vertices of non-manifold edges.
   std::size_t non_manifold_vertices = 0;
-  std::size_t misoriented_edges = 0;  // two triangles run along the edge in the same direction
-  std::size_t boundary_edges = 0;
+  std::size_t misoriented_edges = 0;     // two triangles run along the edge in the same direction
+  std::size_t boundary_edges = 0;        // with one triangle
   std::vector<MeshBoundary> boundaries;  // longest first
   // Pairs of triangles that intersect in more than common corners or edges; 0 if not counted.
   std::size_t self_intersections = 0;

@@ -66,21 +66,21 @@ class CloudStatistics {
 struct SurfaceReconstructionResult {
   // Has unit vertex normals, and colors and fields from the points around each vertex.
   TriangleMesh mesh;
-  double cell_size_m = 0.0;
-  double spacing_m = 0.0;          // median distance to the nearest neighbor
-  std::size_t dropped_points = 0;  // points with a normal that is zero or not finite
-  std::size_t samples = 0;         // number of samples: one per cell and side of the surface
-  int octree_depth = 0;            // poisson; otherwise 0
-  std::size_t trimmed_triangles = 0;
+  double cell_size_m = 0.0;           // the given one or spacing_m
+  double spacing_m = 0.0;             // median distance to the nearest neighbor
+  std::size_t dropped_points = 0;     // points with a normal that is zero or not finite
+  std::size_t samples = 0;            // number of samples: one per cell and side of the surface
+  int octree_depth = 0;               // poisson; otherwise 0
+  std::size_t trimmed_triangles = 0;  // removed by trimming
   StageTimings timings_s;
 };
 void describe(ResultTable& table, const SurfaceReconstructionResult& result);
 
 // Estimate of the work from the number and the spacing of the points.
 struct SurfaceWork {
-  double triangles = 0.0;
-  double bytes = 0.0;    // memory
-  double seconds = 0.0;  // on one thread
+  double triangles = 0.0;  // number of triangles
+  double bytes = 0.0;      // memory
+  double seconds = 0.0;    // on one thread
 };
 using AnnounceWork = std::function<void(const SurfaceWork& work)>;
 

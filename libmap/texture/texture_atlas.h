@@ -29,8 +29,8 @@ struct TextureChart {
   std::vector<std::uint32_t> triangles;              // ascending
   double scale = 1.0;                                // texels per pixel of the photograph
   Eigen::Vector2d origin = Eigen::Vector2d::Zero();  // photograph pixel of texel (0, 0)
-  std::uint32_t photo = 0;
-  std::int32_t page = 0;
+  std::uint32_t photo = 0;                           // index of the photograph
+  std::int32_t page = 0;                             // index of the page
   int column = 0;  // column and row of the top left texel on the page, padding included
   int row = 0;
   int width = 0;  // texels, padding included

@@ -306,7 +306,7 @@ void describe(ResultTable& table, const TextureCounts& counts) {
   table.add("split_charts", counts.split_charts, Merge::sum,
             "number of charts that were split to fit a page");
   table.add("shrunk_charts", counts.shrunk_charts, Merge::sum,
-            "number of charts of reduced resolution");
+            "number of charts whose resolution was reduced to fit a page");
   table.add("pages", counts.pages, Merge::sum, "number of pages of the texture");
   table.add("texel_size_m", counts.texel_size_m(), "square root of the mean area of a texel, m");
   table.add("atlas_scale", counts.atlas_scale, Merge::min,

@@ -46,12 +46,12 @@ void bind(ParameterTable& table, TextureOptions& options);
 
 // Statistics of one model, or of several tiles together.
 struct TextureCounts {
-  std::size_t cut_triangles = 0;   // triangles added by subdivision
-  std::size_t seen_triangles = 0;  // triangles with a photograph
-  std::size_t unseen_triangles = 0;
-  double seen_m2 = 0.0;
-  double unseen_m2 = 0.0;
-  std::size_t charts = 0;
+  std::size_t cut_triangles = 0;     // triangles added by subdivision
+  std::size_t seen_triangles = 0;    // triangles with a photograph
+  std::size_t unseen_triangles = 0;  // triangles without a photograph
+  double seen_m2 = 0.0;              // area with a photograph
+  double unseen_m2 = 0.0;            // area without a photograph
+  std::size_t charts = 0;            // this and the following three as in TextureAtlas
   std::size_t split_charts = 0;
   std::size_t shrunk_charts = 0;
   std::size_t pages = 0;

@@ -44,7 +44,7 @@ SubdivisionResult split_long_sides(
 struct TextureExposure {
   std::vector<Eigen::Vector3f> gains;  // per photograph and channel, relative to the geometric mean
   std::array<double, 3> vignetting{0, 0, 0};  // ln(brightness): a r^2 + b r^4 + c r^6
-  std::size_t observations = 0;
+  std::size_t observations = 0;               // number of colors used
   // Standard deviation of ln(color) of one surface point between photographs, before and after.
   double log_color_deviation_before = 0.0;
   double log_color_deviation = 0.0;
@@ -54,8 +54,8 @@ struct TextureExposure {
 };
 
 struct ExposureOptions {
-  bool gains = true;
-  bool vignetting = true;
+  bool gains = true;       // estimate one gain per photograph and channel
+  bool vignetting = true;  // estimate vignetting, common to all
 };
 
 // Estimates exposure by least squares over all points seen in several photographs (Brown and Lowe
@@ -84,9 +84,9 @@ struct LabelingOptions {
 struct TextureLabels {
   std::vector<std::uint32_t> photos;  // one per triangle; no_photo if no photograph sees it
   double energy_before = 0.0;         // m2, with the best view for every triangle
-  double energy = 0.0;
-  double seams_before_m = 0.0;  // length of edges between triangles of different photographs
-  double seams_m = 0.0;
+  double energy = 0.0;                // m2, with `photos`
+  double seams_before_m = 0.0;        // length of edges between triangles of different photographs
+  double seams_m = 0.0;               // length of these edges with `photos`
 };
 
 // Minimizes the energy. `opposite` has one entry per half-edge, `views` one row per triangle.
@@ -117,7 +117,7 @@ struct TexturePaint {
   const TexturePhotos& photos;
   const TextureExposure& exposure;
   const BlendingWeights& weights;
-  Color neutral{};
+  Color neutral{};  // of triangles without a photograph
 };
 
 // Paints all charts of `atlas` into the pages of `model`, the result of atlas.make_model. Texels

@@ -81,7 +81,7 @@ struct TextureViews {
   ViewTable of_vertices;
   // All views of a subset of vertices, spread over the part. Colors are not set yet.
   std::vector<ColorObservation> observations;
-  std::size_t observed_vertices = 0;
+  std::size_t observed_vertices = 0;  // number of vertices in `observations`' numbering
 };
 
 // Sets radius2 and color of all observations. Decodes each photograph once.

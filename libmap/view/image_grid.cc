@@ -311,7 +311,7 @@ SheetLayout plan_sheet(const std::vector<SheetCell>& cells, const ImageGridOptio
   if (layout.width > max_side_px || layout.height > max_side_px)
     throw Error("the sheet would have " + std::to_string(layout.width) + " x " +
                     std::to_string(layout.height) + " pixels, more than " +
-                    std::to_string(max_side_px) + " per side",
+                    std::to_string(max_side_px) + " per side; use smaller cells",
                 {.field = "cell_width_px", .value = std::to_string(options.cell_width_px)});
   return layout;
 }

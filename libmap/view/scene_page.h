@@ -17,8 +17,8 @@ inline constexpr int max_side_px = 16384;  // of an image
 inline constexpr int min_font_px = 10;
 
 struct ScenePage {
-  PixelRect plot;  // whole pixels
-  std::optional<PixelRect> title;
+  PixelRect plot;                  // whole pixels
+  std::optional<PixelRect> title;  // nullopt: omitted, like the following
   std::optional<PixelRect> legend;
   std::optional<PixelRect> axes;
   std::optional<PixelRect> scale_bar;

@@ -72,7 +72,7 @@ struct SceneViewOptions {
   int height = 1200;  // pixels, 1 to 16384
   Viewpoint view = Viewpoint::top;
   CameraPlacement camera;  // for Viewpoint::camera, in the scene's frame
-  std::string title;
+  std::string title;       // empty: none
   bool axes = true;
   bool scale_bar = true;
   bool legend = true;
