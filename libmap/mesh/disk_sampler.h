@@ -38,9 +38,9 @@ TrianglePoint point_of(const Fragment& fragment, double first, double second);
 
 // Range of consecutive fragments of a surface, with the bounding box.
 struct SurfaceBlock {
-  std::size_t begin = 0;
-  std::size_t end = 0;
-  double area_m2 = 0.0;
+  std::size_t begin = 0;  // index of the first fragment
+  std::size_t end = 0;    // index after the last fragment
+  double area_m2 = 0.0;   // of all fragments
   Eigen::Vector3d center = Eigen::Vector3d::Zero();
   double reach_m = 0.0;    // radius of a bounding sphere about the center
   double longest_m = 0.0;  // longest side
@@ -82,7 +82,7 @@ struct SampledSurface {
 };
 
 struct DiskSamples {
-  std::vector<Eigen::Vector3d> positions;
+  std::vector<Eigen::Vector3d> positions;      // rounded if rounding_m > 0
   std::vector<TrianglePoint> triangle_points;  // positions on the mesh before rounding
 };
 

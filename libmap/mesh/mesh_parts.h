@@ -53,7 +53,7 @@ std::array<TriangleCorners, 4> quarters_of(const TriangleCorners& corners);
 
 // Point on a triangle: (1 - u - v) * a + u * b + v * c.
 struct TrianglePoint {
-  std::uint32_t triangle = 0;
+  std::uint32_t triangle = 0;  // with corners a, b, c
   double u = 0.0;
   double v = 0.0;
 };

@@ -15,7 +15,7 @@ namespace libmap {
 
 // A tile's mesh, followed by the triangles of the margin around the tile.
 struct MeshWithMargin {
-  TriangleMesh mesh;
+  TriangleMesh mesh;          // triangles of the tile, then of the margin
   std::size_t triangles = 0;  // number of triangles before the triangles of the margin
 };
 

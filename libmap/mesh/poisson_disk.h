@@ -19,7 +19,7 @@ struct PoissonDiskOptions {
   // contains a sample, and so does every such voxel that level ground intersects.
   double radius_m = 0.005;  // > 0: minimum distance between samples
   std::uint64_t count = 0;  // > 0: number of samples (within 1 %); the radius is computed
-  std::uint64_t seed = 1;
+  std::uint64_t seed = 1;   // random seed of the samples
 };
 void bind(ParameterTable& table, PoissonDiskOptions& options);
 
@@ -54,7 +54,7 @@ PoissonDiskResult sample_poisson_disk(const TriangleMesh& mesh, const PoissonDis
 // distance also applies between tiles, and seams have no gaps. Memory depends on the tile size.
 class TileSampler {
  public:
-  // Takes the bounding boxes of all tiles. Throws Error for a count, or an option out of range.
+  // Takes all tiles' bounding boxes. Throws Error if `count` is set or an option is out of range.
   TileSampler(std::vector<Bounds3d> boxes, const PoissonDiskOptions& options);
   // Samples tile `number`; each tile may be sampled once. Returns no samples if the tile has no
   // area. Throws as sample_poisson_disk.

@@ -13,7 +13,7 @@
 namespace libmap {
 
 struct RayHit {
-  static constexpr std::uint32_t no_triangle = 0xffffffff;
+  static constexpr std::uint32_t no_triangle = 0xffffffff;  // value of `triangle`
 
   double distance = 0.0;       // in units of the direction's length
   std::uint32_t triangle = 0;  // with corners a, b, c

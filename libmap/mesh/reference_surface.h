@@ -16,8 +16,8 @@ struct NearestSurfacePoint {
   // Unit normal; zero if a cloud's point has no normal. On an edge or a corner of a mesh it is the
   // angle-weighted pseudo-normal, which separates inside and outside (Baerentzen and Aanaes 2005).
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
-  double distance_m = 0.0;
-  bool on_border = false;  // true if `position` is on the border of the surface
+  double distance_m = 0.0;  // between `position` and the query point
+  bool on_border = false;   // true if `position` is on the border of the surface
 
   // Distance, negative behind the surface; >= 0 if `normal` is zero.
   double signed_distance_m(const Eigen::Vector3d& point) const {
@@ -56,7 +56,7 @@ class ReferenceSurface {
 };
 
 struct PointDistances {
-  std::vector<double> distance_m;
+  std::vector<double> distance_m;         // one per point, >= 0
   std::vector<double> signed_distance_m;  // equal to distance_m if the surface is not oriented
 };
 // Distances of points to the surface. The result does not depend on the number of threads.

@@ -26,7 +26,7 @@ void bind(ParameterTable& table, SurfaceAlignmentOptions& options);
 
 struct SurfaceAlignmentResult {
   Pose surface_from_points = Pose::Identity();
-  bool converged = false;
+  bool converged = false;  // true if the last step was below tolerance_m
   int iterations = 0;
   int free_motions = 0;     // how many of the six motions were not determined in the last step
   double curvature = 0.0;   // smallest relative curvature of a determined motion

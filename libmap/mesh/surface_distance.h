@@ -14,8 +14,8 @@ namespace libmap {
 
 struct SurfacePoint {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
-  std::uint32_t triangle = 0;
-  double distance_m = 0.0;  // from the query point
+  std::uint32_t triangle = 0;  // index of the triangle with `position`
+  double distance_m = 0.0;     // from the query point
 };
 
 class SurfaceDistance {
