@@ -21,7 +21,7 @@ struct RobotCamerasOptions {
   // Name in data/sensors or a file. Limits the range, and sets the noise if `depth` has none.
   // "auto": range and noise of `depth`.
   std::string sensor = "auto";
-  // The range is limited to that of the rig's cameras, which also determine the resolution.
+  // The range is limited to the range of the rig's cameras, which also determine the resolution.
   DepthSensorOptions depth = ideal_depth_sensor(0.0, std::numeric_limits<double>::infinity());
   DepthFaults faults{};
   double stamp_s = 0.0;           // earliest possible stamp of the images

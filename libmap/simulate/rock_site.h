@@ -81,7 +81,7 @@ struct RockSite {
   Pose site_from_ground() const;
 };
 
-// Parameters of each part by key. A table refers to the argument.
+// Tables of the parameters of a rock, the ground, ... by key. A table refers to its argument.
 ParameterTable rock_parameters(SiteRock& rock);
 ParameterTable ground_parameters(SiteGround& ground);
 ParameterTable layout_parameters(SiteLayout& layout);
@@ -123,10 +123,10 @@ class GroundRelief {
 //     - {name: R01, height_m: 0.67, overhang_deg: 15}
 //     - {name: C01, shape: cobble, height_m: 0.15, x_m: 1, y_m: 0.2}
 //
-// All parts are optional. A rock requires its height; missing values are drawn from the rock's
-// seed, and a missing seed from the site's seed. Rocks without x_m and y_m are placed within the
-// layout. `seed` replaces the file's seed. Throws Error naming `file`, the entry, the key, the
-// value and the bound, and the nearest known key for an unknown one.
+// All keys are optional. A rock requires its height; missing values are drawn from the rock's seed,
+// and a missing seed from the site's seed. Rocks without x_m and y_m are placed within the layout.
+// `seed` replaces the file's seed. Throws Error naming `file`, the entry, the key, the value and
+// the bound, and the nearest known key for an unknown one.
 RockSite parse_site(const std::string& text, const std::string& file,
                     std::optional<std::uint64_t> seed = std::nullopt);
 

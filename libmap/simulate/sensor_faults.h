@@ -56,7 +56,8 @@ struct CalibrationFaults {
   double depth_shift_mm = 0.0;
   double depth_turn_deg = 0.0;
   // Known position of the depth camera to the right of the color camera. Its images are registered
-  // to color, with occlusion shadows. 0: both have one position, except for the errors above.
+  // to color, with occlusion shadows. 0: both cameras have one position, except for the errors
+  // above.
   double depth_baseline_mm = 0.0;
   int depth_width_px = 0;  // size of depth images, with the field of view of color; 0: color's size
   int depth_height_px = 0;
@@ -102,9 +103,10 @@ void distort_depth(SurfaceView& view, const DepthFaults& faults);
 
 // Adds the multipath interference of diffuse surfaces of this reflectance (0 to 1) to the depths of
 // a view. Light that reaches a surface via another one travels farther than direct light. The
-// camera measures the mean of both, weighted by intensity (the limit of path differences that are
-// small against the modulation wavelength: Fuchs 2010). Concave edges appear rounded and farther
-// away; flat and convex surfaces do not change. Interpolates one reflection on a grid of pixels.
+// camera measures the mean of both path lengths, weighted by intensity (the limit of path
+// differences that are small against the modulation wavelength: Fuchs 2010). Concave edges appear
+// rounded and farther away; flat and convex surfaces do not change. Interpolates one reflection on
+// a grid of pixels.
 void add_multipath(SurfaceView& view, const VisibleSurface& surface, const ViewRays& rays,
                    const Pose& world_from_camera, double reflectance);
 

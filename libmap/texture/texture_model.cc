@@ -17,10 +17,10 @@ namespace {
 
 // Maximum number of candidate views per triangle.
 constexpr std::size_t views_per_triangle = 12;
-// Number of vertices whose colors are compared between photographs, and its minimum per piece.
+// Number of vertices whose colors are compared between photographs, and its minimum per tile.
 constexpr std::size_t observed_vertices = 20000;
 constexpr std::size_t min_observed_vertices = 200;
-// Cache size of decoded photographs. A piece needs only photographs close to it.
+// Cache size of decoded photographs. A tile needs only photographs close to the tile.
 constexpr std::size_t max_image_bytes = std::size_t{400} << 20;
 constexpr std::size_t max_image_bytes_in_pieces = std::size_t{64} << 20;
 // Triangles whose sides are shorter in all photographs are not subdivided.
@@ -98,7 +98,7 @@ MeshWithMargin Texturing::cut_finely(MeshWithMargin part) const {
   SubdivisionResult fine = split_long_sides(
       std::move(part.mesh), options_.max_side_m, max_cut_triangles,
       [this](const TriangleMesh& mesh, const Triangle& t) { return is_shown(mesh, t, *photos_); });
-  // Triangles are ordered by their source, so the piece's own come first.
+  // Triangles are ordered by their source, so those of the tile come first, the margin last.
   const auto own = std::lower_bound(fine.source.begin(), fine.source.end(), part.triangles);
   return {std::move(fine.mesh), static_cast<std::size_t>(own - fine.source.begin())};
 }
@@ -179,7 +179,7 @@ TextureResult Texturing::whole(const TriangleMesh& mesh) {
   return {std::move(report_), std::move(model)};
 }
 
-// Collects color observations from all pieces.
+// Collects color observations from all tiles.
 std::vector<ColorObservation> Texturing::observe(MeshTileIndex& index, double margin_m) {
   const std::size_t wanted = std::max(min_observed_vertices, observed_vertices / index.size());
   std::vector<ColorObservation> all;

@@ -39,7 +39,7 @@ SubdivisionResult split_long_sides(
     const NeedsCutting& needs_cutting = [](const TriangleMesh&, const Triangle&) { return true; });
 
 // Relative exposure of photographs and vignetting of the lens, estimated from common observations.
-// Colors are divided by both before they are blended.
+// Colors are divided by exposure and vignetting before they are blended.
 
 struct TextureExposure {
   std::vector<Eigen::Vector3f> gains;  // per photograph and channel, relative to the geometric mean

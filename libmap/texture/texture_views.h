@@ -79,7 +79,7 @@ struct TextureViews {
   // One row per vertex up to the last one of the requested triangles: photographs that see all
   // triangles of the vertex, with the minimum quality. Empty for vertices of other triangles only.
   ViewTable of_vertices;
-  // All views of a subset of vertices, spread over the part. Colors are not set yet.
+  // All views of a subset of vertices, spread over the requested triangles. Colors are not set yet.
   std::vector<ColorObservation> observations;
   std::size_t observed_vertices = 0;  // number of vertices in `observations`' numbering
 };

@@ -59,7 +59,7 @@ std::vector<PixelRect> place_labels(const std::vector<LabelRequest>& requests,
                                     double point_radius_px, const PixelRect& bounds);
 
 // Draws markers in the terrain frame. Labels are omitted if the plot is too small for all labels.
-// If there are more than 5000 markers, those with drawn labels are drawn, and one per verdict and
+// If there are more than 5000 markers, markers with drawn labels are drawn, and one per verdict and
 // pixel square (side: the disc's radius).
 void draw_markers(const ScenePage& page, const SceneCamera& camera,
                   const std::vector<Marker>& markers, Canvas& canvas);
