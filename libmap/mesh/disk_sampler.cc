@@ -101,7 +101,7 @@ void SurfaceFragments::cut(const PlacedFragment& fragment, double longest_m,
   // Minimum number of parts along the longest side.
   const double parts = std::sqrt(fragment.square_of_longest_side()) / longest_m;
   if (static_cast<double>(parts_.size()) + parts > static_cast<double>(max_parts))
-    throw Error("too small for a mesh of this extent",
+    throw Error("too small for this mesh; it is 4 sample radii, so use a larger radius",
                 {.field = "fragment size", .value = to_text(longest_m) + " m"});
   if (parts > 1.0) {
     for (const PlacedFragment& half : fragment.halves()) cut(half, longest_m, max_parts);

@@ -38,9 +38,9 @@ TrianglePoint point_of(const Fragment& fragment, double first, double second);
 
 // Range of consecutive fragments of a surface, with the bounding box.
 struct SurfaceBlock {
-  std::size_t begin = 0;
-  std::size_t end = 0;
-  double area_m2 = 0.0;
+  std::size_t begin = 0;  // index of the first fragment
+  std::size_t end = 0;    // index after the last fragment
+  double area_m2 = 0.0;   // of all fragments
   Eigen::Vector3d center = Eigen::Vector3d::Zero();
   double reach_m = 0.0;    // radius of a bounding sphere about the center
   double longest_m = 0.0;  // longest side
@@ -51,13 +51,13 @@ class SurfaceFragments {
  public:
   // Takes all triangles of `mesh`, which must outlive this object.
   explicit SurfaceFragments(const TriangleMesh& mesh);
-  // Divides `triangles` until no side is longer than `longest_m`. Throws Error if there are more
-  // than `max_parts` parts.
+  // Copies `triangles`, divided until no side is longer than `longest_m`. Parts without area are
+  // dropped. Throws Error if there are more than `max_parts` parts.
   SurfaceFragments(const SurfaceFragments& triangles, double longest_m, std::size_t max_parts);
 
   const std::vector<SurfaceBlock>& blocks() const { return blocks_; }
   double area_m2() const;  // of all fragments
-  // Fragment with this index and the positions of the corners.
+  // Fragment with an index of a block: first the triangles, then the parts of triangles.
   PlacedFragment fragment_at(std::size_t number) const;
 
  private:
@@ -77,12 +77,12 @@ struct SampledSurface {
   double area_m2 = 0.0;  // > 0
   // Maximum displacement by rounding positions to single precision; 0: positions are not rounded.
   double rounding_m = 0.0;
-  // Samples of other surfaces, which keep the minimum distance and cover this surface as well.
+  // Samples of adjacent surfaces. New samples keep the minimum distance from these samples.
   std::vector<Eigen::Vector3d> neighbor_samples{};
 };
 
 struct DiskSamples {
-  std::vector<Eigen::Vector3d> positions;
+  std::vector<Eigen::Vector3d> positions;      // rounded if rounding_m > 0
   std::vector<TrianglePoint> triangle_points;  // positions on the mesh before rounding
 };
 
@@ -98,8 +98,7 @@ DiskSamples sample_disks(const SampledSurface& surface, double radius_m, std::ui
                          const std::function<bool(std::size_t thrown)>& goes_on,
                          Progress& progress);
 
-// Smallest distance between two positions, m; 0 if there are fewer than two. `expected_m` is an
-// estimate, for efficiency.
+// Smallest distance of two positions, m; 0 for fewer than two. `expected_m` (> 0): an estimate.
 double smallest_distance(const std::vector<Eigen::Vector3d>& positions, double expected_m);
 
 }  // namespace libmap

@@ -59,8 +59,7 @@ HalfEdge across_fan(const std::vector<Triangle>& triangles, const std::vector<Ha
   return no_edge;
 }
 
-// Extreme points along directions evenly distributed over the half-sphere: any direction is within
-// 0.06 rad of one of them.
+// Extreme points along even directions of a half-sphere: any direction is within 0.06 rad of one.
 std::vector<Eigen::Vector3d> extreme_points(const std::vector<Eigen::Vector3d>& points) {
   constexpr int directions = 900;
   const double golden_angle = std::numbers::pi * (3.0 - std::sqrt(5.0));

@@ -38,10 +38,10 @@ struct MeshEdges {
   std::size_t size() const { return first.size() - 1; }
   std::size_t count(std::size_t edge) const { return first[edge + 1] - first[edge]; }
 };
-// Throws Error if there are more than 2^32 / 3 - 1 triangles. Indices must be in range.
+// Throws Error for 1,431,655,764 triangles or more. Indices must be in range.
 MeshEdges edges_of(const std::vector<Triangle>& triangles, std::size_t vertices);
 
-// Opposite of a half-edge: the only other half-edge of its edge, in either direction, or one of
+// Opposite of a half-edge: the only other half-edge of its edge, in either direction, or one of:
 constexpr HalfEdge open_edge = 0xffffffff;          // no other triangle
 constexpr HalfEdge non_manifold_edge = 0xfffffffe;  // more than one other triangle
 constexpr HalfEdge no_edge = 0xfffffffd;            // the triangle has a repeated vertex
@@ -62,8 +62,8 @@ struct VertexTriangles {
 };
 VertexTriangles triangles_at_vertices(const std::vector<Triangle>& triangles, std::size_t vertices);
 
-// Fan of each corner (numbered as half-edges), named by the fan's lowest corner. A fan contains the
-// corners around a vertex that are joined over `opposite`; a manifold vertex has one fan.
+// Returns for each corner (index: the half-edge from it) the lowest corner of its fan: the corners
+// around the vertex whose triangles share edges. A manifold vertex has one fan.
 std::vector<HalfEdge> corner_fans(const std::vector<Triangle>& triangles,
                                   const std::vector<HalfEdge>& opposite);
 
@@ -73,7 +73,7 @@ std::vector<HalfEdge> corner_fans(const std::vector<Triangle>& triangles,
 std::vector<std::vector<HalfEdge>> boundary_loops(const std::vector<Triangle>& triangles,
                                                   const std::vector<HalfEdge>& opposite);
 
-// Dilates the marks by `rings` rings of triangles that share a vertex with a marked triangle.
+// Dilates marks of triangles by `rings` rings of triangles that share a vertex with marked ones.
 void dilate_mask(const TriangleMesh& mesh, int rings, std::vector<bool>& marks);
 
 // Largest distance between two points, m. For more than 2,000 points it is up to 0.2 % too small.

@@ -91,8 +91,8 @@ std::size_t count_of(const std::vector<bool>& marks) {
 
 TriangleMesh select_triangles(const TriangleMesh& mesh, const std::vector<bool>& keep_triangle) {
   if (keep_triangle.size() != mesh.triangles.size())
-    throw Error("number of marks differs from number of triangles",
-                {.field = "marked triangles",
+    throw Error("differs from the number of triangles",
+                {.field = "number of marks of triangles",
                  .value = std::to_string(keep_triangle.size()),
                  .bound = std::to_string(mesh.triangles.size())});
   std::vector<std::uint32_t> triangles;

@@ -21,11 +21,11 @@ TriangleMesh select_triangles(const TriangleMesh& mesh, const std::vector<bool>&
 
 // Components connected by shared edges, numbered in the order of the first triangle of each.
 struct MeshComponents {
-  std::vector<std::uint32_t> of_triangle;
-  std::vector<double> areas_m2;  // by component
+  std::vector<std::uint32_t> of_triangle;  // component of each triangle
+  std::vector<double> areas_m2;            // by component
 };
 MeshComponents connected_components(const TriangleMesh& mesh);
-// As above with known opposites_of(mesh), in a third of the time.
+// As above, in a third of the time: `opposite` is opposites_of(mesh).
 MeshComponents connected_components(const TriangleMesh& mesh,
                                     const std::vector<HalfEdge>& opposite);
 
@@ -37,7 +37,7 @@ inline bool is_integer(ScalarType type) {
 // interpolated linearly, normals are normalized, and integer fields take the nearer end's value.
 std::uint32_t append_vertex_between(TriangleMesh& mesh, std::uint32_t a, std::uint32_t b, double t);
 
-// Returns the mesh with positions, normals and viewpoint transformed by `target_from_source`.
+// Returns the mesh with positions and normals transformed by `target_from_source`.
 TriangleMesh transform_mesh(const TriangleMesh& mesh, const Pose& target_from_source);
 
 inline Eigen::Vector3d center_of(const TriangleMesh& mesh, const Triangle& t) {
@@ -48,12 +48,12 @@ using TriangleCorners = std::array<Eigen::Vector3d, 3>;
 inline TriangleCorners corners_of(const TriangleMesh& mesh, const Triangle& t) {
   return {mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]};
 }
-// The middle one, then one at each corner.
+// Divides a triangle at the midpoints of its edges: the middle part, then the part at each corner.
 std::array<TriangleCorners, 4> quarters_of(const TriangleCorners& corners);
 
 // Point on a triangle: (1 - u - v) * a + u * b + v * c.
 struct TrianglePoint {
-  std::uint32_t triangle = 0;
+  std::uint32_t triangle = 0;  // with corners a, b, c
   double u = 0.0;
   double v = 0.0;
 };

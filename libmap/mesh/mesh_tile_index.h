@@ -1,5 +1,5 @@
-// Access to a mesh that is stored in many files (tiles): each tile with a margin of the surface
-// around it. Memory depends on the size of a tile.
+// Reads a mesh that is stored in many files (tiles), each tile with a margin of the surface around
+// it. Memory depends on the size of a tile.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -13,15 +13,15 @@
 
 namespace libmap {
 
-// A mesh followed by the surface around it.
+// A tile's mesh, followed by the triangles of the margin around the tile.
 struct MeshWithMargin {
-  TriangleMesh mesh;
+  TriangleMesh mesh;          // triangles of the tile, then of the margin
   std::size_t triangles = 0;  // number of triangles before the triangles of the margin
 };
 
 // Appends the triangles of `other` with a corner in `box` (x and y, borders included). Vertices of
-// `other` at exactly the position of an existing vertex are replaced by it, which joins meshes with
-// equal seams. Normals, colors and fields are treated as in append_mesh.
+// `other` at exactly the position of a vertex of `mesh` are replaced by that vertex, which joins
+// meshes with equal seams. Normals, colors and fields are treated as in append_mesh.
 void append_part_within(const TriangleMesh& other, const Eigen::AlignedBox2d& box,
                         TriangleMesh& mesh);
 

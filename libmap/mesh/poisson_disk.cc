@@ -48,9 +48,9 @@ void require_sense(const SampledSurface& surface, const PoissonDiskOptions& opti
       std::clamp(100.0 * static_cast<double>(surface.mesh.triangles.size()), 2.5e6, max_samples);
   const double least = std::sqrt(saturation_density * surface.area_m2 / most);
   if (!(options.radius_m >= least))
-    throw Error("too many samples", {.field = "radius_m",
-                                     .value = to_text(options.radius_m),
-                                     .bound = ">= " + to_text(static_cast<float>(least))});
+    throw Error("yields too many samples", {.field = "radius_m",
+                                            .value = to_text(options.radius_m),
+                                            .bound = ">= " + to_text(static_cast<float>(least))});
 }
 
 // Searches for the radius that yields a number of samples. The number decreases with the square of
@@ -161,10 +161,11 @@ PoissonDiskResult sample(const SampledSurface& surface, const PoissonDiskOptions
 }  // namespace
 
 void bind(ParameterTable& table, PoissonDiskOptions& options) {
-  table.add("radius_m", options.radius_m, positive,
-            "minimum distance between samples, and maximum distance of the surface to one, m");
+  table.add(
+      "radius_m", options.radius_m, positive,
+      "minimum distance between samples and maximum distance from the surface to a sample, m");
   table.add("count", options.count, {0.0, max_samples},
-            "approximate number of samples (1 %); replaces radius_m; 0: use radius_m");
+            "number of samples, reached within 1 %; replaces the minimum distance; 0: not used");
   table.add("seed", options.seed, {}, "random seed of the samples");
 }
 
@@ -177,7 +178,7 @@ TileSampler::TileSampler(std::vector<Bounds3d> boxes, const PoissonDiskOptions& 
     : boxes_(std::move(boxes)), options_(options), near_(boxes_.size()) {
   check_parameters(options);
   if (options.count > 0)
-    throw Error("a number of samples requires the whole surface, not tiles; use a radius",
+    throw Error("cannot be used for a surface that is divided into tiles; set radius_m instead",
                 {.field = "count", .value = std::to_string(options.count), .bound = "0"});
 }
 
@@ -209,7 +210,7 @@ void describe(ResultTable& table, const PoissonDiskResult& result) {
   table.add("smallest_distance_m", result.smallest_distance_m,
             "actual minimum distance between samples, m");
   table.add("relative_radius", result.relative_radius,
-            "minimum distance relative to the densest packing of as many discs");
+            "actual minimum distance relative to that in the densest packing of as many discs");
   table.add("radii_tried", result.tried_radii, "number of radii that were tried");
 }
 

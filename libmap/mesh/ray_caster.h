@@ -1,6 +1,5 @@
 // Ray casting against a triangle mesh (Embree). Triangles are found in single precision relative to
-// the mesh's center, watertight along shared edges; intersections are then computed in double
-// precision.
+// the mesh center, watertight at shared edges; intersections are then refined in double precision.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,29 +13,28 @@
 namespace libmap {
 
 struct RayHit {
-  static constexpr std::uint32_t no_triangle = 0xffffffff;
+  static constexpr std::uint32_t no_triangle = 0xffffffff;  // value of `triangle`
 
-  double distance = 0.0;  // in units of the direction's length
-  std::uint32_t triangle = 0;
-  double u = 0.0;  // barycentric: (1 - u - v) * a + u * b + v * c
+  double distance = 0.0;       // in units of the direction's length
+  std::uint32_t triangle = 0;  // with corners a, b, c
+  double u = 0.0;              // position: (1 - u - v) * a + u * b + v * c
   double v = 0.0;
 };
 
 class RayCaster {
  public:
-  // Throws Error if the mesh has no triangle, an index out of range or a vertex that is not finite.
-  // Copies the mesh.
+  // Copies the mesh. Throws Error if it has no triangle, an invalid index or a non-finite vertex.
   explicit RayCaster(const TriangleMesh& mesh);
 
-  // Nearest intersection origin + distance * direction with either side of a triangle, `near` <=
-  // distance <= `far`. Returns nullopt if there is none, or if the direction is zero or not finite.
-  // Thread-safe.
+  // Returns the nearest intersection, origin + distance * direction, with either side of a
+  // triangle, where `near` <= distance <= `far`. Returns nullopt if there is none, or if the
+  // direction is zero or not finite. Thread-safe.
   std::optional<RayHit> cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                              double near = 0.0, double far = 1e30) const;
 
   // Casts many rays from one origin, fastest if neighbors in `directions` are similar. `hits`
-  // receives one element per direction, with RayHit::no_triangle for no intersection. Throws Error
-  // if the sizes differ.
+  // receives one element per direction, with triangle = no_triangle if there is no intersection.
+  // Throws Error if the sizes differ.
   void cast_bundle(const Eigen::Vector3d& origin, std::span<const Eigen::Vector3d> directions,
                    std::span<RayHit> hits, double near = 0.0, double far = 1e30) const;
 

@@ -13,14 +13,13 @@ namespace libmap {
 // Nearest point of a surface to a query point.
 struct NearestSurfacePoint {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  // on the surface
-  // Unit normal; zero without orientation. On an edge or a corner of a mesh it is the
-  // angle-weighted pseudo-normal, which distinguishes inside from outside (Baerentzen and Aanaes
-  // 2005).
+  // Unit normal; zero if a cloud's point has no normal. On an edge or a corner of a mesh it is the
+  // angle-weighted pseudo-normal, which separates inside and outside (Baerentzen and Aanaes 2005).
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
-  double distance_m = 0.0;
-  bool on_border = false;  // true if `position` is on the border of the surface
+  double distance_m = 0.0;  // between `position` and the query point
+  bool on_border = false;   // true if `position` is on the border of the surface
 
-  // Distance, negative behind the surface; >= 0 without orientation.
+  // Distance, negative behind the surface; >= 0 if `normal` is zero.
   double signed_distance_m(const Eigen::Vector3d& point) const {
     return (point - position).dot(normal) < 0.0 ? -distance_m : distance_m;
   }
@@ -28,14 +27,13 @@ struct NearestSurfacePoint {
 
 class ReferenceSurface {
  public:
-  // Copies the surface of a mesh. Throws Error if it has no triangle, an index out of range or a
-  // vertex that is not finite.
+  // Copies the mesh. Throws Error if it has no triangle, an invalid index or a non-finite vertex.
   explicit ReferenceSurface(const TriangleMesh& mesh);
 
   // Represents a cloud with normals by one disc per point, with a radius of twice the median point
-  // spacing. Distances are to the disc of the nearest point: gaps between points are ignored, but
-  // holes are not. Points without a normal are points. Throws Error if there is no point or one is
-  // not finite.
+  // spacing. Distances are to the disc of the nearest point. Discs close the gaps between points,
+  // but not holes. A point without a normal has no disc. Throws Error for no point or a non-finite
+  // point.
   explicit ReferenceSurface(const PointCloud& cloud);
 
   ~ReferenceSurface();
@@ -58,8 +56,8 @@ class ReferenceSurface {
 };
 
 struct PointDistances {
-  std::vector<double> distance_m;
-  std::vector<double> signed_distance_m;  // equal to distance_m without orientation
+  std::vector<double> distance_m;         // one per point, >= 0
+  std::vector<double> signed_distance_m;  // equal to distance_m if the surface is not oriented
 };
 // Distances of points to the surface. The result does not depend on the number of threads.
 PointDistances distances_to(const ReferenceSurface& surface,

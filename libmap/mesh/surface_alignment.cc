@@ -19,18 +19,19 @@ namespace libmap {
 
 void bind(ParameterTable& table, SurfaceAlignmentOptions& options) {
   table.add("icp_max_distance_m", options.max_distance_m, positive,
-            "maximum distance from the surface of points used by ICP, m");
+            "maximum distance between the surface and the points that ICP uses, m");
   table.add("icp_min_overlap", options.min_overlap, zero_to_one,
-            "minimum share of the points that overlap the surface in ICP");
+            "minimum share of the points that overlap the surface; the alignment fails below it");
   table.add("icp_max_iterations", options.max_iterations, {1.0, 1e6},
             "maximum number of ICP iterations");
-  table.add("icp_tolerance_m", options.tolerance_m, positive,
-            "step of the points below which ICP has converged, m");
+  table.add(
+      "icp_tolerance_m", options.tolerance_m, positive,
+      "root mean square displacement of the points per step below which ICP has converged, m");
   table.add("icp_max_points", options.max_points, {6.0, 1e8},
             "maximum number of points used by ICP");
   table.add("icp_min_curvature", options.min_curvature, zero_to_one,
-            "share of the largest eigenvalue of the ICP information matrix below which a direction "
-            "of motion is left unchanged");
+            "minimum eigenvalue of the ICP information matrix, relative to the largest; ICP does "
+            "not move points along eigenvectors with smaller eigenvalues");
 }
 
 namespace {
@@ -66,10 +67,11 @@ std::vector<Pair> pairs_of(const std::vector<Eigen::Vector3d>& points, const Pos
   const double fraction = static_cast<double>(pairs.size()) / static_cast<double>(points.size());
   if (pairs.size() < 6 || fraction < options.min_overlap)
     throw Error("too few points are near the surface for an alignment",
-                {.field = "points within " + to_text(static_cast<float>(options.max_distance_m)) +
-                          " m of the surface",
+                {.field = "share of points within " +
+                          to_text(static_cast<float>(options.max_distance_m)) + " m of the surface",
                  .value = to_fixed_text(100.0 * fraction, 1) + " %",
-                 .bound = ">= " + to_fixed_text(100.0 * options.min_overlap, 1) + " %"});
+                 .bound = ">= " + to_fixed_text(100.0 * options.min_overlap, 1) +
+                          " % and at least 6 points"});
   return pairs;
 }
 
@@ -168,7 +170,7 @@ SurfaceAlignmentResult align_to_surface(const std::vector<Eigen::Vector3d>& poin
                                         const ReferenceSurface& surface,
                                         const SurfaceAlignmentOptions& options) {
   check_parameters(options);
-  if (!surface.is_oriented()) throw Error("cannot align to a surface without normals");
+  if (!surface.is_oriented()) throw Error("cannot align to a cloud without normals at all points");
   if (points.size() < 6)
     throw Error("too few points to align",
                 {.field = "points", .value = std::to_string(points.size()), .bound = ">= 6"});

@@ -26,22 +26,22 @@ void bind(ParameterTable& table, SurfaceAlignmentOptions& options);
 
 struct SurfaceAlignmentResult {
   Pose surface_from_points = Pose::Identity();
-  bool converged = false;
+  bool converged = false;  // true if the last step was below tolerance_m
   int iterations = 0;
-  int free_motions = 0;     // number of the six motions not determined in the last step
-  double curvature = 0.0;   // smallest relative curvature above min_curvature
+  int free_motions = 0;     // how many of the six motions were not determined in the last step
+  double curvature = 0.0;   // smallest relative curvature of a determined motion
   std::size_t points = 0;   // points used
   std::size_t overlap = 0;  // points within max_distance_m and not beyond a border, at the end
   std::size_t inliers = 0;  // overlapping points with a weight above 0
-  double rmse_m = 0.0;      // of the inliers' distances
+  double rmse_m = 0.0;      // root mean square distance of the inliers from the surface
 };
 
 // Finds the rigid motion of `points` that minimizes the weighted squares of the points' distances
 // along the surface normals. Points with a nearest point on the border are ignored. The scale of
 // the weights is 1.4826 times the median distance in each step, so that up to half of the
 // overlapping points may be outliers. The result does not depend on the number of threads. Throws
-// Error: options out of range, fewer than six points, one that is not finite, a surface without
-// orientation, too little overlap in some step.
+// Error if an option is out of range, there are fewer than six points, a point is not finite, the
+// surface is not oriented, or too few points overlap it in some step.
 SurfaceAlignmentResult align_to_surface(const std::vector<Eigen::Vector3d>& points,
                                         const ReferenceSurface& surface,
                                         const SurfaceAlignmentOptions& options = {});

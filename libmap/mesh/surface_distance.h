@@ -14,14 +14,13 @@ namespace libmap {
 
 struct SurfacePoint {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
-  std::uint32_t triangle = 0;
-  double distance_m = 0.0;  // from the query point
+  std::uint32_t triangle = 0;  // index of the triangle with `position`
+  double distance_m = 0.0;     // from the query point
 };
 
 class SurfaceDistance {
  public:
-  // Throws Error if the mesh has no triangle, an index out of range or a vertex that is not finite.
-  // Copies the mesh.
+  // Copies the mesh. Throws Error if it has no triangle, an invalid index or a non-finite vertex.
   explicit SurfaceDistance(const TriangleMesh& mesh) : mesh_(mesh, false) {}
 
   // Nearest point of the surface to a finite point. Embree finds the candidates; distances are in

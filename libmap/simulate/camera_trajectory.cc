@@ -255,10 +255,10 @@ void bind(ParameterTable& table, CameraTrajectoryOptions& options) {
             {{"auto", CameraPath::automatic},
              {"loops", CameraPath::loops},
              {"serpentine", CameraPath::serpentine}},
-            "camera path; loops: around the site; serpentine: in lanes; auto: serpentine for "
-            "clouds");
+            "camera path; loops: around the site; serpentine: in parallel lanes; auto: loops for a "
+            "mesh, serpentine for a cloud");
   bind(table, options.serpentine);
-  table.add("frames", options.frames, {1.0, 1e6}, "number of poses");
+  table.add("frames", options.frames, {1.0, 1e6}, "number of frames along the camera path");
   table.add("loops", options.loops, {1.0, 1000.0}, "number of loops around the site");
   table.add("radius_m", options.radius_m, not_negative,
             "radius of the first loop around the site's center, m; 0: fitted to the mesh");
@@ -273,8 +273,8 @@ void bind(ParameterTable& table, CameraTrajectoryOptions& options) {
             "direction from the site's center to the start of the first loop, degrees "
             "counter-clockwise from x; at a wall: offset from the default start");
   table.add("sweep_deg", options.sweep_deg, {-360.0, 360.0},
-            "angle swept by each loop, degrees; below 360, every second loop runs backwards; 0: "
-            "360, or 120 at a wall");
+            "angle swept by each loop, degrees; negative: clockwise; below 360, every second loop "
+            "runs backwards; 0: 360, or 120 at a wall");
   table.add("gaze_deg", options.gaze_deg, {0.0, 45.0},
             "standard deviation of the angle between view direction and target, degrees");
   table.add("sway_m", options.sway_m, not_negative,

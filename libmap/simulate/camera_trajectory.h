@@ -32,10 +32,10 @@ void bind(ParameterTable& table, SerpentineOptions& options);
 struct CameraTrajectoryOptions {
   CameraPath path = CameraPath::automatic;
   SerpentineOptions serpentine{};
-  int frames = 60;
-  int loops = 2;
-  double radius_m = 0.0;       // of the first loop; 0: 4/3 of half the mesh's smaller side (wall:
-                               // larger side), 0.8 to 2 m
+  int frames = 60;             // number of poses
+  int loops = 2;               // number of loops
+  double radius_m = 0.0;       // of the first loop; 0: 2/3 of the mesh's smaller horizontal side
+                               // (wall: larger side), limited to 0.8 to 2 m
   double last_radius_m = 0.0;  // of the last loop; 0: 0.7 times the first
   double height_m = 0.0;       // above the ground on the first loop; 0: 0.6 times the loop radius
                                // Serpentine: above the local mean ground; 0: 1.4 m
@@ -53,8 +53,8 @@ struct CameraTrajectoryOptions {
 // Binds all fields except the target.
 void bind(ParameterTable& table, CameraTrajectoryOptions& options);
 
-// Height of the ground around a site: median height of the vertices in the outer tenth of the
-// mesh's length and width. Throws Error for a mesh without vertices.
+// Height of the ground around a site: median height of the vertices within a tenth of the mesh's
+// length or width from its bounding box. Throws Error for a mesh without vertices.
 double surrounding_ground_height(const TriangleMesh& mesh);
 
 // Pose of the camera's body (x forward, y left, z up) in the mesh's frame, `after_s` seconds after

@@ -135,7 +135,7 @@ VisibleSurface::VisibleSurface(const TriangleMesh& mesh, TextureSource texture,
   const auto part = std::make_shared<Part>(Part{RayCaster(mesh), mesh, texture_seed});
   std::vector<Color>& colors = part->mesh.vertex_colors;
   if (texture == TextureSource::mesh && colors.empty())
-    throw Error("the mesh has no vertex colors");
+    throw Error("the mesh has no vertex colors; use texture rock");
   const bool plain = std::all_of(colors.begin(), colors.end(),
                                  [&](const Color& color) { return color == colors.front(); });
   if (texture == TextureSource::rock || (texture == TextureSource::automatic && plain))
@@ -213,11 +213,11 @@ void bind_noise(ParameterTable& table, DepthSensorOptions& options) {
   table.add("max_incidence_deg", options.max_incidence_deg, {0.0, 90.0},
             "maximum angle between ray and normal of measured surfaces, degrees; 90: no limit");
   table.add("edge_gap_m", options.edge_gap_m, positive,
-            "minimum depth discontinuity inside an edge pixel, m");
+            "depth discontinuity within a pixel above which it is an edge pixel, m");
   table.add("flying_pixels", options.flying_pixels, zero_to_one,
-            "share of edge pixels with a depth between foreground and background");
+            "share of the pixels at depth discontinuities that mix foreground and background");
   table.add("edge_dropouts", options.edge_dropouts, zero_to_one,
-            "share of edge pixels without depth");
+            "share of the pixels at depth discontinuities without depth");
 }
 
 void bind(ParameterTable& table, DepthSensorOptions& options) {
@@ -232,7 +232,7 @@ void bind(ParameterTable& table, PhotoOptions& options) {
   table.add("vignetting", options.vignetting, zero_to_one,
             "loss of brightness in the corners of color images, 0 to 1");
   table.add("color_noise", options.color_noise, not_negative,
-            "standard deviation of color noise, 0 to 255");
+            "standard deviation of color noise, in units of 0 to 255");
 }
 
 DepthSensorOptions ideal_depth_sensor(double near_m, double far_m) {

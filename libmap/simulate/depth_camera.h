@@ -25,8 +25,8 @@ class RayCaster;
 
 // Rays (x/z, y/z) through the centers and corners of a camera's pixels; NaN if there is no ray.
 struct ViewRays {
-  int width = 0;
-  int height = 0;
+  int width = 0;                         // of the image, pixels
+  int height = 0;                        // of the image, pixels
   std::vector<Eigen::Vector2d> centers;  // width * height
   std::vector<Eigen::Vector2d> corners;  // (width + 1) * (height + 1); (0, 0) is at pixel -0.5 -0.5
 };
@@ -37,17 +37,16 @@ struct SurfaceView {
   DepthImage depth;              // at pixel centers
   DepthImage corner_depth;       // at pixel corners, indexed as ViewRays::corners
   Image<float> incidence_cos;    // cosine of the angle between ray and normal at the center
-  Image<Eigen::Vector3f> color;  // 0 to 1; weights: 1/2 for the center, 1/8 for each corner
+  Image<Eigen::Vector3f> color;  // 0 to 1; half of the center's color, 1/8 of each corner's
 };
 
-// Source of colors: the vertex colors, or rock_color(). automatic: vertex colors unless all equal.
+// Source of colors: vertex colors or rock_color(). automatic: vertex colors unless all are equal.
 enum class TextureSource { automatic, mesh, rock };
 
 // Source of the normals for shading: estimated from the mesh, or vertex normals of the mesh.
 enum class ShadingNormals { estimated, per_vertex };
 
-// One or several meshes prepared for rendering; copies share the meshes. Light is diffuse from
-// above with a directional part.
+// Meshes for rendering, shared by copies. Light is diffuse from above with a directional part.
 class VisibleSurface {
  public:
   // Copies the mesh. Throws Error as RayCaster does, and if `texture` or `normals` require vertex
@@ -63,13 +62,12 @@ class VisibleSurface {
   // empty unless `with_color` is set.
   SurfaceView view(const ViewRays& rays, const Pose& world_from_camera,
                    bool with_color = true) const;
-  // Renders the view of a rolling-shutter camera with a pose per row; row -0.5 is the upper border
-  // of the first row.
+  // Renders a view with a pose per row (rolling shutter); row -0.5 is the first row's upper border.
   using PoseOfRow = std::function<Pose(double row)>;
   SurfaceView view(const ViewRays& rays, const PoseOfRow& world_from_camera,
                    bool with_color = true) const;
 
-  // Ray caster and mesh (with vertex normals) of the first part.
+  // Ray caster and mesh (with vertex normals) of the first surface.
   const RayCaster& caster() const;
   const TriangleMesh& mesh() const;
 
@@ -94,11 +92,11 @@ struct DepthSensorOptions {
   double near_m = 0.5;            // minimum and maximum measured depth
   double far_m = 4.5;
   double max_incidence_deg = 80.0;  // maximum angle between ray and normal; 90: no limit
-  double edge_gap_m = 0.05;         // minimum depth discontinuity within an edge pixel
-  double flying_pixels = 0.35;      // share of edge pixels measured between front and back
-  double edge_dropouts = 0.35;      // share of edge pixels without depth
+  double edge_gap_m = 0.05;         // depth discontinuity above which a pixel is an edge pixel
+  double flying_pixels = 0.35;  // share of edge pixels measured between foreground and background
+  double edge_dropouts = 0.35;  // share of edge pixels without depth
 
-  void check() const;  // throws Error naming the first invalid field
+  void check() const;  // throws Error if far_m <= near_m or both shares together exceed 1
 };
 void bind(ParameterTable& table, DepthSensorOptions& options);
 // Binds all fields except resolution and limits.
@@ -107,10 +105,10 @@ void bind_noise(ParameterTable& table, DepthSensorOptions& options);
 DepthSensorOptions ideal_depth_sensor(double near_m, double far_m);
 
 struct DepthMeasurement {
-  DepthImage depth;
+  DepthImage depth;          // m; 0: no measurement
   std::size_t measured = 0;  // pixels with a depth
   std::size_t edges = 0;     // pixels with a depth discontinuity
-  std::size_t flying = 0;    // edge pixels measured between front and back
+  std::size_t flying = 0;    // edge pixels measured between foreground and background
 };
 
 // Applies sensor errors to a view. The probability of a missing depth rises from 0 to 1 over the
@@ -120,7 +118,7 @@ DepthMeasurement measure_depth(const SurfaceView& view, const ViewRays& rays,
 
 struct PhotoOptions {
   double vignetting = 0.25;  // loss of brightness in the corners, 0 to 1
-  double color_noise = 2.0;  // standard deviation, 0 to 255
+  double color_noise = 2.0;  // standard deviation, in units of 0 to 255
 };
 void bind(ParameterTable& table, PhotoOptions& options);
 

@@ -83,7 +83,7 @@ void look_around(const TriangleMesh& mesh, const VertexTriangles& around, std::u
 
 const ScalarField& rock_field(const TriangleMesh& mesh) {
   if (const ScalarField* field = find_field(mesh.face_fields, "rock")) return *field;
-  throw Error("the mesh has no such face field; use a mesh of simulate site", {.field = "rock"});
+  throw Error("no such face field; use a mesh of graspmap simulate site", {.field = "rock"});
 }
 
 // Rock of each vertex; 0 unless all of its triangles belong to one rock.

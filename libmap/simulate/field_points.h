@@ -11,19 +11,19 @@
 
 namespace libmap {
 
-// Shape of the surface within the radius, by area-weighted normals (normal voting: Medioni et al.
-// 2000; Page et al. 2002). flat: equal normals. edge: normals vary in one direction, around a
-// ridge. corner: normals vary in both directions, around a tip. irregular: partly concave, such as
-// clefts, steps and feet of rocks.
+// Shape of the surface within FieldPointOptions::radius_m, by area-weighted normals (normal voting:
+// Medioni et al. 2000; Page et al. 2002). flat: equal normals. edge: normals vary in one direction,
+// around a ridge. corner: normals vary in both directions, around a tip. irregular: partly concave,
+// such as clefts, steps and feet of rocks.
 enum class LocationKind { flat, edge, corner, irregular };
 const std::string& location_kind_name(LocationKind kind);
 
 struct FieldPoint {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  // a vertex, in the site's frame
-  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();   // mean within the radius
   LocationKind kind = LocationKind::flat;
   bool is_hard = false;    // difficult to reach: steeper than 60 degrees
-  int rock = 0;            // index in the site
+  int rock = 0;            // index in RockSite::rocks
   double height_m = 0.0;   // above the ground, along the ground normal
   double slope_deg = 0.0;  // between surface and ground: 0 parallel, 90 a wall, above 90 an
                            // overhang

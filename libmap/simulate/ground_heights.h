@@ -19,7 +19,7 @@ class GroundHeights {
   void add(std::span<const Eigen::Vector3d> points);
 
   bool empty() const { return cells_.empty(); }
-  const Eigen::AlignedBox2d& box() const { return box_; }
+  const Eigen::AlignedBox2d& box() const { return box_; }  // of the points in x and y
   // Mean height of the cells around a position, weighted by a Gaussian with a standard deviation of
   // cell_m; the mean of all cells if no point is near, 0 without points.
   double height(const Eigen::Vector2d& position) const;

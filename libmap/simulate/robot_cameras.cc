@@ -61,8 +61,8 @@ DepthSensorOptions sensor_of(const RigCamera& camera, DepthSensorOptions depth,
 
 void bind(ParameterTable& table, RobotCamerasOptions& options) {
   table.add("sensor", options.sensor,
-            "depth camera, a name in data/sensors or a file: its range within that of the rig, and "
-            "its noise if no other option sets it; auto: no noise, and the range of the rig");
+            "depth camera that limits the rig's range and sets the noise if no noise option does: "
+            "a name in data/sensors or a file; auto: range of the rig, no noise");
   bind_noise(table, options.depth);
   bind(table, options.faults);
   table.add("stamp_s", options.stamp_s, not_negative, "earliest possible stamp of the images, s");

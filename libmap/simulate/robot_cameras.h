@@ -18,12 +18,13 @@
 namespace libmap {
 
 struct RobotCamerasOptions {
-  // Name in data/sensors or a file: range, and noise if `depth` has none. "auto": that of `depth`.
+  // Name in data/sensors or a file. Limits the range, and sets the noise if `depth` has none.
+  // "auto": range and noise of `depth`.
   std::string sensor = "auto";
-  // The range is limited to that of the rig's cameras, which also determine the resolution.
+  // The range is limited to the range of the rig's cameras, which also determine the resolution.
   DepthSensorOptions depth = ideal_depth_sensor(0.0, std::numeric_limits<double>::infinity());
   DepthFaults faults{};
-  double stamp_s = 0.0;
+  double stamp_s = 0.0;           // earliest possible stamp of the images
   double stamp_spread_s = 0.004;  // cameras without a common trigger: stamps are between stamp_s
                                   // and this much later
   std::uint64_t seed = 1;
@@ -37,13 +38,12 @@ struct RobotCameraImage {
 };
 
 // Returns one image per camera of the rig, which does not move. An image may have no depth at all.
-// Throws Error for a mesh without triangles, or a sensor that is unknown or has no range in common
-// with a camera.
+// Throws Error if the mesh has no triangle, or the sensor is unknown or out of a camera's range.
 std::vector<RobotCameraImage> simulate_robot_cameras(const TriangleMesh& mesh, const CameraRig& rig,
                                                      const Pose& world_from_robot,
                                                      const RobotCamerasOptions& options);
 
-// Height of the highest surface at (x, y). Throws Error if there is none.
+// Height of the highest surface at (x, y), m. Throws Error if there is none.
 double ground_height(const TriangleMesh& mesh, double x_m, double y_m);
 
 }  // namespace libmap

@@ -120,9 +120,10 @@ ParameterTable ground_parameters(SiteGround& ground) {
 
 ParameterTable layout_parameters(SiteLayout& layout) {
   ParameterTable table;
-  table.add("site_size_m", layout.site_size_m, ground_size_range, "side of the site's square, m");
+  table.add("site_size_m", layout.site_size_m, ground_size_range,
+            "side of the square around the origin that contains the rocks, m");
   table.add("free_square_m", layout.free_square_m, Range{0.0, 100.0},
-            "side of the square without rocks, m");
+            "side of the square around the origin without rocks, m");
   table.add("gap_m", layout.gap_m, Range{0.0, 10.0}, "minimum distance between two rocks, m");
   return table;
 }
@@ -131,9 +132,9 @@ ParameterTable field_point_parameters(FieldPointOptions& options) {
   ParameterTable table;
   table.add("count", options.count, Range{1.0, 10'000.0}, "number of locations for the field test");
   table.add("min_height_m", options.min_height_m, not_negative,
-            "minimum height of field points above the ground, m");
+            "minimum height of locations for the field test above the ground, m");
   table.add("radius_m", options.radius_m, Range{0.005, 1.0},
-            "radius within which the kind of a field point (flat, edge, ...) is determined, m");
+            "radius of the surface that determines the kind of a field test location, m");
   return table;
 }
 
@@ -152,8 +153,8 @@ void RockSite::check() const {
       throw Error("the rock extends beyond the ground",
                   {.field = rock_name(n, rocks[n]) + ".x_m, y_m",
                    .value = to_text(rocks[n].x_m) + ", " + to_text(rocks[n].y_m),
-                   .bound = "5 cm within " + to_text(ground.size_x_m) + " x " +
-                            to_text(ground.size_y_m) + " m"});
+                   .bound = "at least 5 cm inside the ground of " + to_text(ground.size_x_m) +
+                            " x " + to_text(ground.size_y_m) + " m"});
   }
 }
 
@@ -224,7 +225,7 @@ void place_rocks(RockSite& site, std::vector<RockToPlace> rocks) {
                   });
     }
     if (!is_placed)
-      throw Error("no free position for this rock: enlarge site_size_m or reduce free_square_m",
+      throw Error("no free position for this rock; increase site_size_m or reduce free_square_m",
                   {.field = rock_name(one.rock, rock),
                    .value = to_text(rock.width_m) + " x " + to_text(rock.depth_m) + " m"});
     taken.push_back(footprint_of(rock));

@@ -31,12 +31,12 @@ bool is_hold(RockShape shape);
 struct SiteRock {
   std::string name;
   RockShape shape = RockShape::block;
-  double x_m = 0.0;
+  double x_m = 0.0;  // center, in the ground frame
   double y_m = 0.0;
-  double height_m = 0.3;  // of the top above the ground at (x, y)
-  double width_m = 0.3;   // along the rock's x axis, above the ground
-  double depth_m = 0.3;   // along the rock's y axis
-  double yaw_deg = 0.0;
+  double height_m = 0.3;      // of the top above the ground at (x, y)
+  double width_m = 0.3;       // along the rock's x axis, above the ground
+  double depth_m = 0.3;       // along the rock's y axis
+  double yaw_deg = 0.0;       // rotation about z, counter-clockwise
   int sides = 6;              // walls of a block
   int ledges = 0;             // lower blocks that are merged with it
   double overhang_deg = 0.0;  // outward tilt of a third of a block's walls
@@ -48,10 +48,10 @@ struct SiteRock {
 enum class GroundTexture { soil, rock, panel };  // colors of the ground
 
 struct SiteGround {
-  double size_x_m = 4.0;
+  double size_x_m = 4.0;  // extent of the rectangle
   double size_y_m = 4.0;
   double relief_m = 0.02;  // maximum height of the random relief
-  double tilt_deg = 0.0;
+  double tilt_deg = 0.0;   // 0: level; 90: a wall
   GroundTexture texture = GroundTexture::soil;
 };
 
@@ -63,25 +63,25 @@ struct SiteLayout {
 };
 
 struct FieldPointOptions {
-  int count = 30;
+  int count = 30;             // number of locations
   double min_height_m = 0.1;  // above the ground
   double radius_m = 0.04;     // of the neighborhood that determines the kind
 };
 
 struct RockSite {
-  std::uint64_t seed = 1;
+  std::uint64_t seed = 1;  // of missing rock values, positions, relief and colors
   SiteGround ground;
   SiteLayout layout;
   FieldPointOptions field_points;
   std::vector<SceneShape> bumps;  // of kind Bump
   std::vector<SiteRock> rocks;
 
-  // Throws Error naming the entry, the value and the bound.
+  // Throws Error if a rock has a value out of range or extends beyond the ground.
   void check() const;
   Pose site_from_ground() const;
 };
 
-// Parameters of each part by key. A table refers to the argument.
+// Tables of the parameters of a rock, the ground, ... by key. A table refers to its argument.
 ParameterTable rock_parameters(SiteRock& rock);
 ParameterTable ground_parameters(SiteGround& ground);
 ParameterTable layout_parameters(SiteLayout& layout);
@@ -91,12 +91,12 @@ ParameterTable field_point_parameters(FieldPointOptions& options);
 SiteRock draw_rock(RockShape shape, double height_m, std::uint64_t seed);
 
 struct RockToPlace {
-  std::size_t rock = 0;  // index in the site
-  bool keeps_yaw = false;
+  std::size_t rock = 0;    // index in the site
+  bool keeps_yaw = false;  // true: the yaw of the rock is given
 };
-// Draws positions, and yaw unless it is kept, for these rocks, widest first, such that footprints
-// satisfy the layout. Holds have a yaw of at most 25 degrees. Throws Error naming the first rock
-// that cannot be placed.
+// Draws positions, and yaw unless it is kept, for these rocks, largest footprint first, such that
+// the footprints satisfy the layout. Holds have a yaw of at most 25 degrees. Throws Error naming
+// the first rock that cannot be placed.
 void place_rocks(RockSite& site, std::vector<RockToPlace> rocks);
 
 // Height of the ground above z = 0 of the ground frame: bumps and random relief.
@@ -123,10 +123,10 @@ class GroundRelief {
 //     - {name: R01, height_m: 0.67, overhang_deg: 15}
 //     - {name: C01, shape: cobble, height_m: 0.15, x_m: 1, y_m: 0.2}
 //
-// All parts are optional. A rock requires its height; missing values are drawn from the rock's
-// seed, and a missing seed from the site's seed. Rocks without x_m and y_m are placed within the
-// layout. `seed` replaces the file's seed. Throws Error naming `file`, the entry, the key, the
-// value and the bound, and the nearest known key for an unknown one.
+// All keys are optional. A rock requires its height; missing values are drawn from the rock's seed,
+// and a missing seed from the site's seed. Rocks without x_m and y_m are placed within the layout.
+// `seed` replaces the file's seed. Throws Error naming `file`, the entry, the key, the value and
+// the bound, and the nearest known key for an unknown one.
 RockSite parse_site(const std::string& text, const std::string& file,
                     std::optional<std::uint64_t> seed = std::nullopt);
 

@@ -23,7 +23,7 @@ struct ScanEvents {
   int sun_first_frame = 0;      // first frame with sunlight; 0: never
   double sun_far_m = 1.5;       // maximum measured depth in sunlight
   int ceiling_first_frame = 0;  // first frame of a view of a plain ceiling; 0: never
-  int ceiling_frames = 10;
+  int ceiling_frames = 10;      // number of frames with the ceiling
 
   bool looks_up(std::size_t frame) const;  // true if the camera views the ceiling
   // The body's pose, rotated upward if it looks at the ceiling.
@@ -38,9 +38,8 @@ struct ExtraBody {
   std::shared_ptr<const VisibleSurface> surface;
   std::function<std::optional<Pose>(std::size_t frame)> world_from_body;
 };
-// The objects of the enabled events: a person of 1.7 m who walks along y through the center of the
-// mesh; a stone of 30 x 24 x 20 cm near the center, moved by 40 cm; a ceiling 2.5 m above the
-// ground.
+// Objects of the enabled events: a person of 1.7 m who walks along y through the mesh center; a
+// stone of 30 x 24 x 20 cm near the center, moved by 40 cm; a ceiling 2.5 m above the ground.
 std::vector<ExtraBody> extra_bodies(const TriangleMesh& mesh, const ScanEvents& events,
                                     std::uint64_t seed);
 

@@ -230,18 +230,19 @@ DepthMeasurement ScanCamera::take(std::size_t n, const VisibleSurface& surface,
 }  // namespace
 
 void bind(ParameterTable& table, OdometryOptions& options) {
-  table.add("odometry_error_of_distance", options.error_of_distance, not_negative,
-            "standard deviation of the error of an odometry step along an axis, m per m of "
-            "length");
+  table.add(
+      "odometry_error_of_distance", options.error_of_distance, not_negative,
+      "standard deviation of the error of an odometry step along each axis, m per m of distance");
   table.add("odometry_error_of_turn", options.error_of_turn, not_negative,
-            "standard deviation of the error of an odometry step about an axis, degrees per "
-            "degree");
+            "standard deviation of the error of an odometry step about each axis: term "
+            "proportional to the rotation, degrees per degree");
   table.add("odometry_turn_of_distance_deg", options.turn_of_distance_deg, not_negative,
-            "standard deviation of the error of an odometry step about an axis, degrees per m");
+            "standard deviation of the error of an odometry step about each axis: term "
+            "proportional to the distance, degrees per m");
 }
 
 void bind(ParameterTable& table, LoopClosureOptions& options) {
-  table.add("closures", options.closures, "add loop closures between poses that are close");
+  table.add("closures", options.closures, "add loop closures between nodes with similar poses");
   table.add("closure_distance_m", options.distance_m, not_negative,
             "maximum distance between the two poses of a loop closure, m");
   table.add("closure_angle_deg", options.angle_deg, {0.0, 180.0},
@@ -251,9 +252,9 @@ void bind(ParameterTable& table, LoopClosureOptions& options) {
   table.add("closures_per_node", options.closures_per_node, {1.0, 1e6},
             "maximum number of loop closures from each node to the nearest earlier nodes");
   table.add("closure_shift_error_m", options.shift_error_m, positive,
-            "standard deviation of a loop closure along each axis, m");
+            "standard deviation of the error of a loop closure along each axis, m");
   table.add("closure_turn_error_deg", options.turn_error_deg, positive,
-            "standard deviation of a loop closure about each axis, degrees");
+            "standard deviation of the error of a loop closure about each axis, degrees");
 }
 
 PoseGraph simulate_odometry(const Trajectory& truth, const OdometryOptions& odometry,

@@ -1,5 +1,4 @@
-// Simulates a scan of a mesh with a hand-held RGB-D camera: images, drifting odometry, links and
-// ground truth.
+// Simulates a hand-held RGB-D scan of a mesh: images, drifting odometry, links and ground truth.
 #pragma once
 
 #include <cstddef>
@@ -27,7 +26,7 @@ namespace libmap {
 struct OdometryOptions {
   double error_of_distance = 0.01;  // standard deviation in each axis, m per m of distance
   double error_of_turn = 0.005;  // standard deviation about each axis, degrees per degree of turn
-  double turn_of_distance_deg = 0.2;  // term added to it, degrees per m of distance
+  double turn_of_distance_deg = 0.2;  // about each axis, added to the former; degrees per m
 };
 // Minimum standard deviations, for short motions.
 inline constexpr double min_odometry_error_m = 2e-4;
@@ -35,13 +34,13 @@ inline constexpr double min_odometry_error_deg = 0.01;
 void bind(ParameterTable& table, OdometryOptions& options);
 
 struct LoopClosureOptions {
-  bool closures = false;
+  bool closures = false;         // true: add loop closures
   double distance_m = 0.8;       // maximum distance between the two poses
   double angle_deg = 40.0;       // maximum angle between the two poses
   int node_gap = 10;             // minimum difference of node indices
   int closures_per_node = 2;     // maximum number to earlier nodes, nearest first
-  double shift_error_m = 0.005;  // standard deviation in each axis
-  double turn_error_deg = 0.2;   // standard deviation about each axis
+  double shift_error_m = 0.005;  // standard deviation of the error in each axis
+  double turn_error_deg = 0.2;   // standard deviation of the error about each axis
 };
 void bind(ParameterTable& table, LoopClosureOptions& options);
 
@@ -63,8 +62,8 @@ struct ScanSimulationOptions {
   ScanEvents events{};
   OdometryOptions odometry{};
   LoopClosureOptions closures{};
-  std::uint64_t seed = 1;
-  std::uint64_t rock_seed = 0;  // of rock colors; 0: `seed`. Equal for scans of the same ground
+  std::uint64_t seed = 1;       // random seed of path, errors and colors
+  std::uint64_t rock_seed = 0;  // seed of rock colors, equal for scans of one ground; 0: `seed`
   std::uint64_t texture_seed() const { return rock_seed == 0 ? seed : rock_seed; }
 };
 
@@ -72,9 +71,9 @@ struct ScanSimulationResult {
   PoseGraph graph;                  // nodes as passed to the sink, and links
   std::size_t pixels = 0;           // depth pixels of all frames
   std::size_t measured_pixels = 0;  // pixels with a depth
-  std::size_t edge_pixels = 0;
-  std::size_t flying_pixels = 0;
-  std::size_t empty_frames = 0;  // frames without any depth
+  std::size_t edge_pixels = 0;      // as DepthMeasurement::edges
+  std::size_t flying_pixels = 0;    // as DepthMeasurement::flying
+  std::size_t empty_frames = 0;     // frames without any depth
   double path_length_m = 0.0;
 };
 
@@ -86,7 +85,7 @@ struct ScanScene {
   Surfaces surfaces;
   CameraMotion motion;
   std::vector<ExtraBody> bodies;  // objects of the options' events; none for terrain
-  Trajectory truth;               // poses at the frames, numbered as by numbered()
+  Trajectory truth;               // poses at the frames, as of assign_nodes_and_stamps()
 };
 // Scene of a mesh, or of terrain, which must outlive the scene. The camera follows `poses`, or the
 // path of the options if `poses` is empty.
@@ -101,8 +100,8 @@ ScanScene scene_of(TerrainSurface& terrain, const GroundHeights& ground,
 using FrameSink = std::function<void(const GraphNode& node, const RgbdFrame& frame)>;
 ScanSimulationResult simulate_scan(const ScanScene& scene, const ScanSimulationOptions& options,
                                    const FrameSink& sink, Progress& progress = no_progress());
-// Simulates a scan of `mesh` along the options' path. Also throws Error for a mesh without
-// triangles.
+// Simulates a scan of `mesh` along the options' path. Also throws Error if the mesh has no
+// triangle.
 ScanSimulationResult simulate_scan(const TriangleMesh& mesh, const ScanSimulationOptions& options,
                                    const FrameSink& sink, Progress& progress = no_progress());
 

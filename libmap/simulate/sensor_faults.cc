@@ -184,10 +184,10 @@ void bind(ParameterTable& table, DepthFaults& faults) {
       "fault: amplitude of a periodic depth error (time of flight: Lindner and Kolb 2006), m");
   table.add_former_key("depth_wiggle_period_m", "depth_error_period_m");
   table.add("depth_error_period_m", faults.error_period_m, positive,
-            "depth difference over which the periodic depth error repeats, m");
+            "fault: depth difference over which the periodic depth error repeats, m");
   table.add("depth_corner_m", faults.corner_m, any_number,
-            "fault: depth error in the image corners, proportional to the squared radius "
-            "(Teichman et al. 2013), m");
+            "fault: depth error in the image corners, m; in the image, it is proportional to the "
+            "squared distance from the center (Teichman et al. 2013)");
   table.add("depth_holes", faults.holes, zero_to_one,
             "fault: share of the depth image covered by discs without depth");
   table.add("multipath", faults.multipath, zero_to_one,
@@ -197,13 +197,14 @@ void bind(ParameterTable& table, DepthFaults& faults) {
 
 void bind(ParameterTable& table, PhotoFaults& faults) {
   table.add("exposure_drift", faults.exposure_drift, zero_to_one,
-            "fault: relative amplitude of brightness drift");
-  table.add("white_balance_drift", faults.white_balance_drift, zero_to_one,
-            "fault: relative amplitude of white balance drift (red against blue)");
+            "fault: relative amplitude of the drift of brightness over the frames");
+  table.add(
+      "white_balance_drift", faults.white_balance_drift, zero_to_one,
+      "fault: relative amplitude of the drift of white balance (red against blue) over the frames");
   table.add("exposure_s", faults.exposure_s, not_negative,
-            "fault: exposure time of motion blur, s");
+            "fault: exposure time of color images, during which motion blurs them, s");
   table.add("blurred_frames", faults.blurred_frames, zero_to_one,
-            "share of frames with motion blur if an exposure time is set");
+            "fault: share of frames with motion blur if an exposure time is set");
   table.add("jpeg_quality", faults.jpeg_quality, {0, 100},
             "fault: JPEG quality of the stored color images; 0: no compression");
 }
@@ -222,11 +223,11 @@ void bind(ParameterTable& table, CalibrationFaults& faults) {
   table.add("depth_baseline_mm", faults.depth_baseline_mm, any_number,
             "distance of the depth camera to the right of the color camera, mm");
   table.add("depth_width_px", faults.depth_width_px, {0, 16384},
-            "width of depth images (field of view as color), pixels; 0: width of color images");
+            "width of depth images with the field of view of color, pixels; 0: width of color");
   table.add("depth_height_px", faults.depth_height_px, {0, 16384},
-            "height of depth images, pixels; 0: height of color images");
+            "height of depth images with the field of view of color, pixels; 0: height of color");
   table.add("depth_delay_s", faults.depth_delay_s, any_number,
-            "fault: delay of depth after color, s");
+            "fault: delay of each depth image after the color image, s");
   table.add("rolling_shutter_s", faults.rolling_shutter_s, not_negative,
             "fault: time from the first to the last row of a color image, s (RealSense D435: about "
             "0.02); depth has a global shutter");
@@ -237,7 +238,7 @@ void bind(ParameterTable& table, RecordingFaults& faults) {
   table.add("duplicated_frames", faults.duplicated_frames, zero_to_one,
             "fault: share of frames that repeat the images of the previous frame");
   table.add("stamp_error_s", faults.stamp_error_s, not_negative,
-            "fault: standard deviation of the stored stamps, s");
+            "fault: standard deviation of the errors of the stored stamps, s");
 }
 
 void bind(ParameterTable& table, SensorFaults& faults) {

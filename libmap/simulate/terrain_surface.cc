@@ -161,7 +161,7 @@ std::size_t TerrainSurface::points_in_memory() const {
   return points;
 }
 
-// Drops the least recently used squares until at most kept_points are left.
+// Drops the least recently used tiles until at most kept_points are left.
 void TerrainSurface::evict() {
   std::size_t points = points_in_memory();
   while (points > options_.kept_points) {
@@ -187,7 +187,7 @@ std::vector<VisibleSurface> TerrainSurface::seen_from(
   all.erase(std::unique(all.begin(), all.end()), all.end());
   for (const TilePosition& tile : all)
     if (const auto known = tiles_.find(tile); known != tiles_.end()) known->second.last_use = uses_;
-  evict();  // before loading more squares
+  evict();  // before loading more tiles
   load(all);
   std::vector<VisibleSurface> surfaces;
   for (const std::vector<TilePosition>& tiles : of_camera) {

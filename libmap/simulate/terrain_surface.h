@@ -19,24 +19,24 @@ namespace libmap {
 
 // View frustum of a camera: bounds of the rays (x/z, y/z), and maximum depth.
 struct ViewRange {
-  Eigen::AlignedBox2d rays;
-  double far_m = 0.0;
+  Eigen::AlignedBox2d rays;  // bounds of (x/z, y/z)
+  double far_m = 0.0;        // maximum z
 };
 ViewRange view_range(const ViewRays& rays, double far_m);
 
 // Returns a Delaunay triangulation in the x-y plane with vertex normals: the triangles that
 // intersect the rectangle and have a circumradius of at most `max_radius_m`, so that wider gaps
-// stay open. The result is the same for any point set that contains all points within 4
-// `max_radius_m` of the rectangle, except for the diagonals of squares of four points.
+// stay open. The result is the same for any point set that contains all points within
+// 4 * `max_radius_m` of the rectangle, except for the diagonals of squares of four points.
 TriangleMesh triangulate_plan(const std::vector<Eigen::Vector3d>& points,
                               const Eigen::AlignedBox2d& rectangle, double max_radius_m);
 
 struct TerrainSurfaceOptions {
-  double tile_spacings = 256.0;       // side of a square in point spacings; rounded to a multiple
+  double tile_spacings = 256.0;       // side of a tile in point spacings; rounded to a multiple
                                       // of GroundHeights::cell_m
   double gap_spacings = 5.0;          // maximum circumradius of triangles in point spacings
   std::size_t kept_points = 500'000;  // maximum in memory, unless more are in view at once
-  std::uint64_t texture_seed = 1;
+  std::uint64_t texture_seed = 1;     // seed of rock_color()
 };
 
 class TerrainSurface {

@@ -45,10 +45,10 @@ void bind(ParameterTable& table, RockyTerrainOptions& options) {
   table.add("seed", options.seed, not_negative, "random seed of the terrain");
   table.add("relief_m", options.relief_m, Range{0.0, 100.0}, "maximum height of the relief, m");
   table.add("relief_length_m", options.relief_length_m, Range{0.1, 10'000.0},
-            "longest wavelength of the relief, m");
+            "longest wavelength of the ground's relief, m");
   table.add("roughness_m", options.roughness_m, Range{0.0, 1.0},
-            "maximum height of the surface roughness, m");
-  table.add("rocks_per_m2", options.rocks_per_m2, Range{0.0, 100.0}, "rocks per square meter");
+            "maximum height of the small-scale surface roughness, m");
+  table.add("rocks_per_m2", options.rocks_per_m2, Range{0.0, 100.0}, "number of rocks per m2");
   table.add("min_rock_m", options.min_rock_m, Range{0.01, 5.0}, "minimum height of rocks, m");
   table.add("max_rock_m", options.max_rock_m, Range{0.01, 5.0}, "maximum height of rocks, m");
 }

@@ -18,19 +18,18 @@ struct RockyTerrainOptions {
   double relief_m = 0.25;         // maximum height of the ground's relief
   double relief_length_m = 10.0;  // longest wavelength of the relief
   double roughness_m = 0.015;     // maximum height of the small-scale roughness
-  double rocks_per_m2 = 1.2;
-  double min_rock_m = 0.15;  // minimum and maximum height of the rocks
+  double rocks_per_m2 = 1.2;      // mean number of rocks
+  double min_rock_m = 0.15;       // minimum and maximum height of the rocks
   double max_rock_m = 0.7;
 
-  // Throws Error naming field, value and bound.
+  // Throws Error if max_rock_m is less than min_rock_m.
   void check() const;
 };
 void bind(ParameterTable& table, RockyTerrainOptions& options);
 
 // The terrain over a rectangle. Relief and roughness are fractal noise. Rocks are faceted blocks
-// and rounded cobbles without overhangs at random positions; they may overlap. Heights of rocks
-// follow a power law with a cumulative index of -2.65, as boulders on Ryugu (Michikami et al.
-// 2019).
+// and rounded cobbles without overhangs at random positions; they may overlap. Rock heights follow
+// a power law with a cumulative index of -2.65, as do boulders on Ryugu (Michikami et al. 2019).
 class RockyTerrain {
  public:
   // Draws all rocks that intersect the rectangle.
@@ -75,11 +74,11 @@ class RockyTerrain {
 struct TerrainTilesOptions {
   double size_x_m = 100.0;  // extent of the terrain, from 0
   double size_y_m = 100.0;
-  double tile_m = 10.0;
-  double spacing_m = 0.01;
+  double tile_m = 10.0;     // side of a tile
+  double spacing_m = 0.01;  // mean distance between points
   RockyTerrainOptions terrain;
 
-  // Throws Error naming the field: out of range, more than 10^6 tiles or 10^8 cells per tile.
+  // Throws Error if a field is out of range, or for more than 10^6 tiles or 10^8 cells per tile.
   void check() const;
 };
 // Binds all fields except the size.

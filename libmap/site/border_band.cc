@@ -58,7 +58,7 @@ struct TopView {
 };
 
 TopView make_top_view(const PointCloud& cloud, const BorderBandOptions& options) {
-  if (!cloud.has_colors()) throw Error("no colors: a white border cannot be detected");
+  if (!cloud.has_colors()) throw Error("the map has no colors, which a white border requires");
   std::vector<std::size_t> used;
   Vector2d low = Vector2d::Constant(std::numeric_limits<double>::infinity());
   Vector2d high = -low;
@@ -70,7 +70,7 @@ TopView make_top_view(const PointCloud& cloud, const BorderBandOptions& options)
     high = high.cwiseMax(point.head<2>());
   }
   if (used.empty())
-    throw Error("no points are at the heights at which the border band is searched",
+    throw Error("no point is at the heights at which the border band is searched",
                 {.field = "heights of the points",
                  .bound = to_text(options.min_z_m) + " to " + to_text(options.max_z_m) + " m"});
   TopView view;
@@ -420,7 +420,7 @@ BorderScale scale_by_border(const BorderBand& band, const Vector2d& inner_size_m
     std::string sides;
     for (const double side : measured)
       sides += (sides.empty() ? "" : ", ") + to_fixed_text(side, 3);
-    throw Error("the given size does not match the white band's",
+    throw Error("does not match the size of the area inside the white band",
                 {.field = "border_size",
                  .value = to_text(inner_size_m.x()) + "x" + to_text(inner_size_m.y()),
                  .bound = "within " + to_text(100.0 * max_size_error) +

@@ -11,14 +11,14 @@
 namespace libmap {
 
 struct BorderBandOptions {
-  double cell_m = 0.01;  // > 0: cell size of the image from above in which the band is detected
+  double cell_m = 0.01;  // > 0: cell size of the top view in which the band is detected
   // 0 to 255: minimum of red, green and blue of a white cell. 0: the mean of the median and the
   // 99.5 % quantile of all cells.
   double white_level = 0.0;
   double max_width_m = 0.25;  // > 0: maximum width of the band
   double min_side_m = 0.5;    // > 0: minimum side of the area inside
-  double min_seen = 0.4;      // (0, 1]: minimum share of each side's length with white
-  double min_z_m = -0.1;      // range of heights of the band
+  double min_seen = 0.4;  // (0, 1]: minimum share of each side's length along which it is visible
+  double min_z_m = -0.1;  // range of heights of the band
   double max_z_m = 0.15;
 };
 void bind(ParameterTable& table, BorderBandOptions& options);
@@ -26,7 +26,7 @@ void bind(ParameterTable& table, BorderBandOptions& options);
 struct BorderBand {
   std::vector<Eigen::Vector2d> corners;  // of the area inside the band, counter-clockwise
   std::array<double, 4> sides_m{};       // lengths of the band's inner edge, without the margin
-  double seen = 0.0;                     // minimum share of a side's length with white
+  double seen = 0.0;                     // visible share of the least visible side
   double white_level = 0.0;              // level that was used
 };
 
@@ -35,7 +35,8 @@ struct BorderBand {
 // side is detected slice by slice, and a line is fitted robustly, so that gaps in the band and
 // white rocks that touch it are tolerated. Sides need not be parallel. `level_cloud` contains
 // colored points with the ground at z = 0 and a spacing below cell_m. `corners` are `margin_m`
-// inside the detected edges. Throws Error: no colors, no point at the band's heights, no band.
+// inside the detected edges. Throws Error if there are no colors, no points at the band's heights,
+// or no band.
 BorderBand find_border_band(const PointCloud& level_cloud, double margin_m = 0.0,
                             const BorderBandOptions& options = {});
 

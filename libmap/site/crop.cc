@@ -172,7 +172,7 @@ void require_sound(const CropOptions& options) {
     throw Error("not a finite angle", {.field = "yaw", .value = to_text(*options.yaw_deg)});
   if (options.region == CropRegion::box &&
       !(options.box.min.array() < options.box.max.array()).all())
-    throw Error("a minimum of the box is not below its maximum", {.field = "box"});
+    throw Error("the minimum must be below the maximum on each axis", {.field = "box"});
 }
 
 Plan make_plan(const Source& source, const CropOptions& options) {
@@ -258,8 +258,7 @@ void view_sides(const FlatTriangle& triangle, std::uint32_t n, double cell,
 }
 
 // Samples each row within the triangle only, because an oblique triangle covers little of its
-// bounding box. Steps are relative to the corner: far from the origin, a step may be below
-// rounding.
+// bounding box. Steps are relative to the corner, because of rounding far from the origin.
 void view_inside(const FlatTriangle& triangle, std::uint32_t n, double cell,
                  std::vector<TrianglePoint>& samples) {
   const auto& [a, ab, ac] = triangle;
@@ -341,7 +340,7 @@ PointCloud finite_part(const PointCloud& cloud) {
 
 void bind(ParameterTable& table, CropOptions& options) {
   bind(table, options.ground);
-  table.add("center", options.center, "move the center of the outline to x = y = 0");
+  table.add("center", options.center, "move the center of the outline or map to x = y = 0");
   bind(table, options.rectangle);
   bind(table, options.band);
 }

@@ -27,21 +27,22 @@ enum class CropFrame { level, map };
 
 struct CropOptions {
   bool level = true;  // false: the map's z axis is up, and the heights are kept
-  std::optional<Eigen::Vector3d> up = std::nullopt;  // in the map; none: from normals
+  std::optional<Eigen::Vector3d> up = std::nullopt;  // in the map; nullopt: from the normals
   GroundPlaneOptions ground{};                       // `up` is ignored
   CropRegion region = CropRegion::whole;
   CropFrame frame = CropFrame::level;
-  Bounds3d box{};  // z may be infinite
-  std::vector<Eigen::Vector2d> polygon{};
+  Bounds3d box{};                          // in `frame`; z may be infinite
+  std::vector<Eigen::Vector2d> polygon{};  // corners in `frame`
   Eigen::Vector2d size_m = Eigen::Vector2d::Zero();
   SiteRectangleOptions rectangle{};  // margin_m also applies to the border
   BorderBandOptions band{};
-  // Not bound. True size of the area inside the band, without the margin, for estimating the scale.
+  // True size of the area inside the band, without the margin, to estimate the scale. No parameter.
   std::optional<Eigen::Vector2d> border_size_m = std::nullopt;
-  // Rotation about z. None: with size and border, the smallest rotation that makes the rectangle's
-  // sides parallel to x and y, otherwise no rotation.
+  // Counter-clockwise rotation about z. nullopt: with size and border, the smallest rotation that
+  // makes the rectangle's sides parallel to x and y, otherwise no rotation.
   std::optional<double> yaw_deg = std::nullopt;
-  bool center = false;  // true: x = y = 0 is the center of the outline's bounding box
+  // true: x = y = 0 is the center of the outline's bounding box (whole or frame map: the map's).
+  bool center = false;
 };
 // Binds ground, rectangle, band and center.
 void bind(ParameterTable& table, CropOptions& options);
@@ -51,7 +52,7 @@ struct CropReport {
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();  // in the map, used for finding the ground
   std::optional<UpOfNormals> up_of_normals{};     // set if `up` comes from normals
   std::optional<GroundPlane> ground{};            // in the map; none without leveling
-  std::vector<Eigen::Vector2d> outline{};         // in the site, counter-clockwise; may be empty
+  std::vector<Eigen::Vector2d> outline{};         // in the site, counter-clockwise; empty for whole
   std::optional<SiteRectangle> rectangle{};       // in the level frame
   std::optional<BorderBand> band{};               // in the level frame
   std::optional<BorderScale> border_scale{};      // of the map; not applied
@@ -66,9 +67,9 @@ struct CropMeshResult {
   CropReport report;
 };
 
-// Finds the ground among the points of a cloud, or among even samples of a mesh. Keeps the points
-// inside and on the border, or cuts the mesh along the outline (mesh_cutting.h). Throws Error:
-// options out of range, nothing to crop, no ground, no site, nothing inside.
+// Crop a cloud, keeping the points inside and on the border, or a mesh, cutting it along the
+// outline (mesh_cutting.h). The ground is found among the points or among even samples of the mesh.
+// Throw Error if an option is out of range, no ground or site is found, or nothing is inside.
 CropCloudResult crop_cloud(const PointCloud& cloud, const CropOptions& options);
 CropMeshResult crop_mesh(const TriangleMesh& mesh, const CropOptions& options);
 

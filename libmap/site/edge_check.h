@@ -47,8 +47,8 @@ void bind(ParameterTable& table, EdgeCheckOptions& options);
 
 struct EdgeCheckPoint {
   Eigen::Vector2d position = Eigen::Vector2d::Zero();
-  std::optional<double> height_m{};
-  std::optional<double> ground_m{};
+  std::optional<double> height_m{};  // of the surface; nullopt if it has no height there
+  std::optional<double> ground_m{};  // of the ground; nullopt if it has no height there
 
   // Height above the ground; nullopt unless both are known.
   std::optional<double> error_m() const {
@@ -61,14 +61,14 @@ struct EdgeCheckResult {
   std::array<std::vector<EdgeCheckPoint>, 4> edges;  // a, b, c, d
   std::array<std::optional<double>, 4> mean_m;       // mean absolute error by edge
   std::size_t measured = 0;                          // positions with an error
-  std::size_t missing = 0;                           // positions without
-  double mean_abs_error_m = 0.0;                     // over all positions
-  double mean_error_m = 0.0;                         // signed
+  std::size_t missing = 0;                           // positions without an error
+  double mean_abs_error_m = 0.0;                     // over all measured positions
+  double mean_error_m = 0.0;                         // mean of the signed errors
   double max_abs_error_m = 0.0;
 };
 
-// Compares `surface` with `ground` at positions along the site's edges. Throws Error: options out
-// of range, an inset of half a side or more, no position where both have a height.
+// Compares `surface` with `ground` at positions along the site's edges. Throws Error if an option
+// is out of range, the inset is half of a side or more, or at no position do both have a height.
 EdgeCheckResult check_edges(const SiteCorners& site, const HeightFunction& surface,
                             const HeightFunction& ground, const EdgeCheckOptions& options = {});
 

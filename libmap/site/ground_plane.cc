@@ -216,7 +216,7 @@ void require_plane_spread(const Points& points) {
                 {.field = "points", .value = std::to_string(points.size()), .bound = ">= 3"});
   const PlaneSpread spread = weighted_spread(points, points.front(), points_per_chunk,
                                              [](const Eigen::Vector3d&) { return 1.0; });
-  if (!is_plane(spread)) throw Error("all points are on one line: no ground plane");
+  if (!is_plane(spread)) throw Error("all points are on one line, so they define no ground plane");
 }
 
 std::string percent(double fraction) { return to_fixed_text(100.0 * fraction, 1) + " %"; }
@@ -250,9 +250,9 @@ std::string remedy(const Points& points, const GroundPlaneOptions& options,
 void bind(ParameterTable& table, GroundPlaneOptions& options) {
   constexpr Range fraction{0.0, 1.0, true, false};
   table.add("plane_tolerance_m", options.tolerance_m, positive,
-            "maximum distance from a plane of the points that belong to it, m");
+            "maximum distance between a plane and the points that belong to the plane, m");
   table.add("max_tilt_deg", options.max_tilt_deg, {0.0, 90.0, true, true},
-            "maximum angle between the ground's normal and up, degrees");
+            "maximum angle between the ground's normal and the up direction, degrees");
   table.add_former_key("min_ground_share", "min_ground_fraction");
   table.add("min_ground_fraction", options.min_fraction, fraction,
             "minimum share of the cloud's points, or of the mesh's area, on the ground plane");
@@ -261,8 +261,8 @@ void bind(ParameterTable& table, GroundPlaneOptions& options) {
       "min_fraction_of_largest", options.min_fraction_of_largest, fraction,
       "minimum size, relative to the largest plane, of a lower plane that is taken as the ground");
   table.add("plane_hypotheses", options.hypotheses, {1.0, 1e6},
-            "number of random planes through three points that are tried for each plane");
-  table.add("seed", options.seed, not_negative, "random seed");
+            "number of random planes, each through three points, that are tried to find one plane");
+  table.add("seed", options.seed, not_negative, "random seed of the search for the ground plane");
 }
 
 GroundPlane find_ground_plane(const std::vector<Eigen::Vector3d>& points,

@@ -17,8 +17,7 @@ struct GroundPlaneOptions {
   double tolerance_m = 0.02;                      // > 0: maximum distance of the inliers of a plane
   double max_tilt_deg = 40.0;  // > 0, < 90: maximum angle between the ground's normal and `up`
   double min_fraction = 0.05;  // (0, 1]: minimum share of the points on a plane
-  // (0, 1]: minimum number of points on a lower plane to be the ground, relative to the largest
-  // plane.
+  // (0, 1]: minimum size of a lower plane to be the ground, relative to the largest plane.
   double min_fraction_of_largest = 0.2;
   int hypotheses = 3000;  // > 0: number of RANSAC hypotheses per plane
   std::uint64_t seed = 1;
@@ -29,8 +28,8 @@ void bind(ParameterTable& table, GroundPlaneOptions& options);
 struct GroundPlane {
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  // unit, up
   double offset_m = 0.0;                              // normal . p = offset_m on the plane
-  Eigen::Vector3d center = Eigen::Vector3d::Zero();   // of the inliers, on the plane
-  double rmse_m = 0.0;                                // of the inliers
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();   // of the inliers, projected to the plane
+  double rmse_m = 0.0;                                // root mean square distance of the inliers
   std::size_t inliers = 0;                            // points within the tolerance
   double fraction = 0.0;                              // inliers as a share of all points
   double tilt_deg = 0.0;                              // angle between the normal and `up`
@@ -40,13 +39,12 @@ struct GroundPlane {
 // by RANSAC (Fischler and Bolles 1981). The ground is the lowest plane, refined by iterated least
 // squares with Tukey's weights, so that the feet of rocks do not lift the plane. Points must be
 // finite and evenly distributed over the surface, because all points have equal weight. The result
-// does not depend on the number of threads. Throws Error: options out of range, fewer than three
-// points, all points on a line, no plane.
+// does not depend on the number of threads. Throws Error if an option is out of range, there are
+// fewer than three points, all points are on a line, or no plane is found.
 GroundPlane find_ground_plane(const std::vector<Eigen::Vector3d>& points,
                               const GroundPlaneOptions& options = {});
 
-// Transform that moves the plane to z = 0, with the smallest rotation. x and y of `center` are
-// kept.
+// Transform that moves the plane to z = 0 with the smallest rotation. Keeps x and y of `center`.
 Pose level_from_map(const GroundPlane& plane);
 
 }  // namespace libmap

@@ -296,11 +296,10 @@ void MeshCutter::insert_corner(const Vector2d& corner) {
 
 void require_finite(const TriangleMesh& mesh) {
   mesh.check();
-  for (std::size_t n = 0; n < mesh.triangles.size(); ++n)
-    for (const std::uint32_t v : mesh.triangles[n])
+  for (const Triangle& triangle : mesh.triangles)
+    for (const std::uint32_t v : triangle)
       if (!mesh.vertices[v].allFinite())
-        throw Error("the vertex is not finite", {.field = "triangle " + std::to_string(n),
-                                                 .value = "vertex " + std::to_string(v)});
+        throw Error("a coordinate is not finite", {.field = "vertex " + std::to_string(v)});
 }
 
 enum class Location : char { outside, inside, on_border };

@@ -11,8 +11,8 @@ namespace libmap {
 // to an axis. To avoid slivers, vertices within 1e-7 m of the border are moved onto the border.
 // Triangles that share an edge are cut at the same vertex, so that no T-junctions arise. Normals,
 // colors and fields of vertices are interpolated (mesh_parts.h); fields of faces are kept. Surfaces
-// may be open, non-manifold, overhanging or vertical. Throws Error: arrays of inconsistent sizes, a
-// vertex of a triangle that is not finite.
+// may be open, non-manifold, overhanging or vertical. Throws Error if array sizes are inconsistent
+// or a vertex of a triangle is not finite.
 TriangleMesh cut_mesh(TriangleMesh mesh, const ExtrudedPolygon& prism);
 
 }  // namespace libmap

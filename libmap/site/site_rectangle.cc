@@ -40,8 +40,7 @@ class AreaTable {
   int width() const { return sums_.width - 1; }
   int height() const { return sums_.height - 1; }
 
-  // Sum over the columns x to x + width - 1 and rows y to y + height - 1, which must be in the
-  // mask.
+  // Sum over columns x to x + width - 1 and rows y to y + height - 1, which must be in the mask.
   std::uint32_t sum(int x, int y, int width, int height) const {
     return sums_.at(x + width, y + height) - sums_.at(x, y + height) - sums_.at(x + width, y) +
            sums_.at(x, y);
@@ -257,12 +256,12 @@ std::string gap_remedy(const std::vector<Vector2d>& points, const Vector2d& size
 
 void bind(ParameterTable& table, SiteRectangleOptions& options) {
   table.add("site_cell_m", options.cell_m, positive,
-            "cell size for finding the site in the data, m");
-  table.add("max_gap_m", options.max_gap_m, not_negative,
-            "side of a square, m; holes of the data that are too small for the square are "
-            "ignored");
+            "cell size of the mask of the measured area in which the site is searched, m");
+  table.add(
+      "max_gap_m", options.max_gap_m, not_negative,
+      "side of a square, m; holes in the measured area too small for this square are ignored");
   table.add("margin_m", options.margin_m, not_negative,
-            "minimum distance of the site from holes, data borders and the border band, m");
+            "minimum distance of the site from holes, the data's border and the border band, m");
 }
 
 SiteRectangle find_site_rectangle(const std::vector<Vector2d>& points, const Vector2d& size_m,

@@ -9,9 +9,9 @@
 namespace libmap {
 
 struct SiteRectangleOptions {
-  double cell_m = 0.01;    // > 0: cell size of the mask of the data; larger for large data
+  double cell_m = 0.01;  // > 0: cell size of the mask of the measured area; larger for large areas
   double max_gap_m = 0.2;  // >= 0: holes that contain no square of this size are filled
-  double margin_m = 0.0;   // >= 0: minimum distance from holes and from the data's border
+  double margin_m = 0.0;   // >= 0: minimum distance from holes and from the area's border
 };
 void bind(ParameterTable& table, SiteRectangleOptions& options);
 
@@ -25,7 +25,8 @@ struct SiteRectangle {
 // that has the largest clearance, over all positions and directions. Among equal rectangles, the
 // smallest rotation and the mean position are used. `points` are the data in the x-y plane, with
 // gaps below max_gap_m between neighbors. Clearances down to one cell below margin_m are accepted.
-// Throws Error: options out of range, no point, no rectangle fits (the bound is the largest size).
+// Throws Error if an option is out of range, there is no point, or no rectangle fits (the error's
+// bound is the largest size that does).
 SiteRectangle find_site_rectangle(const std::vector<Eigen::Vector2d>& points,
                                   const Eigen::Vector2d& size_m,
                                   const SiteRectangleOptions& options = {});

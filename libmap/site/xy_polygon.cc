@@ -58,7 +58,7 @@ std::string corner_name(std::size_t n) { return "corner " + std::to_string(n + 1
 XyPolygon::XyPolygon(std::vector<Vector2d> corners) : corners_(std::move(corners)) {
   for (std::size_t n = 0; n < corners_.size(); ++n)
     if (!corners_[n].allFinite())
-      throw Error("not a position", {.field = corner_name(n), .value = text_of(corners_[n])});
+      throw Error("not finite", {.field = corner_name(n), .value = text_of(corners_[n])});
   if (corners_.size() > 3 && corners_.front() == corners_.back()) corners_.pop_back();
   if (corners_.size() < 3)
     throw Error("the outline has too few corners",

@@ -18,8 +18,9 @@ inline double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
 
 class XyPolygon {
  public:
-  // Takes corners in either orientation. Drops a last corner equal to the first. Throws Error:
-  // fewer than three corners, not finite, two at one position, edges that cross or touch, no area.
+  // Takes corners in either orientation. Drops a last corner equal to the first. Throws Error if
+  // there are fewer than three corners, a corner is not finite or occurs twice in succession, edges
+  // cross or touch, or there is no area.
   explicit XyPolygon(std::vector<Eigen::Vector2d> corners);
 
   // Counter-clockwise.
@@ -31,7 +32,7 @@ class XyPolygon {
   // True for points inside or within 1e-9 m of the border.
   bool contains(const Eigen::Vector2d& point) const;
 
-  // Candidates for edges that intersect the box, by index of the first corner, ascending.
+  // Returns edges that may intersect the box, as the indices of their first corners, ascending.
   std::vector<std::uint32_t> edges_near(const Eigen::Vector2d& box_min,
                                         const Eigen::Vector2d& box_max) const;
 
@@ -50,7 +51,7 @@ class XyPolygon {
 // The rectangle from min to max.
 XyPolygon make_rectangle(const Eigen::Vector2d& min, const Eigen::Vector2d& max);
 
-// Polygon extruded between two heights. Without a polygon, contains all points between.
+// Polygon extruded between two heights. Without a polygon, contains all points between the heights.
 struct ExtrudedPolygon {
   std::optional<XyPolygon> polygon{};
   double min_z = -std::numeric_limits<double>::infinity();

@@ -29,8 +29,7 @@ using Mesh = CGAL::Surface_mesh<Kernel::Point_3>;
 // Longer boundaries stay open: the time of triangulation may grow with the square of the edges.
 constexpr std::size_t max_hole_edges = 5000;
 
-// Rings of triangles around a hole that its patch is fitted to; curvature at the boundary needs
-// one.
+// Rings of triangles around a hole to which its patch is fitted; boundary curvature needs one.
 constexpr int rings = 2;
 
 // Larger holes are triangulated only over their Delaunay triangulation, because the time of a
@@ -298,7 +297,7 @@ void append_patch_vertex(TriangleMesh& mesh, const Eigen::Vector3d& position,
       field.values[added] = mean([&](std::uint32_t v) { return field.values[v]; });
 }
 
-// Triangle at the edge of the boundary nearest to `place`.
+// Triangle at the edge of the boundary nearest to `near_to`.
 std::uint32_t nearest_triangle(const TriangleMesh& mesh, const BoundaryLoop& loop,
                                const Eigen::Vector3d& near_to) {
   double nearest = std::numeric_limits<double>::infinity();

@@ -22,12 +22,11 @@ using BoundaryLoop = std::vector<HalfEdge>;  // as boundary_loops()
 // vertices) of at most `max_hole_m`. The longest boundary of a component is the outer boundary and
 // not returned, unless its radius is less than half of the component's radius about the same point.
 // If the mesh is part of a larger one that is complete only within the box `known` in x and y,
-// boundaries beyond the box are not holes, and components that extend beyond the box have no outer
-// boundary inside.
+// boundaries beyond the box are not holes, and components beyond it have no outer boundary inside.
 using XyBox = Eigen::AlignedBox2d;
 std::vector<BoundaryLoop> find_holes(const TriangleMesh& mesh, double max_hole_m,
                                      const std::optional<XyBox>& known = std::nullopt);
-// For each component, true if it extends beyond the box; all false without a box.
+// For each component, true if it extends beyond the box `known`; all false without a box.
 std::vector<bool> components_beyond(const TriangleMesh& mesh, const MeshComponents& components,
                                     const std::optional<XyBox>& known);
 
@@ -41,15 +40,16 @@ struct HoleFilling {
   std::size_t holes = 0;      // filled holes
   std::size_t unfilled = 0;   // holes for which no patch was accepted
   std::size_t triangles = 0;  // new triangles
-  double area_m2 = 0.0;       // of the new triangles
+  double area_m2 = 0.0;       // area of the new triangles
 };
 
 // Fills each hole. Tries a faired patch, then a refined one, then a plain triangulation of the
-// boundary; a hole stays open if `check` rejects all. New vertices and triangles are appended.
-// Colors and fields of new vertices are interpolated from the boundary, weighted by the inverse
-// squared distance (integer fields: of the nearest vertex). Face fields are copied from the
-// triangle at the nearest edge of the boundary; `filled` is 1 and is created if missing. The mesh
-// must be an oriented manifold. The result does not depend on the number of threads.
+// boundary. A hole stays open if `check` rejects all three, or its boundary has more than 5000
+// edges. New vertices and triangles are appended. Colors and fields of new vertices are
+// interpolated from the boundary, weighted by the inverse squared distance; integer fields take the
+// value of the nearest vertex. Face fields are copied from the triangle at the nearest edge of the
+// boundary; `filled` is 1 and is created if missing. The mesh must be an oriented manifold. The
+// result does not depend on the number of threads.
 HoleFilling fill_holes(TriangleMesh& mesh, const std::vector<BoundaryLoop>& holes,
                        PatchCheck check = PatchCheck::intersection,
                        Progress& progress = no_progress());

@@ -21,8 +21,7 @@ constexpr int block_cells = 8;
 constexpr int block_corners = block_cells + 1;
 constexpr std::size_t corners_per_block =
     std::size_t{block_corners} * block_corners * block_corners;
-// Minimum distance of a vertex from the ends of its edge, per edge length, so that triangles have
-// an area.
+// Minimum distance of a vertex from the ends of its edge, per length, so that triangles have area.
 constexpr double min_fraction = 0.01;
 // Maximum tangential distance from the weighted mean of the samples, per reach. It is 0.26 at the
 // straight border of evenly distributed samples.
@@ -210,8 +209,7 @@ void ImplicitSurface::march(const Block& block, Part& part) const {
       }
 }
 
-// Sets the corners of the cube. Returns true if the surface intersects it, with samples on all
-// sides.
+// Sets the corners of the cube. True if the surface intersects the cube, with samples on all sides.
 bool ImplicitSurface::is_crossed(const BlockGrid& grid, Cube& cube) {
   for (std::size_t c = 0; c < cube.at.size(); ++c) {
     const auto& offset = corner_offsets[c];

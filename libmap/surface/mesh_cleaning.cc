@@ -116,8 +116,8 @@ void remove_triangles(TriangleMesh& mesh, std::vector<bool> marks, int rings, do
 // triangles around them and the fragments that are cut off. Resulting holes that do not touch an
 // earlier boundary are closed (hole_filling) and marked `filled`. Each round removes one more ring.
 // Triangles that still intersect after four rounds are removed without a ring, and their holes stay
-// open. Separated vertices are `min_gap_m` apart (make_manifold). The mesh must be an oriented
-// manifold and stays one.
+// open. Separated vertices are `min_gap_m` apart. The mesh must be, and stays, an oriented
+// manifold.
 void repair_intersections(double min_gap_m, MeshCleaningResult& result) {
   TriangleMesh& mesh = result.mesh;
   result.remaining_intersecting_triangles = 0;
@@ -291,7 +291,7 @@ class Cleaning {
       }
     if (count_of(drop) > 0 || result_.merged_vertices > 0)
       mesh = select_triangles(mesh, inverse(drop));
-    require_triangles(mesh, {.field = "triangles without area",
+    require_triangles(mesh, {.field = "number of triangles without area",
                              .value = std::to_string(result_.degenerate_triangles)});
   }
 
@@ -301,7 +301,7 @@ class Cleaning {
     result_.degenerate_triangles += caps;
     // Dropping caps at a boundary may leave fans that share only a vertex.
     if (caps > 0) add(make_manifold(mesh_(), 2.0 * merge_distance()));
-    require_triangles(mesh_(), {.field = "triangles without area",
+    require_triangles(mesh_(), {.field = "number of triangles without area",
                                 .value = std::to_string(result_.degenerate_triangles)});
   }
 
@@ -340,7 +340,7 @@ class Cleaning {
 
   void remove_intersections() {
     repair_intersections(2.0 * merge_distance(), result_);
-    require_triangles(mesh_(), {.field = "intersecting triangles",
+    require_triangles(mesh_(), {.field = "number of intersecting triangles",
                                 .value = std::to_string(result_.intersecting_triangles)});
   }
 
@@ -358,16 +358,18 @@ class Cleaning {
 
 void bind(ParameterTable& table, MeshCleaningOptions& options) {
   table.add("repair", options.repair,
-            "merge vertices, drop bad triangles, cut non-manifold edges, remove intersections");
+            "merge coincident vertices, drop degenerate and duplicate triangles, cut non-manifold "
+            "edges, and remove intersecting triangles");
   table.add("merge_distance_m", options.merge_distance_m, not_negative,
-            "maximum distance between vertices that are merged, m; 0: 1e-7 of the mesh's size");
-  table.add("min_island_area_m2", options.min_island_area_m2, not_negative,
-            "minimum area of a component, m2; smaller components are dropped");
+            "maximum distance of vertices to be merged, m; 0: 1e-7 of the bounding box's diagonal");
+  table.add(
+      "min_island_area_m2", options.min_island_area_m2, not_negative,
+      "minimum area of a connected component of the mesh, m2; smaller components are dropped");
   table.add_former_key("min_island_share", "min_island_fraction");
   table.add("min_island_fraction", options.min_island_fraction, zero_to_one,
-            "minimum area of a component relative to the largest; smaller components are dropped");
+            "minimum area of a connected component relative to the largest; others are dropped");
   table.add("max_hole_m", options.max_hole_m, not_negative,
-            "maximum diameter of filled holes, m; outer boundaries stay open");
+            "maximum diameter of holes that are filled, m; 0: none; outer boundaries stay open");
   table.add("smoothing_iterations", options.smoothing_iterations, not_negative,
             "number of iterations of Taubin smoothing, which avoids shrinkage");
   table.add("decimation_error_m", options.decimation_error_m, not_negative,
@@ -383,9 +385,10 @@ MeshCleaningResult clean_mesh(const TriangleMesh& mesh, const MeshCleaningOption
 }
 
 void describe(ResultTable& table, const MeshCleaningResult& result) {
-  table.add("cut_edges", result.cut_edges, "number of cut edges: non-manifold or not orientable");
+  table.add("cut_edges", result.cut_edges,
+            "number of edges that were cut because they were non-manifold or not orientable");
   table.add("split_vertices", result.split_vertices,
-            "number of copies of vertices with several fans of triangles");
+            "number of new copies of vertices with several fans of triangles");
   table.add("degenerate_triangles", result.degenerate_triangles,
             "number of removed triangles without area");
   table.add("islands", result.islands, "number of removed small components");

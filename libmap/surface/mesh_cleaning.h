@@ -2,16 +2,17 @@
 // triangles, without small components and holes. Optionally smooths and decimates the mesh.
 //
 // Steps; each keeps the order of vertices and triangles:
-//  1. merge vertices within a tolerance into the first one; drop triangles without area and
-//     duplicates; remove caps (a corner on the opposite edge) by flipping that edge
+//  1. drop unused vertices; merge vertices within a tolerance into the first one; drop duplicate
+//     triangles and triangles without area
 //  2. cut at edges of more than two triangles, at vertices of more than one fan and where no
-//     consistent orientation exists (make_manifold); keep the orientation of most of the area
+//     consistent orientation exists; keep the orientation of most of the area (make_manifold);
+//     remove caps (triangles with a corner on the opposite edge) by flipping that edge
 //  3. drop islands
 //  4. remove intersecting triangles with the triangles around and close the resulting holes, if
 //     possible (self_intersections, hole_filling)
 //  5. fill holes (hole_filling)
 //  6. smooth, decimate, then step 4 again
-//  7. drop islands again and unused vertices, estimate vertex normals
+//  7. drop islands again, estimate vertex normals
 #pragma once
 
 #include <cstddef>
@@ -30,7 +31,7 @@ struct MeshCleaningOptions {
   bool repair = true;  // steps 1, 2 and 4
   // >= 0: vertices within this distance are merged; 0: 1e-7 of the diagonal of the bounding box.
   double merge_distance_m = 0.0;
-  double min_island_area_m2 = 0.01;  // >= 0: smaller components are dropped
+  double min_island_area_m2 = 0.01;  // >= 0: components with a smaller area are dropped
   double min_island_fraction = 0.0;  // 0 to 1: minimum area relative to the largest component
   // >= 0: maximum diameter (largest distance between two boundary vertices) of filled holes. The
   // longest boundary of a component is the outer boundary and is not filled, unless the boundary
@@ -39,36 +40,38 @@ struct MeshCleaningOptions {
   int smoothing_iterations = 0;  // >= 0
   // >= 0: maximum distance between the decimated and the original surface; 0: no decimation.
   double decimation_error_m = 0.0;
-  // Box in x and y beyond which the mesh continues: parts beyond it are no islands or holes.
+  // Box in x and y beyond which the mesh continues; components and boundaries that extend beyond it
+  // are no islands or holes.
   std::optional<XyBox> known = std::nullopt;
 };
 void bind(ParameterTable& table, MeshCleaningOptions& options);
 
 struct MeshDecimation {
-  std::size_t removed_triangles = 0;
+  std::size_t removed_triangles = 0;  // difference of the numbers of triangles
   // Proved bound of the distance between both surfaces, <= decimation_error_m.
   double deviation_m = 0.0;
 };
 
 struct MeshCleaningResult {
   // Has unit vertex normals and the face field `filled` (uint8), 1 on triangles that fill holes.
-  // Colors and fields are kept; new vertices take both from the hole's boundary.
+  // Colors and fields are kept; new vertices take colors and fields from the hole's boundary.
   TriangleMesh mesh;
 
-  std::size_t merged_vertices = 0;
-  std::size_t unused_vertices = 0;
-  std::size_t degenerate_triangles = 0;
-  std::size_t duplicate_triangles = 0;
-  std::size_t cut_edges = 0;       // non-manifold, or without a consistent orientation
-  std::size_t split_vertices = 0;  // copies of vertices with several fans
-  std::size_t turned_triangles = 0;
-  std::size_t islands = 0;
-  double island_area_m2 = 0.0;
-  // Removed because of intersection or degeneracy, without the triangles around.
+  std::size_t merged_vertices = 0;       // replaced by an earlier vertex
+  std::size_t unused_vertices = 0;       // vertices of no triangle, dropped
+  std::size_t degenerate_triangles = 0;  // removed, without area
+  std::size_t duplicate_triangles = 0;   // removed
+  std::size_t cut_edges = 0;             // non-manifold, or without a consistent orientation
+  std::size_t split_vertices = 0;        // new copies of vertices with several fans of triangles
+  std::size_t turned_triangles = 0;      // triangles whose orientation was reversed
+  std::size_t islands = 0;               // dropped components
+  double island_area_m2 = 0.0;           // area of these components
+  // Removed because they intersect or are degenerate, not counting the triangles around them.
   std::size_t intersecting_triangles = 0;
   std::size_t closing_triangles = 0;  // new triangles in the resulting holes
   std::size_t unclosed_holes = 0;     // resulting holes that stay open
-  std::size_t remaining_intersecting_triangles = 0;
+  std::size_t remaining_intersecting_triangles =
+      0;                // triangles that still intersect; 0 without repair
   HoleFilling filling;  // in step 5
   MeshDecimation decimation;
   StageTimings timings_s;
@@ -76,9 +79,9 @@ struct MeshCleaningResult {
 void describe(ResultTable& table, const MeshCleaningResult& result);
 
 // Cleans a mesh. A clean mesh is returned unchanged except for `filled` and normals. The result
-// does not depend on the number of threads. Throws Error: an option out of range, arrays of
-// inconsistent sizes, an index out of range, a vertex that is not finite, no triangle in the input
-// or the result, filling or decimation without repair of a mesh that is not an oriented manifold.
+// does not depend on the number of threads. Throws Error if an option or an index is out of range,
+// array sizes differ, a vertex is not finite, `mesh` or (without `known`) the result has no
+// triangle, or without `repair`, a mesh to be filled or decimated is no oriented manifold.
 MeshCleaningResult clean_mesh(const TriangleMesh& mesh, const MeshCleaningOptions& options = {},
                               Progress& progress = no_progress());
 

@@ -133,8 +133,7 @@ class DeviationBound {
   DeviationBound(const TriangleMesh& to, double allowed_m)
       : to_(to), surface_(to), allowed_(allowed_m) {}
 
-  // `near` is a triangle that may be near, and becomes the nearest one. If it is within the bound,
-  // it needs no search.
+  // `near`: a guess, which the nearest triangle replaces unless the guess is within the bound.
   Deviation of(const TriangleCorners& part, std::uint32_t& near) const {
     const double known = near == none ? HUGE_VAL : farthest_from(near, part);
     if (known <= allowed_) return {.bound_m = known};

@@ -140,9 +140,9 @@ void require_sound(const TriangleMesh& mesh) {
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
     for (int axis = 0; axis < 3; ++axis)
       if (!(std::abs(mesh.vertices[v][axis]) <= max_coordinate))
-        throw Error("invalid position", {.field = "vertex " + std::to_string(v),
-                                         .value = std::to_string(mesh.vertices[v][axis]),
-                                         .bound = "within 1e30 m of the origin"});
+        throw Error("not finite or too large", {.field = "vertex " + std::to_string(v),
+                                                .value = std::to_string(mesh.vertices[v][axis]),
+                                                .bound = "-1e30 to 1e30 m"});
 }
 
 double size_of(const TriangleMesh& mesh) {
@@ -439,8 +439,7 @@ bool cut_and_orient(TriangleMesh& mesh, std::size_t max_pairs, double min_gap_m,
   return is_sound && cuts.edges == edges_before;
 }
 
-// Drops all but the first triangle of edges that still have more than two triangles, or two in the
-// same direction.
+// Drops all but the first triangle of edges with more than two triangles, or two in one direction.
 void drop_unsettled(TriangleMesh& mesh, ManifoldCuts& cuts) {
   const MeshEdges edges = edges_of(mesh.triangles, mesh.vertices.size());
   std::vector<bool> keep(mesh.triangles.size(), true);

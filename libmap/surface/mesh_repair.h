@@ -9,8 +9,8 @@
 
 namespace libmap {
 
-// Throws Error: arrays of inconsistent sizes, an index out of range, a vertex that is not finite or
-// has a coordinate above 1e30 m.
+// Throws Error if array sizes are inconsistent, an index is out of range, or a vertex is not finite
+// or has a coordinate beyond +-1e30 m.
 void require_sound(const TriangleMesh& mesh);
 
 // Diagonal of the bounding box of the used vertices, m.
@@ -24,8 +24,7 @@ constexpr double degenerate_height = 1e-9;
 std::vector<bool> degenerate_triangles(const TriangleMesh& mesh);
 
 // Replaces each vertex, in order, by the first earlier kept vertex within `distance_m`; kept
-// vertices are farther apart. Changes the triangles only, not the vertices. Returns the number of
-// replaced vertices.
+// vertices are farther apart. Changes only the triangles. Returns the number of replaced vertices.
 std::size_t weld_vertices(TriangleMesh& mesh, double distance_m);
 
 // For each triangle, true if an earlier one has the same three vertices, in any order.
@@ -38,7 +37,7 @@ std::size_t flip_caps(TriangleMesh& mesh);
 
 struct ManifoldCuts {
   std::size_t edges = 0;     // cut edges: more than two triangles, or a one-sided surface
-  std::size_t vertices = 0;  // copies of vertices
+  std::size_t vertices = 0;  // new copies of vertices, one per additional fan of triangles
   std::size_t turned = 0;    // triangles with reversed orientation
   std::size_t dropped = 0;   // removed triangles that fold back on an edge
 };
@@ -50,9 +49,9 @@ struct ManifoldCuts {
 // straightest pair first; the others are cut off. Each component takes the orientation of most of
 // the component's area and is cut where no orientation exists (Moebius strip). Then each fan of
 // triangles at a vertex gets a separate vertex. The largest fan keeps the original. The copies for
-// the other fans are appended and moved towards the center of the fan by 1 % of the distance or
-// `min_gap_m`, at most by half of it, so that the sheets do not touch. The order of triangles is
-// kept. No triangle may have a repeated vertex.
+// the other fans are appended and moved towards the center of the fan by 1 % of the distance or by
+// `min_gap_m`, whichever is more, at most by half of the distance, so that the sheets do not touch.
+// The order of triangles is kept. No triangle may have a repeated vertex.
 ManifoldCuts make_manifold(TriangleMesh& mesh, double min_gap_m = 0.0);
 
 }  // namespace libmap

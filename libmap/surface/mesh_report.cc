@@ -133,7 +133,7 @@ void describe(ResultTable& table, const MeshReport& report) {
             "every edge has at most two triangles, every vertex one fan of triangles");
   table.add("oriented", report.is_oriented(), "neighboring triangles have the same orientation");
   table.add("components", report.components, "number of components connected by edges");
-  table.add("genus", report.genus, "handles of a manifold and oriented mesh, otherwise -1");
+  table.add("genus", report.genus, "number of handles if manifold and oriented, otherwise -1");
   table.add("boundaries", lengths_m.size(), "number of closed chains of boundary edges");
   table.add("boundary_lengths_m", lengths_m, "length of each boundary, longest first, m");
   table.add("area_m2", report.area_m2, "area of the mesh, m2");

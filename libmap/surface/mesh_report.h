@@ -10,7 +10,7 @@
 namespace libmap {
 
 struct MeshReportOptions {
-  bool self_intersections = true;  // true: counts them, which takes most of the time
+  bool self_intersections = true;  // counts them, which takes most of the time
 };
 
 // Closed chain of edges that belong to one triangle only.
@@ -26,12 +26,12 @@ struct EdgeLengths {
   double max_m = 0.0;
 };
 
-// Triangles with a repeated vertex are degenerate and are excluded from all other counts.
+// Triangles with a repeated vertex have no edges; edges, fans and used vertices do not count them.
 struct MeshReport {
   std::size_t vertices = 0;
-  std::size_t unused_vertices = 0;
+  std::size_t unused_vertices = 0;  // without an edge
   std::size_t triangles = 0;
-  std::size_t filled_triangles = 0;      // with the face field `filled`
+  std::size_t filled_triangles = 0;      // face field `filled` is 1
   std::size_t degenerate_triangles = 0;  // repeated vertex, or height below 1e-9 of the mesh's size
   std::size_t duplicate_triangles = 0;   // with the corners of an earlier triangle, in any order
   double area_m2 = 0.0;
@@ -39,12 +39,12 @@ struct MeshReport {
   std::size_t components = 0;  // connected by edges
   EdgeLengths edge_lengths;
 
-  std::size_t edges = 0;
+  std::size_t edges = 0;               // undirected
   std::size_t non_manifold_edges = 0;  // with more than two triangles
-  // More than one fan of triangles; not at non-manifold edges.
+  // Vertices with more than one fan of triangles, without the vertices of non-manifold edges.
   std::size_t non_manifold_vertices = 0;
-  std::size_t misoriented_edges = 0;  // two triangles run along the edge in the same direction
-  std::size_t boundary_edges = 0;
+  std::size_t misoriented_edges = 0;     // two triangles run along the edge in the same direction
+  std::size_t boundary_edges = 0;        // with one triangle
   std::vector<MeshBoundary> boundaries;  // longest first
   // Pairs of triangles that intersect in more than common corners or edges; 0 if not counted.
   std::size_t self_intersections = 0;
@@ -68,7 +68,7 @@ struct MeshReport {
 void describe(ResultTable& table, const MeshReport& report);
 
 // Reports on a mesh; all counts are 0 without triangles. The result does not depend on the number
-// of threads. Throws Error: an index out of range, a vertex that is not finite.
+// of threads. Throws Error as require_sound (mesh_repair.h).
 MeshReport report_mesh(const TriangleMesh& mesh, const MeshReportOptions& options = {});
 
 }  // namespace libmap

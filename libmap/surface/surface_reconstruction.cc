@@ -33,7 +33,7 @@ constexpr double max_grid_cells = voxel_cell_limit;
 // Minimum ratio of the second to the first standard deviation of the positions.
 constexpr double min_width = 1e-4;
 
-// Maximum share of share of neighbors with normals on opposite sides.
+// Maximum share of neighbors with normals on opposite sides.
 constexpr double max_mixed_sides = 0.4;
 
 constexpr std::size_t value_neighbors = 4;
@@ -113,8 +113,7 @@ struct UsedPoint {
 
 class Reconstruction {
  public:
-  // `statistics` describes the whole cloud of which `cloud` is a part; nullptr: `cloud` is the
-  // whole.
+  // `statistics` of the whole cloud, of which `cloud` is a part; nullptr: `cloud` is the whole.
   Reconstruction(const PointCloud& cloud, const CloudStatistics* statistics,
                  const SurfaceReconstructionOptions& options, Progress& progress)
       : cloud_(cloud), options_(options), progress_(progress), is_part_(statistics != nullptr) {
@@ -181,7 +180,7 @@ class Reconstruction {
   PoissonProblem problem_;
   std::vector<SurfaceSample> samples_;      // relative to the origin
   std::vector<Eigen::Vector3d> positions_;  // positions of the samples, relative to the origin
-  std::optional<PointTree> tree_;           // of places_
+  std::optional<PointTree> tree_;           // of positions_
   std::vector<double> spacings_m_;          // local distance between samples
   SurfaceReconstructionResult result_;
 };
@@ -235,7 +234,7 @@ void Reconstruction::choose_cell_size() {
   }
   const Eigen::Vector3d spread = symmetric_eigen(moments).values;
   if (!(spread[1] > min_width * min_width * spread[2]))
-    throw too_thin("all points are on a line: no surface");
+    throw too_thin("all points are on a line, so they define no surface");
   const CloudSpacing spacing = point_spacing(distinct);
   result_.spacing_m = spacing.nearest_m;
   if (!(options_.cell_size_m > 0.0)) result_.cell_size_m = result_.spacing_m;
@@ -431,20 +430,21 @@ void bind(ParameterTable& table, SurfaceReconstructionOptions& options) {
             {{"implicit", SurfaceMethod::implicit}, {"poisson", SurfaceMethod::poisson}},
             "reconstruction method; implicit: algebraic point set surface; poisson: screened "
             "Poisson reconstruction");
-  table.add(
-      "support_cells", options.support_cells, {1.5, 10.0},
-      "method implicit: radius of influence of a point, in cells or, if larger, point spacings");
+  table.add("support_cells", options.support_cells, {1.5, 10.0},
+            "method implicit: radius of influence of a point, as a multiple of the cell size or, "
+            "if larger, of the distance between points");
   table.add("cell_size_m", options.cell_size_m, not_negative,
-            "size of the finest cells and of the mesh's edges, m; 0: the point spacing");
+            "size of the finest cells of the reconstruction, m, which is also the approximate edge "
+            "length of the mesh; 0: the median distance between neighboring points");
   table.add("screening", options.screening, not_negative,
             "method poisson: weight of the points relative to the smoothness of the surface");
   table.add("weigh_by_error", options.weigh_by_error,
-            "weight each point by the inverse square of the field expected_error (m)");
+            "weight points by the inverse square of their field expected_error (m), if it exists");
   table.add("samples_per_cell", options.samples_per_cell, positive,
             "method poisson: minimum number of points per cell; cells with fewer are enlarged");
-  table.add(
-      "trim_distance_cells", options.trim_distance_cells, positive,
-      "maximum distance of the surface from all points, in cells or, if larger, point spacings");
+  table.add("trim_distance_cells", options.trim_distance_cells, positive,
+            "maximum distance between the surface and the nearest point, as a multiple of the cell "
+            "size or, if larger, of the distance between points; the surface beyond it is removed");
 }
 
 SurfaceReconstructionResult reconstruct_surface(const PointCloud& cloud,
@@ -487,7 +487,7 @@ void describe(ResultTable& table, const SurfaceReconstructionResult& result) {
   table.add("octree_depth", result.octree_depth,
             "depth of the octree of method poisson, otherwise 0");
   table.add("trimmed_triangles", result.trimmed_triangles,
-            "number of triangles removed because they are far from all points");
+            "number of triangles removed: far from all points, or against their normals");
 }
 
 }  // namespace libmap

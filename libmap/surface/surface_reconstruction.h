@@ -22,8 +22,8 @@ enum class SurfaceMethod { implicit, poisson };
 
 struct SurfaceReconstructionOptions {
   SurfaceMethod method = SurfaceMethod::implicit;
-  double support_cells =
-      2.5;  // >= 1.5: implicit: radius of influence of a point; surface_solvers.h
+  // >= 1.5: implicit: radius of influence of a point, in cells or, if larger, point distances.
+  double support_cells = 2.5;
   // >= 0: size of the grid's or the octree's finest cells, and about the length of the mesh's
   // edges. 0: the median distance between nearest neighbors (median_spacing).
   double cell_size_m = 0.0;
@@ -33,8 +33,7 @@ struct SurfaceReconstructionOptions {
   bool weigh_by_error = true;
   // > 0: poisson: minimum number (or weight) of points per cell; with fewer, cells are larger.
   double samples_per_cell = 2.15;
-  // > 0: maximum distance of the surface from all points, in cells or in local distances between
-  // points, whichever is more.
+  // > 0: maximum distance of the surface from all points, in cells or, if larger, point distances.
   double trim_distance_cells = 1.5;
 };
 void bind(ParameterTable& table, SurfaceReconstructionOptions& options);
@@ -67,21 +66,21 @@ class CloudStatistics {
 struct SurfaceReconstructionResult {
   // Has unit vertex normals, and colors and fields from the points around each vertex.
   TriangleMesh mesh;
-  double cell_size_m = 0.0;
-  double spacing_m = 0.0;          // median distance to the nearest neighbor
-  std::size_t dropped_points = 0;  // points with a normal that is zero or not finite
-  std::size_t samples = 0;         // one per cell and side of the surface
-  int octree_depth = 0;            // of poisson
-  std::size_t trimmed_triangles = 0;
+  double cell_size_m = 0.0;           // the given one or spacing_m
+  double spacing_m = 0.0;             // median distance to the nearest neighbor
+  std::size_t dropped_points = 0;     // points with a normal that is zero or not finite
+  std::size_t samples = 0;            // number of samples: one per cell and side of the surface
+  int octree_depth = 0;               // poisson; otherwise 0
+  std::size_t trimmed_triangles = 0;  // removed by trimming
   StageTimings timings_s;
 };
 void describe(ResultTable& table, const SurfaceReconstructionResult& result);
 
 // Estimate of the work from the number and the spacing of the points.
 struct SurfaceWork {
-  double triangles = 0.0;
-  double bytes = 0.0;    // memory
-  double seconds = 0.0;  // on one thread
+  double triangles = 0.0;  // number of triangles
+  double bytes = 0.0;      // memory
+  double seconds = 0.0;    // on one thread
 };
 using AnnounceWork = std::function<void(const SurfaceWork& work)>;
 
@@ -91,18 +90,18 @@ using AnnounceWork = std::function<void(const SurfaceWork& work)>;
 // standard output and error of the process are discarded. The result does not depend on the number
 // of threads and the order of the points, except for different values at equal position and normal.
 // A shift of the cloud shifts the mesh, except for rounding. `announce` is called with the
-// estimated work before the work begins. Throws Error: no normals, no point with a normal,
-// inconsistent normals, fewer than 3 positions, positions on a line, options out of range, cells
-// larger than the cloud or too small for the point spacing, an octree too deep, PCL failed.
+// estimated work before the work begins. Throws Error if an option is out of range, the cloud has
+// no normals or inconsistent ones, the positions are fewer than 3 or on a line, the cells are
+// larger than the cloud or too small for the point spacing or the octree's depth, or PCL fails.
 SurfaceReconstructionResult reconstruct_surface(const PointCloud& cloud,
                                                 const SurfaceReconstructionOptions& options = {},
                                                 Progress& progress = no_progress(),
                                                 const AnnounceWork& announce = {});
 
 // Reconstructs the surface of a part of a cloud; `statistics` are the statistics of the whole
-// cloud. At a distance of surface_margin_m() from missing points, the surface equals the surface of
-// the whole cloud, except for the order. Returns an empty mesh for too few points. Throws Error as
-// reconstruct_surface and surface_margin_m.
+// cloud. At a distance of surface_margin_m() from the points that `part` lacks, the surface equals
+// the surface of the whole cloud, except for the order. Returns an empty mesh for too few points.
+// Throws Error as reconstruct_surface and surface_margin_m.
 SurfaceReconstructionResult reconstruct_part(const PointCloud& part,
                                              const CloudStatistics& statistics,
                                              const SurfaceReconstructionOptions& options,

@@ -33,10 +33,10 @@ TriangleMesh implicit_surface(const std::vector<SurfaceSample>& samples, double 
 
 // Parameters of PCL's Poisson reconstruction.
 struct PoissonProblem {
-  int depth = 0;        // of the octree
-  double cube_m = 0.0;  // side of the octree, larger than the samples' bounding box
-  double screening = 4.0;
-  double samples_per_cell = 1.0;
+  int depth = 0;                  // of the octree: 2^depth cells along a side
+  double cube_m = 0.0;            // side of the octree, larger than the samples' bounding box
+  double screening = 4.0;         // as in SurfaceReconstructionOptions
+  double samples_per_cell = 1.0;  // as in SurfaceReconstructionOptions
 };
 
 // Deterministic Poisson reconstruction of the whole surface, positions only. Throws Error of

@@ -89,7 +89,8 @@ void SurfaceTileOptions::check() const {
                 {.field = "tile_size_m",
                  .value = to_text(tile_m),
                  .bound = ">= " + to_text(margin_m() / max_margin_tiles) +
-                          ", from cell_size_m, trim_distance_cells and max_hole_m"});
+                          ", which follows from cell_size_m, support_cells, trim_distance_cells "
+                          "and max_hole_m"});
   if (cleaning.decimation_error_m > 0.0)
     throw Error("surfaces in tiles cannot be decimated",
                 {.field = "decimation_error_m",

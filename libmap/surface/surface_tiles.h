@@ -32,8 +32,8 @@ struct SurfaceTileOptions {
 // Returns the box of a tile, enlarged by a margin on each side.
 XyBox xy_box_of(const XyTile& tile, double tile_m, double margin_m);
 
-// Adds, for each tile that may contain a part of the cloud's surface, the number of points near it.
-// Throws Error if tile_m is too small for the coordinates.
+// Adds, for each tile that may contain a part of the cloud's surface, the number of points near the
+// tile. Throws Error if tile_m is too small for the coordinates.
 void add_surface_tiles(const PointCloud& cloud, const SurfaceTileOptions& options,
                        std::map<XyTile, std::size_t>& points_in_tiles);
 
@@ -58,7 +58,7 @@ SurfaceTile make_surface_tile(const PointCloud& points, const CloudStatistics& s
                               const XyTile& tile, const SurfaceTileOptions& options,
                               Progress& progress = no_progress());
 
-// Returns the mesh without the given connected_components, which must be ascending.
+// Returns the mesh without the connected components of these indices, which must be ascending.
 TriangleMesh without_components(const TriangleMesh& mesh,
                                 const std::vector<std::uint32_t>& components);
 

@@ -1,8 +1,7 @@
 // Packs the charts of a mesh onto texture pages. Private to libmap/texture.
 //
 // A chart is a connected set of triangles with texture from one photograph. Texture coordinates are
-// the triangles' projection into the photograph, shifted by whole pixels, so that texels coincide
-// with pixels at a scale of 1.
+// the triangles' projection, shifted by whole pixels: at a scale of 1, texels coincide with pixels.
 #pragma once
 
 #include <Eigen/Core>
@@ -20,8 +19,7 @@ struct TextureAtlasOptions {
   int texture_size = 4096;        // maximum width and height of a page, pixels, 64 to 16384
   double texel_size_m = 0.0;      // 0: determined by texels_per_pixel
   double texels_per_pixel = 1.5;  // texels per photograph pixel, along one side
-  // Charts are scaled down to fit this number of pages. It is exceeded only if the padding alone
-  // needs more. 0: no limit.
+  // Charts are scaled down to fit this number, unless the padding alone needs more. 0: no limit.
   int max_pages = 64;
   int padding_px = 3;  // width of the extrapolated border of each chart, texels; 1 to 64
 };
@@ -31,9 +29,9 @@ struct TextureChart {
   std::vector<std::uint32_t> triangles;              // ascending
   double scale = 1.0;                                // texels per pixel of the photograph
   Eigen::Vector2d origin = Eigen::Vector2d::Zero();  // photograph pixel of texel (0, 0)
-  std::uint32_t photo = 0;
-  std::int32_t page = 0;
-  int column = 0;  // of the top left texel, padding included
+  std::uint32_t photo = 0;                           // index of the photograph
+  std::int32_t page = 0;                             // index of the page
+  int column = 0;  // column and row of the top left texel on the page, padding included
   int row = 0;
   int width = 0;  // texels, padding included
   int height = 0;
@@ -47,7 +45,7 @@ struct PageSize {
 struct TextureAtlas {
   std::vector<TextureChart> charts;
   std::vector<PageSize> pages;  // cropped to the used area
-  // Block of one color, neutral_size texels wide, for triangles without a photograph.
+  // Block of one color for triangles without a photograph, neutral_size texels wide; 0: no block.
   std::int32_t neutral_page = 0;
   Eigen::Vector2i neutral_corner = Eigen::Vector2i::Zero();
   int neutral_size = 0;
@@ -68,15 +66,14 @@ TextureAtlas make_texture_atlas(const TriangleMesh& mesh, const std::vector<Half
 struct PackedRectangle {
   int width = 0;
   int height = 0;
-  // Results.
+  // Set by pack_rectangles.
   std::size_t page = 0;
   int column = 0;
   int row = 0;
 };
 
-// Packs rectangles onto square pages of side `page_size`, filling one page after the other
-// (skyline, bottom left: stb_rect_pack). Returns the number of pages. Throws Error if a rectangle
-// is larger than a page.
+// Packs rectangles onto square pages of side `page_size`, page by page (skyline, bottom left:
+// stb_rect_pack). Returns the number of pages. Throws Error if a rectangle exceeds a page.
 std::size_t pack_rectangles(std::vector<PackedRectangle>& rectangles, int page_size);
 
 // Returns the texel of a world point on the chart's page; (0, 0) is the center of the first texel.

@@ -110,8 +110,7 @@ class ForestDescent {
   std::vector<float> least_;  // minimum of each node's sums
 };
 
-// Adds nodes one after another unless they close a cycle. Nodes outside the previous forest come
-// first.
+// Adds nodes one after another unless they close a cycle, nodes outside the previous forest first.
 void ForestDescent::choose_forest() {
   std::stable_partition(order_.begin(), order_.end(),
                         [this](std::uint32_t node) { return in_forest_[node] == 0; });

@@ -17,10 +17,10 @@ namespace {
 
 // Maximum number of candidate views per triangle.
 constexpr std::size_t views_per_triangle = 12;
-// Number of vertices whose colors are compared between photographs, and its minimum per piece.
+// Number of vertices whose colors are compared between photographs, and its minimum per tile.
 constexpr std::size_t observed_vertices = 20000;
 constexpr std::size_t min_observed_vertices = 200;
-// Cache size of decoded photographs. A piece needs only photographs close to it.
+// Cache size of decoded photographs. A tile needs only photographs close to the tile.
 constexpr std::size_t max_image_bytes = std::size_t{400} << 20;
 constexpr std::size_t max_image_bytes_in_pieces = std::size_t{64} << 20;
 // Triangles whose sides are shorter in all photographs are not subdivided.
@@ -98,7 +98,7 @@ MeshWithMargin Texturing::cut_finely(MeshWithMargin part) const {
   SubdivisionResult fine = split_long_sides(
       std::move(part.mesh), options_.max_side_m, max_cut_triangles,
       [this](const TriangleMesh& mesh, const Triangle& t) { return is_shown(mesh, t, *photos_); });
-  // Triangles are ordered by their source, so the piece's own come first.
+  // Triangles are ordered by their source, so those of the tile come first, the margin last.
   const auto own = std::lower_bound(fine.source.begin(), fine.source.end(), part.triangles);
   return {std::move(fine.mesh), static_cast<std::size_t>(own - fine.source.begin())};
 }
@@ -179,7 +179,7 @@ TextureResult Texturing::whole(const TriangleMesh& mesh) {
   return {std::move(report_), std::move(model)};
 }
 
-// Collects color observations from all pieces.
+// Collects color observations from all tiles.
 std::vector<ColorObservation> Texturing::observe(MeshTileIndex& index, double margin_m) {
   const std::size_t wanted = std::max(min_observed_vertices, observed_vertices / index.size());
   std::vector<ColorObservation> all;
@@ -221,30 +221,31 @@ void bind(ParameterTable& table, TextureOptions& options) {
   table.add("texture_size_px", options.atlas.texture_size, {64, 16384},
             "maximum width and height of a texture page, pixels");
   table.add("texel_size_m", options.atlas.texel_size_m, not_negative,
-            "size of a texel on the surface, m; 0: determined by texels_per_pixel");
+            "side of a texel on the surface, m; 0: from the number of texels per photograph pixel");
   table.add("texels_per_pixel", options.atlas.texels_per_pixel, {0.05, 8.0},
-            "texels per photograph pixel along one side, used if texel_size_m is 0");
+            "number of texels per photograph pixel along one side, if no texel size is given");
   table.add("max_pages", options.atlas.max_pages, not_negative,
-            "maximum number of texture pages; charts are scaled down to fit; 0: no limit");
+            "maximum number of texture pages; the resolution is reduced to fit; 0: no limit");
   table.add("padding_px", options.atlas.padding_px, {1, 64},
-            "width of the extrapolated border around each chart, texels");
+            "width of the extrapolated border around each connected piece of the texture, texels");
   table.add("max_incidence_deg", options.views.max_incidence_deg, {0, 90, true, true},
-            "maximum angle between viewing ray and surface normal, degrees");
+            "maximum angle between viewing ray and surface normal of a used photograph, degrees");
   table.add("max_depth_m", options.views.max_depth_m, not_negative,
             "maximum depth at which a photograph is used for a surface, m; 0: no limit");
   table.add("occlusion_tolerance_m", options.views.occlusion_tolerance_m, not_negative,
             "depth behind another surface beyond which a surface counts as occluded, m");
-  table.add(
-      "occlusion_margin_px", options.views.occlusion_margin_px, not_negative,
-      "distance from an occluder's silhouette within which other views are preferred, pixels");
+  table.add("occlusion_margin_px", options.views.occlusion_margin_px, not_negative,
+            "distance from the silhouette of an occluding surface within which other photographs "
+            "are preferred, pixels");
   table.add("border_px", options.views.border_px, not_negative,
             "width of the unused border of each photograph, pixels");
   table.add("seam_cost_m", options.labeling.seam_cost_m, not_negative,
-            "cost per meter of seam; larger values give fewer seams but lower view quality");
+            "cost of 1 m of seam between photographs, as the area (m2) shown at half of the best "
+            "quality that costs the same; larger values give fewer seams");
   table.add("blend_views", options.blend_views, {1, 16},
             "maximum number of photographs blended at a point; 1: one photograph per triangle");
   table.add("blend_exponent", options.blend_exponent, not_negative,
-            "exponent of the view quality in the blending weights");
+            "exponent of a photograph's view quality in its blending weight; 0: equal weights");
   table.add("exposure", options.exposure.gains, "equalize the brightness of the photographs");
   table.add("vignetting", options.exposure.vignetting, "correct the vignetting of the photographs");
   table.add("max_side_m", options.max_side_m, not_negative,
@@ -294,7 +295,7 @@ void describe(ResultTable& table, const TextureCounts& counts) {
   table.add("triangles", counts.seen_triangles + counts.unseen_triangles,
             "number of triangles of the textured mesh");
   table.add("triangles_by_cutting", counts.cut_triangles, Merge::sum,
-            "number of triangles added by cutting long ones");
+            "number of triangles added by subdividing triangles with long sides");
   table.add("seen_triangles", counts.seen_triangles, Merge::sum,
             "number of triangles with a photograph");
   table.add("unseen_triangles", counts.unseen_triangles, Merge::sum,
@@ -305,11 +306,11 @@ void describe(ResultTable& table, const TextureCounts& counts) {
   table.add("split_charts", counts.split_charts, Merge::sum,
             "number of charts that were split to fit a page");
   table.add("shrunk_charts", counts.shrunk_charts, Merge::sum,
-            "number of charts of reduced resolution");
+            "number of charts whose resolution was reduced to fit a page");
   table.add("pages", counts.pages, Merge::sum, "number of pages of the texture");
   table.add("texel_size_m", counts.texel_size_m(), "square root of the mean area of a texel, m");
   table.add("atlas_scale", counts.atlas_scale, Merge::min,
-            "scale of the charts to fit max_pages; 1: not reduced");
+            "factor by which the charts were scaled down to fit max_pages; 1: not scaled down");
   table.add("seams_before_m", counts.seams_before_m, Merge::sum,
             "length of seams with the best photograph for each triangle, m");
   table.add("seams_m", counts.seams_m, Merge::sum, "length of seams between photographs, m");
@@ -325,11 +326,12 @@ void describe(ResultTable& table, const TextureReport& report) {
   table.add("skipped_frames", report.skipped.size(), "number of frames that could not be used");
   describe(table, static_cast<const TextureCounts&>(report));
   table.add("color_spread_before", exposure.log_color_deviation_before,
-            "standard deviation of the log color of a location between photographs");
+            "standard deviation of ln(color) between photographs, before exposure correction");
   table.add("color_spread", exposure.log_color_deviation,
-            "standard deviation of the log color of a location, exposure corrected");
+            "standard deviation of ln(color) between photographs, after exposure correction");
   table.add("exposure_gains", gains, "gain of red, green and blue of each photograph");
-  table.add("vignetting", exposure.vignetting, "coefficients of the vignetting");
+  table.add("vignetting", exposure.vignetting,
+            "coefficients a, b, c of the vignetting: ln(brightness) = a r^2 + b r^4 + c r^6");
 }
 
 double TextureCounts::texel_size_m() const {

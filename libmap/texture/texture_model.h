@@ -39,26 +39,26 @@ struct TextureOptions {
   // see most triangles completely or not at all; 0: never. Longer sides remain if the result would
   // exceed both 2.5 million triangles and twice the triangles of the mesh.
   double max_side_m = 0.05;
-  Color unseen_color{128, 128, 128};
-  bool strict = false;  // throw Error for an unusable frame instead of skipping it
+  Color unseen_color{128, 128, 128};  // color of triangles that no photograph shows
+  bool strict = false;                // throw Error for an unusable frame instead of skipping it
 };
 void bind(ParameterTable& table, TextureOptions& options);
 
 // Statistics of one model, or of several tiles together.
 struct TextureCounts {
-  std::size_t cut_triangles = 0;  // triangles added by subdivision
-  std::size_t seen_triangles = 0;
-  std::size_t unseen_triangles = 0;
-  double seen_m2 = 0.0;
-  double unseen_m2 = 0.0;
-  std::size_t charts = 0;
+  std::size_t cut_triangles = 0;     // triangles added by subdivision
+  std::size_t seen_triangles = 0;    // triangles with a photograph
+  std::size_t unseen_triangles = 0;  // triangles without a photograph
+  double seen_m2 = 0.0;              // area with a photograph
+  double unseen_m2 = 0.0;            // area without a photograph
+  std::size_t charts = 0;            // this and the following three as in TextureAtlas
   std::size_t split_charts = 0;
   std::size_t shrunk_charts = 0;
   std::size_t pages = 0;
   double atlas_scale = 1.0;     // minimum scale of the charts; below 1 if reduced for max_pages
   double texels = 0.0;          // texels covered by triangles
-  double seams_before_m = 0.0;  // with the best photograph for every triangle
-  double seams_m = 0.0;
+  double seams_before_m = 0.0;  // length of the seams with the best photograph for every triangle
+  double seams_m = 0.0;         // length of the seams of the model
 
   // Square root of the mean area of a texel on the surface, m; 0 without texels.
   double texel_size_m() const;
@@ -66,8 +66,8 @@ struct TextureCounts {
 void describe(ResultTable& table, const TextureCounts& counts);
 
 struct TextureReport : TextureCounts {
-  std::size_t photos = 0;
-  std::vector<std::pair<int, Error>> skipped;  // node and reason
+  std::size_t photos = 0;                      // number of usable photographs
+  std::vector<std::pair<int, Error>> skipped;  // node and reason of each unusable frame
   TextureExposure exposure;
   StageTimings timings_s;
 };
@@ -78,8 +78,8 @@ struct TextureResult : TextureReport {
 };
 
 // Textures `mesh`, which is in the world frame of the poses. The result is the same for any number
-// of threads. Throws Error: options out of range, an invalid or empty mesh, no usable photograph,
-// or no triangle seen by any photograph.
+// of threads. Throws Error if an option is out of range, the mesh is invalid or empty, or no usable
+// photograph shows any triangle.
 TextureResult texture_mesh(const TriangleMesh& mesh, const ScanSource& scan,
                            const Trajectory& world_from_base, const TextureOptions& options = {},
                            Progress& progress = no_progress());

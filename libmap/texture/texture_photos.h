@@ -35,7 +35,8 @@ class PhotoProjector {
   Eigen::Vector3d project(const Eigen::Vector3d& point_in_world) const;
 
   // Upper bound, in pixels, of the projection of any segment of length `length_m` within the ball;
-  // 0 only if the ball is outside the photograph. Assumes that distortion enlarges at most twice.
+  // 0 only if the ball is outside the photograph, infinite if the camera is in the ball or the
+  // field of view is unknown. Assumes that distortion enlarges at most twice.
   double max_pixels(const Eigen::Vector3d& center, double radius_m, double length_m) const;
 
  private:

@@ -39,23 +39,23 @@ SubdivisionResult split_long_sides(
     const NeedsCutting& needs_cutting = [](const TriangleMesh&, const Triangle&) { return true; });
 
 // Relative exposure of photographs and vignetting of the lens, estimated from common observations.
-// Colors are divided by both before they are blended.
+// Colors are divided by exposure and vignetting before they are blended.
 
 struct TextureExposure {
-  std::vector<Eigen::Vector3f> gains;         // per photograph and channel, relative to the mean
-  std::array<double, 3> vignetting{0, 0, 0};  // log of brightness: a r^2 + b r^4 + c r^6
-  std::size_t observations = 0;
+  std::vector<Eigen::Vector3f> gains;  // per photograph and channel, relative to the geometric mean
+  std::array<double, 3> vignetting{0, 0, 0};  // ln(brightness): a r^2 + b r^4 + c r^6
+  std::size_t observations = 0;               // number of colors used
   // Standard deviation of ln(color) of one surface point between photographs, before and after.
   double log_color_deviation_before = 0.0;
   double log_color_deviation = 0.0;
 
-  // Divisor of the colors of `photo`, per channel; radius2 as in ColorObservation.
+  // Divisor of the colors of `photo`, per channel; radius2 = r^2 as in ColorObservation.
   Eigen::Vector3f factor(std::size_t photo, double radius2) const;
 };
 
 struct ExposureOptions {
-  bool gains = true;
-  bool vignetting = true;
+  bool gains = true;       // estimate one gain per photograph and channel
+  bool vignetting = true;  // estimate vignetting, common to all
 };
 
 // Estimates exposure by least squares over all points seen in several photographs (Brown and Lowe
@@ -77,20 +77,19 @@ TextureExposure estimate_exposure(std::span<const ColorObservation> observations
 constexpr std::uint32_t no_photo = 0xffffffff;
 
 struct LabelingOptions {
-  // Cost of a seam of 1 m: equal to the cost of this area (m2) at half the best quality.
+  // Cost of a seam of 1 m: as much as this area (m2) at half of the best quality.
   double seam_cost_m = 0.1;
 };
 
 struct TextureLabels {
   std::vector<std::uint32_t> photos;  // one per triangle; no_photo if no photograph sees it
   double energy_before = 0.0;         // m2, with the best view for every triangle
-  double energy = 0.0;
-  double seams_before_m = 0.0;  // length of edges between triangles of different photographs
-  double seams_m = 0.0;
+  double energy = 0.0;                // m2, with `photos`
+  double seams_before_m = 0.0;        // length of edges between triangles of different photographs
+  double seams_m = 0.0;               // length of these edges with `photos`
 };
 
-// Minimizes the energy. `opposite` is one per half-edge (mesh_adjacency), `views` one row per
-// triangle.
+// Minimizes the energy. `opposite` has one entry per half-edge, `views` one row per triangle.
 TextureLabels label_triangles(const TriangleMesh& mesh, const std::vector<HalfEdge>& opposite,
                               const ViewTable& views, const LabelingOptions& options);
 
@@ -102,23 +101,23 @@ struct BlendingWeight {
   float weight = 0.0F;
 };
 
-// Blending weights of all vertices: vertex v has shares[first[v]] .. [first[v + 1] - 1], which sum
-// up to 1. A vertex without weights uses the photograph of the triangle.
+// Blending weights of all vertices: vertex v has weights[first[v]] to weights[first[v + 1] - 1],
+// which sum up to 1. A vertex without weights uses the photograph of the triangle.
 struct BlendingWeights {
   std::vector<BlendingWeight> weights;
   std::vector<std::uint32_t> first;
 };
 
-// Returns the weights of the best `views` photographs of each vertex: quality^exponent minus that
-// of the next best photograph, normalized. The weights are continuous over the surface (masked
-// photo blending, Callieri et al. 2008). Returns no weights if `views` is 1.
+// Returns the weights of the best `views` photographs of each vertex: quality^exponent minus
+// quality^exponent of the best unused photograph, normalized. The weights are continuous over the
+// surface (masked photo blending, Callieri et al. 2008). Returns no weights if `views` is 1.
 BlendingWeights blending_weights(const ViewTable& of_vertices, int views, double exponent);
 
 struct TexturePaint {
   const TexturePhotos& photos;
   const TextureExposure& exposure;
   const BlendingWeights& weights;
-  Color neutral{};
+  Color neutral{};  // of triangles without a photograph
 };
 
 // Paints all charts of `atlas` into the pages of `model`, the result of atlas.make_model. Texels

@@ -21,8 +21,7 @@ struct TextureViewOptions {
   // A surface further behind another than this is occluded. Covers errors of mesh and poses.
   double occlusion_tolerance_m = 0.01;
   int border_px = 3;  // width of the unused border of each photograph
-  // Views within this distance of an occluder's silhouette get a low quality, because of pose
-  // errors and mixed pixels.
+  // Views this near to an occluder's silhouette get a low quality (pose errors, mixed pixels).
   int occlusion_margin_px = 3;
 };
 
@@ -71,26 +70,27 @@ struct TextureViewRequest {
   // Maximum number of views; both 0: no views, which takes much less time.
   std::size_t views_per_triangle = 0;
   std::size_t views_per_vertex = 0;
-  std::size_t observed_vertices = 0;  // approximate number, exceeded at most twofold
+  std::size_t observed_vertices = 0;  // approximate number, exceeded at most twofold; 0: none
 };
 
 struct TextureViews {
   // One row per triangle: photographs that see it completely.
   ViewTable of_triangles;
-  // One row per vertex up to the last one of the part: photographs that see all triangles of the
-  // vertex, with the minimum quality. Empty for vertices of other triangles only.
+  // One row per vertex up to the last one of the requested triangles: photographs that see all
+  // triangles of the vertex, with the minimum quality. Empty for vertices of other triangles only.
   ViewTable of_vertices;
-  // All views of a subset of vertices, spread over the part. Colors are not set yet.
+  // All views of a subset of vertices, spread over the requested triangles. Colors are not set yet.
   std::vector<ColorObservation> observations;
-  std::size_t observed_vertices = 0;
+  std::size_t observed_vertices = 0;  // number of vertices in `observations`' numbering
 };
 
 // Sets radius2 and color of all observations. Decodes each photograph once.
 void look_up_colors(const TexturePhotos& photos, std::vector<ColorObservation>& observations);
 
-// Finds the views of triangles and vertices. Corners and center of a triangle must be inside the
-// photograph and not occluded (one ray each, Embree). The mesh must not be empty; triangles larger
-// than a photograph have no view. The result is the same for any number of threads.
+// Finds the views of triangles and vertices. Corners of a triangle must be inside the photograph
+// and not occluded (one ray each, Embree), nor may the center be if a side is longer than 6 pixels.
+// The mesh must not be empty; triangles larger than a photograph have no view. The result is the
+// same for any number of threads.
 TextureViews find_texture_views(const TriangleMesh& mesh, const TexturePhotos& photos,
                                 const TextureViewOptions& options,
                                 const TextureViewRequest& request, Progress& progress);

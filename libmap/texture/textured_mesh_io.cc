@@ -164,7 +164,7 @@ void require_room_in_glb(const std::vector<ModelPart>& parts,
              part.mesh.triangles.size() * 3 * sizeof(std::uint32_t);
   for (const EncodedImage& image : images) bytes += image.bytes.size();
   if (bytes > std::numeric_limits<std::uint32_t>::max())
-    throw Error("too large for .glb: write an .obj instead",
+    throw Error("too large for .glb; write an .obj instead",
                 {.field = "size", .value = std::to_string(bytes) + " bytes", .bound = "< 4 GB"});
 }
 

@@ -38,9 +38,9 @@ std::filesystem::path texture_page_path(const std::filesystem::path& model, std:
                                         ImageFormat format);
 
 // Returns the files of a model in the order in which they must be committed: the model file is
-// last, after all files that it references. `model` must outlive the writers. Throws Error: an
-// extension other than .obj and .glb, an inconsistent model (TexturedMesh::check), no triangles, or
-// coordinates that float32 cannot represent. Writing throws Error for a .glb above 4 GB.
+// last, after all files that it references. `model` must outlive the writers. Throws Error if the
+// extension is neither .obj nor .glb, the model is inconsistent (TexturedMesh::check) or has no
+// triangles, or float32 cannot represent coordinates. Writing throws Error for a .glb above 4 GB.
 std::vector<ModelFile> textured_mesh_files(const std::filesystem::path& path,
                                            const TexturedMesh& model,
                                            const TexturedMeshWriteOptions& options = {});
@@ -51,7 +51,7 @@ bool is_textured_format(const std::filesystem::path& path);
 
 // Reads an .obj or .glb from any program with textures (PNG or JPEG, embedded or in separate
 // files). The result has no pages if the file has no textures. Corners of equal position and normal
-// are merged into one vertex. Throws Error naming the file: it cannot be read or parsed, contains
+// are merged into one vertex. Throws Error naming the file if it cannot be read or parsed, contains
 // no triangle, or references an unreadable image.
 TexturedMesh read_textured_mesh(const std::filesystem::path& path);
 

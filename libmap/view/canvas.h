@@ -1,5 +1,5 @@
-// Draws shapes, text and images with Cairo, as pixels or as SVG. Coordinates are in pixels from the
-// top left corner.
+// Draws shapes, text and images with Cairo, as pixels or SVG. Coordinates: pixels from the top
+// left.
 #pragma once
 
 #include <Eigen/Core>
@@ -27,8 +27,7 @@ struct TextStyle {
 // Width and line height of `text` in pixels. Throws Error (failed) if the font is not installed.
 Eigen::Vector2d text_size(const std::string& text, const TextStyle& style);
 
-// `text`, or the longest prefix of `text` with "..." at most `width_px` wide; empty if "..." is
-// wider.
+// `text`, or its longest prefix with "..." at most `width_px` wide; empty if "..." is wider.
 std::string shortened_text(const std::string& text, const TextStyle& style, double width_px);
 
 // Output of a canvas: an image or an SVG document.

@@ -23,16 +23,16 @@ struct ChartCurve {
 
 // Adjacent bars; bar i covers [first_edge + i * bin_width, first_edge + (i + 1) * bin_width].
 struct ChartHistogram {
-  std::string name;
+  std::string name;  // legend entry; empty: none
   double first_edge = 0.0;
-  double bin_width = 1.0;  // > 0
-  std::vector<double> heights;
-  std::optional<Color> color;
+  double bin_width = 1.0;       // > 0
+  std::vector<double> heights;  // from y = 0
+  std::optional<Color> color;   // default as in ChartCurve
 };
 
 struct ChartAxis {
   std::string title;                               // with unit
-  std::optional<std::pair<double, double>> range;  // default: round numbers around the data
+  std::optional<std::pair<double, double>> range;  // nullopt: round numbers around the data
 };
 
 // Position of the legend in the chart.

@@ -83,9 +83,8 @@ struct ColoredPoints {
   Legend legend;
 };
 
-// Colors all points. Throws Error: a missing field (with the nearest known one) or one of wrong
-// length, a range that is descending or not finite, mode `own` without own colors, an invalid
-// color.
+// Colors all points. Throws Error if a field is missing (with the nearest known one) or has a wrong
+// length, the range descends or is not finite, mode `own` has no colors, or a color is invalid.
 ColoredPoints color_points(const ColorSource& source, const Coloring& coloring);
 
 // Legend of the classes of core/score_color.h.

@@ -24,7 +24,7 @@ void check_whole(const char* field, int value, int low, int high) {
 }
 
 void check(const std::vector<SheetCell>& cells, const ImageGridOptions& options) {
-  if (cells.empty()) throw Error("the sheet has no cells: give at least one image");
+  if (cells.empty()) throw Error("the sheet has no cells; give at least one image");
   check_whole("columns", options.columns, 0, 1000);
   check_whole("cell_width_px", options.cell_width_px, 16, max_side_px);
   if (options.cell_height_px != 0)
@@ -311,7 +311,7 @@ SheetLayout plan_sheet(const std::vector<SheetCell>& cells, const ImageGridOptio
   if (layout.width > max_side_px || layout.height > max_side_px)
     throw Error("the sheet would have " + std::to_string(layout.width) + " x " +
                     std::to_string(layout.height) + " pixels, more than " +
-                    std::to_string(max_side_px) + " per side",
+                    std::to_string(max_side_px) + " per side; use smaller cells",
                 {.field = "cell_width_px", .value = std::to_string(options.cell_width_px)});
   return layout;
 }

@@ -17,7 +17,7 @@ namespace libmap {
 // Content of a cell: a scene or an image. Scenes are created on demand (twice each), so that only
 // one is in memory. Images larger than the cell are scaled down.
 struct SheetCell {
-  std::string caption;
+  std::string caption;             // below the cell; empty: none
   std::function<Scene()> scene{};  // empty: show `image`
   Viewpoint view = Viewpoint::top;
   ColorImage image{};
@@ -29,8 +29,8 @@ enum class SharedView { sheet, row };
 struct ImageGridOptions {
   int columns = 0;  // 0: minimum number with a page at least as wide as high
   int cell_width_px = 480;
-  int cell_height_px = 0;  // 0: from the aspect ratio of the cells' content
-  std::string title;
+  int cell_height_px = 0;                  // 0: from the aspect ratio of the cells' content
+  std::string title;                       // above all; empty: none
   std::vector<std::string> column_titles;  // above the columns; may be empty
   std::vector<std::string> row_titles;     // before the rows; may be empty
   SharedView shared_view = SharedView::sheet;
@@ -43,7 +43,7 @@ struct ImageGridOptions {
 struct SheetLayout {
   int width = 0;
   int height = 0;
-  int columns = 0;
+  int columns = 0;  // number of columns
   int font_px = 12;
   std::optional<PixelRect> title;
   std::optional<PixelRect> legend;
@@ -55,14 +55,13 @@ struct SheetLayout {
 };
 
 // Plans the layout. `aspect` is height / width of a cell, used if the options do not set the
-// height. Throws Error: no cell, columns, a size or the sheet out of bounds, an invalid background,
-// more titles than rows or columns.
+// height. Throws Error if there is no cell, a number of columns, a size or the sheet is out of
+// bounds, the background is invalid, or there are more titles than rows or columns.
 SheetLayout plan_sheet(const std::vector<SheetCell>& cells, const ImageGridOptions& options,
                        const std::vector<Legend>& legends, double aspect);
 
 // Draws the sheet. Continuous color scales with the same title share one range, which covers the
-// ranges of all scenes. Throws Error as plan_sheet and render_scene do, and what a cell's `scene`
-// throws; (failed) if rendering is not possible.
+// ranges of all scenes. Throws Error as plan_sheet, render_scene and the cells' `scene` do.
 ColorImage draw_sheet(const std::vector<SheetCell>& cells, const ImageGridOptions& options);
 
 }  // namespace libmap

@@ -20,7 +20,7 @@ struct PreparedLayer {
   std::vector<Eigen::Vector3f> normals;    // empty, or one per position of length 1 or 0
   std::vector<Triangle> triangles;         // of a mesh
   bool is_mesh = false;
-  bool cubes = false;
+  bool cubes = false;          // points are cubes, otherwise squares
   bool shaded = false;         // by normals; cubes: by side
   double point_size_m = 0.0;   // 0 for a mesh
   double filler_size_m = 0.0;  // size of the squares that close gaps; 0: none
@@ -32,7 +32,7 @@ struct PreparedLayer {
 
 // Prepares a layer. A textured mesh becomes one layer per page, which refers to the page in
 // `layer`; triangles without a page have untextured_color. Other shapes become one layer. Throws
-// Error: arrays of wrong length, mode `texture` without a texture, and as color_points does.
+// Error as color_points does, and if an array has a wrong length, or mode `texture` no texture.
 std::vector<PreparedLayer> prepare_layers(const SceneLayer& layer, const Pose& terrain_from_scene);
 
 inline constexpr Color untextured_color{128, 128, 128};
@@ -41,8 +41,8 @@ struct PointSpacing {
   // Pitch of the lattice along the axes, else the median distance of nearest neighbors; 0 if all
   // points coincide.
   double distance_m = 0.0;
-  bool lattice = false;
-  bool gaps = false;  // surface cells of the lattice are empty; true without a lattice
+  bool lattice = false;  // the points are on a lattice along the axes
+  bool gaps = false;     // surface cells of the lattice are empty; true without a lattice
 };
 // Estimates the spacing, and whether the points are on a lattice along the axes.
 PointSpacing estimate_spacing(const std::vector<Eigen::Vector3d>& positions);

@@ -26,7 +26,7 @@ class VirtualDisplay {
   VirtualDisplay(const VirtualDisplay&) = delete;
   VirtualDisplay& operator=(const VirtualDisplay&) = delete;
 
-  // Returns true if an Xvfb was started; returns the process id of the Xvfb (0 if none).
+  // True if an Xvfb was started; process id of this Xvfb, 0 if none.
   bool started() const { return server_ > 0; }
   int process_id() const { return server_; }
 

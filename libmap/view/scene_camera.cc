@@ -106,7 +106,7 @@ void fit_perspective(SceneCamera& camera, const std::vector<Eigen::Vector3d>& po
 void place(SceneCamera& camera, const CameraPlacement& placement) {
   const Eigen::Vector3d view = placement.focal_point - placement.position;
   if (!view.allFinite() || !(view.norm() > 0.0))
-    throw Error("the camera is at its focal point or is not finite", {.field = "camera"});
+    throw Error("position and focal point coincide or are not finite", {.field = "camera"});
   const double sine = view.normalized().cross(placement.up.normalized()).norm();
   if (!(sine > 1e-6))
     throw Error("the up direction is parallel to the view direction, or zero",

@@ -47,9 +47,9 @@ struct SceneCamera {
   Eigen::Vector3d right = Eigen::Vector3d::UnitX();
   Eigen::Vector3d up = Eigen::Vector3d::UnitY();
   Eigen::Vector3d forward = -Eigen::Vector3d::UnitZ();
-  bool perspective = false;
-  double scale_px = 1.0;  // orthographic: pixels per meter; perspective: focal length in pixels
-  PixelRect plot;         // part of the image that shows the scene, centered on the optical axis
+  bool perspective = false;  // false: orthographic
+  double scale_px = 1.0;     // orthographic: pixels per meter; perspective: focal length in pixels
+  PixelRect plot;            // part of the image that shows the scene, centered on the optical axis
 
   // Depth in meters; negative behind the camera.
   double depth_of(const Eigen::Vector3d& point) const { return (point - position).dot(forward); }

@@ -17,8 +17,8 @@ inline constexpr int max_side_px = 16384;  // of an image
 inline constexpr int min_font_px = 10;
 
 struct ScenePage {
-  PixelRect plot;  // whole pixels
-  std::optional<PixelRect> title;
+  PixelRect plot;                  // whole pixels
+  std::optional<PixelRect> title;  // nullopt: omitted, like the following
   std::optional<PixelRect> legend;
   std::optional<PixelRect> axes;
   std::optional<PixelRect> scale_bar;
@@ -42,10 +42,10 @@ Eigen::Vector2d legends_size(const std::vector<Legend>& legends, int font_px);
 void draw_title(const ScenePage& page, const std::string& title, Canvas& canvas);
 void draw_legends(const ScenePage& page, const std::vector<Legend>& legends, Canvas& canvas);
 void draw_axes(const ScenePage& page, const SceneCamera& camera, Canvas& canvas);
-// In perspective, the scale is that at the depth of `reference`, and the bar is labeled
-// accordingly.
+// Draws the scale bar. In perspective, scale and label are for the depth of `reference`.
 void draw_scale_bar(const ScenePage& page, const SceneCamera& camera,
                     const Eigen::Vector3d& reference, Canvas& canvas);
+// Size of a label, and the point that it belongs to.
 struct LabelRequest {
   Eigen::Vector2d anchor = Eigen::Vector2d::Zero();  // pixel of the point
   double width_px = 0.0;
@@ -59,7 +59,7 @@ std::vector<PixelRect> place_labels(const std::vector<LabelRequest>& requests,
                                     double point_radius_px, const PixelRect& bounds);
 
 // Draws markers in the terrain frame. Labels are omitted if the plot is too small for all labels.
-// If there are more than 5000 markers, those with drawn labels are drawn, and one per verdict and
+// If there are more than 5000 markers, markers with drawn labels are drawn, and one per verdict and
 // pixel square (side: the disc's radius).
 void draw_markers(const ScenePage& page, const SceneCamera& camera,
                   const std::vector<Marker>& markers, Canvas& canvas);

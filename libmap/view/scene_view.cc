@@ -241,19 +241,20 @@ ColorImage draw_plot(const Setup& setup, const Color& background) {
 
 void bind(ParameterTable& table, SceneLayer& layer) {
   Coloring& coloring = layer.coloring;
-  table.add("color", coloring.mode,
-            {{"automatic", ColorMode::automatic},
-             {"own", ColorMode::own},
-             {"score", ColorMode::score},
-             {"field", ColorMode::field},
-             {"flags", ColorMode::flags},
-             {"height", ColorMode::height},
-             {"single", ColorMode::single},
-             {"texture", ColorMode::texture}},
-            "quantity shown by colors; own: stored colors; field: --field; flags: convex, "
-            "graspable, obstacles; single: one color; automatic: by the content of the file");
+  table.add(
+      "color", coloring.mode,
+      {{"automatic", ColorMode::automatic},
+       {"own", ColorMode::own},
+       {"score", ColorMode::score},
+       {"field", ColorMode::field},
+       {"flags", ColorMode::flags},
+       {"height", ColorMode::height},
+       {"single", ColorMode::single},
+       {"texture", ColorMode::texture}},
+      "quantity shown by colors; own: stored colors; field: a scalar field; flags: convex, "
+      "graspable and obstacle points; single: one color; automatic: by the content of the file");
   table.add("field", coloring.field,
-            "name of the scalar field shown by color modes field and automatic");
+            "name of the scalar field shown by the color modes field, score and automatic");
   table.add("load_n", coloring.load_n, positive,
             "load shown in the legend of hold_probability, N; auto: the load stored with the map");
   table.add("color_scale", coloring.scale,
@@ -261,8 +262,9 @@ void bind(ParameterTable& table, SceneLayer& layer) {
             "color scale; viridis: dark to bright; diverging: blue below and red above 0");
   table.add("range_min", coloring.range_min, any_number,
             "value at the lower end of the color scale");
-  table.add("range_max", coloring.range_max, any_number,
-            "value at the upper end of the color scale; equal to range_min: from the data");
+  table.add(
+      "range_max", coloring.range_max, any_number,
+      "value at the upper end of the color scale; equal to the lower end: both from the data");
   table.add("single_color", coloring.color, "color for color mode single, #rrggbb or a name");
   table.add("point_shape", layer.point_shape,
             {{"automatic", PointShape::automatic},
@@ -270,7 +272,7 @@ void bind(ParameterTable& table, SceneLayer& layer) {
              {"square", PointShape::square}},
             "shape of points; automatic: cubes for points on a lattice, else squares");
   table.add("point_size_m", layer.point_size_m, not_negative,
-            "side length of points, m; 0: from the point spacing");
+            "side length of the squares or cubes that show points, m; 0: from the point spacing");
   table.add("shading", layer.shading,
             {{"automatic", Shading::automatic}, {"none", Shading::none}, {"full", Shading::full}},
             "shading; none: exact colors; automatic: meshes, cubes, and clouds of one color with "
@@ -280,7 +282,7 @@ void bind(ParameterTable& table, SceneLayer& layer) {
 void bind(ParameterTable& table, SceneViewOptions& options) {
   table.add("view", options.view, viewpoint_names(),
             "viewpoint; top, front, side: orthographic along -z, +y, -x; oblique: perspective "
-            "from the front left above; camera: perspective from a given position");
+            "from the front, left and above; camera: perspective from a given position");
   table.add("title", options.title, "title above the scene");
   table.add("scale_bar", options.scale_bar, "show the scale bar");
   table.add("background", options.background, "background color, #rrggbb or a name");

@@ -41,7 +41,7 @@ struct SceneLayer {
 // Binds all fields except the shape, the zero plane and the legend of own colors.
 void bind(ParameterTable& table, SceneLayer& layer);
 
-// Verdict on a marked location: dark, green or red.
+// Verdict on a marked location; the markers are dark, green or red, in this order.
 enum class Verdict { none, pass, fail };
 
 // A labeled point, drawn over the scene. Markers outside of the view are omitted.
@@ -72,7 +72,7 @@ struct SceneViewOptions {
   int height = 1200;  // pixels, 1 to 16384
   Viewpoint view = Viewpoint::top;
   CameraPlacement camera;  // for Viewpoint::camera, in the scene's frame
-  std::string title;
+  std::string title;       // empty: none
   bool axes = true;
   bool scale_bar = true;
   bool legend = true;
@@ -84,15 +84,15 @@ struct SceneViewOptions {
   // Title, legend, axes and scale bar are beside the scene. They are omitted if the image is too
   // small.
 };
-// Keys for all images; and keys only for images of a single scene: size, legend and axes.
+// Bind the keys for all images, and the keys for images of a single scene: size, legend and axes.
 void bind(ParameterTable& table, SceneViewOptions& options);
 void bind_single(ParameterTable& table, SceneViewOptions& options);
 
 // Renders `scene`; equal scenes and options give equal bytes on one machine. Clouds and meshes are
 // freed after preparation. Each call starts a VirtualDisplay if no display answers; create one
-// before several calls to start it once. Calls from several threads are serialized. Throws Error:
-// nothing to draw, an invalid size, color or camera, a layer with inconsistent arrays, and as
-// color_points does; (failed) if rendering is not possible.
+// before several calls to start it once. Calls from several threads are serialized. Throws Error as
+// color_points does, and if there is nothing to draw, a size, a color or the camera is invalid, or
+// arrays of a layer are inconsistent; Error (failed) if rendering is not possible.
 ColorImage render_scene(Scene scene, const SceneViewOptions& options);
 
 // Bounding box of a scene in the terrain frame, including the size of points, and the distinct

@@ -264,9 +264,9 @@ TEST(Compare, IcpSaysWhatItCannotDo) {
   EXPECT_TRUE(bad_input(
       graspmap({"compare", "points.ply", "square.ply", "--icp", "--transform", "0,0,1,0,0,0"}),
       {.file = "points.ply",
-       .field = "points within 0.2 m of the surface",
+       .field = "share of points within 0.2 m of the surface",
        .value = "0.0 %",
-       .bound = ">= 10.0 %"}));
+       .bound = ">= 10.0 % and at least 6 points"}));
   const auto short_run =
       graspmap({"compare", "points.ply", "square.ply", "--icp", "--icp-max-iterations", "1"});
   EXPECT_TRUE(warned(short_run, {"ICP", "1 iterations"}));

@@ -84,7 +84,7 @@ TEST(MeshParts, SelectingNothingAndAllAndTheWrongNumber) {
   EXPECT_TRUE(graspmap_test::is_error(error_of([&] {
                                         select_triangles(mesh, {true, false});
                                       }),
-                                      {.field = "marked triangles", .value = "2"}));
+                                      {.field = "number of marks of triangles", .value = "2"}));
 }
 
 TEST(MeshParts, ComponentsByEdgesNotByCorners) {

@@ -190,12 +190,14 @@ TEST(SurfaceAlignment, NoOverlapIsSaid) {
   const Pose beside = make_pose_from_rpy({1.9, 0, 0}, {0, 0, 0});
   for (const Pose& pose : {above, beside})
     EXPECT_TRUE(is_error(error_of([&] { align_to_surface(moved(points, pose), surface); }),
-                         {.field = "points within 0.2 m of the surface"}));
+                         {.field = "share of points within 0.2 m of the surface"}));
   // The overlap is a quarter.
   const Pose partly = make_pose_from_rpy({1.5, 0, 0}, {0, 0, 0});
   EXPECT_TRUE(is_error(
       error_of([&] { align_to_surface(moved(points, partly), surface, {.min_overlap = 0.5}); }),
-      {.field = "points within 0.2 m of the surface", .value = "19.6 %", .bound = ">= 50.0 %"}));
+      {.field = "share of points within 0.2 m of the surface",
+       .value = "19.6 %",
+       .bound = ">= 50.0 % and at least 6 points"}));
 }
 
 TEST(SurfaceAlignment, SaysWhetherItHasConverged) {

@@ -326,7 +326,7 @@ TEST(MeshCutting, AllOrNothing) {
   TriangleMesh broken = mesh;
   broken.vertices[20].y() = std::numeric_limits<double>::quiet_NaN();
   const Error error = error_of([&] { cut_mesh(broken, {}); });
-  EXPECT_EQ(error.context().value, "vertex 20");
+  EXPECT_EQ(error.context().field, "vertex 20");
   broken = mesh;
   broken.triangles[3][1] = 1000;
   EXPECT_TRUE(

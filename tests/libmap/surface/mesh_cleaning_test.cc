@@ -158,7 +158,7 @@ TEST(MeshCleaning, HostileMeshes) {
   EXPECT_EQ(error_of([&] { clean_mesh(short_field); }).context().field, "f");
   const auto none_left = [](const TriangleMesh& mesh) {
     EXPECT_TRUE(is_error(error_of([&] { clean_mesh(mesh, repairs()); }),
-                         {.field = "triangles without area"}));
+                         {.field = "number of triangles without area"}));
   };
   none_left(mesh_of({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}, {{0, 1, 2}}));
   none_left(mesh_of({{1, 1, 1}, {1, 1, 1}, {1, 1, 1}}, {{0, 1, 2}}));
