@@ -40,9 +40,9 @@ void bind(libmap::ParameterTable& table, MaskOptions& options) {
   table.add_overrides("gripper", options.overrides);
   table.add("method", options.mask.method, libgtd::method_names(),
             "scoring method of the mask, as in score --method");
-  table.add("voxel_size_m", options.mask.voxel_size_m, libmap::positive, "edge of a voxel, m");
+  table.add("voxel_size_m", options.mask.voxel_size_m, libmap::positive, "side of a voxel, m");
   table.add("extra_void_layers", options.mask.extra_void_layers, {0, 10000},
-            "number of void layers added on top of the mask (H_add)");
+            "number of layers of void voxels that are added on top of the mask (H_add)");
   table.add("view", options.view, libmap::viewpoint_names(), "viewpoint, as in render --view");
   table.add("sections", options.sections, "draw three sections of the mask instead of a view");
   bind_sections(table, options);

@@ -62,14 +62,14 @@ void bind(libmap::ParameterTable& table, SimulateScanOptions& options) {
             {{"rvl", libmap::DepthFormat::rvl},
              {"png", libmap::DepthFormat::png16},
              {"float", libmap::DepthFormat::float_png}},
-            "format of depth images; rvl, png: whole millimeters, RVL or 16-bit PNG; float: PNG "
-            "with fractions of a millimeter");
+            "format of depth images; rvl: RVL of whole millimeters; png: 16-bit PNG of whole "
+            "millimeters; float: PNG of 32-bit floats, m");
   table.add("color_format", options.writer.color,
             {{"jpeg", libmap::ImageFormat::jpeg}, {"png", libmap::ImageFormat::png}},
             "format of color images; jpeg: lossy; png: lossless");
-  table.add("seed", simulation.seed, libmap::not_negative, "random seed");
+  table.add("seed", simulation.seed, libmap::not_negative, "random seed of the scan");
   table.add("rock_seed", simulation.rock_seed, libmap::not_negative,
-            "random seed of the rock's colors, equal in all scans of one ground; 0: as --seed");
+            "random seed of the rock's colors, to be equal for all scans of one ground; 0: --seed");
 }
 
 void add_results(const libmap::ScanSimulationResult& result, Run& run) {
@@ -153,10 +153,10 @@ void scan_mesh(const SimulateScanOptions& options, const libmap::Trajectory& pos
 // not depend on the size of the terrain.
 void scan_terrain(const SimulateScanOptions& options, const libmap::Trajectory& poses, Run& run) {
   if (options.simulation.texture == libmap::TextureSource::mesh)
-    throw libmap::Error("requires a mesh, because clouds have no surface colors",
+    throw libmap::Error("requires a mesh as scene, because clouds have no surface colors",
                         {.field = "--texture", .value = "mesh", .bound = "auto or rock"});
   if (poses.empty() && options.simulation.trajectory.path == libmap::CameraPath::loops)
-    throw libmap::Error("requires a mesh",
+    throw libmap::Error("requires a mesh as scene",
                         {.field = "--path", .value = "loops", .bound = "auto or serpentine"});
   const libmap::ScanEvents& events = options.simulation.events;
   reject_given({{"--walker-first-frame", events.walker_first_frame > 0},
@@ -202,8 +202,7 @@ void simulate(SimulateScanOptions& options, Run& run) {
   simulation.depth.check();
   run.claim_output(options.output, {options.scene, options.camera, options.trajectory});
   if (!options.output.ends_with(".db"))
-    throw libmap::Error("a scan can be written only as a database",
-                        {.file = options.output, .bound = "a name.db"});
+    throw libmap::Error("scans are written as a database (.db)", {.file = options.output});
   if (!options.camera.empty()) {
     options.camera = libmap::find_data_file("cameras", options.camera).string();
     simulation.camera = libmap::read_camera(options.camera).camera;

@@ -275,8 +275,8 @@ void Command::Parts::add_common_options() {
   }
   app.add_flag("--dry-run", run_options.dry_run, "check inputs and parameters, and write nothing");
   app.add_flag("--force", run_options.force, "overwrite outputs that graspmap did not write");
-  app.add_option("--threads", threads, "number of threads; 0: all")->type_name("N");
-  app.add_option("--progress", progress, "progress display: auto|json|none")->type_name("STYLE");
+  app.add_option("--threads", threads, "number of threads; 0: all processors")->type_name("N");
+  app.add_option("--progress", progress, "progress display: auto, json, none")->type_name("STYLE");
   app.add_flag("--quiet", run_options.quiet, "print warnings and errors only");
   app.add_flag("--verbose", run_options.verbose, "also print the time of each step");
 }
