@@ -69,7 +69,6 @@ void bind(libmap::ParameterTable& table, SpotCheckCommandOptions& options) {
   bind(table, options.plane);
 }
 
-// A cloud, or a mesh.
 struct EdgeData {
   std::optional<libmap::TriangleMesh> mesh{};
   libmap::PointCloud cloud{};

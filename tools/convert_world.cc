@@ -86,7 +86,7 @@ libmap::WorldRig read_world_rig(const WorldCommandOptions& options, Run& run) {
   return rig;
 }
 
-// The frames of the site, for the heads of the files.
+// Returns comments on the frame of the site, for the beginnings of the files.
 std::vector<std::string> notes_of(const libmap::Manifest& manifest) {
   std::vector<std::string> notes = {
       "graspmap: units m, kg, s; x forward or east, y left or north, z up (REP-103); origin: that "

@@ -144,7 +144,7 @@ void write_poses(const FuseOptions& options, const libmap::DepthFusionResult& re
   run.manifest().results = results;
 }
 
-// States an estimate that replaces the assumed noise.
+// Returns the noise of the depth camera, and logs its source.
 libmap::DepthNoise choose_noise(const libmap::DepthFusionOptions& options,
                                 const libmap::ScanSource& scan, const libmap::Trajectory& poses,
                                 Run& run) {
@@ -231,8 +231,8 @@ void tell_consistency(const libmap::ScanSource& scan, const libmap::Trajectory& 
     run.warn("{}: {}", taken.source, warning);
 }
 
-// Colors of depth that is not registered are those of other places. Depth of another focal length
-// is wrong itself.
+// Warns if depth is not registered to color, because points then get the colors of other positions.
+// Throws Error if the scales differ, because the depth itself is then wrong.
 void check_registration(const libmap::ScanSource& scan, const FuseOptions& options, Run& run) {
   if (!options.fusion.color) return;
   const libmap::EdgeAgreement edges =

@@ -66,7 +66,6 @@ bool in_true_frame(const TextureCommandOptions& options) {
   return is_from_true_frame(options.mesh);
 }
 
-// Opens the scan.
 std::unique_ptr<libmap::ScanSource> scan_of(const TextureCommandOptions& options, Run& run) {
   return open_scan(options.scan, options.texture.strict, run,
                    known_camera(options.calibration, options.scan, options.poses, run));
@@ -109,7 +108,7 @@ void say_result(const libmap::TextureReport& result, Run& run) {
       "not visible and gray",
       result.photos, result.charts, result.pages, result.pages == 1 ? "" : "s",
       1e3 * result.texel_size_m(), result.unseen_triangles, triangles, result.unseen_m2);
-  // A larger share than that behind rocks indicates a wrong frame or other poses.
+  // Rocks hide fewer triangles. A larger share indicates a wrong frame or other poses.
   if (5 * result.unseen_triangles > triangles)
     run.warn("more than 20 % of the triangles are visible in no image; check --frame and --poses");
   if (result.split_charts > 0)

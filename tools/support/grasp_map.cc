@@ -59,7 +59,7 @@ class StepsOfTile : public libmap::Progress {
   libmap::Progress& whole_;
 };
 
-// A map by tiles, from a tile store or by splitting one file.
+// A map in tiles: those of a tile store, or parts of one file.
 class TiledMap {
  public:
   explicit TiledMap(const std::string& file) {

@@ -107,8 +107,7 @@ libmap::PointCloud MapTiles::load_checked(std::size_t tile) const {
 
 namespace {
 
-// Copies parameters, frame, transforms and those results of a store that are valid for its merged
-// map.
+// Copies parameters, frame, transforms, and those results of a store that its merged map also has.
 void copy_common_entries(const libmap::Manifest& store, libmap::Manifest& whole) {
   for (const auto& parameter : store.parameters)
     if (parameter.first != "tile") whole.parameters.push_back(parameter);
