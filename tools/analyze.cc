@@ -176,13 +176,13 @@ void say_ground(const Analysis& analysis, const AnalyzeOptions& options, Run& ru
     return;
   }
   run.info(
-      "{} regions, the largest {:.4f} m2; {:g} m strides: {} groups; one group from {:.3f} m on",
+      "{} regions, the largest {:.4f} m2; strides of {:g} m: {} groups, of {:.3f} m: one group",
       analysis.regions.regions.size(), analysis.regions.regions.front().area_m2,
       options.reach.stride_m, reach.groups, *reach.joining_stride_m);
   run.info("{} regions ({:.4f} m2) are reachable from {}", reach.reachable_regions,
            reach.reachable_area_m2, options.start == no_start ? "region 1" : options.start);
   if (reach.reachable_regions == 0)
-    run.warn("the nearest region, {}, is {:.3f} m from the start", *reach.start_region + 1,
+    run.warn("no region is reachable; the nearest, {}, is {:.3f} m away", *reach.start_region + 1,
              reach.start_distance_m);
 }
 
@@ -194,8 +194,8 @@ void say_change(const libgtd::MapChange& change, const AnalyzeOptions& options, 
                : fmt::format("nearest within {:g} voxels", options.change.match_distance_voxels),
            change.only_map.size(), change.only_other.size());
   run.info(
-      "of {} evaluated in both: kappa {}, accuracy {}; graspable in both {}, in MAP only {}, in "
-      "OTHER only {}",
+      "{} voxels evaluated in both: kappa {}, accuracy {}; graspable in both {}, in MAP only {}, "
+      "in OTHER only {}",
       evaluated.graspable.size(),
       evaluated.kappa ? fmt::format("{:.3f} (standard error {:.3f})", evaluated.kappa->value,
                                     evaluated.kappa->standard_error)

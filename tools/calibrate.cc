@@ -138,7 +138,7 @@ std::vector<libmap::BoardImage> boards_of(const std::vector<BoardPhoto>& photos,
     throw libmap::Error("no image shows a whole board with these inner corners",
                         {.field = "--board",
                          .value = options.board,
-                         .bound = "the number of inner corners, one less than squares"});
+                         .bound = "the numbers of inner corners, one less than of squares"});
   for (const BoardPhoto& photo : photos)
     if (!photo.corners && !photo.fault)
       run.warn("{}: does not show a board of {} inner corners", photo.name, options.board);

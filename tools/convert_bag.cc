@@ -116,7 +116,7 @@ void report(const libmap::BagRigPlan& plan, const libmap::BagRigExport& result,
                                            camera.camera.base_from_camera);
     if (plan.topics[n].empty()) run.warn(camera.name + ": no topic contains images of this camera");
   }
-  run.info("{} images of {} cameras, {} of {} image sets, at most {} cameras per set",
+  run.info("{} images of {} cameras in {} of {} image sets, at most {} cameras per set",
            result.images, plan.rig.cameras.size(), result.sets.size(), plan.sets_in_bag, fullest);
 }
 
@@ -266,7 +266,7 @@ libmap::BagGrid grid_of(const CloudFile& map, double cell_m) {
   if (!(cells.prod() <= max_cells))
     throw libmap::Error(
         "the grid would have more than 2^26 cells; use a larger cell size",
-        {.file = map.path, .field = "cell_size_m", .value = libmap::to_text(cell_m)});
+        {.file = map.path, .field = "--cell-size", .value = libmap::to_text(cell_m)});
   grid.columns = static_cast<std::size_t>(cells.x());
   grid.rows = static_cast<std::size_t>(cells.y());
   std::vector<std::size_t> top(grid.columns * grid.rows, points.size());

@@ -41,7 +41,7 @@ std::string_view name_of(libgtd::UpSource source) {
 void report_plane(const libgtd::RegressionPlane& plane, const std::string& terrain, Run& run) {
   if (plane.up_source == libgtd::UpSource::direction) return;
   const bool by_normals = plane.up_source == libgtd::UpSource::normals;
-  run.info("up from the {}{}", name_of(plane.up_source),
+  run.info("up direction from the {}{}", name_of(plane.up_source),
            by_normals ? fmt::format(": {:.1f} % agree", 100.0 * *plane.normals_up) : "");
   if (!by_normals && plane.up_source != libgtd::UpSource::viewpoint && plane.normals_up)
     run.warn("{}: {}; the up direction is from the {} (--up X,Y,Z sets it)", terrain,
@@ -417,7 +417,7 @@ void score(ScoreOptions& options, Run& run) {
   require_points(read.cloud.size(), read.dropped_points, options.terrain, run);
   if (scenario.orientation == libgtd::Orientation::surface && !read.cloud.has_normals())
     run.warn(
-        "{}: has no normals: the terrain's z is assumed to point outwards, and the outer sides of "
+        "{}: has no normals; the terrain's z is assumed to point outwards, and the outer sides of "
         "walls are uncertain",
         options.terrain);
   const libgtd::DetectionResult result = in_file(options.terrain, [&] {

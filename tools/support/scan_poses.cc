@@ -56,11 +56,11 @@ libmap::Trajectory poses_in_file(const PosesOption& poses, const libmap::ScanSou
   for (const std::string& warning : imported.warnings) run.warn("{}: {}", file, warning);
   run.info("{} of {} poses belong to nodes of the scan",
            imported.poses_in_file - imported.trajectory.unmatched, imported.poses_in_file);
-  if (imported.scale != 1.0) run.info("scaled by {:.9g}", imported.scale);
+  if (imported.scale != 1.0) run.info("poses scaled by {:.9g}", imported.scale);
   run.add_results(
       {{"poses_in_file", imported.poses_in_file}, {"poses_scale_taken", imported.scale}});
   if (imported.max_rig_deviation_m > 0.0) {
-    run.info("cameras of one node agree within {:.1f} mm", 1e3 * imported.max_rig_deviation_m);
+    run.info("camera poses of a node agree within {:.1f} mm", 1e3 * imported.max_rig_deviation_m);
     run.add_results({{"largest_rig_deviation_m", imported.max_rig_deviation_m}});
   }
   return std::move(imported.trajectory.poses);
