@@ -280,7 +280,7 @@ int graspmap_tools::compare_edges(int argc, char** argv) {
                   "min), then counter-clockwise b (x = max), c (y = max), d (x = min).");
   command.flag("--edges", edges, "measure height errors along the four edges of one site");
   command.input("SITE", options.file, "cloud or mesh of the site");
-  command.output(options.output, "table of the errors: edge, e1_m, ..., mean_m (.csv)", false);
+  command.output(options.output, "table of height errors: edge, e1_m, ..., mean_m (.csv)", false);
   command.option("--truth", "MESH", options.truth,
                  "true surface as the reference of heights (see --truth-frame)");
   command.option("--box", "XMIN,YMIN,ZMIN,XMAX,YMAX,ZMAX", options.box,

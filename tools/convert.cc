@@ -249,7 +249,7 @@ int convert_file(int argc, char** argv) {
   command.parameters().add("pixel_size_m", options.pixel_size_m, libmap::not_negative,
                            "pixel size of a .tif output, m; 0: the map's voxel size");
   command.parameters().add("poses_format", options.poses_format, libmap::trajectory_format_names(),
-                           "format of the input poses; auto: by the extension or content");
+                           "format of the input poses; auto: by extension, else by content");
   command.parameters().add(
       "output_poses_format", options.output_poses_format, libmap::trajectory_format_names(),
       "format of the output poses; auto: by extension; RTAB-Map's export formats are 0 kitti, 1 "

@@ -174,7 +174,7 @@ int graspmap_tools::convert_world(int argc, char** argv) {
   Command command("convert", "With -o OUT.world: a site as a world for simulators.");
   command.input("SITE", options.site, "mesh of the site (.ply .obj .glb ...), or folder of tiles");
   command.output(options.output,
-                 "folder OUT.world of SDF (Gazebo, CoppeliaSim), MJCF (MuJoCo) and URDF (Bullet)");
+                 "folder OUT.world with SDF (Gazebo, CoppeliaSim), MJCF (MuJoCo), URDF (Bullet)");
   command.option("--map", "MAP", options.map, "graspability map of the site, displayed on it");
   command.option("--footholds", "FOOTHOLDS", options.footholds, "footholds, displayed as markers");
   command.option("--rig", "FILE|NAME", options.rig, "camera rig of a robot, added as sensors");

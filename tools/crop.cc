@@ -311,8 +311,9 @@ int main(int argc, char** argv) {
                  "box to keep, m (its frame: --frame)");
   command.option("--polygon", "FILE.csv", options.polygon,
                  "table of the area's corners in order: columns x, y, m; convex or not");
-  command.option("--size", "WIDTHxHEIGHT", options.size,
-                 "size of the rectangle to keep, m, placed with most data on all its sides");
+  command.option(
+      "--size", "WIDTHxHEIGHT", options.size,
+      "size of the rectangle to keep, m, placed as far as possible from the data's border");
   command.flag("--border", options.border, "keep the area inside a white band on the ground");
   command.option(
       "--border-size", "WIDTHxHEIGHT", options.border_size,

@@ -482,7 +482,7 @@ int main(int argc, char** argv) {
   command.input("MESH", options.mesh,
                 "mesh or DEM (.tif) of the terrain, z up; level: level ground, for --fit");
   command.option("--points", "LOCATIONS.csv", options.points,
-                 "locations: CSV with columns x, y, z in the mesh's frame, m, and any others");
+                 "table of locations: CSV with columns x, y, z (mesh frame, m) and any others");
   command.option(
       "--map", "MAP", options.map,
       "graspability map of the mesh (.pcd, .ply, .csv, .tiles), whose voxels are the locations; "

@@ -295,7 +295,7 @@ int main(int argc, char** argv) {
       "and depth");
   add_calibration_option(command, options.calibration);
   command.option("--write-calibration", "OUT.yaml", options.new_calibration,
-                 "output for the estimated camera, for --calibration of other commands and scans");
+                 "output for the estimated calibration, for --calibration of commands and scans");
   command.option("--known-length", "NODE:X:Y-NODE:X:Y=METERS", options.known_lengths,
                  "measured distance between two points, each given by node and pixel of its image; "
                  "repeatable; it determines the scale");

@@ -339,9 +339,9 @@ void score_into_store(const ScoreOptions& options, const fs::path& gripper_file,
 
 void bind(libmap::ParameterTable& table, ScoreOptions& options) {
   bind(table, options.detection);
-  table.add(
-      "up", options.up,
-      "direction out of the ground: X,Y,Z in the cloud's frame; auto: by viewpoint, normals or z");
+  table.add("up", options.up,
+            "direction out of the ground: X,Y,Z in the cloud's frame; auto: viewpoint, normals or "
+            "z axis");
   table.add("frame", options.frame, libgtd::map_frame_names(),
             "frame of the map's points; terrain: terrain frame; input: frame of the scored cloud");
 }

@@ -135,7 +135,7 @@ std::vector<std::string> scan_inputs(const std::string& scan, const PosesOption&
 void add_calibration_option(Command& command, CalibrationOption& calibration) {
   command.option(
       "--calibration", "auto|stored|FILE.yaml", calibration.source,
-      "camera calibration; stored: from the scan; FILE.yaml: of refine --write-calibration; auto: "
+      "camera calibration; stored: from the scan; a file: by refine --write-calibration; auto: "
       "the calibration with which the poses were estimated, else the stored one");
 }
 
