@@ -14,8 +14,7 @@
 
 namespace graspmap_tools {
 
-// Returns the chart of the score histogram: bars of evaluated voxels by class, a line of all
-// voxels.
+// Returns the score histogram: bars of the evaluated voxels by class, and a line of all voxels.
 libmap::Chart histogram_chart(const libgtd::MapAnalysis& analysis, const std::string& title);
 
 // Returns a chart of the ground by height or slope: bars show the graspable share of each bin's

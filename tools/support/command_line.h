@@ -21,14 +21,14 @@ class UsageError : public libmap::Error {
   using Error::Error;
 };
 
-// Throws Error with `reason` if a parameter of `bind` differs from its default, with its flag.
+// Throws Error with `reason` and the flag of the first parameter of `bind` that is not the default.
 template <typename Options>
 void reject_changed(const Options& options, void (*bind)(libmap::ParameterTable&, Options&),
                     const std::string& reason) {
   if (const auto key = libmap::changed_key(options, bind))
     throw libmap::Error(reason, {.field = libmap::flag_of(*key)});
 }
-// Throws Error with `reason` if a flag has the value true (the user gave it), with this flag.
+// Throws Error with `reason` and the first flag whose value is true, i.e. that the user gave.
 void reject_given(const std::vector<std::pair<const char*, bool>>& flags,
                   const std::string& reason);
 

@@ -69,8 +69,8 @@ struct GraspMapInput {
 // Names of the fields that are added to the map.
 const std::vector<std::string>& grasp_fields();
 
-// Checks the output and claims it if it is one file. Throws Error if it is unusable, or for shares
-// with one file or --force.
+// Checks the output; claims it if it is one file. Throws Error if the output cannot be used, or for
+// a share with one file or --force.
 void require_map_output(const GraspMapInput& input, Run& run);
 
 // Writes the map with the added fields. Tiles are processed in a tile store, so that a killed run

@@ -29,7 +29,7 @@ PointFrame frame_of_points(const std::string& points, PointFrame asked, const st
 // or invalid value, and for a table without rows.
 std::vector<Eigen::Vector3d> positions_of(const libmap::Table& table);
 
-// Returns the transform from the scored cloud to the terrain frame; nullptr without one. Its name:
+// Name of the transform from the scored cloud to the terrain frame, and this transform or nullptr.
 inline constexpr const char* terrain_from_input_name = "terrain_from_input";
 const libmap::Pose* terrain_from_input_of(const std::optional<libmap::Manifest>& manifest);
 
@@ -37,8 +37,9 @@ const libmap::Pose* terrain_from_input_of(const std::optional<libmap::Manifest>&
 // source frame is always that of the cloud or mesh before the first of these commands.
 inline constexpr const char* site_from_map_name = "site_from_map";
 
-// Returns the transform from that source frame to the points in `file`, by the file's manifest;
-// nullopt without one. For points in the terrain frame, the source may be the scored cloud.
+// Returns the transform from the cloud or mesh before `crop` or `simulate cameras` to the points in
+// `file`, by the file's manifest; nullopt without one. For a map in the terrain frame whose terrain
+// was not cropped, it is the transform from the scored cloud.
 std::optional<libmap::Pose> site_from_map_of(const std::string& file);
 std::optional<libmap::Pose> site_from_map_of(const libmap::Manifest& manifest);
 

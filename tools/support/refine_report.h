@@ -7,7 +7,7 @@
 
 namespace graspmap_tools {
 
-// `scan` is the scan's path, as the user named it.
+// Return the report as JSON and as text. `scan` is the path of the scan on the command line.
 std::string refinement_json(const std::string& scan, const libmap::RefinementResult& result);
 std::string refinement_text(const std::string& scan, const libmap::RefinementResult& result);
 
