@@ -1,4 +1,4 @@
-# Finds ROS 1's bag library and messages as Debian packages them. Their own CMake and pkg-config files
+# Finds the bag library and messages of ROS 1 in Debian's packages. Their CMake and pkg-config files
 # cannot be used: they require ament's Python package and a pluginlib.pc that Debian does not have.
 #
 # Defines the target Ros1Bag::Ros1Bag, and Ros1Bag_MISSING, the list of missing packages.

@@ -8,8 +8,9 @@
 #        [EVERY=10] [BAG_FLAGS="--near 0.28 --far 1.5"] [METHOD=corrected] [SCORE="..."] -j2
 #
 # EVERY=n uses every n-th set of images. BAG_FLAGS are further flags of `graspmap convert`, for example
-# topics, a rig or a range; FOOTHOLDS are flags of `graspmap footholds`. A second run does nothing. If a
-# variable changes, the results that depend on it are recomputed. Names must not contain spaces.
+# topics, a rig or a depth range; SCORE and FOOTHOLDS are flags of `graspmap score` and `footholds`. A
+# second run does nothing. If a variable changes, the results that depend on it are recomputed. Names
+# must not contain spaces.
 
 here := $(dir $(lastword $(MAKEFILE_LIST)))
 GRASPMAP ?= $(firstword $(wildcard $(here)../build/release/graspmap) graspmap)
@@ -23,10 +24,10 @@ FOOTHOLDS ?=
 one_word = $(if $(word 2,$($(1))),$(error $(1) contains a space, which make cannot handle: $($(1))))
 $(foreach name,BAG OUT SCENARIO,$(call one_word,$(name)))
 ifeq ($(BAG),)
-  $(error BAG is not set: the robot's bag, e.g. BAG=robot.bag)
+  $(error BAG is not set; set the bag of the robot, e.g. BAG=robot.bag)
 endif
 ifeq ($(OUT),)
-  $(error OUT is not set: the folder of the results, e.g. OUT=results)
+  $(error OUT is not set; set the folder for the results, e.g. OUT=results)
 endif
 
 include $(here)one_run.mk
@@ -47,7 +48,7 @@ export scored_with := $(SCENARIO) $(METHOD) $(SCORE) $(FOOTHOLDS)
 $(OUT)/read_with $(OUT)/scored_with: FORCE | $(OUT)
 	@printf '%s\n' "$${$(@F)}" | cmp -s - $@ || printf '%s\n' "$${$(@F)}" > $@
 
-# The manifest of the folder is the target that represents the folder.
+# The folder's manifest is the target, because make compares the times of files.
 $(OUT)/images.json: $(BAG) $(wildcard $(BAG)/*) $(OUT)/read_with
 	@rm -rf $(OUT)/images
 	@exec $(GRASPMAP) convert $(BAG) -o $(OUT)/images --every $(EVERY) $(BAG_FLAGS)
@@ -55,7 +56,7 @@ $(OUT)/images.json: $(BAG) $(wildcard $(BAG)/*) $(OUT)/read_with
 # Bag of a map. For a folder, its manifest is the target.
 map_bag := $(if $(filter %.bag,$(BAG)),map.bag,$(if $(filter %.mcap,$(BAG)),map.mcap,map_bag.json))
 
-# The list of sets is known once the images exist.
+# Stamps of the sets, which are known only after the images exist: `all` runs a second make.
 stamps := $(shell tail -n +2 $(firstword $(wildcard $(OUT)/images/synchronized_sets.csv $(OUT)/images/moments.csv) /dev/null) | cut -d, -f1)
 sets: $(foreach stamp,$(stamps),$(OUT)/$(stamp)/$(map_bag) $(OUT)/$(stamp)/top.png)
 moments: sets  # earlier name

@@ -4,9 +4,9 @@
 #   sudo apt install visp-images-data netpbm
 #   make -f pipelines/castle.mk OUT=folder -j2
 #
-# The scan has two cameras, to register depth to color, no poses, and short-range noise. planes.txt
-# compares the mesh with the planes, some of which the camera did not see. The other results are those
-# of scan.mk, whose variables are passed on.
+# The scan has two cameras, because its depth must be registered to color, no poses, and the noise of a
+# short-range sensor. planes.txt compares the mesh with the planes, some of which the camera did not see.
+# The other results are those of scan.mk.
 
 here := $(dir $(lastword $(MAKEFILE_LIST)))
 GRASPMAP ?= $(firstword $(wildcard $(here)../build/release/graspmap) graspmap)
@@ -14,7 +14,7 @@ CASTEL ?= /usr/share/visp-images-data/ViSP-images/mbt-depth/castel
 noise := --axial-noise 0.0005 --range-noise 0.002
 
 ifeq ($(OUT),)
-  $(error OUT is not set: the folder of the results, e.g. OUT=results)
+  $(error OUT is not set; set the folder for the results, e.g. OUT=results)
 endif
 ifeq ($(wildcard $(CASTEL)/chateau.cao),)
   $(error $(CASTEL) does not contain the castle sequence: apt install visp-images-data)

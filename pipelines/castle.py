@@ -15,7 +15,7 @@ import subprocess
 import sys
 
 DEPTH_UNIT_M = 0.000125  # depth unit of the SR300
-# Rotation from the optical frame to the base frame: x ahead, z up.
+# Rotation from the optical frame to the base frame (x forward, z up).
 BASE_FROM_OPTICAL = [[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]]
 
 
@@ -85,7 +85,7 @@ def write_scan(source, scan):
 
 
 def planes_of(cao):
-    """Reads vertices and faces of a ViSP model file: lists, each preceded by its number of lines."""
+    """Returns the vertices and faces in a ViSP model file of lists, each after its number of lines."""
     lines = [line.split("#")[0].split() for line in cao.read_text().splitlines()]
     lines = [line for line in lines if line and line != ["V1"]]
     blocks = []

@@ -10,8 +10,9 @@
 # million voxels for 3 x 3 m. Here they are 5 mm, a fifth of its palm's radius, and its mask has three
 # layers. Its published H_add 3 and TSV 100 are converted to these voxels: 1 layer, and 4 of the 324
 # voxels of its window instead of 100 of 7744. Gaps between the points are interpolated. The zero plane
-# is off: all ground counts. A second run does nothing. If a variable or a file changes, the results
-# that depend on it are recomputed.
+# is so low that all ground counts. COUNT, EDGE and SPACING set the resolution of the simulated sites,
+# CELL the width of an image in pixels. A second run does nothing. If a variable or a file changes, the
+# results that depend on it are recomputed.
 
 here := $(dir $(lastword $(MAKEFILE_LIST)))
 GRASPMAP ?= $(firstword $(wildcard $(here)../build/release/graspmap) graspmap)
@@ -33,7 +34,7 @@ hubrobo_score ?= --solid-voxel-threshold 4 --curvature-radius 0.03 --set interpo
 one_word = $(if $(word 2,$($(1))),$(error $(1) contains a space, which make cannot handle: $($(1))))
 $(foreach name,OUT SCENARIO,$(call one_word,$(name)))
 ifeq ($(OUT),)
-  $(error OUT is not set: the folder of the results, e.g. OUT=masks)
+  $(error OUT is not set; set the folder for the results, e.g. OUT=masks)
 endif
 $(foreach name,METHODS GRIPPERS,$(if $(strip $($(name))),,$(error $(name) is empty)))
 

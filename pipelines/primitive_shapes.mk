@@ -1,6 +1,6 @@
-# Embedded example: the thesis's scenario 1 (primitive shapes on a plane), simulated exactly, scored with
-# the methods `thesis` and `corrected`, looked up at 12 locations and evaluated against their expected
-# graspability. Needs no data.
+# Example without data: the thesis's scenario 1 (primitive shapes on a plane) is simulated without errors,
+# scored with the methods `thesis` and `corrected`, looked up at 12 locations and evaluated against their
+# expected graspability.
 #
 #   make -f pipelines/primitive_shapes.mk OUT=folder [SHARES=4] -j2
 

@@ -1,6 +1,6 @@
 # Simulation of the thesis's scenario 4: a rock site, its scan by a hand-held Kinect v2, and the stages of
 # scan.mk (cloud, surface, the 3 x 3 m site, texture, samples, map), each with its distance to the true
-# mesh. Needs no data.
+# mesh. Needs no data. FIELD_TEST are flags of `graspmap grasp`, the virtual field test on the true mesh.
 #
 #   make -f pipelines/rock_site.mk OUT=folder [SEED=1] [FRAMES=60] [SITE=rocks] [EDGE=0.008] -j2
 

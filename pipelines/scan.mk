@@ -1,6 +1,6 @@
 # Graspability map from a scan's database: one cloud of all frames, a clean surface, the leveled and
 # cropped site with its photographs as texture, uniform samples of the site, and the map with look-up,
-# evaluation and images. If there is a true mesh, also the distance of each stage to it.
+# evaluation and images. If TRUTH is set, also the distances of the cloud and the site to the true mesh.
 #
 #   make -f pipelines/scan.mk SCAN=scan.db OUT=folder [POSES=odometry] [TRUTH=mesh.ply] \
 #        [CROP="--size 3x3"] [RESAMPLE="--count 73000"] [POINTS=points.csv] \
@@ -9,14 +9,14 @@
 # SCAN is an RTAB-Map database or a folder of images. POSES is refined (by graspmap refine), odometry,
 # optimized, ground-truth or a file of poses (default: optimized). TRUTH is a mesh in the frame of the
 # scan's true poses; the cloud is transformed into that frame. POINTS are in the frame of the cloud.
-# REFINE, FUSE, MESH, CROP, RESAMPLE and SCORE are further flags of their commands. Without CROP, the map
-# is leveled but not cropped. TEXTURE= omits the texture. TILES is the side of a tile in meters: cloud,
-# mesh, site and terrain are then folders of tiles and the map is a tile store, so that memory does not
-# depend on the area. With TILES there is no texture unless TEXTURE=model requests a folder of models,
-# without an image, and CROP cannot be --size or --border if the site is too large for memory. A second
-# run does nothing. If a variable or a file changes, the results that depend on it are recomputed.
-# The target `world` makes a simulation world of the site, with its texture if there is one, by the
-# flags WORLD.
+# REFINE, FUSE, MESH, CROP, RESAMPLE and SCORE are further flags of the commands of these names. Without
+# CROP, the site is leveled but not cropped. An empty TEXTURE omits the texture. TILES is the side of a
+# tile in meters: cloud, mesh, site and terrain are then folders of tiles and the map is a tile store, so
+# that memory does not depend on the area. With TILES, there is a texture only if TEXTURE=model requests
+# a folder of models; no image shows it. CROP cannot be --size or --border if the site is too large for
+# memory. A second run does nothing. If a variable or a file changes, the results that depend on it are
+# recomputed. The target `world` writes a simulation world of the site, with the texture if there is one;
+# WORLD are further flags of `graspmap convert`.
 
 here := $(dir $(lastword $(MAKEFILE_LIST)))
 GRASPMAP ?= $(firstword $(wildcard $(here)../build/release/graspmap) graspmap)
@@ -41,10 +41,10 @@ export TITLE ?= $(basename $(notdir $(SCAN)))
 one_word = $(if $(word 2,$($(1))),$(error $(1) contains a space, which make cannot handle: $($(1))))
 $(foreach name,SCAN OUT POSES TRUTH POINTS SCENARIO TEXTURE TILES,$(call one_word,$(name)))
 ifeq ($(SCAN),)
-  $(error SCAN is not set: the scan, e.g. SCAN=scan.db)
+  $(error SCAN is not set; set the scan, e.g. SCAN=scan.db)
 endif
 ifeq ($(OUT),)
-  $(error OUT is not set: the folder of the results, e.g. OUT=results)
+  $(error OUT is not set; set the folder for the results, e.g. OUT=results)
 endif
 
 include $(here)one_run.mk
@@ -95,7 +95,7 @@ $(OUT)/poses.tum $(OUT)/refinement.json &: $(SCAN) $(OUT)/refined_with
 	@exec $(GRASPMAP) refine $< -o $(OUT)/poses.tum --report $(OUT)/refinement.json \
 	  $(REFINE)
 
-# fuse corrects the poses. Photographs match its cloud only with the corrected poses.
+# fuse corrects the poses, so photographs match the cloud only with the corrected poses.
 $(cloud) $(OUT)/fused_poses.tum &: $(SCAN) $(or $(refined),$(wildcard $(POSES))) \
     $(OUT)/fused_with
 	@exec $(GRASPMAP) fuse $(SCAN) -o $(cloud) --corrected-poses $(OUT)/fused_poses.tum \
@@ -132,7 +132,7 @@ $(OUT)/site.png: $(site)
 $(OUT)/texture.png: $(OUT)/$(TEXTURE)
 	@exec $(GRASPMAP) render $< -o $@ --view oblique --title "$$TITLE: textured" --quiet
 
-# Without a true mesh, the fitted plane is the ground.
+# Without a true mesh, heights are measured from the fitted plane.
 $(OUT)/spot_check.txt: $(site) $(TRUTH) $(OUT)/checked_with
 	@exec $(GRASPMAP) compare $< --edges -o $(OUT)/spot_check.csv $(if $(TRUTH),--truth $(TRUTH) \
 	  --truth-frame map) > $@.partial

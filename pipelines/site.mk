@@ -5,9 +5,10 @@
 #
 # POINTS is optional (columns x, y, z; first column: name). If it has a column `graspable` (1 or 0), the
 # map is evaluated against it. POINTS are in the frame of the site, or with POINTS_FRAME=map in the frame
-# of the map that the site was cropped from. SCENARIO is a name in data/scenarios or a file. METHOD
-# replaces the scenario's method. SHARES is the number of threads of the scoring. A second run does nothing. A stopped run is resumed. If a variable or
-# a file changes, the results that depend on it are recomputed.
+# of the map from which the site was cropped. SCENARIO is a name in data/scenarios or a file. METHOD
+# replaces the scenario's method. SCORE are further flags of `graspmap score`. SHARES is its number of
+# threads. A second run does nothing. A run that was stopped continues with the missing results. If a
+# variable or a file changes, the results that depend on it are recomputed.
 
 here := $(dir $(lastword $(MAKEFILE_LIST)))
 GRASPMAP ?= $(firstword $(wildcard $(here)../build/release/graspmap) graspmap)
@@ -22,13 +23,13 @@ export TITLE ?= $(basename $(notdir $(SITE)))
 one_word = $(if $(word 2,$($(1))),$(error $(1) contains a space, which make cannot handle: $($(1))))
 $(foreach name,SITE POINTS OUT SCENARIO,$(call one_word,$(name)))
 ifeq ($(SITE),)
-  $(error SITE is not set: the cloud of the terrain, e.g. SITE=cloud.pcd)
+  $(error SITE is not set; set the cloud of the terrain, e.g. SITE=cloud.pcd)
 endif
 ifeq ($(OUT),)
-  $(error OUT is not set: the folder of the results, e.g. OUT=results)
+  $(error OUT is not set; set the folder for the results, e.g. OUT=results)
 endif
 ifneq ($(shell test '$(SHARES)' -ge 1 2>/dev/null && echo yes),yes)
-  $(error SHARES is '$(SHARES)': it must be an integer >= 1)
+  $(error SHARES is '$(SHARES)': must be an integer >= 1)
 endif
 ifneq ($(POINTS)$(wildcard $(POINTS)),$(POINTS)$(POINTS))
   $(error POINTS is '$(POINTS)': no such file)

@@ -41,9 +41,9 @@ TRIALS ?= --trials 16 --draws 8
 one_word = $(if $(word 2,$($(1))),$(error $(1) contains a space, which make cannot handle: $($(1))))
 $(foreach name,OUT SEED EDGE SPACING COUNT SHARES GRASPMAP_DATA,$(call one_word,$(name)))
 ifeq ($(OUT),)
-  $(error OUT is not set: the folder of the results, e.g. OUT=study)
+  $(error OUT is not set; set the folder for the results, e.g. OUT=study)
 endif
-# Fails if a variable contains an unknown word. Arguments: variable, known words.
+# Ends make if a variable contains an unknown word. Arguments: variable, known words.
 known = $(foreach word,$($(1)),$(if $(filter $(word),$(2)),,\
   $(error $(1) contains '$(word)', which is not one of: $(2))))
 $(call known,SCENARIOS,1 2 3 4)

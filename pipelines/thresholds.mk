@@ -31,7 +31,7 @@ EXPECTED ?= $(if $(SITE),,$(data)/expected/primitive_shapes.csv)
 one_word = $(if $(word 2,$($(1))),$(error $(1) contains a space, which make cannot handle: $($(1))))
 $(foreach name,SITE OUT SCENARIO EXPECTED,$(call one_word,$(name)))
 ifeq ($(OUT),)
-  $(error OUT is not set: the folder of the results, e.g. OUT=thresholds)
+  $(error OUT is not set; set the folder for the results, e.g. OUT=thresholds)
 endif
 $(foreach name,TSV HADD METHODS,$(if $(strip $($(name))),,$(error $(name) is empty)))
 

@@ -47,17 +47,17 @@ void bind_one(libmap::ParameterTable& table, AnalyzeOptions& options) {
   bind(table, options.change);
   table.add(
       "transform", options.transform,
-      "transform from OTHER's frame to MAP's: X,Y,Z,ROLL,PITCH,YAW in m and degrees, or a file; "
-      "auto: from the manifests, for maps scored from clouds in one frame or cropped from one map");
+      "transform from OTHER's frame to MAP's: X,Y,Z,ROLL,PITCH,YAW in m and degrees, or a file of "
+      "a 4 x 4 matrix; auto: from the manifests, if both clouds are in one frame or from one map");
 }
 
 void bind(libmap::ParameterTable& table, AnalyzeOptions& options) {
   bind_one(table, options);
   table.add("points_frame", options.points_frame, point_frame_names(),
             "frame of the start position and of the expected regions; input: scored cloud; "
-            "terrain: terrain frame; map: map before cropping");
+            "terrain: terrain frame; map: cloud or mesh before `graspmap crop`");
   table.add_former_key("pictures", "images");
-  table.add("images", options.images, "draw images and charts");
+  table.add("images", options.images, "write images and charts, not only tables");
   bind(table, options.table);
 }
 
@@ -81,7 +81,7 @@ ReadMap read_map(const std::string& file, Run& run) {
   });
   if (!map.manifest)
     run.warn(file +
-             ": has no manifest; points are assumed to be in the terrain frame, all above the "
+             ": has no manifest; its points are assumed to be in the terrain frame and above the "
              "zero plane");
   else if (map.manifest->find_parameter("zero_plane_m") == nullptr)
     run.warn(file +
@@ -101,8 +101,8 @@ libmap::Pose map_from_other(const AnalyzeOptions& options, const ReadMap& map, c
     return *site_from_map_of(options.map) * site_from_map_of(options.other)->inverse();
   if (has_crop(map) != has_crop(other))
     run.warn("only " + (has_crop(map) ? options.map : options.other) +
-             " was cropped: both scored clouds are assumed to be in one frame (--transform sets "
-             "another)");
+             " was cropped; both scored clouds are assumed to be in one frame (--transform sets "
+             "the transform)");
   return map_from_input(map.manifest) * map_from_input(other.manifest).inverse();
 }
 
@@ -167,8 +167,8 @@ void say_ground(const Analysis& analysis, const AnalyzeOptions& options, Run& ru
            ground.ground.graspable_area_m2, percent_text(ground.ground.graspable_fraction()));
   if (ground.column_coverage < 0.95)
     run.warn(
-        "{}: only {:.0f} % of the columns inside the ground have a voxel, which splits regions "
-        "(--adjacency-voxels 2 joins them across one empty voxel)",
+        "{}: only {:.0f} % of the vertical columns inside the ground have a voxel, which splits "
+        "regions; --adjacency-voxels 2 joins them across one empty voxel",
         options.map, 100.0 * ground.column_coverage);
   const libgtd::RegionReach& reach = analysis.reach;
   if (analysis.regions.regions.empty()) {
@@ -176,13 +176,13 @@ void say_ground(const Analysis& analysis, const AnalyzeOptions& options, Run& ru
     return;
   }
   run.info(
-      "{} regions, the largest {:.4f} m2; {:g} m strides: {} groups; one group from {:.3f} m on",
+      "{} regions, the largest {:.4f} m2; strides of {:g} m: {} groups, of {:.3f} m: one group",
       analysis.regions.regions.size(), analysis.regions.regions.front().area_m2,
       options.reach.stride_m, reach.groups, *reach.joining_stride_m);
   run.info("{} regions ({:.4f} m2) are reachable from {}", reach.reachable_regions,
            reach.reachable_area_m2, options.start == no_start ? "region 1" : options.start);
   if (reach.reachable_regions == 0)
-    run.warn("the nearest region, {}, is {:.3f} m from the start", *reach.start_region + 1,
+    run.warn("no region is reachable; the nearest, {}, is {:.3f} m away", *reach.start_region + 1,
              reach.start_distance_m);
 }
 
@@ -194,8 +194,8 @@ void say_change(const libgtd::MapChange& change, const AnalyzeOptions& options, 
                : fmt::format("nearest within {:g} voxels", options.change.match_distance_voxels),
            change.only_map.size(), change.only_other.size());
   run.info(
-      "of {} evaluated in both: kappa {}, accuracy {}; graspable in both {}, in MAP only {}, in "
-      "OTHER only {}",
+      "{} voxels evaluated in both: kappa {}, accuracy {}; graspable in both {}, in MAP only {}, "
+      "in OTHER only {}",
       evaluated.graspable.size(),
       evaluated.kappa ? fmt::format("{:.3f} (standard error {:.3f})", evaluated.kappa->value,
                                     evaluated.kappa->standard_error)
@@ -304,13 +304,13 @@ void analyze(AnalyzeOptions& options, Run& run) {
       throw UsageError(
           "--against requires exactly one MAP and cannot be used with --expected; use --pairs to "
           "compare several maps");
-    reject_changed(options, bind_one, "requires one map without --expected");
+    reject_changed(options, bind_one, "requires a single MAP and no --expected");
     options.table.points_frame = options.points_frame;
     options.table.images = options.images;
     return tabulate_maps(options.maps, options.folder, options.table, run);
   }
   reject_changed<MapTableOptions>(options.table, graspmap_tools::bind,
-                                  "requires several maps or --expected");
+                                  "requires several MAPs or --expected");
   options.map = options.maps.front();
   if (options.other.empty() && options.transform != "auto")
     throw libmap::Error("can only be used with --against OTHER",
@@ -343,15 +343,15 @@ void analyze(AnalyzeOptions& options, Run& run) {
 int main(int argc, char** argv) {
   AnalyzeOptions options;
   Command command("analyze");
-  command.inputs("MAP", options.maps, "graspability map; several maps are tabulated");
-  command.option("--against", "OTHER", options.other, "map of the same ground to compare MAP with");
+  command.inputs("MAP", options.maps, "graspability map; several: a table with one row per map");
+  command.option("--against", "OTHER", options.other, "map of the same ground, compared with MAP");
   command.option("--expected", "EXPECTED.csv", options.table.expected,
-                 "table of regions that are expected to be graspable or not, compared with the "
-                 "map, e.g. data/expected/primitive_shapes.csv");
+                 "table of regions with their expected graspability, compared with each map, e.g. "
+                 "data/expected/primitive_shapes.csv");
   command.output(options.folder,
-                 "folder of summary.json, histogram, by_height, by_slope, regions, region_links "
-                 "and, with OTHER, change; for several maps, of maps.csv, histograms.csv and, if "
-                 "requested, pairs.csv and regions.csv");
+                 "output folder; for one map: summary.json, histogram, by_height, by_slope, "
+                 "regions, region_links and, with --against, change; for several: maps.csv, "
+                 "histograms.csv, pairs.csv (--pairs) and regions.csv (--expected)");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { analyze(options, run); });
 }

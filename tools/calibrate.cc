@@ -83,7 +83,7 @@ BoardPhoto read_photo(const std::string& file, const libmap::Chessboard& board) 
     const std::string bytes = libmap::read_whole_file(file);
     const auto info = libmap::read_image_info(bytes);
     if (info && std::int64_t{info->width} * info->height > max_pixels)
-      throw libmap::Error("too large for the detection of the board",
+      throw libmap::Error("too large for the detection of the board; reduce the image",
                           {.field = "image size",
                            .value = fmt::format("{} x {}", info->width, info->height),
                            .bound = fmt::format("<= {} pixels", max_pixels)});
@@ -138,7 +138,7 @@ std::vector<libmap::BoardImage> boards_of(const std::vector<BoardPhoto>& photos,
     throw libmap::Error("no image shows a whole board with these inner corners",
                         {.field = "--board",
                          .value = options.board,
-                         .bound = "the number of inner corners, one less than squares"});
+                         .bound = "the numbers of inner corners, one less than of squares"});
   for (const BoardPhoto& photo : photos)
     if (!photo.corners && !photo.fault)
       run.warn("{}: does not show a board of {} inner corners", photo.name, options.board);
@@ -250,7 +250,7 @@ void warn_of_weaknesses(const CameraCalibrationResult& result, Run& run) {
   for (const std::string& name : result.repeated)
     run.warn(name + ": skipped because an earlier image shows the board in the same pose");
   for (const std::string& name : result.rejected)
-    run.warn(name + ": skipped because of the reprojection error");
+    run.warn(name + ": skipped because its reprojection error is too large");
   for (const CalibratedImage& photo : result.images)
     if (photo.rms_px > good_error_px)
       run.warn("{}: reprojection error {:.2f} px, above {} px", photo.name, photo.rms_px,
@@ -269,8 +269,8 @@ void warn_of_weaknesses(const CameraCalibrationResult& result, Run& run) {
              with_deviation(*vague));
   if (std::min(result.width_coverage, result.height_coverage) < good_coverage)
     run.warn(
-        "the corners cover {:.0f} % of the image's width and {:.0f} % of its height; distortion "
-        "beyond is extrapolated",
+        "the corners cover {:.0f} % of the image's width and {:.0f} % of its height; outside, the "
+        "distortion is extrapolated",
         100 * result.width_coverage, 100 * result.height_coverage);
 }
 
@@ -283,7 +283,7 @@ std::string chart_png(const Chart& chart, int height_px) {
   return libmap::to_png(libmap::draw_chart(chart, {chart_width_px, height_px}));
 }
 
-// The largest of 1, 2, 5, 10, ... that draws the mean residual at most 1/40 of the width long.
+// The largest of 1, 2, 5, 10, ... with which the mean residual is at most 1/40 of the image width.
 double magnification(const CameraCalibrationResult& result) {
   double sum = 0.0;
   std::size_t count = 0;
@@ -382,8 +382,7 @@ void calibrate(CalibrateOptions& options, Run& run) {
   for (const std::string& file : files) libmap::require_readable_file(file);
   run.claim_output(options.output, files);
   if (!options.output.ends_with(".yaml") && !options.output.ends_with(".yml"))
-    throw libmap::Error("a camera can be written only as YAML",
-                        {.file = options.output, .bound = "a name.yaml"});
+    throw libmap::Error("calibrations are written as YAML (.yaml)", {.file = options.output});
   if (!options.report.empty()) run.claim_output_folder(options.report);
   const std::vector<BoardPhoto> photos =
       run.timed("find boards", [&] { return read_photos(files, options.calibration.board, run); });
@@ -414,10 +413,10 @@ int main(int argc, char** argv) {
   }
   CalibrateOptions options;
   Command command("calibrate");
-  command.inputs("IMAGES", options.images, "images, or folders of images (.png, .jpg)");
-  command.output(options.output, "camera file (.yaml)");
+  command.inputs("IMAGES", options.images, "images of a chessboard (.png, .jpg), or their folders");
+  command.output(options.output, "calibration file of the camera (.yaml)");
   command.option("--report", "DIR", options.report,
-                 "output folder for images.csv, residuals.csv, residuals.png and errors.png");
+                 "output folder for the errors of images and corners, as tables and charts");
   bind(command.parameters(), options);
   return command.run(argc, arguments.data(), [&](Run& run) { calibrate(options, run); });
 }

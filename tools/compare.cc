@@ -43,10 +43,10 @@ struct CompareOptions {
 
 void bind(libmap::ParameterTable& table, CompareOptions& options) {
   table.add("within_m", options.within_m, libmap::positive,
-            "maximum distance of a matched point, for precision and completeness, m");
+            "maximum distance at which points match, for precision and completeness, m");
   table.add("samples_per_m2", options.samples_per_m2, libmap::positive,
-            "density of the samples of a mesh's surface, per m2");
-  table.add("seed", options.seed, {}, "random seed of the samples");
+            "number of sample points per area of a mesh's surface, per m2");
+  table.add("seed", options.seed, {}, "random seed of the sample points on meshes");
   table.add("icp", options.icp, "align A with B by point-to-plane ICP before the comparison");
   bind(table, options.alignment);
   table.add_former_key("picture_range_m", "image_range_m");
@@ -81,8 +81,8 @@ Shape read_shape(const std::string& file, const CompareOptions& options) {
   return shape;
 }
 
-// Throws Error for a distant cloud, which indicates a wrong transform: the time of a distance to a
-// mesh grows with the distance.
+// Throws Error for a distant cloud, which indicates a wrong transform and would take long: the time
+// to compute a distance from a mesh increases with the distance.
 void require_nearness(const libmap::ReferenceSurface& surface, const libmap::PointCloud& cloud,
                       const CompareOptions& options) {
   constexpr double max_sizes = 100;
@@ -113,7 +113,7 @@ libmap::Pose b_from_a_of(const CompareOptions& options) {
   const auto a_from_map = site_from_map_of(options.a);
   const auto b_from_map = site_from_map_of(options.b);
   if (!a_from_map && !b_from_map)
-    throw libmap::Error("neither A nor B was cropped, so the manifests contain no transform",
+    throw libmap::Error("neither A nor B was cropped, so their manifests have no transform",
                         {.file = options.a,
                          .field = "--transform",
                          .value = options.transform,
@@ -170,7 +170,7 @@ void measure_completeness(const Shape& a, const Shape& b, const CompareOptions& 
         libmap::fraction_of(libmap::covered(samples, a.points.positions, options.within_m));
     return;
   }
-  // Samples outside the mesh's enlarged box are too far; measuring them would be slow.
+  // Samples outside the mesh's enlarged box cannot be near; measuring them would be slow.
   const libmap::Bounds3d bounds = libmap::bounds_of(a.mesh->vertices);
   const Eigen::Vector3d margin = Eigen::Vector3d::Constant(options.within_m);
   const libmap::Bounds3d near{bounds.min - margin, bounds.max + margin};
@@ -238,8 +238,9 @@ void align(const Shape& a, const libmap::ReferenceSurface& surface, const Compar
   comparison.b_from_a = found.surface_from_points * comparison.b_from_a;
   if (!found.converged) run.warn("ICP did not converge in {} iterations", found.iterations);
   if (found.free_motions > 0)
-    run.warn("{} of 6 degrees of freedom are not determined by the surface and are unchanged",
-             found.free_motions);
+    run.warn(
+        "ICP leaves {} of 6 degrees of freedom unchanged, which the surface does not determine",
+        found.free_motions);
 }
 
 Comparison compare_shapes(const Shape& a, const Shape& b, const CompareOptions& options, Run& run) {
@@ -441,17 +442,17 @@ void compare(const CompareOptions& options, Run& run) {
 int compare_surfaces(int argc, char** argv) {
   CompareOptions options;
   Command command("compare");
-  command.input("A", options.a, "cloud or mesh (.pcd, .ply, .csv, .obj, .stl, .off, .glb)");
+  command.input("A", options.a, "measured cloud or mesh (.pcd .ply .csv .obj .stl .off .glb)");
   command.input("B", options.b, "reference surface: a mesh or a cloud");
   command.output(options.output,
-                 "A's points in B's frame with the fields distance and signed_distance", false);
+                 "A's points in B's frame with the fields distance and signed_distance, m", false);
   command.renamed_flag("--picture", "--image");
   command.option("--image", "FILE.png", options.image,
-                 "image of A's points, colored by signed distance");
+                 "image of A's points, colored by their signed distance from B");
   command.option("--transform", "X,Y,Z,ROLL,PITCH,YAW|FILE|crop", options.transform,
-                 "transform from A to B: meters and degrees about the fixed axes, roll first; a "
-                 "file of four rows of four numbers, as crop writes; crop: from the manifests of "
-                 "A and B, one of which was cropped from the other's map");
+                 "transform from A's frame to B's: m and degrees about the fixed axes, roll first; "
+                 "a file of four rows of four numbers, as crop writes; crop: from the manifests, "
+                 "if A, B or both were cropped from one map");
   command.option("--box", "XMIN,YMIN,ZMIN,XMAX,YMAX,ZMAX", options.box,
                  "box in B's frame, m; only points inside it are compared");
   command.flag("--json", options.json, "print the results as JSON");

@@ -26,7 +26,7 @@ using Json = nlohmann::ordered_json;
 constexpr double published_mean_m = 0.040;
 constexpr const char* edge_names[] = {"a", "b", "c", "d"};
 
-// Reference of heights. automatic: z = 0 for a levelled site (by its manifest), else fit.
+// Reference of heights. automatic: z = 0 for a leveled site (by its manifest), else fit.
 enum class Ground { automatic, zero, fit };
 enum class SiteOutline { axes, turned };
 // Frame of the true mesh: that of the site, or of the map that the site was cropped from.
@@ -50,13 +50,13 @@ struct SpotCheckCommandOptions {
 void bind(libmap::ParameterTable& table, SpotCheckCommandOptions& options) {
   bind(table, options.check);
   table.add("radius_m", options.radius_m, libmap::positive,
-            "for a cloud: radius of the points that determine the median height at a position, m");
+            "for a cloud: horizontal radius of the points whose median is a location's height, m");
   table.add("min_points", options.min_points, {1.0, 1e9},
-            "for a cloud: minimum number of points for the height of a position");
+            "for a cloud: minimum number of points around a location to determine its height");
   table.add("outline", options.outline,
             {{"axes", SiteOutline::axes}, {"turned", SiteOutline::turned}},
-            "outline of the site: smallest rectangle; axes: parallel to the axes; turned: "
-            "rotated");
+            "outline of the site, the smallest rectangle around the data; axes: parallel to x and "
+            "y; turned: in any direction");
   table.add(
       "ground", options.ground,
       {{"auto", Ground::automatic}, {"zero", Ground::zero}, {"fit", Ground::fit}},
@@ -64,12 +64,11 @@ void bind(libmap::ParameterTable& table, SpotCheckCommandOptions& options) {
       "the transform of a site or terrain frame, else fit");
   table.add("truth_frame", options.truth_frame,
             {{"site", TruthFrame::site}, {"map", TruthFrame::map}},
-            "frame of --truth; site: of the site; map: of the map from which the site was "
-            "cropped");
+            "frame of the true surface; site: frame of the site; map: frame of the map from which "
+            "the site was cropped");
   bind(table, options.plane);
 }
 
-// A cloud, or a mesh.
 struct EdgeData {
   std::optional<libmap::TriangleMesh> mesh{};
   libmap::PointCloud cloud{};
@@ -97,7 +96,7 @@ libmap::TriangleMesh read_truth(const SpotCheckCommandOptions& options) {
   if (options.truth_frame == TruthFrame::site) return truth;
   const auto site_from_map = site_from_map_of(options.file);
   if (!site_from_map)
-    throw libmap::Error("the site was not cropped from a map",
+    throw libmap::Error("the manifest of the site has no transform from a map (graspmap crop)",
                         {.file = options.file, .field = "--truth-frame", .value = "map"});
   return libmap::transform_mesh(truth, *site_from_map);
 }
@@ -279,13 +278,13 @@ int graspmap_tools::compare_edges(int argc, char** argv) {
   Command command("compare",
                   "With --edges: height errors at locations along the four edges of a site: a (y = "
                   "min), then counter-clockwise b (x = max), c (y = max), d (x = min).");
-  command.flag("--edges", edges, "measure along the edges of one site");
-  command.input("SITE", options.file, "cloud or mesh");
-  command.output(options.output, "table: edge, e1_m, e2_m, ..., mean_m (.csv)", false);
+  command.flag("--edges", edges, "measure height errors along the four edges of one site");
+  command.input("SITE", options.file, "cloud or mesh of the site");
+  command.output(options.output, "table of height errors: edge, e1_m, ..., mean_m (.csv)", false);
   command.option("--truth", "MESH", options.truth,
                  "true surface as the reference of heights (see --truth-frame)");
   command.option("--box", "XMIN,YMIN,ZMIN,XMAX,YMAX,ZMAX", options.box,
-                 "extent of the site, m, instead of the rectangle around the data");
+                 "extent of the site, m, instead of a rectangle around all data");
   command.flag("--json", options.json, "print the results as JSON, with each location");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { edge_check(options, run); });

@@ -75,7 +75,7 @@ void refuse_ignored(const ConvertOptions& options) {
     throw libmap::Error("requires .ply output", {.file = options.output, .field = "--big-endian"});
 }
 
-// Maximum error of coordinates in single precision, m.
+// Maximum rounding error of the coordinates in single precision, m.
 double rounding_of(const std::vector<Eigen::Vector3d>& positions) {
   double most = 0.0;
   for (const Eigen::Vector3d& position : positions)
@@ -193,7 +193,7 @@ void convert_poses(const ConvertOptions& options, Run& run) {
   };
   if (!nodes &&
       (is_output(TrajectoryFormat::g2o, ".g2o") || is_output(TrajectoryFormat::toro, ".toro")))
-    run.warn("the poses have no nodes: vertices 1, 2, ... are their indices in the file");
+    run.warn("the poses have no node ids; their positions 1, 2, ... in the file become vertex ids");
   run.write_output(options.output, [&](const auto& temporary) {
     if (named)
       libmap::write_trajectory_as(options.output_poses_format, temporary, read, nodes);
@@ -212,7 +212,7 @@ void convert(ConvertOptions& options, Run& run) {
   options.input = options.inputs.front();
   if (options.inputs.size() > 1)
     throw libmap::Error(
-        "is a second input; shares of a map require a tile store: score --tile K/N -o MAP.tiles",
+        "is a second input; only a tile store merges maps (score --tile K/N -o MAP.tiles)",
         {.file = options.inputs[1]});
   if (is_tile_store(options.input)) {
     refuse_ignored(options);
@@ -234,11 +234,11 @@ int convert_file(int argc, char** argv) {
   Command command("convert");
   command.inputs("IN", options.inputs,
                  "cloud (.pcd .ply .csv), mesh (.ply .obj .stl ...), DEM (.tif), poses (.tum "
-                 ".kitti .g2o .toro "
-                 "...), or tile store (.tiles)");
+                 ".kitti .g2o .toro ...), or tile store (.tiles)");
   command.output(options.output,
-                 "output in the format of its extension, .vtp for ParaView, or .tif (GeoTIFF) for "
-                 "GIS; for a tile store the whole map, the same bytes as in one run");
+                 "output file, whose extension determines the format, e.g. .vtp for ParaView or "
+                 ".tif (GeoTIFF) for GIS; of a tile store: the whole map, with the same bytes as "
+                 "from one run of score");
   command.parameters().add("encoding", options.writing.encoding,
                            {{"ascii", FileEncoding::ascii},
                             {"binary", FileEncoding::binary},
@@ -257,7 +257,7 @@ int convert_file(int argc, char** argv) {
   return command.run(argc, argv, [&](Run& run) { convert(options, run); });
 }
 
-// Words of a command line before parsing; values of options count as inputs.
+// Arguments of a command line before parsing; values of options are also in `inputs`.
 struct Words {
   std::vector<std::string> inputs;
   std::vector<std::string> options;

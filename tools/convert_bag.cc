@@ -50,17 +50,17 @@ struct BagCommandOptions {
 
 void bind(libmap::ParameterTable& table, BagCommandOptions& options) {
   table.add("stamp_s", options.stamp,
-            "time stamp, s; from a bag: image set or cloud to read (auto: all sets, or the cloud "
-            "with most points); from a map to a bag: stamp of all messages (auto: stamp of the "
-            "inputs)");
-  table.add("strict", options.strict, "fail if an image cannot be used");
+            "when reading a bag: stamp of the image set or cloud to read, s (auto: all sets, or "
+            "the cloud with most points); when writing a map: stamp of all messages, s (auto: "
+            "stamp in the inputs' manifests)");
+  table.add("strict", options.strict, "fail if an image cannot be used, instead of a warning");
   bind(table, options.depth);
   table.add("frame", options.frame,
-            "frame_id of the map's points in the bag; auto: from the map's manifest");
+            "when writing a map: frame_id of its points in the bag; auto: by the map's manifest");
   table.add("stamp_offset_s", options.stamp_offset_s, libmap::any_number,
-            "offset added to the stamps of a rig's images, s");
+            "when writing a rig's images: offset added to their stamps, s");
   table.add("arrow_m", options.arrow_m, libmap::positive,
-            "length of the footholds' approach arrows, m");
+            "length of the arrows that show the approach directions of footholds, m");
   table.add("cell_size_m", options.cell_size_m, libmap::not_negative,
             "cell size of the map's grids in a ROS 2 bag, m; 0: the map's voxel size");
   table.add("compression", options.compression,
@@ -116,7 +116,7 @@ void report(const libmap::BagRigPlan& plan, const libmap::BagRigExport& result,
                                            camera.camera.base_from_camera);
     if (plan.topics[n].empty()) run.warn(camera.name + ": no topic contains images of this camera");
   }
-  run.info("{} images of {} cameras, {} of {} image sets, at most {} cameras per set",
+  run.info("{} images of {} cameras in {} of {} image sets, at most {} cameras per set",
            result.images, plan.rig.cameras.size(), result.sets.size(), plan.sets_in_bag, fullest);
 }
 
@@ -139,7 +139,7 @@ void read_bag_into_folder(const BagCommandOptions& options, Run& run) {
 
 void read_bag_into_cloud(const BagCommandOptions& options, Run& run) {
   if (options.topics.size() > 1)
-    throw libmap::Error("only one topic can be read as a cloud", {.field = "--topic"});
+    throw libmap::Error("a cloud is read from one topic only", {.field = "--topic"});
   run.claim_output(options.output, {options.input});
   const libmap::BagCloudResult result = run.timed("read", [&] {
     return libmap::read_bag_cloud(options.input,
@@ -192,7 +192,7 @@ double radius_of(const std::optional<Manifest>& manifest) {
   return radius && *radius > 0 ? *radius : libgtd::CurvatureOptions{}.radius_m;
 }
 
-// Cloud of the map with curvatures at its voxels, colored by convexity like `render --color flags`.
+// Returns the map with curvatures at its voxels, colored by convexity like `render --color flags`.
 PointCloud curvature_map(const CloudFile& map) {
   const libgtd::CurvatureOptions options{.radius_m = radius_of(map.manifest),
                                          .up = up_of_map(map.manifest)};
@@ -266,7 +266,7 @@ libmap::BagGrid grid_of(const CloudFile& map, double cell_m) {
   if (!(cells.prod() <= max_cells))
     throw libmap::Error(
         "the grid would have more than 2^26 cells; use a larger cell size",
-        {.file = map.path, .field = "cell_size_m", .value = libmap::to_text(cell_m)});
+        {.file = map.path, .field = "--cell-size", .value = libmap::to_text(cell_m)});
   grid.columns = static_cast<std::size_t>(cells.x());
   grid.rows = static_cast<std::size_t>(cells.y());
   std::vector<std::size_t> top(grid.columns * grid.rows, points.size());
@@ -299,7 +299,7 @@ void add_grid(const CloudFile& map, const std::string& frame, const BagCommandOp
     if (voxel) cell_m = *voxel;
   }
   if (!(cell_m > 0) || map.cloud.empty())
-    return run.warn("{}: {}, so the bag has no grids", map.path,
+    return run.warn("{}: {}, so the bag contains no grids", map.path,
                     map.cloud.empty() ? "has no points" : "has no voxel size (--cell-size)");
   content.grids.push_back(grid_of(map, cell_m));
   content.grids.back().frame = frame;
@@ -413,9 +413,9 @@ void write_bag(const BagCommandOptions& options, Run& run) {
   if (rig) {
     refuse_map_options(options, "cannot be used with a rig's folder");
     reject_given({{"--stamp", options.stamp != "auto"}},
-                 "cannot be used with a rig's folder: use --stamp-offset");
+                 "cannot be used with a rig's folder; use --stamp-offset");
     if (options.rig.empty() && !fs::exists(fs::path(options.input) / libmap::rig_file_name))
-      throw libmap::Error("is neither a map file nor a folder with rig.yaml (--rig)",
+      throw libmap::Error("is a folder without rig.yaml; give the rig with --rig",
                           {.file = options.input});
   } else {
     reject_given({{"--rig", !options.rig.empty()}}, "cannot be used with a map");
@@ -435,7 +435,7 @@ void require_no_scan(const fs::path& input) {
   for (const char* name : {files::nodes, files::associations, files::depth_list})
     if (fs::exists(input / name))
       throw libmap::Error(
-          fmt::format("ambiguous input: contains {} (a scan) and files of a rig or bag", name),
+          fmt::format("is ambiguous: contains {} of a scan and files of a rig or bag", name),
           {.file = input.string()});
 }
 
@@ -466,20 +466,21 @@ int graspmap_tools::convert_bag(int argc, char** argv) {
       "(.pcd, .ply, .csv, .tif), or a rig's folder in the format of `fuse`");
   command.output(
       options.output,
-      "output of a bag: a rig's folder (no extension) of its depth images, or one of its "
-      "clouds (.pcd, .ply, .vtp, .csv); bag to write: OUT.bag (ROS 1), OUT.mcap, or a folder (no "
-      "extension) of .db3 (ROS 2)");
+      "when reading a bag: folder of a rig (no extension) with its depth images, or a file for one "
+      "of its clouds (.pcd, .ply, .vtp, .csv); bag to write: OUT.bag (ROS 1), OUT.mcap, or a "
+      "folder (no extension) of .db3 (ROS 2)");
   command.option("--topic", "[NAME=]TOPIC", options.topics,
                  "topic of a camera's depth images, NAME: the camera's name (repeatable; default: "
                  "all), or of the cloud (default: the only topic of clouds)");
   command.option(
       "--rig", "FILE|NAME", options.rig,
-      "camera rig; default: from the bag's camera infos and transforms, or DIR/rig.yaml");
-  command.option("--terrain", "CLOUD", options.terrain, "terrain cloud, written to /merged_pcd");
+      "rig file, or rig of the toolkit; default: the bag's camera infos and transforms, or the "
+      "rig.yaml in the rig's folder");
+  command.option("--terrain", "CLOUD", options.terrain, "terrain cloud, for the topic /merged_pcd");
   command.option("--curvature", "CLOUD", options.curvature,
-                 "cloud to publish on /curvature_map, instead of the map with its curvatures");
+                 "cloud for the topic /curvature_map; default: the map with computed curvatures");
   command.option("--footholds", "FOOTHOLDS", options.footholds,
-                 "footholds of the map, written to /footholds and /foothold_poses");
+                 "footholds of the map, for the topics /footholds and /foothold_poses");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { run_bag(options, run); });
 }

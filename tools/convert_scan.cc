@@ -197,13 +197,13 @@ void add_options(Command& command, ImageOptions& options) {
                  "sparse/cameras.txt, images.txt, points3D.txt; images");
   add_poses_option(command, options.poses);
   command.option("--transform", "X,Y,Z,ROLL,PITCH,YAW|FILE", options.transform,
-                 "with --bundler, --colmap: transform of the poses to the frame of a mesh, e.g. "
-                 "the file *.site_from_map.txt of crop");
+                 "with --bundler or --colmap: transform of the poses to the frame of a mesh, m and "
+                 "degrees, or e.g. the file *.site_from_map.txt of crop");
   bind(command.parameters(), options.selection);
   command.parameters().add(
       "keep", options.keep,
       {{"sharpest", ImagePreference::sharpest}, {"first", ImagePreference::first}},
-      "with --bundler: image that is kept of several with similar poses");
+      "with --bundler: image to keep if several have similar poses; first: the first in the scan");
   bind(command.parameters(), options.points);
 }
 
@@ -377,7 +377,7 @@ void write_folder(const ExtractOptions& options, const libmap::ScanSource& scan,
 void extract(ExtractOptions& options, Run& run) {
   if (libmap::has_bag_extension(options.output))
     throw libmap::Error(
-        "a scan cannot be written as a bag: give a map or the folder of a camera rig",
+        "a scan cannot be written as a bag; the input must be a map or the folder of a camera rig",
         {.file = options.output});
   const bool images = options.images.wanted();
   const ImageOptions unset;
@@ -385,7 +385,7 @@ void extract(ExtractOptions& options, Run& run) {
     reject_given({{"--poses", options.images.poses.source != unset.poses.source},
                   {"--transform", options.images.transform != unset.transform},
                   {"--keep", options.images.keep != unset.keep}},
-                 "requires --bundler or --colmap: a folder contains the scan's own poses");
+                 "requires --bundler or --colmap; -o FOLDER contains the scan's stored poses");
   if (options.output.empty() && !images)
     throw UsageError("no output: -o, --bundler or --colmap is required");
   if (!options.output.empty())
@@ -418,7 +418,8 @@ int graspmap_tools::convert_scan(int argc, char** argv) {
       "convert",
       "With a scan: the scan as plain files, for MeshLab (--bundler) or COLMAP (--colmap).");
   command.input("SCAN", options.scan, "RTAB-Map database, or a folder of frames");
-  command.output(options.output, "folder for the whole scan; replaced if it exists", false);
+  command.output(options.output, "output folder for the whole scan; an earlier output is replaced",
+                 false);
   command.flag("--strict", options.strict,
                "fail if a frame is broken, instead of skipping the frame");
   add_calibration_option(command, options.calibration);

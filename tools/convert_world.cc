@@ -44,7 +44,7 @@ libmap::WorldScores read_scores(const std::string& file, Run& run) {
   const libmap::PointCloud map = read_in_site(file, run);
   const libmap::ScalarField* score = map.find_field("score");
   if (score == nullptr)
-    throw libmap::Error("no such field: is this a map?", {.file = file, .field = "score"});
+    throw libmap::Error("no such field; a map is required", {.file = file, .field = "score"});
   scores.points = map.positions;
   for (const double one : score->values) scores.colors.push_back(libmap::score_color(one));
   const auto manifest = libmap::read_manifest_of(file);
@@ -62,7 +62,7 @@ std::vector<libmap::WorldFoothold> read_footholds(const std::string& file, Run& 
   return footholds;
 }
 
-// Above the middle of the site, as high as `simulate cameras` places the robot.
+// Parses the pose. auto: above the middle of the site, at the default height of `simulate cameras`.
 libmap::Pose rig_pose(const std::string& text, const std::string& site) {
   if (text != "auto") return parse_transform(text, "--rig-pose");
   constexpr double height_m = 0.25;
@@ -81,12 +81,12 @@ libmap::WorldRig read_world_rig(const WorldCommandOptions& options, Run& run) {
   for (const libmap::RigCamera& camera : rig.rig.cameras) {
     in_file(file, [&] { libmap::require_world_name(camera.name, "name of a camera"); });
     if (camera.camera.is_distorted())
-      run.warn("{}: simulators do not know the distortion of its lens", camera.name);
+      run.warn("camera {}: simulators do not support its lens distortion", camera.name);
   }
   return rig;
 }
 
-// The frames of the site, for the heads of the files.
+// Returns comments on the frame of the site, for the beginnings of the files.
 std::vector<std::string> notes_of(const libmap::Manifest& manifest) {
   std::vector<std::string> notes = {
       "graspmap: units m, kg, s; x forward or east, y left or north, z up (REP-103); origin: that "
@@ -148,7 +148,7 @@ void write_world(const WorldCommandOptions& options, Run& run) {
       libmap::write_world(folder, scene);
     });
     if (2 * report.score_points < scores.points.size())
-      throw libmap::Error("is the map of another site",
+      throw libmap::Error("the map and the mesh are not of one site, or their frames differ",
                           {.file = options.map,
                            .field = "points on the surface",
                            .value = std::to_string(report.score_points),
@@ -156,8 +156,8 @@ void write_world(const WorldCommandOptions& options, Run& run) {
     run.add_results({{"models", scene.models.size()}, {"footholds", scene.footholds.size()}});
     run.add_results(libmap::described(report));
     run.info(
-        "{} triangles for collision of {}, within {:.3g} mm; height field within {:.3g} mm, {} "
-        "balls where it is left out",
+        "{} of {} triangles for collision, deviation {:.3g} mm; height field: deviation {:.3g} mm, "
+        "{} balls in place of missing cells",
         report.collision_triangles, report.visual_triangles, 1e3 * report.collision_deviation_m,
         1e3 * report.field_deviation_m, report.balls);
   });
@@ -172,12 +172,12 @@ bool graspmap_tools::is_world_path(const std::string& path) {
 int graspmap_tools::convert_world(int argc, char** argv) {
   WorldCommandOptions options;
   Command command("convert", "With -o OUT.world: a site as a world for simulators.");
-  command.input("SITE", options.site, "mesh of the site (.ply, .obj, .glb ...), or its folder");
+  command.input("SITE", options.site, "mesh of the site (.ply .obj .glb ...), or folder of tiles");
   command.output(options.output,
-                 "folder OUT.world of SDF (Gazebo, CoppeliaSim), MJCF (MuJoCo) and URDF (Bullet)");
-  command.option("--map", "MAP", options.map, "graspability map of the site, a second visual");
-  command.option("--footholds", "FOOTHOLDS", options.footholds, "footholds of the map as markers");
-  command.option("--rig", "FILE|NAME", options.rig, "depth cameras of a robot as sensors");
+                 "folder OUT.world with SDF (Gazebo, CoppeliaSim), MJCF (MuJoCo), URDF (Bullet)");
+  command.option("--map", "MAP", options.map, "graspability map of the site, displayed on it");
+  command.option("--footholds", "FOOTHOLDS", options.footholds, "footholds, displayed as markers");
+  command.option("--rig", "FILE|NAME", options.rig, "camera rig of a robot, added as sensors");
   command.parameters().add(
       "rig_pose", options.rig_pose,
       "pose of the robot's body in the site's frame: X,Y,Z,ROLL,PITCH,YAW in m "

@@ -35,13 +35,13 @@ struct CropCommandOptions {
 
 void bind(libmap::ParameterTable& table, CropCommandOptions& options) {
   table.add("level", options.level, {{"auto", true}, {"none", false}},
-            "levelling of the site; auto: the ground becomes z = 0; none: z of the map is "
-            "unchanged");
-  table.add("up", options.up, "up direction: auto, or X,Y,Z in the input map's frame");
+            "leveling of the site; auto: the ground becomes z = 0; none: the map's z is unchanged");
+  table.add("up", options.up,
+            "up direction: X,Y,Z in the input map's frame; auto: by its normals, else its z axis");
   table.add("frame", options.crop.frame,
             {{"level", libmap::CropFrame::level}, {"map", libmap::CropFrame::map}},
-            "frame of --box and --polygon; level: levelled and rotated; map: frame of the input "
-            "map");
+            "frame of the box or polygon to keep; level: after leveling and rotation; map: frame "
+            "of the input map");
   table.add("yaw_deg", options.yaw,
             "rotation of the site about z, degrees; auto: with --size or --border, such that the "
             "sides are parallel to x and y, else none");
@@ -110,7 +110,7 @@ void read_region(CropCommandOptions& options) {
   if (options.up != "auto") crop.up = parse_vector(options.up, "--up");
   crop.yaw_deg = parse_number_or("auto", options.yaw, "not an angle", "--yaw", "auto or degrees");
   if (crop.region == CropRegion::whole && !crop.level && !crop.yaw_deg && !crop.center)
-    throw libmap::Error("without levelling, a region to crop is required",
+    throw libmap::Error("requires a region to crop, --yaw or --center",
                         {.field = "--level", .value = "none"});
 }
 
@@ -138,7 +138,7 @@ void tell_ground(const std::string& input, const libmap::CropReport& report, Run
                    {"ground_rmse_m", ground.rmse_m},
                    {"ground_share", ground.fraction},
                    {"up", report.up}});
-  run.info("ground: {:.2f} deg from the map's z, {:.1f} mm RMSE over {:.1f} % of it", tilt,
+  run.info("ground: {:.2f} deg from the map's z, {:.1f} mm RMSE of {:.1f} % of the points", tilt,
            1e3 * ground.rmse_m, 1e2 * ground.fraction);
   if (!report.up_of_normals) return;
   const libmap::UpOfNormals& by_normals = *report.up_of_normals;
@@ -173,7 +173,7 @@ void tell_site(const libmap::CropReport& report, const libmap::Bounds3d& bounds,
   }
   if (report.band) {
     run.add_results({{"band_seen", report.band->seen}, {"white_level", report.band->white_level}});
-    run.info("border: white (>= {:.0f}) along {:.0f} % of the least visible side",
+    run.info("border: white (gray >= {:.0f}) along {:.0f} % of the least visible side",
              report.band->white_level, 1e2 * report.band->seen);
   }
   if (report.border_scale) tell_scale(*report.band, *report.border_scale, run);
@@ -306,13 +306,14 @@ int main(int argc, char** argv) {
   command.input("MAP", options.input,
                 "mesh (.ply .obj .stl .tif ...), a folder of its tiles, or cloud (.pcd .ply .csv)");
   command.output(options.output,
-                 "cropped mesh or cloud; its transform is OUTPUT's stem + .site_from_map.txt");
+                 "cropped mesh or cloud (transform: STEM.site_from_map.txt), or folder of tiles");
   command.option("--box", "XMIN,YMIN[,ZMIN],XMAX,YMAX[,ZMAX]", options.box,
-                 "box to keep, m, in the frame of --frame");
+                 "box to keep, m (its frame: --frame)");
   command.option("--polygon", "FILE.csv", options.polygon,
-                 "area to keep: corners in order, columns x, y; convex or not");
-  command.option("--size", "WIDTHxHEIGHT", options.size,
-                 "size of the rectangle to keep, centered in the data, m");
+                 "table of the area's corners in order: columns x, y, m; convex or not");
+  command.option(
+      "--size", "WIDTHxHEIGHT", options.size,
+      "size of the rectangle to keep, m, placed as far as possible from the data's border");
   command.flag("--border", options.border, "keep the area inside a white band on the ground");
   command.option(
       "--border-size", "WIDTHxHEIGHT", options.border_size,

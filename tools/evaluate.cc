@@ -26,9 +26,9 @@ struct EvaluateOptions {
 void bind(libmap::ParameterTable& parameters, EvaluateOptions& options) {
   bind(parameters, options.evaluation);
   parameters.add("score", options.scores,
-                 "columns to evaluate as scores, separated by commas; none: every numeric column "
+                 "columns to evaluate as scores, separated by commas; empty: every numeric column "
                  "that is not an id, position or length");
-  parameters.add("title", options.title, "title of the plot and of the summary");
+  parameters.add("title", options.title, "title of the chart and of the summary");
 }
 
 libmap::Chart chart_of(const TableEvaluation& evaluation, const std::string& title) {
@@ -130,7 +130,7 @@ int main(int argc, char** argv) {
                  "columns are evaluated");
   command.output(
       options.folder,
-      "folder of roc.csv, rates.csv, accuracy.csv, summary.json, summary.md, roc.png and roc.svg");
+      "output folder: roc.csv, rates.csv, accuracy.csv, summary.json and .md, roc.png and .svg");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { evaluate(options, run); });
 }

@@ -70,7 +70,7 @@ void bind(libmap::ParameterTable& table, FootholdTrialsOptions& options) {
             "gripper of the test on --mesh: scar-e, hubrobo, limbero or a gripper file; default: "
             "gripper of the map");
   table.add("min_probability", options.min_probability, libmap::zero_to_one,
-            "minimum hold_probability of a foothold in the test on --mesh");
+            "minimum probability that a foothold holds, by the test on --mesh");
   bind(table, options.grasp);
 }
 
@@ -95,7 +95,7 @@ std::vector<libgtd::LocationResult> test_footholds(const FootholdTrialsOptions& 
   const std::vector<Eigen::Vector3d> positions = positions_on(
       ground, map_from_input(manifest).inverse(), map, options.grasp.max_distance_m, footholds);
   if (positions.empty() && found > 0)
-    throw libmap::Error("none of the map's footholds is on the mesh", {.file = options.mesh});
+    throw libmap::Error("no foothold is on the mesh; check the frames", {.file = options.mesh});
   if (positions.size() < found)
     run.warn("{}: {} of {} footholds are not on the mesh and are skipped", options.mesh,
              found - positions.size(), found);
@@ -207,7 +207,7 @@ void find_footholds(const FootholdsCommandOptions& options, Run& run) {
     run.warn("{}: no voxel is a candidate{}", options.map,
              result.at_border == 0
                  ? ""
-                 : fmt::format("; {} at the border of the scan are skipped (--border)",
+                 : fmt::format("; {} at the border of the scan were skipped (--border)",
                                result.at_border));
   libmap::PointCloud cloud = libgtd::to_cloud(result, map);
   add_trial_fields(trials, cloud);

@@ -59,8 +59,8 @@ void report_contradictions(const libmap::DepthFusionResult& result, Run& run) {
       static_cast<double>(points.seen_through + points.missed + points.contradicted);
   if (dropped < usual_fraction * (dropped + static_cast<double>(result.output_points))) return;
   run.info(
-      "{} points dropped because frames contradict each other, for example after a motion: {} seen "
-      "through, {} missed, {} connected to those",
+      "{} points dropped because frames contradict each other, e.g. because something moved: {} "
+      "seen through, {} missed, {} connected to those",
       dropped, points.seen_through, points.missed, points.contradicted);
 }
 
@@ -72,7 +72,7 @@ void tell_registration(const libmap::DepthFusionResult& result, Run& run) {
     run.info("poses corrected by registration: {:.1f} mm and {:.2f} deg (RMS)",
              1e3 * result.registration_shift_m, result.registration_turn_deg);
   else if (result.registration_rejected && shown.count > 0)
-    run.info("poses not corrected: registration does not improve held-out {}, {:.4f} -> {:.4f}",
+    run.info("poses not corrected: the error of held-out {} does not decrease, {:.4f} -> {:.4f}",
              color.count > 0 ? "color" : "depth", shown.before, shown.after);
   else if (result.registration_rejected)
     run.info("poses not corrected: poses are refined, and no color can validate registration");
@@ -85,14 +85,14 @@ void tell_results(const libmap::DepthFusionResult& result, const FuseOptions& op
   run.add_results(libmap::described(result));
   run.add_timings(result.timings_s);
   run.detail(
-      "{} of {} pixels used; {} unmeasured, {} out of range, {} flying, {} grazing, {} without a "
-      "ray",
+      "{} of {} pixels used; {} unmeasured, {} out of range, {} flying, {} grazing, {} outside the "
+      "invertible lens distortion",
       pixels.used, pixels.pixels, pixels.unmeasured, pixels.out_of_range, pixels.flying,
       pixels.grazing, pixels.without_ray);
   tell_registration(result, run);
   report_contradictions(result, run);
   if (result.redundant_frames > 0)
-    run.info("{} frames skipped: earlier frames measured their surface (enough_views)",
+    run.info("{} frames skipped: earlier frames measured their surface (--enough-views)",
              result.redundant_frames);
   run.info("{} frames, {} measurements -> {} points", result.frames, pixels.used,
            result.output_points);
@@ -101,7 +101,7 @@ void tell_results(const libmap::DepthFusionResult& result, const FuseOptions& op
     run.warn("--min-views {} leaves no points; at most {} frames measured one point",
              options.fusion.points.min_views, result.points.max_views);
   else
-    run.warn("the cloud is empty: there are no measurements within the limits");
+    run.warn("the cloud is empty: no depth pixel is within the limits");
 }
 
 // Returns true for one of several shares, the last of which claims the outputs.
@@ -144,7 +144,7 @@ void write_poses(const FuseOptions& options, const libmap::DepthFusionResult& re
   run.manifest().results = results;
 }
 
-// States an estimate that replaces the assumed noise.
+// Returns the noise of the depth camera, and logs its source.
 libmap::DepthNoise choose_noise(const libmap::DepthFusionOptions& options,
                                 const libmap::ScanSource& scan, const libmap::Trajectory& poses,
                                 Run& run) {
@@ -231,8 +231,8 @@ void tell_consistency(const libmap::ScanSource& scan, const libmap::Trajectory& 
     run.warn("{}: {}", taken.source, warning);
 }
 
-// Colors of depth that is not registered are those of other places. Depth of another focal length
-// is wrong itself.
+// Warns if depth is not registered to color, because points then get the colors of other positions.
+// Throws Error if the scales differ, because the depth itself is then wrong.
 void check_registration(const libmap::ScanSource& scan, const FuseOptions& options, Run& run) {
   if (!options.fusion.color) return;
   const libmap::EdgeAgreement edges =
@@ -297,14 +297,13 @@ int fuse_scan(int argc, char** argv) {
   add_poses_option(command, options.poses);
   add_calibration_option(command, options.calibration);
   command.option("--corrected-poses", "FILE", options.corrected_poses,
-                 "output for the registered poses (.tum, .kitti, .g2o, .toro), in the frame of "
-                 "--poses");
+                 "output for the poses after registration (.tum, .kitti, .g2o, .toro), in the "
+                 "frame of the given poses");
   command.parameters().add(
       "frame", options.frame,
       {{"poses", CloudFrame::poses}, {"ground-truth", CloudFrame::ground_truth}},
       "frame of the cloud; poses: frame of the poses; ground-truth: frame of the scan's true "
-      "poses, "
-      "to which the poses are aligned");
+      "poses, to which the poses are aligned");
   command.parameters().add("tile_size_m", options.tile_m, libmap::positive,
                            "side of a tile if the output is a folder, m");
   libmap::bind(command.parameters(), options.fusion);

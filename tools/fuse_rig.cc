@@ -28,10 +28,10 @@ struct PanoramaCommandOptions {
 
 void bind(libmap::ParameterTable& table, PanoramaCommandOptions& options) {
   table.add("stamp_s", options.stamp,
-            "stamp of the image set, s; fullest: the set with most cameras");
+            "stamp of the set of images to fuse, s; fullest: the set with most cameras");
   table.add("tolerance_s", options.tolerance_s, libmap::not_negative,
             "maximum difference between the stamps of an image and its set, s");
-  table.add("strict", options.strict, "fail if a camera's image is late, missing or broken");
+  table.add("strict", options.strict, "fail if a camera has no usable image, instead of a warning");
   bind(table, options.panorama);
 }
 
@@ -132,7 +132,7 @@ void panorama(PanoramaCommandOptions& options, Run& run) {
   const libmap::PanoramaResult result =
       run.timed("project", [&] { return libmap::make_panorama(views, options.panorama); });
   if (views.empty())
-    throw libmap::Error("no image of this time can be read", {.file = options.folder});
+    throw libmap::Error("no image of the set can be read", {.file = options.folder});
   if (result.cloud.empty()) run.warn("no camera has measurements within the depth limits");
   add_rig_results(rig, set, result, views, run);
   copy_transforms(options.folder, run);
@@ -151,7 +151,7 @@ int graspmap_tools::fuse_rig(int argc, char** argv) {
                   "With the folder of a camera rig: one cloud in the robot's frame from depth "
                   "images of the same time.");
   command.input("RIG_FOLDER", options.folder,
-                "folder of rig.yaml and CAMERA/STAMP.png (or images.csv)");
+                "folder of rig.yaml and depth images: CAMERA/STAMP.png, or as in images.csv");
   command.output(options.output, "cloud (.pcd, .ply, .vtp, .csv)");
   command.option("--rig", "FILE|NAME", options.rig,
                  "rig file, or a rig of the toolkit, e.g. scar-e; default: RIG_FOLDER/rig.yaml");

@@ -199,10 +199,10 @@ void bind(libmap::ParameterTable& table, GraspCommandOptions& options) {
             {{"auto", SequentialTest::automatic},
              {"on", SequentialTest::on},
              {"off", SequentialTest::off}},
-            "end of a test as soon as the verdict is certain; on: always; off: never; auto: with "
-            "--map");
+            "early end of the test at a location when its verdict is certain; on: always; off: "
+            "never; auto: with --map");
   table.add("map_draws", options.map_draws, {1, 100000},
-            "with --map: number of random draws per pose, instead of --draws");
+            "with --map: number of draws of asperities at each pose, instead of --draws");
   table.add("more_loads", options.more_loads,
             "additional loads to test, N, separated by commas; each has its own result columns");
   table.add("prefix", options.prefix, "prefix added to the names of the result columns");
@@ -257,7 +257,7 @@ libgtd::Ground ground_of(const libmap::TriangleMesh& mesh, const GraspCommandOpt
       return libgtd::Ground(mesh, libgtd::errors_of(mesh, bounds));
     const auto error_m = libmap::parse_double(options.surface_error);
     if (!error_m || !(*error_m >= 0.0 && *error_m <= bounds.max_error_m))
-      throw libmap::Error("not an error of a surface",
+      throw libmap::Error("not a standard deviation",
                           {.field = "--surface-error",
                            .value = options.surface_error,
                            .bound = "none, mesh, or 0 to --max-surface-error, m"});
@@ -265,8 +265,7 @@ libgtd::Ground ground_of(const libmap::TriangleMesh& mesh, const GraspCommandOpt
   });
 }
 
-// Gripper and terrain of trials at listed locations. Claims the output; `table` is the file of
-// locations or pulls.
+// Gripper and terrain of trials. Claims the output; `table` is the file of locations or pulls.
 struct FieldTest {
   FieldTest(const GraspCommandOptions& options, const std::string& table, Run& run)
       : file((run.claim_output(options.output, {options.mesh, table}),
@@ -323,7 +322,7 @@ void grasp_places(GraspCommandOptions& options, Run& run) {
   for (const std::string& text : libmap::split_list(options.more_loads)) {
     const auto load = libmap::parse_double(text);
     if (!load || !(*load > 0.0))
-      throw libmap::Error("not a force", {.field = "--more-loads", .value = text, .bound = "> 0"});
+      throw libmap::Error("not a load", {.field = "--more-loads", .value = text, .bound = "> 0 N"});
     options.grasp.extra_loads_n.push_back(*load);
   }
   claim_scenes(options.scenes, run);
@@ -346,7 +345,7 @@ void grasp_places(GraspCommandOptions& options, Run& run) {
   for (const std::string& name : libgtd::grasp_columns(options.grasp.extra_loads_n)) {
     const std::string column = options.prefix + name;
     if (table.find_column(column))
-      throw libmap::Error("the locations already have this column",
+      throw libmap::Error("the locations already have this column; set another --prefix",
                           {.file = options.points, .field = column});
     table.columns.push_back(column);
   }
@@ -373,8 +372,8 @@ void say_fit(const libgtd::PullFit& fit, std::size_t tests, Run& run) {
     return fmt::format("{:.2g} N (90 %: {:.2g} to {:.2g})", force.median_n, force.low_n,
                        force.high_n);
   };
-  run.info("{} pull tests; level ground holds {}, before the fit {}", tests, text(fit.level_after),
-           text(fit.level_before));
+  run.info("{} pull tests; force on level ground {}, before the fit {}", tests,
+           text(fit.level_after), text(fit.level_before));
   for (const libgtd::FittedParameter& one : fit.parameters)
     run.info("{}: {:.3g} ({:.3g} to {:.3g}), before {:.3g} ({:.3g} to {:.3g}); {}", one.name,
              one.fitted[1], one.fitted[0], one.fitted[2], one.prior[1], one.prior[0], one.prior[2],
@@ -384,11 +383,11 @@ void say_fit(const libgtd::PullFit& fit, std::size_t tests, Run& run) {
     rows += (rows.empty() ? "" : ", ") + std::to_string(row);
   if (!fit.explains_tests())
     run.warn(
-        "the model does not explain the tests: the mean squared score is {:.2f} instead of 1, "
-        "each predicted from the others (probability {:.1g}){}; the ranges are too narrow",
+        "the model does not explain the tests: the mean squared standard score of predicting each "
+        "from the others is {:.2f} instead of 1 (probability {:.1g}){}; the ranges are too narrow",
         fit.mean_squared_score, fit.p_value, rows.empty() ? "" : ", worst rows " + rows);
   else if (!rows.empty())
-    run.warn("the other tests do not predict the tests of rows {}", rows);
+    run.warn("the tests in rows {} contradict the predictions from the other tests", rows);
   constexpr double few_sets = 8.0;
   if (fit.effective_sets < few_sets)
     run.warn("the fit has only {:.1f} effective parameter sets; the fitted ranges are too narrow",
@@ -451,7 +450,8 @@ void plan_next_pulls(const GraspCommandOptions& options, Run& run) {
     row.push_back(fmt::format("{:.3f}", plan.information_bits));
     planned.rows.push_back(std::move(row));
   }
-  run.info("{} pulls; the first: {:.2f} bits", plans.size(), plans.front().information_bits);
+  run.info("{} pull tests; the first gives {:.2f} bits", plans.size(),
+           plans.front().information_bits);
   run.write_text(options.output, libmap::to_csv(planned));
 }
 
@@ -482,7 +482,7 @@ int main(int argc, char** argv) {
   command.input("MESH", options.mesh,
                 "mesh or DEM (.tif) of the terrain, z up; level: level ground, for --fit");
   command.option("--points", "LOCATIONS.csv", options.points,
-                 "locations: CSV with columns x, y, z in the mesh's frame, m, and any others");
+                 "table of locations: CSV with columns x, y, z (mesh frame, m) and any others");
   command.option(
       "--map", "MAP", options.map,
       "graspability map of the mesh (.pcd, .ply, .csv, .tiles), whose voxels are the locations; "
@@ -494,8 +494,8 @@ int main(int argc, char** argv) {
       "gripper file (.yaml) with the fitted ensemble; with --plan: CSV of pulls");
   command.option(
       "--fit", "PULLS.csv", options.pulls,
-      "table of pull tests to which the gripper's parameters are fitted: x, y, z or ground = "
-      "level, tilt_deg, azimuth_deg, and force_n at slip, or load_n and held (0 or 1)");
+      "table of pull tests to which the gripper's parameters are fitted; columns x, y, z (m) or "
+      "ground (level); tilt_deg, azimuth_deg; force_n at slip, or load_n and held (0 or 1)");
   command.option("--plan", "N", options.plan,
                  "with --points: number of most informative pull tests to plan");
   command.option("--tile", "K/N", options.tile,
@@ -504,7 +504,7 @@ int main(int argc, char** argv) {
                  "output folder for one mesh per location that shows the trial nearest to the "
                  "median force: FOLDER/PLACE.ply, named by the column 'place' or the row");
   command.option("--scene-locations", "LOCATIONS", options.scenes.locations,
-                 "locations for which --scenes writes a scene; default: all");
+                 "names of the locations that --scenes writes, separated by commas; default: all");
   command.renamed_flag("--scene-of", "--scene-locations");
   for (const char* key : {"friction", "asperity-min", "asperity-max", "engagement-rate", "drag"}) {
     std::string name = key;

@@ -26,17 +26,19 @@ struct LookupCommandOptions {
 
 void bind(libmap::ParameterTable& table, LookupCommandOptions& options) {
   bind(table, options.lookup);
-  table.add("points_frame", options.points_frame, listed_point_frame_names(),
-            "frame of the points; input: scored cloud; terrain: terrain frame; map: map before "
-            "cropping or map of a simulated robot; auto: from the manifest of POINTS, else input");
+  table.add(
+      "points_frame", options.points_frame, listed_point_frame_names(),
+      "frame of the points; input: scored cloud; terrain: terrain frame; map: cloud or mesh "
+      "before `graspmap crop`, or mesh of a simulated robot; auto: by the manifest of POINTS, "
+      "else input");
   table.add("column", options.columns,
             "columns to add, separated by commas: NAME=FIELD, or NAME=FIELD>=VALUE for 1 or 0; "
-            "none: found, distance_m and every field of the map");
+            "empty: found, distance_m and every field of the map");
   table.add("visible_radius_m", options.visible_radius_m, libmap::positive,
             "with --visible: maximum distance of a location from the nearest measured point, m");
 }
 
-// Appends a column, with the prefix map_ if the points already have one of this name.
+// Appends a column; its name gets the prefix map_ if the table already has this column.
 void add_column(libmap::Table& table, std::string name) {
   while (table.find_column(name)) name.insert(0, "map_");
   table.columns.push_back(std::move(name));
@@ -163,7 +165,7 @@ std::vector<Cell> add_columns(libmap::Table& table, const std::vector<AddedColum
       throw libmap::Error("the map has no such field" + libmap::did_you_mean(column.field, fields),
                           {.file = map_file, .field = "--column", .value = column.field});
     if (table.find_column(column.name))
-      throw libmap::Error("the points already have this column",
+      throw libmap::Error("the points already have this column; choose another name",
                           {.file = table.file, .field = "--column", .value = column.name});
     cells.push_back({static_cast<std::size_t>(field - fields.begin()), column.cutoff});
     table.columns.push_back(column.name);
@@ -226,8 +228,8 @@ int main(int argc, char** argv) {
                 "table of locations: CSV with the columns x, y, z in meters, and any others");
   command.output(options.output, "CSV of the points with the map's values");
   command.option("--visible", "CLOUD", options.visible,
-                 "measured cloud in the frame of the scored cloud (usually the scored cloud "
-                 "itself); locations far from all its points get no values");
+                 "measured cloud, usually the scored cloud itself, in the frame of the scored "
+                 "cloud; locations that are far from all its points get no values");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { lookup(options, run); });
 }

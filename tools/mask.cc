@@ -40,9 +40,9 @@ void bind(libmap::ParameterTable& table, MaskOptions& options) {
   table.add_overrides("gripper", options.overrides);
   table.add("method", options.mask.method, libgtd::method_names(),
             "scoring method of the mask, as in score --method");
-  table.add("voxel_size_m", options.mask.voxel_size_m, libmap::positive, "edge of a voxel, m");
+  table.add("voxel_size_m", options.mask.voxel_size_m, libmap::positive, "side of a voxel, m");
   table.add("extra_void_layers", options.mask.extra_void_layers, {0, 10000},
-            "number of void layers added on top of the mask (H_add)");
+            "number of layers of void voxels that are added on top of the mask (H_add)");
   table.add("view", options.view, libmap::viewpoint_names(), "viewpoint, as in render --view");
   table.add("sections", options.sections, "draw three sections of the mask instead of a view");
   bind_sections(table, options);
@@ -123,8 +123,8 @@ libmap::DimensionLine measure(const GripperMask& mask, const Eigen::Vector3i& fi
           fmt::format("{}{}{:.4g} mm", name, name.empty() ? "" : " ", 1000.0 * length_m)};
 }
 
-// Run of equal voxels (solid or void) along x through the axis that contains the pivot's column:
-// first index and number.
+// Returns the first index and the number of voxels along x, in layer z, that are connected to the
+// voxel at the pivot's x and y and like it are solid or void.
 std::pair<int, int> run_through_axis(const GripperMask& mask, int z) {
   const int y = mask.pivot_xy;
   const bool solid = mask.is_solid(mask.pivot_xy, y, z);
@@ -193,7 +193,6 @@ std::vector<libmap::SheetCell> mask_sections(const GripperMask& mask, int lower_
                      lower_layer == 0 ? "lowest layer" : fmt::format("layer {}", lower_layer))};
 }
 
-// Legend of the kinds of voxels in the mask.
 libmap::Legend mask_legend(const GripperMask& mask) {
   libmap::Legend legend;
   legend.title = "voxels";

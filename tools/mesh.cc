@@ -74,7 +74,7 @@ void orient_if_mixed(const MeshOptions& options, libmap::PointCloud& cloud, Run&
       run.timed("normals", [&] { return libmap::orient_normals(cloud); });
   cloud.normals = oriented.normals;
   const std::string way(to_text(oriented.orientation));
-  run.warn("{}: {:.1f} % of neighboring normals face opposite sides: all are oriented by {}",
+  run.warn("{}: {:.1f} % of neighboring normals face opposite sides; all are reoriented by {}",
            options.cloud, 100.0 * fraction, way);
   run.add_results({{"normals_oriented_by", way}});
 }
@@ -108,7 +108,7 @@ void announce(const libmap::SurfaceWork& work, Run& run) {
   run.info("about {:.1f} million triangles: {:.1f} GB of memory, {:.0f} s on one thread",
            1e-6 * work.triangles, 1e-9 * work.bytes, work.seconds);
   if (work.bytes > static_cast<double>(libmap::machine_memory()))
-    run.warn("this exceeds the machine's memory: use a larger --cell-size or a folder of tiles");
+    run.warn("this exceeds the machine's memory; use a larger --cell-size or a folder of tiles");
 }
 
 libmap::TriangleMesh reconstructed(const MeshOptions& options, const libmap::PointCloud& cloud,
@@ -128,7 +128,7 @@ libmap::TriangleMesh reconstructed(const MeshOptions& options, const libmap::Poi
     throw libmap::Error("no surface was found: there are too few points, or their normals cancel",
                         {.file = options.cloud});
   throw libmap::Error(
-      "trimming removed the entire surface",
+      "trimming removed the entire surface; use a larger distance",
       {.file = options.cloud,
        .field = "trim_distance_cells",
        .value = libmap::to_text(options.surface.reconstruction.trim_distance_cells)});

@@ -86,7 +86,7 @@ libmap::ColmapModel model_of(const libmap::Trajectory& poses, const libmap::Scan
         builder.add_image(libmap::image_file_of(scan, pose.node, views, c).name, views[c],
                           pose.world_from_base * views[c].color_camera.base_from_camera);
     } catch (const libmap::Error& error) {
-      run.warn(std::string(error.what()) + "; the pose is not in the model of COLMAP");
+      run.warn(std::string(error.what()) + "; the COLMAP model does not contain this pose");
     }
   }
   return builder.model();
@@ -97,8 +97,8 @@ void warn_of_lost_nodes(const std::string& path, const libmap::Trajectory& poses
   const std::size_t nodes = count_valid_nodes(graph);
   if (fs::path(path).extension() != ".kitti" || poses.size() == nodes) return;
   run.warn(
-      "{}: this format has no nodes, and only {} of {} nodes have a pose: use .tum, .g2o or .toro "
-      "for a file that can be assigned to the scan again",
+      "{}: this format has no node ids, and only {} of {} nodes have a pose; only .tum, .g2o and "
+      ".toro can be assigned to the scan again",
       path, poses.size(), nodes);
 }
 
@@ -187,7 +187,7 @@ void say_scans(const libmap::RefinementResult& result, const libmap::ScanSource&
   if (counts.size() < 2) return;
   for (const auto& [path, count] : counts) {
     if (count.poses == 0)
-      run.warn("{}: gets no poses, because no link joins it to the other scans", path.string());
+      run.warn("{}: has no poses, because no link connects it to the other scans", path.string());
     else
       run.info("{}: {} of {} nodes have a pose", path.string(), count.poses, count.nodes);
   }
@@ -247,9 +247,9 @@ void say_result(const RefineOptions& options, const libmap::RefinementResult& re
   if (!result.noise.empty()) run.detail("{}", result.noise);
   if (!result.calibration.empty() && (with_known_camera || result.cameras.size() > 1) &&
       options.database.empty())
-    run.warn("{}: the correction of the camera is not written: {}", first,
-             with_known_camera ? "start from the stored camera"
-                               : "--write-database stores it for several cameras");
+    run.warn("{}: the estimated correction of the camera is not written: {}", first,
+             with_known_camera ? "use --write-calibration without --calibration"
+                               : "with several cameras, only --write-database stores it");
   const bool is_depth_scale = options.refinement.known_lengths.empty() &&
                               !options.refinement.board && options.refinement.scale == 1.0 &&
                               options.refinement.scale_from == libmap::ScaleSource::depth;
@@ -287,15 +287,15 @@ int main(int argc, char** argv) {
   command.inputs("SCAN", options.scans,
                  "scan: an RTAB-Map database, or a folder of images; several scans of overlapping "
                  "ground, or a folder of databases, are joined");
-  command.output(options.output, "poses (.tum, .kitti, .g2o, .toro, or a folder .colmap)");
-  command.option("--links", "LINKS.g2o", options.links, "output for poses and links, a pose graph");
+  command.output(options.output, "refined poses (.tum, .kitti, .g2o, .toro, or a folder .colmap)");
+  command.option("--links", "LINKS.g2o", options.links, "output for the refined pose graph");
   command.option(
       "--write-database", "OUT.db", options.database,
       "output for a copy of the database with refined poses, found links, and corrected camera "
       "and depth");
   add_calibration_option(command, options.calibration);
   command.option("--write-calibration", "OUT.yaml", options.new_calibration,
-                 "output for the estimated camera, for --calibration of other commands and scans");
+                 "output for the estimated calibration, for --calibration of commands and scans");
   command.option("--known-length", "NODE:X:Y-NODE:X:Y=METERS", options.known_lengths,
                  "measured distance between two points, each given by node and pixel of its image; "
                  "repeatable; it determines the scale");
@@ -305,7 +305,8 @@ int main(int argc, char** argv) {
   command.option("--report", "FILE.json|FILE.txt", options.reports,
                  "output for a report on each stage and the standard deviations of the poses");
   command.option("--feature-cache", "FOLDER|off", options.feature_cache,
-                 "folder of frames' features, reused by later runs; default: OUTPUT.features");
+                 "folder for the frames' features, which later runs reuse; off: no such folder; "
+                 "default: OUTPUT.features");
   command.flag("--nodes", options.nodes, "add the node id as a ninth column of a .tum output");
   libmap::bind(command.parameters(), options.refinement);
   command.parameters().add("strict", options.strict,

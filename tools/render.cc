@@ -224,7 +224,7 @@ SceneFile scene_of(const std::string& file, const SceneFileOptions& options, Run
     throw libmap::Error("can only be used for a cloud or a map", {.file = file, .field = "--box"});
   if (const auto* cloud = std::get_if<libmap::PointCloud>(&layer.shape);
       cloud != nullptr && cloud->empty())
-    throw libmap::Error("there is nothing to draw: no point with finite coordinates",
+    throw libmap::Error("there is nothing to draw: no point is finite, or none is in the --box",
                         {.file = file});
   const auto manifest = libmap::read_manifest_of(file);
   if (const auto* mesh = std::get_if<libmap::TriangleMesh>(&layer.shape))
@@ -253,21 +253,21 @@ SceneFile scene_of(const std::string& file, const SceneFileOptions& options, Run
 // Options of marked locations only.
 void bind_points(libmap::ParameterTable& table, SceneFileOptions& options) {
   table.add("label", options.label,
-            "column of names of marked locations; auto: the first, unless x, y or z; none: no "
-            "names");
+            "column of names of marked locations; auto: first column, unless it is x, y or z; "
+            "none: no names");
   table.add("verdict", options.verdict,
             "column of the verdicts of marked locations; 1: green; 0: red; empty: neutral");
   table.add("points_frame", options.points_frame, listed_point_frame_names(),
-            "frame of the marked locations; input: scored cloud; terrain: terrain frame; map: map "
-            "before cropping; auto: from the manifest of the locations' file, else input");
+            "frame of the marked locations; input: scored cloud; terrain: terrain frame; map: "
+            "cloud or mesh before `graspmap crop`; auto: by the locations' manifest, else input");
 }
 
 // Binds all options except `points`, which is a separate option.
 void bind(libmap::ParameterTable& table, SceneFileOptions& options) {
   bind(table, options.layer);
   table.add("zero_plane", options.zero_plane,
-            "height in the terrain frame below which ground is white, m; auto: as the map; none: "
-            "no limit");
+            "height in the terrain frame below which ground is white, m; auto: from the map's "
+            "manifest; none: no limit");
   table.add("box", options.box,
             "shown rectangle of a cloud or map: X0,Y0,X1,Y1 in the frame of the file, m");
   table.add("max_points", options.max_points, libmap::Range{1'000.0, 1e9},
@@ -314,7 +314,7 @@ struct RenderOptions {
 void bind_one(libmap::ParameterTable& table, RenderOptions& options) {
   libmap::bind_single(table, options.view);
   table.add("camera_position", options.camera_position,
-            "camera position X,Y,Z for --view camera, m");
+            "with --view camera: position of the camera X,Y,Z in the frame of the points, m");
   table.add("camera_target", options.camera_target, "camera target X,Y,Z for --view camera, m");
 }
 
@@ -336,8 +336,8 @@ void bind_page(libmap::ParameterTable& table, RenderOptions& options) {
             "for several files: titles of the rows, separated by |");
   table.add("shared_view", sheet.shared_view,
             {{"sheet", libmap::SharedView::sheet}, {"row", libmap::SharedView::row}},
-            "maps with common scale on a page of several files; sheet: all; row: maps of each "
-            "row");
+            "maps that have equal scale and extent on a page of several files; sheet: all; row: "
+            "maps of each row");
 }
 
 void bind(libmap::ParameterTable& table, RenderOptions& options) {
@@ -366,7 +366,7 @@ libmap::ColorImage draw_one(RenderOptions& options, Run& run) {
   if (shown.columns_per_point > 0)
     run.add_results({{"columns_per_point", shown.columns_per_point}});
   if (shown.columns_per_point > 1)
-    run.info("one point per {0} x {0} columns: --box shows a part in full",
+    run.info("one point is drawn per {0} x {0} columns of voxels; --box shows a part in full",
              shown.columns_per_point);
   return image;
 }

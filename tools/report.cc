@@ -176,7 +176,7 @@ libmap::ReportScene load_report_scene(const fs::path& path, double& bytes_left) 
   scene.mesh = libmap::read_mesh(path).mesh;
   const auto bytes = static_cast<double>(libmap::scene_bytes(scene.mesh));
   if (bytes > bytes_left)
-    throw libmap::Error("does not fit into the report: increase --max-size-mb");
+    throw libmap::Error("does not fit into the report; increase --max-size-mb");
   bytes_left -= bytes;
   for (const libgtd::ScenePartStyle& part : libgtd::shown_parts(scene.mesh))
     scene.legend.emplace_back(part.color, part.text);
@@ -228,7 +228,7 @@ void make_report(ReportCommandOptions& options, Run& run) {
 int main(int argc, char** argv) {
   ReportCommandOptions options;
   Command command("report");
-  command.input("DIR", options.folder, "folder of the run");
+  command.input("DIR", options.folder, "folder with the outputs of a run");
   command.output(options.output, "report (.html); default: report.html in DIR", false);
   command.option("--outline", "OUTLINE", options.outline,
                  "removed option; a report shows the content of DIR in the order of the names");

@@ -27,14 +27,13 @@ void tell_results(const libmap::PoissonDiskResult& result, std::uint64_t wanted,
   run.info("{:.2f} m2 -> {} points, radius {:.4g} mm, relative radius {:.3f}", result.area_m2,
            result.cloud.size(), 1e3 * result.radius_m, result.relative_radius);
   if (!result.count_reached)
-    run.warn("no radius was found for {} points; the nearest number is {}", wanted,
-             result.cloud.size());
+    run.warn("no radius gives {} points; the nearest number is {}", wanted, result.cloud.size());
 }
 
 void require_one_of_radius_and_count(const libmap::PoissonDiskOptions& sampling) {
   if (sampling.count > 0 && sampling.radius_m != libmap::PoissonDiskOptions().radius_m)
-    throw libmap::Error("a number of samples cannot be combined with --radius, which determines it",
-                        {.field = "count", .value = std::to_string(sampling.count)});
+    throw libmap::Error("cannot be combined with --radius, which determines the number of samples",
+                        {.field = "--count", .value = std::to_string(sampling.count)});
 }
 
 void resample(const ResampleOptions& options, Run& run) {
@@ -100,7 +99,7 @@ int main(int argc, char** argv) {
   ResampleOptions options;
   Command command("resample");
   command.input("MESH", options.mesh,
-                "surface (.ply, .obj, .stl, .off, .glb), or a folder of its tiles");
+                "mesh to sample (.ply, .obj, .stl, .off, .glb), or a folder of its tiles");
   command.output(options.output,
                  std::string("cloud with normals (.pcd, .ply, .vtp, .csv)") + or_tile_folder);
   libmap::bind(command.parameters(), options.sampling);

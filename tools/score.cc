@@ -41,10 +41,10 @@ std::string_view name_of(libgtd::UpSource source) {
 void report_plane(const libgtd::RegressionPlane& plane, const std::string& terrain, Run& run) {
   if (plane.up_source == libgtd::UpSource::direction) return;
   const bool by_normals = plane.up_source == libgtd::UpSource::normals;
-  run.info("up from the {}{}", name_of(plane.up_source),
+  run.info("up direction from the {}{}", name_of(plane.up_source),
            by_normals ? fmt::format(": {:.1f} % agree", 100.0 * *plane.normals_up) : "");
   if (!by_normals && plane.up_source != libgtd::UpSource::viewpoint && plane.normals_up)
-    run.warn("{}: {}: up is from the {}; --up X,Y,Z sets it", terrain,
+    run.warn("{}: {}; the up direction is from the {} (--up X,Y,Z sets it)", terrain,
              libmap::disagreement_text(std::max(*plane.normals_up, 1.0 - *plane.normals_up),
                                        plane.opposing_normals),
              name_of(plane.up_source));
@@ -53,8 +53,8 @@ void report_plane(const libgtd::RegressionPlane& plane, const std::string& terra
                                    : plane.up_source == libgtd::UpSource::frame_z;
   if (doubtful && plane.relief_skewness < upside_down_skewness)
     run.warn(
-        "{}: the relief is below the plane; if it is upside down, set --up (--up=0,0,-1 for a "
-        "cloud in a camera's frame)",
+        "{}: most relief is below the plane; if the cloud is upside down, set --up (--up=0,0,-1 "
+        "for a cloud in a camera's frame)",
         terrain);
 }
 
@@ -314,7 +314,7 @@ class StoreScoring {
     run_.info("{} of {} tiles scored; all are complete: {} voxels, {} graspable", scored,
               completion.tiles, index.voxels(), index.graspable_voxels());
     if (index.voxels() == 0)
-      run_.warn("the terrain is smaller than the gripper mask: nothing was scored");
+      run_.warn("nothing was scored, because the terrain is smaller than the gripper mask");
   }
 
   const ScoreOptions& options_;
@@ -339,9 +339,9 @@ void score_into_store(const ScoreOptions& options, const fs::path& gripper_file,
 
 void bind(libmap::ParameterTable& table, ScoreOptions& options) {
   bind(table, options.detection);
-  table.add(
-      "up", options.up,
-      "direction toward the outer side of the fitted plane: auto, or X,Y,Z in the cloud's frame");
+  table.add("up", options.up,
+            "direction out of the ground: X,Y,Z in the cloud's frame; auto: viewpoint, normals or "
+            "z axis");
   table.add("frame", options.frame, libgtd::map_frame_names(),
             "frame of the map's points; terrain: terrain frame; input: frame of the scored cloud");
 }
@@ -360,8 +360,8 @@ void say_result(const libgtd::DetectionResult& result, const ScoreOptions& optio
            result.occupied_voxels, result.map.voxels.size(), result.tiles, result.graspable_voxels);
   if (10 * result.isolated_voxels > result.occupied_voxels && result.occupied_voxels >= 10)
     run.warn(
-        "{}: {:.1f} % of the voxels have no neighbor: the points are too sparse for voxels of {:g} "
-        "m (--interpolation, --voxel-size, or resample a mesh)",
+        "{}: {:.1f} % of the voxels have no neighbor, because the points are too sparse for voxels "
+        "of {:g} m; set --interpolation or --voxel-size, or resample a mesh",
         options.terrain,
         100.0 * static_cast<double>(result.isolated_voxels) /
             static_cast<double>(result.occupied_voxels),
@@ -371,7 +371,7 @@ void say_result(const libgtd::DetectionResult& result, const ScoreOptions& optio
              *result.normal_radius_m, result.unoriented_voxels);
   if (result.map.content.obstacles) run.info("{} voxels are obstacles", result.obstacle_voxels);
   if (result.map.voxels.empty())
-    run.warn("the terrain is smaller than the gripper mask: nothing was scored");
+    run.warn("nothing was scored, because the terrain is smaller than the gripper mask");
 }
 
 // Reads a cloud file, or the tiles of a folder one by one.
@@ -417,7 +417,7 @@ void score(ScoreOptions& options, Run& run) {
   require_points(read.cloud.size(), read.dropped_points, options.terrain, run);
   if (scenario.orientation == libgtd::Orientation::surface && !read.cloud.has_normals())
     run.warn(
-        "{}: has no normals: the terrain's z is assumed to point outwards, and the outer sides of "
+        "{}: has no normals; the terrain's z is assumed to point outwards, and the outer sides of "
         "walls are uncertain",
         options.terrain);
   const libgtd::DetectionResult result = in_file(options.terrain, [&] {

@@ -20,7 +20,7 @@ constexpr Entry entries[] = {
     {"cameras", "depth images of a robot's cameras on a mesh", graspmap_tools::simulate_cameras},
     {"scan", "a scan of a mesh as a scan database", graspmap_tools::simulate_scan},
     {"scene", "a scene of primitive shapes as cloud or mesh", graspmap_tools::simulate_scene},
-    {"site", "rocks, slopes or a climbing wall: true mesh and field points",
+    {"site", "rocks, slopes or a climbing wall: true mesh and test locations",
      graspmap_tools::simulate_site},
     {"terrain", "rocky ground of any size as a folder of clouds", graspmap_tools::simulate_terrain},
 };

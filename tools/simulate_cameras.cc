@@ -40,7 +40,7 @@ void bind(libmap::ParameterTable& table, SimulateCamerasOptions& options) {
   table.add("y_m", options.y_m, any_number, "y of the robot's body in the mesh's frame, m");
   table.add("z_m", options.z_m, any_number, "height of the robot's body above the ground, m");
   table.add("absolute_z", options.absolute_z,
-            "measure z in the mesh's frame, not above the ground");
+            "interpret the height of the robot's body as z in the mesh's frame");
   table.add("roll_deg", options.roll_deg, any_number, "rotation of the body about x, degrees");
   table.add("pitch_deg", options.pitch_deg, any_number,
             "rotation of the body about y, degrees; positive: nose down");

@@ -28,7 +28,7 @@ using libmap::positive;
 void bind_cloud(libmap::ParameterTable& table, SimulateOptions& options) {
   table.add("spacing_m", options.sampling.spacing_m, positive, "mean distance between samples, m");
   table.add("count", options.sampling.count, not_negative,
-            "approximate number of samples (2 %); replaces --spacing; 0: use --spacing");
+            "number of samples, reached within 2 %, instead of --spacing; 0: use --spacing");
   table.add("jitter", options.sampling.jitter, libmap::zero_to_one,
             "random offset of the samples from their grid, as a share of a cell");
   table.add("noise_m", options.sampling.noise_m, not_negative,
@@ -44,7 +44,7 @@ void bind_mesh(libmap::ParameterTable& table, SimulateOptions& options) {
 }
 
 void bind(libmap::ParameterTable& table, SimulateOptions& options) {
-  table.add("scene", options.scene, "scene of the toolkit, or a scene file");
+  table.add("scene", options.scene, "scene: a name in data/scenes, or a scene file (.yaml)");
   table.add("mesh", options.mesh, "write a mesh instead of a cloud");
   bind_cloud(table, options);
   bind_mesh(table, options);

@@ -66,7 +66,6 @@ bool in_true_frame(const TextureCommandOptions& options) {
   return is_from_true_frame(options.mesh);
 }
 
-// Opens the scan.
 std::unique_ptr<libmap::ScanSource> scan_of(const TextureCommandOptions& options, Run& run) {
   return open_scan(options.scan, options.texture.strict, run,
                    known_camera(options.calibration, options.scan, options.poses, run));
@@ -109,9 +108,9 @@ void say_result(const libmap::TextureReport& result, Run& run) {
       "not visible and gray",
       result.photos, result.charts, result.pages, result.pages == 1 ? "" : "s",
       1e3 * result.texel_size_m(), result.unseen_triangles, triangles, result.unseen_m2);
-  // A larger share than that behind rocks indicates a wrong frame or other poses.
+  // Rocks hide fewer triangles. A larger share indicates a wrong frame or other poses.
   if (5 * result.unseen_triangles > triangles)
-    run.warn("20 % of the triangles or more are visible in no image: check --frame and --poses");
+    run.warn("more than 20 % of the triangles are visible in no image; check --frame and --poses");
   if (result.split_charts > 0)
     run.info("{} charts larger than a page were cut", result.split_charts);
   if (result.shrunk_charts > 0)
@@ -248,7 +247,7 @@ int main(int argc, char** argv) {
   TextureCommandOptions options;
   Command command("texture");
   command.input("MESH", options.mesh,
-                "mesh in the frame of the poses (.ply, .obj, ...), or a folder of its tiles");
+                "mesh of the scanned surface (.ply, .obj, ...), or a folder of its tiles");
   command.output(
       options.output,
       std::string("textured mesh (.glb; .obj: with STEM.mtl and one image per page, STEM_0.png "

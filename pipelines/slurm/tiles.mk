@@ -51,10 +51,10 @@ else
   $(foreach name,SCAN $(if $(filter model,$(MAKECMDGOALS)),MESH),$(if $(wildcard $($(name))),,$(error $(name) is '$($(name))': no such file)))
 endif
 ifeq ($(OUT),)
-  $(error OUT is not set: the folder of the results, e.g. OUT=results)
+  $(error OUT is not set; set the folder for the results, e.g. OUT=results)
 endif
 ifneq ($(shell test '$(SHARES)' -ge 1 2>/dev/null && echo yes),yes)
-  $(error SHARES is '$(SHARES)': it must be an integer >= 1)
+  $(error SHARES is '$(SHARES)': must be an integer >= 1)
 endif
 
 include $(here)../one_run.mk
@@ -129,7 +129,7 @@ $(store)/index.json: $(TERRAIN) $(OUT)/scored_with | $(logs)
 	$(call in_shares,$(logs),$(store),score $(terrain) $(score_flags))
 
 $(held)/index.json: $(MESH) $(store)/index.json $(OUT)/grasped_with | $(held_logs)
-	$(if $(MESH),,$(error MESH is not set: the mesh for the test of the gripper))
+	$(if $(MESH),,$(error MESH is not set; set the mesh on which the gripper is tested, e.g. MESH=mesh.ply))
 	$(call in_shares,$(held_logs),$(held),grasp $(mesh) --map $(store) $(GRASP))
 
 $(surface): $(TERRAIN) $(OUT)/meshed_with | $(mesh_logs)

@@ -20,7 +20,7 @@ commas = $(subst $(space),$(comma),$(strip $(1)))
 grasp_mesh_1 := $(folder_1)/scene.ply
 grasp_scenario_1 := primitive_shapes_prescan
 $(foreach n,1 2 3 4,$(eval grasp_cloud_$(n) := $(folder_$(n))/terrain.pcd))
-# Keeps locations away from the border, where the gripper would have no ground below it.
+# Boxes that keep locations away from the border, where a part of the gripper has no ground below it.
 grasp_box_1 := -0.8,-0.8,0.8,0.8
 grasp_box_2 := -2.5,-1.9,2.5,1.9
 grasp_box_3 := -1.3,-1.3,1.3,1.3

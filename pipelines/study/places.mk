@@ -5,9 +5,9 @@
 # (graspability of a hold). In situ, a location has a value only if the robot measured a point near it.
 # The wall's cases are evaluated against its pre-scanned map: METHOD/evaluation/.
 
-# Flags of the look-up and field of the map, for the score and for the combined criterion. A hold is
-# graspable by the score if its best score reaches 0.9, and by the combined criterion if any of its voxels is
-# convex and reaches the threshold.
+# Field of the map (by_...) and flags of the look-up (look_by_...), for the score and for the combined
+# criterion. A hold is graspable by the score if its best score reaches 0.9, and by the combined criterion
+# if any of its voxels is convex and reaches the threshold.
 by_score_2 := score
 by_score_3 := score>=0.9
 by_score_4 := score

@@ -1,8 +1,9 @@
 # Inclination of the robot's body on the rocks (chapter 5.2.3); included by study.mk.
 #
 # OUT/4_artificial_rocks/poses/planes.csv: angle between the true ground and the regression plane of the
-# robot's view, in degrees, with the body level and inclined by each of INCLINATIONS to four sides.
-# places_METHOD.csv: scores of the raw map at the field test's locations that each pose sees.
+# robot's panorama, in degrees, with the body level and inclined by each of INCLINATIONS (degrees) to
+# four sides. places_METHOD.csv: scores of the map without interpolation at the field test's locations
+# that the robot measured at each pose.
 
 ifneq ($(filter 4,$(SCENARIOS)),)
 folder_poses := $(folder_4)/poses

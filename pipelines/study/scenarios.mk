@@ -77,7 +77,7 @@ $(folder_$(1))/panorama.pcd: $(folder_$(1))/cameras.json
 $(call picture,$(folder_$(1))/site.png,$(folder_$(1))/site.ply,--view oblique --color own,\
 $(subst _, ,$(name_$(1))))
 $(call picture,$(folder_$(1))/panorama.png,$(folder_$(1))/panorama.pcd,--view top --color height,\
-$(subst _, ,$(name_$(1))): what the robot sees)
+$(subst _, ,$(name_$(1))): view of the robot)
 endef
 
 # Arguments: number of the scenario, method. Scenario 2 has no parameters for a pre-scanned map, so it

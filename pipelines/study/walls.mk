@@ -12,7 +12,7 @@ $(eval $(call map,$(folder_walls)/surface,$(folder_4)/terrain.pcd,artificial_roc
   artificial rocks: mask along the surface,$(folder_4)/site/field_points.csv,map,\
   --orientation surface --obstacle-height $(OBSTACLE_HEIGHT)))
 $(eval $(call picture,$(folder_walls)/obstacles.png,$(surface_map),--view oblique --color flags,\
-  artificial rocks: what cannot be climbed))
+  artificial rocks: obstacles))
 $(folder_walls)/footholds.csv: $(surface_map)
 	@exec $(GRASPMAP) footholds $< -o $@
 $(folder_walls)/analysis/summary.json: $(surface_map) $(upright_map)

@@ -149,7 +149,7 @@ TEST(Resample, BadInput) {
   EXPECT_TRUE(bad_input(run({"--count", "2000000000"}),
                         {.field = "--count", .value = "2000000000", .bound = ">= 0 and <= 1e+08"}));
   EXPECT_TRUE(bad_input(run({"--count", "100", "--radius", "0.1"}),
-                        {.field = "count", .value = "100", .about = "--radius"}));
+                        {.field = "--count", .value = "100", .about = "--radius"}));
   EXPECT_TRUE(bad_input(graspmap({"resample", "none.ply", "-o", "a.pcd"}),
                         {.file = "none.ply", .about = "no such"}));
   EXPECT_TRUE(bad_input(graspmap({"resample", "ridge.ply", "-o", "a.obj"}),

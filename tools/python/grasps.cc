@@ -24,7 +24,7 @@ void bind(libmap::ParameterTable& table, GraspOptions& options) {
   libgtd::bind(table, options.trials);
 }
 
-// None: the mesh is exact; "mesh": as its field expected_error says; else a standard deviation, m.
+// None: an exact mesh; "mesh": by its vertex field expected_error; else a standard deviation, m.
 libgtd::GroundErrors errors_of(const libmap::TriangleMesh& mesh, const py::object& given,
                                const libgtd::SurfaceErrorOptions& bounds) {
   if (given.is_none()) return {};
@@ -35,7 +35,7 @@ libgtd::GroundErrors errors_of(const libmap::TriangleMesh& mesh, const py::objec
     if (error_m >= 0.0 && error_m <= bounds.max_error_m)
       return libgtd::constant_error(mesh, error_m, bounds);
   }
-  throw libmap::Error("not an error of a surface",
+  throw libmap::Error("not a standard deviation",
                       {.field = "surface_error",
                        .value = py::repr(given).cast<std::string>(),
                        .bound = "None, \"mesh\", or 0 to max_surface_error_m, m"});

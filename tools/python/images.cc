@@ -26,9 +26,9 @@ std::vector<libmap::Marker> markers_of(const std::optional<std::vector<Eigen::Ve
   if (!positions) return markers;
   for (const Eigen::Vector3d& position : *positions) markers.push_back({.position = position});
   if (!labels.empty() && labels.size() != markers.size())
-    throw libmap::Error("not one per marker", {.field = "labels",
-                                               .value = std::to_string(labels.size()),
-                                               .bound = std::to_string(markers.size())});
+    throw libmap::Error("not one label per marker", {.field = "labels",
+                                                     .value = std::to_string(labels.size()),
+                                                     .bound = std::to_string(markers.size())});
   for (std::size_t n = 0; n < labels.size(); ++n) markers[n].label = labels[n];
   return markers;
 }

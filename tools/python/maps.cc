@@ -110,7 +110,7 @@ py::dict footholds(const PointCloud& map, const Eigen::Vector3d& up, const py::d
   return made;
 }
 
-// By column, a list of texts each.
+// Returns a list of texts for each column.
 py::dict columns_of(const libmap::Table& table) {
   py::dict dict;
   for (std::size_t column = 0; column < table.columns.size(); ++column) {
@@ -129,7 +129,7 @@ libmap::Table table_from(const py::dict& columns) {
     const auto cells = given.cast<std::vector<std::string>>();
     if (table.columns.size() == 1) table.rows.resize(cells.size());
     if (cells.size() != table.rows.size())
-      throw libmap::Error("number of values differs from number of rows",
+      throw libmap::Error("the columns have different numbers of values",
                           {.field = column,
                            .value = std::to_string(cells.size()),
                            .bound = std::to_string(table.rows.size())});

@@ -1,4 +1,4 @@
-// The extension module graspmap._core: the libraries on arrays. The face of it is in graspmap/.
+// The extension module graspmap._core: the stages on arrays. Its Python interface is in graspmap/.
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
 #include "tools/python/values.h"

@@ -18,7 +18,7 @@ using libmap::PoseSource;
 using libmap::RgbdFrame;
 using libmap::ScanSource;
 
-// A vector of its own type for pybind11.
+// Trajectory of a separate type, which pybind11 does not convert to a list.
 struct Poses {
   libmap::Trajectory poses;
 };
@@ -178,7 +178,7 @@ std::shared_ptr<Poses> read_poses(const fs::path& path, const std::shared_ptr<Sc
       return shared(Poses{libmap::import_poses(path, *scan, options).trajectory.poses});
     const libmap::TrajectoryFile file = libmap::read_trajectory(path, options.format);
     if (file.of_cameras)
-      throw libmap::Error("camera poses require a scan", {.file = path.string(), .field = "scan"});
+      throw libmap::Error("required for camera poses", {.file = path.string(), .field = "scan"});
     return shared(Poses{file.poses});
   });
 }

@@ -1,8 +1,8 @@
 #!/usr/bin/python3
-"""Writes what the libraries' tables say of each stage: the types of its options, for type checkers,
-in _options.pyi, and the fields of its results in _fields.py.
+"""Writes, from the tables of the libraries, the types of each stage's options to _options.pyi, for
+type checkers, and the fields of its results to _fields.py.
 
-stage_types.py FOLDER: that of _core, in which the files are written.
+stage_types.py FOLDER: folder that contains _core and gets the files.
 """
 
 import importlib.util
@@ -21,7 +21,7 @@ import dataclasses
 
 
 def load_core(folder):
-    """The extension module alone: the package is not needed for its tables."""
+    """Returns the extension module without its package, which the tables do not need."""
     file = next(folder.glob("_core.*.so"))
     spec = importlib.util.spec_from_file_location("_core", file)
     module = importlib.util.module_from_spec(spec)
@@ -30,7 +30,7 @@ def load_core(folder):
 
 
 def class_name(stage):
-    """For example "ReadPoses" of "read_poses"."""
+    """Returns, for example, "ReadPoses" for "read_poses"."""
     return "".join(word.capitalize() for word in stage.split("_"))
 
 
@@ -52,7 +52,7 @@ def options_class(stage, options):
 
 
 def fields_class(stage, results):
-    """The data class of a stage's results; of none, nothing."""
+    """The data class of a stage's results; "" if it has none."""
     if not results:
         return ""
     text = f"\n\n@dataclasses.dataclass(frozen=True, repr=False)\nclass {class_name(stage)}Fields:\n"

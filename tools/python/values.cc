@@ -230,7 +230,7 @@ void CallProgress::end() {
   stage_.clear();
 }
 
-// Nobody waits for the mutex with the interpreter's lock in hand.
+// No thread waits for mutex_ while it has the interpreter's lock, so that there is no deadlock.
 void CallProgress::call() {
   const py::gil_scoped_acquire acquired;
   last_call_ = std::chrono::steady_clock::now();

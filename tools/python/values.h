@@ -1,5 +1,5 @@
 // Converts values between Python and the libraries: arrays, options, results, errors, progress, and
-// the arguments of a call, whose errors name the parameter.
+// arguments of calls. Errors name the parameter.
 #pragma once
 
 #include <pybind11/numpy.h>
@@ -38,8 +38,8 @@ namespace py = pybind11;
 
 using Shape = std::vector<py::ssize_t>;
 
-// Returns a read-only array on memory of `owner`, which it keeps alive. Strides: bytes; none:
-// dense.
+// Returns a read-only array on memory of `owner`, which the array keeps alive. `strides` are in
+// bytes; empty: dense.
 template <typename Number>
 py::array view(const Number* data, Shape shape, py::handle owner, Shape strides = {}) {
   py::array array(py::dtype::of<Number>(), std::move(shape), std::move(strides), data, owner);
@@ -47,7 +47,7 @@ py::array view(const Number* data, Shape shape, py::handle owner, Shape strides 
   return array;
 }
 
-// Returns a getter of an array on a member of an object, which lives as long as the array.
+// Returns a property getter for an array on a member of an object, which the array keeps alive.
 template <typename Object, typename Member, typename ViewOf>
 auto viewing(Member Object::*member, ViewOf view_of) {
   return [=](const py::object& self) { return view_of(self.cast<Object&>().*member, self); };
@@ -66,18 +66,18 @@ inline Shape rows(std::size_t count, py::ssize_t width) {
   return {static_cast<py::ssize_t>(count), width};
 }
 
-// Error of a parameter whose value has a wrong type or shape.
+// Returns the error of a parameter whose value `given` has a wrong type or shape.
 libmap::Error wrong_value(py::handle given, const std::string& name, const std::string& bound);
 
-// Throws Error for the first of `others`, keywords that no parameter has, or else for the first of
-// `missing`, parameters without a value.
+// Throws Error for the first of `others`, keywords that are not names of `parameters`, or else for
+// the first of `missing`, required parameters without a value.
 void check_names(const std::vector<std::string>& parameters, const std::vector<std::string>& others,
                  const std::vector<std::string>& missing);
 
-// Bound of a name, as in "one of a b".
+// Returns the bound "one of NAME NAME ...".
 std::string one_of(const std::vector<std::string>& names);
 
-// Types of numbers: NumPy's letters, and their size (0: any).
+// Accepted types of an array: NumPy's letters, and the size of a number in bytes (0: any).
 struct Numbers {
   std::string_view kinds;
   py::ssize_t bytes = 0;
@@ -86,7 +86,7 @@ constexpr Numbers byte_numbers = {"u", 1}, whole_numbers = {"iu"}, real_numbers 
 constexpr Numbers indices_or_truth = {"biu"}, real_or_truth = {"biuf"};
 constexpr py::ssize_t any_length = -1;
 
-// Returns the array after a check of its type and shape.
+// Returns `given` as an array. Throws Error with `name` and `bound` for another type or shape.
 py::array checked_array(const py::object& given, const std::string& name, const Numbers& numbers,
                         const Shape& shape, const std::string& bound);
 template <typename Number>
@@ -119,7 +119,7 @@ Options options_from(const py::dict& values, Options options = {}) {
 // Returns a dict of the results by key; a missing value is None.
 py::dict dict_of(const libmap::ResultTable& table);
 
-// Return a dict per parameter (key, type, default, choices, description) or result.
+// Return a dict per parameter (key, type, default, choices, description) or result (not `objects`).
 py::list list_of(const libmap::ParameterTable& table);
 py::list list_of(const libmap::ResultTable& table, const std::vector<std::string>& objects);
 
@@ -130,7 +130,7 @@ struct Stage {
 };
 std::vector<Stage>& stages();
 // Registers a stage with its options and results for the documentation and the stubs. `objects` are
-// results that are no number or text in Python.
+// keys of results that are objects in Python, not numbers or texts.
 template <typename Options, typename... Results>
 void add_stage(const std::string& name, const std::vector<std::string>& objects = {}) {
   const auto options = [] {
@@ -210,10 +210,10 @@ std::shared_ptr<T> shared(T&& value) {
 
 py::dict numbers_of(const std::vector<std::pair<std::string, double>>& numbers);
 
-// Makes libmap::Error a graspmap.Error in Python.
+// Makes C++ errors of the libraries and the file system a graspmap.Error in Python.
 void translate_errors();
 
-// Add the classes and functions of each part to the module.
+// Add classes and functions to the module.
 void add_shapes(py::module_& module);    // Cloud, Mesh, their files and manifests
 void add_scans(py::module_& module);     // Scan, Frame, Camera, Poses, refine, fuse
 void add_surfaces(py::module_& module);  // estimate_normals, mesh, resample
@@ -221,7 +221,7 @@ void add_maps(py::module_& module);      // score, lookup, footholds, evaluate
 void add_grasps(py::module_& module);    // grasp
 void add_images(py::module_& module);    // render, to_png
 
-// Argument of a class of the module; the object lives at least as long as the call.
+// Argument that is an object of the module; the object lives at least as long as the call.
 template <typename Object>
 struct Kept {
   std::shared_ptr<Object> object;
@@ -353,7 +353,7 @@ decltype(auto) call(const Function& function, const std::array<py::object, sizeo
 template <typename>
 using Given = const py::object&;
 
-// The value of a required parameter that the call does not give.
+// Value of a required parameter for which the call has no argument.
 inline py::object missing_value() { return py::reinterpret_borrow<py::object>(Py_NotImplemented); }
 inline py::arg_v with_default(const py::arg& required) {
   return {required.name, missing_value(), "..."};

@@ -27,14 +27,13 @@ constexpr std::size_t max_labels = 8;
 
 double percent(double part, double whole) { return whole > 0.0 ? 100.0 * part / whole : 0.0; }
 
-// Gray that gets darker with slope.
 Color ground_color(float slope_deg) {
   const double slope = std::isnan(slope_deg) ? 0.0 : static_cast<double>(slope_deg);
   const auto gray = static_cast<std::uint8_t>(std::lround(228.0 - 110.0 * slope / 90.0));
   return {gray, gray, gray};
 }
 
-// The voxels' surface points in the terrain frame.
+// Voxel centers in the terrain frame, colored as ground, obstacle or below the zero plane.
 libmap::PointCloud cloud_of(const libgtd::VoxelMap& map, const libgtd::MapSurface& surface) {
   libmap::PointCloud cloud;
   cloud.positions.reserve(map.size());
@@ -48,8 +47,8 @@ libmap::PointCloud cloud_of(const libgtd::VoxelMap& map, const libgtd::MapSurfac
   return cloud;
 }
 
-// Coloring by the cloud's own colors. The legend shows those of the known colors that occur, and
-// the grays of the `rest` of the ground.
+// Coloring by the cloud's colors. The legend shows the `known` colors that the cloud contains, and
+// the grays of other ground, which is named `rest`.
 libmap::Coloring own_colors(const libmap::PointCloud& cloud, const std::string& title,
                             const std::vector<libmap::LegendEntry>& known,
                             const std::string& rest) {
@@ -154,7 +153,6 @@ libmap::Chart ground_chart(const std::vector<libgtd::GroundBin>& bins,
   double highest = 0.0;
   for (const std::vector<double>* values : {&bars.heights, &line.y})
     for (const double value : *values) highest = std::max(highest, value);
-  // Leaves room for the legend.
   if (highest > 0.0) chart.y_axis.range = std::pair(0.0, 1.25 * highest);
   if (!bins.empty()) {
     bars.first_edge = bins.front().low;

@@ -1,5 +1,4 @@
-// Outputs of `graspmap analyze`: images and charts of the analysis of a map, and a table of several
-// maps with one row per map.
+// Makes the outputs of `graspmap analyze`: images and charts of one map, tables of several maps.
 #pragma once
 
 #include <string>
@@ -15,42 +14,42 @@
 
 namespace graspmap_tools {
 
-// Score histogram: bars of the evaluated voxels in the legend's colors, and a line for all voxels.
+// Returns the score histogram: bars of the evaluated voxels by class, and a line of all voxels.
 libmap::Chart histogram_chart(const libgtd::MapAnalysis& analysis, const std::string& title);
 
-// Returns a chart of the ground by height or slope: bars are the graspable share of a bin, a line
-// shows the bin's share of all ground.
+// Returns a chart of the ground by height or slope: bars show the graspable share of each bin's
+// area, a line shows the share of the bin in the area of all ground.
 libmap::Chart ground_chart(const std::vector<libgtd::GroundBin>& bins,
                            const std::string& axis_title, const std::string& title);
 
-struct MapImage {
+struct MapImage {  // must not outlive `map` and `surface`
   const libgtd::VoxelMap& map;
   const libgtd::MapSurface& surface;
   std::string title;
 };
 
-// Draws the map from above: regions colored by reachability, the largest ones numbered, other
-// ground darker with slope.
+// Draws the map from above: regions are colored by reachability, the eight largest have their
+// numbers, other ground is gray, darker with increasing slope.
 libmap::ColorImage draw_regions(const MapImage& image, const libgtd::MapRegionResult& regions,
                                 const libgtd::RegionReach& reach);
 
-// Draws the map from above, with voxels that are graspable in both maps or in one only.
+// Draws the map from above, with colors for voxels that are graspable in both maps or in one only.
 libmap::ColorImage draw_change(const MapImage& image, const libgtd::MapChange& change,
                                const libgtd::VoxelMap& other,
                                const libmap::Pose& map_terrain_from_other_terrain);
 
-// Draws the map from above, colored by the difference of both scores.
+// Draws the common voxels from above, colored by their scores in `other` minus those in the map.
 libmap::ColorImage draw_score_change(const MapImage& image, const libgtd::MapChange& change,
                                      const libgtd::VoxelMap& other);
 
 struct MapTableOptions {
   std::string expected;  // CSV of regions of expected graspability; empty: none
   PointFrame points_frame = PointFrame::input;  // frame of these regions
-  std::string cutoff = "auto";                  // minimum score, or each map's own threshold
-  std::string names;                            // separated by '|'
-  bool pairs = false;
+  std::string cutoff = "auto";  // minimum score of a graspable voxel; auto: each map's threshold
+  std::string names;            // names of the maps, separated by '|'; empty: names of the files
+  bool pairs = false;           // true: compare all pairs of maps
   std::string varied;  // column of maps.csv, the horizontal axis of charts; empty: no such charts
-  std::string series;  // columns of maps.csv, separated by ',': one curve per combination
+  std::string series;  // columns of maps.csv, separated by ','; one curve per combination of values
   bool images = true;
 };
 
@@ -59,7 +58,7 @@ void bind(libmap::ParameterTable& table, MapTableOptions& options);
 
 // Writes maps.csv, histograms.csv with a chart and, if requested, pairs.csv, regions.csv and charts
 // of graspable_share, voxel_youden and place_youden against the varied parameter into `folder`.
-// Throws Error naming the invalid map or table.
+// Throws Error naming the file if a map or table is invalid.
 void tabulate_maps(const std::vector<std::string>& map_files, const std::string& folder,
                    const MapTableOptions& options, Run& run);
 

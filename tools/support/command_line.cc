@@ -59,7 +59,6 @@ std::string unit_of(const libmap::Parameter& parameter) {
   return parameter.type == libmap::ParameterType::integer ? "N" : "X";
 }
 
-// "draw maps" -> "Draw maps."
 std::string sentence(std::string_view summary) {
   std::string text(summary);
   if (!text.empty()) text[0] = static_cast<char>(std::toupper(text[0]));
@@ -148,9 +147,8 @@ class JsonLines : public Counting {
   }
 };
 
-// Returns the progress display of a style, nullptr for none. "auto": a bar if stderr is a terminal;
-// "json": one JSON line per step; "none". Stages of more than a few seconds show the remaining
-// time. Throws Error for another style.
+// Returns the progress display of a style; nullptr for "none". "auto": a bar if stderr is a
+// terminal, else nullptr; "json": one JSON line per percent. Throws Error for another style.
 std::unique_ptr<libmap::Progress> make_progress(const std::string& style) {
   if (style == "json") return std::make_unique<JsonLines>();
   if (style == "auto" && isatty(STDERR_FILENO) == 1) return std::make_unique<Bar>();
@@ -275,8 +273,8 @@ void Command::Parts::add_common_options() {
   }
   app.add_flag("--dry-run", run_options.dry_run, "check inputs and parameters, and write nothing");
   app.add_flag("--force", run_options.force, "overwrite outputs that graspmap did not write");
-  app.add_option("--threads", threads, "number of threads; 0: all")->type_name("N");
-  app.add_option("--progress", progress, "progress display: auto|json|none")->type_name("STYLE");
+  app.add_option("--threads", threads, "number of threads; 0: all processors")->type_name("N");
+  app.add_option("--progress", progress, "progress display: auto, json, none")->type_name("STYLE");
   app.add_flag("--quiet", run_options.quiet, "print warnings and errors only");
   app.add_flag("--verbose", run_options.verbose, "also print the time of each step");
 }
@@ -413,7 +411,7 @@ std::optional<int> Command::Parts::parse(int argc, char** argv) {
     require_printed();
     return 0;
   } catch (const CLI::ParseError& error) {
-    // CLI11's own text does not fit this case.
+    // CLI11's message does not name the surplus argument.
     const std::vector<std::string> surplus = app.remaining();
     const bool too_many = dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr;
     return usage_error(too_many && !surplus.empty() ? "one argument too many: " + surplus.front()

@@ -1,5 +1,5 @@
-// Command line of all commands: inputs, the output, one flag per parameter, --config,
-// --print-config, --dry-run, one-line errors and exit codes.
+// Parses the command line of a command (inputs, output, one flag per parameter, --config,
+// --print-config, --dry-run), runs the command, and reports errors in one line and by exit code.
 //
 //   int main(int argc, char** argv) {
 //     ScoreOptions options;
@@ -21,15 +21,14 @@ class UsageError : public libmap::Error {
   using Error::Error;
 };
 
-// Throws Error with the flag of the first parameter of `bind` that differs from the default.
+// Throws Error with `reason` and the flag of the first parameter of `bind` that is not the default.
 template <typename Options>
 void reject_changed(const Options& options, void (*bind)(libmap::ParameterTable&, Options&),
                     const std::string& reason) {
   if (const auto key = libmap::changed_key(options, bind))
     throw libmap::Error(reason, {.field = libmap::flag_of(*key)});
 }
-// Throws Error with the first flag with value true, which means that the user gave the flag; for
-// options that are not parameters.
+// Throws Error with `reason` and the first flag whose value is true, i.e. that the user gave.
 void reject_given(const std::vector<std::pair<const char*, bool>>& flags,
                   const std::string& reason);
 
@@ -55,6 +54,7 @@ class Command {
   void former_flag(const std::string& name, const std::string& now);
   // Declares the earlier name of a flag. It is still read, but not shown by --help.
   void renamed_flag(const std::string& earlier, const std::string& now);
+  // An option with any number of values: repeated, or separated by commas.
   void option(const std::string& name, const std::string& value_name,
               std::vector<std::string>& values, const std::string& description);
 
@@ -62,16 +62,16 @@ class Command {
   // and a KEY of --set KEY=VALUE.
   libmap::ParameterTable& parameters();
 
-  // Declares a parameter, such as a sensor's name, with a value that names a file with further
-  // parameters. Flags and --config override that file; "auto" names no file.
+  // Declares that the value of the parameter `key`, e.g. the name of a sensor, names a file with
+  // further parameters, which `resolver` finds. Flags and --config override the file; "auto": none.
   void preset(const std::string& key,
               std::function<std::filesystem::path(const std::string&)> resolver);
   // Sets the function that finds the file of a --config value, e.g. a scenario's name. Default: a
   // path.
   void config_resolver(std::function<std::filesystem::path(const std::string&)> resolver);
 
-  // Parses, applies --config and then the flags, and runs `body`. Errors become one line on stderr.
-  // Returns the exit code: 0 done, 1 failed, 2 wrong usage, 3 bad input.
+  // Parses argv, applies --config and then the flags, and runs `body`. An error becomes one line on
+  // stderr. Returns the exit code: 0 done, 1 failed, 2 wrong usage, 3 bad input.
   int run(int argc, char** argv, const std::function<void(Run&)>& body);
 
  private:
@@ -79,8 +79,8 @@ class Command {
   std::unique_ptr<Parts> parts_;
 };
 
-// Runs the chosen usage of a command with several usages, each with a separate Command and options.
-// --help of the first usage shows all. Returns the exit code.
+// Runs `chosen`, one of the usages of a command, each with a separate Command and options. --help
+// of the first usage shows all usages. Returns the exit code.
 using Subcommand = int(int argc, char** argv);
 int run_subcommand(int argc, char** argv, std::initializer_list<Subcommand*> subcommands,
                    Subcommand* chosen);

@@ -18,7 +18,7 @@ std::vector<graspmap_tools::FootholdMark> graspmap_tools::foothold_marks(
   for (std::size_t n = 0; n < cloud.size(); ++n) {
     const Eigen::Vector3d approach(x[n], y[n], z[n]);
     if (!approach.allFinite() || approach.norm() < 1e-9)
-      throw libmap::Error("is not a direction",
+      throw libmap::Error("not a direction: zero or not finite",
                           {.file = file, .field = "approach of foothold " + std::to_string(n + 1)});
     marks.push_back({cloud.positions[n], approach, score[n]});
   }

@@ -1,4 +1,4 @@
-// Reads the footholds that `graspmap footholds` wrote.
+// Extracts footholds from a cloud that `graspmap footholds` wrote.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,13 +10,13 @@
 namespace graspmap_tools {
 
 struct FootholdMark {
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();
-  Eigen::Vector3d approach = Eigen::Vector3d::Zero();  // of any length but 0
-  double score = 0.0;
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  // m
+  Eigen::Vector3d approach = Eigen::Vector3d::Zero();  // direction; its length is not 0
+  double score = 0.0;                                  // graspability, 0 to 1
 };
 
-// Returns the footholds in a cloud (frame of the map, m). Throws Error naming `file` if the cloud
-// does not have the fields of footholds, and for an approach direction of length zero.
+// Returns the footholds in the frame of the cloud. Throws Error naming `file` if the cloud does not
+// have the fields of footholds, or if an approach direction is zero or not finite.
 std::vector<FootholdMark> foothold_marks(const libmap::PointCloud& cloud, const std::string& file);
 
 }  // namespace graspmap_tools

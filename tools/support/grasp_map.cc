@@ -59,7 +59,7 @@ class StepsOfTile : public libmap::Progress {
   libmap::Progress& whole_;
 };
 
-// A map by tiles, from a tile store or by splitting one file.
+// A map in tiles: those of a tile store, or parts of one file.
 class TiledMap {
  public:
   explicit TiledMap(const std::string& file) {
@@ -183,7 +183,7 @@ class MapGrasping {
       throw libmap::Error("no voxel is within " + libmap::to_text(options_.max_distance_m) +
                           " m of the mesh; check the frames of map and mesh");
     if (2 * on_mesh < voxels)
-      run_.warn("only {} of {} voxels are within {} m of the mesh; check both frames", on_mesh,
+      run_.warn("only {} of {} voxels are within {} m of the mesh; check the frames", on_mesh,
                 voxels, options_.max_distance_m);
   }
 
@@ -204,7 +204,7 @@ class MapGrasping {
     if (earlier && is_store())
       throw libmap::Error(
           "contains tiles of another mesh, map or gripper or of other parameters; use --force to "
-          "replaces them",
+          "replace them",
           {.file = input_.output});
     if (!earlier && !is_forced) require_no_index(store_);
     store_.require_idle();

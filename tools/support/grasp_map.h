@@ -1,4 +1,4 @@
-// `graspmap grasp --map`: virtual field test at candidate voxels of a map.
+// Virtual field test at the candidate voxels of a map, for `graspmap grasp --map`.
 #pragma once
 
 #include <Eigen/Core>
@@ -26,20 +26,21 @@ class GroundTiles {
   // Mesh of one tile and of the surroundings within reach of a gripper.
   struct MeshTile {
     const libmap::TriangleMesh mesh;
-    const libgtd::Ground ground;  // ground of `mesh`
-    const libgtd::GripCandidates from_above;
+    const libgtd::Ground ground;              // ground of `mesh`
+    const libgtd::GripCandidates from_above;  // locations that may hold with approach from above
   };
   using MakeGround = std::function<libgtd::Ground(const libmap::TriangleMesh& mesh)>;
 
-  // Throws Error naming the unreadable file or the gripper's missing section.
+  // `mesh`: a file or a folder of tiles. start_height_m: as in ClosingOptions. `gripper` must
+  // outlive the object. Throws Error naming the file if it cannot be read.
   GroundTiles(const std::string& mesh, const libgtd::Gripper& gripper, double start_height_m,
               MakeGround make_ground);
 
-  // Returns the index of the tile that contains the position's x and y (m, mesh frame): of several,
-  // the one with the nearest center; of none, the nearest tile.
+  // Returns the index of the tile that contains the position's x and y (m, mesh frame). If several
+  // do, it is the one with the nearest center; if none does, the nearest tile.
   std::size_t tile_at(const Eigen::Vector3d& position) const;
 
-  // Returns the tile with this index; the reference is valid until two other tiles are requested.
+  // Returns the tile with this index; the reference is valid until three other tiles are requested.
   const MeshTile& mesh_tile(std::size_t number);
 
  private:
@@ -59,22 +60,23 @@ class GroundTiles {
 
 struct GraspMapInput {
   std::string mesh_file;
-  std::string map_file;  // or a tile store
-  std::string output;    // or a tile store
+  std::string map_file;  // map in one file, or a tile store
+  std::string output;    // map in one file, or a tile store
   libmap::TileShare share;
-  std::string parameters_hash;  // of gripper and options
+  std::string parameters_hash;  // hash of gripper and options
 };
 
 // Names of the fields that are added to the map.
 const std::vector<std::string>& grasp_fields();
 
-// Checks and reserves the output. Throws Error for another format or if it cannot be written.
+// Checks the output; claims it if it is one file. Throws Error if the output cannot be used, or for
+// a share with one file or --force.
 void require_map_output(const GraspMapInput& input, Run& run);
 
 // Writes the map with the added fields. Tiles are processed in a tile store, so that a killed run
 // can be resumed: in the output or in OUTPUT.progress, which is removed once the map in one file is
-// written. The run's manifest must have the inputs. Throws Error if the map is empty or already has
-// a field, no voxel is on the mesh, or the store is of other inputs.
+// written. The run's manifest must have the inputs. Throws Error if the map is empty or has the
+// field grasp_trials, no voxel is on the mesh, or the output store is of other inputs.
 void grasp_map(const GraspMapInput& input, GroundTiles& ground, const libgtd::Gripper& gripper,
                const libgtd::GraspOptions& options, Run& run);
 

@@ -26,7 +26,7 @@ using libmap::RtabmapDatabase;
 using libmap::ScanSource;
 using libmap::Trajectory;
 
-// Limit, because phones store a focal length per image.
+// Limited, because phones store a focal length for each image.
 constexpr std::size_t max_listed_cameras = 8;
 
 Json sessions_json(const libmap::PoseGraph& graph) {
@@ -163,7 +163,7 @@ Json camera_json(const Camera& camera) {
           {"distortion", distortion_text(camera)}};
 }
 
-// Number of nodes by the description of their content.
+// Numbers of nodes by a description of their content.
 using Counts = std::map<std::string, std::size_t>;
 
 std::string image_text(const libmap::ImageInfo& info) {

@@ -9,15 +9,15 @@
 
 namespace graspmap_tools {
 
-// Returns true for *.db, a folder or an SQLite file: kinds of paths that can be scans.
+// Returns true for a path that can be a scan: a name ending in .db, a folder or an SQLite file.
 bool may_be_scan(const std::string& path);
 
 struct ScanInfo {
   nlohmann::ordered_json json;
-  std::vector<libmap::ScanFault> faults;  // found with `verify`
+  std::vector<libmap::ScanFault> faults;  // broken parts of the scan; empty without `verify`
 };
 // Return the description of a camera file and of a scan. Throw Error if the file cannot be read.
-// `verify` checks all data of the scan and lists the faults.
+// With `verify`, scan_info reads all data of the scan and lists the broken parts.
 nlohmann::ordered_json camera_info(const std::string& path);
 ScanInfo scan_info(const std::string& path, bool verify, libmap::Progress& progress);
 

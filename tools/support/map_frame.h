@@ -1,4 +1,4 @@
-// Frames of listed points and of maps, and transforms between them from manifests.
+// Determines the frames of listed points and of maps, and transforms between them, from manifests.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,8 +10,8 @@
 namespace graspmap_tools {
 
 // Frame of the points in a table of locations. input: the cloud that was scored; terrain: the
-// terrain frame; map: the map before `graspmap crop`, or the map of a simulated robot; automatic:
-// by the manifest of the points' file, else input.
+// terrain frame; map: the cloud or mesh before `graspmap crop`, or the mesh of `simulate cameras`;
+// automatic: by the manifest of the points' file, else input.
 enum class PointFrame { input, terrain, map, automatic };
 // Names without `automatic`, for points that are not from a file.
 using PointFrameNames = std::vector<std::pair<std::string, PointFrame>>;
@@ -29,23 +29,24 @@ PointFrame frame_of_points(const std::string& points, PointFrame asked, const st
 // or invalid value, and for a table without rows.
 std::vector<Eigen::Vector3d> positions_of(const libmap::Table& table);
 
-// Returns the transform from the scored cloud to the terrain frame; nullptr if there is none.
+// Name of the transform from the scored cloud to the terrain frame, and this transform or nullptr.
 inline constexpr const char* terrain_from_input_name = "terrain_from_input";
 const libmap::Pose* terrain_from_input_of(const std::optional<libmap::Manifest>& manifest);
 
-// Name of the transform that `crop` and `simulate cameras` write and later commands copy. The
-// source is always the map before the first of these commands.
+// Name of the transform that `crop` and `simulate cameras` write and later commands copy. Its
+// source frame is always that of the cloud or mesh before the first of these commands.
 inline constexpr const char* site_from_map_name = "site_from_map";
 
-// Returns the transform from the map before `crop`, or the map of a simulated robot, to the points
-// in `file`, from the file's manifest; nullopt if there is none.
+// Returns the transform from the cloud or mesh before `crop` or `simulate cameras` to the points in
+// `file`, by the file's manifest; nullopt without one. For a map in the terrain frame whose terrain
+// was not cropped, it is the transform from the scored cloud.
 std::optional<libmap::Pose> site_from_map_of(const std::string& file);
 std::optional<libmap::Pose> site_from_map_of(const libmap::Manifest& manifest);
 
 // Name of the transform to the frame of a scan's true poses.
 inline constexpr const char* truth_from_poses_name = "ground_truth_from_poses";
 
-// Returns true if, by the manifest, `file` or the source of `file` is in the frame of true poses.
+// Returns true if, by its manifest, `file` or its source is in the frame of the scan's true poses.
 bool is_from_true_frame(const std::string& file);
 
 // Copies site_from_map, ground_truth_from_poses and georeference from the manifest of `input` to
@@ -53,10 +54,10 @@ bool is_from_true_frame(const std::string& file);
 void copy_transforms(const std::string& input, Run& run);
 // As copy_transforms, and copies the frame's name.
 void copy_frame(const std::string& input, Run& run);
-// For a map made from a map: copies frame, transforms, georeference, and the parameters and results
-// that the run's manifest does not have, such as zero plane, lattice and method.
+// For a map made from another map: copies frame, transforms and georeference, and the parameters
+// and results that the run's manifest does not have, such as zero plane, lattice and method.
 void copy_missing_entries(const libmap::Manifest& source, Run& run);
-// Copy one of these only; the georeference of a DEM (.tif) is read from the file itself.
+// Copy ground_truth_from_poses and georeference only; a DEM (.tif) itself has the georeference.
 void copy_truth_transform(const std::string& input, Run& run);
 void copy_georeference(const std::string& input, Run& run);
 
@@ -69,8 +70,8 @@ void copy_terrain_transform(const std::string& map, Run& run);
 // `points_frame` is map and the manifest has no site_from_map.
 libmap::Pose map_from_points(const std::string& map, PointFrame points_frame, Run& run);
 
-// Return the transforms from the scored cloud to the points of a map, and from these to the terrain
-// frame, from the map's manifest; the identity if it has none.
+// Return the transforms from the scored cloud to the points of a map, and from these points to the
+// terrain frame, by the map's manifest; the identity if the manifest or transform is missing.
 libmap::Pose map_from_input(const std::optional<libmap::Manifest>& manifest);
 libmap::Pose terrain_from_map(const std::optional<libmap::Manifest>& manifest);
 

@@ -12,17 +12,18 @@ namespace graspmap_tools {
 
 void bind(libmap::ParameterTable& table, MapTableOptions& options) {
   table.add("cutoff", options.cutoff,
-            "for several maps: minimum score of a graspable voxel; auto: each map's own "
-            "threshold");
+            "for several maps: minimum score of a graspable voxel; auto: threshold in each map's "
+            "manifest");
   table.add("names", options.names,
-            "for several maps: names of the maps, separated by |; default: file names");
+            "for several maps: names of the maps, separated by |; default: names of the files");
   table.add("pairs", options.pairs, "for several maps of one cloud: compare all pairs of maps");
   table.add("varied", options.varied,
             "for several maps: column of maps.csv with the varied parameter; charts show the "
             "graspable share and, with --expected, Youden's index against this parameter");
   table.add(
       "series", options.series,
-      "columns of maps.csv, separated by commas; charts have one curve per combination of values");
+      "for several maps: columns of maps.csv, separated by commas; the charts of --varied have one "
+      "curve per combination of their values");
 }
 
 namespace {
@@ -99,8 +100,8 @@ void info(const libgtd::SummarizedMap& map, Run& run) {
   run.info(text);
 }
 
-// Chart of column y against x; rows without one of the two numbers are ignored. Curves are in the
-// order of the first appearance of their names, their points by ascending x.
+// Chart of column y against column x; rows without one of these numbers are ignored. Curves are in
+// the order in which their names first appear, their points by ascending x.
 libmap::Chart chart_of(const libmap::Table& table, const std::string& x, const std::string& y,
                        const std::string& series) {
   libmap::Chart chart;

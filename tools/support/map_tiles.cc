@@ -47,7 +47,7 @@ void write_tile(const std::filesystem::path& store, const libmap::PointCloud& po
 
 void require_no_index(const libgtd::MapTileStore& store) {
   if (std::filesystem::exists(store.index_path()))
-    throw libmap::Error("is complete, but has no folder `progress`; use --force to replace it",
+    throw libmap::Error("has no folder `progress`, so it cannot be resumed; --force replaces it",
                         {.file = store.folder().string()});
 }
 
@@ -86,7 +86,7 @@ libmap::PointCloud MapTiles::read(const std::filesystem::path& file,
                                   const libgtd::StoredTile& tile) const {
   libmap::PointCloud cloud = libmap::read_cloud(file).cloud;
   if (cloud.size() != tile.voxels)
-    throw libmap::Error("number of points differs from the store's index",
+    throw libmap::Error("the number of points differs from the store's index",
                         {.file = file.string(),
                          .field = "points",
                          .value = std::to_string(cloud.size()),
@@ -107,8 +107,7 @@ libmap::PointCloud MapTiles::load_checked(std::size_t tile) const {
 
 namespace {
 
-// Copies parameters, frame, transforms and those results of a store that are valid for its merged
-// map.
+// Copies parameters, frame, transforms, and those results of a store that its merged map also has.
 void copy_common_entries(const libmap::Manifest& store, libmap::Manifest& whole) {
   for (const auto& parameter : store.parameters)
     if (parameter.first != "tile") whole.parameters.push_back(parameter);

@@ -19,7 +19,7 @@ namespace graspmap_tools {
 // Returns true for paths of tile stores: names that end with .tiles.
 bool is_tile_store(const std::string& path);
 
-std::filesystem::path store_index_path(const std::string& store);
+std::filesystem::path store_index_path(const std::string& store);  // STORE/index.json
 
 // Converts the manifest of a map in one file to the index of a store: lattice, frame, transforms,
 // no tiles. Returns nullopt if the manifest has no lattice.
@@ -29,22 +29,22 @@ std::optional<libgtd::TileStoreIndex> index_of(const libmap::Manifest& manifest)
 void write_tile(const std::filesystem::path& store, const libmap::PointCloud& points,
                 libgtd::StoredTile& tile);
 
-// Throws Error if a store has an index but no plan, so that the run cannot be resumed.
+// Throws Error if a store has an index. Called for a store without a plan, which has no progress.
 void require_no_index(const libgtd::MapTileStore& store);
 
 class MapTiles {
  public:
   // Throws Error naming the store or the index if either is missing, incomplete, damaged or empty.
   explicit MapTiles(const std::string& store);
-  // Opens a store without an index.
+  // Opens a store by an index that need not be written. Throws Error if it has no tiles.
   MapTiles(std::filesystem::path store, libgtd::TileStoreIndex index);
 
   const libgtd::TileStoreIndex& index() const { return index_; }
 
-  // Returns a tile's points, at the positions of the merged map. Throws Error naming the tile's
-  // file if it is missing, damaged or differs from the index. Can be called from several threads.
+  // Returns the points of index().tiles[tile], with their positions in the merged map. Throws Error
+  // naming the file if it is missing, damaged or differs from the index. Thread-safe.
   libmap::PointCloud load(std::size_t tile) const;
-  // Like load, and compares the file's hash with the index.
+  // As load; also compares the hash of the file with the index.
   libmap::PointCloud load_checked(std::size_t tile) const;
 
   // Returns the bounding box of a tile's voxel centers, in the frame of the map's points.
@@ -61,20 +61,20 @@ class MapTiles {
   bool float64_positions_ = false;
 };
 
-// Writes the tiles of a store as one map. PCD files are written by rows of tiles; other formats
-// need the whole map in memory. Errors name `store`.
+// Writes the tiles of a store as one map. PCD files are written row by row of tiles; other formats
+// need the whole map in memory. Errors of merging name `store`.
 void write_merged(const MapTiles& tiles, const std::string& store,
                   const std::filesystem::path& file, const libmap::GeometryWriteOptions& writing,
                   Run& run);
 
 struct MergeOptions {
   libmap::GeometryWriteOptions writing;
-  double pixel_size_m = 0.0;  // of a raster, .tif; 0: the voxel size
+  double pixel_size_m = 0.0;  // pixel size of a raster (.tif); 0: the voxel size
 };
 
-// Merges a tile store to the same bytes as scoring into one file: as binary .pcd by rows of tiles,
-// in another cloud format, or as .tif with only the raster in memory. Claims the output. Throws
-// Error if the store is incomplete.
+// Merges a tile store to a cloud, with the same bytes as if it had been scored into one file, or to
+// a .tif with only the raster and a row of tiles in memory. Claims the output. Throws Error if the
+// store is incomplete, or for .pcd that is not binary.
 void merge_store(const std::string& store, const std::string& output, const MergeOptions& options,
                  Run& run);
 
@@ -82,7 +82,7 @@ void merge_store(const std::string& store, const std::string& output, const Merg
 //
 // The raster is in the CRS of the manifest's georeference, else in the frame of the points. Pixels
 // are columns of voxels: their axes are the lattice's x and y axes, projected to the horizontal
-// plane. pixel_size_m 0: the map's voxel size. Throws Error if the manifest has no voxel size, and
+// plane. pixel_size_m 0: the map's voxel size; throws Error if the manifest has none. Throws also
 // the errors of make_map_raster.
 libmap::MapRaster raster_of(const libmap::CloudParts& parts, const libmap::Manifest& manifest,
                             double pixel_size_m);

@@ -34,7 +34,7 @@ libmap::Pose read_matrix(const fs::path& path) {
   const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
   if (!(rotation.transpose() * rotation).isApprox(Eigen::Matrix3d::Identity(), tolerance) ||
       !(rotation.determinant() > 0.0) || matrix.row(3) != Eigen::RowVector4d(0, 0, 0, 1))
-    throw libmap::Error("the matrix is not a rotation and translation", {.file = file});
+    throw libmap::Error("not a rigid transform (rotation and translation)", {.file = file});
   libmap::Pose pose = libmap::Pose::Identity();
   pose.linear() = libmap::nearest_rotation(rotation);
   pose.translation() = matrix.topRightCorner<3, 1>();

@@ -21,9 +21,10 @@ std::string transform_text(const libmap::Pose& pose);
 // if a minimum is above its maximum or the text has another form.
 std::optional<libmap::Bounds3d> parse_box(const std::string& text);
 
+// Returns true if the point is inside the box or on it, or if there is no box.
 bool is_inside(const std::optional<libmap::Bounds3d>& box, const Eigen::Vector3d& point);
 
-// Returns the points in the box. Throws Error naming `file` if there are none.
+// Returns the points for which is_inside is true. Throws Error naming `file` if there are none.
 libmap::PointCloud part_in_box(const libmap::PointCloud& cloud,
                                const std::optional<libmap::Bounds3d>& box, const std::string& file);
 

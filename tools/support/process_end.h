@@ -14,7 +14,7 @@ namespace graspmap_tools {
 // (failed) if no pipe can be created.
 void end_cleanly_on_signals();
 
-// Does not return if such a signal was received, because later errors are caused by it.
+// Waits for the end of the process if such a signal was received, which causes errors afterwards.
 void exit_if_signaled();
 
 // Flushes standard output. Throws Error (failed) if not all of it was written.

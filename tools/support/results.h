@@ -1,4 +1,4 @@
-// Converts the results of stages to JSON for output, and stores results of finished tiles as JSON.
+// Converts results of stages to JSON for output, and results of finished tiles to JSON and back.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -16,17 +16,17 @@ nlohmann::ordered_json to_json(const libmap::ResultTable& table);  // missing va
 inline nlohmann::ordered_json numbers_json(const Eigen::Vector3d& position) {
   return {position.x(), position.y(), position.z()};
 }
-// Returns the bounding box; null if there are no positions.
+// Returns the bounding box as {"min": [x, y, z], "max": ...}; null if there are no positions.
 inline nlohmann::ordered_json bounds_json(const std::vector<Eigen::Vector3d>& positions) {
   if (positions.empty()) return nullptr;
   const libmap::Bounds3d bounds = libmap::bounds_of(positions);
   return {{"min", numbers_json(bounds.min)}, {"max", numbers_json(bounds.max)}};
 }
 
-// Prints to standard output; invalid UTF-8 is replaced.
+// Prints JSON to standard output, with replacement characters for invalid UTF-8.
 void print_json(const nlohmann::ordered_json& json);
 
-// Converts the results of a tile that are merged over tiles (Merge) to JSON, and back.
+// Convert those results of a tile that are merged over tiles (Merge) to JSON, and back.
 template <typename Result>
 nlohmann::json tile_json_of(const Result& result) {
   nlohmann::json data;

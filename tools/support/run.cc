@@ -29,7 +29,7 @@ std::optional<libmap::Manifest> own_manifest_of(const fs::path& output) {
 
 bool written_by_this_toolkit(const fs::path& output) { return own_manifest_of(output).has_value(); }
 
-// Throws Error if a file of the user has the manifest's path.
+// Throws Error if a file that is no manifest of this toolkit has the manifest's path.
 void require_no_foreign_manifest(const fs::path& output) {
   const fs::path manifest = libmap::manifest_path(output);
   if (fs::exists(manifest) && !written_by_this_toolkit(output))

@@ -1,5 +1,5 @@
-// One run of a command: messages, timings and outputs with manifests. Also includes the headers of
-// the standard library, fmt and libmap/core that nearly all commands need.
+// Represents one run of a command: messages, timings, and outputs with manifests. Also includes the
+// headers of the standard library, fmt and libmap/core that nearly all commands need.
 #pragma once
 
 #include <fmt/format.h>
@@ -34,12 +34,13 @@ std::string sanitize_text(const std::string& text);
 // Removes a trailing slash: "maps/" and "maps" are the same folder with the same manifest.
 std::string without_trailing_slash(std::string path);
 
+// Values of the flags that all commands have.
 struct RunOptions {
   bool dry_run = false;
   bool force = false;
   bool quiet = false;
   bool verbose = false;
-  unsigned threads = 0;
+  unsigned threads = 0;  // number of threads, for the manifest
 };
 
 class Run {
@@ -52,8 +53,8 @@ class Run {
 
   void add_results(const libmap::ResultTable& table) { manifest_.add_results(table); }
 
-  // Adds an input with hash to the manifest; for a folder, each file. Paths of the toolkit's data
-  // are relative, so that the manifest does not depend on the installation.
+  // Adds an input with hash to the manifest; for a folder, each file directly in it. Paths in the
+  // toolkit's data folder become relative to it, so that they do not depend on the installation.
   void add_input(const std::filesystem::path& path);
 
   // Print to stderr: `info` without --quiet, `warn` always, `detail` with --verbose.
@@ -79,13 +80,13 @@ class Run {
     const Timing timing(*this, name);
     return step();
   }
-  // Adds times that a stage measured itself, as "STAGE: STEP"; shown with --verbose.
+  // Adds the times of steps that a stage measured, as "STAGE: STEP"; --verbose prints them.
   void add_timings(const std::vector<std::pair<std::string, double>>& timings_s,
                    const std::string& stage = {});
 
-  // Reserves the output for this process until the end of the run; called before the work. Throws
-  // Error if `path` is one of the inputs, exists and was not written by this toolkit (unless
-  // --force), cannot be written, or is reserved by another process.
+  // Claims (reserves) the output for this process until the end of the run; called before the work.
+  // Throws Error if `path` is one of the inputs, exists and was not written by this toolkit (unless
+  // --force), cannot be written, or is claimed by another process.
   void claim_output(const std::filesystem::path& path, const std::vector<std::string>& inputs = {});
 
   // Calls writer(temporary), which writes the file, then moves the file to `path` together with the
@@ -113,7 +114,7 @@ class Run {
   // Claim and write a folder of any number of files: writer(temporary) fills a temporary folder,
   // which then replaces `folder`. Throw Error, even with --force, if `folder` contains other files
   // than `names` or is one of the inputs. With --dry-run the writer gets an empty path and nothing
-  // is written. check_output_tree only checks, without `names`, for folders of several runs.
+  // is written. check_output_tree makes all checks but that of `names`, and claims nothing.
   void check_output_tree(const std::filesystem::path& folder,
                          const std::vector<std::string>& inputs = {});
   void claim_output_tree(const std::filesystem::path& folder, const std::vector<std::string>& names,

@@ -39,7 +39,7 @@ std::string sources_in(const libmap::PoseGraph& graph) {
   for (const PoseSource source : sources)
     if (!libmap::trajectory_of(graph, source).empty())
       names += (names.empty() ? "" : ", ") + to_text(source);
-  return names.empty() ? "no poses" : names;
+  return names.empty() ? "none" : names;
 }
 
 libmap::Trajectory poses_in_file(const PosesOption& poses, const libmap::ScanSource& scan,
@@ -56,11 +56,11 @@ libmap::Trajectory poses_in_file(const PosesOption& poses, const libmap::ScanSou
   for (const std::string& warning : imported.warnings) run.warn("{}: {}", file, warning);
   run.info("{} of {} poses belong to nodes of the scan",
            imported.poses_in_file - imported.trajectory.unmatched, imported.poses_in_file);
-  if (imported.scale != 1.0) run.info("scaled by {:.9g}", imported.scale);
+  if (imported.scale != 1.0) run.info("poses scaled by {:.9g}", imported.scale);
   run.add_results(
       {{"poses_in_file", imported.poses_in_file}, {"poses_scale_taken", imported.scale}});
   if (imported.max_rig_deviation_m > 0.0) {
-    run.info("cameras of one node agree within {:.1f} mm", 1e3 * imported.max_rig_deviation_m);
+    run.info("camera poses of a node agree within {:.1f} mm", 1e3 * imported.max_rig_deviation_m);
     run.add_results({{"largest_rig_deviation_m", imported.max_rig_deviation_m}});
   }
   return std::move(imported.trajectory.poses);
@@ -82,7 +82,7 @@ libmap::Trajectory wanted_poses(const libmap::ScanSource& scan, const PosesOptio
                         {.file = scan.path().string(),
                          .field = "--poses",
                          .value = wanted.source,
-                         .bound = "a source of the scan: " + sources_in(scan.graph())});
+                         .bound = "one of those that it contains: " + sources_in(scan.graph())});
   return poses;
 }
 
@@ -135,8 +135,8 @@ std::vector<std::string> scan_inputs(const std::string& scan, const PosesOption&
 void add_calibration_option(Command& command, CalibrationOption& calibration) {
   command.option(
       "--calibration", "auto|stored|FILE.yaml", calibration.source,
-      "camera calibration: that stored in the scan, or a file of refine --write-calibration; auto: "
-      "the one with which the poses were estimated, else the stored one");
+      "camera calibration; stored: from the scan; a file: by refine --write-calibration; auto: "
+      "the calibration with which the poses were estimated, else the stored one");
 }
 
 std::optional<libmap::CameraFile> known_camera(const CalibrationOption& calibration,
@@ -155,7 +155,7 @@ std::optional<libmap::CameraFile> known_camera(const CalibrationOption& calibrat
     const auto* text = made ? std::get_if<std::string>(made->find_result(camera_result)) : nullptr;
     if (text == nullptr) return std::nullopt;
     if (fs::is_regular_file(scan) && !is_input_of(*made, scan)) {
-      run.info("camera of {}: not applied, because the file is from another scan", name);
+      run.info("camera of {}: not applied, because the poses are from another scan", name);
       return std::nullopt;
     }
     camera = libmap::parse_camera(*text, libmap::manifest_path(name).string());

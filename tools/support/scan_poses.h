@@ -1,4 +1,4 @@
-// Opens a scan and selects poses and camera by the options --poses and --calibration.
+// Opens a scan, and selects its poses and camera by the options --poses and --calibration.
 #pragma once
 
 #include <optional>
@@ -32,15 +32,15 @@ struct CalibrationOption {
 };
 void add_calibration_option(Command& command, CalibrationOption& calibration);
 
-// Returns the camera that the option selects, and reports calibration findings; nullopt for the
-// stored camera. Throws Error if the file cannot be read.
+// Returns the camera that the option selects, and reports the findings of its calibration; nullopt
+// for the stored camera. Throws Error if the file cannot be read.
 std::optional<libmap::CameraFile> known_camera(const CalibrationOption& calibration,
                                                const std::string& scan, const PosesOption& poses,
                                                Run& run);
 // Adds the camera to the run's manifest, for poses that were estimated with it.
 void add_camera(const libmap::CameraFile& camera, Run& run);
 
-// Opens a scan, with `camera` applied to the frames. Parts that cannot be read are reported as
+// Opens a scan; `camera` replaces the stored cameras. Parts that cannot be read are reported as
 // warnings. Throws Error for such parts if `strict`, and for a scan without nodes.
 std::unique_ptr<libmap::ScanSource> open_scan(const std::string& scan, bool strict, Run& run,
                                               const std::optional<libmap::CameraFile>& camera = {});
@@ -49,14 +49,13 @@ std::unique_ptr<libmap::ScanSource> open_scan(const std::vector<std::string>& sc
                                               Run& run,
                                               const std::optional<libmap::CameraFile>& camera = {});
 
-// Returns the poses (world_from_base, m) that the option selects, by ascending node. "auto" is
-// replaced by the selected source, which is reported and added to the manifest. Warns of nodes
-// without a pose. Throws Error if there are no such poses or, if `strict`, for nodes without a
-// pose.
+// Returns the poses (world_from_base, m) that the option selects, by ascending node. The source
+// replaces "auto" in `poses`, and is added to the manifest. Warns of nodes without a pose. Throws
+// Error if there are no such poses or, if `strict`, for nodes without a pose.
 libmap::Trajectory find_poses(const libmap::ScanSource& scan, PosesOption& poses, bool strict,
                               Run& run);
 
-// Returns true if, by the manifest, `refine` wrote the file of poses.
+// Returns true if the poses are from a file that, by its manifest, `refine` wrote.
 bool are_refined(const PosesOption& poses);
 
 // Returns the scan's true poses. Throws Error if it has none.

@@ -1,4 +1,4 @@
-// Entry points of subcommands with separate source files. argv begins at the command.
+// Entry points of subcommands in separate source files. argv begins at the command.
 #pragma once
 
 #include <string>
@@ -21,7 +21,7 @@ int simulate_terrain(int argc, char** argv);
 // Returns true for a path that convert_world writes: a name that ends in .world.
 bool is_world_path(const std::string& path);
 
-// Returns true for a scan that convert_scan accepts: a database or a folder of frames.
+// Returns true for a possible scan: a name *.db, or a folder that is no tile store and no poses.
 bool is_scan_path(const std::string& path);
 
 }  // namespace graspmap_tools

@@ -16,7 +16,7 @@ TileFolder::TileData parse_tile_data(const std::string& text, const fs::path& fi
   }
 }
 
-// Replaces invalid UTF-8, which names of files may contain.
+// Text of the JSON, with replacement characters for invalid UTF-8, which file names may contain.
 std::string json_text(const TileFolder::TileData& json) {
   return json.dump(-1, ' ', false, TileFolder::TileData::error_handler_t::replace);
 }

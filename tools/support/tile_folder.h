@@ -21,7 +21,7 @@
 
 namespace graspmap_tools {
 
-// Last part of an output's option text.
+// End of the option text of an output that may be a folder of tiles.
 inline constexpr const char* or_tile_folder = ", or a folder of tiles (no extension)";
 
 // Returns true if the output is a folder of tiles: a name without extension.
@@ -29,7 +29,7 @@ inline bool is_tile_folder(const std::string& output) {
   return std::filesystem::path(without_trailing_slash(output)).extension().empty();
 }
 
-// Returns the names that the folder may contain: tiles of an earlier run and of this run.
+// Returns the file names that the folder may contain: tiles of an earlier run and of this run.
 inline std::vector<std::string> tile_folder_names(
     const std::string& output, const std::vector<std::filesystem::path>& tiles = {},
     const std::string& extension = {}) {
@@ -49,13 +49,13 @@ class TileFolder {
   using TileData = nlohmann::json;
 
   // Claims the folder `output` unless the run makes one of several shares. `names` and `inputs` are
-  // defined by Run::claim_output_tree. The manifest of `run` must have parameters and inputs.
+  // as in Run::claim_output_tree. The manifest of `run` must have parameters and inputs.
   // Throws Error for a share with --force, which deletes all tiles, and for a share with other
   // parameters or inputs than the earlier shares.
   TileFolder(const std::string& output, const std::vector<std::string>& names,
              const std::vector<std::string>& inputs, const libmap::TileShare& share, Run& run);
 
-  // Returns true, and reports it, if runs with equal parameters and inputs completed the folder.
+  // Returns true, and reports it, if shares with equal parameters and inputs completed the folder.
   bool is_complete() const;
 
   // Begins the run and returns the data common to all tiles; null with --dry-run. The first share
@@ -66,7 +66,7 @@ class TileFolder {
 
   struct Work {
     std::vector<std::string> tiles;  // names of the tiles of all shares, without extension
-    std::string extension;           // of the files of tiles
+    std::string extension;           // extension of the tiles' files, e.g. ".ply"
     // Computes the n-th tile, writes it to `to` unless empty, and returns its data, a JSON object.
     std::function<TileData(std::size_t n, const std::filesystem::path& to)> make;
     // Fills the output with the finished tiles.
@@ -77,7 +77,7 @@ class TileFolder {
   // is made. Throws Error (failed) if another process works on this share.
   void make(const Work& work);
 
-  // Data and file of a finished tile, for Work::finish.
+  // Return the data and the file of a finished tile, for Work::finish.
   TileData tile_data(const std::string& tile) const;
   std::filesystem::path file(const std::string& tile, const std::string& extension) const {
     return store_.tiles() / (tile + extension);

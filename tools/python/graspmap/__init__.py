@@ -1,22 +1,22 @@
 """Graspability maps for robots that climb with spined grippers, on NumPy arrays.
 
-Each function is a stage of the command line of the same name, with the same options by the same
+Each function is a stage of the command with the same name, and has the same options with the same
 names, units and bounds: as keyword arguments (``voxel_size_m=0.01``), or in a dict `options`, in which
-a dict is a section as in YAML (``{"gripper": {"opening_angle_deg": 80}}``). Keyword arguments are
-stronger. ``options("score")`` lists them.
+a dict is a section as in YAML (``{"gripper": {"opening_angle_deg": 80}}``). Keyword arguments take
+precedence. ``options("score")`` lists the options of `score`.
 
-Lengths are meters. Where a cloud is expected, an array (N, 3) of positions is accepted; where a mesh
-is expected, a pair of vertices (V, 3) and triangles (T, 3). An argument of a wrong type, shape or
-value, an unknown and a missing one is an `Error` whose `field` names it.
+Lengths are in meters. A cloud may be given as an array (N, 3) of positions, a mesh as a pair of
+vertices (V, 3) and triangles (T, 3). An argument that is unknown, missing, or of a wrong type, shape
+or value raises an `Error` whose `field` names the argument.
 
 Arrays of clouds, meshes, frames and poses are read-only views of their memory and keep it alive.
-Results do not depend on the number of threads, and are those of the command line to the bit.
+Results do not depend on the number of threads, and are identical to those of the command line.
 
-Long calls let other Python threads run. They take `threads` (0: all processors) and
-``progress(stage, done, total)``, which is called at most ten times a second, from any thread; an
-exception that it raises ends the call.
+Long calls let other Python threads run. Their parameters are `threads` (0: all processors) and
+``progress(stage, done, total)``, a function that is called at most ten times a second, from any
+thread. If it raises an exception, the call ends with this exception.
 
-Examples in docstrings assume ``import graspmap`` and ``import numpy as np``; their scan.db is that of
+Examples in docstrings assume ``import graspmap`` and ``import numpy as np``. The file scan.db is from
 the manual.
 """
 

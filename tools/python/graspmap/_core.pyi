@@ -1,5 +1,5 @@
-"""Types and documentation of the extension module. The docstrings of the classes are those at run
-time: class_documentation.py passes them to the C++ sources."""
+"""Types and documentation of the extension module. class_documentation.py passes the docstrings of
+the classes to the C++ sources, which use them at run time."""
 
 from os import PathLike
 from typing import Any, Callable
@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 class Cloud:
     """Cloud of points; a map is a cloud of its voxels.
 
-    A cloud does not change. A changed one is made of arrays, or by ``cloud[index]`` with N truth
-    values, K indices or a slice. Its arrays are read-only views of its memory.
+    A cloud is immutable; its arrays are read-only views of its memory. ``cloud[index]`` returns a new
+    cloud of the points at a slice, N truth values or K indices.
 
     Parameters
     ----------
@@ -22,9 +22,9 @@ class Cloud:
     colors : array_like of uint8, shape (N, 3), optional
         Red, green and blue.
     fields : dict of array_like, shape (N,), optional
-        Values of each field by name. Files store them as the given type.
+        Values of each field by name. Files store the numbers with the array's type.
     viewpoint : array_like, shape (4, 4), optional
-        Rigid transform cloud_from_sensor, m.
+        Pose of the sensor: rigid transform cloud_from_sensor, m. Default: identity, for unknown.
 
     Raises
     ------
@@ -86,15 +86,14 @@ class Cloud:
         array([[0. , 0. , 0.5]])
         """
     def __getitem__(self, index: slice | ArrayLike) -> Cloud:
-        """Selects points by a slice, N truth values or K indices: a new cloud."""
+        """Returns a new cloud of the points at a slice, N truth values or K indices."""
     def __len__(self) -> int:
         """Number of points."""
 
 class Mesh:
     """Triangle mesh.
 
-    A mesh does not change. A changed one is made of arrays. Its arrays are read-only views of its
-    memory.
+    A mesh is immutable; its arrays are read-only views of its memory.
 
     Parameters
     ----------
@@ -114,7 +113,7 @@ class Mesh:
     Raises
     ------
     Error
-        If an array has a wrong shape, length or type, or an index is not that of a vertex.
+        If an array has a wrong shape, length or type, or an index is not below V.
 
     Examples
     --------
@@ -150,8 +149,8 @@ class Mesh:
 class Camera:
     """Pinhole camera, from `Frame.cameras`.
 
-    A point (x, y, z) of the optical frame (x right, y down, z forward) is seen at the pixel
-    u = fx * x/z + cx, v = fy * y/z + cy, after OpenCV's terms of distortion.
+    A point (x, y, z) in the optical frame (x right, y down, z forward) has the pixel coordinates
+    u = fx * x/z + cx and v = fy * y/z + cy, where OpenCV's distortion was applied to x/z and y/z.
 
     Examples
     --------
@@ -214,8 +213,8 @@ class Frame:
         """Red, green and blue: array (height, width, 3) of uint8, or None."""
     @property
     def depth(self) -> NDArray[np.float32] | None:
-        """Distance from the camera's plane, m, 0 where nothing was measured: array (height, width)
-        of float32, or None."""
+        """Depth along the optical axis, m, 0 where nothing was measured: array (height, width) of
+        float32, or None."""
     @property
     def right(self) -> NDArray[np.uint8] | None:
         """Right image of a stereo pair: array (height, width) of uint8, or None."""
@@ -271,7 +270,7 @@ class Scan:
         """Path of the database or folder."""
     @property
     def warnings(self) -> list[str]:
-        """Warnings of opening the scan."""
+        """Warnings about parts of the scan that could not be read when it was opened."""
     @property
     def nodes(self) -> NDArray[np.int32]:
         """Numbers of the nodes, ascending: array (N,) of int32."""
@@ -287,7 +286,7 @@ class Scan:
         Parameters
         ----------
         source : {'auto', 'optimized', 'odometry', 'ground-truth'}
-            Source of the poses. 'auto' is the first of the others that the scan has.
+            Source of the poses; 'auto': the first of the other sources that the scan has.
 
         Returns
         -------
@@ -336,7 +335,7 @@ class Scan:
     def __len__(self) -> int:
         """Number of nodes."""
 
-# The stages as _stages.py and _files.py call them; a result's fields as a dict.
+# Functions that _stages.py and _files.py call; stages return the fields of their results as a dict.
 _Path = str | PathLike[str]
 _Progress = Callable[[str, int, int], None] | None
 _Cloud = Cloud | ArrayLike

@@ -1,11 +1,11 @@
-"""The exception of the module, in a file of its own: the extension module imports it."""
+"""The exception of the module, in a separate file, because the extension module imports it."""
 
 
 class Error(Exception):
-    """Error of a stage or a file, with the parts of its message.
+    """Error of a stage or a file, with the parts of its message as attributes.
 
     ``str(error)`` is the line that the commands print: "FILE: FIELD is VALUE: REASON (must be
-    BOUND)". Parts that are unknown are empty.
+    BOUND)". A part that does not apply is empty.
 
     Attributes
     ----------
@@ -14,14 +14,14 @@ class Error(Exception):
     file : str
         Path of the file.
     field : str
-        Parameter, option, column or key.
+        Name of the parameter, option, column or key.
     value : str
         Given value, or the shape and type of a given array.
     bound : str
         Accepted values.
     kind : {'bad_input', 'failed'}
         bad_input: a file, an argument or data cannot be used (exit code 3 of the commands). failed:
-        the run itself went wrong, for instance on a full disk (exit code 1).
+        the run itself failed, for example because of a full disk (exit code 1).
 
     Examples
     --------

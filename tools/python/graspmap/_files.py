@@ -23,7 +23,7 @@ Options = Mapping[str, Any] | None
 
 
 def merged(options: Options, values: Mapping[str, Any]) -> Any:
-    """Options as a dict; keyword arguments are stronger. The extension module rejects other types."""
+    """Returns one dict; keyword arguments take precedence. The extension module rejects other types."""
     if options is None or isinstance(options, Mapping):
         return {**(options or {}), **values}
     return options
@@ -32,7 +32,7 @@ def merged(options: Options, values: Mapping[str, Any]) -> Any:
 def open_scan(path: Path, calibration: Path | None = None) -> Scan:
     """Opens a scan: a database of RTAB-Map, or a folder in the layout of the TUM RGB-D benchmark.
 
-    Images are decoded by `Scan.frame`.
+    Images are decoded later, by `Scan.frame`.
 
     Parameters
     ----------
@@ -69,10 +69,10 @@ def read_poses(path: Path, scan: Scan | None = None, *, options: Options = None,
     path : path
         File of poses, or folder of a COLMAP model.
     scan : Scan, optional
-        Scan that the poses are assigned to, as by `graspmap fuse --poses FILE`. Without it, nodes and
-        times are those of the file, or 0.
+        Scan to whose nodes the poses are assigned, as by `graspmap fuse --poses FILE`. Default: nodes
+        and times are from the file, or 0.
     options : mapping, optional
-        Options by name; keyword arguments are stronger.
+        Options by name; keyword arguments take precedence.
     **values
         Options, see Other Parameters.
 
@@ -96,7 +96,7 @@ def read_poses(path: Path, scan: Scan | None = None, *, options: Options = None,
 
 
 def write_poses(path: Path, poses: Poses, *, nodes: bool = False) -> None:
-    """Writes poses to a file, whole or not at all, without a manifest.
+    """Writes poses to a file without a manifest. After an error, there is no incomplete file.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def write_poses(path: Path, poses: Poses, *, nodes: bool = False) -> None:
     poses : Poses
         Poses to write.
     nodes : bool
-        True to write the node as a ninth column of .tum.
+        True to write the node's number as a ninth column of a .tum file.
 
     Raises
     ------
@@ -224,7 +224,7 @@ def read_manifest(path: Path) -> dict[str, Any] | None:
     Parameters
     ----------
     path : path
-        Output; its manifest is PATH.json.
+        Output of a command; its manifest is PATH.json.
 
     Returns
     -------

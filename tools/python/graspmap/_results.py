@@ -1,4 +1,4 @@
-"""Results of the stages: objects, beside the numbers and texts that the libraries describe."""
+"""Results of the stages: objects, in addition to the numbers and texts that the libraries describe."""
 
 import dataclasses
 from typing import Any, Literal
@@ -55,16 +55,17 @@ class RefineResult(_fields.RefineFields, Result):
     nodes_without_pose : list of int
         Nodes that are not connected to the largest component of the pose graph.
     nodes_without_links : list of int
-        Nodes without links; their poses follow the start.
+        Nodes without links; the graph does not refine their poses.
     skipped : list of (int, str)
-        Nodes whose images could not be used, and why.
+        Nodes whose images could not be used, each with the reason.
     stages : list of dict
-        Entry of each stage: name, rejected, seconds, figures; held_out_matches and held_out_surfaces
-        (before, after); trajectory_rmse_m and trajectory_rotation_error_deg of a scan with truth.
+        Entry of each stage: name, rejected (True if its poses were not used), seconds, figures (dict of
+        metrics); held_out_matches and held_out_surfaces (costs before and after the stage);
+        trajectory_rmse_m and trajectory_rotation_error_deg if the scan has true poses.
     findings : list of str
-        Findings about the sensor.
+        Findings about the sensor, one sentence each.
     warnings : list of str
-        Warnings.
+        Warnings of the refinement.
     """
 
     poses: Poses
@@ -87,9 +88,9 @@ class FuseResult(_fields.FuseFields, Result):
         frame has them, and the fields views and expected_error (one standard deviation along the
         normal, m).
     poses : Poses
-        Poses that the frames were fused with.
+        Poses with which the frames were fused, after registration.
     skipped : list of (int, str)
-        Nodes whose images could not be used, and why.
+        Nodes whose images could not be used, each with the reason.
     timings_s : dict of float
         Time of each step, s.
     """
@@ -107,11 +108,11 @@ class NormalsResult(Result):
     Attributes
     ----------
     cloud : Cloud
-        The cloud with N unit normals; a normal that is undefined is zero.
+        The cloud with N unit normals; an undefined normal is zero.
     undefined : int
         Number of normals that are zero.
     oriented_by : str
-        Source of the side that normals point to.
+        Criterion that determined the side to which the normals point.
     """
 
     cloud: Cloud
@@ -128,7 +129,7 @@ class MeshResult(_fields.MeshFields, Result):
     mesh : Mesh
         Surface with vertex normals and the face field filled: 1 on triangles that close holes.
     holes_filled : int
-        As filled_holes.
+        Number of filled holes; equals filled_holes.
     timings_s : dict of float
         Time of each step, s.
     """
@@ -147,7 +148,7 @@ class ResampleResult(_fields.ResampleFields, Result):
     cloud : Cloud
         Samples with the normals, colors and fields of the surface.
     count_reached : bool
-        False if a number of samples was requested and could not be reached.
+        False if a number of samples was requested and not reached.
     timings_s : dict of float
         Time of each step, s.
     """
@@ -171,11 +172,11 @@ class ScoreResult(_fields.ScoreFields, Result):
     terrain_from_input : array, shape (4, 4), float64
         Rigid transform from the frame of the input to the terrain frame, m.
     zero_plane_m : float or None
-        Height of the zero plane in the terrain frame, m; None without one.
+        Height of the zero plane in the terrain frame, m; None if there is no zero plane.
     voxel_size_m : float
         Side of the voxels, m.
     obstacle_voxels : int
-        Voxels with obstacles.
+        Number of voxels that are obstacles.
     timings_s : dict of float
         Time of each step, s.
     """
@@ -200,7 +201,7 @@ class GraspResult(Result):
     hold_probability : array, shape (N,), float64
         Share of the trials that hold the load.
     hold_low, hold_high : array, shape (N,), float64
-        Wilson's interval of the probability, 95 %.
+        Limits of Wilson's 95 % interval of the probability.
     force_n : array, shape (N, 3), float64
         Quantiles 0.1, 0.5 and 0.9 of the holding force over the trials, N.
     force_range_n : array, shape (N, 2), float64
@@ -210,9 +211,9 @@ class GraspResult(Result):
     parameter_spread : array, shape (N,), float64
         Standard deviation of ln(force) between parameter sets.
     best_force_n : array, shape (N, 3), float64
-        As force_n, with the best sharing of the load between the fingers, N.
+        As force_n, but with the best distribution of the load over the spines, N.
     unseen : array, shape (N,), float64
-        Share of unseen ground under the fingers.
+        Mean share of unseen ground under the fingers.
     trials : array, shape (N,), int64
         Number of trials.
     directions : list of str
@@ -220,7 +221,7 @@ class GraspResult(Result):
     pull_limits_n : array, shape (N, 17), float64, or None
         Pull that nine of ten trials hold in each direction, N; None without `pull_limits`.
     columns : dict of list of str
-        Table as `graspmap grasp` writes it, by column.
+        Columns of the table that `graspmap grasp` writes, by name.
     """
 
     holds: NDArray[np.bool_]
@@ -248,11 +249,11 @@ class LookupResult(Result):
     found : array, shape (N,), bool
         True if the map has a value at the point.
     distance_m : array, shape (N,), float64
-        Distance to the nearest map point, found or not, m.
+        Distance to the nearest map point, m, even if found is False.
     map_point : array, shape (N,), int64
-        Index of the map point that the values are from.
+        Index of the map point with the values; of the nearest one if the values are means or not found.
     values : dict of array, shape (N,), float64
-        Values of each field by name; NaN where nothing was found.
+        Values of each field by name; NaN where found is False.
     """
 
     found: NDArray[np.bool_]
@@ -285,7 +286,7 @@ class EvaluateResult(Result):
     Attributes
     ----------
     areas : dict of float or None
-        Area under the ROC curve of each column, by trapezoids; None without both classes.
+        Area under the ROC curve of each column, by trapezoids; None unless both labels occur.
     summary : dict
         Content of summary.json of the command.
     summary_json : str

@@ -59,11 +59,13 @@ def refine(scan: Scan, *, known_lengths: Sequence[str] = (), board: str | None =
     scan : Scan
         Scan with images, depth and cameras.
     known_lengths : sequence of str
-        Distances of pixels, m: "NODE:X:Y-NODE:X:Y=METERS" each, as --known-length.
+        Measured distances between two points, each given by node and pixel of its image:
+        "NODE:X:Y-NODE:X:Y=METERS", as --known-length.
     board : str, optional
-        Chessboard in the images, "COLUMNSxROWS:METERS", as --board.
+        Static chessboard in the scene: numbers of inner corners and side of a square,
+        "COLUMNSxROWS:METERS", as --board.
     options : mapping, optional
-        Options by name; keyword arguments are stronger.
+        Options by name; keyword arguments take precedence.
     progress : callable, optional
         Function of (stage, done, total).
     threads : int
@@ -104,7 +106,7 @@ def fuse(scan: Scan, poses: Poses | None = None, *, options: Options = None,
     poses : Poses, optional
         Poses of the frames, for example `RefineResult.poses`. Default: ``scan.poses()``.
     options : mapping, optional
-        Options by name; keyword arguments are stronger.
+        Options by name; keyword arguments take precedence.
     progress : callable, optional
         Function of (stage, done, total).
     threads : int
@@ -143,7 +145,7 @@ def estimate_normals(cloud: CloudLike, *, options: Options = None, threads: int 
     cloud : Cloud or array_like, shape (N, 3)
         Points, m; normals are ignored.
     options : mapping, optional
-        Options by name; keyword arguments are stronger.
+        Options by name; keyword arguments take precedence.
     threads : int
         Number of threads; 0: all processors.
     **values
@@ -174,14 +176,14 @@ def mesh(cloud: CloudLike, *, options: Options = None, progress: _Progress = Non
          threads: int = 0, **values: Unpack[_options.MeshOptions]) -> MeshResult:
     """Reconstructs a surface from a cloud with normals and cleans it.
 
-    `graspmap mesh` estimates missing normals; here `estimate_normals` does.
+    The command `graspmap mesh` estimates missing normals; here, call `estimate_normals` first.
 
     Parameters
     ----------
     cloud : Cloud
         Points, m, with unit normals that point out of the ground.
     options : mapping, optional
-        Options by name; keyword arguments are stronger.
+        Options by name; keyword arguments take precedence.
     progress : callable, optional
         Function of (stage, done, total).
     threads : int
@@ -220,7 +222,7 @@ def resample(mesh: MeshLike, *, options: Options = None,  # pylint: disable=rede
     mesh : Mesh or pair of array_like, shapes (V, 3) and (T, 3)
         Surface: a Mesh, or vertices, m, and triangles.
     options : mapping, optional
-        Options by name; keyword arguments are stronger.
+        Options by name; keyword arguments take precedence.
     progress : callable, optional
         Function of (stage, done, total).
     threads : int
@@ -259,11 +261,12 @@ def score(terrain: CloudLike, *, scenario: str | None = None, up: ArrayLike | No
     terrain : Cloud or array_like, shape (N, 3)
         Points of the ground, m.
     scenario : str, optional
-        Name of a scenario, or its file, as --config; options are stronger.
+        Name of a scenario, or its file, as --config; options take precedence.
     up : array_like, shape (3,), optional
-        Direction in the cloud's frame that points out of the ground. Default: found as by --up auto.
+        Direction in the cloud's frame that points out of the ground. Default: as --up auto, by the
+        viewpoint, the normals or the z axis.
     options : mapping, optional
-        Options by name; keyword arguments are stronger.
+        Options by name; keyword arguments take precedence.
     progress : callable, optional
         Function of (stage, done, total).
     threads : int
@@ -307,15 +310,16 @@ def grasp(mesh: MeshLike, points: ArrayLike, *,  # pylint: disable=redefined-out
     points : array_like, shape (N, 3)
         Locations on the surface, m.
     surface_error : float or 'mesh', optional
-        Standard deviation of the surface, m; 'mesh': its vertex field expected_error. Default: exact.
+        Standard deviation of the surface's error, m; 'mesh': the vertex field expected_error of
+        `mesh`. Default: the surface is exact.
     more_loads_n : sequence of float
-        Further loads with a verdict each, N.
+        Additional loads to test, N; their results are in `GraspResult.columns`.
     sequential : bool
-        True to end the test of a location when its verdict is clear.
+        True to end the test of a location as soon as its verdict is certain.
     pull_limits : bool
-        True to compute the pull that each of 17 directions holds.
+        True to compute the force that nine of ten trials hold, for each of 17 directions.
     options : mapping, optional
-        Options by name; keyword arguments are stronger.
+        Options by name; keyword arguments take precedence.
     progress : callable, optional
         Function of (stage, done, total).
     threads : int
@@ -353,11 +357,11 @@ def lookup(map: CloudLike, points: ArrayLike, *,  # pylint: disable=redefined-bu
     Parameters
     ----------
     map : Cloud or array_like, shape (M, 3)
-        Map, m.
+        Map with its fields; positions in m.
     points : array_like, shape (N, 3)
         Points in the map's frame, m.
     options : mapping, optional
-        Options by name; keyword arguments are stronger.
+        Options by name; keyword arguments take precedence.
     threads : int
         Number of threads; 0: all processors.
     **values
@@ -390,12 +394,12 @@ def footholds(map: CloudLike, *,  # pylint: disable=redefined-builtin
     Parameters
     ----------
     map : Cloud
-        Map with the fields of `score`, m.
+        Map with the fields of `ScoreResult.map`; positions in m.
     up : array_like, shape (3,)
         Direction in the map's frame that points out of the ground; the default is right for maps in
         the terrain frame.
     options : mapping, optional
-        Options by name; keyword arguments are stronger.
+        Options by name; keyword arguments take precedence.
     threads : int
         Number of threads; 0: all processors.
     **values
@@ -432,7 +436,7 @@ def _cell(value: Any) -> str:
 
 
 def _cells(column: Any) -> Any:
-    """Texts of a column. The extension module rejects all that is not a column."""
+    """Texts of a column. Returns other types unchanged, which the extension module rejects."""
     if isinstance(column, str) or not isinstance(column, Iterable) or getattr(
             column, "ndim", 1) != 1:
         return column
@@ -442,16 +446,16 @@ def _cells(column: Any) -> Any:
 def evaluate(table: Mapping[str, Sequence[Any]], *, scores: Sequence[str] = (),
              options: Options = None, threads: int = 0,
              **values: Unpack[_options.EvaluateOptions]) -> EvaluateResult:
-    """Evaluates columns of scores against the labels in a table: ROC, areas, rates.
+    """Evaluates columns of scores against the labels in a table: ROC curves, areas, rates.
 
     Parameters
     ----------
     table : mapping of array_like, shape (N,)
         Columns by name: a dict, or a data frame of pandas. None, NaN and "" are missing values.
     scores : sequence of str
-        Columns to evaluate. Default: all that contain scores, as by the command.
+        Columns to evaluate. Default: all numeric columns that are no ids, positions or lengths.
     options : mapping, optional
-        Options by name; keyword arguments are stronger.
+        Options by name; keyword arguments take precedence.
     threads : int
         Number of threads; 0: all processors.
     **values
@@ -494,17 +498,17 @@ def render(shown: CloudLike | MeshLike, *, markers: ArrayLike | None = None,
     markers : array_like, shape (M, 3), optional
         Locations to mark, in the frame of `shown`, m.
     labels : sequence of str
-        Labels of the markers, one each.
+        Labels of the markers, one label per marker.
     zero_plane_m : float, optional
-        Ground below this height is white, m (`ScoreResult.zero_plane_m`).
+        Height in the terrain frame below which ground is white, m, e.g. `ScoreResult.zero_plane_m`.
     terrain_from_scene : array_like, shape (4, 4), optional
-        Rigid transform of `shown` to the terrain frame, m.
+        Rigid transform from the frame of `shown` to the terrain frame, m. Default: identity.
     camera_position : array_like, shape (3,), optional
         Position of the camera with view="camera", m.
     camera_target : array_like, shape (3,), optional
-        Point that the camera looks at with view="camera", m.
+        Point that the camera faces with view="camera", m.
     options : mapping, optional
-        Options by name; keyword arguments are stronger.
+        Options by name; keyword arguments take precedence.
     **values
         Options, see Other Parameters.
 
