@@ -82,7 +82,7 @@ void add_cut(const GroundPatch& patch, const CarriedVertices& vertices, const Ei
   if (low <= farthest && high >= -finger.distal_m) profile.push_back(segment);
 }
 
-// Height of the highest point of a triangle over the disc of this radius around the origin, if any.
+// Maximum height of a triangle over the disc of this radius around the origin; nullopt: none.
 std::optional<double> height_over_disc(const std::array<Eigen::Vector3d, 3>& corners,
                                        double radius) {
   std::optional<double> height;
