@@ -39,7 +39,7 @@ void bind(libmap::ParameterTable& table, Gripper& gripper) {
   table.add("top_solid_margin_mm", gripper.top_solid_margin_mm, not_negative,
             "margin added to the diameter of the solid disc at the top of the mask, mm");
   table.add("bottom_void_margin_mm", gripper.bottom_void_margin_mm, not_negative,
-            "margin added to the radius of the void at the bottom of the mask, mm");
+            "margin subtracted from the radius of the void at the bottom of the mask, mm");
 }
 
 void Gripper::check() const {
@@ -58,9 +58,9 @@ void bind(libmap::ParameterTable& table, GripperFingers& fingers) {
   table.add("fingers.count", fingers.count, {1, 64}, "number of fingers");
   table.add(
       "fingers.curl_deg", fingers.curl_deg, {0.0, 90.0},
-      "inward angle of the distal link to the proximal link of a finger without contact, degrees");
+      "inward angle from the proximal to the distal link of a finger without contact, degrees");
   table.add("fingers.curl_limit_deg", fingers.curl_limit_deg, {0.0, 170.0},
-            "maximum inward angle of the distal link after the proximal link has stopped, degrees");
+            "maximum of fingers.curl_deg after contact has stopped the proximal link, degrees");
   table.add("fingers.spines_per_finger", fingers.spines_per_finger, {1, 1000},
             "number of spines per finger");
   table.add("fingers.spine_tip_radius_um", fingers.spine_tip_radius_um, {0.0, 1000.0, true, false},
@@ -68,7 +68,7 @@ void bind(libmap::ParameterTable& table, GripperFingers& fingers) {
   table.add("fingers.spine_force_limit_n", fingers.spine_force_limit_n, positive,
             "maximum force on one spine, N");
   table.add("fingers.closing_force_n", fingers.closing_force_n, positive,
-            "force of one finger toward the palm's axis, N");
+            "closing force of one finger toward the palm's axis, N");
   table.add("fingers.holds_when_closed", fingers.holds_when_closed,
             "true if the drive resists any force that opens the fingers");
 }
@@ -85,7 +85,7 @@ void GripperFingers::check() const {
 void require_fingers(const Gripper& gripper) {
   if (!gripper.fingers)
     throw libmap::Error(
-        "is missing: forces require this section of the gripper file (method corrected does not)",
+        "is missing: forces require this section of the gripper file; method corrected does not",
         {.field = "fingers"});
 }
 

@@ -424,7 +424,7 @@ void bind(libmap::ParameterTable& table, UrdfMapping& mapping) {
   table.add("urdf.palm_axis", mapping.palm_axis,
             "direction X,Y,Z from the palm toward the ground, in the frame of the palm link");
   table.add("urdf.finger_joint", mapping.finger_joint,
-            "revolute joints between palm and finger: a list with commas, or a name with '*'");
+            "revolute joints, palm to finger: a list with commas, or a name with '*' for any text");
   table.add(
       "urdf.spine_joint", mapping.spine_joint,
       "joints between finger and spine carrier: a list or a name with '*' as in finger_joint");

@@ -195,8 +195,8 @@ double plane_height(const Triangle& t, double x, double y) {
          n.z();
 }
 
-// Height from coordinates relative to a corner, so that a distant origin does no harm. Clamped to
-// the heights of the corners, for triangles too thin for an accurate area.
+// Height from coordinates relative to a corner, which are precise far from the origin, too. Clamped
+// to the heights of the corners, because the area of very thin triangles is inaccurate.
 double barycentric_height(const Triangle& t, double x, double y) {
   const double bx = t.at[1].x() - t.at[0].x(), by = t.at[1].y() - t.at[0].y();
   const double cx = t.at[2].x() - t.at[0].x(), cy = t.at[2].y() - t.at[0].y();
