@@ -24,7 +24,7 @@ struct FingerPulls {
   std::vector<float> level_spreads;  // per set: standard deviation / mean of a pull on level ground
   std::vector<double> total_closing_forces_n;  // per set: closing force of all fingers, N
 
-  const float* at(int fall_deg) const {  // pulls of all sets on ground that falls by -90 .. 90
+  const float* at(int fall_deg) const {  // pulls of all sets for a fall of -90 .. 90
     return &pulls[static_cast<std::size_t>(fall_deg + 90) * sets];
   }
 };

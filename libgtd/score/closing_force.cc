@@ -25,8 +25,8 @@ namespace {
 constexpr int azimuths = 16;
 constexpr int gap_columns = 3;
 constexpr int closing_block_columns = 64;
-// The open finger rests on the ground. Only ground that is higher by more than rounding is in its
-// way.
+// The open finger rests on the ground. Only ground that is higher by more than this (rounding)
+// stops it.
 constexpr double palm_clearance_m = 1e-5;
 constexpr double unknown = -std::numeric_limits<double>::infinity();
 // Standard deviation of the resting position, in finger lengths, of a normal distribution truncated
@@ -38,15 +38,15 @@ constexpr double max_deviations = 2.0;
 
 // Coefficients fitted to trials of the virtual field test (grasp) on simulated rocks, slopes, walls
 // and shapes with the three grippers and 16 parameter sets of each, by the likelihood that a trial
-// reaches each of nine loads. With the mean c of C, of the columns whose C is above
-// `floor_of_capacity` the mean of ln C, its spread and their fraction p, and the spread v of a
-// finger's pull on level ground (FingerPulls::spreads):
+// reaches each of nine loads. c is the mean of the capacities C of the columns, p the fraction of
+// columns with C > floor_of_capacity; mean and spread of ln C are over these. v is the spread of a
+// finger's pull on level ground (FingerPulls::level_spreads):
 //   P(force > 0) = logistic(1.234 + 1.623 p + 3.988 contact + 0.679 ln(c + offset) - 1.203 v),
-//   mean ln(force / closing forces) = 0.293 + 1.006 ln C - 0.446 rise + 0.663 tilt - 0.537 v,
+//   mean ln(force / closing forces) = 0.293 + 1.006 mean(ln C) - 0.446 rise + 0.663 tilt - 0.537 v,
 //   ln(spread of ln force) = -1.540 + 1.056 spread(ln C) + 0.745 v.
 // contact: fraction of the azimuths with spine contact on the weakest side; rise of the palm above
-// the voxel; tilt: imbalance of the depths of the contacts. Both in finger lengths. The weakest of
-// several random pulls decreases with their spread, hence v.
+// the voxel, and tilt: imbalance of the depths of the contacts, both in finger lengths. The weakest
+// of several random pulls decreases with their spread, hence v.
 constexpr float floor_of_capacity = 0.0005F;
 constexpr float offset_of_capacity = 0.003F;
 constexpr float largest_capacity = 0.55F;
@@ -60,7 +60,7 @@ constexpr std::size_t force_steps = 48;
 constexpr float first_log_force = -1.6F;
 constexpr float log_force_step = 0.19F;
 
-constexpr std::array<double, 5> dual_steps{0.0, 0.5, 1.0, 2.0, 4.0};  // u
+constexpr std::array<double, 5> dual_steps{0.0, 0.5, 1.0, 2.0, 4.0};  // u of the capacity's dual
 
 // Position relative to a pivot as a column, for one azimuth.
 struct RayCell {
@@ -262,7 +262,7 @@ GRASPMAP_CLONED_CHOICE void add_column(const float* __restrict capacities,
   }
 }
 
-// Distribution of a force: > 0 with this probability, its logarithm then beta(4, 2).
+// Distribution of the force per set: > 0 with `probability`; its logarithm is then beta(4, 2).
 struct SetForces {
   std::vector<float> probability, log_force, spread, scale;  // scale: beta_spread / spread
 };
@@ -284,8 +284,7 @@ struct SetForces {
                  part * (-0.49190F + part * (0.28947F + part * (-0.13606F + part * 0.03215F))));
 }
 
-// Applies the bound of lateral pulls to capacities and computes their logarithms, 0 up to the
-// floor.
+// Applies the bound of lateral pulls to capacities. Computes their logarithms, 0 up to the floor.
 GRASPMAP_CLONED_CHOICE void bound_capacities(float* __restrict capacities, float* __restrict logs,
                                              std::size_t sets) {
   for (std::size_t s = 0; s < sets; ++s) {
@@ -296,7 +295,7 @@ GRASPMAP_CLONED_CHOICE void bound_capacities(float* __restrict capacities, float
   }
 }
 
-// Computes the distribution of the force of each set by the coefficients; `mean` in finger lengths.
+// Means over the columns for find_forces, which computes the distribution of the force of each set.
 struct MeanTerms {
   float contact = 0.0F;
   float bias = 0.0F;     // terms of rise and tilt in ln(force)
@@ -463,8 +462,8 @@ class BlockCloser {
     return met;
   }
 
-  // Weakest side for the parameters of the gripper file. It is used for all sets, because pulls of
-  // all sets increase with the fall.
+  // Weakest side for the parameters of the gripper file; used for all sets, because the pulls of
+  // each set increase with the fall.
   std::size_t weakest_side(const Contacts& contacts) const {
     SideValues pulls{};
     SideValues max_spine_forces{};
@@ -574,7 +573,7 @@ class BlockCloser {
   std::vector<float> capacities_;        // per computed column, in closing forces of all fingers
   std::vector<float> logs_;
   std::vector<float> weights_;    // of the parameter sets
-  ForceGrid log_forces_{};        // a grid, then the load
+  ForceGrid log_forces_{};        // of equally spaced forces, then of the load
   std::vector<float> log_scale_;  // ln of the closing force of all fingers, N
   SetSums sums_;
   SetForces forces_;

@@ -23,16 +23,14 @@ void bind(libmap::ParameterTable& table, Scenario& scenario) {
   table.add("voxel_size_m", scenario.voxel_size_m, positive, "edge length of a voxel, m");
   table.add("extra_void_layers", scenario.extra_void_layers, {0, 10000},
             "number of void layers added on top of the gripper mask (H_add)");
-  table.add(
-      "solid_voxel_threshold", scenario.solid_voxel_threshold, {1, 2147483647},
-      "number of occupied voxels inside the gripper mask below which the score is reduced (TSV)");
+  table.add("solid_voxel_threshold", scenario.solid_voxel_threshold, {1, 2147483647},
+            "number of occupied voxels inside the mask below which the score is reduced (TSV)");
   table.add("load_n", scenario.load_n, positive,
             "pull on the gripper for which method calibrated predicts the hold probability, N");
   table.add(
       "zero_plane_m", scenario.zero_plane_m, libmap::any_number,
       "minimum height of a target in the terrain frame, m; auto: 0; not used by method calibrated");
-  table.add("interpolation", scenario.interpolation,
-            "fill gaps of the terrain by Delaunay interpolation");
+  table.add("interpolation", scenario.interpolation, "fill terrain gaps by Delaunay interpolation");
   table.add("interpolation_max_edge_m", scenario.interpolation_max_edge_m, not_negative,
             "maximum edge length of an interpolated triangle in the x-y plane, m; 0: no limit");
   table.add("graspability_threshold", scenario.graspability_threshold, libmap::zero_to_one,
@@ -50,11 +48,9 @@ void bind(libmap::ParameterTable& table, Scenario& scenario) {
             "radius of the surface normal fits, m; 0: palm diameter of the gripper");
   table.add("obstacle_height_m", scenario.obstacle_height_m, not_negative,
             "minimum rise of a steep face that is an obstacle, m; 0: obstacles are not evaluated");
-  table.add(
-      "obstacle_slope_deg", scenario.obstacle_slope_deg, {0.0, 180.0},
-      "minimum slope of faces that can be obstacles, degrees; 0: obstacles are not evaluated");
-  table.add("tile_size_m", scenario.tile_size_m, positive,
-            "edge length of the square tiles in which the terrain is scored, m");
+  table.add("obstacle_slope_deg", scenario.obstacle_slope_deg, {0.0, 180.0},
+            "minimum slope of a face that can be an obstacle, degrees; 0: no obstacles");
+  table.add("tile_size_m", scenario.tile_size_m, positive, "width of a tile of the terrain, m");
   table.add_overrides("gripper", scenario.gripper_overrides);
 }
 

@@ -1,5 +1,4 @@
-// Parameters of a detection, as in a scenario file (tab. B 2-1 of "Graspable Target Detection for
-// Hexapod Robots", 2023: the thesis).
+// Parameters of a detection, as in a scenario file (tab. B 2-1 of the thesis).
 #pragma once
 
 #include <optional>
