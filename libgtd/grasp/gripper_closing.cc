@@ -240,7 +240,7 @@ void add_contacts(const GroundPatch& patch, std::size_t number, const ClosingOpt
 
 void bind(libmap::ParameterTable& table, ClosingOptions& options) {
   table.add("start_height_m", options.start_height_m, {0.0, 10.0, true, false},
-            "height above the location at which the approach starts, m");
+            "height of the palm above the location at the start of the approach, m");
   table.add("normal_radius_m", options.normal_radius_m, {1e-5, 0.1},
             "radius within which the ground normal at a contact is averaged, m");
   table.add("max_unseen", options.max_unseen, libmap::zero_to_one,

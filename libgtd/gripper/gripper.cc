@@ -27,15 +27,15 @@ void bind(libmap::ParameterTable& table, Gripper& gripper) {
   table.add("spine_depth_mm", gripper.spine_depth_mm, not_negative,
             "depth to which a spine penetrates the ground, mm");
   table.add("opening_angle_deg", gripper.opening_angle_deg, {0.0, 90.0, true, false},
-            "angle between a finger and the palm's axis when open, degrees");
+            "angle between an open finger and the palm's axis, degrees");
   table.add("closing_angle_deg", gripper.closing_angle_deg, angle,
-            "angle between a finger and the palm's axis when closed, degrees");
+            "angle between a closed finger and the palm's axis, degrees");
   table.add("opening_spine_radius_mm", gripper.opening_spine_radius_mm, positive,
-            "radius of the circle through the spine tips when open, mm");
+            "radius of the circle through the spine tips of the open gripper, mm");
   table.add("opening_spine_depth_mm", gripper.opening_spine_depth_mm, not_negative,
-            "depth of the spine tips below the palm when open, mm");
+            "depth of the spine tips of the open gripper below the palm, mm");
   table.add("closing_height_mm", gripper.closing_height_mm, positive,
-            "height of the palm above the spine tips when closed, mm");
+            "height of the palm of the closed gripper above the spine tips, mm");
   table.add("top_solid_margin_mm", gripper.top_solid_margin_mm, not_negative,
             "margin added to the diameter of the solid disc at the top of the mask, mm");
   table.add("bottom_void_margin_mm", gripper.bottom_void_margin_mm, not_negative,

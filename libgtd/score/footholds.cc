@@ -202,11 +202,12 @@ void bind(libmap::ParameterTable& table, FootholdOptions& options) {
             "minimum distance between footholds, m");
   table.add("min_score", options.min_score, libmap::zero_to_one,
             "minimum score of a foothold (hold_probability if the map has it)");
-  table.add("graspable_only", options.graspable_only,
-            "select only voxels with hold_probability >= 0.5 (without this field: graspable)");
+  table.add(
+      "graspable_only", options.graspable_only,
+      "select only voxels with hold_probability >= 0.5, or graspable ones in maps without it");
   table.add("border", options.border, "include voxels at the border of the scanned area");
   table.add("surface_radius_m", options.surface_radius_m, libmap::positive,
-            "radius of the neighborhood that normal and curvature are fitted to, m");
+            "radius within which normal and curvature are estimated, m");
   table.add("max_count", options.max_count, libmap::not_negative,
             "maximum number of footholds; 0: no limit");
 }
