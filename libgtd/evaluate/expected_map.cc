@@ -40,9 +40,9 @@ void check_region(const ExpectedRegion& region) {
   if (region.name.empty()) throw libmap::Error("every region needs a name", {.field = "region"});
   const std::string field = "region '" + region.name + "'";
   if (!(region.radius_m > 0.0) || !std::isfinite(region.radius_m))
-    throw libmap::Error("out of range", {.field = field + ", radius",
-                                         .value = libmap::to_text(region.radius_m),
-                                         .bound = "> 0, finite"});
+    throw libmap::Error(
+        "out of range",
+        {.field = field + ", radius", .value = libmap::to_text(region.radius_m), .bound = "> 0"});
   if (!region.from.allFinite() || !region.to.allFinite())
     throw libmap::Error("coordinates are not finite", {.field = field});
 }

@@ -247,8 +247,8 @@ RocResult evaluate_roc(const std::vector<std::optional<bool>>& labels,
                        const RocOptions& options) {
   options.check();
   if (labels.size() != scores.size())
-    throw libmap::Error("differs from the number of labels",
-                        {.field = "number of scores",
+    throw libmap::Error("number of scores differs from number of labels",
+                        {.field = "scores",
                          .value = std::to_string(scores.size()),
                          .bound = std::to_string(labels.size())});
   RocResult result;

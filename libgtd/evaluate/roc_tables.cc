@@ -257,9 +257,8 @@ std::vector<std::string> default_score_columns(const Table& table, std::string_v
 void bind(libmap::ParameterTable& table, TableEvaluationOptions& options) {
   table.add("label", options.label_column,
             "name of the column of true labels: 1/0, true/false, yes/no, graspable/not graspable");
-  table.add(
-      "cutoff", options.roc.rate_cutoff, libmap::any_number,
-      "minimum score of a location that is predicted graspable (for accuracy and other rates)");
+  table.add("cutoff", options.roc.rate_cutoff, libmap::any_number,
+            "minimum score of a location that is predicted graspable (accuracy and other rates)");
   table.add("bootstrap", options.roc.bootstrap_replicates, libmap::Range{0, 1e7},
             "number of bootstrap replicates for the confidence interval of the AUC; 0: none");
   table.add("seed", options.roc.bootstrap_seed, libmap::not_negative,

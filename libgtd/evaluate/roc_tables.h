@@ -15,8 +15,7 @@ namespace libgtd {
 
 struct TableEvaluationOptions {
   std::string label_column = "graspable";
-  // Score columns; empty: default_score_columns().
-  std::vector<std::string> score_columns;
+  std::vector<std::string> score_columns;  // empty: default_score_columns()
   RocOptions roc;
 };
 // Binds all fields except score_columns.

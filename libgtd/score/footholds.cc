@@ -202,9 +202,8 @@ void bind(libmap::ParameterTable& table, FootholdOptions& options) {
             "minimum distance between footholds, m");
   table.add("min_score", options.min_score, libmap::zero_to_one,
             "minimum score of a foothold (hold_probability if the map has it)");
-  table.add(
-      "graspable_only", options.graspable_only,
-      "select only voxels with hold_probability >= 0.5, or graspable ones in maps without it");
+  table.add("graspable_only", options.graspable_only,
+            "select only voxels with hold_probability >= 0.5, or graspable if the map has none");
   table.add("border", options.border, "include voxels at the border of the scanned area");
   table.add("surface_radius_m", options.surface_radius_m, libmap::positive,
             "radius within which normal and curvature are estimated, m");
