@@ -244,7 +244,7 @@ void describe(libmap::ResultTable& table, const DetectionResult& result) {
             "number of occupied voxels without an occupied neighbor");
   table.add("mask_side_voxels", result.mask.side, "side of the gripper mask, voxels");
   table.add("mask_layers", result.mask.layers, "number of layers of the gripper mask");
-  table.add("tiles", result.tiles, "number of scored tiles");
+  table.add("tiles", result.tiles, "number of tiles that cover the terrain");
   table.add("scored_voxels", result.map.voxels.size(), "number of voxels of the map");
   table.add("border_voxels", result.border_voxels,
             "number of scored voxels at the border of the terrain");

@@ -45,8 +45,8 @@ struct DetectionResult {
   std::size_t isolated_voxels = 0;  // occupied voxels without an occupied neighbor of 26
   Voxel grid_min;                   // box of the occupied voxels
   Voxel grid_max;
-  std::size_t tiles = 0;             // scored tiles
-  std::size_t curvature_points = 0;  // points with a measured curvature
+  std::size_t tiles = 0;             // tiles that cover the grid
+  std::size_t curvature_points = 0;  // points at which the curvature was estimated
   std::size_t convex_points = 0;     // among the curvature points
   std::size_t graspable_voxels = 0;
   std::size_t border_voxels = 0;

@@ -77,7 +77,7 @@ struct TileSurroundings {
 struct TileDetectionResult {
   std::vector<MapVoxel> voxels;       // ascending
   std::size_t unoriented_voxels = 0;  // tilted masks only: no normal, scored upright
-  std::size_t curvature_points = 0;   // points with a measured curvature
+  std::size_t curvature_points = 0;   // points at which the curvature was estimated
   std::size_t convex_points = 0;
   libmap::StageTimings timings_s;  // wall time of each step
 };

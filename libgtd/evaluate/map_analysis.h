@@ -51,7 +51,7 @@ struct ScoreBin {
   double area_m2 = 0.0;       // surface area of the evaluated voxels
 };
 
-// Evaluated voxels with low <= value < high; the last bin includes its upper end.
+// Evaluated voxels with low <= height (m) or slope (degrees) < high; the last bin includes `high`.
 struct GroundBin {
   double low = 0.0;
   double high = 0.0;

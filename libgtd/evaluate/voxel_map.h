@@ -24,7 +24,7 @@ struct MapInfo {
 };
 
 // Reads a MapInfo from a manifest of `graspmap score`; missing properties keep their defaults.
-// Throws Error if one is not finite.
+// Throws Error if the lattice is not finite.
 MapInfo map_info(const libmap::Manifest& manifest);
 
 // Arrays with one entry per voxel, ascending by voxel, for any order of the map's points.
