@@ -31,9 +31,9 @@ struct ExpectedRegion {
 struct ExpectedMap {
   std::vector<ExpectedRegion> regions;
 
-  // Throws Error naming the region for a name that is empty or a duplicate, a radius that is not >
-  // 0, a coordinate that is not finite, overlapping regions with different verdicts, and if no
-  // region has a verdict.
+  // Throws Error naming the region for a name that is empty or a duplicate, a radius that is 0,
+  // negative or infinite, a coordinate that is not finite, and overlapping regions of which only
+  // one is expected to be graspable. Throws Error if all regions are undecided.
   void check() const;
 };
 

@@ -13,9 +13,9 @@
 
 namespace libgtd {
 
-// Dimensions in meters and radians. The proximal angle t is measured at the joint (joint_radius_m,
-// 0) from the palm's axis. With the curl c, the links point along (sin t, -cos t) and (sin(t - c),
-// -cos(t - c)).
+// Dimensions in meters and radians. The joint is at (joint_radius_m, 0). With the angle t of the
+// proximal link from the palm's axis (proximal angle) and the curl c, the links point along
+// (sin t, -cos t) and (sin(t - c), -cos(t - c)).
 struct FingerGeometry {
   double joint_radius_m = 0.0;  // distance of the joint from the palm's axis
   double proximal_m = 0.0;      // length of the proximal link
@@ -61,8 +61,7 @@ struct FingerClosing {
 FingerClosing close_finger(const FingerGeometry& finger, std::span<const GroundSegment> profile);
 
 // Returns the minimum height of the palm at which the open finger is above the whole profile;
-// nullopt if no part of the profile is below the finger. `profile` is relative to the palm at z =
-// 0.
+// nullopt if no part of the profile is below the finger. For `profile`, the palm is at z = 0.
 std::optional<double> open_finger_height(const FingerGeometry& finger,
                                          std::span<const GroundSegment> profile);
 

@@ -25,7 +25,7 @@ enum class ApproachDirection { up, normal };
 struct GraspOptions {
   double load_n = 5.0;  // a trial holds if the force is >= load_n * safety in all directions
   double safety = 1.0;
-  std::vector<double> extra_loads_n;  // further loads to compute the probability of holding for
+  std::vector<double> extra_loads_n;  // further loads, for extra_load_probabilities
   ApproachDirection approach = ApproachDirection::up;
   int poses = 32;  // poses per location
   int draws = 32;  // draws of asperities per pose
@@ -51,9 +51,9 @@ struct GraspOptions {
 void bind(libmap::ParameterTable& table, GraspOptions& options);
 
 // Outcome of a trial. Causes of failure: approach: no ground below, or the approach starts inside
-// the ground. contact: fewer than two contacts. engagement: in some direction, the contacts balance
-// no pull at all. load: the contacts balance a smaller pull than the load. unseen: a failure of any
-// kind except approach while too much of the ground below a finger is unseen.
+// the ground. contact: fewer than two contacts of links or engaged spines. engagement: in some
+// direction, the contacts balance no pull at all. load: the contacts balance a smaller pull than
+// the load. unseen: any failure except approach if too much ground below a finger is unseen.
 enum class TrialOutcome { holds, approach, contact, engagement, load, unseen };
 const std::vector<std::pair<std::string, TrialOutcome>>& trial_outcome_names();
 
