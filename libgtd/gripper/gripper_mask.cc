@@ -33,7 +33,7 @@ libmap::Error too_small(double voxel_size_m, double mask_voxels) {
 // Number of voxels along one side. Rejects the thin and very wide masks of extreme dimensions.
 int whole_voxels(double voxels, const GripperMaskOptions& options) {
   if (voxels >= 0.0 && voxels <= 0x1p20) return static_cast<int>(voxels);
-  throw libmap::Error("the gripper's mask would be " + libmap::to_text(static_cast<float>(voxels)) +
+  throw libmap::Error("too small: the mask is " + libmap::to_text(static_cast<float>(voxels)) +
                           " voxels wide or high, more than 2^20",
                       {.field = "voxel_size_m", .value = libmap::to_text(options.voxel_size_m)});
 }

@@ -54,7 +54,7 @@ struct VoxelPoints {
   std::vector<Eigen::Vector3f> outsides;
 };
 
-// Index of the voxel of each point in the list, or voxels.size().
+// Returns for each point the index of its voxel in `voxels`, or voxels.size() if it is not there.
 std::vector<std::size_t> find_voxels(const libmap::PointCloud& terrain, const VoxelLattice& lattice,
                                      const std::vector<Voxel>& voxels) {
   std::vector<std::size_t> voxel_of_point(terrain.size(), voxels.size());
@@ -110,7 +110,7 @@ std::vector<TiltedPivot> tilt(const std::vector<Voxel>& voxels,
   return pivots;
 }
 
-// Tile by tile, because the scanned columns are known only near each tile.
+// Calls find_border_pivots tile by tile, because scanned columns are known only near each tile.
 std::vector<std::uint8_t> find_tilted_edges(const std::vector<Voxel>& voxels,
                                             const std::vector<TiltedPivot>& pivots,
                                             const TiltedTerrain& terrain, const VoxelGrid& grid,

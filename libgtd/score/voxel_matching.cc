@@ -87,7 +87,7 @@ class BlockMatcher {
   std::size_t size_ = 0;  // columns in the window
   std::size_t planes_ = 0;
   int low_ = 0;                                            // lowest layer of the window
-  std::size_t entered_bits_ = 0, entered_ = 0, left_ = 0;  // entries of ground_ done
+  std::size_t entered_bits_ = 0, entered_ = 0, left_ = 0;  // processed entries of ground_
   std::vector<Pivot> pivots_, pivots_scratch_;             // ascending by k
   std::vector<Ground> ground_, ground_scratch_;
   Lanes bits_;      // planes of 16 layers of the columns of the window

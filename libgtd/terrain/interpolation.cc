@@ -48,7 +48,7 @@ using Corners = std::array<std::uint32_t, 3>;
 struct Placement {
   std::uint32_t first = 0;
   std::uint32_t last = 0;
-  bool refused = false;
+  bool refused = false;  // the triangle has an edge that is too long
 };
 
 std::vector<Vector3d> finite_points(const libmap::PointCloud& cloud, InterpolationMethod method) {
@@ -125,7 +125,7 @@ void check_grid(const Box& box, double spacing, std::size_t max_nodes) {
   if (!(columns * rows <= static_cast<double>(max_nodes)))
     throw libmap::Error(
         "too small: the interpolation grid over the points' x and y would have more than " +
-            std::to_string(max_nodes) + " nodes",
+            std::to_string(max_nodes) + " nodes; remove points far from the others",
         {.field = "grid spacing", .value = libmap::to_text(spacing) + " m"});
   const double farthest = std::max(
       {std::abs(box.min_x), std::abs(box.max_x), std::abs(box.min_y), std::abs(box.max_y)});
