@@ -45,7 +45,8 @@ struct GripperKeys {
       table.add("ranges." + uncertain_parameter_names()[n], ranges[n],
                 "bounds LOW, HIGH of the prior distribution of the parameter");
     table.add("ensemble.sets", sets,
-              "fitted parameter sets, one per line: weight, then the parameters named in ranges");
+              "fitted parameter sets, one per line: weight, spine_force_limit_n, closing_force_n, "
+              "friction, asperity_min_deg, asperity_max_deg, engagement_rate");
   }
 };
 
