@@ -147,8 +147,8 @@ std::size_t evaluate_obstacles(const ObstacleOptions& options, GraspabilityMap& 
 void bind(libmap::ParameterTable& table, DetectionOptions& options) {
   bind(table, options.scenario);
   table.add("plane", options.plane, {{"fit", PlaneSource::fit}, {"none", PlaneSource::none}},
-            "source of the terrain frame; fit: regression plane of the points; none: frame of "
-            "the cloud");
+            "frame in which the terrain is scored; fit: frame of the regression plane of the "
+            "points; none: frame of the cloud");
 }
 
 Gripper gripper_of(const DetectionOptions& options) {
@@ -232,7 +232,7 @@ void describe(libmap::ResultTable& table, const DetectionResult& result) {
   table.add("opposing_normals",
             result.plane && result.plane->normals_up ? std::optional(result.plane->opposing_normals)
                                                      : std::nullopt,
-            "share of neighboring normals on opposite sides");
+            "share of neighboring normals that point to opposite sides of the surface");
   table.add("downsampled_points", only_if(result.downsampled_points > 0, result.downsampled_points),
             "number of points after downsampling");
   table.add("interpolated_points", only_if(has_grid, result.interpolated_points),
@@ -244,19 +244,19 @@ void describe(libmap::ResultTable& table, const DetectionResult& result) {
             "number of occupied voxels without an occupied neighbor");
   table.add("mask_side_voxels", result.mask.side, "side of the gripper mask, voxels");
   table.add("mask_layers", result.mask.layers, "number of layers of the gripper mask");
-  table.add("tiles", result.tiles, "number of scored tiles");
+  table.add("tiles", result.tiles, "number of tiles that cover the terrain");
   table.add("scored_voxels", result.map.voxels.size(), "number of voxels of the map");
   table.add("border_voxels", result.border_voxels,
             "number of scored voxels at the border of the terrain");
   table.add("curvature_points", result.curvature_points,
-            "number of points with an estimated curvature");
+            "number of points at which the curvature was estimated");
   table.add("convex_points", result.convex_points, "number of points on convex ground");
   table.add("graspable_voxels", result.graspable_voxels, "number of graspable voxels");
   table.add("normal_radius_m", result.normal_radius_m, "radius of the surface normal fits, m");
   table.add("unoriented_voxels", only_if(result.map.content.normals, result.unoriented_voxels),
             "number of voxels without a normal, scored with an upright mask");
   table.add("obstacle_voxels", only_if(result.map.content.obstacles, result.obstacle_voxels),
-            "number of voxels that are obstacles");
+            "number of voxels that are obstacles or unreachable");
 }
 
 }  // namespace libgtd

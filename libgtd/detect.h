@@ -1,6 +1,6 @@
-// Main entry of the detection: computes a graspability map, which scores every voxel of a terrain
-// as a target of a spined gripper, from a point cloud in memory ("Graspable Target Detection for
-// Hexapod Robots", 2023, chapters 2.5 and 3.2).
+// Computes a graspability map, which scores every voxel of a terrain as a target of a spined
+// gripper, from a point cloud in memory: the main entry of the detection ("Graspable Target
+// Detection for Hexapod Robots", 2023, chapters 2.5 and 3.2).
 #pragma once
 
 #include <optional>
@@ -19,39 +19,39 @@
 
 namespace libgtd {
 
-// Source of the terrain frame. fit: downsamples the cloud (`thesis` only), fits the regression
-// plane and transforms the cloud into its frame. none: the cloud is in the terrain frame.
+// Source of the terrain frame. fit: downsamples the cloud (methods thesis and envelope only), fits
+// the regression plane and transforms the cloud into its frame. none: frame of the cloud.
 enum class PlaneSource { fit, none };
 
 struct DetectionOptions {
   Scenario scenario;
   std::optional<Gripper> gripper;  // default: the gripper named by the scenario
   PlaneSource plane = PlaneSource::fit;
-  std::optional<Eigen::Vector3d> up;  // direction out of the ground, cloud's frame
+  std::optional<Eigen::Vector3d> up;  // out of the ground, cloud's frame; nullopt: see UpSource
   double max_tilt_deg = 90.0;         // maximum angle between `up` and the plane's normal
 };
-// Binds the keys of the scenario and `plane`.
+// Binds the keys of the scenario and `plane`, but not `up` and `max_tilt_deg`.
 void bind(libmap::ParameterTable& table, DetectionOptions& options);
 
 struct DetectionResult {
   GraspabilityMap map;
   GripperMask mask;
-  std::optional<RegressionPlane> plane;
-  std::size_t points = 0;              // input points
-  std::size_t downsampled_points = 0;  // after downsampling (`thesis` only)
-  std::size_t interpolated_points = 0;
-  double grid_spacing_m = 0.0;  // pitch of the interpolation grid
+  std::optional<RegressionPlane> plane;  // nullopt with PlaneSource::none
+  std::size_t points = 0;                // input points
+  std::size_t downsampled_points = 0;    // after downsampling; 0: not downsampled
+  std::size_t interpolated_points = 0;   // nodes of the interpolation grid; 0: not interpolated
+  double grid_spacing_m = 0.0;           // of the interpolation grid; 0: not interpolated
   std::size_t occupied_voxels = 0;
   std::size_t isolated_voxels = 0;  // occupied voxels without an occupied neighbor of 26
-  Voxel grid_min;
+  Voxel grid_min;                   // box of the occupied voxels
   Voxel grid_max;
-  std::size_t tiles = 0;             // scored tiles
-  std::size_t curvature_points = 0;  // points with a measured curvature
+  std::size_t tiles = 0;             // tiles that cover the grid
+  std::size_t curvature_points = 0;  // points at which the curvature was estimated
   std::size_t convex_points = 0;     // among the curvature points
   std::size_t graspable_voxels = 0;
   std::size_t border_voxels = 0;
-  std::size_t unoriented_voxels = 0;  // orientation surface: no normal, scored upright
-  std::size_t obstacle_voxels = 0;
+  std::size_t unoriented_voxels = 0;      // orientation surface: no normal, scored upright
+  std::size_t obstacle_voxels = 0;        // obstacles and unreachable voxels
   std::optional<double> normal_radius_m;  // nullopt if no surface normals were fitted
   libmap::StageTimings timings_s;         // wall time of each step
 };
@@ -64,7 +64,7 @@ Gripper gripper_of(const DetectionOptions& options);
 
 // Detects graspable targets in `terrain` (m, any frame); the frame of the result is the terrain
 // frame. Throws Error for an empty cloud, options out of range, points too sparse for the voxel
-// size (voxel_grid.h), and all errors of the individual stages.
+// size (methods corrected and calibrated; voxel_grid.h), and all errors of the individual stages.
 DetectionResult detect(const libmap::PointCloud& terrain, const DetectionOptions& options,
                        libmap::Progress& progress = libmap::no_progress());
 

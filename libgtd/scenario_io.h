@@ -8,7 +8,7 @@
 namespace libgtd {
 
 // Returns the parameters and the gripper of a scenario. `name` is a scenario in data/scenarios or a
-// file. Throws Error naming the file and the field for an unknown key or a value out of range.
+// file. Throws Error naming file and field for an unknown key or gripper or a value out of range.
 DetectionOptions read_scenario(const std::string& name);
 
 }  // namespace libgtd

@@ -14,7 +14,7 @@ constexpr const char* opposing_normals = "opposing_normals";
 // The key of the plan matches, but another part of it does not.
 libmap::Error not_of_this_terrain(const std::filesystem::path& plan_file, const char* field) {
   return libmap::Error(
-      "does not match this terrain and these parameters; use --force to start again",
+      "was computed for another terrain or other parameters; use --force to start again",
       {.file = plan_file.string(), .field = field});
 }
 
@@ -101,9 +101,9 @@ void require_appendable(const TilePlan& earlier, const TilePlan& plan,
   const libmap::Manifest& before = earlier.index.manifest;
   const libmap::Manifest& now = plan.index.manifest;
   if (before.parameters != now.parameters || before.version != now.version)
-    refuse("contains tiles of other parameters; use --force to start again");
+    refuse("contains tiles of other parameters or another version; use --force to start again");
   if (before.georeference != now.georeference)
-    refuse("was started with another first file; names of new files must sort after its name");
+    refuse("was started with another first file; names of added files must sort after its name");
   auto at = plan.terrain.begin();
   for (const TerrainFile& file : earlier.terrain) {
     at = std::find_if(at, plan.terrain.end(),
@@ -124,8 +124,7 @@ void require_appendable(const TilePlan& earlier, const TilePlan& plan,
   if (method != Method::corrected && method != Method::calibrated)
     refuse(
         "--append requires --method corrected or calibrated; other methods do not score the border "
-        "of the "
-        "terrain");
+        "of the terrain");
 }
 
 std::vector<StoredTile> unaffected_tiles(const std::map<TileNumber, StoredTile>& done,

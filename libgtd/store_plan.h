@@ -1,6 +1,6 @@
 // Plans how `graspmap score` computes a map in a tile store (a folder with one file per tile). If
-// the store has tiles of an earlier run, it finds the tiles that remain valid, the missing tiles
-// and the points that these depend on.
+// the store has tiles of an earlier run, the functions find the tiles that remain valid, and the
+// points that the missing tiles depend on.
 #pragma once
 
 #include <Eigen/Core>
@@ -27,20 +27,21 @@ struct StoreTiling {
 // Stores the frame in the plan: lattice, box, plane, and the manifest's transform and results.
 void set_frame(const TerrainFrame& frame, const StoreTiling& tiling, TilePlan& plan);
 
-// Returns the frame of an earlier plan. Throws Error naming `plan_file` if the tiles differ.
+// Returns the frame of an earlier plan. Throws Error naming `plan_file` if its tile width or
+// lattice differs from that of `detection`.
 TerrainFrame frame_of(const TilePlan& plan, const DetectionOptions& detection,
                       const std::filesystem::path& plan_file);
 
-// Throws Error naming `plan_file` if a point is outside the frame's box of voxels.
+// Throws Error naming `plan_file` if a point is more than a voxel outside the frame's box.
 void require_in_frame(const libmap::PointCloud& terrain, const TerrainFrame& frame,
                       const std::filesystem::path& plan_file);
 
 // Throws Error naming the store unless `plan` is `earlier` with additional files, `append` is set,
-// and the options allow tiles far from these files to be kept.
+// and new points affect only tiles near them (--plane none, method corrected or calibrated).
 void require_appendable(const TilePlan& earlier, const TilePlan& plan,
                         const DetectionOptions& detection, bool append, const std::string& store);
 
-// Returns the finished tiles that do not depend on any point of the files that are only in `plan`.
+// Returns the tiles of `done` that depend on no point of the files that only `plan` contains.
 std::vector<StoredTile> unaffected_tiles(const std::map<TileNumber, StoredTile>& done,
                                          const TilePlan& earlier, const TilePlan& plan,
                                          const TerrainFrame& frame, const StoreTiling& tiling);

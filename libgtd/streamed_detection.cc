@@ -46,7 +46,7 @@ class StreamedDetection {
         tile_voxels_(tile_voxels(scenario_)),
         halo_(halo_voxels(mask_, scenario_)) {}
 
-  // Like libgtd::require_dense, on a sample of tiles spread over the wanted ones.
+  // Like libgtd::require_dense, on a sample of at most 256 tiles spread over the wanted ones.
   void require_dense(const std::vector<TileNumber>& wanted) const {
     constexpr std::size_t max_tiles = 256, max_points = 1'000'000;
     std::size_t isolated = 0, voxels = 0;
@@ -65,7 +65,7 @@ class StreamedDetection {
     libgtd::require_dense(isolated, voxels, scenario_.voxel_size_m, points);
   }
 
-  // Halves a run of tiles until each part has few enough points.
+  // Halves a set of tiles until each part has at most max_points_ points.
   void run(std::vector<TileNumber> tiles,
            const std::function<void(std::vector<StreamedTile>)>& visit,
            libmap::Progress& progress) {
@@ -193,13 +193,13 @@ bool TerrainFrame::drops_normals() const {
 void require_streamable(const DetectionOptions& options) {
   const Method method = options.scenario.method;
   if (follows_thesis(method))
-    throw libmap::Error("requires the whole cloud in memory: write the map to one file, MAP.pcd",
+    throw libmap::Error("needs the whole cloud in memory; use one output file, -o MAP.pcd",
                         {.field = "method", .value = name_of(method)});
   if (options.scenario.interpolation)
-    throw libmap::Error("requires the whole cloud in memory: write the map to one file, MAP.pcd",
+    throw libmap::Error("needs the whole cloud in memory; use one output file, -o MAP.pcd",
                         {.field = "interpolation", .value = "true"});
   if (options.scenario.evaluates_obstacles())
-    throw libmap::Error("requires the whole map in memory: write the map to one file, MAP.pcd",
+    throw libmap::Error("needs the whole map in memory; use one output file, -o MAP.pcd",
                         {.field = "obstacle_height_m",
                          .value = libmap::to_text(options.scenario.obstacle_height_m)});
 }
@@ -257,7 +257,7 @@ std::vector<TileNumber> tiles_of(const TerrainFrame& frame, int tile_voxels,
 }
 
 PointsRectangle points_for(const TileBounds& columns, const TerrainFrame& frame, int halo_voxels) {
-  // A voxel more, against rounding.
+  // One more voxel as margin for rounding.
   const double margin = 1.0 + halo_voxels;
   const double size = frame.lattice.voxel_size_m;
   const Eigen::Vector2d origin = frame.lattice.origin_m.head<2>();

@@ -45,8 +45,8 @@ std::vector<TileNumber> tiles_of(const TerrainFrame& frame, int tile_voxels,
 
 struct StreamedTile {
   TileNumber number;
-  std::vector<MapVoxel> voxels;  // ascending; empty if no voxel is scored
-  std::size_t occupied_voxels = 0;
+  std::vector<MapVoxel> voxels;     // ascending; empty if no voxel is scored
+  std::size_t occupied_voxels = 0;  // voxels with points, scored or not
 };
 
 struct StreamingOptions {
@@ -64,7 +64,8 @@ struct PointsRectangle {
 PointsRectangle points_for(const TileBounds& columns, const TerrainFrame& frame, int halo_voxels);
 
 // Scores the tiles `wanted` from `points` in the terrain frame, which must cover the halo. Calls
-// `visit` with a few tiles at a time, each tile once, from one thread.
+// `visit` with a few tiles at a time, each tile once, from one thread. Throws like
+// require_streamable, and Error if the points are too sparse for the voxel size (voxel_grid.h).
 void detect_streamed(const TerrainFrame& frame, const libmap::PointTileStore& points,
                      const std::vector<TileNumber>& wanted, const DetectionOptions& options,
                      const std::function<void(std::vector<StreamedTile> tiles)>& visit,

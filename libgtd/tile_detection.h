@@ -19,8 +19,7 @@
 
 namespace libgtd {
 
-// Returns true if the method prepares the cloud as the author's program does (`thesis`,
-// `envelope`).
+// Returns true if the method prepares the cloud as the author's program does: thesis, envelope.
 bool follows_thesis(Method method);
 
 // Returns the plane fit of a method: `thesis` and `envelope` as in the author's program, `climblab`
@@ -33,8 +32,7 @@ int tile_voxels(const Scenario& scenario);
 // Returns the width of the halo in voxels: the columns around a tile that affect the voxels of the
 // tile. The halo covers the mask window, the closing of the scanned area, the points that decide
 // convexity with all neighbors, and the points of surface normals, but not interpolation and
-// obstacles, which use the whole terrain. Throws Error naming a radius too large for the voxel
-// size.
+// obstacles (whole terrain). Throws Error naming a radius that is too large for the voxel size.
 int halo_voxels(const GripperMask& mask, const Scenario& scenario);
 
 // Returns the radius of the surface normal fits of a scenario, m.
@@ -47,17 +45,17 @@ MapContent content_of(const Scenario& scenario);
 struct ConvexityStage {
   CurvatureOptions curvature;
   bool average_per_voxel = true;  // average points per voxel; density has no effect
-  double zero_plane_m = 0.0;      // CurvatureMethod::thesis: lower bound of convex points
+  double zero_plane_m = 0.0;      // CurvatureMethod::thesis: minimum height of convex points
   double distance_m = 0.01;       // maximum distance of a convex voxel from a convex point
 };
 
 // Conditions for a scored voxel to be graspable.
 struct GraspableRule {
   Method method = Method::calibrated;
-  int solid_voxel_threshold = 120;
-  double score_threshold = 0.8;
-  double zero_plane_m = 0.0;
-  bool needs_convexity = false;
+  int solid_voxel_threshold = 120;  // TSV; Method::climblab: SSV must be larger
+  double score_threshold = 0.8;     // minimum score; not used by Method::climblab
+  double zero_plane_m = 0.0;        // minimum height of the voxel's center, terrain frame
+  bool needs_convexity = false;     // the voxel must be near a convex point
 };
 
 // Options of detect_tiles; tile_detection_options derives them from a scenario.
@@ -79,12 +77,13 @@ struct TileSurroundings {
 struct TileDetectionResult {
   std::vector<MapVoxel> voxels;       // ascending
   std::size_t unoriented_voxels = 0;  // tilted masks only: no normal, scored upright
-  std::size_t curvature_points = 0;   // points with a measured curvature
+  std::size_t curvature_points = 0;   // points at which the curvature was estimated
   std::size_t convex_points = 0;
   libmap::StageTimings timings_s;  // wall time of each step
 };
 
-// Points at which curvature is measured. The result is the same if the tiles cover the terrain.
+// Points at which curvature is measured. points_near_tiles: points that can make a voxel of the
+// tiles convex. The voxels are the same; the counts differ unless the tiles cover the terrain.
 enum class CurvatureExtent { points_near_tiles, all_points };
 
 // Scores the voxels of the tiles. Throws all errors of the individual stages.

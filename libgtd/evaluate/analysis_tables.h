@@ -1,4 +1,4 @@
-// Writes map analyses as tables and JSON. Regions are numbered from 1, as in the clouds.
+// Converts map analyses to tables, JSON and clouds, in which regions are numbered from 1.
 #pragma once
 
 #include <string>
@@ -16,10 +16,10 @@ namespace libgtd {
 // classes of the map's legend and "width" for bins of equal width.
 libmap::Table histogram_table(const MapAnalysis& analysis);
 
-// Returns one row per bin; `unit` is the unit of the bounds, "m" or "deg".
+// Returns one row per height bin (`unit` of the bounds "m") or slope bin (`unit` "deg").
 libmap::Table ground_table(const std::vector<GroundBin>& bins, const std::string& unit);
 
-// Returns one row per region; positions are in the frame of the map's points.
+// Returns one row per region: positions in the frame of the map, heights in the terrain frame.
 libmap::Table regions_table(const VoxelMap& map, const MapRegionResult& regions,
                             const RegionReach& reach);
 
@@ -30,13 +30,13 @@ libmap::Table region_links_table(const VoxelMap& map, const RegionReach& reach);
 // height bin and per slope bin of the evaluated common voxels.
 libmap::Table change_table(const MapChange& change);
 
-// Returns counts, areas, regions and reach as JSON; `change` may be null.
+// Returns counts, areas, regions and reach as JSON, and `change` unless it is null.
 std::string analysis_json(const MapAnalysis& analysis, const MapSurface& surface,
                           const MapRegionResult& regions, const RegionReachOptions& reach_options,
                           const RegionReach& reach, const MapChange* change);
 
-// Returns the points of `cloud`, the map, in the same order with the fields region (0: none),
-// reachable, slope_deg and area_m2. Of the other fields, only score and graspable are kept.
+// Returns the points of `cloud`, the map, in the same order with the fields score, graspable,
+// region (0: none), reachable (0 or 1), slope_deg (NaN: unknown) and area_m2.
 libmap::PointCloud regions_cloud(const libmap::PointCloud& cloud, const VoxelMap& map,
                                  const MapSurface& surface, const MapRegionResult& regions,
                                  const RegionReach& reach);

@@ -77,7 +77,7 @@ Eigen::Vector3d read_to(const libmap::Table& table, std::size_t row, const Eigen
     ++given;
   }
   if (given != 0 && given != 3)
-    throw libmap::Error("the end of the segment is incomplete",
+    throw libmap::Error("some coordinates of the segment's end are missing",
                         {.file = table.file,
                          .field = "row " + std::to_string(row + 1) + ", columns to_x, to_y, to_z",
                          .bound = "all set, or all empty for a ball"});
@@ -149,7 +149,7 @@ void ExpectedMap::check() const {
                             {.field = "regions '" + other.name + "' and '" + region.name + "'"});
     }
   }
-  if (!any) throw libmap::Error("no region has a verdict on being graspable");
+  if (!any) throw libmap::Error("all regions are undecided; set graspable to 1 or 0 in one");
 }
 
 ExpectedMap parse_expected_map(const libmap::Table& table) {

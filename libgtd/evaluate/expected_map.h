@@ -18,7 +18,7 @@ namespace libgtd {
 // Region of all points at most `radius_m` from a segment in 3D; a ball if both ends coincide.
 struct ExpectedRegion {
   std::string name;
-  Eigen::Vector3d from = Eigen::Vector3d::Zero();  // meters
+  Eigen::Vector3d from = Eigen::Vector3d::Zero();  // ends of the segment, m
   Eigen::Vector3d to = Eigen::Vector3d::Zero();
   double radius_m = 0.0;
   std::optional<bool> graspable;  // expectation; nullopt: undecided
@@ -31,25 +31,25 @@ struct ExpectedRegion {
 struct ExpectedMap {
   std::vector<ExpectedRegion> regions;
 
-  // Throws Error naming the region for a name that is empty or a duplicate, a radius that is not >
-  // 0, a coordinate that is not finite, overlapping regions with different verdicts, and if no
-  // region has a verdict.
+  // Throws Error naming the region for a name that is empty or a duplicate, a radius that is 0,
+  // negative or infinite, a coordinate that is not finite, and overlapping regions of which only
+  // one is expected to be graspable. Throws Error if all regions are undecided.
   void check() const;
 };
 
 // Parses the columns region, x, y, z, to_x, to_y, to_z, radius, graspable, why. Lengths are in
 // meters; to_* (the other end of the segment) are empty for a ball; `graspable` is empty if
-// undecided. All columns are required, others are rejected. Throws Error naming file, row and
-// column.
+// undecided, else a label (parse_label, roc_tables.h). All columns are required, others are
+// rejected. Throws Error naming file, row and column, and like ExpectedMap::check().
 ExpectedMap parse_expected_map(const libmap::Table& table);
 
-// Returns the regions in the frame of a map.
+// Returns the regions, transformed into the frame of a map.
 ExpectedMap transformed(const ExpectedMap& expected, const libmap::Pose& map_from_expected);
 
 struct RegionResult {
-  std::size_t voxels = 0;            // in the region and, if it is decided, in no undecided region
+  std::size_t voxels = 0;            // with a score; if decided, without those in undecided regions
   std::size_t reaching_cutoff = 0;   // voxels with score >= cutoff
-  std::size_t graspable = 0;         // voxels with the flag of the map
+  std::size_t graspable = 0;         // voxels that the map marks graspable, without obstacles
   std::optional<double> mean_score;  // nullopt without voxels
   std::optional<double> median_score;
   // Returns true if at least half of the voxels reach the cutoff; nullopt without voxels.
@@ -74,8 +74,8 @@ struct ExpectedMapResult {
 // Returns sensitivity + specificity - 1 (Youden 1950); nullopt if one of them is undefined.
 std::optional<double> youden_index(const Confusion& counts);
 
-// Evaluates a map with the field "score" in the frame of the regions. `cutoff` is compared as in
-// roc.h. Throws like ExpectedMap::check(), and Error for a map without points or scores.
+// Evaluates a map with a field "score" in the frame of the regions; `cutoff` as in reaches_cutoff.
+// Throws like ExpectedMap::check(), and Error for a map without points or without this field.
 ExpectedMapResult evaluate_expected_map(const libmap::PointCloud& map, const ExpectedMap& expected,
                                         double cutoff);
 

@@ -15,7 +15,7 @@ namespace libgtd {
 namespace {
 
 constexpr std::size_t points_at_once = std::size_t{1} << 16U;
-// Files contain positions to 1e-5 m.
+// Tolerance of tile boxes; files contain positions to 1e-5 m.
 constexpr double rounding_m = 4e-5;
 // Limit of cell indices, larger than any lattice and without overflow.
 constexpr double farthest_cell = 1e9;
@@ -26,7 +26,7 @@ using MapOrder = std::pair<Voxel, std::size_t>;
 // Map or tile with a search tree. The cloud must outlive it.
 class MapPart {
  public:
-  // `voxels` are those of the points of a tile; empty for a whole map.
+  // `voxels` are the voxels of a tile's points, in the same order; empty for a whole map.
   explicit MapPart(const libmap::PointCloud& cloud, std::vector<Voxel> voxels = {})
       : cloud_(cloud), voxels_(std::move(voxels)), tree_(cloud.positions) {}
 
@@ -51,7 +51,7 @@ std::vector<Voxel> voxels_of_tile(const libmap::PointCloud& tile) {
   if (voxels.empty()) throw libmap::Error("a tile has no points");
   const auto is_not_before = [](const Voxel& a, const Voxel& b) { return !(a < b); };
   if (std::adjacent_find(voxels.begin(), voxels.end(), is_not_before) != voxels.end())
-    throw libmap::Error("the points of a tile are not in order");
+    throw libmap::Error("the points of a tile are not in ascending order of i, j, k");
   return voxels;
 }
 
@@ -211,7 +211,7 @@ class TileLookup {
     if (options.mode != LookupMode::nearest) reach_m_ = std::max(reach_m_, options.radius_m);
   }
 
-  // First the tiles of the nearest points, then tiles that may contain nearer points.
+  // Searches the tiles within the reach first, then tiles that may contain nearer points.
   std::vector<Finding> find(const std::vector<Query>& queries) const {
     std::vector<Finding> findings(queries.size());
     std::vector<Visit> visits;
@@ -281,9 +281,10 @@ void bind(libmap::ParameterTable& table, LookupOptions& options) {
   table.add("mode", options.mode, lookup_mode_names(),
             "map points used for a location; nearest: closest point; maximum: point with the "
             "highest score within the radius; mean: all points within the radius");
-  table.add("radius_m", options.radius_m, libmap::positive, "radius of modes maximum and mean, m");
+  table.add("radius_m", options.radius_m, libmap::positive,
+            "radius around a location for modes maximum and mean, m");
   table.add("max_distance_m", options.max_distance_m, libmap::positive,
-            "maximum distance of the map point used by mode nearest, m");
+            "maximum distance of the map point from the location in mode nearest, m");
 }
 
 std::vector<LookupAnswer> look_up(const libmap::PointCloud& map,

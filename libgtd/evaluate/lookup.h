@@ -31,7 +31,7 @@ void bind(libmap::ParameterTable& table, LookupOptions& options);
 
 struct LookupAnswer {
   bool found = false;
-  double distance_m = 0.0;     // to the nearest map point, even if not found
+  double distance_m = 0.0;     // to the nearest map point; infinity for a point that is not finite
   std::size_t map_point = 0;   // source of the values; with mean the nearest point
   std::size_t map_points = 0;  // number of points that contributed
   std::vector<double> values;  // one per field of the map; empty if not found
@@ -43,8 +43,8 @@ std::vector<LookupAnswer> look_up(const libmap::PointCloud& map,
                                   const std::vector<Eigen::Vector3d>& points,
                                   const LookupOptions& options = {});
 
-// Loads the points of index.tiles[tile] in the frame of index.frame, as ordered by to_cloud. Must
-// be thread-safe.
+// Loads the points of index.tiles[tile] in the frame of index.frame, in the order of to_cloud
+// (graspability_map.h). Must be thread-safe.
 using TileLoader = std::function<libmap::PointCloud(std::size_t tile)>;
 
 // Returns the answers of look_up over the whole map, except that `map_point` is an index within a

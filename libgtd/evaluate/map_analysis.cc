@@ -166,7 +166,7 @@ void bind(libmap::ParameterTable& table, MapAnalysisOptions& options) {
             "bin width of the height histogram, m");
   table.add("slope_bin_deg", options.slope_bin_deg, libmap::Range{0.0, 90.0, true, false},
             "bin width of the slope histogram, degrees");
-  table.add("border", options.border, "include voxels with a mask that extends beyond the scan");
+  table.add("border", options.border, "include voxels at the border of the scanned area");
 }
 
 std::optional<double> GroundBin::graspable_fraction() const {

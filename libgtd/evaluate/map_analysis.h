@@ -25,7 +25,7 @@ struct ValueBins {
 };
 
 // Returns bins from the one that contains `low` to the one that contains `high` or ends at it.
-// Throws Error naming `field` for more than 100,000 bins.
+// Throws Error naming `field` for a width <= 0 and for more than 100,000 bins.
 ValueBins bins_over(double low, double high, double width, const char* field);
 
 // Returns the index of the quantile `fraction` (nearest rank) of `count` > 0 ascending values.
@@ -35,12 +35,12 @@ struct MapAnalysisOptions {
   double score_bin = 0.05;  // width of the histogram bins
   double height_bin_m = 0.05;
   double slope_bin_deg = 5.0;
-  bool border = false;  // includes voxels at the border of the scanned area
+  bool border = false;  // voxels at the border of the scanned area are evaluated, too
 };
 void bind(libmap::ParameterTable& table, MapAnalysisOptions& options);
 
-// Voxels with low <= score < high; the last bin includes its upper end. Bounds have a tolerance of
-// 1e-6 downward, as in the legend of the map (score_color.h).
+// Voxels with low <= score < high; the last bin includes its upper end. A score up to 1e-6 below
+// `low` belongs to the bin, as in the legend of the map (score_color.h).
 struct ScoreBin {
   double low = 0.0;
   double high = 0.0;
@@ -51,7 +51,7 @@ struct ScoreBin {
   double area_m2 = 0.0;       // surface area of the evaluated voxels
 };
 
-// Evaluated voxels with low <= value < high; the last bin includes its upper end.
+// Evaluated voxels with low <= height (m) or slope (degrees) < high; the last bin includes `high`.
 struct GroundBin {
   double low = 0.0;
   double high = 0.0;
@@ -66,25 +66,25 @@ struct GroundBin {
 };
 
 struct MapAnalysis {
-  // Numbers of all voxels.
+  // Numbers of voxels in the whole map.
   std::size_t voxels = 0;
   std::size_t without_score = 0;
   std::size_t below_zero_plane = 0;
   std::size_t at_border = 0;
   std::size_t obstacles = 0;
   std::size_t graspable = 0;
-  // Evaluated voxels only. A column is all voxels with the same i and j; it is graspable if one of
-  // its voxels is.
+  // Evaluated voxels only. A column consists of all voxels with the same i and j; it is graspable
+  // if one of its evaluated voxels is.
   std::size_t columns = 0;
   std::size_t graspable_columns = 0;
   // Area projected to the horizontal plane; the whole area where the slope is unknown.
   double plan_area_m2 = 0.0;
   double graspable_plan_area_m2 = 0.0;
   GroundBin ground;  // all evaluated voxels; low, high: range of heights
-  // occupied / (occupied + empty) columns of the whole map. Only gaps of at most six empty columns
-  // along y count as empty. It is below 1 if the cloud has fewer points than columns.
+  // occupied / (occupied + empty) columns of the whole map. Empty columns count only in gaps of at
+  // most six columns along y. Below 1 if the cloud has fewer points than columns.
   double column_coverage = 1.0;
-  std::vector<ScoreBin> score_classes;  // bins of the legend, best first
+  std::vector<ScoreBin> score_classes;  // classes of the map's legend, best (unbounded) first
   std::vector<ScoreBin> score_bins;     // from min(0, lowest score) to max(1, highest)
   std::vector<GroundBin> by_height;     // heights in the terrain frame
   std::vector<GroundBin> by_slope;      // from 0 to 90 degrees

@@ -59,7 +59,7 @@ std::vector<VoxelPair> pairs_by_index(const VoxelMap& map, const VoxelMap& other
   return pairs;
 }
 
-// Nearest of `points` at most `reach_m` from each of `places`, the first of equally near ones.
+// Returns for each center the nearest point within `reach_m` (first of equally near), or `none`.
 std::vector<std::uint32_t> nearest_points(const std::vector<Eigen::Vector3d>& points,
                                           const std::vector<Eigen::Vector3d>& centers,
                                           double reach_m) {
@@ -110,8 +110,7 @@ ScoreDifference difference_of(const VoxelMap& map, const VoxelMap& other,
   result.mean_absolute /= n;
   result.rms = std::sqrt(result.rms / n);
   std::sort(differences.begin(), differences.end());
-  // If the signs of the values change, all three change their signs, and low and high are
-  // exchanged.
+  // Exchanging the maps negates the percentiles and exchanges low_5 and high_95.
   const std::size_t last = result.count - 1;
   result.low_5 = differences[nearest_rank(result.count, 0.05)];
   result.median = (differences[last / 2] + differences[result.count / 2]) / 2.0;
@@ -205,7 +204,8 @@ void find_unpaired(const VoxelMap& map, const VoxelMap& other, MapChange& change
 void bind(libmap::ParameterTable& table, MapChangeOptions& options) {
   table.add("match_distance_voxels", options.match_distance_voxels,
             libmap::Range{0.0, 10.0, true, false},
-            "maximum distance of corresponding voxels on different lattices, in voxel edges");
+            "maximum distance of corresponding voxels of different lattices, in edges of the "
+            "larger voxel");
 }
 
 std::string_view to_text(VoxelMatching matching) {

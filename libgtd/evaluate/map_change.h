@@ -16,14 +16,15 @@
 namespace libgtd {
 
 struct MapChangeOptions {
-  // Maximum distance of corresponding voxel centers, in voxel edges, if the lattices differ.
-  // Corresponding voxels are mutual nearest neighbors. The default is half a diagonal, the maximum
-  // distance of a point from the nearest center of a lattice.
+  // Maximum distance of corresponding voxel centers if the lattices differ, in edge lengths of the
+  // larger voxel. The default is half a diagonal, the maximum distance from any point to the
+  // nearest center of a lattice.
   double match_distance_voxels = 0.87;
   double height_bin_m = 0.05;
   double slope_bin_deg = 5.0;
-  bool border = false;  // includes voxels at the border of the scanned area
+  bool border = false;  // voxels at the border of the scanned area are evaluated, too
 };
+// Binds match_distance_voxels; MapAnalysisOptions binds the keys of the other fields.
 void bind(libmap::ParameterTable& table, MapChangeOptions& options);
 
 // Correspondence of voxels. lattice: same indices on a common lattice. nearest: mutual nearest
@@ -59,7 +60,7 @@ struct ScoreDifference {
 
 // Statistics of a set of pairs.
 struct ChangeSummary {
-  double low = 0.0;  // bounds of the bin
+  double low = 0.0;  // bounds of the bin, m or degrees; 0 without bins
   double high = 0.0;
   Confusion graspable;  // MAP is the prediction, OTHER the reference
   std::optional<Kappa> kappa;
@@ -75,7 +76,7 @@ struct ChangeSummary {
 struct MapChange {
   VoxelMatching matching = VoxelMatching::lattice;
   std::vector<VoxelPair> pairs;         // ascending by the voxel of MAP
-  std::vector<std::uint32_t> only_map;  // ascending
+  std::vector<std::uint32_t> only_map;  // voxels of MAP without a partner, ascending
   std::vector<std::uint32_t> only_other;
   std::size_t only_map_graspable = 0;
   std::size_t only_other_graspable = 0;
@@ -94,7 +95,7 @@ MapChange compare_maps(const VoxelMap& map, const MapSurface& surface, const Vox
 
 // Returns one point per pair (at the voxel of MAP) and per voxel that is only in one map, in the
 // frame of MAP's points, with the fields score_map, score_other, difference (NaN if undefined),
-// graspable_map, graspable_other, evaluated and change (value of ChangeClass).
+// graspable_map, graspable_other, evaluated (`border` as in the options) and change (ChangeClass).
 libmap::PointCloud to_cloud(const MapChange& change, const VoxelMap& map, const VoxelMap& other,
                             const libmap::Pose& map_terrain_from_other_terrain, bool border);
 

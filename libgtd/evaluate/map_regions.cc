@@ -92,7 +92,7 @@ void check(const RegionReachOptions& options) {
     throw libmap::Error("is not finite", {.field = "start"});
 }
 
-// Connected regions, as points.
+// Voxel centers of one region, or of several connected regions.
 struct PointSet {
   std::vector<std::uint32_t> voxels;
   libmap::PointCloud points;
@@ -326,7 +326,7 @@ std::vector<double> lengths_from(std::uint32_t start, const Graph& graph,
   return lengths;
 }
 
-// Adds the start as a node. Without a position, it is at distance 0 from its region.
+// Adds the start as a node, with links to the regions within `max_m`.
 std::vector<RegionLink> with_start(std::vector<RegionLink> links,
                                    const std::vector<double>& start_distances, double max_m) {
   const auto start = static_cast<std::uint32_t>(start_distances.size());
@@ -361,11 +361,10 @@ void describe_access(const MapRegionResult& regions, const std::vector<double>& 
 }  // namespace
 
 void bind(libmap::ParameterTable& table, MapRegionOptions& options) {
-  table.add(
-      "adjacency_voxels", options.adjacency_voxels, libmap::Range{1.0, 100.0},
-      "maximum index difference of neighboring voxels in a region, per axis; 1: 26 neighbors");
+  table.add("adjacency_voxels", options.adjacency_voxels, libmap::Range{1.0, 100.0},
+            "maximum index difference of connected voxels of a region, per axis; 1: 26 neighbors");
   table.add("min_voxels", options.min_voxels, libmap::Range{1.0, 1e9},
-            "minimum size of a region, voxels");
+            "minimum number of voxels of a region; smaller regions are skipped");
 }
 
 MapRegionResult find_regions(const VoxelMap& map, const MapSurface& surface,

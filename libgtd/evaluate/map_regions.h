@@ -16,7 +16,7 @@ namespace libgtd {
 struct MapRegionOptions {
   int adjacency_voxels = 1;  // maximum index difference of neighbors; 1: 26 neighbors
   int min_voxels = 1;        // minimum number of voxels of a region
-  bool border = false;       // includes voxels at the border of the scanned area
+  bool border = false;       // voxels at the border of the scanned area are evaluated, too
 };
 void bind(libmap::ParameterTable& table, MapRegionOptions& options);
 
@@ -48,7 +48,7 @@ MapRegionResult find_regions(const VoxelMap& map, const MapSurface& surface,
 
 struct RegionReachOptions {
   double stride_m = 0.3;  // maximum step between voxel centers
-  // Position of the robot in the terrain frame; nullopt: on the largest region.
+  // Position of the robot in the terrain frame, m; nullopt: on the largest region.
   std::optional<Eigen::Vector3d> start{};
 };
 void bind(libmap::ParameterTable& table, RegionReachOptions& options);
@@ -68,7 +68,7 @@ struct RegionAccess {
   bool reachable = false;
   std::optional<std::size_t> steps;  // minimum number of steps between regions, including that
                                      // from the start; nullopt: unreachable
-  double stride_needed_m = 0.0;      // minimum stride over all paths
+  double stride_needed_m = 0.0;      // minimum stride with which the region is reachable
 };
 
 struct RegionReach {
@@ -79,15 +79,15 @@ struct RegionReach {
   // Minimum stride that connects all regions: the longest link of the tree; 0 for one region,
   // nullopt for none.
   std::optional<double> joining_stride_m;
-  std::optional<std::uint32_t> start_region;  // region nearest to the start
-  double start_distance_m = 0.0;              // m
+  std::optional<std::uint32_t> start_region;  // nearest to the start; nullopt: no region
+  double start_distance_m = 0.0;              // from the start to its nearest voxel
   std::size_t reachable_regions = 0;
   double reachable_area_m2 = 0.0;
 };
 
-// Computes the graph of regions, linked if their nearest voxels are within the stride. Obstacles
-// and gaps between them are ignored. Throws Error for options out of range and for a stride with
-// more than 10 million links.
+// Computes the graph of regions, which are linked if their nearest voxels are within the stride.
+// Obstacles and gaps between regions are ignored. Throws Error for options out of range and for a
+// stride with more than 10 million links.
 RegionReach find_reach(const VoxelMap& map, const MapRegionResult& regions,
                        const RegionReachOptions& options = {});
 

@@ -25,9 +25,9 @@ inline constexpr std::array<double, 5> summary_quantiles{0.05, 0.25, 0.5, 0.75, 
 struct MapSummary {
   std::size_t voxels = 0;  // all voxels of the map
   std::size_t evaluated = 0;
-  std::size_t reaching_cutoff = 0;  // voxels with score >= threshold
-  std::size_t graspable = 0;        // voxels with the flag of the map
-  // Voxels with fewer solid voxels in the mask (SSV) than TSV. nullopt if one of them is unknown.
+  std::size_t reaching_cutoff = 0;  // evaluated voxels with score >= graspability_threshold
+  std::size_t graspable = 0;        // evaluated voxels that the map marks graspable
+  // Evaluated voxels with fewer occupied voxels in the mask (SSV) than TSV; nullopt if unknown.
   std::optional<std::size_t> below_solid_threshold;
   // Quantiles summary_quantiles by nearest rank; empty if no voxel was evaluated.
   std::vector<double> scores;
@@ -37,7 +37,7 @@ struct MapSummary {
 
 struct MapSummaryOptions {
   double graspability_threshold = 0.8;
-  std::optional<double> solid_voxel_threshold{};
+  std::optional<double> solid_voxel_threshold{};  // TSV; nullopt: unknown
 };
 
 // Summarizes a map; `voxels` must be voxel_map_of(map).
@@ -50,20 +50,20 @@ MapSummaryOptions summary_options(const libmap::Manifest& manifest);
 struct SummarizedMap {
   std::string name;
   libmap::Manifest manifest{};  // empty: parameters are empty cells
-  double cutoff = 0.8;
+  double cutoff = 0.8;          // minimum score for predicted graspable
   MapSummary summary{};
   std::optional<ExpectedMapResult> expected{};
 };
 
 // Returns one row per map: name, parameters of the detection, counts, fractions, quantiles. If one
-// of the maps has an expectation, also sensitivity and specificity of voxels and of regions with
-// Wilson 95 % intervals, Youden's index and the area under the curve. Undefined: empty.
+// of the maps has `expected`, also sensitivity and specificity of voxels and of regions with Wilson
+// 95 % intervals, Youden's index and the area under the curve. Undefined values are empty cells.
 libmap::Table summary_table(const std::vector<SummarizedMap>& maps);
 
-// Returns one row per map and region of `expected`.
+// Returns one row per region of `expected` for each map that was evaluated against it.
 libmap::Table region_table(const std::vector<SummarizedMap>& maps, const ExpectedMap& expected);
 
-// Returns the columns map, score (the middle of a bin), voxels, share (of the evaluated voxels).
+// Returns one row per map and score bin: map, score (middle of the bin), voxels, share of voxels.
 libmap::Table histogram_table(const std::vector<SummarizedMap>& maps);
 
 // Agreement of two maps of one cloud over the voxels that are evaluated in both.
@@ -80,7 +80,7 @@ struct MapPair {
 MapPair compare_pair(const VoxelMap& first, const VoxelMap& second,
                      const libmap::Pose& first_terrain_from_second_terrain);
 
-// Returns one row per pair: numbers of voxels that both, one or none of the maps marks graspable,
+// Returns one row per pair: numbers of voxels that both, one or none of the maps mark graspable,
 // accuracy, Cohen's kappa, and the differences of the scores (second - first).
 libmap::Table pair_table(const std::vector<SummarizedMap>& maps, const std::vector<MapPair>& pairs);
 

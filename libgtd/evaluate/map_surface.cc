@@ -104,7 +104,7 @@ class AreaCounter {
 
 void bind(libmap::ParameterTable& table, MapSurfaceOptions& options) {
   table.add("surface_radius_m", options.surface_radius_m, libmap::not_negative,
-            "radius of the slope and area estimates, m; 0: six voxels");
+            "radius within which slope and surface area are estimated, m; 0: six voxel edges");
 }
 
 double MapSurface::plan_area_m2(std::size_t n) const {

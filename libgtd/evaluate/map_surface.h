@@ -10,16 +10,16 @@
 namespace libgtd {
 
 struct MapSurfaceOptions {
-  // Radius of the normal fits and of the density of voxels; 0: six voxels.
+  // Radius of the normal fits and of the estimates of the voxel density, m; 0: six voxel edges.
   double surface_radius_m = 0.0;
 };
 void bind(libmap::ParameterTable& table, MapSurfaceOptions& options);
 
 // Surface of a map, one entry per voxel.
 struct MapSurface {
-  double radius_m = 0.0;         // radius used
+  double radius_m = 0.0;         // the radius that was used
   std::vector<float> slope_deg;  // angle of the surface to the horizontal, 0..90; NaN: unknown
-  std::vector<float> area_m2;    // area of the surface
+  std::vector<float> area_m2;    // surface area of the voxel
 
   // Returns the area projected to the horizontal plane; the whole area if the slope is unknown.
   double plan_area_m2(std::size_t n) const;

@@ -1,4 +1,4 @@
-// Helpers of this folder's writers: table rows of named cells, and rates as JSON.
+// Makes table rows from named cells, and JSON from rates, for the writers of this folder.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -14,6 +14,7 @@ namespace libgtd {
 
 using NamedCells = std::vector<std::pair<std::string, std::string>>;
 
+// Appends a row; the names of its cells become the columns of the table.
 inline void append(const NamedCells& row, libmap::Table& table) {
   table.columns.clear();
   table.rows.emplace_back();

@@ -19,7 +19,7 @@ struct RocOptions {
   // Cutoffs of the ROC table and the upper sum, finite and ascending; default: tab. 5-1 to 5-3 of
   // the thesis.
   std::vector<double> cutoffs = {0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0};
-  double rate_cutoff = 0.8;          // cutoff of the rates
+  double rate_cutoff = 0.8;          // cutoff at which the rates are computed
   int bootstrap_replicates = 10000;  // 0: no interval
   std::uint64_t bootstrap_seed = 1;
 
@@ -39,8 +39,7 @@ struct Rate {
   std::size_t count = 0;
   std::size_t total = 0;
 
-  // count / total; nullopt if total is 0.
-  std::optional<double> value() const;
+  std::optional<double> value() const;        // count / total
   std::optional<Interval> wilson_95() const;  // Wilson 1927, no continuity correction
 };
 
@@ -79,13 +78,13 @@ struct AreaUnderCurve {
   double trapezoid = 0.0;
   // Area of the thesis: sum over the cutoffs of (FPR_k - FPR_k+1) * TPR_k, without the last cutoff.
   // This sum is at least the trapezoid area over the same cutoffs, and at least `trapezoid` if
-  // `upper_sum_width` is 1. Negatives below the first cutoff or at the last do not contribute.
+  // `upper_sum_width` is 1. Negatives below the first or reaching the last cutoff do not count.
   double upper_sum = 0.0;
   std::vector<double> upper_sum_terms;  // terms of the sum, one per cutoff
   double upper_sum_width = 0.0;         // FPR at the first cutoff - FPR at the last
   // Bootstrap interval of `trapezoid` (95 %, percentile), stratified: positives and negatives are
-  // resampled separately, so that every replicate has both classes. nullopt without replicates. (1,
-  // 1) after a perfect separation, which does not prove one.
+  // resampled separately, so that every replicate has both classes. nullopt without replicates. If
+  // the scores separate the classes perfectly, it is (1, 1), which does not prove an area of 1.
   std::optional<Interval> trapezoid_bootstrap_95;
 };
 
@@ -95,18 +94,18 @@ struct RocResult {
   RocPoint at_rate_cutoff;
   std::optional<AreaUnderCurve> auc;  // nullopt unless both classes exist
   std::string auc_note;               // reason for a missing area
-  // Precision at the cutoff where recall reaches 1/2; ties count in full.
+  // Precision at the highest cutoff with recall >= 1/2; nullopt without positives.
   std::optional<double> precision_at_half_recall;
   // Expected calibration error (Naeini et al. 2015), if all scores are in 0..1: mean over the
   // locations of |fraction of positives - mean score| of the location's bin (width 0.1).
   std::optional<double> calibration_error;
-  std::size_t without_score = 0;  // locations without a score: not visible
+  std::size_t without_score = 0;  // locations without a score, e.g. not visible in the scan
   std::size_t without_label = 0;  // locations with a score but no label
 };
 
 // Evaluates one label and one score per location. A location without one of them, or with a score
 // of NaN, is skipped. The result does not depend on the number of threads. Throws Error if the
-// lengths differ.
+// lengths differ or an option is out of range.
 RocResult evaluate_roc(const std::vector<std::optional<bool>>& labels,
                        const std::vector<std::optional<double>>& scores,
                        const RocOptions& options = {});

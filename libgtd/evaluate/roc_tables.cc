@@ -256,11 +256,11 @@ std::vector<std::string> default_score_columns(const Table& table, std::string_v
 
 void bind(libmap::ParameterTable& table, TableEvaluationOptions& options) {
   table.add("label", options.label_column,
-            "column of the true labels: 1/0, true/false, yes/no, graspable/not graspable");
+            "name of the column of true labels: 1/0, true/false, yes/no, graspable/not graspable");
   table.add("cutoff", options.roc.rate_cutoff, libmap::any_number,
-            "minimum score of a location that counts as predicted graspable in the rates");
+            "minimum score of a location that is predicted graspable (accuracy and other rates)");
   table.add("bootstrap", options.roc.bootstrap_replicates, libmap::Range{0, 1e7},
-            "bootstrap replicates for the confidence interval of the AUC; 0: no interval");
+            "number of bootstrap replicates for the confidence interval of the AUC; 0: none");
   table.add("seed", options.roc.bootstrap_seed, libmap::not_negative,
             "random seed of the bootstrap");
 }
@@ -274,7 +274,7 @@ TableEvaluation evaluate_table(const Table& table, const TableEvaluationOptions&
   std::vector<std::string>& names = evaluation.options.score_columns;
   if (names.empty()) names = default_score_columns(table, options.label_column);
   if (names.empty())
-    throw libmap::Error("the table has no score column; name one with --score",
+    throw libmap::Error("no column was recognized as a score; name the score columns with --score",
                         {.file = table.file});
   for (std::size_t n = 0; n < names.size(); ++n) {
     if (std::find(names.begin(), names.begin() + static_cast<std::ptrdiff_t>(n), names[n]) !=
@@ -364,23 +364,23 @@ std::string to_markdown(const TableEvaluation& evaluation, const std::string& ti
           std::to_string(evaluation.rows) + " rows.\n\n## Area under the ROC curve\n\n" +
           areas_markdown(evaluation) + "\n";
   text +=
-      "The trapezoid equals the Mann-Whitney statistic, the chance that a graspable place scores "
-      "higher than one that is not, ties counting one half";
+      "The trapezoid equals the Mann-Whitney statistic, the probability that a graspable location "
+      "scores higher than one that is not; ties count one half";
   if (roc.bootstrap_replicates > 0)
     text += "; in brackets its 95 % percentile interval of " +
             std::to_string(roc.bootstrap_replicates) + " bootstrap replicates (seed " +
             std::to_string(roc.bootstrap_seed) +
-            ", graspable and other places resampled separately, so that each replicate has both)";
+            ", graspable and other locations resampled separately, so each replicate has both)";
   text +=
       ". The AUC that the thesis published (0.84, 0.75, 0.72) is the upper sum over its ten "
       "cutoffs, the sum of (FPR_k - FPR_k+1) * TPR_k, and not the trapezoid (0.745, 0.642, 0.650 "
-      "on the same scores). If the cutoffs span the scores of all places that are not "
+      "on the same scores). If the cutoffs span the scores of all locations that are not "
       "graspable, the upper sum is never less than the trapezoid. Do not use it for comparison "
       "with other work.\n\n";
   text += notes_markdown(evaluation);
   text += "## Rates at cutoff " + libmap::to_text(roc.rate_cutoff) + "\n\n" +
           rates_markdown(evaluation) +
-          "\nA place is predicted graspable if its score reaches the cutoff. In brackets the "
+          "\nA location is predicted graspable if its score reaches the cutoff. In brackets the "
           "Wilson 95 % interval.\n";
   return text;
 }

@@ -15,8 +15,7 @@ namespace libgtd {
 
 struct TableEvaluationOptions {
   std::string label_column = "graspable";
-  // Score columns; empty: default_score_columns().
-  std::vector<std::string> score_columns;
+  std::vector<std::string> score_columns;  // empty: default_score_columns()
   RocOptions roc;
 };
 // Binds all fields except score_columns.
@@ -42,8 +41,8 @@ std::optional<bool> parse_label(std::string_view text);
 std::optional<bool> label_at(const libmap::Table& table, std::size_t row, std::size_t column);
 
 // Returns the columns evaluated by default: columns with only numbers and empty cells, and at least
-// one number, except the label, ids (id, point, hold, i, j, k), positions and distances (x, y, z,
-// or a name that ends with a unit of length such as "_m"), and the look-up flags found and edge.
+// one number, except the label, ids (id, place, region, point, hold, i, j, k), positions and
+// lengths (x, y, z, *_m, *_mm, *_cm), found, border, edge, trial_spread and parameter_spread.
 std::vector<std::string> default_score_columns(const libmap::Table& table,
                                                std::string_view label_column);
 
@@ -59,8 +58,8 @@ libmap::Table roc_table(const TableEvaluation& evaluation);
 // Returns one row per score column and rate: count, total, value, and the Wilson 95 % interval.
 libmap::Table rates_table(const TableEvaluation& evaluation);
 
-// Returns one row per score column: case, locations, cutoff, and the same rates with four decimals,
-// as in tables 5-4 and 5-5 of the thesis.
+// Returns one row per score column: case (its name), locations, cutoff, and the rates of
+// rates_table with four decimals, as in tables 5-4 and 5-5 of the thesis.
 libmap::Table accuracy_table(const TableEvaluation& evaluation);
 
 // Returns all results except the ROC points. Undefined values are null.

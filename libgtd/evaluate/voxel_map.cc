@@ -58,7 +58,7 @@ VoxelLattice fitted_lattice(const PointCloud& map, const libmap::Pose& terrain_f
     squares += offset.squaredNorm();
   }
   if (!(products > 0.0))
-    throw libmap::Error("is unknown; the map has neither a manifest nor the fields i, j and k",
+    throw libmap::Error("does not follow from the fields i, j and k; provide the map's manifest",
                         {.field = "voxel_size_m"});
   const double size_m = products / squares;
   return {mean_point - size_m * (mean_voxel.array() + 0.5).matrix(), size_m};
@@ -88,7 +88,7 @@ void require_on_lattice(const PointCloud& map, const VoxelMap& result,
     const Eigen::Vector3d point = result.terrain_from_map * map.positions[kept[n]];
     if (!((point - center).cwiseAbs().array() <= bound_m).all())
       throw libmap::Error(
-          "too large for the lattice of the map",
+          "too large for the lattice of the map; the manifest may belong to another map",
           {.field = "distance of point " + std::to_string(kept[n]) + " from a voxel center",
            .value =
                libmap::to_text(static_cast<float>((point - center).cwiseAbs().maxCoeff())) + " m",
@@ -189,7 +189,7 @@ VoxelMap voxel_map_of(const PointCloud& map, const MapInfo& info) {
       const Eigen::Vector3d cell =
           result.lattice.cell_of(result.terrain_from_map * map.positions[n]);
       if (!(cell.cwiseAbs().array() <= max_voxel_index).all())
-        throw libmap::Error("a point is too far from the origin for this voxel size",
+        throw libmap::Error("too far from the origin for this voxel size",
                             {.field = "point " + std::to_string(n)});
       voxels.push_back(result.lattice.voxel_of(result.terrain_from_map * map.positions[n]));
     }

@@ -23,20 +23,20 @@ struct MapInfo {
   double zero_plane_m = -std::numeric_limits<double>::infinity();  // in the terrain frame
 };
 
-// Reads these properties from a manifest of `graspmap score`: parameters, frame, transforms and the
-// origin of the lattice. Throws Error if one is not finite.
+// Reads a MapInfo from a manifest of `graspmap score`; missing properties keep their defaults.
+// Throws Error if the lattice is not finite.
 MapInfo map_info(const libmap::Manifest& manifest);
 
 // Arrays with one entry per voxel, ascending by voxel, for any order of the map's points.
 struct VoxelMap {
-  VoxelLattice lattice;                                      // in the terrain frame
-  libmap::Pose terrain_from_map = libmap::Pose::Identity();  // from the frame of the points
-  double zero_plane_m = -std::numeric_limits<double>::infinity();
+  VoxelLattice lattice;                                            // in the terrain frame
+  libmap::Pose terrain_from_map = libmap::Pose::Identity();        // from the frame of the points
+  double zero_plane_m = -std::numeric_limits<double>::infinity();  // -infinity: none
   std::vector<Voxel> voxels;
   std::vector<float> scores;              // NaN: no score
-  std::vector<std::uint8_t> graspable;    // flag of the map, with a score and no obstacle
+  std::vector<std::uint8_t> graspable;    // 1: set in the map, has a score, no obstacle
   std::vector<std::uint8_t> border;       // 0 if the map has no such field
-  std::vector<std::uint8_t> obstacle;     // 0 if the map has no such field
+  std::vector<std::uint8_t> obstacle;     // 1: obstacle or unreachable; 0 without such a field
   std::vector<std::uint32_t> map_points;  // index of the point in the map
 
   std::size_t size() const { return voxels.size(); }
@@ -51,10 +51,10 @@ struct VoxelMap {
   }
 };
 
-// Converts a map with the fields "score" and "graspable" and voxel indices: the fields i, j and k,
-// or a known lattice. With the fields only, the lattice is fitted to the points in the terrain
-// frame. Points without a position are skipped. Throws Error for a map without points, a missing
-// or invalid field, points that are not at voxel centers, and two points in one voxel.
+// Converts a map with the fields "score" and "graspable". Voxel indices are the fields i, j and k,
+// or follow from a known lattice. An unknown lattice is fitted to the points in the terrain frame.
+// Points with coordinates that are not finite are skipped. Throws Error for a map without points, a
+// missing or invalid field, points that are not at voxel centers, and two points in one voxel.
 VoxelMap voxel_map_of(const libmap::PointCloud& map, const MapInfo& info = {});
 
 }  // namespace libgtd

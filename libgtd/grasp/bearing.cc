@@ -88,7 +88,7 @@ void bind(libmap::ParameterTable& table, EngagementOptions& options) {
   using libmap::positive;
   constexpr libmap::Range cone{0.0, 89.0};
   table.add("law", options.law, engagement_law_names(),
-            "force of a contact; asperities: random facets; adhesion: limited tension (LORIS)");
+            "law of contact forces; asperities: random facets; adhesion: limited tension (LORIS)");
   table.add("adhesion_limit_n", options.adhesion_limit_n, positive,
             "law adhesion: maximum total tension of all fingers, N");
   table.add("adhesion_lateral_deg", options.adhesion_lateral_deg, cone,
@@ -117,7 +117,7 @@ BearingContact::BearingContact(const GripContact& contact, std::vector<double> f
       limit_n_(limit_n) {
   std::sort(facet_angles_rad.begin(), facet_angles_rad.end(), std::greater<>());
   spines_ = facet_angles_rad.size();
-  // Padded to whole chunks.
+  // Padded to a multiple of the chunk size.
   cosines_.assign((spines_ + chunk - 1) / chunk * chunk, 0.0);
   counts_ = sines_ = cosines_;
   for (std::size_t n = 0; n < spines_; ++n) {
@@ -135,7 +135,7 @@ BearingContact::BearingContact(const GripContact& contact, const EngagementOptio
   adhesion_ = {{1.0, 0.0, 0.0}, {-pull, -1.0, side}, {-pull, -1.0, -side}};
 }
 
-// Best of the eight edges of the friction pyramid on a facet.
+// Returns the edge of the friction pyramid on a facet with the largest product with `local`.
 BearingContact::Edge BearingContact::best_edge(double cosine, double sine,
                                                const Eigen::Vector3d& local) const {
   const double axis = cosine * local.x() - sine * local.y();

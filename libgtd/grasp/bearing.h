@@ -38,8 +38,8 @@ enum class SpineSharing { best, equally };
 // Coulomb's friction cone. Forces in N, directions in the frame of the contacts.
 class BearingContact {
  public:
-  // Law `asperities`: `facet_angles_rad` are the inclinations of the engaged facets, or one 0 for a
-  // link.
+  // Law `asperities`: `facet_angles_rad` are the inclinations of the facets, one per engaged spine;
+  // {0} for a contact of a link. `limit_n` is the limit of one spine, or of the link.
   BearingContact(const GripContact& contact, std::vector<double> facet_angles_rad, double friction,
                  double limit_n);
   // Law `adhesion`: `limit_n` is the limit of this finger.
@@ -51,7 +51,7 @@ class BearingContact {
   const Eigen::Vector3d& outward() const { return outward_; }  // away from the palm's axis
   std::size_t finger() const { return finger_; }
   bool is_link() const { return is_link_; }
-  std::size_t spines() const { return spines_; }
+  std::size_t spines() const { return spines_; }  // engaged ones; link: 1, law adhesion: 0
 
   // Returns the force of the set with the maximum scalar product with `objective`, N.
   Eigen::Vector3d best_force(const Eigen::Vector3d& objective, SpineSharing sharing) const {
@@ -63,7 +63,8 @@ class BearingContact {
     frame << normal_, drag_, lateral_;
     return frame;
   }
-  // Return the maximum scalar product with `local` (contact frame) and the force that attains it.
+  // Return the maximum scalar product of a force of the set with `local`, a vector in the contact
+  // frame (frame()), and the force that attains it, in the frame of the contacts.
   double max_local_product(const Eigen::Vector3d& local, SpineSharing sharing) const;
   Eigen::Vector3d best_local_force(const Eigen::Vector3d& local, SpineSharing sharing) const;
   // Returns the edges of the cone of forces on the steepest facet (adhesion: of all forces), as
@@ -85,14 +86,14 @@ class BearingContact {
   double cos_friction_angle_ = 1.0;  // cosine of the friction angle
   double limit_n_ = 0.0;
   std::size_t spines_ = 0;
-  std::vector<double> cosines_;  // cosines of the facet angles, descending; padded with 0
+  std::vector<double> cosines_;  // of the facet angles, which descend; padded with 0
   std::vector<double> sines_;
   std::vector<double> counts_;             // number of facet angles up to each; padded with 0
   std::vector<Eigen::Vector3d> adhesion_;  // edges for `limit_n_`; empty for asperities
 };
 
-// Draws at random the spines of a closed gripper's contacts that engage, and the facets. Contacts
-// without an engaged spine are skipped. Law `adhesion` draws no random numbers.
+// Draws at random which spines of a closed gripper's contacts engage, and their facets. Contacts
+// without an engaged spine are skipped. Law `adhesion` draws no random numbers. Requires `fingers`.
 std::vector<BearingContact> draw_bearing(const std::vector<GripContact>& contacts,
                                          const Gripper& gripper, const EngagementOptions& options,
                                          libmap::RandomStream& random);

@@ -110,7 +110,7 @@ std::optional<LinkContact> first_contact(const TurningLink& link, double first, 
   return search.contact();
 }
 
-// Height of a chain of straight links above the profile, at its lowest.
+// Raises `height` to the palm height at which the link from p to q is above the segment.
 void rise_above(const Eigen::Vector2d& p, const Eigen::Vector2d& q, const GroundSegment& segment,
                 std::optional<double>& height) {
   const auto [link_low, link_high] = std::minmax(p.x(), q.x());

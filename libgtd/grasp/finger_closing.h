@@ -13,17 +13,17 @@
 
 namespace libgtd {
 
-// Dimensions in meters and radians. The proximal angle t is measured at the joint (joint_radius_m,
-// 0) from the palm's axis. With the curl c, the links point along (sin t, -cos t) and (sin(t - c),
-// -cos(t - c)).
+// Dimensions in meters and radians. The joint is at (joint_radius_m, 0). With the angle t of the
+// proximal link from the palm's axis (proximal angle) and the curl c, the links point along
+// (sin t, -cos t) and (sin(t - c), -cos(t - c)).
 struct FingerGeometry {
-  double joint_radius_m = 0.0;
-  double proximal_m = 0.0;
-  double distal_m = 0.0;
-  double opening_rad = 0.0;
-  double closing_rad = 0.0;
-  double curl_rad = 0.0;
-  double curl_limit_rad = 0.0;
+  double joint_radius_m = 0.0;  // distance of the joint from the palm's axis
+  double proximal_m = 0.0;      // length of the proximal link
+  double distal_m = 0.0;        // length of the distal link
+  double opening_rad = 0.0;     // proximal angle of the open finger
+  double closing_rad = 0.0;     // proximal angle at the end stop
+  double curl_rad = 0.0;        // curl without contact
+  double curl_limit_rad = 0.0;  // maximum curl
 
   // Positions (r, z), m.
   Eigen::Vector2d joint() const { return {joint_radius_m, 0.0}; }
@@ -42,14 +42,14 @@ struct GroundSegment {
   bool faces_palm = true;  // the triangle's front faces the palm
 };
 
-// Result of closing. spines: the outer half of the distal link or the tip is in contact. link: only
-// another part is in contact. end_stop: no contact.
+// Result of closing. spines: the outer half of the distal link is in contact, including the tip.
+// link: only the inner half or the proximal link is in contact. end_stop: no contact.
 enum class FingerOutcome { spines, link, end_stop };
 
 struct FingerClosing {
   FingerOutcome outcome = FingerOutcome::end_stop;
-  double proximal_rad = 0.0;
-  double curl_rad = 0.0;
+  double proximal_rad = 0.0;  // after closing
+  double curl_rad = 0.0;      // after closing
   // Contact points on the profile; nullopt without contact.
   std::optional<Eigen::Vector2d> spines;
   std::optional<Eigen::Vector2d> link;  // on the proximal link or the inner half of the distal link
@@ -61,8 +61,7 @@ struct FingerClosing {
 FingerClosing close_finger(const FingerGeometry& finger, std::span<const GroundSegment> profile);
 
 // Returns the minimum height of the palm at which the open finger is above the whole profile;
-// nullopt if no part of the profile is below the finger. `profile` is relative to the palm at z =
-// 0.
+// nullopt if no part of the profile is below the finger. For `profile`, the palm is at z = 0.
 std::optional<double> open_finger_height(const FingerGeometry& finger,
                                          std::span<const GroundSegment> profile);
 

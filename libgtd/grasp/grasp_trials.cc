@@ -157,7 +157,7 @@ TrialOutcome outcome_of(const ClosedGripper& closed, std::size_t bearing, double
   return force_n > 0.0 ? TrialOutcome::load : TrialOutcome::engagement;
 }
 
-// Quantile of sorted values; the lower of two.
+// Quantile of sorted values, rounded down to a value; 0 without values.
 double sorted_quantile(const std::vector<double>& sorted, double fraction) {
   if (sorted.empty()) return 0.0;
   return sorted[static_cast<std::size_t>(fraction * static_cast<double>(sorted.size() - 1))];
@@ -400,18 +400,17 @@ void bind(libmap::ParameterTable& table, GraspOptions& options) {
   table.add("trials", options.poses, {1, 100000}, "number of gripper poses at each location");
   table.add("draws", options.draws, {1, 100000}, "number of draws of asperities at each pose");
   table.add("best_draws", options.best_draws, {0, 100000},
-            "number of draws of asperities at each pose for which the force with the best "
+            "number of draws of asperities at each pose for which the holding force with the best "
             "distribution over the spines is also computed");
   table.add("seed", options.seed, not_negative, "random seed");
   table.add("offset_m", options.offset_m, {0.0, 1.0},
-            "standard deviation of the random palm position in x and in y, m");
+            "standard deviation of the random offset of the palm from the location in x and y, m");
   table.add("tilt_deg", options.tilt_deg, {0.0, 15.0},
-            "standard deviation of the random palm tilt, degrees");
+            "standard deviation of the random palm tilt about x and about y, degrees");
   table.add("max_distance_m", options.max_distance_m, positive,
             "maximum distance of a tested location from the mesh, m");
-  table.add(
-      "ensemble", options.ensemble,
-      "cycle through the gripper's ensemble of parameter sets, instead of its nominal parameters");
+  table.add("ensemble", options.ensemble,
+            "use the gripper's ensemble of parameter sets instead of the gripper file's values");
   bind(table, options.closing);
   bind(table, options.engagement);
   bind(table, options.surface);

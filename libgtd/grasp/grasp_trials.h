@@ -19,13 +19,13 @@
 namespace libgtd {
 
 // Direction opposite to the approach. up: against gravity (z of the mesh). normal: mean normal of
-// the ground within the palm radius of the location.
+// the ground within the palm radius of the location, which is doubled until it contains ground.
 enum class ApproachDirection { up, normal };
 
 struct GraspOptions {
   double load_n = 5.0;  // a trial holds if the force is >= load_n * safety in all directions
   double safety = 1.0;
-  std::vector<double> extra_loads_n;  // further loads with computed probabilities
+  std::vector<double> extra_loads_n;  // further loads, for extra_load_probabilities
   ApproachDirection approach = ApproachDirection::up;
   int poses = 32;  // poses per location
   int draws = 32;  // draws of asperities per pose
@@ -43,7 +43,7 @@ struct GraspOptions {
   bool ensemble = true;
   ClosingOptions closing;
   EngagementOptions engagement;
-  SurfaceErrorOptions surface;  // ground with errors: random surface for each pose
+  SurfaceErrorOptions surface;  // for ground with errors: each pose has a random surface
 
   // Throws Error naming field, value and bound if an option is out of range.
   void check() const;
@@ -51,9 +51,9 @@ struct GraspOptions {
 void bind(libmap::ParameterTable& table, GraspOptions& options);
 
 // Outcome of a trial. Causes of failure: approach: no ground below, or the approach starts inside
-// the ground. contact: fewer than two contacts. engagement: in some direction, the contacts balance
-// no pull at all. load: the contacts balance a smaller pull than the load. unseen: a failure of any
-// kind except approach while too much of the ground below a finger is unseen.
+// the ground. contact: fewer than two contacts of links or engaged spines. engagement: in some
+// direction, the contacts balance no pull at all. load: the contacts balance a smaller pull than
+// the load. unseen: any failure except approach if too much ground below a finger is unseen.
 enum class TrialOutcome { holds, approach, contact, engagement, load, unseen };
 const std::vector<std::pair<std::string, TrialOutcome>>& trial_outcome_names();
 
@@ -70,17 +70,17 @@ struct LocationResult {
   Eigen::Vector3d location;  // as given, in the mesh frame, m
   std::size_t trials = 0;
   std::array<std::size_t, 6> outcomes{};  // number of trials per TrialOutcome
-  double hold_probability = 0.0;
+  double hold_probability = 0.0;          // share of trials that hold load_n * safety
   // Wilson interval of 95 %. Trials of one pose are correlated, so that a pose counts once.
   double hold_low = 0.0;
   double hold_high = 0.0;
-  std::vector<double> extra_load_probabilities;  // for extra_loads_n
-  std::array<double, 3> force_n{};               // equal sharing: quantiles 0.1, 0.5, 0.9
-  std::array<double, 3> best_force_n{};          // best sharing: quantiles 0.1, 0.5, 0.9
+  std::vector<double> extra_load_probabilities;  // hold probabilities of extra_loads_n
+  std::array<double, 3> force_n{};       // holding force, equal sharing: quantiles 0.1, 0.5, 0.9
+  std::array<double, 3> best_force_n{};  // the same with best sharing, over best_draws
   // Most frequent direction of minimum force (trials with a force); index in pull_directions().
   std::size_t limiting_direction = 0;
   bool has_force = false;                 // at least one trial has a force
-  std::array<double, 2> force_range_n{};  // equal sharing: quantiles 0.05 and 0.95
+  std::array<double, 2> force_range_n{};  // holding force, equal sharing: quantiles 0.05, 0.95
   // Standard deviations of ln(force) over trials with a force (analysis of variance): between
   // trials of one parameter set, and between the sets.
   double trial_spread = 0.0;
@@ -94,7 +94,7 @@ struct LocationResult {
   double palm_fraction = 0.0;  // fraction of poses in which the palm touches the ground
   double unseen = 0.0;         // mean of ClosedFinger::unseen
   double clearance_m = 0.0;    // mean height of the palm above the location
-  // Trial with the force nearest to the median.
+  // Trial with the force nearest to the median (arguments of repeat_trial).
   int median_pose = 0;
   int median_draw = 0;
 
@@ -123,7 +123,7 @@ std::vector<LocationResult> test_grasps(const Ground& ground, const Gripper& gri
                                         const std::vector<Eigen::Vector3d>& locations,
                                         const GraspOptions& options, libmap::Progress& progress);
 
-// Repeats one trial of a location, to draw the trial.
+// Repeats one trial of a location, to show it; `pose` and `draw` count from 0.
 Trial repeat_trial(const Ground& ground, const Gripper& gripper, const Eigen::Vector3d& location,
                    const GraspOptions& options, int pose, int draw);
 

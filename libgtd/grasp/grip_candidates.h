@@ -13,16 +13,16 @@
 namespace libgtd {
 
 struct CandidateOptions {
-  double cell_m = 0.01;          // width of the columns
-  double start_height_m = 0.15;  // see ClosingOptions
+  double cell_m = 0.01;          // width of the columns; larger for more than 1e8 columns
+  double start_height_m = 0.15;  // as in ClosingOptions
   // Maximum fraction of the columns below the open gripper that rise above the start of the
   // approach, so that a finger may start inside the ground.
   double max_blocked_fraction = 0.15;
 };
 
-// Heights of the ground in columns. At least 99.8 % of the voxels that hold in 32 x 8 trials are
-// candidates (1500 voxels of each of three simulated sites; one site was not used to choose the
-// bounds).
+// Decides by the heights of the ground in columns. At least 99.8 % of the voxels that hold in 32 x
+// 8 trials are candidates (1500 voxels of each of three simulated sites; one site was not used to
+// choose the bounds).
 class GripCandidates {
  public:
   // Throws Error if the gripper has no `fingers`.
@@ -45,7 +45,7 @@ class GripCandidates {
   std::vector<float> cell_tops_;  // heights of the columns; -infinity without ground
   double start_height_m_ = 0.0;
   std::size_t max_blocked_cells_ = 0;
-  std::vector<std::array<std::int64_t, 2>> reach_;  // columns under the open gripper
+  std::vector<std::array<std::int64_t, 2>> reach_;  // offsets of columns below the open gripper
 };
 
 }  // namespace libgtd

@@ -82,7 +82,7 @@ void add_cut(const GroundPatch& patch, const CarriedVertices& vertices, const Ei
   if (low <= farthest && high >= -finger.distal_m) profile.push_back(segment);
 }
 
-// Height of the highest point of a triangle over the disc of this radius around the origin, if any.
+// Maximum height of a triangle over the disc of this radius around the origin; nullopt: none.
 std::optional<double> height_over_disc(const std::array<Eigen::Vector3d, 3>& corners,
                                        double radius) {
   std::optional<double> height;
@@ -240,7 +240,7 @@ void add_contacts(const GroundPatch& patch, std::size_t number, const ClosingOpt
 
 void bind(libmap::ParameterTable& table, ClosingOptions& options) {
   table.add("start_height_m", options.start_height_m, {0.0, 10.0, true, false},
-            "height above the location at which the approach starts, m");
+            "height of the palm above the location at the start of the approach, m");
   table.add("normal_radius_m", options.normal_radius_m, {1e-5, 0.1},
             "radius within which the ground normal at a contact is averaged, m");
   table.add("max_unseen", options.max_unseen, libmap::zero_to_one,

@@ -14,8 +14,8 @@ namespace libgtd {
 // Pose of the palm relative to the frame of the location (GroundPatch) before the approach along
 // the palm's axis.
 struct ApproachPose {
-  double yaw_rad = 0.0;
-  Eigen::Vector2d offset_m{0.0, 0.0};
+  double yaw_rad = 0.0;                // about the palm's axis
+  Eigen::Vector2d offset_m{0.0, 0.0};  // along x and y
   Eigen::Vector2d tilt_rad{0.0, 0.0};  // about x and y
 };
 
@@ -61,9 +61,9 @@ struct ClosingOptions {
 };
 void bind(libmap::ParameterTable& table, ClosingOptions& options);
 
-// Returns the part of the ground that the gripper may touch at a location (mesh frame, m) from
-// poses with offsets and tilts up to `offset_m` and `tilt_rad`; `away`: direction out of the
-// ground.
+// Returns the ground that the gripper may touch at a location (mesh frame, m) from poses with
+// offsets and tilts up to `offset_m` and `tilt_rad`; `away` is the direction out of the ground.
+// Throws Error if the gripper has no `fingers`.
 GroundPatch patch_around(const Ground& ground, const Eigen::Vector3d& location,
                          const Eigen::Vector3d& away, const Gripper& gripper, double offset_m,
                          double tilt_rad, const ClosingOptions& options);

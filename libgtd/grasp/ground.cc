@@ -165,7 +165,7 @@ struct Ground::Index {
     for (const Entry& entry : small) entries[next[cell_of(entry.center)]++] = entry;
   }
 
-  // Calls use(entry) for the triangles that intersect the box, and some others.
+  // Calls use(entry) for all triangles that intersect the box, and for some other triangles.
   template <typename Use>
   void visit(const Eigen::AlignedBox3d& around, const Use& use) const {
     for (const Entry& entry : large) use(entry);
@@ -181,7 +181,7 @@ struct Ground::Index {
     }
   }
 
-  // Uses a bit per number if the numbers are dense.
+  // Sorts by setting one bit per number if the numbers are dense.
   static void sort(std::vector<std::uint32_t>& numbers) {
     if (numbers.empty()) return;
     const auto [low, high] = std::minmax_element(numbers.begin(), numbers.end());

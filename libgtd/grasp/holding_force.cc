@@ -14,7 +14,7 @@ namespace libgtd {
 
 namespace {
 
-// Scale of moments, so that all rows are forces of similar size.
+// Divisor of moments, so that all rows are forces of similar size.
 constexpr double wrench_length_m = 0.1;
 
 double small_value(Eigen::Index row) {

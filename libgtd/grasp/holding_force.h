@@ -11,10 +11,10 @@
 namespace libgtd {
 
 struct HoldingOptions {
-  // Point at which the pull acts (m), without a moment.
+  // Point at which the pull acts, without a moment (m, in the frame of the contacts).
   Eigen::Vector3d load_point{0.0, 0.0, 0.0};
-  // Maximum force of a finger toward the palm's axis. If the drives resist opening, a finger is
-  // rigid and converts part of the pull into a force toward the axis; see holding_force.
+  // Maximum force of a finger toward the palm's axis. If the drives resist opening
+  // (holds_when_closed), a finger is rigid and converts part of the pull into such a force.
   double closing_force_n = 10.0;
   bool holds_when_closed = true;
   Eigen::Vector3d axis{0.0, 0.0, 1.0};  // axis of the palm, away from the ground

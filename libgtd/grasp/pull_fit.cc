@@ -59,14 +59,14 @@ class PullReader {
     if (test.force_n) {
       if (held)
         throw wrong_row(table_, row, "held", libmap::to_text(*held),
-                        "a force at slip and a verdict exclude each other", "empty");
+                        "force_n and held exclude each other", "empty");
       return test;
     }
     if (!held)
       throw wrong_row(table_, row, "force_n", "", "no result", "force_n, or load_n and held");
     if (!load || !(*load > 0.0))
       throw wrong_row(table_, row, "load_n", load ? libmap::to_text(*load) : "",
-                      "a verdict requires a load", "> 0");
+                      "held requires a load", "> 0");
     test.load_n = *load;
     test.held = *held >= 0.5;
     return test;
@@ -96,7 +96,7 @@ class PullReader {
   const libmap::Table& table_;
 };
 
-// Test with its closed gripper, to be pulled with any parameters.
+// Test with its closed gripper, of which pull forces are computed for any parameters.
 struct ClosedTest {
   const PullTest* test;
   ClosedPoses poses;
@@ -448,7 +448,7 @@ double entropy(double probability) {
   return -probability * std::log2(probability) - (1.0 - probability) * std::log2(1.0 - probability);
 }
 
-// Pull with the load that about half of the sets hold, and the information of its verdict.
+// Returns the load with the most informative verdict, of three that 30 to 70 % of the sets hold.
 PlannedPull informative_pull(const std::vector<std::vector<double>>& forces_of_sets,
                              const std::vector<ParameterSet>& sets) {
   std::vector<double> medians;

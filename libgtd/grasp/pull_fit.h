@@ -18,9 +18,9 @@ namespace libgtd {
 // Pull of a closed gripper. The direction is defined as in PullDirection: tilt 0 is away from the
 // ground along the palm's axis.
 struct PullTest {
-  std::size_t row = 0;  // row of the table, from 1
-  Eigen::Vector3d location = Eigen::Vector3d::Zero();
-  bool on_level_ground = false;  // true: the location is not used
+  std::size_t row = 0;                                 // row of the table, from 1
+  Eigen::Vector3d location = Eigen::Vector3d::Zero();  // m, in the mesh frame
+  bool on_level_ground = false;                        // true: the location is not used
   double tilt_deg = 0.0;
   double azimuth_deg = 0.0;
   std::optional<double> force_n;  // force at which the gripper slipped; nullopt: verdict only
@@ -39,10 +39,10 @@ struct PullFitOptions {
   double force_noise = 0.15;       // standard deviation of the logarithm of a measured force
   double outlier_fraction = 0.05;  // prior fraction of uninformative tests
   int sets = 256;                  // number of parameter sets per round
-  int rounds = 8;                  // maximum; the fit ends if a quarter of the sets are effective
+  int rounds = 8;                  // maximum; from 3 on, ends if 1/4 of the sets are effective
 };
 
-// Median and 90 % interval.
+// Median and 90 % interval of a holding force.
 struct PredictedForce {
   double low_n = 0.0;
   double median_n = 0.0;
@@ -51,8 +51,8 @@ struct PredictedForce {
 
 struct FittedParameter {
   std::string name;
-  double prior[3] = {};  // quantiles 0.05, 0.5, 0.95
-  double fitted[3] = {};
+  double prior[3] = {};   // quantiles 0.05, 0.5, 0.95 of the prior
+  double fitted[3] = {};  // the same quantiles after the tests
   // Standard deviation of the parameter's quantile in the prior, relative to the value before the
   // tests. The tests determine the parameter if the ratio is below 0.6.
   double spread_ratio = 1.0;
@@ -70,14 +70,14 @@ struct PullFit {
   // chance.
   double mean_squared_score = 0.0;
   double p_value = 1.0;
-  std::vector<std::size_t> outliers;  // rows with a probability below 0.01 given the other tests
+  std::vector<std::size_t> outliers;  // rows of tests with probability < 0.01 by the other tests
 
   bool explains_tests() const { return p_value >= 0.02; }
 };
 
-// Fits the parameters. `ground` may be null if all tests are on level ground. Throws Error if there
-// are no tests, `fingers` or `ranges`, and for a location off the mesh or a pull without contact
-// (the field is the row).
+// Fits the parameters to at least one test. `ground` may be null if all tests are on level ground.
+// Throws Error if the gripper has no `fingers` or `ranges`, and for a location without `ground` or
+// off the mesh and a pull without contact (the field is the row).
 PullFit fit_pulls(const Ground* ground, const Gripper& gripper, const std::vector<PullTest>& tests,
                   const PullFitOptions& options, libmap::Progress& progress);
 
@@ -88,12 +88,12 @@ libmap::TriangleMesh level_ground(double half_m = 0.4);
 struct PlannedPull {
   std::size_t location = 0;  // index in the candidates
   PullDirection direction;
-  double load_n = 0.0;            // load that about half of the sets hold
+  double load_n = 0.0;            // the most informative of three loads that 30 to 70 % hold
   double information_bits = 0.0;  // expected entropy reduction of the weights by the verdict
 };
 
-// Returns the `count` pulls with the most information, each at a different location, in descending
-// order. Locations without contact are skipped. Throws Error if the gripper has no `fingers`.
+// Returns at most `count` pulls (tilt 0 or 45 degrees) with the most information, in descending
+// order, each at a different location with contact. Throws Error if the gripper has no `fingers`.
 std::vector<PlannedPull> plan_pulls(const Ground& ground, const Gripper& gripper,
                                     const std::vector<Eigen::Vector3d>& candidates,
                                     std::size_t count, const PullFitOptions& options,

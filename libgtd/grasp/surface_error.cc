@@ -41,7 +41,7 @@ GroundErrors bounded(const libmap::TriangleMesh& mesh, std::vector<double> error
 
 void bind(libmap::ParameterTable& table, SurfaceErrorOptions& options) {
   table.add("surface_correlation_m", options.correlation_m, {1e-4, 10.0},
-            "distance at which simulated mesh errors of two points correlate by 0.29, m");
+            "correlation length of simulated mesh errors, m (correlation 0.29 at this distance)");
   table.add("max_surface_error_m", options.max_error_m, {0.0, 0.1, true, false},
             "standard deviation of the mesh error above which ground counts as unseen, m");
 }

@@ -26,7 +26,7 @@ void bind(libmap::ParameterTable& table, SurfaceErrorOptions& options);
 // exceeds the bound or is not finite, or if the face field `filled` marks the triangle as closing a
 // hole of the scan. Throws Error if the field is missing or an error is negative.
 GroundErrors errors_of(const libmap::TriangleMesh& mesh, const SurfaceErrorOptions& options);
-// Returns the same standard deviation `error_m` for all vertices.
+// Returns the same standard deviation `error_m` for all vertices; no errors if it is 0.
 GroundErrors constant_error(const libmap::TriangleMesh& mesh, double error_m,
                             const SurfaceErrorOptions& options);
 
@@ -35,10 +35,10 @@ GroundErrors constant_error(const libmap::TriangleMesh& mesh, double error_m,
 // nearness (trilinear) and divided by the root of the sum of the squared weights.
 class RandomField {
  public:
-  // Nodes in `box` are cached, so that positions inside it are fast.
+  // Nodes in `box` are cached, which makes at() fast inside it; the values are the same.
   RandomField(double length_m, std::uint64_t seed, std::uint64_t key,
               const Eigen::AlignedBox3d& box);
-  double at(const Eigen::Vector3d& position);
+  double at(const Eigen::Vector3d& position);  // value of the field
 
  private:
   double node(const Eigen::Array3i& number);

@@ -1,5 +1,5 @@
-// Draws one trial of the virtual field test as a colored mesh: ground, closed gripper, contacts and
-// forces. For images of `graspmap grasp --scenes`.
+// Makes a colored mesh that shows one trial of the virtual field test: ground, closed gripper,
+// contacts and forces. For images of `graspmap grasp --scenes`.
 #pragma once
 
 #include <cstddef>
@@ -14,7 +14,7 @@ namespace libgtd {
 
 // Part of the scene, stored in the vertex field `scene_part`. engaged, link: contacts that bear a
 // force. idle: a finger that bears no force. cone: forces that a contact can bear on the steepest
-// facet. pull: the direction with the minimum holding force. load: arrow of `load_n` with a disc.
+// facet. pull: arrow of the minimum holding force. load: arrow of the load, which ends with a disc.
 enum class ScenePart { ground, gripper, engaged, link, idle, cone, pull, load };
 
 struct ScenePartStyle {
@@ -28,9 +28,9 @@ const std::vector<ScenePartStyle>& scene_parts();
 
 // Returns the scene in the frame of the mesh, with vertex colors and the vertex field `scene_part`.
 // There is a sphere at each contact that bears a force and at the tip of each finger that bears no
-// force, or one sphere at the location if the gripper does not reach the ground. The arrow of the
-// pull starts at the middle of the palm. The length is proportional to the force, up to three times
-// the length of the arrow of `load_n`, which ends with a disc.
+// force, or one sphere at the location if the gripper does not reach the ground. Both arrows start
+// at the middle of the palm and have lengths proportional to the forces; the arrow of the pull is
+// at most three times as long as that of `load_n`.
 libmap::TriangleMesh trial_scene(const libmap::TriangleMesh& mesh, const Gripper& gripper,
                                  const Trial& trial, double load_n);
 

@@ -19,7 +19,7 @@ namespace {
 // independent draws 5 %.
 constexpr std::uint64_t draws = 199;
 constexpr std::uint64_t generator = 184;
-constexpr std::size_t step_deg = 5;  // interpolated linearly
+constexpr std::size_t step_deg = 5;  // of computed pulls; others are interpolated linearly
 constexpr double max_spread = 4.0;   // of pulls that are nearly always 0
 
 // A slope of the ground or of a facet.
@@ -61,8 +61,8 @@ std::vector<Slope> draw_facets(const Gripper& gripper, double fraction, std::uin
   return facets;
 }
 
-// Pull in closing forces; `limit` of one spine, too. `steepness` of a facet: psi + atan(friction) -
-// 90 degrees, descending.
+// Pull in units of the closing force, as is `limit`, the force limit of a spine. `steepness`: psi +
+// atan(friction) - 90 degrees of each facet, descending.
 double pull_of(const std::vector<Slope>& steepness, const Slope& fall, double limit,
                bool drive_holds) {
   constexpr double right_angle = std::numbers::pi / 2.0;

@@ -19,12 +19,12 @@ namespace libgtd {
 // k counts.
 struct FingerPulls {
   std::size_t sets = 0;
-  std::vector<float> pulls;             // at (fall + 90) * sets + set
-  std::vector<float> max_spine_forces;  // per set: force that all engaged spines bear
+  std::vector<float> pulls;             // index: (fall + 90) * sets + set; see at()
+  std::vector<float> max_spine_forces;  // per set: mean force that all engaged spines can bear
   std::vector<float> level_spreads;  // per set: standard deviation / mean of a pull on level ground
   std::vector<double> total_closing_forces_n;  // per set: closing force of all fingers, N
 
-  const float* at(int fall_deg) const {
+  const float* at(int fall_deg) const {  // pulls of all sets for a fall of -90 .. 90
     return &pulls[static_cast<std::size_t>(fall_deg + 90) * sets];
   }
 };
@@ -46,7 +46,7 @@ struct ClosingPath {
   std::vector<PathPoint> open;  // the open finger, from joint to tip
   double palm_radius_m = 0.0;
   double finger_length_m = 0.0;    // both links
-  double load_n = 0.0;             // load of the hold probability
+  double load_n = 0.0;             // load of the hold probability, N
   std::vector<ParameterSet> sets;  // parameter sets of the prediction
   FingerPulls pulls;               // for `sets`
   FingerPulls nominal_pulls;       // for the parameters of the gripper file

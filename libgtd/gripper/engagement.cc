@@ -1,4 +1,4 @@
-// Engagement and uncertain parameters of gripper.h.
+// Implements the engagement and the uncertain parameters of gripper.h.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>

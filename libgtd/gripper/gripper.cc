@@ -27,19 +27,19 @@ void bind(libmap::ParameterTable& table, Gripper& gripper) {
   table.add("spine_depth_mm", gripper.spine_depth_mm, not_negative,
             "depth to which a spine penetrates the ground, mm");
   table.add("opening_angle_deg", gripper.opening_angle_deg, {0.0, 90.0, true, false},
-            "angle between a finger and the palm's axis when open, degrees");
+            "angle between an open finger and the palm's axis, degrees");
   table.add("closing_angle_deg", gripper.closing_angle_deg, angle,
-            "angle between a finger and the palm's axis when closed, degrees");
+            "angle between a closed finger and the palm's axis, degrees");
   table.add("opening_spine_radius_mm", gripper.opening_spine_radius_mm, positive,
-            "radius of the circle through the spine tips when open, mm");
+            "radius of the circle through the spine tips of the open gripper, mm");
   table.add("opening_spine_depth_mm", gripper.opening_spine_depth_mm, not_negative,
-            "depth of the spine tips below the palm when open, mm");
+            "depth of the spine tips of the open gripper below the palm, mm");
   table.add("closing_height_mm", gripper.closing_height_mm, positive,
-            "height of the palm above the spine tips when closed, mm");
+            "height of the palm of the closed gripper above the spine tips, mm");
   table.add("top_solid_margin_mm", gripper.top_solid_margin_mm, not_negative,
             "margin added to the diameter of the solid disc at the top of the mask, mm");
   table.add("bottom_void_margin_mm", gripper.bottom_void_margin_mm, not_negative,
-            "margin added to the radius of the void at the bottom of the mask, mm");
+            "margin subtracted from the radius of the void at the bottom of the mask, mm");
 }
 
 void Gripper::check() const {
@@ -58,9 +58,9 @@ void bind(libmap::ParameterTable& table, GripperFingers& fingers) {
   table.add("fingers.count", fingers.count, {1, 64}, "number of fingers");
   table.add(
       "fingers.curl_deg", fingers.curl_deg, {0.0, 90.0},
-      "inward angle of the distal link to the proximal link of a finger without contact, degrees");
+      "inward angle from the proximal to the distal link of a finger without contact, degrees");
   table.add("fingers.curl_limit_deg", fingers.curl_limit_deg, {0.0, 170.0},
-            "maximum inward angle of the distal link after the proximal link has stopped, degrees");
+            "maximum inward angle of the distal link when the proximal link is stopped, degrees");
   table.add("fingers.spines_per_finger", fingers.spines_per_finger, {1, 1000},
             "number of spines per finger");
   table.add("fingers.spine_tip_radius_um", fingers.spine_tip_radius_um, {0.0, 1000.0, true, false},
@@ -68,7 +68,7 @@ void bind(libmap::ParameterTable& table, GripperFingers& fingers) {
   table.add("fingers.spine_force_limit_n", fingers.spine_force_limit_n, positive,
             "maximum force on one spine, N");
   table.add("fingers.closing_force_n", fingers.closing_force_n, positive,
-            "force of one finger toward the palm's axis, N");
+            "closing force of one finger toward the palm's axis, N");
   table.add("fingers.holds_when_closed", fingers.holds_when_closed,
             "true if the drive resists any force that opens the fingers");
 }
@@ -85,7 +85,7 @@ void GripperFingers::check() const {
 void require_fingers(const Gripper& gripper) {
   if (!gripper.fingers)
     throw libmap::Error(
-        "is missing: forces require this section of the gripper file (method corrected does not)",
+        "is missing: forces require this section of the gripper file; method corrected does not",
         {.field = "fingers"});
 }
 

@@ -16,13 +16,13 @@ namespace libgtd {
 // (libgtd/grasp) need in addition to the dimensions of the mask.
 struct GripperFingers {
   int count = 0;                     // number of fingers, evenly around the palm's axis
-  double curl_deg = 0.0;             // inward angle of the distal against the proximal link, free
-  double curl_limit_deg = 0.0;       // maximum of this angle if the proximal link is stopped
+  double curl_deg = 0.0;             // inward angle from proximal to distal link, no contact
+  double curl_limit_deg = 0.0;       // maximum of this angle after the proximal link has stopped
   int spines_per_finger = 0;         // on the outer half of the distal link
   double spine_tip_radius_um = 0.0;  // radius of the rounded tip
   double spine_force_limit_n = 0.0;  // maximum force on one spine or the asperity below it
   double closing_force_n = 0.0;      // force of one finger toward the palm's axis
-  bool holds_when_closed = false;    // drive resists any opening force, e.g. a ball screw
+  bool holds_when_closed = false;    // the drive resists any opening force, e.g. a ball screw
 
   // Throws Error naming key, value and bound.
   void check() const;
@@ -82,8 +82,8 @@ struct ParameterSet {
 // (2018), shifted by the seed.
 std::vector<ParameterValues> low_discrepancy_quantiles(std::size_t count, std::uint64_t seed);
 
-// Returns the index of the set at `fraction` (0 .. 1) of the cumulative weights. With evenly spaced
-// shares, sets are drawn in proportion to the weights.
+// Returns the index of the set at `fraction` (0 .. 1) of the cumulative weights. Evenly spaced
+// fractions select the sets in proportion to their weights.
 std::size_t parameter_set_at(const std::vector<ParameterSet>& ensemble, double fraction);
 
 // Dimensions (mm, degrees) and force parameters of a gripper.
@@ -106,8 +106,8 @@ struct Gripper {
   ParameterRanges ranges;              // prior of the uncertain parameters
   std::vector<ParameterSet> ensemble;  // fitted to pull tests; empty: the prior is used
 
-  // Throws Error naming field, value and bound. Relations between fields are checked,
-  // too, for example a closing angle below the opening angle.
+  // Throws Error naming field, value and bound if a value is out of range, or if values contradict
+  // each other, for example a closing angle that is not below the opening angle.
   void check() const;
 };
 
@@ -117,7 +117,7 @@ void bind(libmap::ParameterTable& table, Gripper& gripper);
 // Throws Error if the gripper has no `fingers`, which are required for forces.
 void require_fingers(const Gripper& gripper);
 
-// Returns the uncertain parameters of a gripper with `fingers`, and a copy with other values.
+// Return the uncertain parameters of a gripper with `fingers`, and a copy with other values.
 ParameterValues parameters_of(const Gripper& gripper);
 Gripper with_parameters(Gripper gripper, const ParameterValues& values);
 

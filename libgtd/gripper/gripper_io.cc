@@ -43,9 +43,10 @@ struct GripperKeys {
     bind(table, gripper.engagement);
     for (std::size_t n = 0; n < uncertain_parameters; ++n)
       table.add("ranges." + uncertain_parameter_names()[n], ranges[n],
-                "prior bounds of the parameter in a fit to pull tests: LOW, HIGH");
+                "bounds LOW, HIGH of the prior distribution of the parameter");
     table.add("ensemble.sets", sets,
-              "fitted parameter sets, one per line: weight, then the uncertain parameters");
+              "fitted parameter sets, one per line: weight, spine_force_limit_n, closing_force_n, "
+              "friction, asperity_min_deg, asperity_max_deg, engagement_rate");
   }
 };
 
@@ -60,7 +61,7 @@ std::optional<ParameterRange> parse_range(const std::string& name, const std::st
     return ParameterRange{*low, *high};
   throw libmap::Error("not a range", {.field = "ranges." + name,
                                       .value = text,
-                                      .bound = is_angle ? "0 <= LOW <= HIGH <= 90"
+                                      .bound = is_angle ? "LOW, HIGH with 0 <= LOW <= HIGH <= 90"
                                                         : "LOW, HIGH with 0 < LOW <= HIGH"});
 }
 
@@ -99,8 +100,8 @@ std::filesystem::path urdf_path(const UrdfMapping& urdf, const std::string& grip
   return std::filesystem::path(gripper_file).parent_path() / urdf.file;
 }
 
-// Adds values that are missing in the file from its URDF. Keys of fingers are added only if the
-// file has some.
+// Adds values that are missing in the file from its URDF. Keys "fingers.KEY" are added only if the
+// file has this section.
 void add_measures_of_urdf(const libmap::ParameterTable& table, const UrdfMapping& mapping,
                           const std::string& file, std::vector<std::string>& given) {
   libmap::ParameterTable section;

@@ -30,7 +30,7 @@ std::string to_yaml(const Gripper& gripper);
 Gripper find_gripper(const std::string& name,
                      const std::vector<std::pair<std::string, std::string>>& overrides = {});
 
-// Returns the file and the URDF that it names, if any.
+// Returns the path of the gripper file, and of the URDF that it names, if any.
 std::vector<std::filesystem::path> gripper_files(const std::filesystem::path& path);
 
 }  // namespace libgtd

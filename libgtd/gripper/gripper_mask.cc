@@ -30,10 +30,10 @@ libmap::Error too_small(double voxel_size_m, double mask_voxels) {
                        {.field = "voxel_size_m", .value = libmap::to_text(voxel_size_m)});
 }
 
-// Number of voxels along one side. Limits thin and very wide masks of extreme gripper dimensions.
+// Number of voxels along one side. Rejects the thin and very wide masks of extreme dimensions.
 int whole_voxels(double voxels, const GripperMaskOptions& options) {
   if (voxels >= 0.0 && voxels <= 0x1p20) return static_cast<int>(voxels);
-  throw libmap::Error("the gripper's mask would be " + libmap::to_text(static_cast<float>(voxels)) +
+  throw libmap::Error("too small: the mask is " + libmap::to_text(static_cast<float>(voxels)) +
                           " voxels wide or high, more than 2^20",
                       {.field = "voxel_size_m", .value = libmap::to_text(options.voxel_size_m)});
 }
@@ -181,7 +181,7 @@ GripperMask make_corrected(const Gripper& gripper, const GripperMaskOptions& opt
   const double voxel_mm = options.voxel_size_m * 1000.0;
   const double half =
       gripper.finger_joint_diameter_mm / 2.0 + gripper.finger_length_mm + gripper.spine_length_mm;
-  // Slack, so that a length of whole voxels does not depend on rounding of a quotient.
+  // The slack makes lengths of whole voxels independent of the rounding of a quotient.
   const double slack = 1e-9;
   const double rings = std::floor(half / voxel_mm + slack);
   const double depth_layers = std::ceil(gripper.closing_height_mm / voxel_mm - slack);

@@ -30,7 +30,7 @@ struct GripperMaskOptions {
   Method method = Method::corrected;
   double voxel_size_m = 0.01;
   int extra_void_layers = 1;  // H_add; not used by climblab
-  double load_n = 5.0;        // calibrated only
+  double load_n = 5.0;        // calibrated only: load of the hold probability, N
 };
 
 // Mask of side x side x layers voxels. z = 0 is the lowest layer, farthest from the palm; layers
@@ -39,10 +39,10 @@ struct GripperMaskOptions {
 struct GripperMask {
   Method method = Method::corrected;           // mask layout; `corrected` also if calibrated
   std::shared_ptr<const ClosingPath> closing;  // set for Method::calibrated, else null
-  double closed_radius_m = 0.0;                // corrected only: circle of the closed spines
-  double open_radius_m = 0.0;                  // corrected only: circle of the open fingers
-  // corrected only: the ground drops outward by more than this from the circle closed_radius_m to
-  // the circle open_radius_m where spines can hold.
+  double closed_radius_m = 0.0;                // corrected only: of the circle of closed spines
+  double open_radius_m = 0.0;                  // corrected only: of the circle of open fingers
+  // corrected only: spines can hold where the ground drops outward by more than this between the
+  // circles of closed_radius_m and open_radius_m.
   double min_fall_m = 0.0;
   double voxel_size_m = 0.01;
   double palm_diameter_m = 0.0;  // diameter of the gripper's palm
@@ -51,7 +51,7 @@ struct GripperMask {
   int solid_layers = 0;
   int pivot_xy = 0;
   int pivot_z = 0;
-  std::vector<std::uint8_t> solid;    // M, at index(x, y, z)
+  std::vector<std::uint8_t> solid;    // M: 1 for solid, 0 for void, at index(x, y, z)
   std::vector<std::uint8_t> counted;  // V: voxels counted in SSV and GSV
 
   std::size_t index(int x, int y, int z) const {
@@ -64,12 +64,12 @@ struct GripperMask {
   bool is_counted(int x, int y, int z) const { return counted[index(x, y, z)] != 0; }
 };
 
-// Makes the mask of a gripper. Throws Error for a gripper value out of range, and for a voxel size
-// with which the mask has no layer, no ring around the center or more than 2^28 voxels.
+// Makes a mask. Throws Error for a value out of range, calibrated without `fingers`, and voxel
+// sizes that give fewer than two solid layers, no ring around the center or more than 2^28 voxels.
 GripperMask make_gripper_mask(const Gripper& gripper, const GripperMaskOptions& options);
 
-// Returns the mask as text, from the lowest layer: "z 0", then `side` lines (x) of `side`
-// characters (y), '1' for solid.
+// Returns the mask as text: comment, "side side layers", then for each layer from the lowest "z 0"
+// and `side` lines (x) of `side` characters (y), '1' for solid.
 std::string to_text(const GripperMask& mask);
 
 // Returns a point at the center of each solid voxel in meters, pivot at the origin, z toward the

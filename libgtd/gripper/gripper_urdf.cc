@@ -424,12 +424,11 @@ void bind(libmap::ParameterTable& table, UrdfMapping& mapping) {
   table.add("urdf.palm_axis", mapping.palm_axis,
             "direction X,Y,Z from the palm toward the ground, in the frame of the palm link");
   table.add("urdf.finger_joint", mapping.finger_joint,
-            "revolute joints between palm and finger: a list with commas, or a name with '*'");
-  table.add(
-      "urdf.spine_joint", mapping.spine_joint,
-      "joints between finger and spine carrier: a list or a name with '*' as in finger_joint");
+            "revolute joints from palm to finger: list with commas, or name with '*' for finger");
+  table.add("urdf.spine_joint", mapping.spine_joint,
+            "joints from finger to spine carrier: list with commas, or name with '*' for finger");
   table.add("urdf.tip_link", mapping.tip_link,
-            "links with the origin at the spine tip: a list or a name with '*' as in finger_joint");
+            "links with origin at the spine tip: list with commas, or name with '*' for finger");
 }
 
 Measures read_urdf_dimensions(const std::string& xml, const UrdfMapping& mapping) {

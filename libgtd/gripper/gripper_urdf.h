@@ -10,9 +10,9 @@
 
 namespace libgtd {
 
-// Names of joints and links of the URDF. Names of finger parts contain a '*' for the part that
-// differs between fingers, "finger_*_joint", or are comma-separated lists in the same order for
-// each key.
+// Names of joints and links of the URDF. Each name of a joint or link of the fingers contains a '*'
+// for the text that differs between fingers, e.g. "finger_*_joint", or is a comma-separated list of
+// the names of all fingers, in the same order for each key.
 struct UrdfMapping {
   std::string file;          // path of the URDF, relative to the gripper file
   std::string palm_link;     // link with the origin at the center of the palm's face
@@ -25,7 +25,7 @@ struct UrdfMapping {
 // Binds the keys "urdf.KEY" of a gripper file.
 void bind(libmap::ParameterTable& table, UrdfMapping& mapping);
 
-// Returns the keys and values of a gripper file that the URDF determines:
+// Returns the keys and values of a gripper file that the URDF (the text `xml`) determines:
 //   palm_diameter_mm          if the palm has a cylinder as collision or visual geometry
 //   finger_joint_diameter_mm, finger_length_mm, spine_length_mm, fingers.count
 //   opening_angle_deg, closing_angle_deg, opening_spine_radius_mm, opening_spine_depth_mm,

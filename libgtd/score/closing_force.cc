@@ -23,8 +23,8 @@ namespace {
 
 constexpr int azimuths = 16;
 constexpr int closing_block_columns = 64;
-// The open finger rests on the ground. Only ground that is higher by more than rounding is in its
-// way.
+// The open finger rests on the ground. Only ground that is higher by more than this (rounding)
+// stops it.
 constexpr double palm_clearance_m = 1e-5;
 // Standard deviation of the resting position, in finger lengths, of a normal distribution truncated
 // at twice this value. It covers pose and tilt of the palm, azimuths of the fingers and width of a
@@ -33,7 +33,7 @@ constexpr double palm_clearance_m = 1e-5;
 constexpr double spread = 0.25;
 constexpr double max_deviations = 2.0;
 
-constexpr std::array<double, 5> dual_steps{0.0, 0.5, 1.0, 2.0, 4.0};  // u
+constexpr std::array<double, 5> dual_steps{0.0, 0.5, 1.0, 2.0, 4.0};  // u of the capacity's dual
 
 // Position relative to a pivot as a column, for one azimuth.
 struct RayCell {
@@ -219,8 +219,8 @@ class BlockCloser {
     return met;
   }
 
-  // Weakest side for the parameters of the gripper file. It is used for all sets, because pulls of
-  // all sets increase with the fall.
+  // Weakest side for the parameters of the gripper file; used for all sets, because the pulls of
+  // each set increase with the fall.
   std::size_t weakest_side(const Contacts& contacts) const {
     SideValues pulls{};
     SideValues max_spine_forces{};

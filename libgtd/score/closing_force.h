@@ -9,7 +9,7 @@
 
 namespace libgtd {
 
-// Returns the number of columns around a voxel that affect the voxel's force.
+// Returns the maximum distance, in columns, of voxels that affect the force at a voxel.
 int closing_reach_voxels(const ClosingPath& path, double voxel_size_m);
 
 // Returns the forces at the voxels `pivots` (ascending indices in grid.voxels), one per pivot. The

@@ -27,8 +27,7 @@ void check(const FootholdOptions& options, const FootholdFrame& frame) {
     throw libmap::Error("has length zero or is not finite", {.field = "up"});
 }
 
-// Calls use(index) for the points within `radius_m` of `place`; `radius_m` is at most the edge of a
-// cell.
+// Calls use(index) for the points within `radius_m`, at most the edge of a cell, of `center`.
 template <typename Use>
 void for_each_near(const PointGrid& grid, const std::vector<Eigen::Vector3d>& positions,
                    const Eigen::Vector3d& center, double radius_m,
@@ -201,12 +200,13 @@ class FootholdSearch {
 void bind(libmap::ParameterTable& table, FootholdOptions& options) {
   table.add("separation_m", options.separation_m, libmap::positive,
             "minimum distance between footholds, m");
-  table.add("min_score", options.min_score, libmap::zero_to_one, "minimum score of a foothold");
+  table.add("min_score", options.min_score, libmap::zero_to_one,
+            "minimum score of a foothold (hold_probability if the map has it)");
   table.add("graspable_only", options.graspable_only,
-            "consider only voxels that are graspable or have a hold_probability of at least 0.5");
-  table.add("border", options.border, "include voxels with a mask that extends beyond the scan");
+            "select only voxels with hold_probability >= 0.5, or graspable if the map has none");
+  table.add("border", options.border, "include voxels at the border of the scanned area");
   table.add("surface_radius_m", options.surface_radius_m, libmap::positive,
-            "radius of the normal and curvature fits, m");
+            "radius within which normal and curvature are estimated, m");
   table.add("max_count", options.max_count, libmap::not_negative,
             "maximum number of footholds; 0: no limit");
 }
@@ -242,9 +242,9 @@ PointCloud to_cloud(const FootholdResult& result, const PointCloud& map) {
 }
 
 void describe(libmap::ResultTable& table, const FootholdResult& result) {
-  table.add("candidates", result.candidates, "number of map points that meet the options");
+  table.add("candidates", result.candidates, "number of map points that could become footholds");
   table.add("candidates_at_border", result.at_border,
-            "number of candidates skipped at the border of the scan");
+            "number of further map points, skipped because they are at the border of the scan");
 }
 
 }  // namespace libgtd

@@ -14,8 +14,8 @@ namespace libgtd {
 struct FootholdOptions {
   double separation_m = 0.1;  // minimum distance between footholds, > 0
   double min_score = 0.0;     // minimum score of a foothold
-  // Only graspable points: hold_probability of at least one half, or `graspable` if the map has no
-  // hold_probability.
+  // Only graspable points become footholds: hold_probability of at least 0.5, or the field
+  // `graspable` if the map has no hold_probability.
   bool graspable_only = true;
   bool border = false;             // includes points at the border of the scanned area
   double surface_radius_m = 0.05;  // radius of the normal and curvature fits, > 0
@@ -23,17 +23,17 @@ struct FootholdOptions {
 };
 void bind(libmap::ParameterTable& table, FootholdOptions& options);
 
-// Frame of the map's points.
+// Direction up in the frame of the map's points.
 struct FootholdFrame {
-  Eigen::Vector3d up = Eigen::Vector3d::UnitZ();  // outward normal of the regression plane
+  Eigen::Vector3d up = Eigen::Vector3d::UnitZ();  // out of the ground, any length
 };
 
 struct Foothold {
   std::size_t map_point = 0;  // index in the map
   double score = 0.0;         // hold_probability if the map has this field, else the score
-  double force_n = 0.0;  // holding_force_n of the map, else 0; first criterion for equal scores
+  double force_n = 0.0;       // holding_force_n of the map, else 0; decides between equal scores
   // Mean score of the map points within half of the separation, weighted by the Epanechnikov
-  // kernel. Second criterion for equal scores: the middle of a plateau precedes the border.
+  // kernel. Decides between equal scores and forces: the middle of a plateau precedes its border.
   double mean_score = 0.0;
   std::size_t graspable_points = 0;  // graspable points within half of the separation
   // Unit surface normal, outward (on the side of the map's normals, or else up); principal
@@ -52,12 +52,12 @@ struct FootholdResult {
   std::size_t candidates = 0;       // map points that meet the options
   std::size_t at_border = 0;        // points excluded only because of the border
 };
-// Binds the names of the results (libmap/core/result_table.h).
+// Names each result for manifests and tables (libmap/core/result_table.h).
 void describe(libmap::ResultTable& table, const FootholdResult& result);
 
 // Finds local maxima of the score by non-maximum suppression: the best candidate becomes a
-// foothold, and candidates closer to it than the separation are dropped; this repeats. Points that
-// are equal in all criteria keep the order of the map. Throws Error for an empty map, a missing
+// foothold, and candidates within the separation from it are dropped; this repeats. Points that are
+// equal in all criteria keep the order of the map. Throws Error for an empty map, a missing
 // field that the options need ("score", "graspable", "border"), options out of range, and an `up`
 // of length zero.
 FootholdResult find_footholds(const libmap::PointCloud& map, const FootholdOptions& options = {},

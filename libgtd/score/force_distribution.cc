@@ -14,15 +14,15 @@ namespace {
 
 // Coefficients fitted to trials of the virtual field test (grasp) on simulated rocks, slopes, walls
 // and shapes with the three grippers and 16 parameter sets of each, by the likelihood that a trial
-// reaches each of nine loads. With the mean c of C, of the columns whose C is above
-// floor_of_capacity the mean of ln C, its spread and their fraction p, and the spread v of a
+// reaches each of nine loads. c is the mean of the capacities C of the columns, p the fraction of
+// columns with C > floor_of_capacity; mean and spread of ln C are over these. v is the spread of a
 // finger's pull on level ground (FingerPulls::level_spreads):
 //   P(force > 0) = logistic(1.234 + 1.623 p + 3.988 contact + 0.679 ln(c + offset) - 1.203 v),
-//   mean ln(force / closing forces) = 0.293 + 1.006 ln C - 0.446 rise + 0.663 tilt - 0.537 v,
+//   mean ln(force / closing forces) = 0.293 + 1.006 mean(ln C) - 0.446 rise + 0.663 tilt - 0.537 v,
 //   ln(spread of ln force) = -1.540 + 1.056 spread(ln C) + 0.745 v.
 // contact: fraction of the azimuths with spine contact on the weakest side; rise of the palm above
-// the voxel; tilt: imbalance of the depths of the contacts. Both in finger lengths. The weakest of
-// several random pulls decreases with their spread, hence v.
+// the voxel, and tilt: imbalance of the depths of the contacts, both in finger lengths. The weakest
+// of several random pulls decreases with their spread, hence v.
 constexpr float floor_of_capacity = 0.0005F;
 constexpr float offset_of_capacity = 0.003F;
 constexpr float largest_capacity = 0.55F;
@@ -67,7 +67,7 @@ GRASPMAP_CLONED_CHOICE void add_to_sums(const float* __restrict capacities,
                  part * (-0.49190F + part * (0.28947F + part * (-0.13606F + part * 0.03215F))));
 }
 
-// Computes the distribution of the force of each set by the coefficients; `mean` in finger lengths.
+// Means over the columns for find_forces, which computes the distribution of the force of each set.
 struct MeanTerms {
   float contact = 0.0F;
   float bias = 0.0F;     // terms of rise and tilt in ln(force)

@@ -36,7 +36,7 @@ struct SetSums {
   }
 };
 
-// Distribution of a force: > 0 with this probability, its logarithm then beta(4, 2).
+// Distribution of the force per set: > 0 with `probability`; its logarithm is then beta(4, 2).
 struct SetForces {
   std::vector<float> probability, log_force, spread, scale;  // scale: beta_spread / spread
 };
@@ -60,7 +60,7 @@ class ForceDistribution {
   const ClosingPath& path_;
   std::vector<float> weights_;    // of the parameter sets
   std::vector<float> log_scale_;  // ln of the closing force of all fingers, N
-  ForceGrid log_forces_{};        // a grid, then the load
+  ForceGrid log_forces_{};        // of equally spaced forces, then of the load
   SetSums sums_;
   SetForces forces_;
 };

@@ -22,7 +22,7 @@ struct MapVoxel {
   // Fraction of 16 azimuths in which the ground drops outward by more than the mask's min_fall_m;
   // corrected, upright masks only.
   double outward_fall_fraction = 1.0;
-  float slope_deg = 0.0F;                             // see SurfaceNormal
+  float slope_deg = 0.0F;                             // SurfaceNormal::slope_deg
   Eigen::Vector3f normal = Eigen::Vector3f::UnitZ();  // axis of the mask, in the terrain frame
 };
 

@@ -16,8 +16,8 @@ std::int64_t off_middle(int column, int square, int width) {
   return std::abs(2 * (column - std::int64_t{square} * width) - (width - 1));
 }
 
-// Keeps the point nearest to the middle of each square of columns or cube, the highest of equally
-// near ones.
+// Keeps the point nearest to the middle of each square of columns, or with `by_layers` of each
+// cube; the highest of equally near ones.
 libmap::PointCloud thin(const libmap::PointCloud& map, int width, bool by_layers) {
   const VoxelFields voxels(map);
   struct Candidate {

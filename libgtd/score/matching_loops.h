@@ -16,8 +16,7 @@ struct MaskChunk {
   alignas(64) std::uint16_t bits[columns];
 };
 
-// Transform from the lattice of the terrain, in voxels, to the lattice of a pivot in cell (0, 0,
-// 0).
+// Lattice of a tilted mask, in voxels of the terrain's lattice; the pivot is in cell (0, 0, 0).
 struct TiltedLattice {
   double origin[3];   // center of cell (0, 0, 0)
   double axes[3][3];  // axes[n] is axis n

@@ -104,7 +104,7 @@ std::vector<Obstacle> find_obstacles(const std::vector<Voxel>& voxels,
                                      const ObstacleOptions& options) {
   check(voxels, slopes_deg);
   check(voxel_size_m, options);
-  // Slack, so that a rise of exactly the limit does not depend on rounding.
+  // The slack makes the result for a rise of exactly the limit independent of rounding.
   const double limit = options.height_m / voxel_size_m * (1.0 + 1e-9);
   std::vector<std::uint8_t> is_steep(voxels.size(), 0);
   for (std::size_t n = 0; n < voxels.size(); ++n)

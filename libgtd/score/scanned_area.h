@@ -1,5 +1,5 @@
 // Finds the scanned area of a voxel grid: the occupied voxel columns, closed over the gaps between
-// points. Mask windows that leave it are at the border of the map.
+// points. Voxels are at the border of the map if their mask window is partly outside this area.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,4 @@
-// Scenario: all parameters of a detection, as in a scenario file (tab. B 2-1 of the thesis).
+// Parameters of a detection, as in a scenario file (tab. B 2-1 of the thesis).
 #pragma once
 
 #include <optional>
@@ -21,25 +21,25 @@ struct Scenario {
   std::string gripper = "scar-e";  // name of a gripper in the toolkit, or a file
   std::vector<std::pair<std::string, std::string>> gripper_overrides;  // "gripper.KEY: VALUE"
   double voxel_size_m = 0.01;
-  int extra_void_layers = 1;        // H_add
-  int solid_voxel_threshold = 120;  // TSV
+  int extra_void_layers = 1;        // H_add: void layers on top of the gripper mask
+  int solid_voxel_threshold = 120;  // TSV: the score is reduced for fewer occupied voxels (SSV)
   double load_n = 5.0;  // pull for which method calibrated predicts the hold probability, N
   // Minimum height of a target in the terrain frame; nullopt: 0. Not used by method calibrated,
   // which also predicts forces on level ground.
   std::optional<double> zero_plane_m;
-  bool interpolation = false;
-  double interpolation_max_edge_m = 0.0;         // 0: no limit
+  bool interpolation = false;                    // fills gaps (interpolation.h)
+  double interpolation_max_edge_m = 0.0;         // maximum triangle edge in plan; 0: no limit
   std::optional<double> graspability_threshold;  // nullopt: 0.8; not used by calibrated
   double probability_threshold = 0.5;            // calibrated only
   double curvature_radius_m = 0.09;              // 0: convexity is not evaluated
-  double intersection_distance_m = 0.01;
+  double intersection_distance_m = 0.01;         // from a convex voxel to a convex point
   Orientation orientation = Orientation::plane;
   double normal_radius_m = 0.0;  // radius of normal fits; 0: palm diameter of the gripper
   // Minimum rise of a steep face that counts as an obstacle; ground above it is unreachable. 0:
   // obstacles are not evaluated.
   double obstacle_height_m = 0.0;
-  double obstacle_slope_deg = 60.0;  // minimum slope of a steep face; 0: not evaluated
-  double tile_size_m = 1.0;
+  double obstacle_slope_deg = 60.0;  // minimum slope of a steep face; 0: no obstacles
+  double tile_size_m = 1.0;          // width of a tile
 
   // Return the values that the method uses: height of the zero plane (terrain frame, m; -infinity
   // with method calibrated), and minimum score of a graspable voxel.

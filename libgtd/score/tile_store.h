@@ -20,7 +20,7 @@ struct TileNumber {
   int j = 0;
   auto operator<=>(const TileNumber&) const = default;
 };
-TileNumber tile_of(const Voxel& voxel, int tile_voxels);
+TileNumber tile_of(const Voxel& voxel, int tile_voxels);         // tile that contains the voxel
 TileBounds columns_of(const TileNumber& tile, int tile_voxels);  // not clipped to the terrain
 std::string tile_file_of(const TileNumber& tile);                // "tiles/-3_12.pcd"
 

@@ -298,7 +298,7 @@ void add_totals(const std::map<TileNumber, StoredTile>& tiles, TileStoreIndex& i
 
 libmap::Error not_the_tile(const fs::path& path, libmap::ErrorContext context) {
   context.file = path.string();
-  return libmap::Error("is not the tile that the index describes; score again to replace it",
+  return libmap::Error("differs from the tile in the index; score again to replace it",
                        std::move(context));
 }
 

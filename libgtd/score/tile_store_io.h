@@ -30,8 +30,8 @@ bool is_tile_store_name(const std::filesystem::path& path);
 // version or with inconsistent content.
 TileStoreIndex read_tile_store(const std::filesystem::path& store);
 
-// Reads the index. If it is missing although all tiles are done (after shares that ended at the
-// same time), writes it first. Throws like read_tile_store.
+// Reads the index. Writes it first if it is missing although all tiles are done (possible if runs
+// that share the tiles end at the same time). Throws like read_tile_store.
 TileStoreIndex finish_tile_store(const std::filesystem::path& store);
 
 // Returns the path of a tile file. Throws Error naming it if it is missing or differs in size.
@@ -43,19 +43,19 @@ std::filesystem::path checked_tile_path(const std::filesystem::path& store, cons
 // Input file of the terrain. Size and modification time identify it without reading it.
 struct TerrainFile {
   libmap::ManifestInput input;
-  std::int64_t modified_ns = 0;
+  std::int64_t modified_ns = 0;  // modification time
   std::uint64_t points = 0;
-  std::uint64_t dropped_points = 0;
-  libmap::Bounds3d box;  // in the input frame
+  std::uint64_t dropped_points = 0;  // points with coordinates that are not finite
+  libmap::Bounds3d box;              // in the input frame
 };
 
 struct TilePlan {
-  std::string key;                                     // hash of parameters and inputs: key_of
+  std::string key;                                     // hash of parameters and inputs
   TileStoreIndex index;                                // without tiles and counts of tiles
   Eigen::Vector3d centroid = Eigen::Vector3d::Zero();  // centroid of the fitted plane
   bool has_plane = false;
   std::vector<TerrainFile> terrain;
-  std::vector<StoredTile> kept;  // finished tiles of an earlier plan
+  std::vector<StoredTile> kept;  // finished tiles of an earlier plan, which remain valid
 };
 
 class MapTileStore : public libmap::TileStore {

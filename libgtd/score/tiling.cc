@@ -20,7 +20,7 @@ constexpr std::size_t pivots_per_chunk = 4096;
 constexpr std::uint8_t is_pivot = 1;
 constexpr std::uint8_t is_border = 2;
 
-// Flags per voxel of the grid: pivot of the tiles, and pivot at an edge.
+// Flags per voxel of the grid: pivot of the tiles (is_pivot), and pivot at the border (is_border).
 std::vector<std::uint8_t> find_pivots(const VoxelGrid& grid, const GripperMask& mask,
                                       const std::vector<TileBounds>& tiles) {
   std::vector<std::uint8_t> flags(grid.voxels.size(), 0);

@@ -31,14 +31,15 @@ struct ForceEstimate {
 struct ScoredVoxel {
   Voxel voxel;
   VoxelCounts counts;
-  double score = 0.0;                  // score_percent / 100
+  double score = 0.0;                  // score_percent / 100 * outward_fall_fraction, or
+                                       // hold_probability (calibrated)
   bool border = false;                 // the window of the mask leaves the scanned area
   ForceEstimate force{};               // calibrated only
   double outward_fall_fraction = 1.0;  // corrected only, see outward_fall_fractions
 };
 
 struct ScoringOptions {
-  int solid_voxel_threshold = 120;
+  int solid_voxel_threshold = 120;                                       // TSV, see score_percent
   libmap::InstructionSet instructions = libmap::best_instruction_set();  // affects speed only
 };
 

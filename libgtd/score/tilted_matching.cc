@@ -54,7 +54,7 @@ struct VoxelPoints {
   std::vector<Eigen::Vector3f> outsides;
 };
 
-// Index of the voxel of each point in the list, or voxels.size().
+// Returns for each point the index of its voxel in `voxels`, or voxels.size() if it is not there.
 std::vector<std::size_t> find_voxels(const libmap::PointCloud& terrain, const VoxelLattice& lattice,
                                      const std::vector<Voxel>& voxels) {
   std::vector<std::size_t> voxel_of_point(terrain.size(), voxels.size());
@@ -110,7 +110,7 @@ std::vector<TiltedPivot> tilt(const std::vector<Voxel>& voxels,
   return pivots;
 }
 
-// Tile by tile, because the scanned columns are known only near each tile.
+// Calls find_border_pivots tile by tile, because scanned columns are known only near each tile.
 std::vector<std::uint8_t> find_tilted_edges(const std::vector<Voxel>& voxels,
                                             const std::vector<TiltedPivot>& pivots,
                                             const TiltedTerrain& terrain, const VoxelGrid& grid,
@@ -218,11 +218,11 @@ class TiltedTerrain::Window {
     double half[3];
   };
 
-  // Returns false if the box of the run is outside a face of the tilted box, as is most frequent.
+  // Returns false if the box of the run is outside a face of the tilted box (most frequent).
   bool may_touch(const Run& run, const TiltedLattice& lattice) const {
     for (int a = 0; a < 3; ++a) {
       double cell_position = 0.5;
-      double half = 1e-6;  // against rounding
+      double half = 1e-6;  // margin for rounding
       for (int b = 0; b < 3; ++b) {
         cell_position += lattice.axes[a][b] * (run.center[b] - lattice.origin[b]);
         half += std::abs(lattice.axes[a][b]) * run.half[b];
@@ -328,7 +328,7 @@ class EdgeSearch {
     return {.low = {-half_, -half_, -half_}, .size = {side, side, side}, .stride = {side, 1, 0}};
   }
 
-  // Returns true if a column below the square was not scanned. Decides most pivots quickly.
+  // Returns true if a column below the square was not scanned, which is false for most pivots.
   bool may_be_edge(const TiltedPivot& pivot) const {
     const Matrix3d axes = tilted_axes(pivot.normal);
     const Vector3d origin = lattice_.cell_of(pivot.anchor_m);

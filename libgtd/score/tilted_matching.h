@@ -25,7 +25,7 @@ struct TiltedPivot {
 // -z, half a turn about x.
 Eigen::Matrix3d tilted_axes(const Eigen::Vector3d& normal);
 
-// Returns the maximum distance, in voxels, of points that affect the counts and edge of a pivot.
+// Returns the maximum distance, in voxels, of points that affect counts and border of a pivot.
 int tilted_reach_voxels(const GripperMask& mask);
 
 // Points in the terrain frame, sorted for searches.
@@ -41,11 +41,11 @@ class TiltedTerrain {
   std::vector<VoxelCounts> match(const std::vector<TiltedPivot>& pivots,
                                  libmap::Progress& progress = libmap::no_progress()) const;
 
-  // Returns 1 for each pivot with a mask that extends beyond the scanned area, else 0: a position
-  // of the mask's square on the tangent plane has no points above or below along the axis of the
-  // mask (within half the square plus the closed gaps, and closed over gaps like scanned columns)
-  // and is over a column that was not scanned. Empty space beside a rock is therefore not an edge.
-  // `unscanned` must contain the columns within tilted_reach_voxels.
+  // Returns 1 for each pivot with a mask that extends beyond the scanned area, else 0: if a
+  // position of the mask's square on the tangent plane is in an unscanned column (scanned_area.h)
+  // and has no points on the line through it along the axis of the mask. This line is as long as
+  // the square plus closed gaps, and gaps between such lines are closed, too. Empty space beside a
+  // rock is therefore no border. `unscanned` must contain the columns within tilted_reach_voxels.
   std::vector<std::uint8_t> find_border_pivots(const std::vector<TiltedPivot>& pivots,
                                                const ColumnSums& unscanned) const;
 
@@ -62,8 +62,8 @@ class TiltedTerrain {
 std::vector<Voxel> pivots_of(const VoxelGrid& grid, const GripperMask& mask,
                              const std::vector<TileBounds>& tiles);
 
-// Returns the surface normal at the center of each voxel, on the side of the normals of the points
-// in the voxel, or of +z if the points have no normals.
+// Returns the surface normal at the center of each voxel. It points to the side of the normals of
+// the points in the voxel, or of +z if the points have no normals; NaN as in SurfaceNormal.
 std::vector<SurfaceNormal> normals_at(const std::vector<Voxel>& voxels,
                                       const libmap::PointCloud& surface,
                                       const VoxelLattice& lattice, double radius_m);

@@ -87,7 +87,7 @@ class BlockMatcher {
   std::size_t size_ = 0;  // columns in the window
   std::size_t planes_ = 0;
   int low_ = 0;                                            // lowest layer of the window
-  std::size_t entered_bits_ = 0, entered_ = 0, left_ = 0;  // entries of ground_ done
+  std::size_t entered_bits_ = 0, entered_ = 0, left_ = 0;  // processed entries of ground_
   std::vector<Pivot> pivots_, pivots_scratch_;             // ascending by k
   std::vector<Ground> ground_, ground_scratch_;
   Lanes bits_;      // planes of 16 layers of the columns of the window
@@ -318,8 +318,8 @@ void BlockMatcher::match(const std::vector<std::size_t>& pivots, const Run* runs
   }
 }
 
-// Side of a block of pivots, in columns. Its window fits the first two caches for typical masks,
-// and is not mainly halo.
+// Side of a block of pivots, in columns. The window fits the first two caches for typical masks,
+// and most of it is not halo.
 constexpr int block_columns = 80;
 
 struct Blocks {
@@ -327,8 +327,8 @@ struct Blocks {
   std::vector<std::size_t> first_of_block;  // index in runs; with a sentinel at the end
 };
 
-// Blocks are on a lattice of their own. Pivots ascend, so that those of a row and a block are
-// adjacent. Blocks without pivots are not created.
+// Groups the pivots by square blocks of columns. Pivots ascend, so that the pivots of one row in a
+// block are adjacent. Blocks without pivots are not created.
 Blocks cut_into_blocks(const VoxelGrid& grid, const std::vector<std::size_t>& pivots) {
   struct Piece {
     int row, column;  // of the block

@@ -39,14 +39,14 @@ std::vector<VoxelCounts> match_voxels(
 std::size_t solid_chunks(const GripperMask& mask);
 
 // Returns the score in percent (eq. 3-17, 3-18): 100 GSV / SSV; minus 100 (TSV - SSV) / TSV if
-// SSV <= TSV and the quotient is >= 60, where TSV is `solid_voxel_threshold`. `thesis` and
-// `envelope` divide in single precision as
-// the author's program does (which then truncates to an integer), and can be negative. `corrected`
-// divides in double precision and is at least 0. `climblab` has no reduction.
+// SSV <= TSV and the quotient is >= 60, where TSV is `solid_voxel_threshold`; 0 if SSV is 0. For
+// `thesis` and `envelope`, the quotient has single precision as in the author's program (which then
+// truncates it to an integer), and the score can be negative. For `corrected`, it has double
+// precision, and the score is at least 0. `climblab` has no reduction.
 double score_percent(const VoxelCounts& counts, Method method, int solid_voxel_threshold);
 
 // Returns true if a voxel is graspable by the counts: the score (0..1) is >= the threshold or, with
-// `climblab`, all solid voxels of the window are inside the mask and ssv exceeds TSV.
+// `climblab`, all counted occupied voxels are solid in the mask (gsv = ssv) and ssv exceeds TSV.
 bool meets_threshold(const VoxelCounts& counts, double score, Method method,
                      int solid_voxel_threshold, double graspability_threshold);
 

@@ -21,7 +21,7 @@ enum class CurvatureMethod { thesis, corrected };
 
 struct CurvatureOptions {
   CurvatureMethod method = CurvatureMethod::corrected;
-  double radius_m = 0.09;  // maximum distance of neighbors; 0.09 SCAR-E, 0.03 HubRobo
+  double radius_m = 0.09;  // maximum distance of neighbors; for SCAR-E 0.09, HubRobo 0.03
   // Outside direction for points without a normal in the cloud. Corrected only.
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
 };
@@ -43,8 +43,8 @@ struct Curvature {
 struct CurvatureResult {
   CurvatureMethod method = CurvatureMethod::corrected;
   double radius_m = 0;            // radius of the estimate
-  std::vector<Curvature> points;  // one per query
-  std::size_t valid_count = 0;
+  std::vector<Curvature> points;  // one per query, in their order
+  std::size_t valid_count = 0;    // number of points with `valid`
 };
 
 // Estimates the curvature at all points of the cloud, or at the points with indices `queries`. A

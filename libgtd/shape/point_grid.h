@@ -20,7 +20,7 @@ class PointGrid {
  public:
   using Cell = std::array<std::int64_t, 3>;
 
-  // Leaves out points that are not finite. Throws Error if `cell_size_m` is not positive, or if a
+  // Skips points that are not finite. Throws Error if `cell_size_m` is not positive, or if a
   // point is more than 2^40 cells from the origin of the frame.
   PointGrid(const std::vector<Eigen::Vector3d>& points, double cell_size_m);
 
@@ -75,7 +75,7 @@ inline bool is_same_position(const Eigen::Vector3d& a, const Eigen::Vector3d& b)
   return position_bits(a) == position_bits(b);
 }
 
-// Total order in which points of the same bits are adjacent.
+// Compares in a total order in which points of the same bits are adjacent.
 inline bool is_position_less(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return position_bits(a) < position_bits(b);
 }

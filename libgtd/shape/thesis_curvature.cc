@@ -68,7 +68,7 @@ class NeighborSearch {
   }
   const std::vector<std::uint32_t>& candidates() const { return candidates_; }
 
-  // Also prepares find().
+  // Lists the points around a cell and prepares find() for the points of this cell.
   void enter(const PointGrid::Cell& cell) {
     list(cell);
     const std::size_t count = candidates_.size();
@@ -211,7 +211,7 @@ Curvature curvature_of(const Vector3f& normal, const std::vector<Quad>& normals,
   return result.valid ? result : Curvature{};
 }
 
-// Neighbors of the points of a run of cells, as consecutive lists.
+// Lists of the neighbors of the points of a run of cells, one list after another.
 struct KeptNeighbors {
   bool complete = false;
   Numbers lists;

@@ -48,7 +48,7 @@ using Corners = std::array<std::uint32_t, 3>;
 struct Placement {
   std::uint32_t first = 0;
   std::uint32_t last = 0;
-  bool refused = false;
+  bool refused = false;  // the triangle has an edge that is too long
 };
 
 std::vector<Vector3d> finite_points(const libmap::PointCloud& cloud, InterpolationMethod method) {
@@ -125,7 +125,7 @@ void check_grid(const Box& box, double spacing, std::size_t max_nodes) {
   if (!(columns * rows <= static_cast<double>(max_nodes)))
     throw libmap::Error(
         "too small: the interpolation grid over the points' x and y would have more than " +
-            std::to_string(max_nodes) + " nodes",
+            std::to_string(max_nodes) + " nodes; remove points far from the others",
         {.field = "grid spacing", .value = libmap::to_text(spacing) + " m"});
   const double farthest = std::max(
       {std::abs(box.min_x), std::abs(box.max_x), std::abs(box.min_y), std::abs(box.max_y)});
@@ -195,8 +195,8 @@ double plane_height(const Triangle& t, double x, double y) {
          n.z();
 }
 
-// Height from coordinates relative to a corner, so that a distant origin does no harm. Clamped to
-// the heights of the corners, for triangles too thin for an accurate area.
+// Height from coordinates relative to a corner, which are precise far from the origin, too. Clamped
+// to the heights of the corners, because the area of very thin triangles is inaccurate.
 double barycentric_height(const Triangle& t, double x, double y) {
   const double bx = t.at[1].x() - t.at[0].x(), by = t.at[1].y() - t.at[0].y();
   const double cx = t.at[2].x() - t.at[0].x(), cy = t.at[2].y() - t.at[0].y();

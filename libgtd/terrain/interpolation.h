@@ -9,9 +9,9 @@
 
 namespace libgtd {
 
-// thesis: the grid starts at the minimum x and y of the points, has the pitch of the author's
+// thesis: the grid starts at the minimum x and y of the points, has the spacing of the author's
 // program, drops nodes of height exactly 0 and rounds coordinates to single precision. corrected:
-// the pitch follows eq. 3-5 as printed, and nodes are at multiples of the pitch in the input frame.
+// the spacing follows eq. 3-5 as printed, and nodes are at its multiples in the terrain frame.
 enum class InterpolationMethod { thesis, corrected };
 
 struct InterpolationOptions {
@@ -19,15 +19,15 @@ struct InterpolationOptions {
   // Maximum edge length of a triangle in the x-y plane; 0: no limit. Edges are not measured in 3D,
   // because cliffs have long edges even between dense points.
   double max_edge_m = 0;
-  // Pitch of the grid for `corrected`; 0: from eq. 3-5. Tiles of one terrain need a common pitch.
+  // Spacing of the nodes for `corrected`; 0: from eq. 3-5. Tiles of one terrain need the same one.
   double grid_spacing_m = 0;
-  // Maximum pitch from eq. 3-5 for `corrected`; 0: no limit. If nodes are farther apart than the
-  // voxels to be filled, rows of voxels remain empty.
+  // Maximum spacing for `corrected`; 0: no limit. If nodes are farther apart than the voxels to be
+  // filled, rows of voxels remain empty.
   double max_grid_spacing_m = 0;
-  // Side of square cells; the number of occupied cells measures the area A of eq. 3-5 for
-  // `corrected`. 0: 4 times the mean spacing of as many points in the bounding box.
+  // Side of the square cells of which the occupied ones form the area A of eq. 3-5 for `corrected`;
+  // 0: four times the spacing that the points would have if they filled the bounding box evenly.
   double area_cell_m = 0;
-  // Maximum number of nodes. More nodes indicate a wrong pitch or a stray point.
+  // Maximum number of nodes. More nodes indicate a wrong spacing or a stray point.
   std::size_t max_nodes = 100'000'000;
   // Maximum number of nodes per finite point, beyond the first million nodes. More nodes indicate a
   // few points that are far apart.
@@ -35,14 +35,14 @@ struct InterpolationOptions {
 };
 
 struct InterpolationResult {
-  libmap::PointCloud cloud;  // x outer, y inner; positions and the input's viewpoint
+  libmap::PointCloud cloud;  // nodes, ascending by x, then y, and the viewpoint of the input
   double grid_spacing_m = 0;
   double area_m2 = 0;                  // thesis: bounding box; corrected: occupied cells
   std::size_t triangles = 0;           // of the triangulation
   std::size_t rejected_triangles = 0;  // triangles with an edge longer than max_edge_m
   std::size_t nodes = 0;               // grid nodes
-  std::size_t outside_nodes = 0;       // outside the hull or inside refused triangles
-  std::size_t zero_nodes = 0;          // `thesis`: dropped because of a height of exactly 0
+  std::size_t outside_nodes = 0;       // dropped: outside the hull or inside rejected triangles
+  std::size_t zero_nodes = 0;          // dropped by `thesis` because of a height of exactly 0
   std::size_t skipped_points = 0;      // not finite, or below a point of the same x and y
 };
 

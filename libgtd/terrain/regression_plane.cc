@@ -143,7 +143,7 @@ Matrix3d principal_axes(const PointStream& points, const Vector3d& centroid, std
                                    s += d * d.transpose();
                                  });
   covariance /= static_cast<double>(count);
-  // Scaled, so that tiny and huge clouds stay in the range of numbers.
+  // Scaled to avoid underflow and overflow for tiny and huge clouds.
   const double scale = covariance.trace();
   if (scale > 0) covariance /= scale;
   const libmap::SymmetricEigen<3> eigen = libmap::symmetric_eigen(covariance);
@@ -341,8 +341,7 @@ double choose_up(const Facts& facts, const RegressionPlaneOptions& options, cons
     if (side == 0)
       throw libmap::Error(
           "the direction is zero or parallel to the plane, so it does not determine the upper side "
-          "of "
-          "the plane",
+          "of the plane",
           {.field = "up"});
     const double tilt_deg = std::acos(std::min(1.0, std::abs(side))) * 180.0 / std::numbers::pi;
     if (tilt_deg > options.max_tilt_deg)

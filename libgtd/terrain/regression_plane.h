@@ -34,8 +34,8 @@ enum class UpSource {
 struct RegressionPlaneOptions {
   PlaneMethod method = PlaneMethod::robust;
   std::optional<Eigen::Vector3d> up =
-      std::nullopt;            // a direction of any length in the cloud's frame
-  double max_tilt_deg = 90.0;  // between `up` and the plane's normal
+      std::nullopt;            // any length, cloud's frame; nullopt: the next criterion decides
+  double max_tilt_deg = 90.0;  // maximum angle between `up` and the plane's normal
 };
 
 struct RegressionPlane {
@@ -45,9 +45,9 @@ struct RegressionPlane {
   UpSource up_source = UpSource::frame_z;
   double relief_skewness = 0;        // skewness of heights; negative suggests upside down
   std::optional<double> normals_up;  // share of the normals that point up, weighted by |cosine|
-  double opposing_normals = 0;       // share of neighbors on opposite sides (normal_sides.h)
-  std::size_t points = 0;            // fitted points (all finite ones)
-  std::size_t skipped = 0;           // points with NaN or infinite coordinates
+  double opposing_normals = 0;  // share of neighboring normals on opposite sides of the surface
+  std::size_t points = 0;       // points with finite coordinates, which are fitted
+  std::size_t skipped = 0;      // points with NaN or infinite coordinates
 };
 
 // Fits the plane by the smallest eigenvector of the points' covariance (eq. 2-13..2-15); points

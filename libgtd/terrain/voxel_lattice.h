@@ -55,6 +55,7 @@ struct ThesisLattice {
     const Eigen::Vector3f index = ((centroid - min_m) / voxel_size_m).array() + voxel_size_m / 4.0F;
     return {static_cast<int>(index.x()), static_cast<int>(index.y()), static_cast<int>(index.z())};
   }
+  // Returns the numbers of voxels along i, j, k up to the maximum coordinates of the cloud.
   Voxel size_to(const Eigen::Vector3f& max_m) const {
     const Eigen::Vector3f cells = (max_m - min_m) / voxel_size_m;
     return {static_cast<int>(cells.x()) + 1, static_cast<int>(cells.y()) + 1,
