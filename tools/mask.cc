@@ -40,7 +40,8 @@ void bind(libmap::ParameterTable& table, MaskOptions& options) {
   table.add_overrides("gripper", options.overrides);
   table.add("method", options.mask.method, libgtd::method_names(),
             "scoring method of the mask, as in score --method");
-  table.add("voxel_size_m", options.mask.voxel_size_m, libmap::positive, "side of a voxel, m");
+  table.add("voxel_size_m", options.mask.voxel_size_m, libmap::positive,
+            "edge length of a voxel, m");
   table.add("extra_void_layers", options.mask.extra_void_layers, {0, 10000},
             "number of layers of void voxels that are added on top of the mask (H_add)");
   table.add("view", options.view, libmap::viewpoint_names(), "viewpoint, as in render --view");

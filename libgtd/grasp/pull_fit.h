@@ -75,9 +75,9 @@ struct PullFit {
   bool explains_tests() const { return p_value >= 0.02; }
 };
 
-// Fits the parameters to at least one test. `ground` may be null if all tests are on level ground.
-// Throws Error if the gripper has no `fingers` or `ranges`, and for a location without `ground` or
-// off the mesh and a pull without contact (the field is the row).
+// Fits the parameters to the tests. `ground` may be null if all tests are on level ground. Throws
+// Error if there are no tests, the gripper has no `fingers` or `ranges`, and for a location without
+// `ground` or off the mesh and a pull without contact (the field is the row).
 PullFit fit_pulls(const Ground* ground, const Gripper& gripper, const std::vector<PullTest>& tests,
                   const PullFitOptions& options, libmap::Progress& progress);
 

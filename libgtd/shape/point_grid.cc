@@ -33,7 +33,7 @@ PointGrid::PointGrid(const std::vector<Eigen::Vector3d>& points, double cell_siz
   if (!(extent / cell_size_m <= 0x1.0p40))
     throw libmap::Error(
         "too small for points up to " + libmap::to_text(extent) + " m from the origin",
-        {.field = "search radius, m", .value = libmap::to_text(cell_size_m)});
+        {.field = "cell size, m", .value = libmap::to_text(cell_size_m)});
 
   sort_by_cell(points);
 }

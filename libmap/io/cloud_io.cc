@@ -208,11 +208,17 @@ std::vector<std::filesystem::path> cloud_tiles(const std::filesystem::path& give
   return tiles;
 }
 
-CloudReadResult read_cloud(const std::filesystem::path& path) {
+CloudReadResult read_cloud(const std::filesystem::path& path,
+                           const std::optional<Georeference>& frame) {
   if (std::filesystem::is_directory(path)) {
     CloudReadResult joined;
-    for (const std::filesystem::path& tile : cloud_tiles(path)) {
-      CloudReadResult read = read_cloud(tile);
+    const std::vector<std::filesystem::path> tiles = cloud_tiles(path);
+    const auto first_frame = is_dem_path(tiles.front()) ? read_georeference(tiles.front()) : frame;
+    for (const std::filesystem::path& tile : tiles) {
+      if (is_dem_path(tile) != is_dem_path(tiles.front()))
+        throw Error("DEMs and clouds have different frames; use separate folders",
+                    {.file = tile.string()});
+      CloudReadResult read = read_cloud(tile, first_frame);
       append_cloud(read.cloud, joined.cloud);
       joined.dropped_points += read.dropped_points;
       joined.info = std::move(read.info);
@@ -222,7 +228,7 @@ CloudReadResult read_cloud(const std::filesystem::path& path) {
   require_cloud_file(path);
   if (is_dem_path(path)) {
     CloudReadResult read{{}, 0, dem_file_info(path)};
-    read.cloud = read_dem_cloud(path, &read.dropped_points);
+    read.cloud = read_dem_cloud(path, &read.dropped_points, frame);
     return read;
   }
   return in_file(path, [&] {

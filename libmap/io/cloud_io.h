@@ -21,10 +21,12 @@
 #include <fstream>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <ostream>
 #include <string>
 #include <vector>
 
+#include "libmap/core/georeference.h"
 #include "libmap/core/point_cloud.h"
 #include "libmap/io/geometry_file.h"
 
@@ -41,9 +43,11 @@ struct CloudReadResult {
 std::vector<std::filesystem::path> cloud_tiles(const std::filesystem::path& file_or_folder);
 
 // Reads a file, or all files of a folder into one cloud with the info of the last file. A file
-// without points is an empty cloud; each DEM is in its own local frame. Throws Error naming the
-// file if it cannot be read, is invalid or truncated, or has no fields x, y and z.
-CloudReadResult read_cloud(const std::filesystem::path& path);
+// without points is an empty cloud. A DEM is in the local frame of `frame`, else in its own; all
+// DEMs of a folder are in that of the first. Throws Error naming the file if it cannot be read, is
+// invalid or truncated, has no fields x, y and z, or if only some files are DEMs.
+CloudReadResult read_cloud(const std::filesystem::path& path,
+                           const std::optional<Georeference>& frame = std::nullopt);
 
 // Reads the header only, except for CSV, which is read completely. Throws as read_cloud does.
 GeometryFileInfo read_cloud_info(const std::filesystem::path& path);

@@ -247,8 +247,9 @@ TilesReadResult read_tiles(const std::vector<fs::path>& tiles) {
 }
 
 TileIndex::TileIndex(std::vector<std::filesystem::path> tiles, const Visit& visit) {
+  if (!tiles.empty() && is_dem_path(tiles.front())) frame_ = read_georeference(tiles.front());
   for (std::filesystem::path& path : tiles) {
-    CloudReadResult read = read_cloud(path);
+    CloudReadResult read = read_cloud(path, frame_);
     dropped_ += read.dropped_points;
     const PointCloud& cloud = read.cloud;
     if (cloud.empty()) continue;
@@ -273,7 +274,7 @@ const PointCloud& TileIndex::cloud_of(const Tile& tile) {
     kept_.splice(kept_.begin(), kept_, kept);
     return kept_.front().second;
   }
-  kept_.emplace_front(&tile, read_cloud(tile.path).cloud);
+  kept_.emplace_front(&tile, read_cloud(tile.path, frame_).cloud);
   std::size_t points = 0;
   for (auto one = kept_.begin(); one != kept_.end();) {
     points += one->second.size();

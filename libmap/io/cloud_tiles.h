@@ -59,7 +59,7 @@ struct TilesReadResult {
 TilesReadResult read_tiles(const std::vector<std::filesystem::path>& tiles);
 
 // Reads the points in a rectangle from one or many cloud files, with normals, colors and fields.
-// Each DEM is in its own local frame. Memory depends on the size of a file and of the result.
+// DEMs are in the local frame of the first. Memory depends on the size of a file and of the result.
 class TileIndex {
  public:
   // Reads each file once and calls visit(cloud) unless it is empty. Throws Error naming the file if
@@ -81,7 +81,8 @@ class TileIndex {
   };
   const PointCloud& cloud_of(const Tile& tile);
 
-  std::vector<Tile> tiles_;  // files with points
+  std::vector<Tile> tiles_;            // files with points
+  std::optional<Georeference> frame_;  // of the first DEM
   bool has_normals_ = false;
   std::size_t points_ = 0;
   std::size_t dropped_ = 0;

@@ -63,6 +63,8 @@ std::optional<std::string> exceeded_bound(const SensorCalibration& calibration,
 // Standard deviation of the mean relative depth correction of a camera's features. Images and depth
 // do not distinguish a depth scale error from a larger scene, so the depth camera sets the scale.
 inline constexpr double depth_gauge = 1e-6;
+// Standard deviation of the prior of a registration's shift, m.
+inline constexpr double registration_prior_m = 0.02;
 
 struct BundleAdjustmentResult {
   std::map<int, Pose> map_from_base;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "libmap/core/parallel.h"
+#include "libmap/features/frame_calibration.h"
 #include "libmap/optimize/graph_covariance.h"
 #include "libmap/optimize/graph_links.h"
 #include "libmap/optimize/joint_adjustment.h"
@@ -246,6 +247,25 @@ BundleAdjustmentResult adjust_sparse(const std::vector<FrameFeatures>& frames,
   result.information.add(link_system(result.map_from_base, links));
   result.information.clear_rhs();
   return result;
+}
+
+void add_information(const std::vector<FrameFeatures>& frames,
+                     const std::vector<FeatureTrack>& tracks,
+                     const std::vector<GraphLinkResult>& links,
+                     const BundleAdjustmentOptions& options, BundleAdjustmentResult& result,
+                     const std::vector<Eigen::Vector3d>& points) {
+  std::vector<FrameFeatures> calibrated;
+  if (!result.calibration.empty())
+    for (const FrameFeatures& frame : frames)
+      calibrated.push_back(calibrated_features(frame, result.calibration));
+  const TrackSystem observed(calibrated.empty() ? frames : calibrated, tracks,
+                             options.robust_scale);
+  const std::vector<Eigen::Vector3d> at =
+      points.empty() ? observed.points_at(result.map_from_base) : points;
+  observed.totals(result.map_from_base, at).add_to(result);
+  result.information = observed.system(result.map_from_base, at);
+  result.information.add(link_system(result.map_from_base, links));
+  result.information.clear_rhs();
 }
 
 }  // namespace libmap

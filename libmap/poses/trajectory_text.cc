@@ -8,6 +8,7 @@
 
 #include "libmap/core/camera.h"
 #include "libmap/core/error.h"
+#include "libmap/core/json_input.h"
 #include "libmap/core/text.h"
 #include "libmap/core/text_lines.h"
 
@@ -286,7 +287,7 @@ Trajectory parse_euroc(std::string_view text, const std::string& file) {
 std::vector<ImagePose> parse_nerfstudio(std::string_view text, const std::string& file) {
   std::vector<ImagePose> images;
   try {
-    const auto json = nlohmann::json::parse(text);
+    const auto json = parse_json<nlohmann::json>(std::string(text));
     for (const auto& frame : json.at("frames")) {
       const TextLine entry{images.size() + 1, {}, {}};
       std::vector<double> rows;

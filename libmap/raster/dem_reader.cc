@@ -131,8 +131,9 @@ Eigen::Vector3d point_of(const DemInfo& info, const DemBlock& block, std::size_t
   return {position.x(), position.y(), block.heights_m[pixel]};
 }
 
-PointCloud read_dem_cloud(const fs::path& path, std::size_t* undeclared) {
-  DemReader reader(path);
+PointCloud read_dem_cloud(const fs::path& path, std::size_t* undeclared,
+                          const std::optional<Georeference>& frame) {
+  DemReader reader(path, frame);
   if (reader.info().pixels() > machine_memory() / (2 * sizeof(Eigen::Vector3d)))
     throw Error(
         "the points need more than half of the machine's memory; use a tile store (score -o "
@@ -156,7 +157,8 @@ std::optional<Georeference> read_georeference(const fs::path& path) {
   if (fs::is_directory(path)) {
     fs::path first;
     for (const fs::directory_entry& entry : fs::directory_iterator(path))
-      if (is_dem_path(entry.path()) && (first.empty() || entry.path() < first))
+      if (is_dem_path(entry.path()) && entry.path().filename().string().front() != '.' &&
+          (first.empty() || entry.path() < first))
         first = entry.path();
     if (!first.empty()) return DemReader(first).info().georeference;
   }

@@ -74,10 +74,12 @@ class DemReader {
 // Returns the local position, m, of the center of a pixel; `pixel` is the index in the block.
 Eigen::Vector3d point_of(const DemInfo& info, const DemBlock& block, std::size_t pixel);
 
-// Reads a DEM as a cloud of the centers of pixels with a height, in the order of blocks. Adds to
+// Reads a DEM as a cloud of the centers of pixels with a height, in the order of blocks, in
+// the local frame of `frame`, else in that of the file. Adds to
 // `undeclared` the number of pixels whose height is -infinity in DemBlock. Throws as DemReader
 // does, and if the points need more than half of the machine's memory.
-PointCloud read_dem_cloud(const std::filesystem::path& path, std::size_t* undeclared = nullptr);
+PointCloud read_dem_cloud(const std::filesystem::path& path, std::size_t* undeclared = nullptr,
+                          const std::optional<Georeference>& frame = std::nullopt);
 
 // Returns the georeference of a DEM, of the first DEM in a folder (in the order of names), or of
 // another output by the manifest; nullopt if there is none.

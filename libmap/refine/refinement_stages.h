@@ -119,6 +119,12 @@ using CalibrationMoves = std::map<int, std::vector<Vector6d>>;
 CalibrationMoves calibration_moves(const RefinementInput& input, const RefinementState& state,
                                    SensorCalibration& deviations);
 
+// Returns the options, with default values replaced by depth range, noise, timing and bounds of the
+// sensor. Throws Error for an unknown sensor.
+RefinementOptions with_sensor(RefinementOptions options);
+// Throws Error if two options determine the scale.
+void require_one_scale(const RefinementOptions& options);
+
 struct ScaleResult {
   std::string sentence{};              // source and uncertainty of the scale
   std::optional<StageResult> stage{};  // with the corrected scale

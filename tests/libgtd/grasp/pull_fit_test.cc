@@ -171,6 +171,10 @@ TEST(PullFit, PullsThatCannotBeMadeAreNamed) {
   EXPECT_EQ(field(&ground, {3, 0, 0}, prior), "row 7");
   EXPECT_EQ(field(nullptr, {0, 0, 0.05}, prior), "row 7");
   EXPECT_EQ(field(&ground, {0, 0, 0.05}, grasp_test::gripper()), "ranges");
+  EXPECT_EQ(error_of([&] { libgtd::fit_pulls(&ground, prior, {}, few(), libmap::no_progress()); })
+                .context()
+                .field,
+            "pull tests");
   // A post too thin for the fingers.
   const auto post = grasp_test::revolved({{0.001, 0}, {0.002, 0}, {0.002, -0.5}, {0.4, -0.5}}, 24);
   const libgtd::Ground thin(post);

@@ -169,6 +169,12 @@ TEST(Dem, PiecesShareTheFrameOfTheFirst) {
   const PointCloud cloud = libmap::read_tiles(pieces).cloud;
   ASSERT_EQ(cloud.size(), 22U);
   EXPECT_EQ(cloud.positions[11] - cloud.positions[0], Eigen::Vector3d(5000, 0, 0));
+  EXPECT_EQ(libmap::read_cloud(scratch_folder() / "pieces").cloud.positions, cloud.positions);
+  PointCloud indexed;
+  libmap::TileIndex index(pieces,
+                          [&](const PointCloud& tile) { libmap::append_cloud(tile, indexed); });
+  EXPECT_EQ(indexed.positions, cloud.positions);
+  EXPECT_EQ(index.points_in({-1e6, -1e6}, {1e6, 1e6}).positions, cloud.positions);
   EXPECT_EQ(libmap::read_georeference(scratch_folder() / "pieces"),
             libmap::read_georeference(first));
   const auto box = libmap::read_tile_info(second, libmap::read_georeference(first)).box;
@@ -177,6 +183,8 @@ TEST(Dem, PiecesShareTheFrameOfTheFirst) {
   EXPECT_EQ(error_of([] { libmap::read_tiles(libmap::cloud_tiles(scratch_folder() / "pieces")); })
                 .context()
                 .file,
+            (scratch_folder() / "pieces/c.pcd").string());
+  EXPECT_EQ(error_of([] { libmap::read_cloud(scratch_folder() / "pieces"); }).context().file,
             (scratch_folder() / "pieces/c.pcd").string());
   fs::remove(scratch_folder() / "pieces/c.pcd");
   write_dem("pieces/c.tif", grid, {"-a_srs", "EPSG:32632"});
