@@ -149,7 +149,9 @@ void ExpectedMap::check() const {
                             {.field = "regions '" + other.name + "' and '" + region.name + "'"});
     }
   }
-  if (!any) throw libmap::Error("all regions are undecided; set graspable to 1 or 0 in one");
+  if (!any)
+    throw libmap::Error("no region has a label",
+                        {.field = "graspable", .bound = "1 or 0 in at least one region"});
 }
 
 ExpectedMap parse_expected_map(const libmap::Table& table) {

@@ -33,7 +33,7 @@ struct ExpectedMap {
 
   // Throws Error naming the region for a name that is empty or a duplicate, a radius that is 0,
   // negative or infinite, a coordinate that is not finite, and overlapping regions of which only
-  // one is expected to be graspable. Throws Error if all regions are undecided.
+  // one is expected to be graspable. Throws Error if no region is decided.
   void check() const;
 };
 

@@ -274,8 +274,8 @@ TableEvaluation evaluate_table(const Table& table, const TableEvaluationOptions&
   std::vector<std::string>& names = evaluation.options.score_columns;
   if (names.empty()) names = default_score_columns(table, options.label_column);
   if (names.empty())
-    throw libmap::Error("no column was recognized as a score; name the score columns with --score",
-                        {.file = table.file});
+    throw libmap::Error("not recognized; name the columns with --score",
+                        {.file = table.file, .field = "score columns"});
   for (std::size_t n = 0; n < names.size(); ++n) {
     if (std::find(names.begin(), names.begin() + static_cast<std::ptrdiff_t>(n), names[n]) !=
         names.begin() + static_cast<std::ptrdiff_t>(n))

@@ -93,9 +93,9 @@ DepthImage read_rig_depth(const RigImage& image, const RigCamera& camera);
 struct SynchronizedSet {
   double stamp_s = 0.0;
   struct Camera {
-    enum class State { seen, late, missing };
     // seen: the set has an image of the camera. late: the nearest image, earlier or later, is not
     // within the tolerance (not in results of synchronized_sets). missing: no image is available.
+    enum class State { seen, late, missing };
     State state = State::missing;
     std::size_t image = 0;  // index of the image nearest to stamp_s, unless missing
     double offset_s = 0.0;  // stamp of the image minus stamp_s

@@ -100,14 +100,16 @@ void JoinedScan::find_step() {
   }
   const auto most = static_cast<std::int64_t>(std::numeric_limits<int>::max()) /
                     static_cast<std::int64_t>(scans_.size());
+  std::int64_t bound = 1;  // largest power of ten <= most
+  while (10 * bound <= most) bound *= 10;
   std::int64_t step = 10;
   while (step <= largest) step *= 10;
-  if (step > most)
+  if (step > bound)
     throw Error("node ids are too large for joining this many scans",
                 {.file = path().string(),
                  .field = "largest node id",
                  .value = std::to_string(largest),
-                 .bound = "< " + std::to_string(most / 10)});
+                 .bound = "< " + std::to_string(bound)});
   step_ = static_cast<int>(step);
 }
 

@@ -93,7 +93,7 @@ TEST(Summarize, BadInputIsOneLine) {
   EXPECT_TRUE(bad_input(graspmap({"analyze", "terrain.pcd", "-o", "sum"}),
                         {.file = "terrain.pcd", .field = "score"}));
   EXPECT_TRUE(bad_input(graspmap({"analyze", "a.pcd", "-o", "sum", "--expected", "e.csv"}),
-                        {.file = "e.csv", .about = "verdict"}));
+                        {.file = "e.csv", .field = "graspable"}));
   EXPECT_TRUE(bad_input(graspmap({"analyze", "a.pcd", "a.pcd", "-o", "sum", "--cutoff", "high"}),
                         {.file = "a.pcd", .field = "--cutoff", .value = "high"}));
   EXPECT_TRUE(bad_input(graspmap({"analyze", "a.pcd", "a.pcd", "-o", "sum", "--names", "a|b|c"}),

@@ -174,8 +174,8 @@ TEST(ExpectedMap, HostileTables) {
   EXPECT_TRUE(is_error(parse_error("a,0,0,0,,,,0.1,1,\na,1,0,0,,,,0.1,1,\n"),
                        {.file = "e.csv", .field = "region 'a'"}));
   EXPECT_TRUE(is_error(parse_error(",0,0,0,,,,0.1,1,\n"), {.file = "e.csv", .field = "region"}));
-  EXPECT_TRUE(is_error(parse_error("a,0,0,0,,,,0.1,,\n"), {.file = "e.csv", .about = "no region"}));
-  EXPECT_TRUE(is_error(parse_error(""), {.file = "e.csv", .about = "no region"}));
+  EXPECT_TRUE(is_error(parse_error("a,0,0,0,,,,0.1,,\n"), {.file = "e.csv", .field = "graspable"}));
+  EXPECT_TRUE(is_error(parse_error(""), {.file = "e.csv", .field = "graspable"}));
   const auto of_text = [](const std::string& text) {
     return error_of([&] { libgtd::parse_expected_map(libmap::parse_csv(text, "e.csv")); });
   };

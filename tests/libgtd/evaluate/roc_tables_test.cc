@@ -146,12 +146,12 @@ TEST(RocTables, WrongTablesNameFileRowAndColumn) {
   EXPECT_EQ(label.context().value, "'maybe'");
   EXPECT_EQ(error_for("graspable,score\n1,high\n", {"score"}).context().field,
             "row 1, column 'score'");
-  EXPECT_TRUE(
-      is_error(error_for("graspable,name\n1,a\n"), {.file = "lookup.csv", .about = "no score"}));
+  EXPECT_TRUE(is_error(error_for("graspable,name\n1,a\n"),
+                       {.file = "lookup.csv", .field = "score columns"}));
   EXPECT_TRUE(is_error(error_for("graspable,score\n1,0.5\n", {"score", "score"}),
                        {.file = "lookup.csv", .field = "column 'score'"}));
-  EXPECT_TRUE(
-      is_error(error_for("graspable,score\n", {}), {.file = "lookup.csv", .about = "no score"}));
+  EXPECT_TRUE(is_error(error_for("graspable,score\n", {}),
+                       {.file = "lookup.csv", .field = "score columns"}));
   EXPECT_TRUE(is_error(error_for("graspable,score\n1,0.5\n", {"scor"}),
                        {.file = "lookup.csv", .field = "column 'scor'", .about = "'score'"}));
 }

@@ -79,7 +79,7 @@ TEST(PoseConsistency, OtherConventionsAreNamed) {
            Pose(Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::UnitX()));
   });
   expect_named("inverted", [](const Pose& pose) { return pose.inverse(); });
-  expect_named("positions as x -z y", [](const Pose& pose) {
+  expect_named("changed to x -z y", [](const Pose& pose) {
     Pose wrong = pose;
     const Eigen::Vector3d p = pose.translation();
     wrong.translation() = Eigen::Vector3d(p.x(), p.z(), -p.y());

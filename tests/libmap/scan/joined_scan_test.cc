@@ -96,6 +96,7 @@ TEST(JoinedScan, NumbersThatAreTooLargeAreNamed) {
   });
   EXPECT_EQ(error.context().field, "largest node id");
   EXPECT_EQ(error.context().value, std::to_string(std::numeric_limits<int>::max() - 1));
+  EXPECT_EQ(error.context().bound, "< 1000000000");
 }
 
 }  // namespace joined_scan_test

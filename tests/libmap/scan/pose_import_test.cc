@@ -287,7 +287,8 @@ TEST(PoseImport, NamesTheFileThatIsOfNoUse) {
   const fs::path twice = write_model({{"3.jpg", random_pose()}, {"b/000003.png", random_pose()}});
   const libmap::Error error = error_of([&] { libmap::import_poses(twice, scan); });
   EXPECT_EQ(error.context().file, twice.string());
-  EXPECT_EQ(error.context().value, "3.jpg and b/000003.png");
+  EXPECT_EQ(error.context().value, "b/000003.png");
+  EXPECT_EQ(error.context().field, "image of node 3");
   write_text(scratch_folder() / "few.kitti", "1 0 0 0 0 1 0 0 0 0 1 0\n");
   const libmap::Error few =
       error_of([&] { libmap::import_poses(scratch_folder() / "few.kitti", scan); });
