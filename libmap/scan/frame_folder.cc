@@ -228,17 +228,6 @@ FrameFolder::FrameFolder(const fs::path& path, const FrameFolderOptions& default
   read_links();
 }
 
-fs::path FrameFolder::calibration_file(const std::string& name) const {
-  fs::path file = path_ / name;
-  std::error_code code;  // lists can contain invalid file names
-  if (!fs::exists(file, code))
-    throw Error(name == options_.calibration
-                    ? "no such calibration file; set the key 'calibration' in scan.yaml"
-                    : "no such calibration file",
-                {.file = file.string()});
-  return file;
-}
-
 std::size_t FrameFolder::add_camera(const std::string& name) {
   const auto known = camera_of_name_.find(name);
   if (known != camera_of_name_.end()) return known->second;

@@ -1,3 +1,4 @@
+#include "libmap/core/error.h"
 #include "libmap/scan/frame_folder.h"
 
 namespace libmap {
@@ -16,6 +17,17 @@ void bind(ParameterTable& table, FrameFolderOptions& options) {
             "frame of the poses in the pose files; camera: optical frame; base: robot's base");
   table.add("pairing_tolerance_s", options.pairing_tolerance_s, not_negative,
             "maximum time difference between color and depth, and between image and pose, s");
+}
+
+std::filesystem::path FrameFolder::calibration_file(const std::string& name) const {
+  std::filesystem::path file = path_ / name;
+  std::error_code code;  // lists can contain invalid file names
+  if (!std::filesystem::exists(file, code))
+    throw Error(name == options_.calibration
+                    ? "no such calibration file; set the key 'calibration' in scan.yaml"
+                    : "no such calibration file",
+                {.file = file.string()});
+  return file;
 }
 
 }  // namespace libmap
