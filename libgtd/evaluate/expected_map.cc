@@ -55,7 +55,7 @@ void check_columns(const libmap::Table& table) {
       throw libmap::Error("unknown column" + libmap::did_you_mean(column, known),
                           {.file = table.file, .field = column});
     if (!seen.insert(column).second)
-      throw libmap::Error("occurs more than once", {.file = table.file, .field = column});
+      throw libmap::Error("column occurs more than once", {.file = table.file, .field = column});
   }
 }
 

@@ -16,7 +16,7 @@ struct SurfaceErrorOptions {
   // Correlation length of the displacement: along an axis, the correlation is 0.285 at this
   // distance and 0 from twice this distance.
   double correlation_m = 0.025;
-  // Maximum standard deviation; ground with a larger one is unseen and has this value.
+  // Maximum standard deviation; ground with a larger error counts as unseen and gets this value.
   double max_error_m = 0.005;
 };
 void bind(libmap::ParameterTable& table, SurfaceErrorOptions& options);

@@ -32,10 +32,10 @@ void bind(libmap::ParameterTable& table, UrdfMapping& mapping);
 //   closing_height_mm         at the limits of the finger joint
 //   fingers.curl_deg          with the spine joint at rest: 0, or the limit nearest to 0
 //   fingers.curl_limit_deg    if the spine joint has limits
-// urdfdom runs in a separate process. Throws Error naming the joint or link that is missing, is
-// movable inside the chain or is part of a cycle, a finger joint that is not revolute or has an
-// axis that is not tangential to the circle of joints, fingers that are not evenly spaced or differ
-// by more than 0.1 mm or 0.1 degrees, lengths above 1 m, and angles above 2 pi.
+// urdfdom runs in a separate process. Throws Error if a joint or link is missing, links form a
+// cycle, another joint between palm and tip is movable, a finger joint is not revolute or its axis
+// is not tangential to the circle of joints, fingers are not evenly spaced or differ by more than
+// 0.1 mm or 0.1 degrees, or a length is above 1 m or an angle above 2 pi.
 std::vector<std::pair<std::string, std::string>> read_urdf_dimensions(const std::string& xml,
                                                                       const UrdfMapping& mapping);
 

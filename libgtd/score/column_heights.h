@@ -13,10 +13,10 @@ namespace libgtd {
 class ColumnHeights {
  public:
   static constexpr double unknown = -std::numeric_limits<double>::infinity();
-  static constexpr int gap_columns = 3;  // columns into a gap that are filled
+  static constexpr int gap_columns = 3;  // passes of filling gaps
 
-  // The height of a column is that of its highest voxel; up to gap_columns into a gap, it is the
-  // mean of the adjacent columns.
+  // The height of a column is that of its highest voxel. In each of gap_columns passes, a column
+  // without voxels gets the mean height of its known neighbors (8-neighborhood).
   ColumnHeights(const VoxelGrid& grid, const TileBounds& bounds);
 
   // Returns the index of a column inside the bounds.

@@ -11,8 +11,8 @@ namespace libgtd {
 
 struct SurfaceNormalOptions {
   double radius_m = 0.07;  // radius of the ball of points for the plane fit
-  // Reference direction of slopes; replaces an outside direction that is missing, zero, not finite
-  // or parallel to the surface.
+  // Reference direction of slopes; replaces `outsides` (fit_surface_normals) that are missing,
+  // zero, not finite or parallel to the surface.
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
 };
 

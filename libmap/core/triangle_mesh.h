@@ -40,7 +40,8 @@ double surface_area(const TriangleMesh& mesh);
 // Returns the signed volume in m3 by the divergence theorem: the enclosed volume of a closed mesh.
 double signed_volume(const TriangleMesh& mesh);
 
-// Returns unit vertex normals, area-weighted means of adjacent triangles' normals; 0 without any.
+// Returns unit vertex normals: area-weighted means of the normals of adjacent triangles, zero at
+// vertices without triangles.
 std::vector<Eigen::Vector3f> estimate_vertex_normals(const TriangleMesh& mesh);
 
 // Texture coordinates of a triangle's corners: 0 to 1 over the width and height of the texture

@@ -61,7 +61,8 @@ class FusionFrames {
   // for an invalid camera. Can be called from several threads.
   void measure_reach(const RgbdFrame& depth, double max_depth_m, FusionFrame& frame);
 
-  // Calls use(views, number of frames) for groups of frames, in order; views are numbered by frame.
+  // Calls use(views, frames) for successive groups of `frames` frames; views are numbered by the
+  // index of the frame in the whole list.
   using UseViews = std::function<void(std::span<const RefinementView> views, std::size_t frames)>;
   void each_view_group(std::span<const FusionFrame> frames, bool color, const UseViews& use);
 

@@ -16,7 +16,7 @@ class BlockSystem {
   explicit BlockSystem(std::size_t blocks);  // number of poses; all entries are zero
   std::size_t size() const { return size_; }
 
-  // Adds to block (row, column) of the information matrix and adds the transpose at (column, row).
+  // Adds `block` at (row, column) and, off the diagonal, its transpose at (column, row).
   void add(std::size_t row, std::size_t column, const Matrix6d& block);
   void add_rhs(std::size_t row, const Vector6d& rhs);
   // Adds a residual with derivatives by two blocks; `rhs` is -information * residual.

@@ -46,8 +46,8 @@ struct DemBlock {
 //
 // The height band is the band named height, elevation, dem, dsm, dtm or z, else the only band.
 // Scale, offset, unit (m, ft, us-ft), nodata and mask of the band are applied. The local origin is
-// the origin of `frame`, else the center of the raster rounded to km, and the first height rounded
-// to 100 m (0 for small coordinates). Files next to the DEM (.tfw, .aux.xml) are ignored.
+// the origin of `frame`, else x and y of the raster's center rounded to 1000 m, and the first
+// height rounded to 100 m. Files next to the DEM (.tfw, .aux.xml) are ignored.
 //
 // Throws Error naming the file if it is not a GeoTIFF or damaged; has no affine transform, or a
 // geographic or geocentric CRS; has no height band, or one of 8 bits or complex numbers; has more

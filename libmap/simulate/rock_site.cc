@@ -91,7 +91,8 @@ ParameterTable rock_parameters(SiteRock& rock) {
   table.add("depth_m", rock.depth_m, rock_size_range, "size along the rock's y axis, m");
   table.add("yaw_deg", rock.yaw_deg, Range{-360.0, 360.0}, "rotation of the rock about z, degrees");
   table.add("sides", rock.sides, Range{4.0, 12.0}, "number of walls of a block");
-  table.add("ledges", rock.ledges, Range{0.0, 3.0}, "number of lower blocks merged with a block");
+  table.add("ledges", rock.ledges, Range{0.0, 3.0},
+            "number of smaller, lower blocks attached to the sides of a block");
   table.add("overhang_deg", rock.overhang_deg, Range{0.0, 35.0},
             "outward tilt of a third of the walls, degrees");
   table.add("cleft_m", rock.cleft_m, Range{0.0, 10.0},

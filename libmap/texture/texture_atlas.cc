@@ -284,7 +284,7 @@ std::size_t pack_rectangles(std::vector<PackedRectangle>& rectangles, int page_s
     stbrp_pack_rects(&page, left.data(), static_cast<int>(left.size()));
     const auto packed = std::stable_partition(
         left.begin(), left.end(), [](const stbrp_rect& r) { return r.was_packed == 0; });
-    if (packed == left.end()) throw Error("a rectangle is larger than the page");
+    if (packed == left.end()) throw Error("a part of the texture is larger than a page");
     for (auto r = packed; r != left.end(); ++r) {
       PackedRectangle& rectangle = rectangles[static_cast<std::size_t>(r->id)];
       rectangle.page = pages;
