@@ -23,9 +23,11 @@ set(graspmap_sanitizer_flags "")
 if(GRASPMAP_SANITIZE)
   string(REPLACE ";" "," sanitizers "${GRASPMAP_SANITIZE}")
   set(graspmap_sanitizer_flags -fsanitize=${sanitizers} -fno-omit-frame-pointer
-    -fno-sanitize-recover=all
-    # GCC 12 reports false warnings for OpenMesh in instrumented code.
-    $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
+    -fno-sanitize-recover=all)
+  # GCC 12 reports false warnings for OpenMesh in instrumented code.
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+    list(APPEND graspmap_sanitizer_flags -Wno-maybe-uninitialized)
+  endif()
 endif()
 
 # Eigen changes its allocator under sanitizers. PCL is compiled without them and frees memory that
