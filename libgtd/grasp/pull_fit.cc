@@ -432,7 +432,7 @@ libmap::TriangleMesh level_ground(double half_m) {
 
 PullFit fit_pulls(const Ground* ground, const Gripper& gripper, const std::vector<PullTest>& tests,
                   const PullFitOptions& options, libmap::Progress& progress) {
-  if (tests.empty()) throw libmap::Error("is missing", {.field = "pull tests"});
+  if (tests.empty()) throw libmap::Error("are missing", {.field = "pull tests"});
   options.grasp.check();
   gripper.check();
   require_fingers(gripper);
