@@ -160,7 +160,7 @@ Gripper gripper_of(const DetectionOptions& options) {
 DetectionResult detect(const PointCloud& terrain, const DetectionOptions& options,
                        libmap::Progress& progress) {
   options.scenario.check();
-  if (terrain.empty()) throw libmap::Error("the cloud has no points");
+  if (terrain.empty()) throw libmap::no_elements("points of the cloud");
   const Scenario& scenario = options.scenario;
   // Rejects a voxel size that does not fit the gripper before any work.
   const DetectionStages stages =

@@ -219,7 +219,7 @@ TerrainFrame frame_terrain(const libmap::PointStream& points, const DetectionOpt
     box->min = box->min.cwiseMin(part.min);
     box->max = box->max.cwiseMax(part.max);
   });
-  if (!box) throw libmap::Error("the cloud has no points");
+  if (!box) throw libmap::no_elements("points of the cloud");
   const VoxelGrid corners = voxelize({box->min, box->max}, options.scenario.voxel_size_m);
   frame.lattice = corners.lattice;
   frame.min = corners.min;

@@ -196,7 +196,7 @@ void grasp_places(GraspCommandOptions& options, Run& run) {
   FieldTest test(options, options.points, run);
   libmap::Table& table = test.rows;
   const std::vector<Eigen::Vector3d> locations = positions_of(table);
-  if (locations.empty()) throw libmap::Error("contains no locations", {.file = options.points});
+  if (locations.empty()) throw libmap::no_elements("locations", options.points);
   const auto scenes = scenes_of(table, options.scenes);
   options.grasp.check();
   std::vector<libgtd::LocationResult> results;

@@ -97,7 +97,7 @@ std::vector<Eigen::Vector3d> carried(const LookupCommandOptions& options,
 MapAnswers ask_map(const LookupCommandOptions& options, std::vector<Eigen::Vector3d> positions,
                    Run& run) {
   const libmap::PointCloud map = libmap::read_cloud(options.map).cloud;
-  if (map.empty()) throw libmap::Error("the map has no points", {.file = options.map});
+  if (map.empty()) throw libmap::no_elements("points of the map", options.map);
   run.add_input(options.map);
   positions = carried(options, std::move(positions), run);
   MapAnswers asked = {field_names(map), std::move(positions), {}};
@@ -126,7 +126,7 @@ MapAnswers ask_tiles(const LookupCommandOptions& options, std::vector<Eigen::Vec
 // only interpolated values. Returns their number.
 std::int64_t hide_unseen(const LookupCommandOptions& options, MapAnswers& map, Run& run) {
   const libmap::PointCloud seen = libmap::read_cloud(options.visible).cloud;
-  if (seen.empty()) throw libmap::Error("the cloud has no points", {.file = options.visible});
+  if (seen.empty()) throw libmap::no_elements("points of the cloud", options.visible);
   run.add_input(options.visible);
   const libmap::Pose input_from_map =
       map_from_input(libmap::read_manifest_of(options.map)).inverse();

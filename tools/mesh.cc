@@ -56,7 +56,7 @@ void bind(libmap::ParameterTable& table, MeshOptions& options) {
 
 void check_points(const std::string& input, std::size_t points, std::size_t dropped, Run& run) {
   if (dropped > 0) run.warn("{}: {} points without a finite position are skipped", input, dropped);
-  if (points == 0) throw libmap::Error("the cloud has no points", {.file = input});
+  if (points == 0) throw libmap::no_elements("points of the cloud", input);
 }
 
 libmap::PointCloud read_points(const std::string& input, Run& run) {

@@ -115,7 +115,7 @@ void set_scores(std::vector<double> scores, RegionResult& region) {
 }
 
 const libmap::ScalarField& scores_of(const libmap::PointCloud& map) {
-  if (map.empty()) throw libmap::Error("the map has no points");
+  if (map.empty()) throw libmap::no_elements("points of the map");
   const libmap::ScalarField* score = map.find_field("score");
   if (score == nullptr)
     throw libmap::Error("no such field; a graspability map is required", {.field = "score"});

@@ -48,10 +48,10 @@ class MapPart {
 
 std::vector<Voxel> voxels_of_tile(const libmap::PointCloud& tile) {
   std::vector<Voxel> voxels = VoxelFields(tile).all();
-  if (voxels.empty()) throw libmap::Error("a tile has no points");
+  if (voxels.empty()) throw libmap::no_elements("points of a tile");
   const auto is_not_before = [](const Voxel& a, const Voxel& b) { return !(a < b); };
   if (std::adjacent_find(voxels.begin(), voxels.end(), is_not_before) != voxels.end())
-    throw libmap::Error("the points of a tile are not in ascending order of i, j, k");
+    throw libmap::Error("not in ascending order of i, j, k", {.field = "points of a tile"});
   return voxels;
 }
 
@@ -291,7 +291,7 @@ std::vector<LookupAnswer> look_up(const libmap::PointCloud& map,
                                   const std::vector<Eigen::Vector3d>& points,
                                   const LookupOptions& options) {
   libmap::check_parameters(options);
-  if (map.empty()) throw libmap::Error("the map has no points");
+  if (map.empty()) throw libmap::no_elements("points of the map");
   if (options.mode == LookupMode::maximum) values_of(map, "score");
   const MapPart whole(map);
   std::vector<LookupAnswer> answers(points.size());
@@ -306,7 +306,7 @@ std::vector<LookupAnswer> look_up_tiles(const TileStoreIndex& index, const TileL
                                         const std::vector<Eigen::Vector3d>& points,
                                         const LookupOptions& options, libmap::Progress& progress) {
   libmap::check_parameters(options);
-  if (index.tiles.empty()) throw libmap::Error("the map has no points");
+  if (index.tiles.empty()) throw libmap::no_elements("points of the map");
   const libmap::Pose terrain_from_map = index.frame == MapFrame::input
                                             ? index.terrain_from_input()
                                             : libmap::Pose(libmap::Pose::Identity());

@@ -235,8 +235,8 @@ MapChange compare_maps(const VoxelMap& map, const MapSurface& surface, const Vox
                                      options.match_distance_voxels * size_m);
   }
   if (change.pairs.empty())
-    throw libmap::Error(
-        "the maps have no voxel in common; check the areas and frames of both maps");
+    throw libmap::Error("none is common to both maps; check their areas and frames",
+                        {.field = "voxels"});
   find_unpaired(map, other, change);
   change.common = summarize(map, surface, other, change.pairs);
   summarize_evaluated(map, surface, other, options, change);

@@ -178,7 +178,7 @@ VoxelMap voxel_map_of(const PointCloud& map, const MapInfo& info) {
   kept.reserve(map.size());
   for (std::uint32_t n = 0; n < map.size(); ++n)
     if (map.positions[n].allFinite()) kept.push_back(n);
-  if (kept.empty()) throw libmap::Error("the map has no points");
+  if (kept.empty()) throw libmap::no_elements("points of the map");
   std::vector<Voxel> voxels;
   if (!info.lattice || map.find_field("i") != nullptr) voxels = voxels_of_fields(map, kept);
   result.lattice =

@@ -231,17 +231,17 @@ class PatchVertices {
 Ground::Ground(const libmap::TriangleMesh& mesh, GroundErrors errors)
     : index_(std::make_unique<Index>(mesh, std::move(errors))) {
   mesh.check();
-  if (mesh.triangles.empty()) throw libmap::Error("the mesh has no triangles");
+  if (mesh.triangles.empty()) throw libmap::no_elements("triangles of the mesh");
   for (const Eigen::Vector3d& vertex : mesh.vertices)
     if (vertex.allFinite())
       index_->box.extend(vertex);
     else
-      throw libmap::Error("a vertex of the mesh is not finite");
+      throw libmap::Error("one is not finite", {.field = "vertices of the mesh"});
   index_->fill();
   if (index_->errors.vertex_errors_m.empty()) return;
   if (index_->errors.vertex_errors_m.size() != mesh.vertices.size() ||
       index_->errors.is_unscanned.size() != mesh.triangles.size())
-    throw libmap::Error("the number of errors differs from the number of vertices or triangles");
+    throw libmap::Error("not one per vertex or triangle", {.field = "errors of the mesh"});
   index_->find_vertex_normals();
 }
 

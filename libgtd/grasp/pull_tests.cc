@@ -77,7 +77,7 @@ class PullReader {
 }  // namespace
 
 std::vector<PullTest> pull_tests_of(const libmap::Table& table) {
-  if (table.rows.empty()) throw libmap::Error("contains no pull tests", {.file = table.file});
+  if (table.rows.empty()) throw libmap::no_elements("pull tests", table.file);
   const PullReader reader(table);
   std::vector<PullTest> tests;
   for (std::size_t row = 0; row < table.rows.size(); ++row) tests.push_back(reader.read(row));

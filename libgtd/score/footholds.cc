@@ -214,7 +214,7 @@ void bind(libmap::ParameterTable& table, FootholdOptions& options) {
 FootholdResult find_footholds(const PointCloud& map, const FootholdOptions& options,
                               const FootholdFrame& frame) {
   check(options, frame);
-  if (map.empty()) throw libmap::Error("the map has no points");
+  if (map.empty()) throw libmap::no_elements("points of the map");
   return FootholdSearch(map, options, frame).run();
 }
 

@@ -39,9 +39,9 @@ void append(PointCloud& whole, const PointCloud& part) {
     add(field.values, other->values);
   }
   if (whole.has_colors() != part.has_colors() && !whole.empty() && !part.empty())
-    throw libmap::Error("only some parts of the map have colors");
+    throw libmap::Error("only some parts of the map have them", {.field = "colors"});
   if (whole.has_normals() != part.has_normals() && !whole.empty() && !part.empty())
-    throw libmap::Error("only some parts of the map have normals");
+    throw libmap::Error("only some parts of the map have them", {.field = "normals"});
   add(whole.positions, part.positions);
   add(whole.colors, part.colors);
   add(whole.normals, part.normals);

@@ -376,7 +376,8 @@ InterpolationResult interpolate(const libmap::PointCloud& cloud,
   const Box box = box_of(points);
   const PlanarTriangulation triangulation = triangulate_in_plane(points);
   if (triangulation.triangles.empty())
-    throw libmap::Error("the points' x and y are on a line: interpolation is impossible");
+    throw libmap::Error("x and y are on a line, so that interpolation is impossible",
+                        {.field = "points"});
   InterpolationResult result;
   result.skipped_points = cloud.size() - triangulation.vertices;
   HeightGrid grid = make_grid(points, box, options, result);

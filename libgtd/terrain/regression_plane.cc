@@ -157,10 +157,11 @@ void check_spread(const Vector3d& variances, const Vector3d& centroid, std::size
                         {.field = "points", .value = std::to_string(count), .bound = ">= 3"});
   const double size = std::sqrt(variances[2]);
   const double rounding = 1e-15 * centroid.norm();
-  if (!(size > 4 * rounding)) throw libmap::Error("all points coincide: no plane can be fitted");
+  if (!(size > 4 * rounding))
+    throw libmap::Error("all coincide, so that no plane can be fitted", {.field = "points"});
   // Single-precision coordinates have noise of about 1e-7 of the offset across an exact line.
   if (!(std::sqrt(variances[1]) > 1e-6 * size + 4 * rounding))
-    throw libmap::Error("all points are on a line: no plane can be fitted");
+    throw libmap::Error("all are on a line, so that no plane can be fitted", {.field = "points"});
 }
 
 // Moments of the heights, and votes of the normals for the side of `normal`.

@@ -153,7 +153,7 @@ void write_bag(const fs::path& path, BagFormat format, const BagContent& content
 void write_rig_bag(const fs::path& path, BagFormat format, const CameraRig& rig,
                    const std::vector<RigImage>& images, const RigBagOptions& options) {
   const std::vector<RigImage> ordered = in_recording_order(images);
-  if (ordered.empty()) throw Error("there are no images to write");
+  if (ordered.empty()) throw no_elements("images");
   std::vector<BagTransform> transforms;
   for (const RigCamera& camera : rig.cameras)
     transforms.push_back(

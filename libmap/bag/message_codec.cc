@@ -301,8 +301,9 @@ Message decode(MessageEncoding encoding, std::string_view bytes) {
   } catch (const std::length_error&) {
   } catch (const eprosima::fastcdr::exception::Exception&) {
   }
-  throw Error("a message is damaged: it declares more data than its " +
-              std::to_string(bytes.size()) + " bytes contain");
+  throw Error(
+      "damaged: declares more data than its " + std::to_string(bytes.size()) + " bytes contain",
+      {.field = "message"});
 }
 
 template <typename Message>

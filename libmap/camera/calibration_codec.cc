@@ -121,14 +121,15 @@ Calibration read_records(std::string_view bytes) {
   ByteReader reader(bytes);
   while (!reader.empty()) {
     const std::string_view rest = reader.rest();
-    if (!begins_with_record(rest)) throw Error("calibration contains an invalid record");
+    if (!begins_with_record(rest)) throw Error("a record is invalid", {.field = "calibration"});
     if (rest[12] == 0)
       calibration.cameras.push_back(read_record(reader));
     else
       calibration.stereo.push_back(read_stereo_record(reader));
   }
   if (!calibration.cameras.empty() && !calibration.stereo.empty())
-    throw Error("calibration contains both single and stereo cameras, which is not supported");
+    throw Error("contains both single and stereo cameras, which is not supported",
+                {.field = "calibration"});
   return calibration;
 }
 
@@ -244,7 +245,7 @@ Camera camera_of(const CalibrationRecord& record, int width, int height) {
     camera.cy = record.k[5];
     set_distortion(camera, record.d);
   } else {
-    throw Error("calibration contains neither K nor P");
+    throw Error("contains neither K nor P", {.field = "calibration"});
   }
   camera.check();
   return camera;
@@ -282,17 +283,19 @@ std::string to_text(CalibrationLayout layout) {
 }
 
 Calibration decode_calibration(std::string_view bytes) {
-  if (bytes.empty()) throw Error("calibration is empty");
+  if (bytes.empty()) throw Error("empty", {.field = "calibration"});
   if (begins_with_record(bytes)) {
     try {
       return read_records(bytes);
     } catch (const std::length_error&) {
-      throw Error("calibration is truncated after " + std::to_string(bytes.size()) + " bytes");
+      throw Error("truncated after " + std::to_string(bytes.size()) + " bytes",
+                  {.field = "calibration"});
     }
   }
   const auto layout = floats_layout(bytes);
   if (!layout)
-    throw Error("calibration is in no known layout: " + std::to_string(bytes.size()) + " bytes");
+    throw Error("unknown layout of " + std::to_string(bytes.size()) + " bytes",
+                {.field = "calibration"});
   return read_floats(bytes, layout->first, layout->second);
 }
 

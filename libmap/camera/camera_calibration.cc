@@ -51,8 +51,9 @@ Pose pose_of(const cv::Mat& rotation_vector, const cv::Mat& translation) {
 
 [[noreturn]] void refuse_undetermined() {
   throw Error(
-      "the images do not determine the camera: show the board at different tilts about both "
-      "axes, some of 30 degrees and more");
+      "do not determine the camera; show the board at different tilts about both axes, some of 30 "
+      "degrees and more",
+      {.field = "images"});
 }
 
 DistortionModel distortion_of(LensModel lens) {

@@ -37,7 +37,7 @@ class NibbleReader {
       value |= (nibble & 7) << shift;
       if ((nibble & 8) == 0) return value;
     }
-    throw Error("RVL contains a number of more than 32 bits");
+    throw Error("contains a number of more than 32 bits", {.field = "RVL data"});
   }
 
   std::size_t bytes_read() const { return at_; }
@@ -139,7 +139,9 @@ std::optional<DepthInfo> read_depth_info(std::string_view bytes) {
 
 DepthImage decode_depth(std::string_view bytes) {
   const std::optional<DepthInfo> info = read_depth_info(bytes);
-  if (!info) throw Error("not a depth image: must be RVL, 16-bit PNG or float PNG");
+  if (!info)
+    throw Error("unknown format",
+                {.field = "depth image", .bound = "RVL, 16-bit PNG or float PNG"});
   if (info->format == DepthFormat::rvl) return to_meters(decode_rvl(bytes));
   if (info->format == DepthFormat::png16) return to_meters(decode_gray16(bytes));
   DepthImage image = decode_float_png(bytes);
@@ -165,7 +167,8 @@ MillimeterImage decode_rvl(std::string_view bytes) {
     for (const std::uint64_t end = at + values; at < end; ++at) {
       const std::uint32_t zigzag = reader.number();
       previous += (zigzag >> 1) ^ (0U - (zigzag & 1));
-      if (previous > no_depth_mm) throw Error("RVL contains a depth of more than 16 bits");
+      if (previous > no_depth_mm)
+        throw Error("contains a depth of more than 16 bits", {.field = "RVL data"});
       image.pixels[at] = static_cast<std::uint16_t>(previous);
     }
   }

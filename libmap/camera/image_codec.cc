@@ -87,7 +87,7 @@ std::optional<ImageInfo> png_info(std::string_view bytes) {
 std::optional<ImageInfo> jpeg_info(std::string_view bytes) {
   std::size_t at = 2;
   while (at + 4 <= bytes.size()) {
-    if (bytes[at] != '\xff') throw Error("JPEG header is damaged");
+    if (bytes[at] != '\xff') throw Error("damaged", {.field = "JPEG header"});
     const auto marker = static_cast<std::uint8_t>(bytes[at + 1]);
     if (marker == 0xff) {  // fill byte
       ++at;
@@ -97,7 +97,7 @@ std::optional<ImageInfo> jpeg_info(std::string_view bytes) {
     const bool is_frame =
         marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc;
     if (length < 2 || marker < 0xc0 || marker == 0xd8 || marker == 0xd9 || marker == 0xda)
-      throw Error("JPEG header is damaged");
+      throw Error("damaged", {.field = "JPEG header"});
     if (is_frame) {
       if (at + 10 > bytes.size()) return std::nullopt;
       ImageInfo info;
@@ -118,8 +118,8 @@ std::optional<ImageInfo> jpeg_info(std::string_view bytes) {
 ImageInfo checked_info(std::string_view bytes, std::int64_t max_pixels = max_frame_pixels) {
   const std::optional<ImageInfo> info = read_image_info(bytes);
   if (!info)
-    throw Error("image is truncated in the header, after " + std::to_string(bytes.size()) +
-                " bytes");
+    throw Error("truncated after " + std::to_string(bytes.size()) + " bytes",
+                {.field = "image header"});
   check_size(*info, bytes.size(), max_pixels);
   return *info;
 }
@@ -137,12 +137,14 @@ void decode_jpeg(std::string_view bytes, const ImageInfo& info, int pixel_format
       tjDecompress2(handle.get(), reinterpret_cast<const unsigned char*>(bytes.data()),
                     static_cast<unsigned long>(bytes.size()), pixels, info.width, 0, info.height,
                     pixel_format, flags);
-  if (result != 0) throw Error(std::string("JPEG is damaged: ") + tjGetErrorStr2(handle.get()));
+  if (result != 0)
+    throw Error(std::string("damaged: ") + tjGetErrorStr2(handle.get()), {.field = "JPEG data"});
 }
 
 std::string encode_jpeg(const std::uint8_t* pixels, int width, int height, int pixel_format,
                         int subsampling, int quality) {
-  if (width <= 0 || height <= 0) throw Error("an empty image cannot be written");
+  if (width <= 0 || height <= 0)
+    throw Error("an empty image cannot be written", {.field = "image size"});
   const JpegHandle handle(tjInitCompress(), &tjDestroy);
   if (!handle) throw Error("libjpeg-turbo could not be initialized", {}, ErrorKind::failed);
   unsigned char* buffer = nullptr;
@@ -231,7 +233,7 @@ void decode_png(std::string_view bytes, PngWanted wanted, std::uint8_t* target,
   const bool is_sound =
       info != nullptr && decode_png_rows(source, wanted, target, row_bytes, png, info);
   png_destroy_read_struct(&png, &info, nullptr);
-  if (!is_sound) throw Error(std::string("PNG is damaged: ") + source.message);
+  if (!is_sound) throw Error(std::string("damaged: ") + source.message, {.field = "PNG data"});
 }
 
 void append_bytes(png_structp png, png_bytep data, png_size_t count) {
@@ -273,7 +275,8 @@ bool encode_png_rows(PngSink& sink, const PngPixels& pixels, png_structp png, pn
 }
 
 std::string encode_png(const PngPixels& pixels) {
-  if (pixels.width <= 0 || pixels.height <= 0) throw Error("an empty image cannot be written");
+  if (pixels.width <= 0 || pixels.height <= 0)
+    throw Error("an empty image cannot be written", {.field = "image size"});
   PngSink sink;
   png_structp png =
       png_create_write_struct(PNG_LIBPNG_VER_STRING, &sink, remember_error, ignore_warning);
@@ -330,7 +333,7 @@ std::optional<ImageFormat> image_format(std::string_view bytes) {
 
 std::optional<ImageInfo> read_image_info(std::string_view bytes) {
   const std::optional<ImageFormat> format = image_format(bytes);
-  if (!format) throw Error("neither a JPEG nor a PNG");
+  if (!format) throw Error("unknown format", {.field = "image", .bound = "JPEG or PNG"});
   return *format == ImageFormat::jpeg ? jpeg_info(bytes) : png_info(bytes);
 }
 

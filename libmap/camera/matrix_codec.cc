@@ -63,17 +63,19 @@ std::size_t bytes_of(MatrixElement element) {
 
 StoredMatrix read_matrix_header(std::string_view blob) {
   if (blob.size() <= trailer_bytes)
-    throw Error("compressed matrix ends after " + std::to_string(blob.size()) + " bytes");
+    throw Error("ends after " + std::to_string(blob.size()) + " bytes",
+                {.field = "compressed matrix"});
   std::array<std::int32_t, 3> numbers{};
   std::memcpy(numbers.data(), blob.data() + blob.size() - trailer_bytes, trailer_bytes);
   const auto [rows, columns, type] = numbers;
   if (rows < 0 || columns < 0)
-    throw Error("compressed matrix has an invalid size",
-                {.value = std::to_string(rows) + " x " + std::to_string(columns)});
+    throw Error("invalid", {.field = "size of the compressed matrix",
+                            .value = std::to_string(rows) + " x " + std::to_string(columns)});
   if (type < 0 || (type & 7) > static_cast<int>(MatrixElement::float64) ||
       (type >> 3) + 1 > max_channels)
-    throw Error("compressed matrix has an unsupported element type or too many channels",
-                {.value = std::to_string(type), .bound = "CV_8U to CV_64F, at most 512 channels"});
+    throw Error("unsupported", {.field = "type of the compressed matrix",
+                                .value = std::to_string(type),
+                                .bound = "CV_8U to CV_64F, at most 512 channels"});
   return {.rows = rows,
           .columns = columns,
           .channels = (type >> 3) + 1,
@@ -97,14 +99,15 @@ void for_each_matrix_chunk(std::string_view blob,
     const std::size_t bytes = piece.size() - stream.avail_out;
     done += bytes;
     if (done > wanted)
-      throw Error("compressed matrix exceeds the declared size",
-                  {.value = matrix_size_text(matrix)});
+      throw Error("less than the data",
+                  {.field = "size of the compressed matrix", .value = matrix_size_text(matrix)});
     const bool is_at_end = result == Z_BUF_ERROR || (result == Z_OK && stream.avail_out > 0);
     if (is_at_end || (result == Z_STREAM_END && done < wanted))
-      throw Error("compressed matrix is damaged: the data end after " + std::to_string(done) +
-                  " of " + std::to_string(wanted) + " bytes");
+      throw Error("damaged: the data end after " + std::to_string(done) + " of " +
+                      std::to_string(wanted) + " bytes",
+                  {.field = "compressed matrix"});
     if (result != Z_OK && result != Z_STREAM_END)
-      throw Error("compressed matrix is damaged: " + std::string(zError(result)));
+      throw Error("damaged: " + std::string(zError(result)), {.field = "compressed matrix"});
     if (bytes > 0) use(std::string_view(piece).substr(0, bytes));
   }
 }
@@ -113,9 +116,9 @@ StoredMatrix decode_matrix(std::string_view blob) {
   StoredMatrix matrix = read_matrix_header(blob);
   const std::uint64_t wanted = checked_bytes(matrix, blob.size() - trailer_bytes);
   if (wanted > max_matrix_bytes)
-    throw Error("compressed matrix is too large",
-                {.value = matrix_size_text(matrix),
-                 .bound = "<= " + std::to_string(max_matrix_bytes) + " bytes"});
+    throw Error("too large", {.field = "size of the compressed matrix",
+                              .value = matrix_size_text(matrix),
+                              .bound = "<= " + std::to_string(max_matrix_bytes) + " bytes"});
   matrix.bytes.reserve(wanted);
   for_each_matrix_chunk(blob, [&](std::string_view bytes) { matrix.bytes += bytes; });
   return matrix;
@@ -140,7 +143,7 @@ std::string encode_matrix(const StoredMatrix& matrix) {
 std::string decode_compressed_text(std::string_view blob) {
   StoredMatrix matrix = decode_matrix(blob);
   if (matrix.element != MatrixElement::int8 || matrix.channels != 1 || matrix.rows != 1)
-    throw Error("compressed matrix is not a text");
+    throw Error("is not a text", {.field = "compressed matrix"});
   std::string text = std::move(matrix.bytes);
   text.resize(std::strlen(text.c_str()));
   return text;

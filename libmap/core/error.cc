@@ -41,4 +41,8 @@ Error Error::in_field(const std::string& prefix, const char* joint) const {
   return Error(reason_, std::move(context), kind_);
 }
 
+Error no_elements(const std::string& elements, const std::filesystem::path& file) {
+  return Error("there are none", {.file = file.string(), .field = elements});
+}
+
 }  // namespace libmap

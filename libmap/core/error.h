@@ -41,6 +41,10 @@ class Error : public std::runtime_error {
   ErrorKind kind_;
 };
 
+// Returns the error "FILE: ELEMENTS: there are none", e.g. of a cloud without points; `file` may be
+// empty.
+Error no_elements(const std::string& elements, const std::filesystem::path& file = {});
+
 // Returns step(). Adds `file` to Errors of `step` that name no file.
 template <typename Step>
 auto in_file(const std::filesystem::path& file, const Step& step) {

@@ -24,7 +24,7 @@ Json parse_json(const std::string& text) {
     if (event == Json::parse_event_t::object_start) members.push_back(0);
     if (event == Json::parse_event_t::object_end) members.pop_back();
     if (event == Json::parse_event_t::key && ++members.back() > max_members)
-      throw Error("contains an object of more than 10000 members");
+      throw Error("contains more than 10000 members", {.field = "object"});
     return true;
   });
 }

@@ -83,8 +83,7 @@ SandboxedProcess::SandboxedProcess(std::uint64_t max_data_bytes,
     pipe_.reset(fdopen(ends[0], "rb"));
   }
   if (process_ < 0 || !pipe_)
-    throw Error(std::string("cannot start a child process: ") + std::strerror(errno), {},
-                ErrorKind::failed);
+    throw Error(std::strerror(errno), {.field = "start of a child process"}, ErrorKind::failed);
 }
 
 SandboxedProcess::~SandboxedProcess() { end(); }

@@ -109,13 +109,18 @@ Error duplicate(const TextLine& line, const std::string& record, const std::stri
   return in_line("occurs twice", line, file, record);
 }
 
+void require_rows(std::uint64_t rows, std::uint64_t row_bytes, std::uint64_t bytes,
+                  const std::string& what) {
+  if (row_bytes > 0 && rows > bytes / row_bytes)
+    throw Error("more than the data contain", {.field = "number of " + what,
+                                               .value = std::to_string(rows),
+                                               .bound = "<= " + std::to_string(bytes / row_bytes)});
+}
+
 void require_room_for_text(std::uint64_t rows, std::uint64_t words, std::uint64_t bytes,
                            const std::string& what) {
   // Each word needs a character and a blank, except for the last word of the file.
-  const std::uint64_t line_bytes = 2 * words;
-  if (line_bytes > 0 && rows > (bytes + 1) / line_bytes)
-    throw Error("the header declares " + std::to_string(rows) + " " + what + ", but only " +
-                std::to_string(bytes) + " bytes of text follow");
+  require_rows(rows, 2 * words, bytes + 1, what);
 }
 
 Pose pose_of(const TextLine& line, const Eigen::Vector3d& translation,

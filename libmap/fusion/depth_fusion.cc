@@ -112,10 +112,10 @@ class Fusion {
 
   Error no_frames(std::size_t poses) const {
     if (plan_.skipped.empty())
-      return Error(poses == 0 ? "no frame can be fused: there are no poses"
-                              : "no frame can be fused: none has depth");
+      return poses == 0 ? no_elements("poses") : Error("none has depth", {.field = "frames"});
     return Error("none of " + std::to_string(poses) +
-                 " frames can be used; error of the first: " + plan_.skipped.front().second.what());
+                     " can be used; error of the first: " + plan_.skipped.front().second.what(),
+                 {.field = "frames"});
   }
 
   void skip(int node, const Error& fault) {

@@ -407,7 +407,8 @@ DecodedModel decode_glb_model(const std::filesystem::path& path) {
 
 std::string encode_by_assimp(const TriangleMesh& mesh, const std::string& format, bool ascii) {
   if (mesh.triangles.empty())
-    throw Error("a mesh without triangles cannot be written as " + format);
+    throw Error("there are none, so that the mesh cannot be written as " + format,
+                {.field = "triangles"});
   const bool is_glb = format == "glb";
   std::vector<std::unique_ptr<aiMesh>> meshes;
   meshes.push_back(mesh_of(mesh, 0));

@@ -47,8 +47,9 @@ Triple require_positions(const ColumnSet& set) {
   if (const auto triple = find_triple(set, position_names)) return *triple;
   std::string all;
   for (const std::string& name : names_of(set)) all += " " + name.substr(0, 40);
-  throw Error("contains no points: fields x, y and z are required, found" +
-              (all.empty() ? std::string(" none") : all.substr(0, 400)));
+  throw Error(
+      "required for points; found:" + (all.empty() ? std::string(" none") : all.substr(0, 400)),
+      {.field = "fields x, y and z"});
 }
 
 std::vector<Eigen::Vector3d> read_positions(const Triple& triple, std::size_t rows) {

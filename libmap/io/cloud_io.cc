@@ -286,7 +286,10 @@ void PcdPartsWriter::append(const PointCloud& part) {
   if (part.empty()) return;  // an empty part does not determine the attributes of the cloud
   written_ += part.size();
   if (written_ > options_.points)
-    throw Error("contains more points than declared", {.file = path_.string()});
+    throw Error("more than declared", {.file = path_.string(),
+                                       .field = "number of points",
+                                       .value = std::to_string(written_),
+                                       .bound = std::to_string(options_.points)});
   ColumnSet set = columns_of_cloud(part, NormalNames::long_names);
   for (Column& column : set.columns)
     if (column.name == "x" || column.name == "y" || column.name == "z")
@@ -295,7 +298,8 @@ void PcdPartsWriter::append(const PointCloud& part) {
   if (header_.empty())
     file_ << header;
   else if (header != header_)
-    throw Error("the parts have different fields or viewpoints", {.file = path_.string()});
+    throw Error("the parts have different ones",
+                {.file = path_.string(), .field = "fields or viewpoints"});
   header_ = header;
   encode_pcd_points(set, FileEncoding::binary, file_);
   require_good();
@@ -303,7 +307,10 @@ void PcdPartsWriter::append(const PointCloud& part) {
 
 void PcdPartsWriter::finish() {
   if (written_ != options_.points)
-    throw Error("contains fewer points than declared", {.file = path_.string()});
+    throw Error("fewer than declared", {.file = path_.string(),
+                                        .field = "number of points",
+                                        .value = std::to_string(written_),
+                                        .bound = std::to_string(options_.points)});
   file_.close();
   require_good();
 }

@@ -238,7 +238,7 @@ MeshReadResult decode(const std::string& format, const std::shared_ptr<const std
 
 MeshReadResult read_dem(const std::filesystem::path& path) {
   MeshReadResult result{read_dem_mesh(path), read_cloud_info(path)};
-  if (result.mesh.triangles.empty()) throw Error("contains no triangle", {.file = path.string()});
+  if (result.mesh.triangles.empty()) throw no_elements("triangles", path);
   result.info.points = result.mesh.vertices.size();
   result.info.faces = result.mesh.triangles.size();
   return result;
@@ -318,7 +318,7 @@ MeshReadResult read_mesh(const std::filesystem::path& path) {
   const auto bytes = read_geometry_bytes(path);
   return in_file(path, [&] {
     MeshReadResult result = decode(format_of(path), bytes);
-    if (result.mesh.triangles.empty()) throw Error("contains no triangle");
+    if (result.mesh.triangles.empty()) throw no_elements("triangles");
     return result;
   });
 }

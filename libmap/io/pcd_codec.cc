@@ -86,7 +86,7 @@ HeaderLines read_lines(std::string_view file, PcdHeader& header) {
       return lines;
     }
   }
-  throw Error(text.empty() ? "is empty" : "the PCD header has no DATA line");
+  throw Error("missing", {.field = text.empty() ? "PCD header" : "DATA line of the PCD header"});
 }
 
 const std::string& single_word(const HeaderLines& lines, const std::string& key) {
@@ -214,10 +214,8 @@ void require_data(const PcdHeader& header, std::uint64_t file_bytes) {
     std::uint64_t words = 0;
     for (const PcdField& field : header.fields) words += field.count;
     require_room_for_text(header.points, words, data, "points");
-  } else if (header.encoding == FileEncoding::binary && header.points > data / record) {
-    throw Error("the header declares " + std::to_string(header.points) + " points of " +
-                std::to_string(record) + " bytes, but only " + std::to_string(data) +
-                " bytes of data follow (" + std::to_string(data / record) + " points)");
+  } else if (header.encoding == FileEncoding::binary) {
+    require_rows(header.points, record, data, "points");
   }
 }
 
@@ -268,30 +266,33 @@ std::uint32_t little_endian_u32(std::string_view bytes) {
 void add_compressed(const PcdHeader& header, std::string_view data, ColumnSet& set) {
   if (data.size() < 8 && header.points == 0)
     return add_binary(header, reinterpret_cast<const std::byte*>(data.data()), set);
-  if (data.size() < 8) throw Error("the data are too short: the compressed size is missing");
+  if (data.size() < 8) throw Error("missing", {.field = "compressed size"});
   const std::uint64_t compressed = little_endian_u32(data);
   const std::uint64_t uncompressed = little_endian_u32(data.substr(4));
   if (compressed > data.size() - 8)
-    throw Error("the compressed data end after " + std::to_string(data.size() - 8) + " of " +
-                std::to_string(compressed) + " bytes");
+    throw Error("more than the file contains", {.field = "bytes of the compressed data",
+                                                .value = std::to_string(compressed),
+                                                .bound = "<= " + std::to_string(data.size() - 8)});
   const std::uint64_t record = record_bytes(header, true);
   const std::uint64_t record_unpadded = record_bytes(header, false);
   // No overflow: a record has at most a MiB, and a larger number of points is not equal anyway.
   const bool few = header.points <= std::numeric_limits<std::uint32_t>::max();
   const bool padded = few && uncompressed == header.points * record;
   if (!padded && !(few && uncompressed == header.points * record_unpadded))
-    throw Error("the header declares " + std::to_string(header.points) + " points of " +
-                std::to_string(record_unpadded) + " bytes, but the data contain " +
-                std::to_string(uncompressed) + " bytes");
+    throw Error("differs from the size of the points",
+                {.field = "bytes of the uncompressed data",
+                 .value = std::to_string(uncompressed),
+                 .bound = std::to_string(header.points) + " * " + std::to_string(record_unpadded)});
   // LZF expands 3 bytes to at most 264.
   if (uncompressed / 88 > compressed)
-    throw Error("the compressed data are too few for " + std::to_string(uncompressed) + " bytes");
+    throw Error("too few for " + std::to_string(uncompressed) + " bytes",
+                {.field = "compressed data"});
   auto buffer = std::make_shared<std::string>(uncompressed, '\0');
   if (uncompressed > 0 &&
       (compressed == 0 ||
        pcl::lzfDecompress(data.data() + 8, static_cast<unsigned>(compressed), buffer->data(),
                           static_cast<unsigned>(uncompressed)) != uncompressed))
-    throw Error("the compressed data are broken");
+    throw Error("damaged", {.field = "compressed data"});
   const auto* at = reinterpret_cast<const std::byte*>(buffer->data());
   for (const PcdField& field : header.fields) {
     if (field.is_padding() && !padded) continue;
@@ -329,11 +330,13 @@ void add_text(const PcdHeader& header, std::string_view text, ColumnSet& set) {
   TextLine line;
   for (std::size_t row = 0; row < header.points; ++row) {
     if (!lines.next(line))
-      throw Error("the header declares " + std::to_string(header.points) + " points, but only " +
-                  std::to_string(row) + " lines of data follow");
+      throw Error("more than the lines of data", {.field = "number of points",
+                                                  .value = std::to_string(header.points),
+                                                  .bound = "<= " + std::to_string(row)});
     if (line.words.size() != targets.size())
-      throw Error(name_of(line) + " contains " + std::to_string(line.words.size()) +
-                  " numbers instead of " + std::to_string(targets.size()));
+      throw Error("wrong", {.field = "numbers of " + name_of(line),
+                            .value = std::to_string(line.words.size()),
+                            .bound = std::to_string(targets.size())});
     for (std::size_t i = 0; i < targets.size(); ++i) {
       const Target& target = targets[i];
       if (target.values == nullptr && target.packed == nullptr) continue;

@@ -190,11 +190,7 @@ void require_room(const PlyElement& element, FileEncoding encoding, std::uint64_
     return require_room_for_text(element.count, element.properties.size(), bytes,
                                  "rows of " + quoted_name(element));
   const std::uint64_t record = element.record_bytes();
-  if (record > 0 && element.count > bytes / record)
-    throw Error("the header declares " + std::to_string(element.count) + " rows of " +
-                quoted_name(element) + " of " + std::to_string(record) + " bytes, but only " +
-                std::to_string(bytes) + " bytes of data follow (" + std::to_string(bytes / record) +
-                " rows)");
+  require_rows(element.count, record, bytes, "rows of " + quoted_name(element));
 }
 
 bool is_index_list(const PlyElement& element, const PlyProperty& property) {
@@ -234,7 +230,8 @@ class RowReader {
   }
   void end_row() {
     if (ascii_ && word_ != line_.words.size())
-      throw Error(name_of(line_) + " contains more than one row of " + quoted_name(element_));
+      throw Error("contains more than one row of " + quoted_name(element_),
+                  {.field = name_of(line_)});
   }
 
  private:
@@ -373,7 +370,8 @@ GeometryFileInfo info_of(const PlyHeader& header, std::uint64_t file_bytes) {
 }
 
 void require_vertices(const PlyHeader& header) {
-  if (header.find("vertex") == nullptr) throw Error("the PLY header has no element vertex");
+  if (header.find("vertex") == nullptr)
+    throw Error("has no element vertex", {.field = "PLY header"});
 }
 
 // Throws Error unless the file is large enough for all elements.

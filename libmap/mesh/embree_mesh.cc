@@ -20,10 +20,10 @@ void require_success(RTCDevice device) {
 }  // namespace
 
 EmbreeMesh::EmbreeMesh(const TriangleMesh& mesh, bool robust) : triangles_(mesh.triangles) {
-  if (mesh.triangles.empty()) throw Error("the mesh has no triangles");
+  if (mesh.triangles.empty()) throw no_elements("triangles of the mesh");
   mesh.check();
   for (const Eigen::Vector3d& vertex : mesh.vertices)
-    if (!vertex.allFinite()) throw Error("a vertex of the mesh is not finite");
+    if (!vertex.allFinite()) throw Error("one is not finite", {.field = "vertices of the mesh"});
   const Bounds3d bounds = bounds_of(mesh.vertices);
   center_ = 0.5 * (bounds.min + bounds.max);
   size_ = bounds.max - bounds.min;

@@ -24,7 +24,7 @@ constexpr double single_precision_m = 256.0;
 SampledSurface surface_of(const TriangleMesh& mesh) {
   mesh.check();
   for (const Eigen::Vector3d& vertex : mesh.vertices)
-    if (!vertex.allFinite()) throw Error("the mesh has a vertex that is not finite");
+    if (!vertex.allFinite()) throw Error("one is not finite", {.field = "vertices of the mesh"});
   const Bounds3d bounds = bounds_of(mesh.vertices);
   const double farthest =
       std::max(bounds.min.cwiseAbs().maxCoeff(), bounds.max.cwiseAbs().maxCoeff());
@@ -36,7 +36,7 @@ SampledSurface surface_of(const TriangleMesh& mesh) {
   }
   surface.area_m2 = surface.triangles.area_m2();
   if (!(surface.area_m2 > 0.0) || !std::isfinite(surface.area_m2))
-    throw Error("the mesh has no area");
+    throw Error("has no area", {.field = "mesh"});
   return surface;
 }
 

@@ -124,9 +124,9 @@ struct ReferenceSurface::CloudShape : Shape {
 
   explicit CloudShape(const PointCloud& cloud)
       : points(cloud.positions), normals(points.size(), Eigen::Vector3d::Zero()) {
-    if (points.empty()) throw Error("the cloud has no points");
+    if (points.empty()) throw no_elements("points of the cloud");
     for (const Eigen::Vector3d& point : points)
-      if (!point.allFinite()) throw Error("a point is not finite");
+      if (!point.allFinite()) throw Error("one is not finite", {.field = "points"});
     bounds = bounds_of(points);
     disc_radius_m = 2.0 * median_spacing(points);
     tree = std::make_unique<PointTree>(points);

@@ -170,12 +170,13 @@ SurfaceAlignmentResult align_to_surface(const std::vector<Eigen::Vector3d>& poin
                                         const ReferenceSurface& surface,
                                         const SurfaceAlignmentOptions& options) {
   check_parameters(options);
-  if (!surface.is_oriented()) throw Error("cannot align to a cloud without normals at all points");
+  if (!surface.is_oriented())
+    throw Error("alignment requires them at all points of the cloud", {.field = "normals"});
   if (points.size() < 6)
     throw Error("too few points to align",
                 {.field = "points", .value = std::to_string(points.size()), .bound = ">= 6"});
   for (const Eigen::Vector3d& point : points)
-    if (!point.allFinite()) throw Error("a point is not finite");
+    if (!point.allFinite()) throw Error("one is not finite", {.field = "points"});
   const std::vector<Eigen::Vector3d> used = downsampled(points, options.max_points);
   // Smaller distances are rounding errors.
   const double floor_m = 1e-9 * (surface.bounds().max - surface.bounds().min).norm();

@@ -148,7 +148,7 @@ std::vector<TrianglePoint> sample_triangles(const TriangleMesh& mesh, double per
     area_before.push_back(area);
     area += 0.5 * area_normal(mesh, triangle).norm();
   }
-  if (!(area > 0.0) || !std::isfinite(area)) throw Error("the mesh has no area");
+  if (!(area > 0.0) || !std::isfinite(area)) throw Error("has no area", {.field = "mesh"});
   const double wanted = std::ceil(per_m2 * area);
   if (!(wanted >= 0.0 && wanted <= most))
     throw Error("too many for the surface",

@@ -181,8 +181,7 @@ TrajectoryFile read_trajectory(const fs::path& path, TrajectoryFormat format) {
     if (format == TrajectoryFormat::automatic) format = format_of_text(text, path);
     file = parse_poses(format, text, path.string());
   }
-  if (file.poses.empty() && file.images.empty())
-    throw Error("contains no pose", {.file = path.string()});
+  if (file.poses.empty() && file.images.empty()) throw no_elements("poses", path);
   return file;
 }
 
@@ -255,8 +254,9 @@ NodeTrajectory assign_nodes(const Trajectory& trajectory, const PoseGraph& graph
                           : have_stamps ? pair_by_time(trajectory, nodes)
                                         : pair_by_order(trajectory, graph, nodes);
   if (pairs.empty())
-    throw Error(have_nodes ? "none of the poses matches a node of the scan"
-                           : "no pose is within 20 ms of a node of the scan");
+    throw Error(have_nodes ? "none matches a node of the scan"
+                           : "none is within 20 ms of a node of the scan",
+                {.field = "poses"});
   std::map<int, TrajectoryPose> poses;
   for (const auto& [node, pose] : pairs)
     if (!poses.emplace(node->id, TrajectoryPose{node->id, node->stamp_s, pose->world_from_base})

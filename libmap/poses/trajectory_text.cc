@@ -407,7 +407,7 @@ std::string recognize_poses(std::string_view text, const std::string& file) {
     throw wrong_columns("unknown pose format", line, file,
                         "8 or 9 of TUM, 12 of KITTI, 3 of Open3D, or VERTEX... of g2o or TORO");
   }
-  throw Error("contains no pose", {.file = file});
+  throw no_elements("poses", file);
 }
 
 }  // namespace libmap

@@ -169,8 +169,9 @@ class Dem {
     std::array<double, 6> transform{};
     if (GDALGetGeoTransform(dataset_.get(), transform.data()) != CE_None)
       throw Error(
-          "has no affine transform from pixels to coordinates; add one with "
-          "gdal_translate -a_ullr, or with gdalwarp from control points");
+          "none from pixels to coordinates; add one with gdal_translate -a_ullr, or with gdalwarp "
+          "from control points",
+          {.field = "affine transform"});
     Eigen::Matrix<double, 2, 3> crs_from_pixel;
     crs_from_pixel << transform[1], transform[2], transform[0], transform[4], transform[5],
         transform[3];

@@ -59,7 +59,7 @@ class Rasterizer {
   }
 
   void allocate() {
-    if (!has_points_) throw Error("the input has no points");
+    if (!has_points_) throw no_elements("points of the input");
     raster_.columns = max_.x() - min_.x() + 1;
     raster_.rows = max_.y() - min_.y() + 1;
     const double pixels = static_cast<double>(raster_.columns) * static_cast<double>(raster_.rows);

@@ -59,7 +59,7 @@ ReportImage read_image_bytes(std::string bytes) {
     return report_image;
   }
   const auto format = image_format(bytes);
-  if (!format) throw Error("not a PNG, JPEG or SVG image");
+  if (!format) throw Error("unknown format", {.field = "image", .bound = "PNG, JPEG or SVG"});
   const ColorImage image = decode_color(bytes, max_decoded_pixels);
   report_image.media_type = *format == ImageFormat::png ? "image/png" : "image/jpeg";
   report_image.width = image.width;

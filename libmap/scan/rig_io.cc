@@ -393,7 +393,7 @@ SynchronizedSet synchronized_set_at(const std::vector<RigImage>& images, std::si
 
 SynchronizedSet fullest_synchronized_set(const std::vector<RigImage>& images,
                                          std::size_t camera_count, double tolerance_s) {
-  if (images.empty()) throw Error("there are no images to synchronize");
+  if (images.empty()) throw no_elements("images");
   const std::vector<std::size_t> order = in_order_of_time(images);
   const ImagesByCamera all = by_camera(images, order, camera_count);
   SynchronizedSet best;

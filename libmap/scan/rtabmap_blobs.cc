@@ -105,14 +105,14 @@ std::optional<Pose> decode_pose(std::string_view bytes) {
   using RowMajor = Eigen::Matrix<float, 3, 4, Eigen::RowMajor>;
   const Eigen::Matrix<double, 3, 4> stored =
       Eigen::Map<const RowMajor>(numbers.data()).cast<double>();
-  if (!stored.allFinite()) throw Error("pose is not finite");
+  if (!stored.allFinite()) throw Error("not finite", {.field = "pose"});
   if (stored.col(3).cwiseAbs().maxCoeff() > max_position_m)
-    throw Error("pose is more than 1e8 m from the origin");
+    throw Error("more than 1e8 m from the origin", {.field = "pose"});
   Pose pose = Pose::Identity();
   pose.linear() = nearest_rotation(stored.leftCols<3>());
   pose.translation() = stored.col(3);
   if ((pose.linear() - stored.leftCols<3>()).norm() > max_rotation_error)
-    throw Error("matrix of the pose is not a rotation");
+    throw Error("not a rotation", {.field = "matrix of the pose"});
   return pose;
 }
 
@@ -121,7 +121,7 @@ Matrix6d decode_information(std::string_view bytes) {
   using RowMajor = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
   Matrix6d information = Eigen::Map<const RowMajor>(numbers.data());
   if (!(information.cwiseAbs().array() <= max_information).all())
-    throw Error("information matrix is not finite or exceeds 1e300");
+    throw Error("not finite or larger than 1e300", {.field = "information matrix"});
   return information;
 }
 

@@ -113,9 +113,9 @@ void read_nodes(const SqliteFile& file, const RtabmapColumns& columns, PoseGraph
 Matrix6d information_of(double rotation_variance, double translation_variance) {
   if (!(rotation_variance > 0) || !(translation_variance > 0) ||
       !std::isfinite(rotation_variance) || !std::isfinite(translation_variance))
-    throw Error("variance is not finite and positive");
+    throw Error("not finite and positive", {.field = "variance"});
   if (1 / translation_variance > max_information || 1 / rotation_variance > max_information)
-    throw Error("reciprocal of the variance exceeds 1e300");
+    throw Error("larger than 1e300", {.field = "reciprocal of the variance"});
   Matrix6d information = Matrix6d::Zero();
   information.diagonal() << Eigen::Vector3d::Constant(1 / translation_variance),
       Eigen::Vector3d::Constant(1 / rotation_variance);

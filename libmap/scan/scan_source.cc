@@ -137,7 +137,7 @@ void JoinedScan::add(std::size_t scan) {
 }  // namespace
 
 std::unique_ptr<ScanSource> join_scans(std::vector<std::unique_ptr<ScanSource>> scans) {
-  if (scans.empty()) throw Error("at least one scan is required");
+  if (scans.empty()) throw Error("at least one is required", {.field = "scans"});
   if (scans.size() == 1) return std::move(scans.front());
   for (std::size_t a = 0; a < scans.size(); ++a)
     for (std::size_t b = 0; b < a; ++b)

@@ -122,7 +122,7 @@ Solid convex_solid(const std::vector<HalfSpace>& half_spaces, double bound_m) {
   for (std::size_t n = 0; n < half_spaces.size(); ++n)
     body.cut(half_spaces[n], static_cast<int>(n));
   Solid solid = body.solid();
-  if (solid.triangles.empty()) throw Error("the intersection of the half-spaces is empty");
+  if (solid.triangles.empty()) throw Error("their intersection is empty", {.field = "half-spaces"});
   if (std::find(solid.labels.begin(), solid.labels.end(), -1) != solid.labels.end())
     throw Error("the intersection of the half-spaces extends more than " + to_text(bound_m) +
                 " m from the origin along an axis");

@@ -81,7 +81,7 @@ void unite_into(Mesh& mesh, Mesh& other) {
   if (!processing::corefine_and_compute_union(mesh, other, mesh,
                                               processing::parameters::visitor(LabelKeeper()),
                                               processing::parameters::default_values()))
-    throw Error("the union of two solids is not a manifold: they touch at an edge or a point");
+    throw Error("not a manifold: the two solids touch at an edge or a point", {.field = "union"});
 }
 
 // Returns true if moving the edge's source onto its target rotates no adjacent triangle by more
@@ -174,7 +174,7 @@ Solid subtract(const Solid& solid, const Solid& removed) {
   if (!processing::corefine_and_compute_difference(meshes[0], meshes[1], meshes[0],
                                                    processing::parameters::visitor(LabelKeeper()),
                                                    processing::parameters::default_values()))
-    throw Error("the difference of two solids is not a manifold");
+    throw Error("not a manifold", {.field = "difference of two solids"});
   return to_solid(meshes[0]);
 }
 
@@ -304,7 +304,7 @@ class FacetRefiner {
     const Eigen::Vector2d at = in_plane(result_.vertices[vertex]);
     const auto handle = triangulation.insert({at.x(), at.y()});
     if (handle->info().vertex != no_vertex && handle->info().vertex != vertex)
-      throw Error("two corners of a facet coincide");
+      throw Error("two of a facet coincide", {.field = "corners"});
     handle->info().vertex = vertex;
     return handle;
   }

@@ -285,7 +285,7 @@ void bind(ParameterTable& table, CameraTrajectoryOptions& options) {
 }
 
 double surrounding_ground_height(const TriangleMesh& mesh) {
-  if (mesh.vertices.empty()) throw Error("the mesh has no vertices");
+  if (mesh.vertices.empty()) throw no_elements("vertices of the mesh");
   const Bounds3d bounds = bounds_of(mesh.vertices);
   const Eigen::Vector3d inset = 0.1 * (bounds.max - bounds.min);
   std::vector<double> heights;
@@ -312,7 +312,7 @@ CameraMotion camera_motion(const TriangleMesh& mesh, const CameraTrajectoryOptio
 
 CameraMotion serpentine_motion(const GroundHeights& ground, const CameraTrajectoryOptions& options,
                                std::uint64_t seed) {
-  if (ground.empty()) throw Error("the terrain has no points");
+  if (ground.empty()) throw no_elements("points of the terrain");
   const Serpentine way(ground.box(), options.serpentine);
   const double height_m = options.height_m > 0.0 ? options.height_m : 1.4;
   const double ahead_m = options.serpentine.ahead_m;

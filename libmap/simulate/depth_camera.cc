@@ -135,7 +135,7 @@ VisibleSurface::VisibleSurface(const TriangleMesh& mesh, TextureSource texture,
   const auto part = std::make_shared<Part>(Part{RayCaster(mesh), mesh, texture_seed});
   std::vector<Color>& colors = part->mesh.vertex_colors;
   if (texture == TextureSource::mesh && colors.empty())
-    throw Error("the mesh has no vertex colors; use texture rock");
+    throw Error("the mesh has none; use texture rock", {.field = "vertex colors"});
   const bool plain = std::all_of(colors.begin(), colors.end(),
                                  [&](const Color& color) { return color == colors.front(); });
   if (texture == TextureSource::rock || (texture == TextureSource::automatic && plain))
@@ -143,7 +143,7 @@ VisibleSurface::VisibleSurface(const TriangleMesh& mesh, TextureSource texture,
   if (normals == ShadingNormals::estimated)
     part->mesh.vertex_normals = estimate_vertex_normals(mesh);
   else if (mesh.vertex_normals.empty())
-    throw Error("the mesh has no vertex normals");
+    throw Error("the mesh has none", {.field = "vertex normals"});
   part->mesh.vertex_fields.clear();
   part->mesh.face_fields.clear();
   parts_ = {part};

@@ -364,7 +364,8 @@ ScanSimulationResult simulate_scan(const ScanScene& scene, const ScanSimulationO
   }
   progress.end();
   if (result.measured_pixels == 0)
-    throw Error("no frame sees the mesh within the depth range; check poses, near_m and far_m");
+    throw Error("none sees the mesh within the depth range; check poses, near_m and far_m",
+                {.field = "frames"});
   return result;
 }
 

@@ -58,7 +58,8 @@ struct TopView {
 };
 
 TopView make_top_view(const PointCloud& cloud, const BorderBandOptions& options) {
-  if (!cloud.has_colors()) throw Error("the map has no colors, which a white border requires");
+  if (!cloud.has_colors())
+    throw Error("the map has none, but a white border requires them", {.field = "colors"});
   std::vector<std::size_t> used;
   Vector2d low = Vector2d::Constant(std::numeric_limits<double>::infinity());
   Vector2d high = -low;

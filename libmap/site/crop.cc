@@ -215,9 +215,9 @@ Error nothing_inside(const Eigen::AlignedBox3d& bounds, const char* what) {
     return to_fixed_text(p.x(), 2) + ", " + to_fixed_text(p.y(), 2) + ", " +
            to_fixed_text(p.z(), 2);
   };
-  return Error(std::string("no part of the ") + what +
-               " is inside the crop region; the points extend from " + text(bounds.min()) + " to " +
-               text(bounds.max()));
+  return Error("no part is inside the crop region; the points extend from " + text(bounds.min()) +
+                   " to " + text(bounds.max()),
+               {.field = what});
 }
 
 // Projection of a triangle to the x-y plane: its first corner and the two sides from it.
@@ -348,7 +348,7 @@ void bind(ParameterTable& table, CropOptions& options) {
 CropCloudResult crop_cloud(const PointCloud& cloud, const CropOptions& options) {
   cloud.check();
   PointCloud kept = finite_part(cloud);
-  if (kept.empty()) throw Error("the cloud has no finite points to crop");
+  if (kept.empty()) throw Error("none is finite", {.field = "points of the cloud"});
   Source source{kept.positions, kept.normals, middle_of(kept.positions), {}};
   source.view = [&](const Pose& level_from_map, double) {
     return transform_cloud(kept, level_from_map);
@@ -372,7 +372,7 @@ CropReport crop_mesh_tiles(const EachMesh& each, const CropOptions& options,
     area += surface_area(mesh);
     for (const Vector3d& vertex : mesh.vertices) box.extend(vertex);
   });
-  if (!std::isfinite(area)) throw Error("a corner of a triangle is not finite");
+  if (!std::isfinite(area)) throw Error("one is not finite", {.field = "corners of triangles"});
   if (!(area > 0.0))
     throw Error("the mesh has no surface to crop",
                 {.field = "area", .value = to_text(area) + " m2", .bound = "> 0"});

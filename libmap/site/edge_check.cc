@@ -94,7 +94,7 @@ SiteCorners corners_of(const TurnedBox& box) {
 }  // namespace
 
 SiteCorners bounding_corners(const std::vector<Eigen::Vector3d>& points, bool turned) {
-  if (points.empty()) throw Error("the data contain no points");
+  if (points.empty()) throw no_elements("points");
   std::vector<Eigen::Vector2d> plan_points;
   plan_points.reserve(points.size());
   for (const Eigen::Vector3d& point : points) plan_points.emplace_back(point.head<2>());
@@ -178,7 +178,8 @@ void summarize(EdgeCheckResult& result) {
     sum += of_edge;
     result.measured += count;
   }
-  if (result.measured == 0) throw Error("no position along the site's edges has data and ground");
+  if (result.measured == 0)
+    throw Error("none along the site's edges has both data and ground", {.field = "positions"});
   result.mean_abs_error_m = sum / static_cast<double>(result.measured);
   result.mean_error_m /= static_cast<double>(result.measured);
 }

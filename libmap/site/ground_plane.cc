@@ -216,7 +216,8 @@ void require_plane_spread(const Points& points) {
                 {.field = "points", .value = std::to_string(points.size()), .bound = ">= 3"});
   const PlaneSpread spread = weighted_spread(points, points.front(), points_per_chunk,
                                              [](const Eigen::Vector3d&) { return 1.0; });
-  if (!is_plane(spread)) throw Error("all points are on one line, so they define no ground plane");
+  if (!is_plane(spread))
+    throw Error("all are on one line, so they define no ground plane", {.field = "points"});
 }
 
 std::string percent(double fraction) { return to_fixed_text(100.0 * fraction, 1) + " %"; }

@@ -267,7 +267,7 @@ void bind(ParameterTable& table, SiteRectangleOptions& options) {
 SiteRectangle find_site_rectangle(const std::vector<Vector2d>& points, const Vector2d& size_m,
                                   const SiteRectangleOptions& options) {
   require_ranges(size_m, options);
-  if (points.empty()) throw Error("the data contain no points");
+  if (points.empty()) throw no_elements("points");
   const Ground ground = make_ground(points, options);
   if (ground.cell > std::max(options.cell_m, size_m.minCoeff() / min_on_site))
     throw Error("the data extend too far for a site of this size; remove stray points",

@@ -380,7 +380,7 @@ MeshCleaningResult clean_mesh(const TriangleMesh& mesh, const MeshCleaningOption
                               Progress& progress) {
   check_parameters(options);
   require_sound(mesh);
-  if (mesh.triangles.empty()) throw Error("the mesh has no triangle");
+  if (mesh.triangles.empty()) throw no_elements("triangles of the mesh");
   return Cleaning(mesh, options, progress).run();
 }
 

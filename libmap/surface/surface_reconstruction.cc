@@ -188,11 +188,11 @@ class Reconstruction {
 void Reconstruction::choose_points() {
   cloud_.check();
   if (!is_part_) statistics_.add(cloud_, options_.weigh_by_error);
-  if (!cloud_.has_normals()) throw Error("the cloud has no normals");
+  if (!cloud_.has_normals()) throw Error("the cloud has none", {.field = "normals"});
   for (std::size_t n = 0; n < cloud_.size(); ++n)
     if (has_normal(cloud_, n)) used_.push_back(n);
   result_.dropped_points = cloud_.size() - used_.size();
-  if (statistics_.points() == 0) throw Error("no point of the cloud has a normal");
+  if (statistics_.points() == 0) throw Error("none is finite", {.field = "normals"});
   const double opposing = opposing_fraction(cloud_.positions, cloud_.normals);
   if (opposing > max_mixed_sides)
     throw Error("the normals are not consistently oriented; use --normals estimate",
@@ -395,7 +395,8 @@ void Reconstruction::trim(TriangleMesh& surface) {
 }  // namespace
 
 void CloudStatistics::add(const PointCloud& cloud, bool weigh_by_error) {
-  if (!cloud.empty() && !cloud.has_normals()) throw Error("the cloud has no normals");
+  if (!cloud.empty() && !cloud.has_normals())
+    throw Error("the cloud has none", {.field = "normals"});
   const ScalarField* errors = weigh_by_error ? cloud.find_field("expected_error") : nullptr;
   for (std::size_t n = 0; n < cloud.size(); ++n) {
     if (!has_normal(cloud, n)) {

@@ -163,7 +163,7 @@ TexturedMesh Texturing::paint(MeshWithMargin part, TextureViews views, Progress&
 
 TextureResult Texturing::whole(const TriangleMesh& mesh) {
   mesh.check();
-  if (mesh.triangles.empty()) throw Error("the mesh has no triangles");
+  if (mesh.triangles.empty()) throw no_elements("triangles of the mesh");
   const MeshWithMargin part = timed("cutting", [&] {
     return cut_finely({mesh, mesh.triangles.size()});
   });

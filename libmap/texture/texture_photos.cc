@@ -155,10 +155,11 @@ TexturePhotos::Frame TexturePhotos::read_frame(const TrajectoryPose& pose) const
   Frame frame;
   const std::string name = "node " + std::to_string(pose.node);
   try {
-    if (!pose.world_from_base.matrix().allFinite()) throw Error(name + ": pose is not finite");
+    if (!pose.world_from_base.matrix().allFinite())
+      throw Error("pose is not finite", {.field = name});
     const RgbdFrame read = scan_.read_frame(pose.node, {.color = true, .depth = false});
-    if (read.cameras.empty()) throw Error(name + ": no calibration");
-    if (read.color.empty()) throw Error(name + ": no color image");
+    if (read.cameras.empty()) throw Error("no calibration", {.field = name});
+    if (read.color.empty()) throw Error("no color image", {.field = name});
     std::vector<CameraView> views = camera_views(read);
     for (std::size_t i = 0; i < views.size(); ++i) {
       views[i].color_camera.check();

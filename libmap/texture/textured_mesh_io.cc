@@ -233,7 +233,7 @@ std::vector<ModelFile> textured_mesh_files(const fs::path& path, const TexturedM
                                            const TexturedMeshWriteOptions& options) {
   require_textured_format(path);
   model.check();
-  if (model.mesh.triangles.empty()) throw Error("the mesh has no triangles");
+  if (model.mesh.triangles.empty()) throw no_elements("triangles of the mesh");
   require_single_precision(model.mesh, format_of(path));
   std::vector<ModelFile> files;
   if (format_of(path) == ".glb") {
@@ -265,7 +265,7 @@ TexturedMesh read_textured_mesh(const fs::path& path) {
   return in_file(path, [&] {
     DecodedModel decoded =
         format_of(path) == ".glb" ? decode_glb_model(path) : read_obj_model(path);
-    if (decoded.model.mesh.triangles.empty()) throw Error("contains no triangle");
+    if (decoded.model.mesh.triangles.empty()) throw no_elements("triangles");
     for (const TextureImage& image : decoded.images)
       decoded.model.pages.push_back(read_image(image, path));
     decoded.model.check();

@@ -19,7 +19,7 @@ namespace {
 constexpr int largest_side = 1'000'000;
 
 void check(const ColorImage& image) {
-  if (image.width <= 0 || image.height <= 0) throw Error("the image has no pixels");
+  if (image.width <= 0 || image.height <= 0) throw Error("the image has none", {.field = "pixels"});
   if (std::max(image.width, image.height) > largest_side)
     throw Error("too large for PNG",
                 {.field = "size",

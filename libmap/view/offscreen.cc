@@ -156,7 +156,7 @@ ColorImage pixels_of(vtkRenderWindow& window, int width, int height) {
   const std::size_t row_bytes = 3 * static_cast<std::size_t>(width);
   const std::size_t bytes = row_bytes * static_cast<std::size_t>(height);
   if (static_cast<std::size_t>(pixels->GetNumberOfValues()) != bytes)
-    throw Error("the image could not be read back from OpenGL", {}, ErrorKind::failed);
+    throw Error("the image could not be read back", {.field = "OpenGL"}, ErrorKind::failed);
   // Rows of OpenGL begin at the bottom.
   for (std::size_t row = 0; row < static_cast<std::size_t>(height); ++row)
     std::memcpy(image.pixels.data() + row * static_cast<std::size_t>(width),
@@ -182,7 +182,8 @@ VirtualDisplay::~VirtualDisplay() { stop(); }
 void VirtualDisplay::start() {
   const std::string program = find_in_path("Xvfb");
   if (program.empty())
-    throw Error("no X display and no Xvfb: install the Debian package xvfb", {}, ErrorKind::failed);
+    throw Error("missing, and there is no X display; install the Debian package xvfb",
+                {.field = "program Xvfb"}, ErrorKind::failed);
   // The child process inherits the environment.
   set_variable("LIBGL_ALWAYS_SOFTWARE", "1");
   set_variable("GALLIUM_DRIVER", "llvmpipe");
@@ -195,25 +196,24 @@ void VirtualDisplay::start() {
 
   std::array<int, 2> number_pipe{};
   if (pipe2(number_pipe.data(), O_CLOEXEC) != 0)
-    throw Error(std::string("a pipe to the display server Xvfb failed: ") + std::strerror(errno),
-                {}, ErrorKind::failed);
+    throw Error(std::strerror(errno), {.field = "pipe to Xvfb"}, ErrorKind::failed);
   const pid_t parent = getpid();
   const pid_t child = fork();
   if (child == 0) become_server(program.c_str(), arguments.data(), number_pipe[1], parent);
   close(number_pipe[1]);
   if (child < 0) {
     close(number_pipe[0]);
-    throw Error(std::string("Xvfb could not be started: ") + std::strerror(errno), {},
-                ErrorKind::failed);
+    throw Error(std::strerror(errno), {.field = "start of Xvfb"}, ErrorKind::failed);
   }
   server_ = child;
   const std::string number = read_display_number(number_pipe[0]);
   close(number_pipe[0]);
   if (number.empty())
-    throw Error("Xvfb did not start (Debian package xvfb): " + program, {}, ErrorKind::failed);
+    throw Error("failed (Debian package xvfb): " + program, {.field = "start of Xvfb"},
+                ErrorKind::failed);
   set_variable("DISPLAY", ":" + number);
   if (!display_answers())
-    throw Error("Xvfb has no OpenGL: install the Debian package libgl1-mesa-dri", {},
+    throw Error("Xvfb has none; install the Debian package libgl1-mesa-dri", {.field = "OpenGL"},
                 ErrorKind::failed);
 }
 

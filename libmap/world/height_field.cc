@@ -237,7 +237,7 @@ HeightField make_height_field(const TriangleMesh& mesh, const HeightFieldOptions
       lowest = std::min(lowest, height);
       faces_up = true;
     });
-  if (!faces_up) throw Error("no triangle faces up");
+  if (!faces_up) throw Error("none faces up", {.field = "triangles of the mesh"});
   extend_border(field);
   CellDeviations deviations(field);
   for (const Triangle& t : mesh.triangles) deviations.add(corners_of(mesh, t));

@@ -179,7 +179,7 @@ WorldModel write_world_model(const fs::path& folder, const WorldModelInput& inpu
   check_parameters(options);
   const TriangleMesh& visual = input.visual.mesh;
   require_sound(visual);
-  if (visual.triangles.empty()) throw Error("contains no triangle");
+  if (visual.triangles.empty()) throw no_elements("triangles");
   const fs::path meshes = folder.empty() ? fs::path() : folder / "meshes";
   if (!meshes.empty()) fs::create_directories(meshes);
   WorldModel model;

@@ -83,7 +83,7 @@ class TiledMap {
  private:
   void cut(const std::string& file) {
     cloud_ = libmap::read_cloud(file).cloud;
-    if (cloud_.empty()) throw libmap::Error("the map has no points");
+    if (cloud_.empty()) throw libmap::no_elements("points of the map");
     const auto manifest = libmap::read_manifest_of(file);
     has_manifest_ = manifest.has_value();
     const libmap::Manifest known = manifest.value_or(libmap::Manifest{});

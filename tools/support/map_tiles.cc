@@ -57,7 +57,7 @@ MapTiles::MapTiles(const std::string& store)
 
 MapTiles::MapTiles(std::filesystem::path store, libgtd::TileStoreIndex index)
     : store_(std::move(store)), index_(std::move(index)) {
-  if (index_.tiles.empty()) throw libmap::Error("the map has no points", {.file = store_.string()});
+  if (index_.tiles.empty()) throw libmap::no_elements("points of the map", store_);
   float64_positions_ = need_float64();
 }
 

@@ -90,7 +90,7 @@ libmap::PointCloud part_in_box(const libmap::PointCloud& cloud,
   for (std::size_t n = 0; n < cloud.size(); ++n)
     if (is_inside(box, cloud.positions[n])) inside.push_back(n);
   if (inside.empty())
-    throw cloud.empty() ? libmap::Error("the cloud has no points", {.file = file})
+    throw cloud.empty() ? libmap::no_elements("points of the cloud", file)
                         : libmap::Error("no point is in the box", {.file = file, .field = "--box"});
   return libmap::select_points(cloud, inside);
 }
