@@ -58,14 +58,14 @@ struct ScoreDifference {
   std::optional<double> correlation;  // Pearson; nullopt if one map is constant
 };
 
-// Statistics of a set of pairs.
+// Statistics of the voxel pairs of one bin, or of all pairs.
 struct ChangeSummary {
   double low = 0.0;  // bounds of the bin, m or degrees; 0 without bins
   double high = 0.0;
   Confusion graspable;  // MAP is the prediction, OTHER the reference
   std::optional<Kappa> kappa;
   ScoreDifference difference;
-  double both_area_m2 = 0.0;  // areas on MAP's surface
+  double both_area_m2 = 0.0;  // surface areas of the pairs of these classes, on MAP
   double gained_area_m2 = 0.0;
   double lost_area_m2 = 0.0;
 
@@ -87,15 +87,15 @@ struct MapChange {
 };
 
 // Compares two maps. `map_terrain_from_other_terrain` transforms OTHER's terrain frame to MAP's.
-// Exchanging the maps transposes the counts and negates the differences. Throws Error for options
-// out of range, maps without a common voxel and a surface of a different size than the map.
+// Exchanging the maps transposes the confusion matrices and negates the differences. Throws Error
+// for options out of range, maps without a common voxel and a surface of another size.
 MapChange compare_maps(const VoxelMap& map, const MapSurface& surface, const VoxelMap& other,
                        const libmap::Pose& map_terrain_from_other_terrain,
                        const MapChangeOptions& options = {});
 
 // Returns one point per pair (at the voxel of MAP) and per voxel that is only in one map, in the
-// frame of MAP's points, with the fields score_map, score_other, difference (NaN if undefined),
-// graspable_map, graspable_other, evaluated (`border` as in the options) and change (ChangeClass).
+// frame of MAP's points. Fields: score_map, score_other, difference (NaN if undefined),
+// graspable_map, graspable_other, evaluated (for `border`), change (ChangeClass).
 libmap::PointCloud to_cloud(const MapChange& change, const VoxelMap& map, const VoxelMap& other,
                             const libmap::Pose& map_terrain_from_other_terrain, bool border);
 
