@@ -12,8 +12,8 @@
 
 namespace libgtd {
 
-// Triangles near a location, in the frame of the patch, m: location at the origin, z opposite to
-// the approach, x is the projection of the mesh's x axis (or y axis if z is nearly parallel to x).
+// Triangles near a location, in m in the frame of the patch: location at the origin, z opposite to
+// the approach, x along the projection of the mesh's x axis (y axis if x is nearly parallel to z).
 struct GroundPatch {
   Eigen::Isometry3d mesh_from_patch = Eigen::Isometry3d::Identity();
   std::vector<Eigen::Vector3d> vertices;
@@ -30,7 +30,7 @@ struct GroundPatch {
   void measure_triangles();
 
   // Returns the unit mean normal of the triangles within `radius_m` of a point, weighted by area
-  // and by a distance weight that is 0 at the radius; nullopt if there are no triangles.
+  // and by nearness (0 at the radius); nullopt if there are no triangles.
   std::optional<Eigen::Vector3d> normal_at(const Eigen::Vector3d& point, double radius_m) const;
 };
 
