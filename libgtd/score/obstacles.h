@@ -22,7 +22,7 @@ struct ObstacleOptions {
   double normal_radius_m = 0.07;
 };
 
-// Maximum index difference of connected voxels along each axis. It bridges gaps of a cloud.
+// Maximum difference of i, j and k of connected voxels; 2 bridges small gaps of a cloud.
 inline constexpr int obstacle_link_voxels = 2;
 
 // Returns the class of each voxel. The voxels must ascend by i, j, k and form a complete map,
