@@ -47,7 +47,7 @@ py::array view(const Number* data, Shape shape, py::handle owner, Shape strides 
   return array;
 }
 
-// Returns a property getter for an array (by `view_of`) on a member of the object it keeps alive.
+// Returns a property getter: view_of makes an array on the member, which keeps the object alive.
 template <typename Object, typename Member, typename ViewOf>
 auto viewing(Member Object::*member, ViewOf view_of) {
   return [=](const py::object& self) { return view_of(self.cast<Object&>().*member, self); };
