@@ -20,15 +20,14 @@
 namespace libgtd {
 
 // Source of the terrain frame. fit: downsamples the cloud (methods thesis and envelope only), fits
-// the regression plane and transforms the cloud into its frame. none: the terrain frame is the
-// frame of the cloud.
+// the regression plane and transforms the cloud into its frame. none: the cloud's frame.
 enum class PlaneSource { fit, none };
 
 struct DetectionOptions {
   Scenario scenario;
   std::optional<Gripper> gripper;  // default: the gripper named by the scenario
   PlaneSource plane = PlaneSource::fit;
-  std::optional<Eigen::Vector3d> up;  // out of the ground, in the cloud's frame; nullopt: UpSource
+  std::optional<Eigen::Vector3d> up;  // out of the ground, cloud's frame; nullopt: as in UpSource
   double max_tilt_deg = 90.0;         // maximum angle between `up` and the plane's normal
 };
 // Binds the keys of the scenario and `plane`, but not `up` and `max_tilt_deg`.

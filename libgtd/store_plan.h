@@ -1,6 +1,5 @@
-// Plans how `graspmap score` computes a map in a tile store (a folder with one file per tile). If
-// the store has tiles of an earlier run, finds the tiles that remain valid, and the points that
-// affect the other tiles.
+// Plans how `graspmap score` computes a map in a tile store (a folder with one file per tile).
+// Finds the tiles of an earlier run that remain valid, and the points that affect other tiles.
 #pragma once
 
 #include <Eigen/Core>
@@ -42,7 +41,7 @@ void require_in_frame(const libmap::PointCloud& terrain, const TerrainFrame& fra
 void require_appendable(const TilePlan& earlier, const TilePlan& plan,
                         const DetectionOptions& detection, bool append, const std::string& store);
 
-// Returns the tiles of `done` that the files of `plan` that are not in `earlier` cannot affect.
+// Returns the tiles of `done` that the files added to `earlier` in `plan` cannot affect.
 std::vector<StoredTile> unaffected_tiles(const std::map<TileNumber, StoredTile>& done,
                                          const TilePlan& earlier, const TilePlan& plan,
                                          const TerrainFrame& frame, const StoreTiling& tiling);

@@ -47,7 +47,7 @@ ExpectedMap parse_expected_map(const libmap::Table& table);
 ExpectedMap transformed(const ExpectedMap& expected, const libmap::Pose& map_from_expected);
 
 struct RegionResult {
-  std::size_t voxels = 0;  // with a score; decided regions exclude voxels of undecided ones
+  std::size_t voxels = 0;  // with a score; decided regions exclude voxels of undecided regions
   std::size_t reaching_cutoff = 0;   // voxels with score >= cutoff
   std::size_t graspable = 0;         // voxels that are marked graspable and no obstacles
   std::optional<double> mean_score;  // nullopt without voxels

@@ -19,8 +19,7 @@ struct ValueBins {
 
   double low(std::size_t bin) const { return first_edge + static_cast<double>(bin) * width; }
   double high(std::size_t bin) const { return first_edge + static_cast<double>(bin + 1) * width; }
-  // Returns the bin with low <= value < high; values beyond the ends belong to the first or last
-  // bin.
+  // Returns the bin with low <= value < high; values beyond belong to the end bins.
   std::size_t bin_of(double value) const;
 };
 
@@ -47,7 +46,7 @@ struct ScoreBin {
   std::size_t all = 0;
   std::size_t above_zero_plane = 0;
   std::size_t evaluated = 0;  // VoxelMap::evaluated
-  std::size_t graspable = 0;  // among the evaluated voxels
+  std::size_t graspable = 0;  // graspable voxels among the evaluated voxels
   double area_m2 = 0.0;       // surface area of the evaluated voxels
 };
 

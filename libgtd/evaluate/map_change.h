@@ -27,7 +27,7 @@ struct MapChangeOptions {
 // Binds match_distance_voxels; MapAnalysisOptions binds the keys of the other fields.
 void bind(libmap::ParameterTable& table, MapChangeOptions& options);
 
-// Correspondence of voxels. lattice: same indices on a common lattice. nearest: mutual nearest
+// Correspondence of voxels. lattice: same indices of one lattice. nearest: mutual nearest
 // neighbors.
 enum class VoxelMatching { lattice, nearest };
 std::string_view to_text(VoxelMatching matching);
@@ -62,10 +62,10 @@ struct ScoreDifference {
 struct ChangeSummary {
   double low = 0.0;  // bounds of the bin, m or degrees; 0 without bins
   double high = 0.0;
-  Confusion graspable;  // MAP is the prediction, OTHER the reference
-  std::optional<Kappa> kappa;
+  Confusion graspable;         // MAP is the prediction, OTHER the reference
+  std::optional<Kappa> kappa;  // nullopt if undefined
   ScoreDifference difference;
-  double both_area_m2 = 0.0;  // surface areas of the pairs of these classes, on MAP
+  double both_area_m2 = 0.0;  // surface areas of pairs by ChangeClass, measured on MAP
   double gained_area_m2 = 0.0;
   double lost_area_m2 = 0.0;
 
@@ -95,7 +95,7 @@ MapChange compare_maps(const VoxelMap& map, const MapSurface& surface, const Vox
 
 // Returns one point per pair (at the voxel of MAP) and per voxel that is only in one map, in the
 // frame of MAP's points. Fields: score_map, score_other, difference (NaN if undefined),
-// graspable_map, graspable_other, evaluated (for `border`), change (ChangeClass).
+// graspable_map, graspable_other, evaluated (given `border`), change (ChangeClass).
 libmap::PointCloud to_cloud(const MapChange& change, const VoxelMap& map, const VoxelMap& other,
                             const libmap::Pose& map_terrain_from_other_terrain, bool border);
 

@@ -64,7 +64,7 @@ struct RegionLink {
 
 // Reachability of a region from the start of the robot.
 struct RegionAccess {
-  std::uint32_t group = 0;  // regions connected by links; index of the first of them
+  std::uint32_t group = 0;  // index of the first region of its group of linked regions
   bool reachable = false;
   std::optional<std::size_t> steps;  // minimum number of steps, from the start to a region and
                                      // between regions; nullopt: unreachable
@@ -75,12 +75,12 @@ struct RegionReach {
   std::vector<RegionLink> links;     // pairs within the stride, ascending by a, then b
   std::vector<RegionLink> tree;      // minimum spanning tree of all regions, shortest first
   std::vector<RegionAccess> access;  // one per region
-  std::size_t groups = 0;
+  std::size_t groups = 0;            // number of groups of linked regions
   // Minimum stride that connects all regions: the longest link of the tree; 0 for one region,
   // nullopt for none.
   std::optional<double> joining_stride_m;
   std::optional<std::uint32_t> start_region;  // region nearest to the start; nullopt: no region
-  double start_distance_m = 0.0;              // from the start to its nearest voxel
+  double start_distance_m = 0.0;              // from the start to the nearest voxel of a region
   std::size_t reachable_regions = 0;
   double reachable_area_m2 = 0.0;
 };

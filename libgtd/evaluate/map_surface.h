@@ -27,12 +27,13 @@ struct MapSurface {
 
 // Measures slope and area. The normal of a voxel is from a quadric fitted to the voxel centers
 // (curvature.h). The area is K / sum w, with the weights w = 1 - d^2 / r^2 of the voxels at
-// distances d < r (Epanechnikov kernel; half a voxel less along the normal) and the integral K = pi
-// r^2 / 2 of w over a disc. More voxels on slopes and gaps in sparse clouds do not affect the area.
-// Near a border, the weighted mean of the voxels is off-center. The surface is assumed to end at
-// the straight edge that explains this mean, and K is integrated over the remaining part of the
-// disc; areas at corners are up to a fifth too large. A voxel with too few neighbors for a normal
-// has slope NaN and the area of one voxel face. Throws Error for a negative radius.
+// distances d < r (Epanechnikov kernel; the part of d along the normal is reduced by half a voxel)
+// and the integral K = pi r^2 / 2 of w over a disc. More voxels on slopes and gaps in sparse clouds
+// do not affect the area. Near a border, the weighted mean of the voxels is off-center. The surface
+// is assumed to end at the straight edge that explains this mean, and K is integrated over the
+// remaining part of the disc; areas at corners are up to a fifth too large. Without a normal (too
+// few neighbors), the slope is NaN and the area that of a voxel face. Throws Error for a radius <
+// 0.
 MapSurface measure_surface(const VoxelMap& map, const MapSurfaceOptions& options = {});
 
 }  // namespace libgtd

@@ -16,8 +16,7 @@
 namespace libgtd {
 
 struct RocOptions {
-  // Cutoffs of the ROC table and of AreaUnderCurve::upper_sum, finite and ascending; default: tab.
-  // 5-1 to 5-3 of the thesis.
+  // Finite, ascending cutoffs of the ROC table and AreaUnderCurve::upper_sum; default: thesis.
   std::vector<double> cutoffs = {0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0};
   double rate_cutoff = 0.8;          // cutoff at which the rates are computed
   int bootstrap_replicates = 10000;  // number of bootstrap samples; 0: no interval

@@ -54,8 +54,8 @@ struct VoxelMap {
 // Converts a map with the fields "score" and "graspable"; missing fields "border" and "obstacle"
 // are 0. Voxel indices are the fields i, j and k, or follow from a known lattice. An unknown
 // lattice is fitted to the points in the terrain frame. Skips points that are not finite. Throws
-// Error for a map without points, a missing or invalid field, points that are not at voxel centers,
-// and two points in one voxel.
+// Error for a map without points, a missing or invalid field, and points that are not at voxel
+// centers or share a voxel.
 VoxelMap voxel_map_of(const libmap::PointCloud& map, const MapInfo& info = {});
 
 }  // namespace libgtd

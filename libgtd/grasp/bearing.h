@@ -42,7 +42,7 @@ class BearingContact {
   // {0} for a contact of a link. `limit_n` is the limit of one spine, or of the link.
   BearingContact(const GripContact& contact, std::vector<double> facet_angles_rad, double friction,
                  double limit_n);
-  // Law `adhesion`: `limit_n` is the limit of this finger.
+  // Law `adhesion`: `limit_n` is the maximum of T for this finger.
   BearingContact(const GripContact& contact, const EngagementOptions& options, double friction,
                  double limit_n);
 

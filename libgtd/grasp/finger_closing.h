@@ -13,9 +13,9 @@
 
 namespace libgtd {
 
-// Dimensions in meters and radians. The joint is at (joint_radius_m, 0). With the angle t of the
-// proximal link from the palm's axis (proximal angle) and the curl c, the links point along
-// (sin t, -cos t) and (sin(t - c), -cos(t - c)).
+// Dimensions in meters and radians. The joint is at (joint_radius_m, 0). With the proximal angle t,
+// from the palm's axis to the proximal link, and the curl c, from this link inward to the distal
+// link, the links point along (sin t, -cos t) and (sin(t - c), -cos(t - c)).
 struct FingerGeometry {
   double joint_radius_m = 0.0;  // distance of the joint from the palm's axis
   double proximal_m = 0.0;      // length of the proximal link

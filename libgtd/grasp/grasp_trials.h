@@ -23,8 +23,7 @@ namespace libgtd {
 enum class ApproachDirection { up, normal };
 
 struct GraspOptions {
-  // A trial holds if the holding force is at least load_n * safety in all directions.
-  double load_n = 5.0;
+  double load_n = 5.0;  // a trial holds if the force >= load_n * safety in all directions
   double safety = 1.0;
   std::vector<double> extra_loads_n;  // for LocationResult::extra_load_probabilities
   ApproachDirection approach = ApproachDirection::up;
@@ -62,7 +61,7 @@ const std::vector<std::pair<std::string, TrialOutcome>>& trial_outcome_names();
 struct Trial {
   Eigen::Isometry3d mesh_from_patch = Eigen::Isometry3d::Identity();
   ClosedGripper gripper;
-  std::vector<BearingContact> bearing;
+  std::vector<BearingContact> bearing;  // contacts that bear forces
   TrialOutcome outcome = TrialOutcome::approach;
   double force_n = 0.0;       // holding force: equal sharing, minimum over directions
   std::size_t direction = 0;  // direction of the minimum, index in pull_directions()
@@ -73,7 +72,7 @@ struct LocationResult {
   std::size_t trials = 0;
   std::array<std::size_t, 6> outcomes{};  // number of trials per TrialOutcome
   double hold_probability = 0.0;          // share of trials that hold load_n * safety
-  // 95 % Wilson interval. Each pose is one sample, because its trials are correlated.
+  // 95 % Wilson interval. A pose is one sample, because the trials of a pose are correlated.
   double hold_low = 0.0;
   double hold_high = 0.0;
   std::vector<double> extra_load_probabilities;  // hold probabilities of extra_loads_n

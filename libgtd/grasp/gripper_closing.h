@@ -50,7 +50,7 @@ struct ClosedGripper {
   bool palm_touches = false;                              // else an open finger rests on the ground
   Eigen::Isometry3d patch_from_gripper = Eigen::Isometry3d::Identity();  // palm at z = 0, axis z
   std::vector<ClosedFinger> fingers;
-  std::vector<GripContact> contacts;  // by finger; for a finger, its link before its spines
+  std::vector<GripContact> contacts;  // ascending by finger; link before spines
   double unseen = 0.0;                // mean over the fingers; 1 if there is no ground
 };
 

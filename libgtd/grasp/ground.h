@@ -18,7 +18,7 @@ struct GroundPatch {
   Eigen::Isometry3d mesh_from_patch = Eigen::Isometry3d::Identity();
   std::vector<Eigen::Vector3d> vertices;
   std::vector<libmap::Triangle> triangles;
-  std::vector<Eigen::Vector3d> area_normals;  // length: twice the area
+  std::vector<Eigen::Vector3d> area_normals;  // normals of the triangles; length: twice the area
   std::vector<Eigen::Vector3d> centers;       // centers of bounding spheres of the triangles
   std::vector<double> radii;                  // radii of these spheres
   // Errors as in GroundErrors, and unit vertex normals; all three are empty for exact ground.

@@ -34,8 +34,7 @@ double holding_force(const std::vector<BearingContact>& contacts, const Eigen::V
                      double sufficient_force_n = std::numeric_limits<double>::infinity());
 
 // Direction of a pull: tilted by `tilt_deg` from the z axis of the ground patch (away from the
-// ground), toward the azimuth `azimuth_deg`, which is measured from the x axis (0 if the tilt is
-// 0).
+// ground) to the azimuth `azimuth_deg` from the x axis (0 if the tilt is 0).
 struct PullDirection {
   int tilt_deg = 0;
   int azimuth_deg = 0;
@@ -53,8 +52,8 @@ struct WeakestDirection {
   std::size_t direction = 0;  // index in pull_directions(); if tied, any
 };
 
-// Computes the minimum holding force. Direction `first` is tested first; a good guess saves time.
-// It only affects the choice of tied directions.
+// Computes the minimum holding force. Direction `first` is tested first; a good guess saves time
+// and only affects the choice of tied directions.
 WeakestDirection min_holding_force(const std::vector<BearingContact>& contacts,
                                    const HoldingOptions& options, std::size_t first = 0);
 

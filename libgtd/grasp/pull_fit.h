@@ -28,7 +28,7 @@ struct PullTest {
   bool held = false;              // verdict: the gripper held load_n
 };
 
-// Reads pull tests from the columns x, y, z (m, in the mesh frame) or ground = level; tilt_deg,
+// Reads pull tests from the columns x, y, z (m, in the mesh frame) or ground (level); tilt_deg,
 // azimuth_deg (0 if missing or empty); force_n, or load_n and held (0 or 1). Throws Error naming
 // file, row, column and bound if there are no rows, a location is missing, a force is negative, or
 // a row does not have exactly one of force_n and held (with load_n).

@@ -98,7 +98,7 @@ struct Gripper {
   double closing_angle_deg = 0.0;         // angle of a finger from the palm's axis, closed
   double opening_spine_radius_mm = 0.0;   // radius of the circle of spine tips, open
   double opening_spine_depth_mm = 0.0;    // depth of the spine tips below the palm, open
-  double closing_height_mm = 0.0;         // from palm to spine tips, closed
+  double closing_height_mm = 0.0;         // depth of the spine tips below the palm, closed
   double top_solid_margin_mm = 0.0;       // added to the palm diameter at the top of the mask
   double bottom_void_margin_mm = 0.0;     // subtracted from the void radius at the bottom
   std::optional<GripperFingers> fingers;  // nullopt: forces are unknown
@@ -117,7 +117,7 @@ void bind(libmap::ParameterTable& table, Gripper& gripper);
 // Throws Error if the gripper has no `fingers`, which are required for forces.
 void require_fingers(const Gripper& gripper);
 
-// Return the uncertain parameters of a gripper with `fingers`, and a copy with other values.
+// Return the uncertain parameters of a gripper with `fingers`, and a copy of it with other values.
 ParameterValues parameters_of(const Gripper& gripper);
 Gripper with_parameters(Gripper gripper, const ParameterValues& values);
 

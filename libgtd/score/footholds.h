@@ -58,8 +58,7 @@ void describe(libmap::ResultTable& table, const FootholdResult& result);
 // Finds local maxima of the score by non-maximum suppression: the best candidate becomes a foothold
 // and candidates within separation_m of this foothold are dropped, until none is left. Points that
 // are equal in all criteria keep the order of the map. Throws Error for an empty map, a missing
-// field that the options need ("score", "graspable", "border"), options out of range, and an `up`
-// of length zero.
+// field that the options need ("score", "graspable", "border"), options out of range, and `up` = 0.
 FootholdResult find_footholds(const libmap::PointCloud& map, const FootholdOptions& options = {},
                               const FootholdFrame& frame = {});
 

@@ -38,8 +38,7 @@ struct SetSums {
 };
 
 // Distribution of the force F per parameter set: F > 0 with `probability`; ln F is then beta(4, 2)
-// distributed with mean log_force and standard deviation `spread`; scale is proportional to 1 /
-// spread.
+// distributed with mean log_force and standard deviation `spread` = 0.178 / scale.
 struct SetForces {
   std::vector<float> probability, log_force, spread, scale;
 };

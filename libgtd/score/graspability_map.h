@@ -43,8 +43,7 @@ struct GraspabilityMap {
   std::vector<MapVoxel> voxels;  // ascending
 };
 
-// Frame of the points of a map. terrain: frame of the regression plane. input: frame of the scored
-// cloud.
+// Frame of a map's points. terrain: that of the regression plane. input: that of the scored cloud.
 enum class MapFrame { terrain, input };
 const std::vector<std::pair<std::string, MapFrame>>& map_frame_names();
 

@@ -32,7 +32,7 @@ struct Scenario {
   std::optional<double> graspability_threshold;  // minimum score (not calibrated); nullopt: 0.8
   double probability_threshold = 0.5;            // minimum score of method calibrated
   double curvature_radius_m = 0.09;              // radius of estimates; 0: no convexity
-  double intersection_distance_m = 0.01;         // maximum, from convex voxel to convex point
+  double intersection_distance_m = 0.01;         // voxels this close to a convex point are convex
   Orientation orientation = Orientation::plane;
   double normal_radius_m = 0.0;  // radius of normal fits; 0: palm diameter of the gripper
   // Minimum rise of a steep face that counts as an obstacle; ground above it is unreachable. 0:

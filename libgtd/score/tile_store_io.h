@@ -34,8 +34,7 @@ TileStoreIndex read_tile_store(const std::filesystem::path& store);
 // runs that share the tiles end at the same time). Throws like read_tile_store.
 TileStoreIndex finish_tile_store(const std::filesystem::path& store);
 
-// Returns the path of a tile file. Throws Error naming the file if it is missing or its size
-// differs from the index.
+// Returns the path of a tile file. Throws Error naming a file that is missing or differs in size.
 std::filesystem::path tile_path(const std::filesystem::path& store, const StoredTile& tile);
 
 // As tile_path, but also throws Error if the SHA-256 of the file differs from the index.

@@ -1,6 +1,6 @@
-// Scores the voxels of a terrain with an upright gripper mask, tile by tile. A tile depends on the
-// voxels of the tile and of a margin around the tile. The result does not depend on the tile size,
-// the order of the tiles or the number of threads.
+// Scores the voxels of a terrain with an upright gripper mask, tile by tile. The scores of a tile
+// depend on the voxels of the tile and of a margin around it, but not on the tile size, the order
+// of the tiles or the number of threads.
 #pragma once
 
 #include <cstddef>
@@ -14,8 +14,7 @@
 namespace libgtd {
 
 // Returns the tiles that cover the box of the grid, ascending by i, then j. Borders between tiles
-// are at multiples of `tile_voxels` and do not depend on the cloud. Throws Error for more than 2^24
-// tiles.
+// are at multiples of `tile_voxels` for any cloud. Throws Error for more than 2^24 tiles.
 std::vector<TileBounds> make_tiles(const VoxelGrid& grid, int tile_voxels);
 
 // Distribution of the holding force (weakest direction) at a voxel over trials and parameter sets.

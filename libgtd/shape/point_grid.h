@@ -2,7 +2,7 @@
 // few cells, always in the same order, so that sums over neighbors are reproducible to the bit.
 // Cells are aligned with the origin of the frame. The order therefore does not depend on distant
 // points, and a tile with its surroundings has the same results as the whole cloud. A
-// libmap::PointTree has not, and is 8 to 12 times slower for 27 to 165 neighbors.
+// libmap::PointTree lacks this property and is 8 to 12 times slower for 27 to 165 neighbors.
 #pragma once
 
 #include <Eigen/Core>
@@ -38,7 +38,7 @@ class PointGrid {
   // Sets `runs` to the ranges of order() with the points of all cells at most `reach` cells away
   // along each axis, ascending and not empty. A column of cells is one run.
   void find_near(const Cell& cell, std::int64_t reach, std::vector<Range>& runs) const;
-  // The cells that contain points, with ranges in the sequence of order().
+  // The cells that contain points, and the range of each cell in order().
   const std::vector<Cell>& cells() const { return cells_; }
   const std::vector<Range>& ranges() const { return ranges_; }
 

@@ -41,11 +41,10 @@ inline bool determines_plane(const Eigen::Vector3d& variances) {
 }
 
 // Fits the regression plane (eq. 2-13..2-15) to the points of the cloud within the radius of each
-// of `positions` (m). Normals face `outsides`, directions of any length, one per position. `up`
-// replaces them if the list is empty, and a direction that is zero, not finite or along the
-// surface. A result does not depend on points outside the radius, other positions or the number of
-// threads. Throws Error for a radius that is not positive, an `up` of length zero, and arrays that
-// differ in length.
+// of `positions` (m). Normals face `outsides`, directions of any length, one per position or none
+// at all. `up` replaces a direction that is missing, zero, not finite or along the surface. A
+// result does not depend on points outside the radius, other positions or the number of threads.
+// Throws Error for a radius that is not positive, an `up` of length 0, and lists of unequal length.
 std::vector<SurfaceNormal> fit_surface_normals(const libmap::PointCloud& cloud,
                                                const std::vector<Eigen::Vector3d>& positions,
                                                const std::vector<Eigen::Vector3f>& outsides,

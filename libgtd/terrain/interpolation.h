@@ -11,8 +11,7 @@ namespace libgtd {
 
 // thesis: the grid starts at the minimum x and y of the points, has the author's spacing (1 /
 // sqrt(n / A), rounded), drops nodes of height exactly 0 and rounds coordinates to single
-// precision. corrected: the spacing follows eq. 3-5, and nodes are at its multiples in the terrain
-// frame.
+// precision. corrected: the spacing follows eq. 3-5, and nodes are at its multiples.
 enum class InterpolationMethod { thesis, corrected };
 
 struct InterpolationOptions {
@@ -25,8 +24,8 @@ struct InterpolationOptions {
   // Maximum spacing for `corrected`; 0: no limit. Rows of voxels remain empty if the spacing
   // exceeds the voxel size.
   double max_grid_spacing_m = 0;
-  // For `corrected`, A in eq. 3-5 is the area of the square cells with points; this is their side.
-  // 0: four times the spacing of points that are spread evenly over the bounding box.
+  // For `corrected`: side of square cells; A in eq. 3-5 is the area of the cells with points. 0:
+  // four times the spacing of points that are spread evenly over the bounding box.
   double area_cell_m = 0;
   // Maximum number of nodes. More nodes indicate a wrong spacing or a stray point.
   std::size_t max_nodes = 100'000'000;
