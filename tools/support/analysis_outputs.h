@@ -50,7 +50,7 @@ struct MapTableOptions {
   bool pairs = false;           // true: compare all pairs of maps
   std::string varied;  // column of maps.csv that charts show on the horizontal axis; empty: none
   std::string series;  // columns of maps.csv, separated by ','; a curve per combination of values
-  bool images = true;
+  bool images = true;  // false: tables only, no charts
 };
 
 // Binds all options except `expected`, `points_frame` and `images`.

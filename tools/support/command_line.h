@@ -21,7 +21,7 @@ class UsageError : public libmap::Error {
   using Error::Error;
 };
 
-// Throws Error with `reason` and the flag of the first parameter of `bind` that is not the default.
+// Throws Error with `reason` and the flag of the first parameter of `bind` with a changed value.
 template <typename Options>
 void reject_changed(const Options& options, void (*bind)(libmap::ParameterTable&, Options&),
                     const std::string& reason) {
@@ -66,8 +66,7 @@ class Command {
   // further parameters, which `resolver` finds. Flags and --config override the file; "auto": none.
   void preset(const std::string& key,
               std::function<std::filesystem::path(const std::string&)> resolver);
-  // Sets the function that finds the file of a --config value, e.g. a scenario's name. Default: a
-  // path.
+  // Sets the function that finds the file of a --config value, e.g. of a name; default: a path.
   void config_resolver(std::function<std::filesystem::path(const std::string&)> resolver);
 
   // Parses argv, applies --config, then flags, then --set, and runs `body`. An error becomes one

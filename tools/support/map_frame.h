@@ -31,7 +31,7 @@ PointFrame frame_of_points(const std::string& points, PointFrame asked, const st
 // or invalid value, and for a table without rows.
 std::vector<Eigen::Vector3d> positions_of(const libmap::Table& table);
 
-// Name of the transform from the scored cloud to the terrain frame; the transform or nullptr.
+// Name of the transform from the scored cloud to the terrain frame. Its value; nullptr if missing.
 inline constexpr const char* terrain_from_input_name = "terrain_from_input";
 const libmap::Pose* terrain_from_input_of(const std::optional<libmap::Manifest>& manifest);
 
@@ -56,8 +56,8 @@ bool is_from_true_frame(const std::string& file);
 void copy_transforms(const std::string& input, Run& run);
 // As copy_transforms; also copies the name of the frame.
 void copy_frame(const std::string& input, Run& run);
-// For a map made from the map of `source`: copies frame, transforms, georeference, and those
-// parameters and results that the run's manifest does not have.
+// For a map made from the map with the manifest `source`: copies frame, transforms, georeference,
+// and those parameters and results that the run's manifest does not have.
 void copy_missing_entries(const libmap::Manifest& source, Run& run);
 // Copy only ground_truth_from_poses, or only the georeference, which a DEM (.tif) itself contains.
 void copy_truth_transform(const std::string& input, Run& run);

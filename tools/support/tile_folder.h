@@ -1,7 +1,7 @@
 // Outputs that are folders of tiles. One run, or several runs that share the tiles, make the tiles
 // in a tile store beside the folder (libmap/tiles/tile_store_io.h):
 //
-//   FOLDER.progress/tiles/TILE.*    file of a finished tile; none if it is empty
+//   FOLDER.progress/tiles/TILE.*    file of a finished tile; none for an empty tile
 //   FOLDER.progress/progress/...    plan with common data, and journals with data of each tile
 //
 // When all tiles are complete, the folder is created at once and the store is removed.
@@ -55,7 +55,7 @@ class TileFolder {
   TileFolder(const std::string& output, const std::vector<std::string>& names,
              const std::vector<std::string>& inputs, const libmap::TileShare& share, Run& run);
 
-  // Returns true, and prints so, if shares with equal parameters and inputs completed the folder.
+  // Returns true, with a message, if shares with equal parameters and inputs completed the folder.
   bool is_complete() const;
 
   // Begins the run and returns the data common to all tiles; null with --dry-run. The first share
