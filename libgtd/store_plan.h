@@ -23,7 +23,7 @@ struct StoreTiling {
   int halo_voxels = 0;
 };
 
-// Stores the frame in the plan: lattice, box, plane, and transform and results in its manifest.
+// Stores the frame in the plan (lattice, box, plane) and its manifest (transform, results).
 void set_frame(const TerrainFrame& frame, const StoreTiling& tiling, TilePlan& plan);
 
 // Returns the frame of an earlier plan. Throws Error naming `plan_file` if its tile width or

@@ -19,7 +19,7 @@
 
 namespace libgtd {
 
-// Returns true for thesis and envelope, which prepare the cloud as the author's program.
+// Returns true for thesis and envelope, which prepare the cloud as the thesis does.
 bool follows_thesis(Method method);
 
 // Returns the plane fit of a method: PlaneMethod::thesis for thesis and envelope, corrected for

@@ -27,8 +27,7 @@ struct MapChangeOptions {
 // Binds match_distance_voxels; MapAnalysisOptions binds the keys of the other fields.
 void bind(libmap::ParameterTable& table, MapChangeOptions& options);
 
-// Correspondence of voxels. lattice: same indices of one lattice. nearest: mutual nearest
-// neighbors.
+// Correspondence of voxels. lattice: same indices, one lattice. nearest: mutual nearest voxels.
 enum class VoxelMatching { lattice, nearest };
 std::string_view to_text(VoxelMatching matching);
 

@@ -27,7 +27,7 @@ struct MapSummary {
   std::size_t evaluated = 0;
   std::size_t reaching_cutoff = 0;  // evaluated voxels with score >= graspability_threshold
   std::size_t graspable = 0;        // evaluated voxels that the map marks graspable
-  // Evaluated voxels with SSV (occupied voxels in the mask) below TSV; nullopt if unknown.
+  // Evaluated voxels with SSV (number of occupied voxels in the mask) < TSV; nullopt if unknown.
   std::optional<std::size_t> below_solid_threshold;
   // Scores at summary_quantiles (nearest rank); empty if no voxel was evaluated.
   std::vector<double> scores;
@@ -37,7 +37,7 @@ struct MapSummary {
 
 struct MapSummaryOptions {
   double graspability_threshold = 0.8;
-  std::optional<double> solid_voxel_threshold{};  // TSV (score_percent); nullopt: unknown
+  std::optional<double> solid_voxel_threshold{};  // TSV, minimum of SSV; nullopt: unknown
 };
 
 // Summarizes a map; `voxels` must be voxel_map_of(map).

@@ -32,8 +32,7 @@ struct MapSurface {
 // do not affect the area. Near a border, the weighted mean of the voxels is off-center. The surface
 // is assumed to end at the straight edge that explains this mean, and K is integrated over the
 // remaining part of the disc; areas at corners are up to a fifth too large. Without a normal (too
-// few neighbors), the slope is NaN and the area that of a voxel face. Throws Error for a radius <
-// 0.
+// few neighbors), the slope is NaN, the area that of a voxel face. Throws Error for a radius < 0.
 MapSurface measure_surface(const VoxelMap& map, const MapSurfaceOptions& options = {});
 
 }  // namespace libgtd

@@ -41,8 +41,7 @@ struct GripContact {
 };
 
 // End of the approach. on_ground: the palm or an open finger rests on the ground. no_ground: there
-// is no ground below. blocked: the approach starts inside the ground, for example below the top of
-// a higher rock.
+// is no ground below. blocked: the approach starts inside the ground, e.g. below the top of a rock.
 enum class ApproachOutcome { on_ground, no_ground, blocked };
 
 struct ClosedGripper {

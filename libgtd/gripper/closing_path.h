@@ -11,8 +11,8 @@ namespace libgtd {
 
 // Largest force away from the ground that the spines of a finger bear, per parameter set, for
 // ground that falls outward by g = -90 .. 90 degrees. Forces are divided by the closing force P.
-// Value: mean of max_k f_k over random draws of the facets of the spines. The k steepest facets
-// bear equal parts of
+// Value: mean of max_k f_k over random draws of the facets that the spines meet. The k steepest
+// facets bear equal parts of
 //   f_k = min(tan b / (1 - c tan b), k L sin b),  b = g + psi_k + atan(friction) - 90 deg.
 // f_k is 0 for b <= 0 and k L for b >= 90 deg; psi_k is the inclination of the k-th facet, and L
 // the force limit of a spine. c = sin g cos g / (1 + sin^2 g) for g > 0 if the drive resists

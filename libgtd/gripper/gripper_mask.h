@@ -16,11 +16,11 @@ namespace libgtd {
 
 struct ClosingPath;  // closing_path.h
 
-// thesis: as the author's program (eq. 3-6..3-16). envelope: the alternative design of the thesis
-// (5.1), which does not count voxels outside the reach of the fingers. climblab: mask of ClimbLab
-// v3, without void layers. corrected: as thesis, with an odd side centered on the pivot voxel and
-// exact radii. calibrated: the mask of `corrected`; the score is the hold probability
-// (closing_force.h).
+// thesis: as the program of the thesis's author (eq. 3-6..3-16). envelope: the alternative design
+// of the thesis (5.1), which does not count voxels outside the reach of the fingers. climblab: mask
+// of ClimbLab v3 (MATLAB), without void layers. corrected: as thesis, with an odd side centered on
+// the pivot voxel and exact radii. calibrated: the mask of `corrected`; the score is the hold
+// probability (closing_force.h).
 enum class Method { thesis, envelope, climblab, corrected, calibrated };
 
 const std::vector<std::pair<std::string, Method>>& method_names();

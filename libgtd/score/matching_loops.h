@@ -46,8 +46,7 @@ struct MatchingLoops {
   // sums[n] += entering[n] - leaving[n].
   void (*slide)(std::uint16_t* sums, const std::uint16_t* entering, const std::uint16_t* leaving,
                 std::size_t count);
-  // Computes sums of `length` values of `sums` from each index in `starts`; reads up to 64 bytes
-  // more.
+  // Sums `length` values of `sums` from each index in `starts`. Reads up to 64 bytes more.
   void (*add_runs)(const std::uint16_t* sums, const std::uint32_t* starts, std::size_t start_count,
                    std::size_t length, std::uint32_t* totals);
 

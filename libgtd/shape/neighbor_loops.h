@@ -39,8 +39,7 @@ struct NeighborLoops {
   // Writes a sort key for each candidate with a squared distance to `center` below `limit`, in the
   // order of the candidates, and returns the number of keys. The high 32 bits are those of the
   // squared distance in single precision, which sort like the distances; the low 32 bits are the
-  // index. Candidates beyond `count` must be infinite. x, y, z and keys need room for `rank_lanes`
-  // more values.
+  // index. Candidates beyond `count` must be infinite. All arrays need room for `rank_lanes` more.
   std::size_t (*rank)(const float* x, const float* y, const float* z, std::size_t count,
                       const float* center, float limit, std::uint64_t* keys);
   static constexpr std::size_t rank_lanes = 16;

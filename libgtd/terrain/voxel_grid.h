@@ -112,8 +112,8 @@ VoxelGrid voxelize(const std::vector<Eigen::Vector3d>& points_in_terrain, double
 libmap::PointCloud voxel_means(const libmap::PointCloud& terrain, double voxel_size_m);
 
 // Voxelizes points for `thesis` (listing A.4), in single precision: the centroids of the cells of
-// one lattice are put into the cells of a second lattice that starts at the minimum coordinates of
-// the points.
+// one lattice are put into the cells of a second lattice, which starts at the minimum of the
+// points.
 VoxelGrid voxelize_thesis(const std::vector<Eigen::Vector3f>& points_in_terrain,
                           double voxel_size_m);
 

@@ -119,8 +119,8 @@ Options options_from(const py::dict& values, Options options = {}) {
 // Returns a dict of the results by key; a missing value is None.
 py::dict dict_of(const libmap::ResultTable& table);
 
-// Return a dict per parameter (key, type, default, choices, description) or result (not in
-// objects).
+// Return a dict per parameter (key, type, default, choices, description) or result not in
+// `objects`.
 py::list list_of(const libmap::ParameterTable& table);
 py::list list_of(const libmap::ResultTable& table, const std::vector<std::string>& objects);
 

@@ -19,8 +19,8 @@
 
 namespace graspmap_tools {
 
-// Ground of the virtual field test: a mesh in one file, or in a folder of tiles, of which few are
-// in memory.
+// Ground of the virtual field test: a mesh in one file, or in a folder of tiles, of which at most
+// three are in memory.
 class GroundTiles {
  public:
   // Mesh of one tile and of the surroundings within reach of a gripper.

@@ -1,5 +1,5 @@
-// One run of a command: messages, timings, and outputs with manifests. Also includes the headers of
-// the standard library, fmt and libmap/core that nearly all commands need.
+// One run of a command: messages, timings, and outputs with manifests (OUTPUT.json). Also includes
+// the headers of the standard library, fmt and libmap/core that nearly all commands need.
 #pragma once
 
 #include <fmt/format.h>
