@@ -14,7 +14,7 @@
 
 namespace graspmap_test {
 
-// Random engine, reset to the same seed at the start of each test, and its number in [low, high).
+// Random engine with the same seed at the start of each test. uniform() draws from [low, high).
 std::mt19937_64& random_engine();
 double uniform(double low, double high);
 
