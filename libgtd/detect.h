@@ -1,6 +1,6 @@
-// Computes a graspability map, which scores every voxel of a terrain as a target of a spined
-// gripper, from a point cloud in memory: the main entry of the detection ("Graspable Target
-// Detection for Hexapod Robots", 2023, chapters 2.5 and 3.2).
+// Main entry of the detection ("Graspable Target Detection for Hexapod Robots", 2023, chapters 2.5
+// and 3.2): computes a graspability map from a point cloud in memory. The map contains a score for
+// each occupied voxel of the terrain as a target of a spined gripper.
 #pragma once
 
 #include <optional>
@@ -20,14 +20,14 @@
 namespace libgtd {
 
 // Source of the terrain frame. fit: downsamples the cloud (methods thesis and envelope only), fits
-// the regression plane and transforms the cloud into its frame. none: frame of the cloud.
+// the regression plane and transforms the cloud into its frame. none: the cloud's frame.
 enum class PlaneSource { fit, none };
 
 struct DetectionOptions {
   Scenario scenario;
   std::optional<Gripper> gripper;  // default: the gripper named by the scenario
   PlaneSource plane = PlaneSource::fit;
-  std::optional<Eigen::Vector3d> up;  // out of the ground, cloud's frame; nullopt: see UpSource
+  std::optional<Eigen::Vector3d> up;  // out of the ground, cloud's frame; nullopt: as in UpSource
   double max_tilt_deg = 90.0;         // maximum angle between `up` and the plane's normal
 };
 // Binds the keys of the scenario and `plane`, but not `up` and `max_tilt_deg`.
@@ -37,20 +37,20 @@ struct DetectionResult {
   GraspabilityMap map;
   GripperMask mask;
   std::optional<RegressionPlane> plane;  // nullopt with PlaneSource::none
-  std::size_t points = 0;                // input points
-  std::size_t downsampled_points = 0;    // after downsampling; 0: not downsampled
+  std::size_t points = 0;                // points of the input cloud
+  std::size_t downsampled_points = 0;    // points after downsampling; 0: not downsampled
   std::size_t interpolated_points = 0;   // nodes of the interpolation grid; 0: not interpolated
-  double grid_spacing_m = 0.0;           // of the interpolation grid; 0: not interpolated
+  double grid_spacing_m = 0.0;           // spacing of this grid; 0: not interpolated
   std::size_t occupied_voxels = 0;
-  std::size_t isolated_voxels = 0;  // occupied voxels without an occupied neighbor of 26
-  Voxel grid_min;                   // box of the occupied voxels
+  std::size_t isolated_voxels = 0;  // occupied voxels of which all 26 neighbors are empty
+  Voxel grid_min;                   // corners of the bounding box of the occupied voxels
   Voxel grid_max;
   std::size_t tiles = 0;             // tiles that cover the grid
   std::size_t curvature_points = 0;  // points at which the curvature was estimated
-  std::size_t convex_points = 0;     // among the curvature points
+  std::size_t convex_points = 0;     // curvature points that are convex
   std::size_t graspable_voxels = 0;
-  std::size_t border_voxels = 0;
-  std::size_t unoriented_voxels = 0;      // orientation surface: no normal, scored upright
+  std::size_t border_voxels = 0;          // the mask window extends beyond the scanned area
+  std::size_t unoriented_voxels = 0;      // without a normal (orientation surface): upright mask
   std::size_t obstacle_voxels = 0;        // obstacles and unreachable voxels
   std::optional<double> normal_radius_m;  // nullopt if no surface normals were fitted
   libmap::StageTimings timings_s;         // wall time of each step
@@ -58,8 +58,8 @@ struct DetectionResult {
 // Names each result for manifests and tables (libmap/core/result_table.h).
 void describe(libmap::ResultTable& table, const DetectionResult& result);
 
-// Returns options.gripper, or else the gripper and overrides of the scenario. Throws like
-// find_gripper.
+// Returns options.gripper, or else the scenario's gripper with its overrides. Throws like
+// find_gripper (gripper_io.h).
 Gripper gripper_of(const DetectionOptions& options);
 
 // Detects graspable targets in `terrain` (m, any frame); the frame of the result is the terrain

@@ -1,6 +1,5 @@
-// Plans how `graspmap score` computes a map in a tile store (a folder with one file per tile). If
-// the store has tiles of an earlier run, the functions find the tiles that remain valid, and the
-// points that the missing tiles depend on.
+// Plans how `graspmap score` computes a map in a tile store (a folder with one file per tile).
+// Finds the tiles of an earlier run that remain valid, and the points that affect other tiles.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,9 +13,9 @@
 
 namespace libgtd {
 
-// Tile width and halo width of a detection, in voxels.
+// Widths in voxels of a tile and of its halo, the margin in which points affect the tile.
 struct StoreTiling {
-  // Makes the mask and derives both widths from it and the scenario.
+  // Makes the mask, and derives both widths from the mask and the scenario.
   explicit StoreTiling(const DetectionOptions& detection);
 
   GripperMask mask;
@@ -24,7 +23,7 @@ struct StoreTiling {
   int halo_voxels = 0;
 };
 
-// Stores the frame in the plan: lattice, box, plane, and the manifest's transform and results.
+// Stores the frame in the plan (lattice, box, plane) and its manifest (transform, results).
 void set_frame(const TerrainFrame& frame, const StoreTiling& tiling, TilePlan& plan);
 
 // Returns the frame of an earlier plan. Throws Error naming `plan_file` if its tile width or
@@ -36,17 +35,18 @@ TerrainFrame frame_of(const TilePlan& plan, const DetectionOptions& detection,
 void require_in_frame(const libmap::PointCloud& terrain, const TerrainFrame& frame,
                       const std::filesystem::path& plan_file);
 
-// Throws Error naming the store unless `plan` is `earlier` with additional files, `append` is set,
-// and new points affect only tiles near them (--plane none, method corrected or calibrated).
+// Throws Error naming the store unless files can be added: `append` is set, `plan` is `earlier`
+// with further files, and points affect only tiles near them, i.e. the frame is PlaneSource::none
+// and the method corrected or calibrated.
 void require_appendable(const TilePlan& earlier, const TilePlan& plan,
                         const DetectionOptions& detection, bool append, const std::string& store);
 
-// Returns the tiles of `done` that depend on no point of the files that only `plan` contains.
+// Returns the tiles of `done` that the files added to `earlier` in `plan` cannot affect.
 std::vector<StoredTile> unaffected_tiles(const std::map<TileNumber, StoredTile>& done,
                                          const TilePlan& earlier, const TilePlan& plan,
                                          const TerrainFrame& frame, const StoreTiling& tiling);
 
-// Returns the rectangle with all points that the tiles depend on, in the terrain frame.
+// Returns a rectangle in the terrain frame that contains all points that affect the tiles.
 PointsRectangle points_for(const std::vector<TileNumber>& tiles, const TerrainFrame& frame,
                            const StoreTiling& tiling);
 // Returns true if a point of the file may be in the rectangle.

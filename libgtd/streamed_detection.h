@@ -1,6 +1,6 @@
 // Detection of graspable targets for terrains larger than memory, in tiles. A first pass over all
 // points determines the terrain frame and the box of voxels. Each tile is scored from the points in
-// the tile and a margin (the halo). The voxels equal those of detect() to the bit.
+// the tile and a margin (the halo). The voxels are identical to the voxels of detect().
 #pragma once
 
 #include <Eigen/Core>
@@ -24,7 +24,7 @@ struct TerrainFrame {
   Voxel min;  // box of the terrain's voxels
   Voxel max;
 
-  // Returns true if the normals have random sides and thus do not indicate the outside.
+  // Returns true if the normals are on random sides of the surface and are not used.
   bool drops_normals() const;
 };
 
@@ -35,11 +35,11 @@ void require_streamable(const DetectionOptions& options);
 // Computes the frame and the box in passes over `points`. Throws Error if there are no points, and
 // all errors of the plane fit and the voxel lattice.
 TerrainFrame frame_terrain(const libmap::PointStream& points, const DetectionOptions& options);
-// Transforms a block of points into the terrain frame; normals with random sides are dropped.
+// Transforms points into the terrain frame; removes the normals if drops_normals() is true.
 libmap::PointCloud to_terrain(const libmap::PointCloud& block, const TerrainFrame& frame);
 
-// Returns the tiles of the box, ascending; if several runs divide the tiles, only the tiles of one
-// run (`share`). Throws Error naming tile_size_m if the box has more than 2^20 tiles.
+// Returns the tiles of the box, ascending. If several runs divide the tiles, `share` selects the
+// tiles of one run. Throws Error naming tile_size_m if the box has more than 2^20 tiles.
 std::vector<TileNumber> tiles_of(const TerrainFrame& frame, int tile_voxels,
                                  const libmap::TileShare& share = {});
 
@@ -50,8 +50,8 @@ struct StreamedTile {
 };
 
 struct StreamingOptions {
-  // Maximum number of points processed at once. Neighboring tiles are combined while tiles and halo
-  // have fewer points; a tile with more points is split, down to the width of the halo.
+  // Maximum number of points processed at once. Neighboring tiles with fewer points are processed
+  // together; a tile with more points is divided, down to the width of the halo.
   std::size_t max_points = 1'000'000;
 };
 
@@ -60,12 +60,12 @@ struct PointsRectangle {
   Eigen::Vector2d low;
   Eigen::Vector2d high;
 };
-// Returns the rectangle with all points that the result in `columns` depends on.
+// Returns the rectangle of all points that affect the result in `columns`.
 PointsRectangle points_for(const TileBounds& columns, const TerrainFrame& frame, int halo_voxels);
 
-// Scores the tiles `wanted` from `points` in the terrain frame, which must cover the halo. Calls
-// `visit` with a few tiles at a time, each tile once, from one thread. Throws like
-// require_streamable, and Error if the points are too sparse for the voxel size (voxel_grid.h).
+// Scores the tiles `wanted` from `points` in the terrain frame, including the halo. Calls `visit`
+// with a few tiles at a time, each tile once, from one thread. Throws like require_streamable, and
+// Error if the points are too sparse for the voxel size (voxel_grid.h).
 void detect_streamed(const TerrainFrame& frame, const libmap::PointTileStore& points,
                      const std::vector<TileNumber>& wanted, const DetectionOptions& options,
                      const std::function<void(std::vector<StreamedTile> tiles)>& visit,

@@ -1,6 +1,6 @@
-// Scores single tiles of a terrain, for detect() and detect_streamed(): computes the voxels of the
-// map from points in the terrain frame and a voxel grid. A tile depends only on the data in the
-// tile and in a margin around the tile (the halo); other data do not affect it.
+// Scores tiles of a terrain, for detect() and detect_streamed(): computes the voxels of the map
+// from points in the terrain frame and a voxel grid. Only data in a tile and in a margin around the
+// tile (the halo) affect the result of the tile.
 #pragma once
 
 #include <cstddef>
@@ -19,20 +19,19 @@
 
 namespace libgtd {
 
-// Returns true if the method prepares the cloud as the author's program does: thesis, envelope.
+// Returns true for thesis and envelope, which prepare the cloud as the thesis does.
 bool follows_thesis(Method method);
 
-// Returns the plane fit of a method: `thesis` and `envelope` as in the author's program, `climblab`
-// by least squares as in the source of ClimbLab, the others robust.
+// Returns the plane fit of a method: PlaneMethod::thesis for thesis and envelope, corrected for
+// climblab (least squares, as in the source of ClimbLab), robust for the other methods.
 PlaneMethod plane_method(Method method);
 
 // Returns the width of a tile in voxels. Throws Error naming tile_size_m if it is out of range.
 int tile_voxels(const Scenario& scenario);
 
-// Returns the width of the halo in voxels: the columns around a tile that affect the voxels of the
-// tile. The halo covers the mask window, the closing of the scanned area, the points that decide
-// convexity with all neighbors, and the points of surface normals, but not interpolation and
-// obstacles (whole terrain). Throws Error naming a radius that is too large for the voxel size.
+// Returns the width of the halo in voxels: the distance around a tile within which voxels and
+// points affect the tile's scores, border marks, convexity and normals. Interpolation and obstacles
+// depend on the whole terrain. Throws Error naming a radius that is too large for the voxel size.
 int halo_voxels(const GripperMask& mask, const Scenario& scenario);
 
 // Returns the radius of the surface normal fits of a scenario, m.
@@ -44,15 +43,15 @@ MapContent content_of(const Scenario& scenario);
 // Options for the curvature near scored voxels and the convexity test.
 struct ConvexityStage {
   CurvatureOptions curvature;
-  bool average_per_voxel = true;  // average points per voxel; density has no effect
-  double zero_plane_m = 0.0;      // CurvatureMethod::thesis: minimum height of convex points
-  double distance_m = 0.01;       // maximum distance of a convex voxel from a convex point
+  bool average_per_voxel = true;  // from the mean point of each voxel: density has no effect
+  double zero_plane_m = 0.0;      // CurvatureMethod::thesis only: minimum height of convex points
+  double distance_m = 0.01;       // maximum distance from a convex voxel to a convex point
 };
 
 // Conditions for a scored voxel to be graspable.
 struct GraspableRule {
   Method method = Method::calibrated;
-  int solid_voxel_threshold = 120;  // TSV; Method::climblab: SSV must be larger
+  int solid_voxel_threshold = 120;  // TSV (score_percent); climblab: SSV must be larger
   double score_threshold = 0.8;     // minimum score; not used by Method::climblab
   double zero_plane_m = 0.0;        // minimum height of the voxel's center, terrain frame
   bool needs_convexity = false;     // the voxel must be near a convex point
@@ -71,19 +70,19 @@ TileDetectionOptions tile_detection_options(const GripperMask& mask, const Scena
 struct TileSurroundings {
   const libmap::PointCloud& terrain;  // measured points, for the curvature
   const libmap::PointCloud& surface;  // points from which the voxels were made
-  const VoxelGrid& grid;              // with the box of the whole terrain
+  const VoxelGrid& grid;              // its box (min, max) is that of the whole terrain
 };
 
 struct TileDetectionResult {
   std::vector<MapVoxel> voxels;       // ascending
-  std::size_t unoriented_voxels = 0;  // tilted masks only: no normal, scored upright
+  std::size_t unoriented_voxels = 0;  // tilted masks only: no normal, upright mask used
   std::size_t curvature_points = 0;   // points at which the curvature was estimated
   std::size_t convex_points = 0;
   libmap::StageTimings timings_s;  // wall time of each step
 };
 
-// Points at which curvature is measured. points_near_tiles: points that can make a voxel of the
-// tiles convex. The voxels are the same; the counts differ unless the tiles cover the terrain.
+// Points at which curvature is estimated. points_near_tiles: only points that can make a voxel of
+// the tiles convex, with the same voxels as result, but fewer curvature_points and convex_points.
 enum class CurvatureExtent { points_near_tiles, all_points };
 
 // Scores the voxels of the tiles. Throws all errors of the individual stages.

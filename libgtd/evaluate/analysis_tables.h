@@ -1,4 +1,4 @@
-// Converts map analyses to tables, JSON and clouds, in which regions are numbered from 1.
+// Converts map analyses to tables, JSON and clouds. Regions are numbered from 1.
 #pragma once
 
 #include <string>
@@ -23,20 +23,20 @@ libmap::Table ground_table(const std::vector<GroundBin>& bins, const std::string
 libmap::Table regions_table(const VoxelMap& map, const MapRegionResult& regions,
                             const RegionReach& reach);
 
-// Returns one row per pair of regions that is linked within the stride or by the spanning tree.
+// Returns one row per pair of regions in RegionReach::links or RegionReach::tree, ascending.
 libmap::Table region_links_table(const VoxelMap& map, const RegionReach& reach);
 
-// Returns one row for all common voxels, one row for the evaluated common voxels, and one row per
-// height bin and per slope bin of the evaluated common voxels.
+// Returns rows for all voxels that both maps have, for the voxels that are evaluated in both maps,
+// and for each height bin and slope bin of the evaluated voxels.
 libmap::Table change_table(const MapChange& change);
 
-// Returns counts, areas, regions and reach as JSON, and `change` unless it is null.
+// Returns counts, areas, regions, reachability and (unless null) `change` as JSON.
 std::string analysis_json(const MapAnalysis& analysis, const MapSurface& surface,
                           const MapRegionResult& regions, const RegionReachOptions& reach_options,
                           const RegionReach& reach, const MapChange* change);
 
-// Returns the points of `cloud`, the map, in the same order with the fields score, graspable,
-// region (0: none), reachable (0 or 1), slope_deg (NaN: unknown) and area_m2.
+// Returns the points of the map `cloud` in the same order, with the fields score, graspable (0 or
+// 1), region (0: none), reachable (0 or 1), slope_deg (NaN: unknown) and area_m2.
 libmap::PointCloud regions_cloud(const libmap::PointCloud& cloud, const VoxelMap& map,
                                  const MapSurface& surface, const MapRegionResult& regions,
                                  const RegionReach& reach);

@@ -1,5 +1,5 @@
-// Looks up the values of a map at given locations, such as tested locations, for a map in memory or
-// in tiles that are loaded one by one.
+// Looks up the values of a map at given locations, for example of a field test. The map is in
+// memory or in tiles that are loaded one by one.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,29 +16,29 @@
 
 namespace libgtd {
 
-// nearest: values of the closest map point. maximum: values of the point with the largest score
-// within the radius (the closest of equal ones). mean: mean of each field within the radius. Of
-// points that are still equal, the first in the map is used.
+// Map points that determine the values at a location. nearest: the closest point. maximum: the
+// point with the largest score within the radius (of equal scores, the closest). mean: all points
+// within the radius, with the mean of each field. Of equal points, the first in the map is used.
 enum class LookupMode { nearest, maximum, mean };
 std::vector<std::pair<std::string, LookupMode>> lookup_mode_names();
 
 struct LookupOptions {
   LookupMode mode = LookupMode::nearest;
-  double radius_m = 0.02;        // for maximum and mean
-  double max_distance_m = 0.05;  // for nearest: maximum distance of the point
+  double radius_m = 0.02;        // radius around the location (maximum, mean)
+  double max_distance_m = 0.05;  // maximum distance of the closest point (nearest)
 };
 void bind(libmap::ParameterTable& table, LookupOptions& options);
 
 struct LookupAnswer {
   bool found = false;
-  double distance_m = 0.0;     // to the nearest map point; infinity for a point that is not finite
-  std::size_t map_point = 0;   // source of the values; with mean the nearest point
-  std::size_t map_points = 0;  // number of points that contributed
+  double distance_m = 0.0;     // to the closest map point; infinity if the location is not finite
+  std::size_t map_point = 0;   // point with the values; closest point for mean or if not found
+  std::size_t map_points = 0;  // number of points that determine the values
   std::vector<double> values;  // one per field of the map; empty if not found
 };
 
-// Returns one answer per point; `points` are in the frame of the map. Throws Error for an empty
-// map, a map without the field "score" if the mode needs it, and options out of range.
+// Returns one answer per location in `points` (m, in the frame of the map). Throws Error for an
+// empty map, a map without the field "score" if the mode needs it, and options out of range.
 std::vector<LookupAnswer> look_up(const libmap::PointCloud& map,
                                   const std::vector<Eigen::Vector3d>& points,
                                   const LookupOptions& options = {});
@@ -47,10 +47,10 @@ std::vector<LookupAnswer> look_up(const libmap::PointCloud& map,
 // (graspability_map.h). Must be thread-safe.
 using TileLoader = std::function<libmap::PointCloud(std::size_t tile)>;
 
-// Returns the answers of look_up over the whole map, except that `map_point` is an index within a
-// tile. Points are sorted by tile, about 10^5 at a time. Only required tiles are loaded, few of
-// them twice; memory contains the answers and one tile per thread. Throws like look_up, and all
-// errors of `load`.
+// Returns the same answers as look_up over the whole map, except that `map_point` is an index
+// within a tile. Sorts the locations by tile and processes about 10^5 at a time. Loads only tiles
+// that are needed, few of them twice. Memory contains the answers and one tile per thread. Throws
+// like look_up, and all errors of `load`.
 std::vector<LookupAnswer> look_up_tiles(const TileStoreIndex& index, const TileLoader& load,
                                         const std::vector<Eigen::Vector3d>& points,
                                         const LookupOptions& options = {},

@@ -19,8 +19,7 @@ struct ValueBins {
 
   double low(std::size_t bin) const { return first_edge + static_cast<double>(bin) * width; }
   double high(std::size_t bin) const { return first_edge + static_cast<double>(bin + 1) * width; }
-  // Returns the bin with low <= value < high; values beyond the ends belong to the first or last
-  // bin.
+  // Returns the bin with low <= value < high; values beyond belong to the end bins.
   std::size_t bin_of(double value) const;
 };
 
@@ -32,22 +31,22 @@ ValueBins bins_over(double low, double high, double width, const char* field);
 std::size_t nearest_rank(std::size_t count, double fraction);
 
 struct MapAnalysisOptions {
-  double score_bin = 0.05;  // width of the histogram bins
+  double score_bin = 0.05;  // widths of the bins of score, height and slope
   double height_bin_m = 0.05;
   double slope_bin_deg = 5.0;
   bool border = false;  // voxels at the border of the scanned area are evaluated, too
 };
 void bind(libmap::ParameterTable& table, MapAnalysisOptions& options);
 
-// Voxels with low <= score < high; the last bin includes its upper end. A score up to 1e-6 below
-// `low` belongs to the bin, as in the legend of the map (score_color.h).
+// Numbers of voxels with low <= score < high; the last bin includes its upper end. A score up to
+// 1e-6 below `low` belongs to the bin, as in the legend of the map (score_color.h).
 struct ScoreBin {
   double low = 0.0;
   double high = 0.0;
   std::size_t all = 0;
   std::size_t above_zero_plane = 0;
   std::size_t evaluated = 0;  // VoxelMap::evaluated
-  std::size_t graspable = 0;  // among the evaluated voxels
+  std::size_t graspable = 0;  // graspable voxels among the evaluated voxels
   double area_m2 = 0.0;       // surface area of the evaluated voxels
 };
 
@@ -59,7 +58,7 @@ struct GroundBin {
   std::size_t graspable_voxels = 0;
   double area_m2 = 0.0;
   double graspable_area_m2 = 0.0;
-  double score_sum = 0.0;
+  double score_sum = 0.0;  // sum over the voxels
 
   std::optional<double> graspable_fraction() const;  // fraction of the area; nullopt without area
   std::optional<double> mean_score() const;          // nullopt without voxels
@@ -77,12 +76,12 @@ struct MapAnalysis {
   // if one of its evaluated voxels is.
   std::size_t columns = 0;
   std::size_t graspable_columns = 0;
-  // Area projected to the horizontal plane; the whole area where the slope is unknown.
+  // Area projected to the horizontal plane; a voxel of unknown slope counts with its whole area.
   double plan_area_m2 = 0.0;
   double graspable_plan_area_m2 = 0.0;
   GroundBin ground;  // all evaluated voxels; low, high: range of heights
-  // occupied / (occupied + empty) columns of the whole map. Empty columns count only in gaps of at
-  // most six columns along y. Below 1 if the cloud has fewer points than columns.
+  // Ratio occupied / (occupied + empty) columns of the whole map, in which only gaps of at most six
+  // columns along y count as empty. Below 1 if the cloud has fewer points than columns.
   double column_coverage = 1.0;
   std::vector<ScoreBin> score_classes;  // classes of the map's legend, best (unbounded) first
   std::vector<ScoreBin> score_bins;     // from min(0, lowest score) to max(1, highest)

@@ -27,8 +27,7 @@ struct MapChangeOptions {
 // Binds match_distance_voxels; MapAnalysisOptions binds the keys of the other fields.
 void bind(libmap::ParameterTable& table, MapChangeOptions& options);
 
-// Correspondence of voxels. lattice: same indices on a common lattice. nearest: mutual nearest
-// neighbors.
+// Correspondence of voxels. lattice: same indices, one lattice. nearest: mutual nearest voxels.
 enum class VoxelMatching { lattice, nearest };
 std::string_view to_text(VoxelMatching matching);
 
@@ -58,14 +57,14 @@ struct ScoreDifference {
   std::optional<double> correlation;  // Pearson; nullopt if one map is constant
 };
 
-// Statistics of a set of pairs.
+// Statistics of the voxel pairs of one bin, or of all pairs.
 struct ChangeSummary {
   double low = 0.0;  // bounds of the bin, m or degrees; 0 without bins
   double high = 0.0;
-  Confusion graspable;  // MAP is the prediction, OTHER the reference
-  std::optional<Kappa> kappa;
+  Confusion graspable;         // MAP is the prediction, OTHER the reference
+  std::optional<Kappa> kappa;  // nullopt if undefined
   ScoreDifference difference;
-  double both_area_m2 = 0.0;  // areas on MAP's surface
+  double both_area_m2 = 0.0;  // surface areas of pairs by ChangeClass, measured on MAP
   double gained_area_m2 = 0.0;
   double lost_area_m2 = 0.0;
 
@@ -87,15 +86,15 @@ struct MapChange {
 };
 
 // Compares two maps. `map_terrain_from_other_terrain` transforms OTHER's terrain frame to MAP's.
-// Exchanging the maps transposes the counts and negates the differences. Throws Error for options
-// out of range, maps without a common voxel and a surface of a different size than the map.
+// Exchanging the maps transposes the confusion matrices and negates the differences. Throws Error
+// for options out of range, maps without a common voxel and a surface of another size.
 MapChange compare_maps(const VoxelMap& map, const MapSurface& surface, const VoxelMap& other,
                        const libmap::Pose& map_terrain_from_other_terrain,
                        const MapChangeOptions& options = {});
 
 // Returns one point per pair (at the voxel of MAP) and per voxel that is only in one map, in the
-// frame of MAP's points, with the fields score_map, score_other, difference (NaN if undefined),
-// graspable_map, graspable_other, evaluated (`border` as in the options) and change (ChangeClass).
+// frame of MAP's points. Fields: score_map, score_other, difference (NaN if undefined),
+// graspable_map, graspable_other, evaluated (given `border`), change (ChangeClass).
 libmap::PointCloud to_cloud(const MapChange& change, const VoxelMap& map, const VoxelMap& other,
                             const libmap::Pose& map_terrain_from_other_terrain, bool border);
 

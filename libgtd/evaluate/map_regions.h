@@ -14,7 +14,7 @@
 namespace libgtd {
 
 struct MapRegionOptions {
-  int adjacency_voxels = 1;  // maximum index difference of neighbors; 1: 26 neighbors
+  int adjacency_voxels = 1;  // maximum difference of i, j and k of neighbors; 1: 26 neighbors
   int min_voxels = 1;        // minimum number of voxels of a region
   bool border = false;       // voxels at the border of the scanned area are evaluated, too
 };
@@ -64,10 +64,10 @@ struct RegionLink {
 
 // Reachability of a region from the start of the robot.
 struct RegionAccess {
-  std::uint32_t group = 0;  // connected regions; numbered by the first region of the group
+  std::uint32_t group = 0;  // index of the first region of its group of linked regions
   bool reachable = false;
-  std::optional<std::size_t> steps;  // minimum number of steps between regions, including that
-                                     // from the start; nullopt: unreachable
+  std::optional<std::size_t> steps;  // minimum number of steps, from the start to a region and
+                                     // between regions; nullopt: unreachable
   double stride_needed_m = 0.0;      // minimum stride with which the region is reachable
 };
 
@@ -75,18 +75,18 @@ struct RegionReach {
   std::vector<RegionLink> links;     // pairs within the stride, ascending by a, then b
   std::vector<RegionLink> tree;      // minimum spanning tree of all regions, shortest first
   std::vector<RegionAccess> access;  // one per region
-  std::size_t groups = 0;
+  std::size_t groups = 0;            // number of groups of linked regions
   // Minimum stride that connects all regions: the longest link of the tree; 0 for one region,
   // nullopt for none.
   std::optional<double> joining_stride_m;
-  std::optional<std::uint32_t> start_region;  // nearest to the start; nullopt: no region
-  double start_distance_m = 0.0;              // from the start to its nearest voxel
+  std::optional<std::uint32_t> start_region;  // region nearest to the start; nullopt: no region
+  double start_distance_m = 0.0;              // from the start to the nearest voxel of a region
   std::size_t reachable_regions = 0;
   double reachable_area_m2 = 0.0;
 };
 
-// Computes the graph of regions, which are linked if their nearest voxels are within the stride.
-// Obstacles and gaps between regions are ignored. Throws Error for options out of range and for a
+// Links regions whose nearest voxels are at most one stride apart, whatever is between them, and
+// finds the regions that the robot can reach. Throws Error for options out of range and for a
 // stride with more than 10 million links.
 RegionReach find_reach(const VoxelMap& map, const MapRegionResult& regions,
                        const RegionReachOptions& options = {});

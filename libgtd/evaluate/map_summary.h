@@ -20,24 +20,24 @@ namespace libgtd {
 
 inline constexpr std::array<double, 5> summary_quantiles{0.05, 0.25, 0.5, 0.75, 0.95};
 
-// Statistics of the evaluated voxels (VoxelMap::evaluated): above the zero plane, with the whole
-// window of the mask in the scanned area.
+// Statistics of the evaluated voxels (VoxelMap::evaluated), which have a score, are above the zero
+// plane, and have the whole window of the mask in the scanned area.
 struct MapSummary {
   std::size_t voxels = 0;  // all voxels of the map
   std::size_t evaluated = 0;
   std::size_t reaching_cutoff = 0;  // evaluated voxels with score >= graspability_threshold
   std::size_t graspable = 0;        // evaluated voxels that the map marks graspable
-  // Evaluated voxels with fewer occupied voxels in the mask (SSV) than TSV; nullopt if unknown.
+  // Evaluated voxels with SSV (number of occupied voxels in the mask) < TSV; nullopt if unknown.
   std::optional<std::size_t> below_solid_threshold;
-  // Quantiles summary_quantiles by nearest rank; empty if no voxel was evaluated.
+  // Scores at summary_quantiles (nearest rank); empty if no voxel was evaluated.
   std::vector<double> scores;
-  std::vector<double> solid_voxels;  // quantiles of SSV; empty if unknown
+  std::vector<double> solid_voxels;  // SSV at summary_quantiles; empty if unknown
   std::vector<ScoreBin> score_bins;  // areas are not set
 };
 
 struct MapSummaryOptions {
   double graspability_threshold = 0.8;
-  std::optional<double> solid_voxel_threshold{};  // TSV; nullopt: unknown
+  std::optional<double> solid_voxel_threshold{};  // TSV, minimum of SSV; nullopt: unknown
 };
 
 // Summarizes a map; `voxels` must be voxel_map_of(map).
@@ -49,8 +49,8 @@ MapSummaryOptions summary_options(const libmap::Manifest& manifest);
 
 struct SummarizedMap {
   std::string name;
-  libmap::Manifest manifest{};  // empty: parameters are empty cells
-  double cutoff = 0.8;          // minimum score for predicted graspable
+  libmap::Manifest manifest{};  // empty: the cells of parameters are empty
+  double cutoff = 0.8;          // minimum score that predicts graspable
   MapSummary summary{};
   std::optional<ExpectedMapResult> expected{};
 };
@@ -80,7 +80,7 @@ struct MapPair {
 MapPair compare_pair(const VoxelMap& first, const VoxelMap& second,
                      const libmap::Pose& first_terrain_from_second_terrain);
 
-// Returns one row per pair: numbers of voxels that both, one or none of the maps mark graspable,
+// Returns one row per pair: numbers of voxels that are graspable in both maps, one map or neither,
 // accuracy, Cohen's kappa, and the differences of the scores (second - first).
 libmap::Table pair_table(const std::vector<SummarizedMap>& maps, const std::vector<MapPair>& pairs);
 

@@ -25,15 +25,14 @@ struct MapSurface {
   double plan_area_m2(std::size_t n) const;
 };
 
-// Measures slope and area. Normals are from quadrics fitted to the voxel centers (curvature.h). The
-// area of a voxel is the inverse of the density of surface voxels: the sum of 1 - d^2 / r^2 over
-// the voxels at distances d < r (Epanechnikov kernel), divided by the mass of the kernel pi r^2 /
-// 2. The area is independent of the larger number of voxels on slopes, and of gaps in clouds with
-// fewer points than voxels. At a border, the mean of the weights is off-center. The surface is then
-// assumed to end at a straight edge at the distance that explains this mean, and the kernel is
-// integrated over the remaining part of the disc; areas at corners are up to a fifth too large.
-// Distances across the surface are reduced by half a voxel. A voxel with too few neighbors for a
-// normal counts as one horizontal face. Throws Error for a negative radius.
+// Measures slope and area. The normal of a voxel is from a quadric fitted to the voxel centers
+// (curvature.h). The area is K / sum w, with the weights w = 1 - d^2 / r^2 of the voxels at
+// distances d < r (Epanechnikov kernel; the part of d along the normal is reduced by half a voxel)
+// and the integral K = pi r^2 / 2 of w over a disc. More voxels on slopes and gaps in sparse clouds
+// do not affect the area. Near a border, the weighted mean of the voxels is off-center. The surface
+// is assumed to end at the straight edge that explains this mean, and K is integrated over the
+// remaining part of the disc; areas at corners are up to a fifth too large. Without a normal (too
+// few neighbors), the slope is NaN, the area that of a voxel face. Throws Error for a radius < 0.
 MapSurface measure_surface(const VoxelMap& map, const MapSurfaceOptions& options = {});
 
 }  // namespace libgtd

@@ -1,4 +1,4 @@
-// Makes table rows from named cells, and JSON from rates, for the writers of this folder.
+// Makes table rows from named cells, and JSON from rates, for the tables of libgtd/evaluate.
 #pragma once
 
 #include <nlohmann/json.hpp>

@@ -1,10 +1,10 @@
 // Evaluates scores against the results of a field test: ROC curve, rates at a cutoff with
 // confidence intervals, and the area under the curve.
 //
-// A location is predicted positive if score >= cutoff. A tolerance absorbs rounding: a score at
-// most one part in 2^24 below a given cutoff (the largest rounding of single precision) reaches the
-// cutoff, so that 0.8 reaches 0.8 in any representation. Scores are compared with each other
-// exactly, as in the curve at every distinct score and in the trapezoid area.
+// A location is predicted positive if score >= cutoff. A tolerance absorbs rounding: a score that
+// is below a given cutoff by at most one part in 2^24 (the largest rounding error of single
+// precision) reaches the cutoff. Comparisons of scores with each other, as in the curve through
+// every distinct score and in its area, have no tolerance.
 #pragma once
 
 #include <cstddef>
@@ -16,11 +16,10 @@
 namespace libgtd {
 
 struct RocOptions {
-  // Cutoffs of the ROC table and the upper sum, finite and ascending; default: tab. 5-1 to 5-3 of
-  // the thesis.
+  // Finite, ascending cutoffs of the ROC table and AreaUnderCurve::upper_sum; default: thesis.
   std::vector<double> cutoffs = {0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0};
   double rate_cutoff = 0.8;          // cutoff at which the rates are computed
-  int bootstrap_replicates = 10000;  // 0: no interval
+  int bootstrap_replicates = 10000;  // number of bootstrap samples; 0: no interval
   std::uint64_t bootstrap_seed = 1;
 
   void check() const;  // throws Error naming field, value and bound
@@ -76,15 +75,16 @@ struct RocPoint {
 struct AreaUnderCurve {
   // Area under the curve through every distinct score: the Mann-Whitney statistic, ties count 1/2.
   double trapezoid = 0.0;
-  // Area of the thesis: sum over the cutoffs of (FPR_k - FPR_k+1) * TPR_k, without the last cutoff.
-  // This sum is at least the trapezoid area over the same cutoffs, and at least `trapezoid` if
-  // `upper_sum_width` is 1. Negatives below the first or reaching the last cutoff do not count.
+  // Area of the thesis: sum of (FPR_k - FPR_k+1) * TPR_k over all cutoffs k but the last, with the
+  // false positive rate FPR and the true positive rate TPR. Not less than the trapezoid area over
+  // these cutoffs, nor than `trapezoid` if `upper_sum_width` is 1. Negatives below the first cutoff
+  // or reaching the last do not count.
   double upper_sum = 0.0;
   std::vector<double> upper_sum_terms;  // terms of the sum, one per cutoff
   double upper_sum_width = 0.0;         // FPR at the first cutoff - FPR at the last
   // Bootstrap interval of `trapezoid` (95 %, percentile), stratified: positives and negatives are
-  // resampled separately, so that every replicate has both classes. nullopt without replicates. If
-  // the scores separate the classes perfectly, it is (1, 1), which does not prove an area of 1.
+  // resampled separately, so that every replicate has both classes. nullopt without replicates. For
+  // perfectly separated classes, the interval is (1, 1), which does not prove an area of 1.
   std::optional<Interval> trapezoid_bootstrap_95;
 };
 
@@ -96,15 +96,15 @@ struct RocResult {
   std::string auc_note;               // reason for a missing area
   // Precision at the highest cutoff with recall >= 1/2; nullopt without positives.
   std::optional<double> precision_at_half_recall;
-  // Expected calibration error (Naeini et al. 2015), if all scores are in 0..1: mean over the
-  // locations of |fraction of positives - mean score| of the location's bin (width 0.1).
+  // Expected calibration error (Naeini et al. 2015), nullopt unless all scores are in 0..1: mean
+  // over the locations of |fraction of positives - mean score| in the location's bin (width 0.1).
   std::optional<double> calibration_error;
   std::size_t without_score = 0;  // locations without a score, e.g. not visible in the scan
   std::size_t without_label = 0;  // locations with a score but no label
 };
 
-// Evaluates one label and one score per location. A location without one of them, or with a score
-// of NaN, is skipped. The result does not depend on the number of threads. Throws Error if the
+// Evaluates one label and one score per location. Skips locations without a label, without a score,
+// or with a score of NaN. The result does not depend on the number of threads. Throws Error if the
 // lengths differ or an option is out of range.
 RocResult evaluate_roc(const std::vector<std::optional<bool>>& labels,
                        const std::vector<std::optional<double>>& scores,

@@ -40,26 +40,26 @@ std::optional<bool> parse_label(std::string_view text);
 // if the cell contains another text.
 std::optional<bool> label_at(const libmap::Table& table, std::size_t row, std::size_t column);
 
-// Returns the columns evaluated by default: columns with only numbers and empty cells, and at least
-// one number, except the label, ids (id, place, region, point, hold, i, j, k), positions and
-// lengths (x, y, z, *_m, *_mm, *_cm), found, border, edge, trial_spread and parameter_spread.
+// Returns the columns with at least one number and otherwise only numbers and empty cells, in the
+// order of the table. Skips the label, ids (id, place, region, point, hold, i, j, k), positions and
+// lengths (x, y, z, *_m, *_mm, *_cm), found, border, edge, trial_spread, parameter_spread.
 std::vector<std::string> default_score_columns(const libmap::Table& table,
                                                std::string_view label_column);
 
-// Evaluates the score columns of a table. Rows with an empty cell (unknown label, or location that
-// is not visible) are omitted from that column. Throws Error naming file, row and column for a
+// Evaluates the score columns of a table. For each score column, rows without a label or score
+// (e.g. a location that is not visible) are omitted. Throws Error naming file, row and column for a
 // missing column, a cell that is no label or number, and a table without score columns.
 TableEvaluation evaluate_table(const libmap::Table& table, const TableEvaluationOptions& options);
 
-// Returns one row per score column and cutoff. `at` is "cutoff" for given cutoffs, with terms of
-// the upper sum, or "score" for distinct scores. Undefined rates are empty cells.
+// Returns one row per score column and cutoff. The column `at` is "cutoff" for given cutoffs, which
+// have terms of the upper sum, or "score" for the distinct scores. Undefined rates are empty cells.
 libmap::Table roc_table(const TableEvaluation& evaluation);
 
 // Returns one row per score column and rate: count, total, value, and the Wilson 95 % interval.
 libmap::Table rates_table(const TableEvaluation& evaluation);
 
-// Returns one row per score column: case (its name), locations, cutoff, and the rates of
-// rates_table with four decimals, as in tables 5-4 and 5-5 of the thesis.
+// Returns one row per score column: case (name of the score column), locations, cutoff, and the
+// rates of rates_table with four decimals, as in tables 5-4 and 5-5 of the thesis.
 libmap::Table accuracy_table(const TableEvaluation& evaluation);
 
 // Returns all results except the ROC points. Undefined values are null.

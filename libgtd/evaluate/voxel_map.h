@@ -20,7 +20,7 @@ namespace libgtd {
 struct MapInfo {
   std::optional<VoxelLattice> lattice{};  // in the terrain frame; nullopt: unknown
   libmap::Pose terrain_from_map = libmap::Pose::Identity();        // from the frame of the points
-  double zero_plane_m = -std::numeric_limits<double>::infinity();  // in the terrain frame
+  double zero_plane_m = -std::numeric_limits<double>::infinity();  // minimum z, terrain frame
 };
 
 // Reads a MapInfo from a manifest of `graspmap score`; missing properties keep their defaults.
@@ -31,12 +31,12 @@ MapInfo map_info(const libmap::Manifest& manifest);
 struct VoxelMap {
   VoxelLattice lattice;                                            // in the terrain frame
   libmap::Pose terrain_from_map = libmap::Pose::Identity();        // from the frame of the points
-  double zero_plane_m = -std::numeric_limits<double>::infinity();  // -infinity: none
+  double zero_plane_m = -std::numeric_limits<double>::infinity();  // minimum z, terrain frame
   std::vector<Voxel> voxels;
   std::vector<float> scores;              // NaN: no score
-  std::vector<std::uint8_t> graspable;    // 1: set in the map, has a score, no obstacle
-  std::vector<std::uint8_t> border;       // 0 if the map has no such field
-  std::vector<std::uint8_t> obstacle;     // 1: obstacle or unreachable; 0 without such a field
+  std::vector<std::uint8_t> graspable;    // 1: marked graspable, has a score, no obstacle
+  std::vector<std::uint8_t> border;       // 1: window of the mask leaves the scanned area
+  std::vector<std::uint8_t> obstacle;     // 1: obstacle or unreachable ground
   std::vector<std::uint32_t> map_points;  // index of the point in the map
 
   std::size_t size() const { return voxels.size(); }
@@ -51,10 +51,11 @@ struct VoxelMap {
   }
 };
 
-// Converts a map with the fields "score" and "graspable". Voxel indices are the fields i, j and k,
-// or follow from a known lattice. An unknown lattice is fitted to the points in the terrain frame.
-// Points with coordinates that are not finite are skipped. Throws Error for a map without points, a
-// missing or invalid field, points that are not at voxel centers, and two points in one voxel.
+// Converts a map with the fields "score" and "graspable"; missing fields "border" and "obstacle"
+// are 0. Voxel indices are the fields i, j and k, or follow from a known lattice. An unknown
+// lattice is fitted to the points in the terrain frame. Skips points that are not finite. Throws
+// Error for a map without points, a missing or invalid field, and points that are not at voxel
+// centers or share a voxel.
 VoxelMap voxel_map_of(const libmap::PointCloud& map, const MapInfo& info = {});
 
 }  // namespace libgtd

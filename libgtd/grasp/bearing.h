@@ -14,9 +14,9 @@
 
 namespace libgtd {
 
-// asperities: spines engage with facets at random, by the section `engagement` of the gripper.
-// adhesion: a finger bears a tension T in drag direction (GripContact) up to a limit, and lateral
-// and pull-off forces up to a fraction of T (LORIS).
+// asperities: each spine engages with a random facet, by the section `engagement` of the gripper
+// file. adhesion: a finger bears a tension T in drag direction (GripContact) up to a limit, and
+// lateral and pull-off forces up to a fraction of T, as in the model of the LORIS gripper.
 enum class EngagementLaw { asperities, adhesion };
 const std::vector<std::pair<std::string, EngagementLaw>>& engagement_law_names();
 
@@ -29,20 +29,20 @@ struct EngagementOptions {
 void bind(libmap::ParameterTable& table, EngagementOptions& options);
 
 // Distribution of a contact's force over the spines of the contact. best: the distribution with the
-// largest force. equally: equal parts; if a spine slips, spines on steeper facets bear its part.
+// largest force. equally: equal parts; if spines slip, the spines on steeper facets bear all.
 enum class SpineSharing { best, equally };
 
-// Convex set of forces that a contact can exert on the gripper; it contains 0. A spine touches both
-// the ground and a facet. The force is the sum of one force from the ground plane and one force
-// from the facet, both at most `limit_n` and inside a pyramid with eight edges that approximates
-// Coulomb's friction cone. Forces in N, directions in the frame of the contacts.
+// Convex set of forces that a contact can exert on the gripper; it contains the zero force. A spine
+// touches both the ground and a facet. Its force is the sum of a force from the ground plane and a
+// force from the facet, both at most `limit_n` and inside a pyramid with eight edges that
+// approximates Coulomb's friction cone. Forces in N; vectors in the frame of the ground patch.
 class BearingContact {
  public:
   // Law `asperities`: `facet_angles_rad` are the inclinations of the facets, one per engaged spine;
   // {0} for a contact of a link. `limit_n` is the limit of one spine, or of the link.
   BearingContact(const GripContact& contact, std::vector<double> facet_angles_rad, double friction,
                  double limit_n);
-  // Law `adhesion`: `limit_n` is the limit of this finger.
+  // Law `adhesion`: `limit_n` is the maximum of T for this finger.
   BearingContact(const GripContact& contact, const EngagementOptions& options, double friction,
                  double limit_n);
 
@@ -51,9 +51,9 @@ class BearingContact {
   const Eigen::Vector3d& outward() const { return outward_; }  // away from the palm's axis
   std::size_t finger() const { return finger_; }
   bool is_link() const { return is_link_; }
-  std::size_t spines() const { return spines_; }  // engaged ones; link: 1, law adhesion: 0
+  std::size_t spines() const { return spines_; }  // engaged spines; link: 1, adhesion: 0
 
-  // Returns the force of the set with the maximum scalar product with `objective`, N.
+  // Returns the force of the set that has the maximum scalar product with `objective`, N.
   Eigen::Vector3d best_force(const Eigen::Vector3d& objective, SpineSharing sharing) const {
     return best_local_force(frame().transpose() * objective, sharing);
   }
@@ -64,10 +64,10 @@ class BearingContact {
     return frame;
   }
   // Return the maximum scalar product of a force of the set with `local`, a vector in the contact
-  // frame (frame()), and the force that attains it, in the frame of the contacts.
+  // frame (frame()), and the force with this product, in the frame of the patch.
   double max_local_product(const Eigen::Vector3d& local, SpineSharing sharing) const;
   Eigen::Vector3d best_local_force(const Eigen::Vector3d& local, SpineSharing sharing) const;
-  // Returns the edges of the cone of forces on the steepest facet (adhesion: of all forces), as
+  // Returns the edges of the cone of forces of the steepest facet (law adhesion: of the finger), as
   // unit vectors in order around the cone, for images.
   std::vector<Eigen::Vector3d> cone() const;
 
@@ -92,8 +92,8 @@ class BearingContact {
   std::vector<Eigen::Vector3d> adhesion_;  // edges for `limit_n_`; empty for asperities
 };
 
-// Draws at random which spines of a closed gripper's contacts engage, and their facets. Contacts
-// without an engaged spine are skipped. Law `adhesion` draws no random numbers. Requires `fingers`.
+// Draws at random which spines of a closed gripper's contacts engage, and with which facets. Skips
+// spine contacts of which no spine engages. Law adhesion is not random. Requires `fingers`.
 std::vector<BearingContact> draw_bearing(const std::vector<GripContact>& contacts,
                                          const Gripper& gripper, const EngagementOptions& options,
                                          libmap::RandomStream& random);

@@ -1,7 +1,7 @@
-// Closes one finger of a gripper, two links in a plane, on the profile of the ground until it makes
-// contact. The plane contains the palm's axis and has coordinates (r, z) in meters: r away from the
-// axis, z away from the ground, palm at z = 0. Contacts are computed in closed form, so that no
-// ridge is missed.
+// Closes one finger of a gripper, two links in a plane, on the profile of the ground until the
+// finger makes contact. The plane contains the palm's axis and has coordinates (r, z) in meters: r
+// away from the axis, z away from the ground, palm at z = 0. Contacts are computed in closed form,
+// so that narrow ridges are not missed.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,9 +13,9 @@
 
 namespace libgtd {
 
-// Dimensions in meters and radians. The joint is at (joint_radius_m, 0). With the angle t of the
-// proximal link from the palm's axis (proximal angle) and the curl c, the links point along
-// (sin t, -cos t) and (sin(t - c), -cos(t - c)).
+// Dimensions in meters and radians. The joint is at (joint_radius_m, 0). With the proximal angle t,
+// from the palm's axis to the proximal link, and the curl c, from this link inward to the distal
+// link, the links point along (sin t, -cos t) and (sin(t - c), -cos(t - c)).
 struct FingerGeometry {
   double joint_radius_m = 0.0;  // distance of the joint from the palm's axis
   double proximal_m = 0.0;      // length of the proximal link
@@ -48,8 +48,8 @@ enum class FingerOutcome { spines, link, end_stop };
 
 struct FingerClosing {
   FingerOutcome outcome = FingerOutcome::end_stop;
-  double proximal_rad = 0.0;  // after closing
-  double curl_rad = 0.0;      // after closing
+  double proximal_rad = 0.0;  // angle of the proximal link after closing
+  double curl_rad = 0.0;      // curl after closing
   // Contact points on the profile; nullopt without contact.
   std::optional<Eigen::Vector2d> spines;
   std::optional<Eigen::Vector2d> link;  // on the proximal link or the inner half of the distal link

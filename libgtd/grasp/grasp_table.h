@@ -9,7 +9,7 @@
 namespace libgtd {
 
 // Returns the names of the columns: graspable (1 or 0, the verdict for `evaluate`), probability,
-// forces, contacts and failures, then graspable_L and hold_probability_L for each further load L.
+// forces, contacts, failures; for each further load L (N) also graspable_L, hold_probability_L.
 std::vector<std::string> grasp_columns(const std::vector<double>& extra_loads_n = {});
 
 // Returns the cells of one location, one per column.

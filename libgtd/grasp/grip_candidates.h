@@ -1,5 +1,5 @@
 // Prefilter of locations for the virtual field test: excludes locations next to ground that is too
-// high for a gripper approaching from above, using the highest point of each column of the mesh.
+// high for a gripper that approaches from above. Uses the highest point of each column of the mesh.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,16 +13,15 @@
 namespace libgtd {
 
 struct CandidateOptions {
-  double cell_m = 0.01;          // width of the columns; larger for more than 1e8 columns
-  double start_height_m = 0.15;  // as in ClosingOptions
-  // Maximum fraction of the columns below the open gripper that rise above the start of the
-  // approach, so that a finger may start inside the ground.
+  double cell_m = 0.01;          // width of a column; increased to limit the mesh to 1e8 columns
+  double start_height_m = 0.15;  // height above the location at which the approach starts
+  // Maximum fraction of the columns below the open gripper that are higher than the start of the
+  // approach, where a finger may start inside the ground.
   double max_blocked_fraction = 0.15;
 };
 
-// Decides by the heights of the ground in columns. At least 99.8 % of the voxels that hold in 32 x
-// 8 trials are candidates (1500 voxels of each of three simulated sites; one site was not used to
-// choose the bounds).
+// At least 99.8 % of the voxels that hold in trials with 32 poses and 8 draws are candidates (1500
+// voxels of each of three simulated sites; one site was not used to choose the bounds).
 class GripCandidates {
  public:
   // Throws Error if the gripper has no `fingers`.

@@ -28,9 +28,9 @@ struct ClosedFinger {
 };
 
 // Contact of a finger with the ground, in the frame of the ground patch. The normal points out of
-// the ground, `outward` away from the palm's axis. `drag` (drag direction) is the direction along
-// the ground, in the plane of the finger, in which drive and load pull a spine: toward the axis on
-// level ground, upward on ground that falls outward. Unit vectors; `point` in m.
+// the ground, `outward` away from the palm's axis. `drag` is the direction along the ground, in the
+// plane of the finger, in which drive and load pull a spine: toward the axis on level ground,
+// upward on ground that falls outward. Unit vectors; `point` in m.
 struct GripContact {
   std::size_t finger = 0;
   bool by_spines = false;
@@ -41,8 +41,7 @@ struct GripContact {
 };
 
 // End of the approach. on_ground: the palm or an open finger rests on the ground. no_ground: there
-// is no ground below. blocked: the approach starts inside the ground, for example below the top of
-// a higher rock.
+// is no ground below. blocked: the approach starts inside the ground, e.g. below the top of a rock.
 enum class ApproachOutcome { on_ground, no_ground, blocked };
 
 struct ClosedGripper {
@@ -50,13 +49,13 @@ struct ClosedGripper {
   bool palm_touches = false;                              // else an open finger rests on the ground
   Eigen::Isometry3d patch_from_gripper = Eigen::Isometry3d::Identity();  // palm at z = 0, axis z
   std::vector<ClosedFinger> fingers;
-  std::vector<GripContact> contacts;  // by finger; contact of the link before contacts of spines
+  std::vector<GripContact> contacts;  // ascending by finger; link before spines
   double unseen = 0.0;                // mean over the fingers; 1 if there is no ground
 };
 
 struct ClosingOptions {
   double start_height_m = 0.15;    // height of the approach's start above the location
-  double normal_radius_m = 0.002;  // radius of the mean ground normal at a contact
+  double normal_radius_m = 0.002;  // the normal of a contact is a mean within this radius
   double max_unseen = 0.1;         // a finger with a larger ClosedFinger::unseen has no contacts
 };
 void bind(libmap::ParameterTable& table, ClosingOptions& options);

@@ -12,13 +12,13 @@
 
 namespace libgtd {
 
-// Triangles near a location, in the frame of the patch, m: location at the origin, z opposite to
-// the approach, x is the projection of the mesh's x axis (or y axis if z is nearly parallel to x).
+// Triangles near a location, in m in the frame of the patch: location at the origin, z opposite to
+// the approach, x along the projection of the mesh's x axis (y axis if x is nearly parallel to z).
 struct GroundPatch {
   Eigen::Isometry3d mesh_from_patch = Eigen::Isometry3d::Identity();
   std::vector<Eigen::Vector3d> vertices;
   std::vector<libmap::Triangle> triangles;
-  std::vector<Eigen::Vector3d> area_normals;  // length: twice the area
+  std::vector<Eigen::Vector3d> area_normals;  // normals of the triangles; length: twice the area
   std::vector<Eigen::Vector3d> centers;       // centers of bounding spheres of the triangles
   std::vector<double> radii;                  // radii of these spheres
   // Errors as in GroundErrors, and unit vertex normals; all three are empty for exact ground.
@@ -30,7 +30,7 @@ struct GroundPatch {
   void measure_triangles();
 
   // Returns the unit mean normal of the triangles within `radius_m` of a point, weighted by area
-  // and by a distance weight that is 0 at the radius; nullopt if there are no triangles.
+  // and by nearness (0 at the radius); nullopt if there are no triangles.
   std::optional<Eigen::Vector3d> normal_at(const Eigen::Vector3d& point, double radius_m) const;
 };
 

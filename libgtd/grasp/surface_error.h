@@ -23,19 +23,19 @@ void bind(libmap::ParameterTable& table, SurfaceErrorOptions& options);
 
 // Reads the vertex field `expected_error` of a mesh as written by `graspmap fuse` and `mesh` (m,
 // one standard deviation along the normal). A triangle counts as unseen if the error of a vertex
-// exceeds the bound or is not finite, or if the face field `filled` marks the triangle as closing a
-// hole of the scan. Throws Error if the field is missing or an error is negative.
+// exceeds max_error_m or is not finite, or if the face field `filled` marks the triangle as closing
+// a hole of the scan. Throws Error if the field is missing or an error is negative.
 GroundErrors errors_of(const libmap::TriangleMesh& mesh, const SurfaceErrorOptions& options);
 // Returns the same standard deviation `error_m` for all vertices; no errors if it is 0.
 GroundErrors constant_error(const libmap::TriangleMesh& mesh, double error_m,
                             const SurfaceErrorOptions& options);
 
-// Continuous random field: normally distributed with mean 0 and standard deviation 1, truncated at
-// 4. Random numbers at the nodes of a randomly shifted lattice of edge `length_m` are weighted by
-// nearness (trilinear) and divided by the root of the sum of the squared weights.
+// Continuous random field: normally distributed with mean 0 and standard deviation 1, truncated to
+// -4..4. Random numbers at the nodes of a randomly shifted lattice of edge `length_m` are weighted
+// by nearness (trilinear) and divided by the root of the sum of the squared weights.
 class RandomField {
  public:
-  // Nodes in `box` are cached, which makes at() fast inside it; the values are the same.
+  // `seed` and `key` select the field. Nodes in `box` are cached for speed, without other effect.
   RandomField(double length_m, std::uint64_t seed, std::uint64_t key,
               const Eigen::AlignedBox3d& box);
   double at(const Eigen::Vector3d& position);  // value of the field

@@ -12,9 +12,9 @@
 
 namespace libgtd {
 
-// Part of the scene, stored in the vertex field `scene_part`. engaged, link: contacts that bear a
-// force. idle: a finger that bears no force. cone: forces that a contact can bear on the steepest
-// facet. pull: arrow of the minimum holding force. load: arrow of the load, which ends with a disc.
+// Part of the scene, stored in the vertex field `scene_part`. engaged, link: contact of spines or
+// of a link that bears a force. idle: finger that bears no force. cone: forces that a contact can
+// bear on its steepest facet. pull: arrow of the minimum holding force. load: arrow with a disc.
 enum class ScenePart { ground, gripper, engaged, link, idle, cone, pull, load };
 
 struct ScenePartStyle {
@@ -23,7 +23,7 @@ struct ScenePartStyle {
   std::string text;  // label in the legend of an image; empty: not in the legend
 };
 
-// Returns one style per part, in order. The ground has this color if the mesh has none.
+// Returns one style per part, in order of ScenePart. Ground with vertex colors keeps them.
 const std::vector<ScenePartStyle>& scene_parts();
 
 // Returns the scene in the frame of the mesh, with vertex colors and the vertex field `scene_part`.

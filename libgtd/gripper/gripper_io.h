@@ -25,12 +25,12 @@ Gripper parse_gripper(const std::string& yaml, const std::string& file,
 // Returns the text of a gripper file, without the section `urdf`.
 std::string to_yaml(const Gripper& gripper);
 
-// Reads the gripper of this name from the toolkit's data (libmap::find_data_file), or from a file.
+// Reads the gripper `name`: a gripper in the toolkit's data (libmap::find_data_file), or a file.
 // Throws like read_gripper.
 Gripper find_gripper(const std::string& name,
                      const std::vector<std::pair<std::string, std::string>>& overrides = {});
 
-// Returns the path of the gripper file, and of the URDF that it names, if any.
+// Returns the paths of the gripper file and, if the file names a URDF, of this URDF.
 std::vector<std::filesystem::path> gripper_files(const std::filesystem::path& path);
 
 }  // namespace libgtd

@@ -1,5 +1,5 @@
-// Gripper mask: a stack of voxel layers around a pivot voxel that marks where ground supports the
-// gripper (solid) and where it obstructs it (void).
+// Gripper mask: a stack of voxel layers around a pivot voxel. Each voxel is solid (ground in it
+// supports the gripper) or void (ground in it obstructs the gripper).
 #pragma once
 
 #include <cstddef>
@@ -16,11 +16,11 @@ namespace libgtd {
 
 struct ClosingPath;  // closing_path.h
 
-// thesis: the author's program (eq. 3-6..3-16). envelope: the alternative design of the thesis
-// (5.1), which does not count voxels outside the reach of the fingers. climblab: mask of ClimbLab
-// v3, without void layers. corrected: as thesis, with an odd side centered on the pivot voxel and
-// exact radii. calibrated: the mask of `corrected`; the score is the hold probability
-// (closing_force.h).
+// thesis: as the program of the thesis's author (eq. 3-6..3-16). envelope: the alternative design
+// of the thesis (5.1), which does not count voxels outside the reach of the fingers. climblab: mask
+// of ClimbLab v3 (MATLAB), without void layers. corrected: as thesis, with an odd side centered on
+// the pivot voxel and exact radii. calibrated: the mask of `corrected`; the score is the hold
+// probability (closing_force.h).
 enum class Method { thesis, envelope, climblab, corrected, calibrated };
 
 const std::vector<std::pair<std::string, Method>>& method_names();
@@ -29,20 +29,19 @@ std::string name_of(Method method);  // as in flags and files
 struct GripperMaskOptions {
   Method method = Method::corrected;
   double voxel_size_m = 0.01;
-  int extra_void_layers = 1;  // H_add; not used by climblab
+  int extra_void_layers = 1;  // void layers on top of the mask (H_add); not used by climblab
   double load_n = 5.0;        // calibrated only: load of the hold probability, N
 };
 
 // Mask of side x side x layers voxels. z = 0 is the lowest layer, farthest from the palm; layers
-// with z >= solid_layers are the extra void layers on top. The pivot is at (pivot_xy, pivot_xy,
-// pivot_z).
+// with z >= solid_layers are the extra void layers on top. Pivot: (pivot_xy, pivot_xy, pivot_z).
 struct GripperMask {
   Method method = Method::corrected;           // mask layout; `corrected` also if calibrated
   std::shared_ptr<const ClosingPath> closing;  // set for Method::calibrated, else null
-  double closed_radius_m = 0.0;                // corrected only: of the circle of closed spines
-  double open_radius_m = 0.0;                  // corrected only: of the circle of open fingers
-  // corrected only: spines can hold where the ground drops outward by more than this between the
-  // circles of closed_radius_m and open_radius_m.
+  double closed_radius_m = 0.0;  // corrected only: radius of the circle of closed spines
+  double open_radius_m = 0.0;    // corrected only: radius of the circle of open fingers
+  // corrected only: spines can hold if the ground falls by more than this from the circle of
+  // closed_radius_m outward to the circle of open_radius_m.
   double min_fall_m = 0.0;
   double voxel_size_m = 0.01;
   double palm_diameter_m = 0.0;  // diameter of the gripper's palm
@@ -52,7 +51,7 @@ struct GripperMask {
   int pivot_xy = 0;
   int pivot_z = 0;
   std::vector<std::uint8_t> solid;    // M: 1 for solid, 0 for void, at index(x, y, z)
-  std::vector<std::uint8_t> counted;  // V: voxels counted in SSV and GSV
+  std::vector<std::uint8_t> counted;  // V: 1 if the voxel is counted in VoxelCounts
 
   std::size_t index(int x, int y, int z) const {
     return (static_cast<std::size_t>(z) * static_cast<std::size_t>(side) +
@@ -65,11 +64,11 @@ struct GripperMask {
 };
 
 // Makes a mask. Throws Error for a value out of range, calibrated without `fingers`, and voxel
-// sizes that give fewer than two solid layers, no ring around the center or more than 2^28 voxels.
+// sizes that give fewer than two solid layers, a side below 3 voxels or more than 2^28 voxels.
 GripperMask make_gripper_mask(const Gripper& gripper, const GripperMaskOptions& options);
 
-// Returns the mask as text: comment, "side side layers", then for each layer from the lowest "z 0"
-// and `side` lines (x) of `side` characters (y), '1' for solid.
+// Returns the mask as text: comment, "side side layers", then for each layer, from the lowest, "z
+// N" and `side` lines (x) of `side` characters (y), '1' for solid.
 std::string to_text(const GripperMask& mask);
 
 // Returns a point at the center of each solid voxel in meters, pivot at the origin, z toward the

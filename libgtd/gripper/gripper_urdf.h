@@ -16,9 +16,9 @@ namespace libgtd {
 struct UrdfMapping {
   std::string file;          // path of the URDF, relative to the gripper file
   std::string palm_link;     // link with the origin at the center of the palm's face
-  std::string palm_axis;     // X,Y,Z in the frame of this link, toward the ground
-  std::string finger_joint;  // revolute, palm to finger; limits: open and closed
-  std::string spine_joint;   // finger to spine carrier; revolute or fixed
+  std::string palm_axis;     // direction X,Y,Z toward the ground, in the frame of palm_link
+  std::string finger_joint;  // revolute joint from palm to finger; limits: open, closed
+  std::string spine_joint;   // joint from finger to spine carrier, revolute or fixed
   std::string tip_link;      // link with the origin at the spine tip
 };
 
@@ -32,10 +32,12 @@ void bind(libmap::ParameterTable& table, UrdfMapping& mapping);
 //   closing_height_mm         at the limits of the finger joint
 //   fingers.curl_deg          with the spine joint at rest: 0, or the limit nearest to 0
 //   fingers.curl_limit_deg    if the spine joint has limits
-// urdfdom runs in a separate process. Throws Error if a joint or link is missing, links form a
-// cycle, another joint between palm and tip is movable, a finger joint is not revolute or its axis
-// is not tangential to the circle of joints, fingers are not evenly spaced or differ by more than
-// 0.1 mm or 0.1 degrees, or a length is above 1 m or an angle above 2 pi.
+// Runs urdfdom in a separate process. Throws Error if
+// - a joint or link is missing, or links form a cycle,
+// - a joint between palm and tip is movable, except finger joint and spine joint,
+// - a finger joint is not revolute, or its axis is not tangential to the circle of joints,
+// - fingers are not evenly spaced, or differ by more than 0.1 mm or 0.1 degrees, or
+// - a length is more than 1 m, or an angle more than 2 pi.
 std::vector<std::pair<std::string, std::string>> read_urdf_dimensions(const std::string& xml,
                                                                       const UrdfMapping& mapping);
 

@@ -13,7 +13,7 @@ namespace libgtd {
 class ColumnHeights {
  public:
   static constexpr double unknown = -std::numeric_limits<double>::infinity();
-  static constexpr int gap_columns = 3;  // passes of filling gaps
+  static constexpr int gap_columns = 3;  // number of passes that fill gaps
 
   // The height of a column is that of its highest voxel. In each of gap_columns passes, a column
   // without voxels gets the mean height of its known neighbors (8-neighborhood).

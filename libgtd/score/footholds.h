@@ -17,7 +17,7 @@ struct FootholdOptions {
   // Only graspable points become footholds: hold_probability of at least 0.5, or the field
   // `graspable` if the map has no hold_probability.
   bool graspable_only = true;
-  bool border = false;             // includes points at the border of the scanned area
+  bool border = false;             // true: points at the border of the scanned area are candidates
   double surface_radius_m = 0.05;  // radius of the normal and curvature fits, > 0
   int max_count = 0;               // maximum number of footholds; 0: no limit
 };
@@ -29,15 +29,15 @@ struct FootholdFrame {
 };
 
 struct Foothold {
-  std::size_t map_point = 0;  // index in the map
+  std::size_t map_point = 0;  // index of the point in the map
   double score = 0.0;         // hold_probability if the map has this field, else the score
   double force_n = 0.0;       // holding_force_n of the map, else 0; decides between equal scores
-  // Mean score of the map points within half of the separation, weighted by the Epanechnikov
-  // kernel. Decides between equal scores and forces: the middle of a plateau precedes its border.
+  // Mean score of the map points within separation_m / 2, weighted by the Epanechnikov kernel.
+  // Decides between equal scores and forces: the middle of a plateau precedes its border.
   double mean_score = 0.0;
-  std::size_t graspable_points = 0;  // graspable points within half of the separation
-  // Unit surface normal, outward (on the side of the map's normals, or else up); principal
-  // curvatures, 1/m (curvature.h); angle between normal and up. NaN if the fit failed.
+  std::size_t graspable_points = 0;  // graspable points within separation_m / 2
+  // Fitted surface, NaN if the fit failed: outward unit normal (on the side of the map's normals,
+  // or else of up), principal curvatures k1 >= k2, 1/m (curvature.h), angle between normal and up.
   Eigen::Vector3f normal = Eigen::Vector3f::Zero();
   float k1 = 0.0F;
   float k2 = 0.0F;
@@ -49,17 +49,16 @@ struct Foothold {
 
 struct FootholdResult {
   std::vector<Foothold> footholds;  // best first
-  std::size_t candidates = 0;       // map points that meet the options
+  std::size_t candidates = 0;       // map points that can become footholds
   std::size_t at_border = 0;        // points excluded only because of the border
 };
 // Names each result for manifests and tables (libmap/core/result_table.h).
 void describe(libmap::ResultTable& table, const FootholdResult& result);
 
-// Finds local maxima of the score by non-maximum suppression: the best candidate becomes a
-// foothold, and candidates within the separation from it are dropped; this repeats. Points that are
-// equal in all criteria keep the order of the map. Throws Error for an empty map, a missing
-// field that the options need ("score", "graspable", "border"), options out of range, and an `up`
-// of length zero.
+// Finds local maxima of the score by non-maximum suppression: the best candidate becomes a foothold
+// and candidates within separation_m of this foothold are dropped, until none is left. Points that
+// are equal in all criteria keep the order of the map. Throws Error for an empty map, a missing
+// field that the options need ("score", "graspable", "border"), options out of range, and `up` = 0.
 FootholdResult find_footholds(const libmap::PointCloud& map, const FootholdOptions& options = {},
                               const FootholdFrame& frame = {});
 

@@ -1,5 +1,6 @@
-// Predicts the distribution of a gripper's holding force at a voxel over trials and parameter sets
-// from the capacities of the resting columns. Private to libgtd/score.
+// Predicts the distribution of a gripper's holding force at a voxel over trials and parameter sets,
+// from the capacities of the columns near the voxel on which the gripper may rest. Capacity: force
+// of the gripper at rest, divided by the closing force of all fingers. Private to libgtd/score.
 #pragma once
 
 #include <algorithm>
@@ -12,20 +13,20 @@
 
 namespace libgtd {
 
-// Bounds the capacities C (force in total closing forces) of `sets` parameter sets by that of
-// lateral pulls, and computes their logarithms: 0 if C is not above the floor of capacities.
+// Limits the capacities C of a column, one per parameter set, smoothly to the capacity of a lateral
+// pull. Writes ln C to `logs`, or 0 if C is too small for a force.
 void bound_capacities(float* capacities, float* logs, std::size_t sets);
 
-// Weighted sums over the resting columns of a voxel.
+// Sums over the resting columns of a voxel, each column with its weight.
 struct RestSums {
-  double contact = 0.0;  // fraction of the azimuths with spine contact on the weakest side
+  double contact = 0.0;  // fraction of azimuths with spine contact, on the weakest side
   double rise_m = 0.0;   // height of the palm above the voxel
-  double tilt_m = 0.0;   // imbalance of the depths of the contacts
-  double weights = 0.0;  // > 0
+  double tilt_m = 0.0;   // norm of the mean of (depth times outward direction) of contacts
+  double weights = 0.0;  // sum of the weights, > 0
 };
 
-// Sums over columns per parameter set: weights, ln C and its square of columns with a capacity, and
-// C of all columns.
+// Weighted sums over the columns, one per parameter set. capacities: sum of C. weights, logs,
+// squares: sums of 1, ln C and (ln C)^2 over the columns in which C is not too small.
 struct SetSums {
   std::vector<float> weights, logs, squares, capacities;
 
@@ -36,12 +37,13 @@ struct SetSums {
   }
 };
 
-// Distribution of the force per set: > 0 with `probability`; its logarithm is then beta(4, 2).
+// Distribution of the force F per parameter set: F > 0 with `probability`; ln F is then beta(4, 2)
+// distributed with mean log_force and standard deviation `spread` = 0.178 / scale.
 struct SetForces {
-  std::vector<float> probability, log_force, spread, scale;  // scale: beta_spread / spread
+  std::vector<float> probability, log_force, spread, scale;
 };
 
-// Logarithms of forces, or values at these forces.
+// Logarithms of 48 forces, or values of a function at these forces.
 using ForceGrid = std::array<float, 48>;
 
 class ForceDistribution {
@@ -58,9 +60,9 @@ class ForceDistribution {
 
  private:
   const ClosingPath& path_;
-  std::vector<float> weights_;    // of the parameter sets
+  std::vector<float> weights_;    // weights of the parameter sets
   std::vector<float> log_scale_;  // ln of the closing force of all fingers, N
-  ForceGrid log_forces_{};        // of equally spaced forces, then of the load
+  ForceGrid log_forces_{};        // 47 equally spaced values, then ln(load)
   SetSums sums_;
   SetForces forces_;
 };

@@ -16,14 +16,14 @@ struct MaskChunk {
   alignas(64) std::uint16_t bits[columns];
 };
 
-// Lattice of a tilted mask, in voxels of the terrain's lattice; the pivot is in cell (0, 0, 0).
+// Lattice of a tilted mask, in units of the terrain's voxels; its voxel (0, 0, 0) is the pivot.
 struct TiltedLattice {
-  double origin[3];   // center of cell (0, 0, 0)
+  double origin[3];   // center of voxel (0, 0, 0)
   double axes[3][3];  // axes[n] is axis n
 };
 
-// Box of tilted voxels that starts at `low`, and the strides of the voxel numbers. A stride of 0
-// for layers gives all voxels of a column the same number.
+// Box of tilted voxels with the lowest index `low`. The number of the voxel with index v is the sum
+// of (v[a] - low[a]) * stride[a] over the axes a; with stride[2] = 0, it is the number of a column.
 struct TiltedBox {
   int low[3];
   int size[3];
@@ -46,18 +46,17 @@ struct MatchingLoops {
   // sums[n] += entering[n] - leaving[n].
   void (*slide)(std::uint16_t* sums, const std::uint16_t* entering, const std::uint16_t* leaving,
                 std::size_t count);
-  // Computes the sum of `length` values of `sums` from each index in `starts` on. Reads up to 64
-  // bytes beyond.
+  // Sums `length` values of `sums` from each index in `starts`. Reads up to 64 bytes more.
   void (*add_runs)(const std::uint16_t* sums, const std::uint32_t* starts, std::size_t start_count,
                    std::size_t length, std::uint32_t* totals);
 
   // Writes the voxel number of each point inside the box, in the order of the points, and returns
-  // the number of values. `points` are coordinates, one array per axis. Up to a full set of lanes
-  // beyond `count` is read and included in the result, so that some points may occur twice; `cells`
-  // needs the same room.
+  // the number of values. `points` are coordinates, one array per axis. Up to `lanes` points beyond
+  // `count` are read and included in the result, so that some points may occur twice; `cells` needs
+  // this room, too.
   std::size_t (*find_cells)(const double* const points[3], std::size_t count,
                             const TiltedLattice& lattice, const TiltedBox& box, int* cells);
-  // Returns the number of common bits of two sets.
+  // Returns the number of bits that are set in both `a` and `b`.
   std::uint32_t (*count_common)(const std::uint64_t* a, const std::uint64_t* b, std::size_t words);
 };
 

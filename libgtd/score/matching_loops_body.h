@@ -4,8 +4,8 @@
 using Words [[gnu::vector_size(GRASPMAP_REGISTER)]] = std::uint64_t;
 using Numbers [[gnu::vector_size(GRASPMAP_REGISTER)]] = std::uint32_t;
 
-// add_bits adds the population counts of words, or of bytes, of at most 8 each. At most max_added
-// registers are summed before widen converts the counts to words.
+// add_bits adds the number of set bits of each word, or of each byte (at most 8), to `counts`.
+// After at most max_added calls, widen must convert byte counts to word counts.
 #if GRASPMAP_REGISTER == 64
 
 constexpr std::size_t max_added = std::size_t{1} << 32;

@@ -22,14 +22,14 @@ struct ObstacleOptions {
   double normal_radius_m = 0.07;
 };
 
-// Maximum index difference of connected voxels along each axis. It bridges gaps of a cloud.
+// Maximum difference of i, j and k of connected voxels; 2 bridges small gaps of a cloud.
 inline constexpr int obstacle_link_voxels = 2;
 
 // Returns the class of each voxel. The voxels must ascend by i, j, k and form a complete map,
 // because a face may cross tiles.
-// - Connected steep voxels form a face. Its foot and top are the lowest and highest voxel within
-//   the normal radius of its voxels. The face is an obstacle if the top is more than height_m above
-//   the foot.
+// - Connected steep voxels form a face. The foot and top of a face are the lowest and highest
+//   voxels within normal_radius_m of the face. A face is an obstacle if its top is more than
+//   height_m above its foot.
 // - Connected voxels outside obstacle faces form a region. The region with the most voxels is the
 //   ground (of equal ones, the region of the first voxel). Another region is unreachable if one of
 //   the voxels is connected to an obstacle face in the upper half of the face, or more than

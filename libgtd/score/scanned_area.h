@@ -13,7 +13,7 @@ namespace libgtd {
 // Half of the maximum width of gaps that are closed.
 inline constexpr int scan_gap_voxels = 3;
 
-// Set of columns as a summed-area table (Crow 1984), for counting the set columns of a rectangle.
+// Set of columns as a summed-area table (Crow 1984), which counts the set columns in a rectangle.
 class ColumnSums {
  public:
   explicit ColumnSums(const TileBounds& bounds);  // no column is set
@@ -42,7 +42,7 @@ TileBounds expanded(const TileBounds& bounds, int below, int above);
 TileBounds columns_around(int i, int j, int below, int above);
 
 // Returns the columns of `bounds` that are not in the morphological closing (by a square of
-// scan_gap_voxels to each side) of the occupied columns. `occupied` must cover twice that distance
+// scan_gap_voxels to each side) of the occupied columns. `occupied` must extend 2 * scan_gap_voxels
 // beyond `bounds`.
 ColumnSums unscanned_columns(const ColumnSums& occupied, const TileBounds& bounds);
 ColumnSums unscanned_columns(const VoxelGrid& grid, const TileBounds& bounds);

@@ -28,11 +28,11 @@ struct Scenario {
   // which also predicts forces on level ground.
   std::optional<double> zero_plane_m;
   bool interpolation = false;                    // fills gaps (interpolation.h)
-  double interpolation_max_edge_m = 0.0;         // maximum triangle edge in plan; 0: no limit
-  std::optional<double> graspability_threshold;  // nullopt: 0.8; not used by calibrated
-  double probability_threshold = 0.5;            // calibrated only
-  double curvature_radius_m = 0.09;              // 0: convexity is not evaluated
-  double intersection_distance_m = 0.01;         // from a convex voxel to a convex point
+  double interpolation_max_edge_m = 0.0;         // maximum triangle edge in x-y; 0: no limit
+  std::optional<double> graspability_threshold;  // minimum score (not calibrated); nullopt: 0.8
+  double probability_threshold = 0.5;            // minimum score of method calibrated
+  double curvature_radius_m = 0.09;              // radius of estimates; 0: no convexity
+  double intersection_distance_m = 0.01;         // voxels this close to a convex point are convex
   Orientation orientation = Orientation::plane;
   double normal_radius_m = 0.0;  // radius of normal fits; 0: palm diameter of the gripper
   // Minimum rise of a steep face that counts as an obstacle; ground above it is unreachable. 0:
@@ -41,11 +41,11 @@ struct Scenario {
   double obstacle_slope_deg = 60.0;  // minimum slope of a steep face; 0: no obstacles
   double tile_size_m = 1.0;          // width of a tile
 
-  // Return the values that the method uses: height of the zero plane (terrain frame, m; -infinity
-  // with method calibrated), and minimum score of a graspable voxel.
+  // Return the values for the method: minimum height of a target (terrain frame, m; -infinity for
+  // calibrated), and minimum score of a graspable voxel.
   double lowest_target_m() const;
   double score_threshold() const;
-  // Sets zero_plane_m and graspability_threshold to these values, so that a manifest contains them.
+  // Sets zero_plane_m and graspability_threshold to the values of these functions, for a manifest.
   void set_defaults();
   bool evaluates_obstacles() const { return obstacle_height_m > 0.0 && obstacle_slope_deg > 0.0; }
   bool fits_normals() const { return orientation == Orientation::surface || evaluates_obstacles(); }

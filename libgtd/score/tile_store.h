@@ -31,7 +31,7 @@ struct StoredTile {
   TileNumber number;
   Voxel min;  // box of the scored voxels
   Voxel max;
-  std::uint64_t voxels = 0;  // scored; tiles without any have no file and are not listed
+  std::uint64_t voxels = 0;  // scored voxels; a tile without them has no file and is not listed
   std::uint64_t occupied_voxels = 0;
   std::uint64_t border_voxels = 0;
   std::uint64_t graspable_voxels = 0;
@@ -43,7 +43,7 @@ struct StoredTile {
 struct TileStoreIndex {
   std::string key;       // hash of parameters and inputs; identifies the map
   VoxelLattice lattice;  // in the terrain frame
-  int tile_voxels = 0;   // width of a tile
+  int tile_voxels = 0;   // width of a tile, in voxels
   Voxel min;             // box of the terrain's voxels
   Voxel max;
   MapFrame frame = MapFrame::terrain;  // frame of the points in the tile files
@@ -60,9 +60,8 @@ struct TileStoreIndex {
   std::uint64_t graspable_voxels() const;
 };
 
-// Recomputes the positions of the points of `tile` from the fields i, j, k in full precision. Tile
-// files contain single precision if this is enough for the tile alone. Throws Error for a cloud
-// without these fields.
+// Recomputes the positions of the points of `tile` from the fields i, j, k in double precision,
+// because tile files may contain single precision. Throws Error for a cloud without these fields.
 void restore_positions(const TileStoreIndex& index, libmap::PointCloud& tile);
 
 }  // namespace libgtd

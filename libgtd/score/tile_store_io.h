@@ -25,22 +25,22 @@ namespace libgtd {
 // Returns true if the name ends with ".tiles" or ".tiles/".
 bool is_tile_store_name(const std::filesystem::path& path);
 
-// Reads the index. Throws Error naming the file if there is no store, no index (the message
-// contains the number of finished tiles of an unfinished run), or an index of another format or
-// version or with inconsistent content.
+// Reads the index. Throws Error naming the file if there is no store or no index, or if the index
+// has another format or version or inconsistent content. For an unfinished run, the message
+// contains the number of finished tiles.
 TileStoreIndex read_tile_store(const std::filesystem::path& store);
 
-// Reads the index. Writes it first if it is missing although all tiles are done (possible if runs
-// that share the tiles end at the same time). Throws like read_tile_store.
+// Reads the index, after writing it if it is missing although all tiles are finished (possible if
+// runs that share the tiles end at the same time). Throws like read_tile_store.
 TileStoreIndex finish_tile_store(const std::filesystem::path& store);
 
-// Returns the path of a tile file. Throws Error naming it if it is missing or differs in size.
+// Returns the path of a tile file. Throws Error naming a file that is missing or differs in size.
 std::filesystem::path tile_path(const std::filesystem::path& store, const StoredTile& tile);
 
 // As tile_path, but also throws Error if the SHA-256 of the file differs from the index.
 std::filesystem::path checked_tile_path(const std::filesystem::path& store, const StoredTile& tile);
 
-// Input file of the terrain. Size and modification time identify it without reading it.
+// Input file of the terrain. Size and modification time identify the file without reading it.
 struct TerrainFile {
   libmap::ManifestInput input;
   std::int64_t modified_ns = 0;  // modification time
@@ -51,8 +51,8 @@ struct TerrainFile {
 
 struct TilePlan {
   std::string key;                                     // hash of parameters and inputs
-  TileStoreIndex index;                                // without tiles and counts of tiles
-  Eigen::Vector3d centroid = Eigen::Vector3d::Zero();  // centroid of the fitted plane
+  TileStoreIndex index;                                // without tiles and their counts
+  Eigen::Vector3d centroid = Eigen::Vector3d::Zero();  // of the fitted plane, m, input frame
   bool has_plane = false;
   std::vector<TerrainFile> terrain;
   std::vector<StoredTile> kept;  // finished tiles of an earlier plan, which remain valid
@@ -68,7 +68,7 @@ class MapTileStore : public libmap::TileStore {
 
   // Returns the finished tiles of all shares.
   std::map<TileNumber, StoredTile> done(const TilePlan& plan) const;
-  // Returns the tiles that are not finished or have a changed file.
+  // Returns the elements of `tiles` that are not finished or have a changed or missing file.
   std::vector<TileNumber> missing(const TilePlan& plan, const std::vector<TileNumber>& tiles) const;
 
   struct Completion {
@@ -78,8 +78,8 @@ class MapTileStore : public libmap::TileStore {
   };
   // Counts the finished tiles of the plan; if all are finished, makes the index.
   Completion complete(const TilePlan& plan) const;
-  // Writes the index and, before it, a manifest beside the store: the manifest of the index with
-  // times and threads of `run`. Does nothing if the index exists.
+  // Writes the manifest of the map (index.manifest with times and threads of `run`) beside the
+  // store, then the index. Does nothing if the index exists.
   void write_index(const TileStoreIndex& index, const libmap::Manifest& run = {}) const;
 };
 

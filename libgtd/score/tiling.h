@@ -1,6 +1,6 @@
-// Scores the voxels of a terrain with an upright gripper mask, tile by tile. A tile depends on the
-// voxels of the tile and of a margin around the tile. The result does not depend on the tile size,
-// the order of the tiles or the number of threads.
+// Scores the voxels of a terrain with an upright gripper mask, tile by tile. The scores of a tile
+// depend on the voxels of the tile and of a margin around it, but not on the tile size, the order
+// of the tiles or the number of threads.
 #pragma once
 
 #include <cstddef>
@@ -13,9 +13,8 @@
 
 namespace libgtd {
 
-// Returns the tiles that cover the box of the grid, in rows along j. Borders inside the box are
-// multiples of `tile_voxels` on the lattice and do not depend on the cloud. Throws Error for more
-// than 2^24 tiles.
+// Returns the tiles that cover the box of the grid, ascending by i, then j. Borders between tiles
+// are at multiples of `tile_voxels` for any cloud. Throws Error for more than 2^24 tiles.
 std::vector<TileBounds> make_tiles(const VoxelGrid& grid, int tile_voxels);
 
 // Distribution of the holding force (weakest direction) at a voxel over trials and parameter sets.
@@ -31,8 +30,8 @@ struct ForceEstimate {
 struct ScoredVoxel {
   Voxel voxel;
   VoxelCounts counts;
-  double score = 0.0;                  // score_percent / 100 * outward_fall_fraction, or
-                                       // hold_probability (calibrated)
+  double score = 0.0;                  // calibrated: hold_probability; others:
+                                       // score_percent / 100 * outward_fall_fraction
   bool border = false;                 // the window of the mask leaves the scanned area
   ForceEstimate force{};               // calibrated only
   double outward_fall_fraction = 1.0;  // corrected only, see outward_fall_fractions
@@ -43,7 +42,7 @@ struct ScoringOptions {
   libmap::InstructionSet instructions = libmap::best_instruction_set();  // affects speed only
 };
 
-// Scores every pivot of the tiles; results are ascending by voxel, each once.
+// Scores every pivot (pivots_in) of the tiles. Results ascend by voxel, each voxel once.
 std::vector<ScoredVoxel> score_tiles(const VoxelGrid& grid, const GripperMask& mask,
                                      const std::vector<TileBounds>& tiles,
                                      const ScoringOptions& options,

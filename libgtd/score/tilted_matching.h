@@ -35,17 +35,19 @@ class TiltedTerrain {
   TiltedTerrain(const std::vector<Eigen::Vector3d>& points, const VoxelLattice& lattice,
                 const GripperMask& mask);
 
-  // Returns the counts of each pivot. A tilted voxel is occupied if it contains a point, so that a
-  // surface counts the same in any orientation. Counts depend only on the points within reach, not
-  // on the order of the points.
+  // Returns the counts of each pivot. A tilted voxel is occupied if it contains a point; the counts
+  // of a surface thus do not depend on its orientation. Counts depend only on the points within
+  // tilted_reach_voxels, not on their order.
   std::vector<VoxelCounts> match(const std::vector<TiltedPivot>& pivots,
                                  libmap::Progress& progress = libmap::no_progress()) const;
 
-  // Returns 1 for each pivot with a mask that extends beyond the scanned area, else 0: if a
-  // position of the mask's square on the tangent plane is in an unscanned column (scanned_area.h)
-  // and has no points on the line through it along the axis of the mask. This line is as long as
-  // the square plus closed gaps, and gaps between such lines are closed, too. Empty space beside a
-  // rock is therefore no border. `unscanned` must contain the columns within tilted_reach_voxels.
+  // Returns 1 for each pivot with a mask that extends beyond the scanned area, else 0. A pivot has
+  // 1 if a position of the mask's square on the tangent plane
+  // - is in an unscanned column (scanned_area.h), and
+  // - has no points on the line through it along the axis of the mask. The line is as long as the
+  //   square plus closed gaps; gaps between lines with points are closed, too.
+  // Empty space beside a rock is therefore no border. `unscanned` must contain the columns within
+  // tilted_reach_voxels.
   std::vector<std::uint8_t> find_border_pivots(const std::vector<TiltedPivot>& pivots,
                                                const ColumnSums& unscanned) const;
 
@@ -62,18 +64,17 @@ class TiltedTerrain {
 std::vector<Voxel> pivots_of(const VoxelGrid& grid, const GripperMask& mask,
                              const std::vector<TileBounds>& tiles);
 
-// Returns the surface normal at the center of each voxel. It points to the side of the normals of
-// the points in the voxel, or of +z if the points have no normals; NaN as in SurfaceNormal.
+// Returns the surface normal at the center of each voxel. The normal is on the side of the normals
+// of the points in the voxel, or of +z if they have none; NaN as in SurfaceNormal.
 std::vector<SurfaceNormal> normals_at(const std::vector<Voxel>& voxels,
                                       const libmap::PointCloud& surface,
                                       const VoxelLattice& lattice, double radius_m);
 
-// Scores the pivots `voxels` with the mask along `normals`, or along +z for a voxel without a
-// normal. The center of the tilted voxel is on the normal through the center of the voxel, at the
-// mean height of the points of the voxel along the normal. The top layer of the mask thus contains
-// a flat surface completely, in any orientation and position relative to the voxels. Without a
-// normal, the pivot is the voxel itself and has the counts of the upright mask. `surface` contains
-// the points from which the voxels were made.
+// Scores the pivots `voxels` with the mask along `normals`. The center of a pivot's tilted voxel is
+// on the normal through the center of the voxel, at the mean height of the voxel's points along the
+// normal. The top layer of the mask thus contains a flat surface completely, in any orientation and
+// position relative to the voxels. For a voxel without a normal, the mask is along +z and the pivot
+// is the voxel itself. `surface` contains the points from which the voxels were made.
 std::vector<ScoredVoxel> score_on_surface(const std::vector<Voxel>& voxels,
                                           const std::vector<SurfaceNormal>& normals,
                                           const libmap::PointCloud& surface, const VoxelGrid& grid,

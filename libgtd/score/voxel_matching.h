@@ -15,14 +15,14 @@ namespace libgtd {
 
 // Numbers of occupied terrain voxels in the window of the mask around a pivot.
 struct VoxelCounts {
-  std::uint32_t ssv = 0;  // in the counted volume of the mask (GripperMask::counted)
-  std::uint32_t gsv = 0;  // also solid in the mask
+  std::uint32_t ssv = 0;  // occupied voxels that GripperMask::counted selects
+  std::uint32_t gsv = 0;  // voxels of ssv that are solid in the mask
   bool operator==(const VoxelCounts&) const = default;
 };
 
-// Returns the pivots of `grid` in `tile` as ascending indices in grid.voxels. Methods other than
-// `corrected` exclude a border of half a mask: with h = mask.pivot_xy and NX columns along i,
-// pivots have h+1 <= i <= NX-h-2 (i relative to the first column), and j likewise.
+// Returns the pivots (voxels to be scored) of `grid` in `tile` as ascending indices in grid.voxels.
+// Method corrected: all. Other methods exclude a border of half a mask: with h = mask.pivot_xy and
+// NX columns along i, pivots have h+1 <= i <= NX-h-2 (i from the first column); j likewise.
 std::vector<std::size_t> pivots_in(const VoxelGrid& grid, const GripperMask& mask,
                                    const TileBounds& tile);
 
@@ -38,11 +38,12 @@ std::vector<VoxelCounts> match_voxels(
 // Returns the number of 64-byte chunks of the mask that are compared at each pivot.
 std::size_t solid_chunks(const GripperMask& mask);
 
-// Returns the score in percent (eq. 3-17, 3-18): 100 GSV / SSV; minus 100 (TSV - SSV) / TSV if
-// SSV <= TSV and the quotient is >= 60, where TSV is `solid_voxel_threshold`; 0 if SSV is 0. For
-// `thesis` and `envelope`, the quotient has single precision as in the author's program (which then
-// truncates it to an integer), and the score can be negative. For `corrected`, it has double
-// precision, and the score is at least 0. `climblab` has no reduction.
+// Returns the score in percent (eq. 3-17, 3-18) with TSV = `solid_voxel_threshold`; 0 if SSV is 0:
+// - q = 100 GSV / SSV. climblab: the score is q.
+// - Others: if SSV <= TSV and q >= 60, the score is q - 100 (TSV - SSV) / TSV, else q.
+// - thesis, envelope: q has single precision as in the author's program (which then truncates the
+//   score to an integer); the score can be negative.
+// - corrected: q has double precision, and the score is at least 0.
 double score_percent(const VoxelCounts& counts, Method method, int solid_voxel_threshold);
 
 // Returns true if a voxel is graspable by the counts: the score (0..1) is >= the threshold or, with

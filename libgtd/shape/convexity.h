@@ -12,21 +12,21 @@
 namespace libgtd {
 
 struct ConvexityOptions {
-  // Corrected: minimum of both principal curvatures of a convex point, 1/m, away from the outside.
-  // nullopt: 0.1 / radius of the estimate (1.1/m for 0.09 m), so that the surface falls off by a
-  // twentieth of the radius (4.5 mm for 0.09 m) at this distance from a convex point. Noise of 2 mm
-  // on 200 neighbors within 0.09 m bends a plane by 0.17/m (standard deviation).
+  // CurvatureMethod::corrected: lower bound of both principal curvatures of a convex point, 1/m.
+  // nullopt: 0.1 / radius of the estimate (1.1/m for 0.09 m); the surface then falls by a twentieth
+  // of the radius (4.5 mm for 0.09 m) at the distance of the radius from a convex point. Noise of 2
+  // mm on 200 neighbors within 0.09 m bends a plane by 0.17/m (standard deviation).
   std::optional<double> min_curvature_per_m = std::nullopt;
-  // Thesis: minimum of k1 * k2 of a convex point (listing 3.2). PCL's curvature of a ball of radius
-  // R is about (r / 2R)^2 for a radius r of the estimate, so that balls with R below 3.3 r are
-  // convex (0.3 m for 0.09 m).
+  // CurvatureMethod::thesis: lower bound of k1 * k2 of a convex point (listing 3.2). PCL's
+  // curvature of a ball of radius R is about (r / 2R)^2 for a radius r of the estimate, so that
+  // balls with R below 3.3 r are convex (0.3 m for 0.09 m).
   double min_gaussian_curvature = 0.0005;
-  // Thesis: minimum height of a convex point in the terrain frame.
+  // CurvatureMethod::thesis: lower bound of the height of a convex point, terrain frame.
   double zero_plane_m = 0;
 };
 
-// Returns 1 for each convex point of `curvature`, else 0, by the rule of the method that estimated
-// it. `positions` are the positions of curvature.points in the terrain frame. Points without a
+// Returns 1 for each convex point of `curvature`, else 0, by the rule for curvature.method.
+// `positions` are the positions of curvature.points in the terrain frame. Points without a
 // curvature are not convex. Throws Error for arrays of different length and for NaN bounds.
 std::vector<std::uint8_t> find_convex(const CurvatureResult& curvature,
                                       const std::vector<Eigen::Vector3d>& positions,

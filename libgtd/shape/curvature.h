@@ -22,13 +22,13 @@ enum class CurvatureMethod { thesis, corrected };
 struct CurvatureOptions {
   CurvatureMethod method = CurvatureMethod::corrected;
   double radius_m = 0.09;  // maximum distance of neighbors; for SCAR-E 0.09, HubRobo 0.03
-  // Outside direction for points without a normal in the cloud. Corrected only.
+  // Direction of the outside at points that have no normal in the cloud. Corrected only.
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
 };
 
 // Curvature at one point. If `valid` is false, all numbers are NaN: there are too few neighbors,
-// the neighbors do not determine a quadric (on one or two lines, coincident), or the surface is
-// along `up` and no normal defines the outside.
+// the neighbors do not determine a quadric (on one or two lines, coincident), or the cloud has no
+// normal at the point and the surface is parallel to `up`.
 struct Curvature {
   static constexpr float nan = std::numeric_limits<float>::quiet_NaN();
 
@@ -48,7 +48,7 @@ struct CurvatureResult {
 };
 
 // Estimates the curvature at all points of the cloud, or at the points with indices `queries`. A
-// value does not depend on the other queries or the number of threads. Points that are not finite
+// result does not depend on the other queries or the number of threads. Points that are not finite
 // are not used as neighbors. Throws Error for a radius that is not positive, an `up` of length
 // zero, and an index out of range.
 CurvatureResult estimate_curvature(

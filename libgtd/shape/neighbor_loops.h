@@ -1,7 +1,7 @@
 // Inner loops of the curvature and normal fits over the neighbors of a point, compiled for several
-// instruction sets with identical results: sums run in eight lanes, whatever the width of the
-// registers, and are joined in a fixed order. The interface uses plain pointers only, so that the
-// loops use no inline functions of other sources: the linker could keep the AVX copy for all.
+// instruction sets. Results are identical: sums run in eight lanes for any register width, and are
+// joined in a fixed order. The interface uses plain pointers, so that the loops need no inline
+// functions of other sources, of which the linker could keep the AVX copy for all callers.
 #pragma once
 
 #include <cstddef>
@@ -37,10 +37,9 @@ struct NeighborLoops {
   static constexpr std::size_t quadric_sums = 20;
 
   // Writes a sort key for each candidate with a squared distance to `center` below `limit`, in the
-  // order of the candidates, and returns the number of keys. The high 32 bits are the squared
-  // distance in single precision, of which the bits sort like the values; the low 32 bits are the
-  // index. Candidates beyond `count` must be infinite. x, y, z and keys need room for
-  // `rank_lanes` more values.
+  // order of the candidates, and returns the number of keys. The high 32 bits are those of the
+  // squared distance in single precision, which sort like the distances; the low 32 bits are the
+  // index. Candidates beyond `count` must be infinite. All arrays need room for `rank_lanes` more.
   std::size_t (*rank)(const float* x, const float* y, const float* z, std::size_t count,
                       const float* center, float limit, std::uint64_t* keys);
   static constexpr std::size_t rank_lanes = 16;

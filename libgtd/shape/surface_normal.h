@@ -11,23 +11,23 @@ namespace libgtd {
 
 struct SurfaceNormalOptions {
   double radius_m = 0.07;  // radius of the ball of points for the plane fit
-  // Reference direction of slopes; replaces `outsides` (fit_surface_normals) that are missing,
-  // zero, not finite or parallel to the surface.
+  // Reference direction of slopes. Also the outside of a position for which fit_surface_normals has
+  // no direction, or one that is zero, not finite or parallel to the surface.
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
 };
 
 struct SurfaceNormal {
   static constexpr float nan = std::numeric_limits<float>::quiet_NaN();
 
-  // Unit normal, outward. NaN if fewer than three points are within the radius, if they do not
-  // determine a plane, or if neither the outside direction nor `up` determines the sign.
+  // Unit normal, outward. NaN if the points within the radius (at least three) do not determine a
+  // plane, or if neither the outside direction nor `up` determines the sign.
   Eigen::Vector3f normal = Eigen::Vector3f::Constant(nan);
   // Angle between the normal and `up`: 0 level, 90 a wall, above 90 an overhang. At most 90 if `up`
-  // replaces the outside direction. NaN if the normal is.
+  // is the outside direction. NaN if the points do not determine a plane.
   float slope_deg = nan;
 };
 
-// Returns the cosine between a unit normal and the direction `outside` of any length. Its sign is
+// Returns the cosine between a unit normal and the direction `outside` of any length. The sign is
 // the side of the surface. 0 if `outside` is zero, not finite or within 0.06 deg of the surface.
 double side_of(const Eigen::Vector3d& normal, const Eigen::Vector3d& outside);
 
@@ -42,9 +42,9 @@ inline bool determines_plane(const Eigen::Vector3d& variances) {
 
 // Fits the regression plane (eq. 2-13..2-15) to the points of the cloud within the radius of each
 // of `positions` (m). Normals face `outsides`, directions of any length, one per position or none
-// at all. If an outside is zero, not finite or along the surface, `up` replaces it. A result does
-// not depend on points outside the radius, other positions or the number of threads. Throws Error
-// for a radius that is not positive, an `up` of length zero, and arrays that differ in length.
+// at all. `up` replaces a direction that is missing, zero, not finite or along the surface. A
+// result does not depend on points outside the radius, other positions or the number of threads.
+// Throws Error for a radius that is not positive, an `up` of length 0, and lists of unequal length.
 std::vector<SurfaceNormal> fit_surface_normals(const libmap::PointCloud& cloud,
                                                const std::vector<Eigen::Vector3d>& positions,
                                                const std::vector<Eigen::Vector3f>& outsides,

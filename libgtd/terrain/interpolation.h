@@ -1,6 +1,6 @@
 // Fills gaps of a terrain: interpolates heights linearly on the Delaunay triangulation of the
 // points, at the nodes of a regular grid ("Graspable Target Detection for Hexapod Robots", 2023,
-// eq. 3-5, listing A.3).
+// listing A.3). For n points on the area A, the spacing is 1 / sqrt(5 n / (3 A)) (eq. 3-5).
 #pragma once
 
 #include <cstddef>
@@ -9,9 +9,9 @@
 
 namespace libgtd {
 
-// thesis: the grid starts at the minimum x and y of the points, has the spacing of the author's
-// program, drops nodes of height exactly 0 and rounds coordinates to single precision. corrected:
-// the spacing follows eq. 3-5 as printed, and nodes are at its multiples in the terrain frame.
+// thesis: the grid starts at the minimum x and y of the points, has the author's spacing (1 /
+// sqrt(n / A), rounded), drops nodes of height exactly 0 and rounds coordinates to single
+// precision. corrected: the spacing follows eq. 3-5, and nodes are at its multiples.
 enum class InterpolationMethod { thesis, corrected };
 
 struct InterpolationOptions {
@@ -19,13 +19,13 @@ struct InterpolationOptions {
   // Maximum edge length of a triangle in the x-y plane; 0: no limit. Edges are not measured in 3D,
   // because cliffs have long edges even between dense points.
   double max_edge_m = 0;
-  // Spacing of the nodes for `corrected`; 0: from eq. 3-5. Tiles of one terrain need the same one.
+  // Spacing of the nodes for `corrected`; 0: from eq. 3-5. All tiles of a terrain need the same.
   double grid_spacing_m = 0;
-  // Maximum spacing for `corrected`; 0: no limit. If nodes are farther apart than the voxels to be
-  // filled, rows of voxels remain empty.
+  // Maximum spacing for `corrected`; 0: no limit. Rows of voxels remain empty if the spacing
+  // exceeds the voxel size.
   double max_grid_spacing_m = 0;
-  // Side of the square cells of which the occupied ones form the area A of eq. 3-5 for `corrected`;
-  // 0: four times the spacing that the points would have if they filled the bounding box evenly.
+  // For `corrected`: side of square cells; A in eq. 3-5 is the area of the cells with points. 0:
+  // four times the spacing of points that are spread evenly over the bounding box.
   double area_cell_m = 0;
   // Maximum number of nodes. More nodes indicate a wrong spacing or a stray point.
   std::size_t max_nodes = 100'000'000;
@@ -37,13 +37,13 @@ struct InterpolationOptions {
 struct InterpolationResult {
   libmap::PointCloud cloud;  // nodes, ascending by x, then y, and the viewpoint of the input
   double grid_spacing_m = 0;
-  double area_m2 = 0;                  // thesis: bounding box; corrected: occupied cells
-  std::size_t triangles = 0;           // of the triangulation
+  double area_m2 = 0;                  // A: bounding box (thesis), occupied cells (corrected)
+  std::size_t triangles = 0;           // triangles of the triangulation
   std::size_t rejected_triangles = 0;  // triangles with an edge longer than max_edge_m
   std::size_t nodes = 0;               // grid nodes
-  std::size_t outside_nodes = 0;       // dropped: outside the hull or inside rejected triangles
-  std::size_t zero_nodes = 0;          // dropped by `thesis` because of a height of exactly 0
-  std::size_t skipped_points = 0;      // not finite, or below a point of the same x and y
+  std::size_t outside_nodes = 0;   // dropped nodes outside the hull or inside rejected triangles
+  std::size_t zero_nodes = 0;      // nodes that `thesis` dropped: height exactly 0
+  std::size_t skipped_points = 0;  // points not finite, or below one of the same x and y
 };
 
 // Interpolates `cloud`, which is in the terrain frame (z up, meters). Throws Error for an option

@@ -17,8 +17,7 @@ struct PlanarTriangulation {
 
 // Triangulates the x and y of the points. Of points with the same x and y, one of maximum z is a
 // vertex. Returns no triangles if the points are collinear. The set of triangles does not depend on
-// the order of the points, even if four points are cocircular: CGAL decides these cases by symbolic
-// perturbation.
+// the order of the points, even if four points are cocircular (symbolic perturbation of CGAL).
 PlanarTriangulation triangulate_in_plane(const std::vector<Eigen::Vector3d>& points);
 
 }  // namespace libgtd

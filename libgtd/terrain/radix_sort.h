@@ -28,8 +28,8 @@ void radix_sort(std::vector<Item>& items, unsigned bits, const KeyOf& key_of) {
   }
 }
 
-// Maps three integers inside a box to one integer of the same order, x first. fits() is false if
-// the box needs more than 63 bits.
+// Maps cells (three integers) inside a box to keys in the order of x, then y, then z. If fits() is
+// false, the keys of the box need more than 63 bits and cannot be used.
 template <typename Integer>
 class BoxKey {
  public:

@@ -14,13 +14,13 @@
 
 namespace libgtd {
 
-// thesis: the heading is y = (c x n) / |c x n|, which depends on the distance to the input's
-// origin. corrected: x is the projection of the input frame's x axis into the plane; if that axis
-// is normal to the plane, y is the projection of the input frame's y axis. robust: as corrected,
-// with a robust normal that rocks do not tilt.
+// thesis: the y axis is -(c x n) / |c x n|, with the centroid c and the normal n; it depends on the
+// input frame's origin. corrected: x is the projection of the input frame's x axis into the plane;
+// if that axis is normal to the plane, y is the projection of the input frame's y axis. robust: as
+// corrected, with a robust plane fit that rocks do not tilt.
 enum class PlaneMethod { thesis, corrected, robust };
 
-// Criterion that decided which side of the plane is up, in order of precedence.
+// Criterion for the upper side of the plane. The first of these that applies is used.
 enum class UpSource {
   direction,      // RegressionPlaneOptions::up was given
   viewpoint,      // the cloud's viewpoint is above, unless it is the identity
@@ -40,10 +40,10 @@ struct RegressionPlaneOptions {
 
 struct RegressionPlane {
   Eigen::Vector3d centroid = Eigen::Vector3d::Zero();          // in the input frame, meters
-  libmap::Pose terrain_from_input = libmap::Pose::Identity();  // p' = R^T (p - c), R = [x, -y, n]
-  double rmse_m = 0;                                           // root mean square of the heights
+  libmap::Pose terrain_from_input = libmap::Pose::Identity();  // p' = R^T (p - c), R = terrain axes
+  double rmse_m = 0;  // root mean square of the points' heights
   UpSource up_source = UpSource::frame_z;
-  double relief_skewness = 0;        // skewness of heights; negative suggests upside down
+  double relief_skewness = 0;        // skewness of the heights; negative: may be upside down
   std::optional<double> normals_up;  // share of the normals that point up, weighted by |cosine|
   double opposing_normals = 0;  // share of neighboring normals on opposite sides of the surface
   std::size_t points = 0;       // points with finite coordinates, which are fitted
@@ -56,7 +56,7 @@ struct RegressionPlane {
 // beyond max_tilt_deg, and with `thesis` if c is parallel to n.
 RegressionPlane fit_regression_plane(const libmap::PointCloud& cloud,
                                      const RegressionPlaneOptions& options = {});
-// Fits the plane to points in blocks, in a few passes. The result is the same to the bit.
+// Fits the plane to points that are read in blocks, in a few passes. The result is identical.
 RegressionPlane fit_regression_plane(const libmap::PointStream& points,
                                      const RegressionPlaneOptions& options = {});
 

@@ -18,7 +18,7 @@ namespace libgtd {
 struct VoxelGrid {
   VoxelLattice lattice;
   std::vector<Voxel> voxels;  // occupied, ascending, each once
-  Voxel min;                  // box of the grid, which may be larger than the box of `voxels`
+  Voxel min;                  // box of the grid, may be larger than the box of `voxels`
   Voxel max;
 };
 
@@ -69,14 +69,14 @@ void visit_pairs(const std::vector<Voxel>& voxels, int reach, const Visit& visit
 std::size_t count_isolated(const std::vector<Voxel>& voxels);
 
 // Throws Error naming the share of isolated voxels if it exceeds 60 % of at least 10 voxels: such
-// points do not form a surface at this voxel size. A regular grid with a spacing of more than two
-// voxels has 100 %, one of 1.5 voxels less than half. The published pre-scanned cloud of scenario 2
-// has 54 % at the published voxel size and must be accepted.
+// points do not form a surface at this voxel size. Points in a regular grid have 100 % at a spacing
+// of more than two voxels, and less than 50 % at 1.5 voxels. The thesis's cloud of scenario 2 has
+// 54 % at its voxel size and must be accepted.
 void require_dense(std::size_t isolated, std::size_t voxels, double voxel_size_m,
                    const std::vector<Eigen::Vector3d>& points);
 
-// Calls visit(first, last) for each row (one i) of voxels in the columns, ascending. The row is
-// grid.voxels[first .. last - 1].
+// Calls visit(first, last) for each row in the columns, ascending. A row consists of the voxels of
+// one i: grid.voxels[first .. last - 1].
 template <typename Visit>
 void visit_rows(const VoxelGrid& grid, const TileBounds& columns, const Visit& visit) {
   const auto begin = grid.voxels.begin();
@@ -106,14 +106,14 @@ void visit_columns(const VoxelGrid& grid, const TileBounds& columns, const Visit
 // voxel_size_m if an index is outside +-2^29.
 VoxelGrid voxelize(const std::vector<Eigen::Vector3d>& points_in_terrain, double voxel_size_m);
 
-// Returns the mean of the points in each voxel of that lattice, in ascending order, with the sum of
-// the normals if the cloud has normals. This removes the effect of scan density. Throws like
-// voxelize.
+// Returns the mean of the points in each voxel of the lattice of voxelize(), ascending by voxel,
+// with the sum of the normals if the cloud has normals. The means do not depend on scan density.
+// Throws like voxelize.
 libmap::PointCloud voxel_means(const libmap::PointCloud& terrain, double voxel_size_m);
 
 // Voxelizes points for `thesis` (listing A.4), in single precision: the centroids of the cells of
-// one lattice are put into the cells of a second lattice that starts at the minimum coordinates of
-// the points.
+// one lattice are put into the cells of a second lattice, which starts at the minimum of the
+// points.
 VoxelGrid voxelize_thesis(const std::vector<Eigen::Vector3f>& points_in_terrain,
                           double voxel_size_m);
 
@@ -122,7 +122,7 @@ VoxelGrid voxelize_thesis(const std::vector<Eigen::Vector3f>& points_in_terrain,
 std::vector<Eigen::Vector3f> voxel_centroids(const std::vector<Eigen::Vector3f>& points,
                                              double leaf_m);
 
-// Returns the values of a field. Throws Error naming the field if it is missing.
+// Returns the values of the field `name`. Throws Error naming the field if it is missing.
 const std::vector<double>& values_of(const libmap::PointCloud& map, const char* name);
 
 // Voxel indices of map points, from the fields i, j and k.

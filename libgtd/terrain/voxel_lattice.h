@@ -13,7 +13,7 @@ constexpr Integer floor_to(Real value) {
   return static_cast<Real>(whole) > value ? whole - 1 : whole;
 }
 
-// Bound of voxel indices (+-2^29), so that differences of indices and windows fit an int.
+// Bound of voxel indices (+-2^29), so that sums and differences of indices fit an int.
 inline constexpr double max_voxel_index = 0x1p29;
 
 // Voxel index. All lists of voxels and all maps are ordered by i, then j, then k.
@@ -25,7 +25,7 @@ struct Voxel {
 };
 
 // Lattice of cubes with edge voxel_size_m; `origin_m` is the lowest corner of voxel (0, 0, 0). A
-// point on a face belongs to the voxel above it.
+// point on a face between two voxels belongs to the voxel with the larger index.
 struct VoxelLattice {
   Eigen::Vector3d origin_m = Eigen::Vector3d::Zero();
   double voxel_size_m = 0.01;

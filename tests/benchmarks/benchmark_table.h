@@ -16,8 +16,8 @@
 
 namespace graspmap_bench {
 
-// Seconds on the clock, and the minimum processor time of all threads and finished children: what
-// the code costs where the machine has other work too.
+// Wall times of the repetitions, and the minimum processor time of all threads and finished child
+// processes, which is less sensitive to other work on the machine.
 struct Times {
   std::vector<double> seconds;
   double processor_s = std::numeric_limits<double>::infinity();
@@ -47,7 +47,7 @@ void time_once(const Work& work, Times& times) {
   times.processor_s = std::min(times.processor_s, processor_seconds() - processor_start);
 }
 
-// Runs the benchmark's iterations and leaves the counters min_ms and processor_ms.
+// Runs the benchmark's iterations and sets the counters min_ms (wall time) and processor_ms.
 template <typename Work>
 Times time_iterations(benchmark::State& state, const Work& work) {
   Times times;
@@ -57,7 +57,7 @@ Times time_iterations(benchmark::State& state, const Work& work) {
   return times;
 }
 
-// Processor time of the author's program, if it was measured.
+// Sets the counter author_ms: processor time of the thesis author's program; 0: not measured.
 inline void set_author_ms(benchmark::State& state, double author_ms) {
   if (author_ms > 0.0) state.counters["author_ms"] = author_ms;
 }
@@ -66,7 +66,7 @@ inline std::string threads_text(unsigned threads) {
   return std::to_string(threads) + (threads == 1 ? " thread" : " threads");
 }
 
-// The folder that the environment names, if it does.
+// Returns the folder in this environment variable; nullopt if the variable is empty or not set.
 inline std::optional<std::filesystem::path> folder_of(const char* variable) {
   const char* const value = std::getenv(variable);
   if (value == nullptr || *value == '\0') return std::nullopt;

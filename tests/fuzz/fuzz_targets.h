@@ -1,4 +1,4 @@
-// The readers that take bytes from outside, each as a function that swallows any bytes.
+// Targets for fuzzing: the readers of external data, each as a function of any bytes.
 #pragma once
 
 #include <filesystem>
@@ -9,24 +9,24 @@
 
 namespace graspmap_fuzz {
 
-// Reads `bytes` as the target's format and says whether they were accepted. A libmap::Error is the
-// right answer to broken bytes; any other exception, a crash, a hang or a sanitizer's report is a
-// finding.
+// A reader as a fuzz target. `run` reads bytes as the format `reads` and returns true if they are
+// accepted. libmap::Error is the correct result for invalid bytes; any other exception, a crash, a
+// hang or a report of a sanitizer is a finding.
 struct FuzzTarget {
   const char* name;
   const char* reads;
   bool (*run)(std::string_view bytes);
-  std::vector<std::string> (*seeds)();  // well-formed inputs, from which a fuzzer begins
+  std::vector<std::string> (*seeds)();  // valid inputs, with which a fuzzer begins
 };
 
 inline void PrintTo(const FuzzTarget& target, std::ostream* out) { *out << target.name; }
 
-// By name.
+// Returns all targets, ascending by name.
 const std::vector<FuzzTarget>& fuzz_targets();
-// Throws std::out_of_range if there is none of that name.
+// Returns the target `name`. Throws std::out_of_range if there is none.
 const FuzzTarget& fuzz_target(std::string_view name);
 
-// A file a seed in `folder`, which is made.
+// Creates `folder` and writes one file per seed into it.
 void write_seeds(const FuzzTarget& target, const std::filesystem::path& folder);
 
 }  // namespace graspmap_fuzz

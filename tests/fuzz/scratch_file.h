@@ -1,4 +1,4 @@
-// A file in memory for readers that take paths, written anew for every input.
+// File in memory for readers that take paths, rewritten for each input.
 #pragma once
 
 #include <filesystem>
@@ -9,8 +9,8 @@ namespace graspmap_fuzz {
 
 class ScratchFile {
  public:
-  // `name` may hold a folder. It lies in a folder of this process, which goes when the process
-  // ends well.
+  // `name` may contain a folder. The file is in a folder of this process, which is removed when the
+  // process ends normally.
   explicit ScratchFile(const std::string& name);
 
   const std::filesystem::path& path() const { return path_; }

@@ -1,4 +1,4 @@
-// A small scan database, any blob of which can be replaced.
+// Small scan database in which single blobs can be replaced.
 #pragma once
 
 #include <cstdint>
@@ -15,11 +15,11 @@ class StoredBlobs {
  public:
   StoredBlobs();
 
-  // Blobs in it.
+  // Number of blobs in the database.
   std::size_t places() const { return places_.size(); }
   const std::string& blob(std::size_t place) const { return places_[place].bytes; }
 
-  // The database with `bytes` in place of one of them; the file is the same for every call.
+  // Returns the path of the database with one blob replaced; each call overwrites the same file.
   const std::filesystem::path& database_with(std::size_t place, std::string_view bytes) const;
 
  private:
@@ -31,7 +31,7 @@ class StoredBlobs {
   };
 
   ScratchFile file_{"blob.db"};
-  std::string sample_;  // the whole file
+  std::string sample_;  // bytes of the unchanged database
   std::vector<Place> places_;
 };
 

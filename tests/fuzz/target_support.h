@@ -38,7 +38,7 @@ bool accepts(const Read& read) {
   }
 }
 
-// Calls all of them; whether one came to its end.
+// Calls all readers. Returns true if at least one completed.
 template <typename... Reads>
 bool any_accepts(const Reads&... reads) {
   bool any = false;
@@ -46,18 +46,19 @@ bool any_accepts(const Reads&... reads) {
   return any;
 }
 
-// The first byte chooses among `count` formats that share a target.
+// For several formats in one target: takes the first byte and returns it modulo `count` (0 without
+// a byte). with_choice prepends this byte.
 std::size_t take_choice(std::string_view& bytes, std::size_t count);
 std::string with_choice(std::size_t choice, const std::string& bytes);
 
-// Several files in one input, form feeds between: the bytes up to the next one.
+// Takes the first file from `bytes`, an input of several files separated by form feeds.
 std::string_view take_file(std::string_view& bytes);
 
-// Returns the content that `write` leaves in a file of that name.
+// Returns the content that `write` writes to a file of this name.
 std::string written(const std::string& name,
                     const std::function<void(const std::filesystem::path&)>& write);
 
-// Every file of the toolkit's own data of a kind.
+// Adds the files of data/KIND, each with_choice, ascending by name.
 void add_data(Seeds& seeds, std::size_t choice, const std::string& kind);
 
 libmap::Manifest small_manifest();

@@ -10,13 +10,13 @@
 namespace graspmap_test {
 
 struct PaintedBoard {
-  int columns = 8;  // inner corners
-  int rows = 6;
+  int columns = 8;  // inner corners per row
+  int rows = 6;     // inner corners per column
   double square_m = 0.03;
 };
 
-// Paints a board with a white margin of one square. Its first inner corner is at the board's
-// origin, x along the rows, y along the columns.
+// Paints a board with a white margin of one square. The first inner corner is the board's origin; x
+// is along the rows, y along the columns.
 class ChessboardPainter {
  public:
   // Uses `samples` x `samples` rays per pixel.
@@ -41,7 +41,7 @@ class ChessboardPainter {
 std::vector<libmap::Pose> board_poses(const libmap::Camera& camera, const PaintedBoard& board,
                                       int count, double max_tilt_deg, double margin_px = 12);
 
-// Applies a Gaussian blur of `blur_px`, Gaussian noise of `noise` gray levels, and rounding.
+// Applies a Gaussian blur (sigma `blur_px`), Gaussian noise of `noise` gray levels, and rounding.
 libmap::GrayImage photographed(const libmap::Image<float>& photo, double blur_px, double noise);
 
 }  // namespace graspmap_test

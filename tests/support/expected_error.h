@@ -1,4 +1,4 @@
-// Expects errors by their parts, so that a message can be reworded without changing tests.
+// Compares errors by their parts, so that messages can be reworded without changing tests.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -10,13 +10,13 @@
 
 namespace graspmap_test {
 
-// Empty parts are not compared, except the kind.
+// Expected parts of an error. Empty parts are not compared; the kind always is.
 struct ExpectedError {
   std::filesystem::path file{};
   std::string field{};
   std::string value{};
   std::string bound{};
-  // A name or number in the reason, for an error that its other parts do not identify.
+  // Text, e.g. a name, that the reason must contain if other parts do not identify the error.
   std::string about{};
   libmap::ErrorKind kind = libmap::ErrorKind::bad_input;
 };

@@ -1,4 +1,4 @@
-// Lowers resource limits of the test's process during the lifetime of an object.
+// Lowers a resource limit of the test's process during the lifetime of an object.
 #pragma once
 
 #include <sys/resource.h>

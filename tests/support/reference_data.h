@@ -1,5 +1,5 @@
-// Readers of the exact outputs of the author's program, in the folder GRASPMAP_REFERENCE. All throw
-// std::runtime_error naming a file that cannot be read.
+// Readers of the exact outputs of the thesis author's program in the folder GRASPMAP_REFERENCE. All
+// throw std::runtime_error naming a file that cannot be read.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,13 +12,13 @@
 
 namespace graspmap_test {
 
-// The whole of a .gz file, unpacked.
+// Returns the decompressed content of a .gz file.
 std::string read_gz(const std::filesystem::path& path);
 
 // NAME.transformed.f32.gz, NAME.interpolated.f32.gz: float32 x y z, little-endian.
 std::vector<Eigen::Vector3f> read_points_f32_gz(const std::filesystem::path& path);
 
-// NAME.scores.csv.gz: every pivot in the program's order.
+// NAME.scores.csv.gz: one row per pivot, in the program's order.
 struct ReferenceScores {
   std::vector<std::array<int, 5>> rows;  // i, j, k, ssv, gsv
   std::vector<double> score_percent;
@@ -32,7 +32,7 @@ struct ReferenceVoxels {
 };
 ReferenceVoxels read_voxels_gz(const std::filesystem::path& path);
 
-// mask.METHOD.GRIPPER.SIZE.txt; layer z = 0 is the lowest.
+// mask.METHOD.GRIPPER.SIZE.txt; the layer z = 0 is the lowest.
 struct ReferenceMask {
   std::array<int, 3> dims{};
   std::vector<std::uint8_t> cells;  // z outermost, then x, then y: 0 or 1
@@ -44,7 +44,7 @@ struct ReferenceMask {
 };
 ReferenceMask read_mask(const std::filesystem::path& path);
 
-// NAME.frame.txt: the plane's frame; p' = rotation^T (p - centroid).
+// NAME.frame.txt: terrain frame, p' = rotation^T (p - centroid), and numbers of points.
 struct ReferenceFrame {
   int points_in = 0;
   int downsampled = 0;
@@ -52,7 +52,7 @@ struct ReferenceFrame {
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
   Eigen::Vector3d min_of_voxelized = Eigen::Vector3d::Zero();
   std::vector<Eigen::Vector3f> transformed;  // the first points
-  // Zero and empty if the set was not interpolated.
+  // 0 and empty if the points were not interpolated.
   double grid_spacing = 0;
   double x_width = 0;
   double y_width = 0;

@@ -15,12 +15,12 @@ struct ProgramResult {
 };
 
 struct ProgramSurroundings {
-  std::filesystem::path folder{};                       // to run in; empty: this process's own
-  std::map<std::string, std::string> environment = {};  // added to this process's own
+  std::filesystem::path folder{};  // working folder; empty: that of this process
+  std::map<std::string, std::string> environment = {};  // added to that of this process
 };
 
-// Runs words[0] with the other words as its arguments, nothing on its standard input, and waits for
-// its end. Throws std::runtime_error if it cannot be started.
+// Runs words[0] with the other words as arguments and empty standard input, and waits for its end.
+// Throws std::runtime_error if it cannot be started.
 ProgramResult run_program(const std::vector<std::string>& words,
                           const ProgramSurroundings& surroundings = {});
 

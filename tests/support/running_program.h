@@ -13,9 +13,8 @@ namespace graspmap_test {
 
 class RunningProgram {
  public:
-  // Starts words[0] with the other words as its arguments, nothing on its standard input, with
-  // `own_group` as the leader of a process group. Throws std::runtime_error if it cannot be
-  // started.
+  // Starts words[0] with the other words as arguments and empty standard input; with `own_group` as
+  // the leader of a new process group. Throws std::runtime_error if it cannot be started.
   explicit RunningProgram(const std::vector<std::string>& words,
                           const ProgramSurroundings& surroundings = {}, bool own_group = false);
   // Kills the program if it still runs.
@@ -27,7 +26,7 @@ class RunningProgram {
   pid_t process() const;
   // Returns true if the program has ended.
   bool has_ended() const;
-  ProgramResult wait();
+  ProgramResult wait();  // waits for the end of the program
 
  private:
   struct State;

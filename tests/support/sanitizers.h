@@ -26,7 +26,7 @@ inline constexpr bool has_thread_sanitizer = true;
 inline constexpr bool has_thread_sanitizer = false;
 #endif
 
-// Memory limits do not work with sanitizers, which need much memory and end the program.
+// False with sanitizers: they need much memory, and a memory limit would end the program.
 inline constexpr bool memory_can_be_limited = !has_address_sanitizer && !has_thread_sanitizer;
 
 }  // namespace graspmap_test

@@ -14,7 +14,7 @@
 
 namespace graspmap_test {
 
-// Random engine with the same seed at the start of each test.
+// Random engine with the same seed at the start of each test. uniform() draws from [low, high).
 std::mt19937_64& random_engine();
 double uniform(double low, double high);
 
@@ -25,11 +25,11 @@ std::filesystem::path scratch_folder();
 std::filesystem::path source_folder();
 std::filesystem::path build_folder();
 
-// $GRASPMAP_DATA and $GRASPMAP_REFERENCE; empty if not set.
+// Folders in the variables $GRASPMAP_DATA and $GRASPMAP_REFERENCE; empty if not set.
 std::filesystem::path data_folder();
 std::filesystem::path reference_folder();
 
-// Returns the Error that `action` throws; the test fails if it throws none.
+// Returns the Error that `action` throws; the test fails if it throws no Error.
 [[nodiscard]] libmap::Error error_of(const std::function<void()>& action);
 
 std::string read_text(const std::filesystem::path& path);

@@ -6,10 +6,12 @@
 
 namespace graspmap_test {
 
-// Scenario 1 of the thesis: a plane of 3 x 3 m at z = 0, centered on the origin, that bears five
-// hemispheres of radius 0.05 to 0.25 m (y = -1), five half-capsules along y, 0.1 x 0.2 to
-// 0.3 x 0.6 m (y = 0), and five cones of base radius 0.15 m, height 0.05 to 0.2 m (y = 1); x is 1,
-// 0.5, 0, -0.5, -1 from the smallest to the largest. No two of them touch.
+// Scenario 1 of the thesis: a plane of 3 x 3 m at z = 0, centered on the origin, with rows of five
+// shapes that do not touch. From the smallest to the largest shape of a row, x is 1, 0.5, 0, -0.5,
+// -1.
+// - y = -1: hemispheres with radius 0.05 to 0.25 m.
+// - y = 0: half-capsules along y, 0.1 x 0.2 to 0.3 x 0.6 m.
+// - y = 1: cones with base radius 0.15 m and height 0.05 to 0.2 m.
 inline libmap::PrimitiveScene thesis_primitive_scene() {
   using namespace libmap;
   constexpr std::array<double, 5> columns_m = {1.0, 0.5, 0.0, -0.5, -1.0};

@@ -27,11 +27,11 @@ testing::AssertionResult succeeded(const ProgramResult& result);
 // parts of the error.
 testing::AssertionResult bad_input(const ProgramResult& result, const ExpectedError& expected);
 
-// Success for the exit code of the expected kind and such a line as the last one on stderr, which
-// warnings may precede.
+// Success for the exit code of the expected kind and an error line as in bad_input, which is the
+// last line on stderr; warnings may precede it.
 testing::AssertionResult ended_with(const ProgramResult& result, const ExpectedError& expected);
 
-// Success for exit code 2 (wrong usage) and such a line that contains these names of commands,
+// Success for exit code 2 (wrong usage) and an error line that contains these names of commands,
 // options, arguments or files.
 testing::AssertionResult wrong_usage(const ProgramResult& result,
                                      const std::vector<std::string>& names);
@@ -40,7 +40,8 @@ testing::AssertionResult wrong_usage(const ProgramResult& result,
 // and these numbers. Without names: any warning.
 testing::AssertionResult warned(const ProgramResult& result, const std::vector<std::string>& names);
 
-// A file in the scratch folder.
+// Return the path of a file in the scratch folder, the names of all files there, and the content of
+// a file as text and as JSON.
 std::filesystem::path scratch(const std::string& name);
 std::vector<std::string> names_in_scratch();
 std::string content(const std::string& name);
@@ -51,11 +52,11 @@ std::map<std::string, std::string> pieces_in(const std::string& folder);
 // Expects equal tiles and results in both folders, and no temporary files.
 void expect_same_tiles(const std::string& folder, const std::string& whole);
 
-// Returns gently bumpy ground of 0.6 x 0.6 m about (0, 0), z up, with a point spacing of 5 mm, the
+// Returns bumpy ground of size_m x size_m around (0, 0), z up, with a point spacing of 5 mm, the
 // same for every call. Coordinates are multiples of 2^-20 m, which any format stores exactly.
 libmap::PointCloud bumpy_terrain(double size_m = 0.6);
 
-// Writes it as terrain.pcd and returns that name.
+// Writes bumpy_terrain() as terrain.pcd. Returns this name.
 std::string write_terrain();
 
 }  // namespace graspmap_test

@@ -1,5 +1,5 @@
 // Converts values between Python and the libraries: arrays, options, results, errors, progress, and
-// arguments of calls. Errors name the parameter.
+// the arguments of calls. Errors about an argument name its parameter.
 #pragma once
 
 #include <pybind11/numpy.h>
@@ -38,8 +38,8 @@ namespace py = pybind11;
 
 using Shape = std::vector<py::ssize_t>;
 
-// Returns a read-only array on memory of `owner`, which the array keeps alive. `strides` are in
-// bytes; empty: dense.
+// Returns a read-only array that uses the memory of `owner` and keeps `owner` alive. `strides` are
+// in bytes; empty: the array is dense.
 template <typename Number>
 py::array view(const Number* data, Shape shape, py::handle owner, Shape strides = {}) {
   py::array array(py::dtype::of<Number>(), std::move(shape), std::move(strides), data, owner);
@@ -47,7 +47,7 @@ py::array view(const Number* data, Shape shape, py::handle owner, Shape strides 
   return array;
 }
 
-// Returns a property getter for an array on a member of an object, which the array keeps alive.
+// Returns a property getter: view_of makes an array on the member, which keeps the object alive.
 template <typename Object, typename Member, typename ViewOf>
 auto viewing(Member Object::*member, ViewOf view_of) {
   return [=](const py::object& self) { return view_of(self.cast<Object&>().*member, self); };
@@ -69,8 +69,8 @@ inline Shape rows(std::size_t count, py::ssize_t width) {
 // Returns the error of a parameter whose value `given` has a wrong type or shape.
 libmap::Error wrong_value(py::handle given, const std::string& name, const std::string& bound);
 
-// Throws Error for the first of `others`, keywords that are not names of `parameters`, or else for
-// the first of `missing`, required parameters without a value.
+// Throws Error for the first keyword in `others`, which are not names of `parameters`; if there is
+// none, for the first of `missing`, required parameters without a value.
 void check_names(const std::vector<std::string>& parameters, const std::vector<std::string>& others,
                  const std::vector<std::string>& missing);
 
@@ -84,7 +84,7 @@ struct Numbers {
 };
 constexpr Numbers byte_numbers = {"u", 1}, whole_numbers = {"iu"}, real_numbers = {"iuf"};
 constexpr Numbers indices_or_truth = {"biu"}, real_or_truth = {"biuf"};
-constexpr py::ssize_t any_length = -1;
+constexpr py::ssize_t any_length = -1;  // in a Shape: any number
 
 // Returns `given` as an array. Throws Error with `name` and `bound` for another type or shape.
 py::array checked_array(const py::object& given, const std::string& name, const Numbers& numbers,
@@ -104,8 +104,8 @@ Eigen::Vector3d vector_from(const py::object& given, const std::string& name);
 libmap::Pose pose_from(const py::object& given, const std::string& name);  // 4 x 4, rigid
 py::array matrix_of(const libmap::Pose& pose);
 
-// Sets the table's parameters by their keys; a dict in a dict is a section, as in YAML. Throws what
-// ParameterTable::set throws, and Error for a value that is no truth value, number or text.
+// Sets the table's parameters by their keys. A dict in the dict is a section, as in YAML. Throws
+// what ParameterTable::set throws, and Error for a value that is no truth value, number or text.
 void set_options(const libmap::ParameterTable& table, const py::dict& values);
 
 template <typename Options>
@@ -119,7 +119,8 @@ Options options_from(const py::dict& values, Options options = {}) {
 // Returns a dict of the results by key; a missing value is None.
 py::dict dict_of(const libmap::ResultTable& table);
 
-// Return a dict per parameter (key, type, default, choices, description) or result (not `objects`).
+// Return a dict per parameter (key, type, default, choices, description) or result not in
+// `objects`.
 py::list list_of(const libmap::ParameterTable& table);
 py::list list_of(const libmap::ResultTable& table, const std::vector<std::string>& objects);
 
@@ -129,8 +130,8 @@ struct Stage {
   std::function<py::list()> results;
 };
 std::vector<Stage>& stages();
-// Registers a stage with its options and results for the documentation and the stubs. `objects` are
-// keys of results that are objects in Python, not numbers or texts.
+// Registers a stage with its options and results, for documentation and stubs. `objects` are keys
+// of results that are objects in Python, not numbers or texts.
 template <typename Options, typename... Results>
 void add_stage(const std::string& name, const std::vector<std::string>& objects = {}) {
   const auto options = [] {
@@ -147,8 +148,8 @@ void add_stage(const std::string& name, const std::vector<std::string>& objects 
   stages().push_back({name, options, results});
 }
 
-// Calls callback(stage, done, total) when a stage begins, at most ten times a second, and when it
-// ends; handles Ctrl-C. An exception of the callback ends the work.
+// Calls callback(stage, done, total) when a stage begins or ends, and at most ten times a second
+// meanwhile. Handles Ctrl-C. An exception of the callback ends the work.
 class CallProgress : public libmap::Progress {
  public:
   explicit CallProgress(py::object callback) : callback_(std::move(callback)) {}
@@ -189,8 +190,8 @@ auto without_lock(const Step& step) {
   return step();
 }
 
-// Calls write(temporary), then moves the file to `path`. Throws Error if the path has a manifest,
-// which would describe an earlier output.
+// Calls write(temporary), then moves the temporary file to `path`. Throws Error if `path` has a
+// manifest, which would describe an earlier output.
 template <typename Write>
 void write_whole(const std::filesystem::path& path, const Write& write) {
   if (std::filesystem::exists(libmap::manifest_path(path)))
@@ -210,7 +211,7 @@ std::shared_ptr<T> shared(T&& value) {
 
 py::dict numbers_of(const std::vector<std::pair<std::string, double>>& numbers);
 
-// Makes C++ errors of the libraries and the file system a graspmap.Error in Python.
+// Converts C++ errors of the libraries and the file system to graspmap.Error in Python.
 void translate_errors();
 
 // Add classes and functions to the module.
@@ -381,7 +382,7 @@ auto checked(Result (*function)(Types...), std::array<const char*, sizeof...(Typ
   };
 }
 
-// Returns a method with checked arguments; its object is not one of them.
+// Returns a method with checked arguments, without the object itself.
 template <typename Result, typename Self, typename... Types>
 auto checked(Result (*method)(const Self&, Types...),
              std::array<const char*, sizeof...(Types)> names) {

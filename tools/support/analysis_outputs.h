@@ -17,8 +17,8 @@ namespace graspmap_tools {
 // Returns the score histogram: bars of the evaluated voxels by class, and a line of all voxels.
 libmap::Chart histogram_chart(const libgtd::MapAnalysis& analysis, const std::string& title);
 
-// Returns a chart of the ground by height or slope: bars show the graspable share of each bin's
-// area, a line shows the share of the bin in the area of all ground.
+// Returns a chart of the ground by height or slope. Bars show the graspable share of each bin's
+// area; a line shows the share of each bin in the area of all ground.
 libmap::Chart ground_chart(const std::vector<libgtd::GroundBin>& bins,
                            const std::string& axis_title, const std::string& title);
 
@@ -28,8 +28,8 @@ struct MapImage {  // must not outlive `map` and `surface`
   std::string title;
 };
 
-// Draws the map from above: regions are colored by reachability, the eight largest have their
-// numbers, other ground is gray, darker with increasing slope.
+// Draws the map from above. Regions are colored by reachability, and the eight largest are
+// numbered. Other ground is gray, darker with increasing slope.
 libmap::ColorImage draw_regions(const MapImage& image, const libgtd::MapRegionResult& regions,
                                 const libgtd::RegionReach& reach);
 
@@ -38,19 +38,19 @@ libmap::ColorImage draw_change(const MapImage& image, const libgtd::MapChange& c
                                const libgtd::VoxelMap& other,
                                const libmap::Pose& map_terrain_from_other_terrain);
 
-// Draws the common voxels from above, colored by their scores in `other` minus those in the map.
+// Draws the voxels of both maps from above, colored by the score in `other` minus that in the map.
 libmap::ColorImage draw_score_change(const MapImage& image, const libgtd::MapChange& change,
                                      const libgtd::VoxelMap& other);
 
 struct MapTableOptions {
-  std::string expected;  // CSV of regions of expected graspability; empty: none
-  PointFrame points_frame = PointFrame::input;  // frame of these regions
+  std::string expected;                         // CSV of ExpectedMap; empty: no expectations
+  PointFrame points_frame = PointFrame::input;  // frame of `expected`
   std::string cutoff = "auto";  // minimum score of a graspable voxel; auto: each map's threshold
   std::string names;            // names of the maps, separated by '|'; empty: names of the files
   bool pairs = false;           // true: compare all pairs of maps
-  std::string varied;  // column of maps.csv, the horizontal axis of charts; empty: no such charts
-  std::string series;  // columns of maps.csv, separated by ','; one curve per combination of values
-  bool images = true;
+  std::string varied;  // column of maps.csv that charts show on the horizontal axis; empty: none
+  std::string series;  // columns of maps.csv, separated by ','; a curve per combination of values
+  bool images = true;  // false: tables only, no charts
 };
 
 // Binds all options except `expected`, `points_frame` and `images`.

@@ -15,26 +15,26 @@
 
 namespace graspmap_tools {
 
-// Wrong usage, found before any file is read: exit code 2.
+// Error of wrong usage, found before any file is read: exit code 2.
 class UsageError : public libmap::Error {
  public:
   using Error::Error;
 };
 
-// Throws Error with `reason` and the flag of the first parameter of `bind` that is not the default.
+// Throws Error with `reason` and the flag of the first parameter of `bind` with a changed value.
 template <typename Options>
 void reject_changed(const Options& options, void (*bind)(libmap::ParameterTable&, Options&),
                     const std::string& reason) {
   if (const auto key = libmap::changed_key(options, bind))
     throw libmap::Error(reason, {.field = libmap::flag_of(*key)});
 }
-// Throws Error with `reason` and the first flag whose value is true, i.e. that the user gave.
+// Throws Error with `reason` and the first flag that the user gave (value true).
 void reject_given(const std::vector<std::pair<const char*, bool>>& flags,
                   const std::string& reason);
 
 class Command {
  public:
-  // The default description is in commands.h; commands with several usages pass a description.
+  // An empty description means the summary in commands.h.
   explicit Command(const std::string& name, const std::string& description = {});
   ~Command();
   Command(const Command&) = delete;
@@ -50,28 +50,27 @@ class Command {
   void flag(const std::string& name, bool& value, const std::string& description);
   void option(const std::string& name, const std::string& value_name, std::string& value,
               const std::string& description, bool required = false);
-  // Declares a flag of earlier versions; the use of this flag is an error that names `now`.
+  // Declares a flag of earlier versions. Its use is an error, which names the flag `now`.
   void former_flag(const std::string& name, const std::string& now);
-  // Declares the earlier name of a flag. It is still read, but not shown by --help.
+  // Declares the earlier name of a flag, which is still read, but not shown by --help.
   void renamed_flag(const std::string& earlier, const std::string& now);
   // An option with any number of values: repeated, or separated by commas.
   void option(const std::string& name, const std::string& value_name,
               std::vector<std::string>& values, const std::string& description);
 
-  // Parameters of the command's stages. Each becomes a flag, a key of --config and --print-config,
-  // and a KEY of --set KEY=VALUE.
+  // Parameters of the command's stages. Each has a flag, and a key for --config, --print-config and
+  // --set KEY=VALUE.
   libmap::ParameterTable& parameters();
 
   // Declares that the value of the parameter `key`, e.g. the name of a sensor, names a file with
   // further parameters, which `resolver` finds. Flags and --config override the file; "auto": none.
   void preset(const std::string& key,
               std::function<std::filesystem::path(const std::string&)> resolver);
-  // Sets the function that finds the file of a --config value, e.g. a scenario's name. Default: a
-  // path.
+  // Sets the function that finds the file of a --config value, e.g. of a name; default: a path.
   void config_resolver(std::function<std::filesystem::path(const std::string&)> resolver);
 
-  // Parses argv, applies --config and then the flags, and runs `body`. An error becomes one line on
-  // stderr. Returns the exit code: 0 done, 1 failed, 2 wrong usage, 3 bad input.
+  // Parses argv, applies --config, then flags, then --set, and runs `body`. An error becomes one
+  // line on stderr. Returns the exit code: 0 done, 1 failed, 2 wrong usage, 3 bad input.
   int run(int argc, char** argv, const std::function<void(Run&)>& body);
 
  private:
@@ -79,8 +78,8 @@ class Command {
   std::unique_ptr<Parts> parts_;
 };
 
-// Runs `chosen`, one of the usages of a command, each with a separate Command and options. --help
-// of the first usage shows all usages. Returns the exit code.
+// Runs `chosen`, one of the usages of a command, and returns the exit code. Each usage has a
+// separate Command and options; --help of the first shows all usages.
 using Subcommand = int(int argc, char** argv);
 int run_subcommand(int argc, char** argv, std::initializer_list<Subcommand*> subcommands,
                    Subcommand* chosen);

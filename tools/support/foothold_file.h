@@ -11,7 +11,7 @@ namespace graspmap_tools {
 
 struct FootholdMark {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  // m
-  Eigen::Vector3d approach = Eigen::Vector3d::Zero();  // direction; its length is not 0
+  Eigen::Vector3d approach = Eigen::Vector3d::Zero();  // direction of the approach, any length > 0
   double score = 0.0;                                  // graspability, 0 to 1
 };
 

@@ -19,25 +19,25 @@
 
 namespace graspmap_tools {
 
-// Ground of the virtual field test: a mesh in one file, or in a folder of tiles, of which few are
-// in memory.
+// Ground of the virtual field test: a mesh in one file, or in a folder of tiles, of which at most
+// three are in memory.
 class GroundTiles {
  public:
   // Mesh of one tile and of the surroundings within reach of a gripper.
   struct MeshTile {
     const libmap::TriangleMesh mesh;
-    const libgtd::Ground ground;              // ground of `mesh`
-    const libgtd::GripCandidates from_above;  // locations that may hold with approach from above
+    const libgtd::Ground ground;              // `mesh` as ground
+    const libgtd::GripCandidates from_above;  // prefilter for approach from above
   };
   using MakeGround = std::function<libgtd::Ground(const libmap::TriangleMesh& mesh)>;
 
   // `mesh`: a file or a folder of tiles. start_height_m: as in ClosingOptions. `gripper` must
-  // outlive the object. Throws Error naming the file if it cannot be read.
+  // outlive the object. Throws Error naming a file that cannot be read.
   GroundTiles(const std::string& mesh, const libgtd::Gripper& gripper, double start_height_m,
               MakeGround make_ground);
 
-  // Returns the index of the tile that contains the position's x and y (m, mesh frame). If several
-  // do, it is the one with the nearest center; if none does, the nearest tile.
+  // Returns the index of the tile that contains the position's x and y (m, mesh frame): of several
+  // tiles, the tile with the nearest center; if there is none, the nearest tile.
   std::size_t tile_at(const Eigen::Vector3d& position) const;
 
   // Returns the tile with this index; the reference is valid until three other tiles are requested.
@@ -69,14 +69,14 @@ struct GraspMapInput {
 // Names of the fields that are added to the map.
 const std::vector<std::string>& grasp_fields();
 
-// Checks the output; claims it if it is one file. Throws Error if the output cannot be used, or for
-// a share with one file or --force.
+// Checks the output, and claims an output that is one file. Throws Error if the output cannot be
+// used, or if a share is combined with --force or with an output that is one file.
 void require_map_output(const GraspMapInput& input, Run& run);
 
 // Writes the map with the added fields. Tiles are processed in a tile store, so that a killed run
-// can be resumed: in the output or in OUTPUT.progress, which is removed once the map in one file is
-// written. The run's manifest must have the inputs. Throws Error if the map is empty or has the
-// field grasp_trials, no voxel is on the mesh, or the output store is of other inputs.
+// can be resumed. The store is the output, or OUTPUT.progress for a map in one file, which is
+// removed at the end. The run's manifest must have the inputs. Throws Error if the map is empty or
+// has the field grasp_trials, no voxel is on the mesh, or the output has tiles of other inputs.
 void grasp_map(const GraspMapInput& input, GroundTiles& ground, const libgtd::Gripper& gripper,
                const libgtd::GraspOptions& options, Run& run);
 

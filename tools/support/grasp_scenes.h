@@ -17,8 +17,8 @@ struct GraspScenesOptions {
 };
 
 struct GraspScene {
-  std::size_t row = 0;  // row of the location
-  std::string file;     // name of the scene, PLACE.ply
+  std::size_t row = 0;  // row of the location, from 0
+  std::string file;     // name of the scene file, NAME.ply
 };
 
 struct GraspScenesInput {
@@ -29,18 +29,18 @@ struct GraspScenesInput {
   const std::vector<libgtd::LocationResult>& results;
 };
 
-// Returns the names of the locations: the column `place`, or the numbers of the rows, from 1.
+// Returns the names of the locations: the column `place`, else the numbers of the rows, from 1.
 std::vector<std::string> names_of(const libmap::Table& locations);
 
 // Claims the folder. Throws Error if another command wrote it, or for locations without a folder.
 void claim_scenes(const GraspScenesOptions& options, Run& run);
 
-// Returns the scenes to write. Throws Error for a location that is not in the table, two with the
-// same file name, or too many without a list.
+// Returns the scenes to write; none without a folder. Throws Error for a location that is not in
+// the table, two equal file names, or more than 100 scenes without a list of locations.
 std::vector<GraspScene> scenes_of(const libmap::Table& locations,
                                   const GraspScenesOptions& options);
 
-// Writes the scenes and adds one result per scene to the manifest, the text of its trial.
+// Writes the scenes. Adds a description of each scene's trial to the manifest as a result.
 void write_scenes(const GraspScenesOptions& options, const std::vector<GraspScene>& scenes,
                   const GraspScenesInput& input, Run& run);
 

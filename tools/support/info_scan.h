@@ -14,10 +14,10 @@ bool may_be_scan(const std::string& path);
 
 struct ScanInfo {
   nlohmann::ordered_json json;
-  std::vector<libmap::ScanFault> faults;  // broken parts of the scan; empty without `verify`
+  std::vector<libmap::ScanFault> faults;  // damaged data; empty without `verify`
 };
 // Return the description of a camera file and of a scan. Throw Error if the file cannot be read.
-// With `verify`, scan_info reads all data of the scan and lists the broken parts.
+// With `verify`, scan_info reads all data of the scan and lists the damaged data.
 nlohmann::ordered_json camera_info(const std::string& path);
 ScanInfo scan_info(const std::string& path, bool verify, libmap::Progress& progress);
 

@@ -16,35 +16,35 @@
 
 namespace graspmap_tools {
 
-// Returns true for paths of tile stores: names that end with .tiles.
+// Returns true for the path of a tile store: the name ends with .tiles.
 bool is_tile_store(const std::string& path);
 
 std::filesystem::path store_index_path(const std::string& store);  // STORE/index.json
 
-// Converts the manifest of a map in one file to the index of a store: lattice, frame, transforms,
-// no tiles. Returns nullopt if the manifest has no lattice.
+// Converts the manifest of a map in one file to the index of a tile store without tiles: sets
+// lattice, frame and manifest. Returns nullopt if the manifest has no lattice.
 std::optional<libgtd::TileStoreIndex> index_of(const libmap::Manifest& manifest);
 
-// Writes the file of one tile of the store, and adds hash and size of the file to `tile`.
+// Writes the file of one tile of the store, and sets path, hash and size of the file in `tile`.
 void write_tile(const std::filesystem::path& store, const libmap::PointCloud& points,
                 libgtd::StoredTile& tile);
 
-// Throws Error if a store has an index. Called for a store without a plan, which has no progress.
+// Throws Error if a store has an index. For a store without a plan, which cannot be resumed.
 void require_no_index(const libgtd::MapTileStore& store);
 
 class MapTiles {
  public:
-  // Throws Error naming the store or the index if either is missing, incomplete, damaged or empty.
+  // Throws Error naming store or index if one of them is missing, incomplete, damaged or empty.
   explicit MapTiles(const std::string& store);
-  // Opens a store by an index that need not be written. Throws Error if it has no tiles.
+  // Opens a store with an index that may not be written yet. Throws Error if it has no tiles.
   MapTiles(std::filesystem::path store, libgtd::TileStoreIndex index);
 
   const libgtd::TileStoreIndex& index() const { return index_; }
 
-  // Returns the points of index().tiles[tile], with their positions in the merged map. Throws Error
-  // naming the file if it is missing, damaged or differs from the index. Thread-safe.
+  // Returns the points of index().tiles[tile], with the same positions as in the merged map. Throws
+  // Error naming the file if it is missing, damaged or differs from the index. Thread-safe.
   libmap::PointCloud load(std::size_t tile) const;
-  // As load; also compares the hash of the file with the index.
+  // As load; also throws Error if the hash of the file differs from the index.
   libmap::PointCloud load_checked(std::size_t tile) const;
 
   // Returns the bounding box of a tile's voxel centers, in the frame of the map's points.
@@ -61,8 +61,8 @@ class MapTiles {
   bool float64_positions_ = false;
 };
 
-// Writes the tiles of a store as one map. PCD files are written row by row of tiles; other formats
-// need the whole map in memory. Errors of merging name `store`.
+// Writes the tiles of a store as one map. PCD files are written one row of tiles at a time; other
+// formats need the whole map in memory. Errors of merging name `store`.
 void write_merged(const MapTiles& tiles, const std::string& store,
                   const std::filesystem::path& file, const libmap::GeometryWriteOptions& writing,
                   Run& run);
@@ -73,22 +73,22 @@ struct MergeOptions {
 };
 
 // Merges a tile store to a cloud, with the same bytes as if it had been scored into one file, or to
-// a .tif with only the raster and a row of tiles in memory. Claims the output. Throws Error if the
-// store is incomplete, or for .pcd that is not binary.
+// a raster (.tif), with only the raster and a row of tiles in memory. Claims the output. Throws
+// Error if the store is incomplete, or for a .pcd that is not binary.
 void merge_store(const std::string& store, const std::string& output, const MergeOptions& options,
                  Run& run);
 
 // Returns the raster of a map or cloud, whose points `parts` visits.
 //
-// The raster is in the CRS of the manifest's georeference, else in the frame of the points. Pixels
-// are columns of voxels: their axes are the lattice's x and y axes, projected to the horizontal
-// plane. pixel_size_m 0: the map's voxel size; throws Error if the manifest has none. Throws also
-// the errors of make_map_raster.
+// The raster is in the CRS of the manifest's georeference; without one, in the frame of the points.
+// Pixels are columns of voxels: the pixel axes are the lattice's x and y axes, projected to the
+// horizontal plane. pixel_size_m 0: the map's voxel size; throws Error if the manifest has none.
+// Also throws the errors of make_map_raster.
 libmap::MapRaster raster_of(const libmap::CloudParts& parts, const libmap::Manifest& manifest,
                             double pixel_size_m);
 
 // Writes the raster to `output`, which must be claimed. The run's manifest must already have frame,
-// transforms and inputs; if the raster is in a CRS, the transforms are removed.
+// transforms and inputs. For a raster in a CRS, the transforms are removed from the manifest.
 void write_raster(const std::string& output, const libmap::MapRaster& raster, Run& run);
 
 }  // namespace graspmap_tools

@@ -9,7 +9,7 @@
 
 namespace graspmap_tools {
 
-// Splits at '|': "a| b||c" -> a, b, "", c; returns nothing for an empty text.
+// Splits at '|' and trims: "a| b||c" -> "a", "b", "", "c". Returns an empty list for an empty text.
 std::vector<std::string> split_texts(std::string_view text);
 // Splits at '|'. Throws Error with `reason` and `field` if there are more than `max_count` texts.
 std::vector<std::string> split_texts(std::string_view text, std::size_t max_count,

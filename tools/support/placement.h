@@ -9,9 +9,9 @@
 
 namespace graspmap_tools {
 
-// Parses "X,Y,Z,ROLL,PITCH,YAW" in meters and degrees about the fixed axes, roll first, or reads a
-// file of four rows of four numbers, as `crop` writes. Returns the identity for an empty text.
-// Throws Error naming the field or file.
+// Parses "X,Y,Z,ROLL,PITCH,YAW" in meters and degrees (rotations about the fixed axes x, then y,
+// then z), or reads a file of four rows of four numbers, as `crop` writes. Returns the identity for
+// an empty text. Throws Error naming the field or file.
 libmap::Pose parse_transform(const std::string& text, const std::string& field);
 
 // Returns the six numbers that parse_transform converts back to `pose`.

@@ -14,7 +14,7 @@ namespace graspmap_tools {
 // (failed) if no pipe can be created.
 void end_cleanly_on_signals();
 
-// Waits for the end of the process if such a signal was received, which causes errors afterwards.
+// If one of these signals was received, waits for the end of the process, and reports no errors.
 void exit_if_signaled();
 
 // Flushes standard output. Throws Error (failed) if not all of it was written.

@@ -1,5 +1,5 @@
-// Represents one run of a command: messages, timings, and outputs with manifests. Also includes the
-// headers of the standard library, fmt and libmap/core that nearly all commands need.
+// One run of a command: messages, timings, and outputs with manifests (OUTPUT.json). Also includes
+// the headers of the standard library, fmt and libmap/core that nearly all commands need.
 #pragma once
 
 #include <fmt/format.h>
@@ -28,10 +28,10 @@ namespace graspmap_tools {
 using libmap::in_file;
 
 // Converts any text to one line of printable UTF-8 for a terminal: control characters and invalid
-// bytes become \xNN, line breaks become spaces, a long text is shortened in the middle.
+// bytes become \xNN, line breaks become spaces, the middle of a long text is left out.
 std::string sanitize_text(const std::string& text);
 
-// Removes a trailing slash: "maps/" and "maps" are the same folder with the same manifest.
+// Removes trailing slashes: "maps/" and "maps" are the same folder with the same manifest.
 std::string without_trailing_slash(std::string path);
 
 // Values of the flags that all commands have.
@@ -53,8 +53,8 @@ class Run {
 
   void add_results(const libmap::ResultTable& table) { manifest_.add_results(table); }
 
-  // Adds an input with hash to the manifest; for a folder, each file directly in it. Paths in the
-  // toolkit's data folder become relative to it, so that they do not depend on the installation.
+  // Adds an input with its hash to the manifest; for a folder, each file directly in the folder.
+  // Paths in the toolkit's data folder become relative, independent of the installation.
   void add_input(const std::filesystem::path& path);
 
   // Print to stderr: `info` without --quiet, `warn` always, `detail` with --verbose.
@@ -74,47 +74,47 @@ class Run {
     detail(fmt::format(text, std::forward<Values>(values)...));
   }
 
-  // Runs `step` and adds the wall time to the manifest.
+  // Runs `step`, adds its wall time to the manifest, and returns its result.
   template <typename Step>
   auto timed(const std::string& name, const Step& step) {
     const Timing timing(*this, name);
     return step();
   }
-  // Adds the times of steps that a stage measured, as "STAGE: STEP"; --verbose prints them.
+  // Adds the times of a stage's steps to the manifest as "STAGE: STEP"; --verbose prints them.
   void add_timings(const std::vector<std::pair<std::string, double>>& timings_s,
                    const std::string& stage = {});
 
-  // Claims (reserves) the output for this process until the end of the run; called before the work.
-  // Throws Error if `path` is one of the inputs, exists and was not written by this toolkit (unless
-  // --force), cannot be written, or is claimed by another process.
+  // Claims (reserves) the output for this process until the end of the run; call it before the
+  // work. Throws Error if `path` is one of the inputs, is claimed by another process, cannot be
+  // written, or, unless --force, exists and was not written by this toolkit.
   void claim_output(const std::filesystem::path& path, const std::vector<std::string>& inputs = {});
 
-  // Calls writer(temporary), which writes the file, then moves the file to `path` together with the
-  // manifest. With --dry-run nothing is written.
+  // Calls writer(temporary), which writes a temporary file, then moves this file to `path` together
+  // with the manifest. With --dry-run, writes nothing.
   using Writer = std::function<void(const std::filesystem::path& temporary)>;
   static Writer text_writer(std::string text);
   void write_output(const std::filesystem::path& path, const Writer& writer);
   void write_text(const std::filesystem::path& path, const std::string& text);
 
-  // write_outputs writes an output of several files, of which `path` is the last. All files are
-  // written before they are moved in order, so that all others exist if `path` does.
-  // require_own_companions throws Error if one of the others exists and no earlier run of this
-  // command wrote `path` (unless --force). write_outputs calls it too.
+  // write_outputs writes an output of several files, of which `path` is the last. All are complete
+  // before they are moved in order, so that all others exist if `path` does. It first calls
+  // require_own_companions, which throws Error if one of the others exists and no earlier run of
+  // this command wrote `path` (unless --force).
   void require_own_companions(const std::filesystem::path& path,
                               const std::vector<std::filesystem::path>& others);
   using Files = std::vector<std::pair<std::filesystem::path, Writer>>;
   void write_outputs(const std::filesystem::path& path, const Files& files);
 
-  // Claim and write a folder of outputs, which is created if it is missing. All files are written
-  // before the first is moved into the folder; the manifest is FOLDER.json. With --dry-run nothing
-  // is written.
+  // Claim and write a folder of outputs, which is created if it is missing and may contain other
+  // files of this command. All files are complete before the first is moved into the folder. The
+  // manifest is FOLDER.json. With --dry-run, nothing is written.
   void claim_output_folder(const std::filesystem::path& folder);
   void write_output_folder(const std::filesystem::path& folder, const Files& files);
 
-  // Claim and write a folder of any number of files: writer(temporary) fills a temporary folder,
-  // which then replaces `folder`. Throw Error, even with --force, if `folder` contains other files
-  // than `names` or is one of the inputs. With --dry-run the writer gets an empty path and nothing
-  // is written. check_output_tree makes all checks but that of `names`, and claims nothing.
+  // Claim and write a folder that replaces an earlier `folder` as a whole; writer(temporary) fills
+  // a temporary folder. Throw Error, even with --force, if `folder` contains other files than
+  // `names` or is one of the inputs. With --dry-run, writes nothing and calls writer({}).
+  // check_output_tree makes all checks except that of `names`, and claims nothing.
   void check_output_tree(const std::filesystem::path& folder,
                          const std::vector<std::string>& inputs = {});
   void claim_output_tree(const std::filesystem::path& folder, const std::vector<std::string>& names,
@@ -137,8 +137,8 @@ class Run {
   // Throws Error if the folder contains files that this command did not write; `remedy` is appended
   // to the message.
   void require_own_folder(const std::filesystem::path& folder, const std::string& remedy);
-  // claim_manifest claims an output by creating the temporary manifest. begin_manifest returns this
-  // for writing, and creates it if the output was not claimed.
+  // claim_manifest claims an output by creating a temporary manifest. begin_manifest returns the
+  // temporary manifest for writing, and creates it if the output was not claimed.
   void claim_manifest(const std::filesystem::path& output);
   libmap::OutputFile begin_manifest(const std::filesystem::path& output);
   // Writes the files and the manifest, then moves all to the final paths.

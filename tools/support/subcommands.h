@@ -1,4 +1,4 @@
-// Entry points of subcommands in separate source files. argv begins at the command.
+// Entry points of usages of a command (comment) in separate source files. argv[0] is the command.
 #pragma once
 
 #include <string>
@@ -11,7 +11,7 @@ int convert_world(int argc, char** argv);  // convert SITE -o OUT.world
 int convert_scan(int argc, char** argv);   // convert SCAN
 int fuse_rig(int argc, char** argv);       // fuse RIG_FOLDER
 
-// simulate SUBCOMMAND; argv begins at SUBCOMMAND.
+// Usages of `simulate SUBCOMMAND`. argv[0] is SUBCOMMAND.
 int simulate_cameras(int argc, char** argv);
 int simulate_scan(int argc, char** argv);
 int simulate_scene(int argc, char** argv);
@@ -21,7 +21,7 @@ int simulate_terrain(int argc, char** argv);
 // Returns true for a path that convert_world writes: a name that ends in .world.
 bool is_world_path(const std::string& path);
 
-// Returns true for a possible scan: a name *.db, or a folder that is no tile store and no poses.
+// Returns true for a possible scan: a name *.db, or a folder that is no tile store or pose folder.
 bool is_scan_path(const std::string& path);
 
 }  // namespace graspmap_tools

@@ -1,7 +1,7 @@
-// Outputs that are folders of tiles. The tiles are made in a tile store beside the folder, by one
-// run or in shares (libmap/tiles/tile_store_io.h):
+// Outputs that are folders of tiles. One run, or several runs that share the tiles, make the tiles
+// in a tile store beside the folder (libmap/tiles/tile_store_io.h):
 //
-//   FOLDER.progress/tiles/TILE.*    file of a finished tile; none if it is empty
+//   FOLDER.progress/tiles/TILE.*    file of a finished tile; none for an empty tile
 //   FOLDER.progress/progress/...    plan with common data, and journals with data of each tile
 //
 // When all tiles are complete, the folder is created at once and the store is removed.
@@ -38,7 +38,7 @@ inline std::vector<std::string> tile_folder_names(
   return names;
 }
 
-// --tile K/N: share of the tiles that this run computes.
+// Value of --tile: "K/N", the share of the tiles that this run computes. "1/1" is all tiles.
 inline constexpr const char* whole_share = "1/1";
 void add_share_option(Command& command, std::string& share);
 // Throws Error if a share is requested and the output is one file.
@@ -48,26 +48,26 @@ class TileFolder {
  public:
   using TileData = nlohmann::json;
 
-  // Claims the folder `output` unless the run makes one of several shares. `names` and `inputs` are
-  // as in Run::claim_output_tree. The manifest of `run` must have parameters and inputs.
-  // Throws Error for a share with --force, which deletes all tiles, and for a share with other
-  // parameters or inputs than the earlier shares.
+  // Claims the folder `output` unless the run computes one of several shares. `names` and `inputs`
+  // are as in Run::claim_output_tree. The manifest of `run` must have parameters and inputs. Throws
+  // Error for a share with --force, which deletes all tiles, and for a share with other parameters
+  // or inputs than the earlier shares.
   TileFolder(const std::string& output, const std::vector<std::string>& names,
              const std::vector<std::string>& inputs, const libmap::TileShare& share, Run& run);
 
-  // Returns true, and reports it, if shares with equal parameters and inputs completed the folder.
+  // Returns true, with a message, if shares with equal parameters and inputs completed the folder.
   bool is_complete() const;
 
   // Begins the run and returns the data common to all tiles; null with --dry-run. The first share
-  // computes it by `find` while the others wait. Tiles of other parameters or inputs are deleted.
-  // Throws Error for such tiles if the run is one of several shares or another process uses them,
-  // and the errors of `find`.
+  // computes the data by `find` while the others wait. Deletes tiles of other parameters or inputs;
+  // throws Error instead if the run is one of several shares, or if another process uses the store.
+  // Throws the errors of `find`.
   TileData begin(const std::function<TileData()>& find = [] { return TileData::object(); });
 
   struct Work {
     std::vector<std::string> tiles;  // names of the tiles of all shares, without extension
     std::string extension;           // extension of the tiles' files, e.g. ".ply"
-    // Computes the n-th tile, writes it to `to` unless empty, and returns its data, a JSON object.
+    // Computes the n-th tile, writes it to `to` if not empty, and returns its data, a JSON object.
     std::function<TileData(std::size_t n, const std::filesystem::path& to)> make;
     // Fills the output with the finished tiles.
     std::function<void(const std::filesystem::path& folder)> finish;
@@ -82,7 +82,7 @@ class TileFolder {
   std::filesystem::path file(const std::string& tile, const std::string& extension) const {
     return store_.tiles() / (tile + extension);
   }
-  // Links the file of a tile to `to`, or copies it if the file system has no hard links.
+  // Creates a hard link `to` of a tile's file, or a copy if the file system has no hard links.
   static void link_file(const std::filesystem::path& file, const std::filesystem::path& to);
 
  private:
