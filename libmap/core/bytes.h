@@ -11,8 +11,8 @@
 
 namespace libmap {
 
-// Reads numbers from the front of a byte string, which must outlive the reader. Throws
-// std::length_error if too few bytes remain.
+// Reads numbers from the front of a byte string, which must outlive the reader and the returned
+// views. Throws std::length_error if too few bytes remain.
 class ByteReader {
  public:
   explicit ByteReader(std::string_view bytes) : bytes_(bytes) {}
@@ -52,7 +52,7 @@ class ByteReader {
   std::string_view bytes_;
 };
 
-// Appends numbers and texts to a byte string, in the format that ByteReader reads.
+// Appends numbers and texts to a byte string, as ByteReader reads them. numbers() writes no count.
 class ByteWriter {
  public:
   template <typename T>

@@ -1,5 +1,5 @@
 // The exception type of the project. It contains file, field, value and bound; a command prints
-// what() as one line and exits with the code of its kind.
+// what() as one line and exits with the exit code of the ErrorKind.
 #pragma once
 
 #include <filesystem>
@@ -9,7 +9,7 @@
 namespace libmap {
 
 // bad_input: a file, an option or data is invalid (exit code 3).
-// failed: the run itself failed, e.g. the disk is full (exit code 1); in comments "Error (failed)".
+// failed: the run failed, e.g. the disk is full (exit code 1). Comments write "Error (failed)".
 enum class ErrorKind { bad_input, failed };
 
 struct ErrorContext {
@@ -30,9 +30,10 @@ class Error : public std::runtime_error {
   const std::string& reason() const { return reason_; }
   ErrorKind kind() const { return kind_; }
 
-  // Returns a copy that names `file`, unless the error names a file already.
+  // Returns a copy with the file `file`; an unchanged copy if the error already names a file.
   Error in_file(const std::string& file) const;
-  // Returns a copy with the field `prefix`, joined to the present field if any: "rig: width".
+  // Returns a copy with the field `prefix` + `joint` + present field, e.g. "rig: width"; only
+  // `prefix` if the error has no field.
   Error in_field(const std::string& prefix, const char* joint = ": ") const;
 
  private:

@@ -1,5 +1,5 @@
-// Checked parsing of untrusted JSON. The library of `Json` (nlohmann) casts between all number
-// types and does not limit the nesting depth.
+// Checked parsing of untrusted JSON. `Json` is a type of the library nlohmann, which itself casts
+// between all number types and does not limit the nesting depth.
 #pragma once
 
 #include <cstddef>
@@ -13,7 +13,7 @@
 namespace libmap {
 
 // Parses `text`. Throws Error if arrays and objects are nested deeper than 64 levels or an object
-// has more than 10,000 members (ordered_json searches linearly), and exceptions of Json::parse.
+// has more than 10,000 members (ordered_json searches linearly). Invalid JSON: as Json::parse.
 template <typename Json>
 Json parse_json(const std::string& text) {
   constexpr int max_depth = 64;
@@ -43,7 +43,8 @@ Integer integer_of(const Json& json, const std::string& field) {
               {.field = field, .value = json.is_number() ? json.dump() : json.type_name()});
 }
 
-// Returns the member `key` of an object as an Integer. Throws as integer_of and Json::at do.
+// Returns the member `key` of an object as an Integer. Throws as integer_of does, or as Json::at if
+// there is no such member.
 template <typename Integer, typename Json>
 Integer integer_at(const Json& json, const char* key) {
   return integer_of<Integer>(json.at(key), key);

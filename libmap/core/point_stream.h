@@ -17,8 +17,8 @@ class PointStream {
   // Attributes that the visitor uses. The stream can omit all others.
   enum class Need { positions, positions_and_normals };
   using Visit = std::function<void(const PointCloud& block)>;
-  // Visits all points in order; can be called repeatedly. Either all blocks have normals or none
-  // has, and all have the same viewpoint.
+  // Visits all points in order; can be called repeatedly. Either all blocks or no block have
+  // normals, and all blocks have the same viewpoint.
   virtual void for_each_block(Need need, const Visit& visit) const = 0;
 };
 

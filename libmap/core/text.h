@@ -16,7 +16,7 @@ std::string to_text(std::int64_t value);
 // Returns fixed-point notation with `decimals` digits after the point.
 std::string to_fixed_text(double value, int decimals);
 
-// Parse all of `text`, apart from white space at both ends; nullopt if invalid or out of range.
+// Return the number in `text`, ignoring white space at both ends; nullopt if invalid or too large.
 std::optional<double> parse_double(std::string_view text);
 std::optional<std::int64_t> parse_integer(std::string_view text);
 std::optional<int> parse_int(std::string_view text);
@@ -29,8 +29,9 @@ std::string lower_case(std::string_view text);  // converts ASCII letters only
 // Splits at commas and drops empty parts: "a, b,,c" -> a, b, c.
 std::vector<std::string> split_list(std::string_view text);
 
-// Returns the candidate with the smallest Levenshtein distance to `name`, at most half its length;
-// else the first that begins with `name`, if 3 letters or longer; else nullopt. Ignores the case.
+// Returns the candidate with the smallest Levenshtein distance to `name`, which must be at most
+// half the length of `name`. Otherwise, returns the first candidate that begins with `name`, if
+// `name` has at least 3 letters; else nullopt. Ignores the case.
 std::optional<std::string> nearest_name(std::string_view name,
                                         const std::vector<std::string>& candidates);
 

@@ -1,4 +1,4 @@
-// Parses YAML; errors name file, key and line.
+// Parses YAML. The Errors name file, key and line.
 #pragma once
 
 #include <cstdint>

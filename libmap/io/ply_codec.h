@@ -20,9 +20,9 @@ namespace libmap {
 // the size of the file. Throws as decode_ply does.
 GeometryFileInfo ply_info(std::string_view head, std::uint64_t file_bytes);
 
-// Returns the layout of the vertices in a binary file, with columns that refer to records at
-// `block`; nullopt if the file is ascii, or if the vertices or an element before them contain a
-// list. Throws Error as decode_ply does.
+// Returns the layout of the vertices in a binary file, with columns that refer to records at the
+// address `block`; nullopt if the file is ascii, or if the vertices or an element before the
+// vertices contain a list. Throws Error as decode_ply does.
 std::optional<BinaryRecords> ply_records(std::string_view head, std::uint64_t file_bytes,
                                          const std::byte* block);
 
