@@ -27,8 +27,7 @@ std::string read_whole_file(const std::filesystem::path& path,
 // Returns the first bytes of a file, at most `max_bytes`; empty if it cannot be read.
 std::string file_head(const std::filesystem::path& path, std::size_t max_bytes);
 
-// Writes `content` directly to `path`; for atomic output, pass the temporary path of an OutputFile.
-// Throws Error (failed) if the write fails.
+// Writes `content` directly to `path`, e.g. OutputFile::temporary_path(). Throws Error (failed).
 void write_text(const std::filesystem::path& path, std::string_view content);
 
 // Writes `content` atomically through an OutputFile. Throws as OutputFile and commit() do.
@@ -84,8 +83,7 @@ class OutputFolder : public PendingOutput {
 // the commits. Throws Error (failed) as OutputFile::commit() does.
 void commit_together(std::vector<OutputFile>& outputs);
 
-// While a CommitGuard exists, abandon_unfinished_outputs() waits, so that the outputs that this
-// thread commits meanwhile are committed together.
+// Delays abandon_unfinished_outputs() while it exists, so that outputs are committed together.
 class CommitGuard {
  public:
   CommitGuard();

@@ -43,8 +43,7 @@ Integer integer_of(const Json& json, const std::string& field) {
               {.field = field, .value = json.is_number() ? json.dump() : json.type_name()});
 }
 
-// Returns the member `key` of an object as an Integer. Throws as integer_of does, or as Json::at if
-// there is no such member.
+// Returns the member `key` of an object as an Integer. Throws as integer_of and Json::at do.
 template <typename Integer, typename Json>
 Integer integer_at(const Json& json, const char* key) {
   return integer_of<Integer>(json.at(key), key);

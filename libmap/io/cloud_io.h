@@ -88,18 +88,16 @@ struct PcdPartsOptions {
 };
 
 // Writes a binary PCD part by part, so that only one part is in memory. The file is identical to
-// the file that write_cloud writes for one cloud of all parts.
+// that of write_cloud for one cloud of all parts. All functions can throw Error (failed).
 class PcdPartsWriter {
  public:
-  // Creates the file and writes directly to it, as write_cloud does. Throws Error (failed).
+  // Creates the file and writes directly to it, as write_cloud does.
   PcdPartsWriter(std::filesystem::path path, const PcdPartsOptions& options);
 
   // Appends a part; empty parts are skipped. Throws Error if fields, normals, colors or viewpoint
-  // differ from the first part or the parts have more than `points` points; Error (failed) if the
-  // write fails.
+  // differ from the first part, or if the parts have more than `points` points.
   void append(const PointCloud& part);
-  // Closes the file after the last part. Throws Error if the parts have fewer than `points` points;
-  // Error (failed) if the write fails.
+  // Closes the file after the last part. Throws Error if the parts have fewer than `points` points.
   void finish();
 
  private:

@@ -12,7 +12,7 @@ struct RTCSceneTy;
 
 namespace libmap {
 
-// Positions are relative to the center of the mesh, where single precision is most accurate.
+// Positions are relative to the center of the bounding box, where float32 is most accurate.
 class EmbreeMesh {
  public:
   // Throws Error if the mesh has no triangle, an index out of range or a vertex that is not finite.
@@ -21,10 +21,10 @@ class EmbreeMesh {
   EmbreeMesh(EmbreeMesh&&) = default;
   EmbreeMesh& operator=(EmbreeMesh&&) = default;
 
-  RTCSceneTy* scene() const { return scene_.get(); }  // relative to center()
+  RTCSceneTy* scene() const { return scene_.get(); }  // positions relative to center(), m
   const Eigen::Vector3d& center() const { return center_; }
   Eigen::Vector3d size() const { return size_; }  // size of the bounding box, m
-  // Corner of a triangle relative to center(), in double precision.
+  // Position of corner k (0 to 2) of a triangle relative to center(), m, in double precision.
   const Eigen::Vector3d& corner(std::uint32_t triangle, int k) const {
     return vertices_[triangles_[triangle][static_cast<std::size_t>(k)]];
   }
