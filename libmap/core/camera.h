@@ -37,12 +37,11 @@ struct Camera {
   void check() const;
 };
 
-// Returns the camera with the model `none` and no coefficients.
-Camera without_distortion(Camera camera);
+Camera without_distortion(Camera camera);  // with the model `none` and no coefficients
 
 // Returns the distorted pixel position of the ray (x/z, y/z) in the optical frame.
 Eigen::Vector2d distort_to_pixel(const Camera& camera, const Eigen::Vector2d& ray);
-// Inverse by Newton's method, with a tolerance of 1e-9 in x/z and y/z; nullopt if no ray is found.
+// Inverse of distort_to_pixel by Newton's method (tolerance: 1e-9); nullopt if no ray is found.
 std::optional<Eigen::Vector2d> pixel_to_ray(const Camera& camera, const Eigen::Vector2d& pixel);
 
 // Returns the distorted pixel position of a point in the optical frame, m, also outside the image;

@@ -32,8 +32,7 @@ class Error : public std::runtime_error {
 
   // Returns a copy with the file `file`; an unchanged copy if the error already names a file.
   Error in_file(const std::string& file) const;
-  // Returns a copy with the field `prefix` + `joint` + present field, e.g. "rig: width"; only
-  // `prefix` if the error has no field.
+  // Returns a copy with the field `prefix` + `joint` + present field; only `prefix` without field.
   Error in_field(const std::string& prefix, const char* joint = ": ") const;
 
  private:

@@ -59,7 +59,7 @@ class PendingOutput {
   int lock_ = -1;
 };
 
-// An output file. Write to temporary_path(), which has the extension of the final path.
+// An output file. Write to temporary_path(), which has the final path's extension, then commit().
 class OutputFile : public PendingOutput {
  public:
   // Throws Error if the folder does not exist or is not writable, or if the path exists and is not
@@ -69,7 +69,7 @@ class OutputFile : public PendingOutput {
   void commit();
 };
 
-// An output folder. Write into temporary_path().
+// An output folder. Write into temporary_path(), then call commit().
 class OutputFolder : public PendingOutput {
  public:
   // `names` lists the entries that an earlier folder at `final_path` may contain. Throws Error if
@@ -83,7 +83,7 @@ class OutputFolder : public PendingOutput {
 // the commits. Throws Error (failed) as OutputFile::commit() does.
 void commit_together(std::vector<OutputFile>& outputs);
 
-// Delays abandon_unfinished_outputs() while it exists, so that outputs are committed together.
+// Delays abandon_unfinished_outputs() while the guard exists, e.g. to commit several outputs.
 class CommitGuard {
  public:
   CommitGuard();
@@ -102,8 +102,8 @@ bool is_named_unfinished(const std::filesystem::path& path);
 // Returns a copy of the error that names `file` instead of the present file.
 Error naming(const Error& error, const std::filesystem::path& file);
 
-// Calls write(temporary). If it throws an Error that names `temporary` or a file in that folder,
-// the path of `temporary` in the Error is replaced by `output`.
+// Calls write(temporary). If `write` throws an Error that names `temporary` or a file in that
+// folder, the path `temporary` in the Error is replaced by `output`.
 void write_named(const std::filesystem::path& temporary, const std::filesystem::path& output,
                  const std::function<void(const std::filesystem::path&)>& write);
 

@@ -13,7 +13,7 @@
 namespace libmap {
 
 // Parses `text`. Throws Error if arrays and objects are nested deeper than 64 levels or an object
-// has more than 10,000 members (ordered_json searches linearly). Invalid JSON: as Json::parse.
+// has more than 10,000 members (ordered_json searches linearly). Also throws as Json::parse does.
 template <typename Json>
 Json parse_json(const std::string& text) {
   constexpr int max_depth = 64;

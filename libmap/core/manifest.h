@@ -49,9 +49,8 @@ struct Manifest {
 // Returns the path of an output's manifest: "map.pcd" -> "map.pcd.json".
 std::filesystem::path manifest_path(const std::filesystem::path& output);
 
-// Returns JSON text with keys in a fixed order. NaN and infinity become null, read back as NaN.
-std::string to_json(const Manifest& manifest);
-// Parses the output of to_json; the section "run" is optional. Throws Error naming `file`.
+std::string to_json(const Manifest& manifest);  // keys in fixed order; NaN and infinity are null
+// Parses the output of to_json (null: NaN; "run" is optional). Throws Error naming `file`.
 Manifest parse_manifest(const std::string& json, const std::string& file);
 // Reads the manifest next to `output`. Returns nullopt if there is no manifest. Throws Error naming
 // the manifest's path if it is invalid.

@@ -64,7 +64,7 @@ class ParameterTable {
 
   // Makes set() accept keys "PREFIX.KEY", e.g. "gripper.opening_angle_deg", which override values
   // of a file that is read later: set() stores KEY and text in `texts`, replacing an earlier text
-  // of KEY. `texts` must outlive the table; the caller checks its keys.
+  // of KEY. `texts` must outlive the table. The table does not check KEY and text.
   void add_overrides(std::string prefix, std::vector<std::pair<std::string, std::string>>& texts);
 
   const std::vector<Parameter>& parameters() const { return parameters_; }
@@ -76,7 +76,7 @@ class ParameterTable {
   // Returns all keys with their values as text, including the texts of add_overrides().
   std::vector<std::pair<std::string, std::string>> values() const;
 
-  // Returns the first key whose values differ; nullopt if the tables, of equal keys, are equal.
+  // Returns the first key with different values in two tables of equal keys, or nullopt.
   std::optional<std::string> first_difference(const ParameterTable& other) const;
 
   // Sets one parameter from text. Throws Error if the key is unknown (with the nearest known key),
@@ -119,7 +119,7 @@ std::optional<std::string> changed_key(Options options, void (*bind)(ParameterTa
 std::string flag_of(std::string_view key);
 
 // Sets the table from YAML `text`, a map of scalars; a section "a: {b: 1}" sets the key "a.b".
-// Throws Error naming `file` for unknown keys, duplicates and values that are not scalars (before
+// Throws Error naming `file` for unknown or duplicate keys and values that are not scalars (before
 // any field is set), and for invalid values. Returns the keys of the text, sorted.
 std::vector<std::string> set_from_yaml(const ParameterTable& table, const std::string& text,
                                        const std::string& file);

@@ -46,7 +46,6 @@ struct PointCloud {
   bool has_normals() const { return !normals.empty(); }
   bool has_colors() const { return !colors.empty(); }
 
-  // Returns the field called `name`, or nullptr.
   const ScalarField* find_field(std::string_view name) const {
     return libmap::find_field(fields, name);
   }

@@ -64,8 +64,7 @@ Error wrong_columns(const std::string& reason, const TextLine& line, const std::
 // Returns an error for a record, e.g. "node 7", that an earlier line has already defined.
 Error duplicate(const TextLine& line, const std::string& record, const std::string& file);
 
-// Throws Error if `bytes` bytes are too few for `rows` lines of `words` words each. `what` is the
-// name of the rows in the Error, e.g. "points".
+// Throws Error unless `rows` lines (`what`, e.g. "points") of `words` words fit in `bytes` bytes.
 void require_room_for_text(std::uint64_t rows, std::uint64_t words, std::uint64_t bytes,
                            const std::string& what);
 

@@ -40,8 +40,7 @@ double surface_area(const TriangleMesh& mesh);
 // Returns the enclosed volume of a closed mesh, m3; negative if triangles are clockwise outside.
 double signed_volume(const TriangleMesh& mesh);
 
-// Returns unit vertex normals: area-weighted means of the normals of adjacent triangles, zero at
-// vertices without triangles.
+// Returns unit vertex normals: area-weighted means of adjacent triangles; zero without triangles.
 std::vector<Eigen::Vector3f> estimate_vertex_normals(const TriangleMesh& mesh);
 
 // Texture coordinates of a triangle's corners: 0 to 1 over the width and height of the texture

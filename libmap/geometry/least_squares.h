@@ -42,8 +42,8 @@ struct LeastSquaresSummary {
 // Levenberg-Marquardt (Marquardt 1963). `cost` is the finite cost of the problem's initial state.
 // The class Problem must have the functions
 //   void linearize()                computes the normal equations at the current state
-//   double propose(double damping)  solves them; returns the cost of the state after the step, or
-//                                   infinity if there is no step
+//   double propose(double damping)  solves the equations for a step; returns the cost of the state
+//                                   after the step, infinity if there is no step
 //   void accept()                   replaces the current state by the proposed state
 template <typename Problem>
 LeastSquaresSummary levenberg_marquardt(Problem& problem, double cost,

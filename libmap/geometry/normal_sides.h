@@ -10,9 +10,9 @@
 namespace libmap {
 
 // Minimum of NormalVotes::fraction() of a surface whose normals have correct signs. Measured: 0.92
-// for rocks on the ground, scanned from all sides; <= 0.82 for random signs (excluded by the next).
+// for rocks on the ground, scanned from all sides. Random signs (up to 0.82) fail the next bound.
 inline constexpr double min_agreeing_fraction = 0.8;
-// Maximum of opposing_fraction() of such a surface; only its thin parts have opposing neighbors.
+// Maximum of opposing_fraction() for correct signs; only thin parts have opposing neighbors then.
 inline constexpr double max_opposing_fraction = 0.1;
 
 // Sums of |cos(angle to an axis)| of the normals along and of the normals against the axis. Zero

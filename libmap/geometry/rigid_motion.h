@@ -38,7 +38,7 @@ Matrix6d step_derivative(const Pose& from, const Pose& to);
 // True if two poses differ by at most `distance_m` and `angle_rad`.
 bool is_near(const Pose& a, const Pose& b, double distance_m, double angle_rad);
 
-// Derivatives of a step of the relative pose a_from_b = a^-1 * b by steps of the poses a and b.
+// Derivatives of a step of the relative pose a_from_b = a^-1 * b with respect to steps of a and b.
 struct RelativeJacobian {
   Matrix6d by_a;  // minus the adjoint of b_from_a
   Matrix6d by_b;  // the identity

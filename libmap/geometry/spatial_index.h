@@ -30,7 +30,7 @@ class PointTree {
   std::vector<NeighborPoint> nearest(const Eigen::Vector3d& point, std::size_t count) const;
   // Returns the nearest point, any of several at equal distance. The tree must not be empty.
   NeighborPoint nearest(const Eigen::Vector3d& point) const;
-  // Returns the nearest point, of several the lowest index. The tree must not be empty.
+  // Like nearest(point), with the lowest index at equal distance. The tree must not be empty.
   NeighborPoint first_of_nearest(const Eigen::Vector3d& point) const;
   // Returns the points nearest to point n within `radius_m`, at most `count` and without point n,
   // by ascending distance.
@@ -48,7 +48,7 @@ double median_spacing(const std::vector<Eigen::Vector3d>& points);
 
 struct CloudSpacing {
   // Median distance from a point to the nearest point at another position. If most points are
-  // near-duplicates (first and last returns, joined clouds), by_area_m of the points after merging.
+  // near-duplicates (first and last returns, joined clouds), it is by_area_m of the merged points.
   double nearest_m = 0.0;
   double by_area_m = 0.0;  // spacing of a square grid with as many points per area
 };

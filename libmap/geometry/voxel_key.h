@@ -56,8 +56,7 @@ inline std::uint64_t scramble(std::uint64_t key) {
 
 }  // namespace voxel_key
 
-// Returns the key of a voxel; unpack() is the inverse.
-inline std::uint64_t pack(const VoxelSide& voxel) {
+inline std::uint64_t pack(const VoxelSide& voxel) {  // returns the key; inverse: unpack()
   using voxel_key::axis_bits;
   return axis_bits(voxel.cell.x()) << 43U | axis_bits(voxel.cell.y()) << 22U |
          axis_bits(voxel.cell.z()) << 1U | static_cast<std::uint64_t>(voxel.side);

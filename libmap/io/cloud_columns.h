@@ -47,8 +47,7 @@ void add_field_columns(const std::vector<ScalarField>& fields, ColumnSet& set);
 // Returns all columns as scalar fields. Throws Error if two columns have equal names.
 std::vector<ScalarField> fields_of_columns(const ColumnSet& columns);
 
-// Adds columns red, green, blue of PCL's packed colors (0xAARRGGBB): row 0 is at the address
-// `first`, each other row `stride` bytes later. The colors must outlive `set`.
+// Adds columns red, green, blue of packed PCL colors (0xAARRGGBB) at `first`, `stride` bytes apart.
 void add_packed_color_columns(const std::byte* first, std::size_t stride, bool big_endian,
                               ColumnSet& set);
 // Returns the columns; red, green and blue, if all three exist, are packed into a column `rgb`.

@@ -1,11 +1,11 @@
-// Reader and writer of cloud files. The extension, in any case, selects the format.
+// Reader and writer of cloud files. The extension (upper or lower case) selects the format.
 //
 //          fields and their types   viewpoint   encodings
 //   .pcd   all                      yes         ascii, binary, binary_compressed
 //   .ply   all                      comment     ascii, binary (little- or big-endian)
 //   .vtp   all                      field data  ascii, binary, binary_compressed (zlib); not read
 //   .csv   all, without types       no          text
-//   .tif   not written (a map: libmap/raster); a DEM is read as the centers of its pixels
+//   .tif   DEM, read as the centers of its pixels; not written (see libmap/raster)
 //
 // Coordinates are doubles in memory. They are written as float32, or as float64 if float32 would
 // move a coordinate by more than 1e-5 m; normals as float32, colors as three bytes, fields in their
@@ -34,7 +34,7 @@ namespace libmap {
 
 struct CloudReadResult {
   PointCloud cloud;
-  std::size_t dropped_points = 0;  // position not finite, or undeclared nodata (DemBlock) of a DEM
+  std::size_t dropped_points = 0;  // points that are not finite, or undeclared nodata (DemBlock)
   GeometryFileInfo info;
 };
 
@@ -83,7 +83,7 @@ void write_geometry_file(const std::filesystem::path& path,
                          const std::function<void(std::ostream&)>& write);
 
 struct PcdPartsOptions {
-  std::uint64_t points = 1;        // total of all parts, at least 1
+  std::uint64_t points = 1;        // number of points of all parts, at least 1
   bool float64_positions = false;  // need_float64(all points), cloud_columns.h; false: float32
 };
 

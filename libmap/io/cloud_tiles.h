@@ -60,8 +60,7 @@ struct TilesReadResult {
 TilesReadResult read_tiles(const std::vector<std::filesystem::path>& tiles);
 
 // Reads the points in a rectangle from one or many cloud files, with normals, colors and fields.
-// All DEMs are read in the local frame of the first DEM. Memory depends on the size of a file and
-// of the result.
+// DEMs are read in the local frame of the first DEM. Memory depends on the size of a file.
 class TileIndex {
  public:
   // Reads each file once and calls visit(cloud) for each file with points. Throws Error naming the
@@ -72,8 +71,8 @@ class TileIndex {
   std::size_t points() const { return points_; }           // in all files, with finite positions
   std::size_t dropped_points() const { return dropped_; }  // see CloudReadResult, of all files
 
-  // Returns the points with low <= (x, y) < high, m, in the order of the files. Omits colors and
-  // fields that a file with such points lacks. Caches recently used files, up to 4 million points.
+  // Returns the points with low <= (x, y) < high, m, in the order of the files, with the colors and
+  // fields that all files of these points have. Caches recently used files, up to 4 million points.
   PointCloud points_in(const Eigen::Vector2d& low, const Eigen::Vector2d& high);
 
  private:

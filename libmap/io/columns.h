@@ -1,6 +1,5 @@
-// Named columns of numbers: the common format between the file codecs and clouds or meshes. A
-// column refers to memory that another object owns, so that reading and writing do not copy a
-// cloud.
+// Named columns of numbers: the common format between file codecs and clouds or meshes. A column
+// refers to memory that another object owns, so that reading and writing do not copy a cloud.
 #pragma once
 
 #include <array>
@@ -44,8 +43,7 @@ enum class StoredType {
 StoredType stored_as(ScalarType type);
 // Inverse of stored_as; float64 for 64-bit integers.
 ScalarType scalar_type_of(StoredType type);
-// Size of a number in bytes.
-std::size_t size_of(StoredType type);
+std::size_t size_of(StoredType type);  // size of a number in bytes
 
 struct Column {
   std::string name;
@@ -53,7 +51,7 @@ struct Column {
   StoredType stored = StoredType::float32;  // type in memory
   const std::byte* first = nullptr;         // address of row 0
   std::size_t stride = 0;                   // bytes between rows
-  bool swapped = false;                     // true: numbers have the opposite byte order
+  bool swapped = false;                     // true: opposite of this machine's byte order
 };
 
 struct ColumnSet {
@@ -116,8 +114,7 @@ void write_rows(
 
 // Returns the pose cloud_from_sensor as tx ty tz (m) qw qx qy qz, the order of PCD files.
 std::array<double, 7> viewpoint_numbers(const Pose& viewpoint);
-// Returns these numbers as text, with a space before each number.
-std::string viewpoint_words(const Pose& viewpoint);
+std::string viewpoint_words(const Pose& viewpoint);  // as text, with a space before each number
 // Inverse of viewpoint_numbers; nullopt if the quaternion is zero.
 std::optional<Pose> pose_of_viewpoint(const std::array<double, 7>& numbers);
 

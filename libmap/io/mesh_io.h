@@ -1,4 +1,4 @@
-// Reader and writer of triangle mesh files. The extension, in any case, selects the format.
+// Reader and writer of triangle mesh files. The extension (upper or lower case) selects the format.
 //
 //          read by         written by      content
 //   .ply   ply_codec       ply_codec       doubles, normals, colors, vertex and face fields
@@ -15,7 +15,7 @@
 //
 // The library assimp reads .stl and .glb as triangle corners. Equal corners are merged into one
 // vertex, in the order of first use; vertices without triangles are lost. GLB has y up by
-// definition, this project z up: writing and reading rotate about x.
+// definition, this project z up: writing and reading rotate by 90 degrees about x.
 #pragma once
 
 #include <filesystem>

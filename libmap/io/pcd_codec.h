@@ -35,8 +35,7 @@ std::string pcd_header(const ColumnSet& columns, std::uint64_t points, const Pos
                        FileEncoding encoding);
 // Writes the points after the header. Throws Error for more than 2.8 GB to compress.
 void encode_pcd_points(const ColumnSet& columns, FileEncoding encoding, std::ostream& out);
-// Writes header and points. Throws as both functions do.
 void encode_pcd(const ColumnSet& columns, const Pose& viewpoint, FileEncoding encoding,
-                std::ostream& out);
+                std::ostream& out);  // writes header and points; throws as both functions
 
 }  // namespace libmap

@@ -1,6 +1,6 @@
 // In-memory codec of PLY (Turk 1994), ascii and binary little- and big-endian, for clouds and
 // meshes. All scalar properties of `vertex` and `face` are kept, with types. The faces are the list
-// `vertex_indices` or `vertex_index`; other lists and elements are listed in info.skipped.
+// `vertex_indices` or `vertex_index`; GeometryFileInfo::skipped names other lists and elements.
 #pragma once
 
 #include <cstddef>
@@ -27,8 +27,7 @@ std::optional<BinaryRecords> ply_records(std::string_view head, std::uint64_t fi
                                          const std::byte* block);
 
 // Decodes a file. Throws Error (without the file's name) for an invalid header line, truncated data
-// (checked before memory is allocated), and a face with fewer than three corners or an index out of
-// range.
+// (checked before memory is allocated), a face with fewer than 3 corners or an index out of range.
 GeometryColumns decode_ply(const std::shared_ptr<const std::string>& bytes);
 
 // Writes a file; the viewpoint is a comment line. Throws Error for a field name that is not valid

@@ -25,8 +25,9 @@ struct PlacedFragment {
   Fragment fragment;
   std::array<Eigen::Vector3d, 3> corners;
 
+  // Return the area and the squared length of the longest side, m2.
   double area_m2() const;
-  double square_of_longest_side() const;  // m2
+  double square_of_longest_side() const;
   // Returns the halves on both sides of the longest side's midpoint (Rivara 1984).
   std::array<PlacedFragment, 2> halves() const;
 };
@@ -56,8 +57,7 @@ class SurfaceFragments {
 
   const std::vector<SurfaceBlock>& blocks() const { return blocks_; }
   double area_m2() const;  // total area of the fragments
-  // Returns the fragment at an index of a SurfaceBlock: triangle `number` of the mesh, or a part of
-  // a triangle if `number` is higher than the indices of the triangles.
+  // Returns triangle `number` of the mesh or, beyond the last triangle, a part of a triangle.
   PlacedFragment fragment_at(std::size_t number) const;
 
  private:

@@ -16,7 +16,7 @@ namespace libmap {
 class EmbreeMesh {
  public:
   // Throws Error if the mesh has no triangle, an index out of range or a vertex that is not finite.
-  // `robust`: rays do not pass between two triangles at a shared edge.
+  // With `robust`, rays do not pass between two triangles at their shared edge.
   EmbreeMesh(const TriangleMesh& mesh, bool robust);
   EmbreeMesh(EmbreeMesh&&) = default;
   EmbreeMesh& operator=(EmbreeMesh&&) = default;

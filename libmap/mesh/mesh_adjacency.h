@@ -29,8 +29,8 @@ inline bool has_repeated_vertex(const Triangle& t) {
 }
 
 // Half-edges by undirected edge: edge e has half_edges[first[e]] to half_edges[first[e + 1] - 1],
-// ascending. Edges are sorted by the lower, then by the higher vertex. Triangles with a repeated
-// vertex have no edges.
+// ascending. Edges are sorted by their lower, then their higher vertex index. Triangles with a
+// repeated vertex have no edges.
 struct MeshEdges {
   std::vector<HalfEdge> half_edges;
   std::vector<std::uint32_t> first;

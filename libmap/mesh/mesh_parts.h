@@ -25,7 +25,7 @@ struct MeshComponents {
   std::vector<double> areas_m2;            // by component
 };
 MeshComponents connected_components(const TriangleMesh& mesh);
-// Returns the same in a third of the time; `opposite` is opposites_of(mesh).
+// Returns connected_components(mesh) in a third of the time; `opposite` is opposites_of(mesh).
 MeshComponents connected_components(const TriangleMesh& mesh,
                                     const std::vector<HalfEdge>& opposite);
 
@@ -48,7 +48,7 @@ using TriangleCorners = std::array<Eigen::Vector3d, 3>;
 inline TriangleCorners corners_of(const TriangleMesh& mesh, const Triangle& t) {
   return {mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]};
 }
-// Divides a triangle at the midpoints of its sides. Returns the middle part, then those at corners.
+// Divides a triangle at the midpoints of its sides: the middle part, then the parts at the corners.
 std::array<TriangleCorners, 4> quarters_of(const TriangleCorners& corners);
 
 // Point on a triangle: (1 - u - v) * a + u * b + v * c.

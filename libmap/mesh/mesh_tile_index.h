@@ -36,7 +36,7 @@ class MeshTileIndex {
   // Bounding box of the tile in x and y, m.
   const Eigen::AlignedBox2d& box(std::size_t tile) const { return tiles_[tile].box; }
 
-  // Returns the tile, and the triangles of other tiles with a corner in box(tile) + `margin_m`.
+  // Returns the tile and the triangles of other tiles with a corner within `margin_m` of box(tile).
   // Caches recently used tiles, up to 1 million triangles. Throws Error if a file cannot be read.
   MeshWithMargin with_margin(std::size_t tile, double margin_m);
 

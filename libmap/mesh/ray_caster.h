@@ -32,9 +32,8 @@ class RayCaster {
   std::optional<RayHit> cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                              double near = 0.0, double far = 1e30) const;
 
-  // Casts many rays from one origin, fastest if neighbors in `directions` are similar. `hits`
-  // receives one element per direction, with triangle = no_triangle if there is no intersection.
-  // Throws Error if the sizes differ.
+  // Casts one ray per direction, fastest if successive directions are similar. hits[n] becomes the
+  // hit of directions[n]; triangle = no_triangle: no hit. Throws Error if the sizes differ.
   void cast_bundle(const Eigen::Vector3d& origin, std::span<const Eigen::Vector3d> directions,
                    std::span<RayHit> hits, double near = 0.0, double far = 1e30) const;
 

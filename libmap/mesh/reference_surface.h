@@ -32,8 +32,7 @@ class ReferenceSurface {
 
   // Represents a cloud with normals by one disc per point, with a radius of twice the median point
   // spacing. Distances are to the disc of the nearest point. Discs close the gaps between points,
-  // but not holes. A point without a normal has no disc. Throws Error if the cloud has no point or
-  // a point is not finite.
+  // but not holes. Points without normals have no disc. Throws Error if empty or not finite.
   explicit ReferenceSurface(const PointCloud& cloud);
 
   ~ReferenceSurface();

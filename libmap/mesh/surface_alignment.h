@@ -15,7 +15,7 @@ struct SurfaceAlignmentOptions {
   double max_distance_m = 0.2;  // > 0: points farther from the surface are ignored
   double min_overlap = 0.1;     // 0 to 1: minimum share of points within max_distance_m, else Error
   int max_iterations = 100;     // >= 1: maximum number of ICP iterations
-  double tolerance_m = 1e-7;    // > 0: converged if a step moves the points by less (RMS)
+  double tolerance_m = 1e-7;    // > 0: RMS displacement per step below which ICP has converged
   int max_points = 50000;       // >= 6: maximum number of points used, evenly over the list
   // 0 to 1: minimum eigenvalue of the ICP information matrix, relative to the largest eigenvalue.
   // Points are not moved along eigenvectors with smaller eigenvalues, which the surface does not
@@ -39,9 +39,9 @@ struct SurfaceAlignmentResult {
 // Finds the rigid motion of `points`, from the identity, that minimizes the weighted squares of the
 // points' distances along the surface normals. Points with a nearest point on the border are
 // ignored. The scale of the weights is 1.4826 times the median distance in each step, so that up to
-// half of the overlapping points may be outliers. The result does not depend on the number of
-// threads. Throws Error if an option is out of range, there are fewer than six points, a point is
-// not finite, the surface is not oriented, or in a step too few points overlap the surface.
+// half of the overlapping points may be outliers. Throws Error if an option is out of range, there
+// are fewer than six points, a point is not finite, the surface is not oriented, or the overlap in
+// a step is below min_overlap or six points.
 SurfaceAlignmentResult align_to_surface(const std::vector<Eigen::Vector3d>& points,
                                         const ReferenceSurface& surface,
                                         const SurfaceAlignmentOptions& options = {});

@@ -18,8 +18,7 @@
 
 namespace libmap {
 
-// COLMAP's pixel coordinates minus this project's pixel coordinates.
-inline constexpr double colmap_pixel_offset = 0.5;
+inline constexpr double colmap_pixel_offset = 0.5;  // pixel in COLMAP minus pixel in this project
 
 // A line of cameras.txt: "CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]".
 struct ColmapCamera {

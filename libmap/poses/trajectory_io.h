@@ -14,7 +14,7 @@ namespace libmap {
 
 // Formats; comments give RTAB-Map's numbers. `automatic` recognizes the extensions .tum, .kitti,
 // .g2o and .toro; a folder or images.txt as a COLMAP model; other files (.txt, .graph, .csv) by
-// content. Formats 1 and 2 have other axes, which no content shows, so they must be selected.
+// content. Formats 1 and 2 have other axes, which files do not state, so they must be selected.
 enum class TrajectoryFormat {
   automatic,
   tum,                 // 10, 11
@@ -28,7 +28,6 @@ enum class TrajectoryFormat {
   nerfstudio,  // transforms.json
   euroc
 };
-// Names of the formats in options.
 const std::vector<std::pair<std::string, TrajectoryFormat>>& trajectory_format_names();
 
 struct TrajectoryFile {
@@ -56,7 +55,7 @@ std::filesystem::path file_of_trajectory(const std::filesystem::path& path);
 // stamps repeat. Throws Error for another extension; Error (failed) if the write fails.
 void write_trajectory(const std::filesystem::path& path, const TrajectoryFile& trajectory,
                       bool nodes = false);
-// Same with a given format. Throws Error for `automatic`, `colmap` and the read-only formats.
+// As write_trajectory, in a given format. Throws Error for automatic, colmap, read-only formats.
 void write_trajectory_as(TrajectoryFormat format, const std::filesystem::path& path,
                          const TrajectoryFile& trajectory, bool nodes = false);
 

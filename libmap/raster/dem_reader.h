@@ -15,7 +15,7 @@
 
 namespace libmap {
 
-// True if the extension is .tif or .tiff, in any case.
+// True if the extension is .tif or .tiff, in upper or lower case.
 bool is_dem_path(const std::filesystem::path& path);
 
 struct DemInfo {
@@ -36,8 +36,8 @@ struct DemBlock {
   std::int64_t row = 0;     // first row
   std::int64_t columns = 0;
   std::int64_t rows = 0;
-  // Local heights, m; NaN for nodata. -infinity for undeclared nodata: usual nodata values (-9999,
-  // -99999, -999999, -32767, -32768) that the file does not declare; only heights in m, not scaled.
+  // Local heights, m; NaN for nodata; -infinity for undeclared nodata. These are the values -9999,
+  // -99999, -999999, -32767 and -32768 in a file with heights in m, without scale and offset.
   std::vector<double> heights_m;
 };
 
@@ -54,17 +54,17 @@ struct DemBlock {
 //   - its CRS is geographic or geocentric, or differs from the CRS of `frame`;
 //   - it has no height band, or a height band of 8 bits or of complex numbers;
 //   - it has more than 2^33 pixels, or a strip or tile of more than 2^24 pixels;
-//   - a height is beyond 1e6 m.
+//   - the absolute value of a height exceeds 1e6 m.
 // The constructor throws Error (failed) if graspmap was built without GDAL.
 class DemReader {
  public:
+  // Opens the file and reads its properties.
   explicit DemReader(const std::filesystem::path& path,
                      const std::optional<Georeference>& frame = std::nullopt);
   ~DemReader();
   DemReader(DemReader&&) noexcept;
 
-  // Properties of the whole raster.
-  const DemInfo& info() const;
+  const DemInfo& info() const;  // properties of the whole raster
   // Reads the next block. Returns false if no block is left.
   bool next(DemBlock& block);
 

@@ -19,7 +19,7 @@ namespace libmap {
 struct PointTileStoreOptions {
   double tile_m = 1.0;                                // > 0: side of a tile
   bool has_normals = false;                           // true to store the points' normals
-  std::size_t buffer_bytes = std::size_t{64} << 20U;  // amount of points to write to disk at once
+  std::size_t buffer_bytes = std::size_t{64} << 20U;  // buffered bytes before a write to disk
 };
 
 class PointTileStore {
@@ -28,8 +28,7 @@ class PointTileStore {
   // throw Error (failed) if the file cannot be created, written or read.
   PointTileStore(const std::filesystem::path& folder, const PointTileStoreOptions& options);
 
-  // Adds points, which must have normals if has_normals is true. Positions must be finite and less
-  // than 2^40 tiles away from the origin.
+  // Adds points (with normals if has_normals), finite and less than 2^40 tiles from the origin.
   void add(const PointCloud& cloud);
   // Writes the buffered points. Call it after the last add(), to release memory.
   void finish() { flush(); }

@@ -34,8 +34,7 @@ class TileJournal {
   ~TileJournal();
   TileJournal(TileJournal&& other) noexcept;
   TileJournal& operator=(TileJournal&&) = delete;
-  // Appends `lines` (JSON), one per finished tile, whose file must be complete, and syncs them to
-  // disk. Throws Error (failed).
+  // Appends and syncs lines of JSON, one per tile whose file is complete. Throws Error (failed).
   void add(const std::vector<std::string>& lines);
 
  private:
@@ -57,8 +56,8 @@ class TileStore {
   std::filesystem::path plan_path() const { return progress() / "plan.json"; }
 
   // Begins the run of a share: creates missing folders, calls check_plan() while the store is
-  // locked, and locks the journal. Throws Error if the folder is not a tile store, the errors of
-  // check_plan() and of TileJournal; a new folder is then removed again.
+  // locked, and locks the journal. Throws Error if the folder is not a tile store, and as
+  // check_plan() and TileJournal do. After an error, a new folder is removed again.
   TileJournal begin(const TileShare& share, const std::function<void()>& check_plan) const;
   void open() const;  // only creates missing folders; throws Error if `folder` is no tile store
 
