@@ -26,9 +26,9 @@ struct ManifestInput {
 };
 
 struct Manifest {
-  std::string command;
-  std::string version;
-  std::vector<std::pair<std::string, ManifestValue>> parameters;
+  std::string command;                                            // e.g. "score"
+  std::string version;                                            // version of graspmap
+  std::vector<std::pair<std::string, ManifestValue>> parameters;  // by key
   std::vector<ManifestInput> inputs;
   std::string frame;                                     // frame of the output's coordinates
   std::vector<std::pair<std::string, Pose>> transforms;  // by name, e.g. "terrain_from_input"

@@ -22,7 +22,7 @@ enum class LinkType {
   virtual_closure = 5,
   neighbor_merged = 6,
   pose_prior = 7,  // of one node: PoseLink::from = to
-  landmark = 8,    // PoseLink::to < 0, the id of a landmark
+  landmark = 8,    // from a node to a landmark: PoseLink::to < 0
   gravity = 9      // of one node: PoseLink::from = to
 };
 // Returns "neighbor", "global closure", ...; "type N" for an unknown number.
@@ -32,8 +32,8 @@ using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
 // Relative pose between two nodes, given by their ids: pose_to = pose_from * from_from_to.
 struct PoseLink {
-  int from = 0;
-  int to = 0;
+  int from = 0;  // node id
+  int to = 0;    // node id; of a landmark: < 0
   LinkType type = LinkType::neighbor;
   Pose from_from_to = Pose::Identity();
   // Inverse covariance in the order x y z roll pitch yaw, m and rad.

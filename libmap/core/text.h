@@ -16,7 +16,7 @@ std::string to_text(std::int64_t value);
 // Returns fixed-point notation with `decimals` digits after the point.
 std::string to_fixed_text(double value, int decimals);
 
-// Return the number in `text`, ignoring white space at both ends; nullopt if invalid or too large.
+// Return the number in `text` (ignoring outer white space); nullopt if invalid or out of range.
 std::optional<double> parse_double(std::string_view text);
 std::optional<std::int64_t> parse_integer(std::string_view text);
 std::optional<int> parse_int(std::string_view text);

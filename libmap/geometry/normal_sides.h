@@ -15,11 +15,10 @@ inline constexpr double min_agreeing_fraction = 0.8;
 // Maximum of opposing_fraction() for correct signs; only thin parts have opposing neighbors then.
 inline constexpr double max_opposing_fraction = 0.1;
 
-// Sums of |cos(angle to an axis)| of the normals along and of the normals against the axis. Zero
-// and NaN normals are skipped.
+// Sums of |cosine| of the angles between normals and an axis. Zero and NaN normals are skipped.
 struct NormalVotes {
-  double along = 0.0;
-  double against = 0.0;
+  double along = 0.0;    // sum over normals with cosine > 0
+  double against = 0.0;  // sum over the other normals
 
   void add(const Eigen::Vector3f& normal, const Eigen::Vector3d& unit_axis) {
     const Eigen::Vector3d n = normal.cast<double>();

@@ -30,7 +30,7 @@ struct PlaneMoments {
 
 // Principal axes of weighted points. The first axis is the plane normal, of either sign.
 struct PlaneSpread {
-  Eigen::Vector3d center = Eigen::Vector3d::Zero();
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();     // weighted mean, m
   Eigen::Vector3d variances = Eigen::Vector3d::Zero();  // along the axes, m2, ascending
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();   // unit vectors in columns
 

@@ -79,7 +79,7 @@ inline std::uint64_t z_order(std::uint64_t key) {
 // entries are blocks of 4 x 4 x 2 voxels of one side, because neighbors are mostly in one block.
 class VoxelIndex {
  public:
-  static constexpr std::uint32_t none = 0xffffffff;
+  static constexpr std::uint32_t none = 0xffffffff;  // number of a key that is not in the table
 
   VoxelIndex() : slots_(1U << 6U) {}  // no key yet
 

@@ -55,7 +55,7 @@ struct Column {
 };
 
 struct ColumnSet {
-  std::size_t rows = 0;
+  std::size_t rows = 0;  // number of rows of each column
   std::vector<Column> columns;
   std::vector<std::shared_ptr<const void>> storage;  // owners of memory of the columns, if any
 

@@ -30,7 +30,7 @@ struct FileField {
 struct GeometryFileInfo {
   std::string format;  // "pcd", "ply", "csv", "tif", "obj", "stl", "off", "glb"
   FileEncoding encoding = FileEncoding::binary;
-  bool big_endian = false;
+  bool big_endian = false;           // byte order of binary numbers
   std::uint64_t bytes = 0;           // size of the file
   std::uint64_t points = 0;          // points or vertices of the file, also dropped points
   std::uint64_t faces = 0;           // number of polygons
