@@ -19,7 +19,7 @@ class ByteReader {
 
   bool empty() const { return bytes_.empty(); }
   std::string_view rest() const { return bytes_; }  // bytes that are not read yet
-  std::string_view take(std::uint64_t count) {
+  std::string_view take(std::uint64_t count) {      // returns the next `count` bytes
     if (count > bytes_.size()) throw std::length_error("too few bytes");
     const std::string_view taken = bytes_.substr(0, count);
     bytes_.remove_prefix(count);

@@ -1,7 +1,7 @@
 // Pinhole cameras with lens distortion.
 //
 // The camera's optical frame has z forward, x right, y down (REP-103); pixel centers have whole
-// coordinates: u = fx * x/z + cx, v = fy * y/z + cy.
+// coordinates. Without distortion, u = fx * x/z + cx and v = fy * y/z + cy.
 #pragma once
 
 #include <Eigen/Core>

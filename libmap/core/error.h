@@ -32,7 +32,7 @@ class Error : public std::runtime_error {
 
   // Returns a copy with the file `file`; an unchanged copy if the error already names a file.
   Error in_file(const std::string& file) const;
-  // Returns a copy with the field `prefix` + `joint` + present field; only `prefix` without field.
+  // Returns a copy with the field `prefix` + `joint` + present field; `prefix` if there is none.
   Error in_field(const std::string& prefix, const char* joint = ": ") const;
 
  private:
@@ -41,7 +41,7 @@ class Error : public std::runtime_error {
   ErrorKind kind_;
 };
 
-// Returns step(). Adds `file` to Errors of `step` that name no file.
+// Returns step(). Adds `file` to Errors that `step` throws without a file.
 template <typename Step>
 auto in_file(const std::filesystem::path& file, const Step& step) {
   try {
@@ -51,7 +51,7 @@ auto in_file(const std::filesystem::path& file, const Step& step) {
   }
 }
 
-// Returns step(). Puts `prefix` before the field of Errors of `step`, as Error::in_field does.
+// Returns step(). Changes the field of Errors that `step` throws, as Error::in_field does.
 template <typename Step>
 auto in_field(const std::string& prefix, const Step& step) {
   try {

@@ -40,7 +40,7 @@ struct Manifest {
 
   void add_parameters(const ParameterTable& table);   // all keys with current values
   void add_results(const ResultTable& table);         // skips results without a value
-  void add_input(const std::filesystem::path& path);  // reads and hashes the file
+  void add_input(const std::filesystem::path& path);  // hashes the file; throws as sha256_of_file
   const ManifestValue* find_parameter(std::string_view name) const;  // nullptr if there is none
   const ManifestValue* find_result(std::string_view name) const;     // nullptr if there is none
   const Pose* find_transform(std::string_view name) const;           // nullptr if there is none

@@ -19,12 +19,12 @@ namespace libmap {
 
 enum class ParameterType { boolean, integer, real, text };  // type of a parameter's value
 
-// Interval of valid numbers. An open end excludes the end itself.
+// Interval of valid numbers.
 struct Range {
   double min = -std::numeric_limits<double>::infinity();
   double max = std::numeric_limits<double>::infinity();
-  bool min_open = false;
-  bool max_open = false;
+  bool min_open = false;  // true: `min` itself is invalid
+  bool max_open = false;  // true: `max` itself is invalid
 };
 inline constexpr Range any_number{};
 inline constexpr Range not_negative{0.0};
@@ -44,6 +44,7 @@ struct Parameter {
 
 class ParameterTable {
  public:
+  // Adds a parameter whose value is in `field`, which must outlive the table.
   void add(std::string key, double& field, Range range, std::string description);
   // The text "auto" sets the field to nullopt.
   void add(std::string key, std::optional<double>& field, Range range, std::string description);
@@ -51,7 +52,7 @@ class ParameterTable {
   void add(std::string key, std::uint64_t& field, Range range, std::string description);
   void add(std::string key, bool& field, std::string description);
   void add(std::string key, std::string& field, std::string description);
-  // Adds an enumeration with the names of the values.
+  // Adds an enumeration; `names` contains its values with their names.
   template <typename Enum>
   void add(std::string key, Enum& field, const std::vector<std::pair<std::string, Enum>>& names,
            std::string description);

@@ -1,4 +1,4 @@
-// Table of the named results of a stage, the counterpart of ParameterTable for outputs.
+// Table of the named results of a processing stage, the counterpart of ParameterTable for outputs.
 // describe(table, result) next to a result struct binds each field to a key and a description. The
 // manifest, --json, printed lists, the merging of tiles and the Python module use it.
 #pragma once
@@ -19,7 +19,7 @@ namespace libmap {
 using ManifestValue = std::variant<bool, std::int64_t, double, std::string, std::vector<double>>;
 
 struct NamedResult {
-  // `found` is the value: a boolean, a number, a text, a range of numbers, or an optional of these.
+  // `found` is the value: a boolean, a number, a text, a list of numbers, or an optional of these.
   template <typename Found>
   NamedResult(std::string result_key, const Found& found, std::string text = {})
       : key(std::move(result_key)),

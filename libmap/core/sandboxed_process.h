@@ -21,7 +21,7 @@ class SandboxedProcess {
   using Write = std::function<void(std::string_view bytes)>;
 
   // Calls work(write) in a child process without terminal output and with at most `max_data_bytes`
-  // of memory. read() returns the bytes of `write`. Throws Error (failed) if no child can start.
+  // of memory. read() receives the bytes of `write`. Throws Error (failed) if no child can start.
   SandboxedProcess(std::uint64_t max_data_bytes, const std::function<void(const Write&)>& work);
   ~SandboxedProcess();  // ends the child
   SandboxedProcess(const SandboxedProcess&) = delete;

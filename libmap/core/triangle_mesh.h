@@ -37,10 +37,10 @@ Eigen::Vector3d area_normal(const TriangleMesh& mesh, const Triangle& triangle);
 // Returns the surface area in m2.
 double surface_area(const TriangleMesh& mesh);
 
-// Returns the enclosed volume of a closed mesh, m3; negative if triangles are clockwise outside.
+// Returns the volume in a closed mesh, m3; negative if the triangles are clockwise from outside.
 double signed_volume(const TriangleMesh& mesh);
 
-// Returns unit vertex normals: area-weighted means of adjacent triangles; zero without triangles.
+// Returns unit vertex normals: area-weighted means over adjacent triangles; zero without triangles.
 std::vector<Eigen::Vector3f> estimate_vertex_normals(const TriangleMesh& mesh);
 
 // Texture coordinates of a triangle's corners: 0 to 1 over the width and height of the texture

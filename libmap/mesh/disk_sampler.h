@@ -93,8 +93,8 @@ inline constexpr double saturation_density = 0.6965;
 inline constexpr double dart_fraction = 0.808;
 
 // Returns random samples with a minimum distance of `radius_m`. Tries random points (darts) over
-// the whole surface. Then, if goes_on(number of samples) is true, fills the gaps; otherwise, gaps
-// remain. Throws Error if the mesh is too large for the radius.
+// the whole surface. Then, if goes_on(number of samples) is true, fills the gaps: parts farther
+// than `radius_m` from all samples. Throws Error if the mesh is too large for the radius.
 DiskSamples sample_disks(const SampledSurface& surface, double radius_m, std::uint64_t seed,
                          const std::function<bool(std::size_t thrown)>& goes_on,
                          Progress& progress);

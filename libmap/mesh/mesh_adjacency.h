@@ -21,7 +21,7 @@ inline std::uint32_t source_of(const std::vector<Triangle>& triangles, HalfEdge 
 inline std::uint32_t target_of(const std::vector<Triangle>& triangles, HalfEdge h) {
   return source_of(triangles, next_in_triangle(h));
 }
-inline Eigen::Vector3d along(const TriangleMesh& mesh, HalfEdge h) {
+inline Eigen::Vector3d along(const TriangleMesh& mesh, HalfEdge h) {  // from source to target
   return mesh.vertices[target_of(mesh.triangles, h)] - mesh.vertices[source_of(mesh.triangles, h)];
 }
 inline bool has_repeated_vertex(const Triangle& t) {
@@ -45,7 +45,7 @@ MeshEdges edges_of(const std::vector<Triangle>& triangles, std::size_t vertices)
 constexpr HalfEdge open_edge = 0xffffffff;          // no other triangle
 constexpr HalfEdge non_manifold_edge = 0xfffffffe;  // more than one other triangle
 constexpr HalfEdge no_edge = 0xfffffffd;            // the triangle has a repeated vertex
-inline bool is_joined(HalfEdge opposite) { return opposite < no_edge; }
+inline bool is_joined(HalfEdge opposite) { return opposite < no_edge; }  // true: a half-edge
 // Opposites of all half-edges, indexed by half-edge.
 std::vector<HalfEdge> opposites_of(const std::vector<Triangle>& triangles, const MeshEdges& edges);
 inline std::vector<HalfEdge> opposites_of(const TriangleMesh& mesh) {

@@ -21,8 +21,8 @@ TriangleMesh select_triangles(const TriangleMesh& mesh, const std::vector<bool>&
 
 // Components of triangles connected by shared edges, numbered by ascending first triangle.
 struct MeshComponents {
-  std::vector<std::uint32_t> of_triangle;  // component of each triangle
-  std::vector<double> areas_m2;            // by component
+  std::vector<std::uint32_t> of_triangle;  // component number of each triangle
+  std::vector<double> areas_m2;            // area of each component
 };
 MeshComponents connected_components(const TriangleMesh& mesh);
 // Returns connected_components(mesh) in a third of the time; `opposite` is opposites_of(mesh).
