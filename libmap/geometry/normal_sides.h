@@ -56,7 +56,7 @@ struct UpOfNormals {
 
 // Returns the up direction of a surface: the mean of the normals, repeatedly restricted to normals
 // near the mean, so that walls and rocks do not tilt the result. `direction` is +z if the mean is
-// within 20 degrees of +z or not decided. Normals can have any length; zeros and NaN are skipped.
+// within 20 degrees of +z or `decided` is false. Normals can have any length; skips zeros and NaN.
 UpOfNormals up_of_normals(const std::vector<Eigen::Vector3d>& positions,
                           const std::vector<Eigen::Vector3f>& normals);
 

@@ -48,9 +48,9 @@ double median_spacing(const std::vector<Eigen::Vector3d>& points);
 
 struct CloudSpacing {
   // Median distance from a point to the nearest point at another position. If most points are
-  // near-duplicates (first and last returns, joined clouds), it is by_area_m of the merged points.
+  // near-duplicates (multiple returns, joined clouds), nearest_m is by_area_m of the merged points.
   double nearest_m = 0.0;
-  double by_area_m = 0.0;  // spacing of a square grid with as many points per area
+  double by_area_m = 0.0;  // spacing of a square grid with the cloud's number of points per area
 };
 // Returns both spacings from at most 10000 points, spread evenly over the list; 0 if all positions
 // are equal.

@@ -15,7 +15,7 @@
 
 namespace libmap {
 
-enum class NotFinite { drop, refuse };  // points with a position that is not finite: drop, or throw
+enum class NotFinite { drop, refuse };  // points that are not finite: omit them, or throw Error
 
 struct CloudFromColumns {
   PointCloud cloud;

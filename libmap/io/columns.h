@@ -50,7 +50,7 @@ struct Column {
   ScalarType type = ScalarType::float32;    // declared type in the file
   StoredType stored = StoredType::float32;  // type in memory
   const std::byte* first = nullptr;         // address of row 0
-  std::size_t stride = 0;                   // bytes between rows
+  std::size_t stride = 0;                   // bytes from one row to the next
   bool swapped = false;                     // true: opposite of this machine's byte order
 };
 
@@ -114,7 +114,7 @@ void write_rows(
 
 // Returns the pose cloud_from_sensor as tx ty tz (m) qw qx qy qz, the order of PCD files.
 std::array<double, 7> viewpoint_numbers(const Pose& viewpoint);
-std::string viewpoint_words(const Pose& viewpoint);  // as text, with a space before each number
+std::string viewpoint_words(const Pose& viewpoint);  // these numbers as text, each after a space
 // Inverse of viewpoint_numbers; nullopt if the quaternion is zero.
 std::optional<Pose> pose_of_viewpoint(const std::array<double, 7>& numbers);
 

@@ -71,10 +71,10 @@ class SurfaceFragments {
 };
 
 struct SampledSurface {
-  const TriangleMesh& mesh;  // with finite vertices
-  Eigen::Vector3d low;       // minimum of the bounding box
-  SurfaceFragments triangles;
-  double area_m2 = 0.0;  // > 0
+  const TriangleMesh& mesh;    // with finite vertices
+  Eigen::Vector3d low;         // minimum of the bounding box
+  SurfaceFragments triangles;  // all triangles of `mesh`
+  double area_m2 = 0.0;        // > 0
   // Maximum displacement by rounding positions to single precision; 0: positions are not rounded.
   double rounding_m = 0.0;
   // Samples of adjacent surfaces. New samples keep the minimum distance from these samples.

@@ -42,11 +42,11 @@ void describe(ResultTable& table, const PoissonDiskResult& result);
 
 // Samples a mesh. Distances are Euclidean, so samples on one side of a thin plate exclude samples
 // on the other side. Every point of the surface is within 1.001 radii (plus rounding) of a sample.
-// Darts are thrown evenly over the surface, then into the gaps, which are divided until a disc
-// covers each of them (after Ebeida et al. 2012). A `count` below 100 is reached exactly if one of
-// 100 tried radii yields it. Throws Error if an option is out of range, the mesh has no area, a
-// vertex is not finite, or the radius is too small: the limit is 100 samples per triangle, but at
-// least 2.5 million and at most 10^8 samples.
+// Random points (darts) are tried evenly over the surface, then in the gaps between the discs,
+// which are divided until a disc covers each part (after Ebeida et al. 2012). A `count` below 100
+// is reached exactly if one of 100 tried radii yields it. Throws Error if an option is out of
+// range, the mesh has no area, a vertex is not finite, or the radius is too small: the limit is 100
+// samples per triangle, but at least 2.5 million and at most 10^8 samples.
 PoissonDiskResult sample_poisson_disk(const TriangleMesh& mesh, const PoissonDiskOptions& options,
                                       Progress& progress = no_progress());
 
