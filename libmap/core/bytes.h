@@ -11,15 +11,15 @@
 
 namespace libmap {
 
-// Reads numbers from the front of a byte string, which must outlive the reader. Throws
-// std::length_error if too few bytes remain.
+// Reads numbers from the front of a byte string, which must outlive the reader and the returned
+// views. Throws std::length_error if too few bytes remain.
 class ByteReader {
  public:
   explicit ByteReader(std::string_view bytes) : bytes_(bytes) {}
 
   bool empty() const { return bytes_.empty(); }
   std::string_view rest() const { return bytes_; }  // bytes that are not read yet
-  std::string_view take(std::uint64_t count) {
+  std::string_view take(std::uint64_t count) {      // returns the next `count` bytes
     if (count > bytes_.size()) throw std::length_error("too few bytes");
     const std::string_view taken = bytes_.substr(0, count);
     bytes_.remove_prefix(count);
@@ -52,7 +52,7 @@ class ByteReader {
   std::string_view bytes_;
 };
 
-// Appends numbers and texts to a byte string, in the format that ByteReader reads.
+// Appends numbers and texts to a byte string, as ByteReader reads them. numbers() writes no count.
 class ByteWriter {
  public:
   template <typename T>

@@ -1,7 +1,7 @@
 // Pinhole cameras with lens distortion.
 //
 // The camera's optical frame has z forward, x right, y down (REP-103); pixel centers have whole
-// coordinates: u = fx * x/z + cx, v = fy * y/z + cy.
+// coordinates. Without distortion, u = fx * x/z + cx and v = fy * y/z + cy.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,37 +16,36 @@ namespace libmap {
 // radial part and thin prisms). equidistant: OpenCV's fisheye k1..k4 (Kannala and Brandt 2006).
 enum class DistortionModel { none, radial_tangential, equidistant };
 
-// Returns the rotation body_from_optical; the axes of a body frame are x forward, y left, z up.
+// Returns the rotation from the optical frame to a body frame (x forward, y left, z up).
 Pose optical_to_body_rotation();
 
 struct Camera {
   int width = 0;  // pixels
   int height = 0;
-  double fx = 0.0;  // pixels
+  double fx = 0.0;  // focal lengths, pixels
   double fy = 0.0;
-  double cx = 0.0;
+  double cx = 0.0;  // principal point, pixels
   double cy = 0.0;
   DistortionModel distortion_model = DistortionModel::none;
-  std::vector<double> distortion{};                    // 4, 5, 8 or 12 coefficients; equidistant: 4
-  Pose base_from_camera = optical_to_body_rotation();  // pose of the optical frame
+  std::vector<double> distortion{};  // 4, 5, 8 or 12 coefficients; equidistant: 4; none: unused
+  Pose base_from_camera = optical_to_body_rotation();  // optical frame in the robot's base frame
 
   // True if the model is equidistant, or radial_tangential with a coefficient other than 0.
   bool is_distorted() const;
-  // Throws Error naming field, value and bound, unless: size > 0, focal lengths 1e-6 to 1e9 px,
-  // |cx|, |cy| <= 1e9 px, valid number of coefficients, each within 1e12, position within 1e8 m.
+  // Throws Error naming field, value and bound if a value is invalid. Valid are: size > 0, focal
+  // lengths 1e-6 to 1e9 px, |cx|, |cy| <= 1e9 px, |coefficients| <= 1e12, |position| <= 1e8 m.
   void check() const;
 };
 
-// Returns the camera with the model `none` and no coefficients.
-Camera without_distortion(Camera camera);
+Camera without_distortion(Camera camera);  // with the model `none` and no coefficients
 
-// Convert between rays (x/z, y/z) in the optical frame and distorted pixel positions. pixel_to_ray
-// uses Newton's method (tolerance 1e-9 focal lengths); it returns nullopt if no ray is found.
+// Returns the distorted pixel position of the ray (x/z, y/z) in the optical frame.
 Eigen::Vector2d distort_to_pixel(const Camera& camera, const Eigen::Vector2d& ray);
+// Inverse of distort_to_pixel by Newton's method (tolerance: 1e-9); nullopt if no ray is found.
 std::optional<Eigen::Vector2d> pixel_to_ray(const Camera& camera, const Eigen::Vector2d& pixel);
 
-// Projects a point in the optical frame, m. Returns nullopt unless z > 0. The pixel can be outside
-// the image.
+// Returns the distorted pixel position of a point in the optical frame, m, also outside the image;
+// nullopt unless z > 0.
 std::optional<Eigen::Vector2d> project_point(const Camera& camera,
                                              const Eigen::Vector3d& point_in_camera);
 

@@ -1,5 +1,5 @@
 // The exception type of the project. It contains file, field, value and bound; a command prints
-// what() as one line and exits with the code of its kind.
+// what() as one line and exits with the exit code of the ErrorKind.
 #pragma once
 
 #include <filesystem>
@@ -9,7 +9,7 @@
 namespace libmap {
 
 // bad_input: a file, an option or data is invalid (exit code 3).
-// failed: the run itself failed, e.g. the disk is full (exit code 1); in comments "Error (failed)".
+// failed: the run failed, e.g. the disk is full (exit code 1). Comments write "Error (failed)".
 enum class ErrorKind { bad_input, failed };
 
 struct ErrorContext {
@@ -30,9 +30,9 @@ class Error : public std::runtime_error {
   const std::string& reason() const { return reason_; }
   ErrorKind kind() const { return kind_; }
 
-  // Returns a copy that names `file`, unless the error names a file already.
+  // Returns a copy with the file `file`; an unchanged copy if the error already names a file.
   Error in_file(const std::string& file) const;
-  // Returns a copy with the field `prefix`, joined to the present field if any: "rig: width".
+  // Returns a copy with the field `prefix` + `joint` + present field; `prefix` if there is none.
   Error in_field(const std::string& prefix, const char* joint = ": ") const;
 
  private:
@@ -45,7 +45,7 @@ class Error : public std::runtime_error {
 // empty.
 Error no_elements(const std::string& elements, const std::filesystem::path& file = {});
 
-// Returns step(). Adds `file` to Errors of `step` that name no file.
+// Returns step(). Adds `file` to Errors that `step` throws without a file.
 template <typename Step>
 auto in_file(const std::filesystem::path& file, const Step& step) {
   try {
@@ -55,7 +55,7 @@ auto in_file(const std::filesystem::path& file, const Step& step) {
   }
 }
 
-// Returns step(). Puts `prefix` before the field of Errors of `step`, as Error::in_field does.
+// Returns step(). Changes the field of Errors that `step` throws, as Error::in_field does.
 template <typename Step>
 auto in_field(const std::string& prefix, const Step& step) {
   try {

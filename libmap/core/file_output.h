@@ -17,7 +17,7 @@ namespace libmap {
 // Throws Error unless `path` is a readable regular file.
 void require_readable_file(const std::filesystem::path& path);
 
-// Throws Error if the file `path` is larger than `max_bytes`, or missing.
+// Throws Error if the file `path` is missing or larger than `max_bytes`.
 void require_file_size(const std::filesystem::path& path, std::uint64_t max_bytes);
 
 // Returns the file's content. Throws Error unless it is readable and at most `max_bytes` long.
@@ -27,15 +27,15 @@ std::string read_whole_file(const std::filesystem::path& path,
 // Returns the first bytes of a file, at most `max_bytes`; empty if it cannot be read.
 std::string file_head(const std::filesystem::path& path, std::size_t max_bytes);
 
-// Writes `content` to `path`, not atomically: for temporary_path() below. Throws Error (failed).
+// Writes `content` directly to `path`, e.g. OutputFile::temporary_path(). Throws Error (failed).
 void write_text(const std::filesystem::path& path, std::string_view content);
 
-// Writes `content` atomically through an OutputFile, and throws as it does.
+// Writes `content` atomically through an OutputFile. Throws as OutputFile and commit() do.
 void write_whole_file(const std::filesystem::path& path, std::string_view content);
 
-// An uncommitted output, stored under a temporary name in the folder of the final output. Without a
-// commit, the destructor removes the temporary, and an earlier output is unchanged. While this
-// object exists, a second one for the same output, in any process, throws Error (failed).
+// An output before its commit: a temporary file or folder next to the final path. Without commit(),
+// the destructor removes it, and an earlier output is unchanged. While this object exists, the
+// constructor of a second object for the same path, in any process, throws Error (failed).
 class PendingOutput {
  public:
   ~PendingOutput();
@@ -46,12 +46,12 @@ class PendingOutput {
   const std::filesystem::path& final_path() const { return final_path_; }
 
  protected:
-  // `open_temporary` creates and opens the temporary. It returns a descriptor, or -1 with errno.
+  // `open_temporary` creates and opens the file or folder. It returns a descriptor; -1: see errno.
   PendingOutput(std::filesystem::path final_path, const std::string& temporary_name,
                 int (*open_temporary)(const char* path));
-  // Unlocks the temporary and removes its path from the list of uncommitted outputs.
+  // Unlocks the file or folder and removes its path from the list of uncommitted outputs.
   void release();
-  int lock() const { return lock_; }  // descriptor of the temporary
+  int lock() const { return lock_; }  // descriptor of the temporary file or folder
 
  private:
   std::filesystem::path final_path_;
@@ -59,23 +59,23 @@ class PendingOutput {
   int lock_ = -1;
 };
 
-// An output file. Write to temporary_path(), which has the extension of the final path.
+// An output file. Write to temporary_path(), which has the final path's extension, then commit().
 class OutputFile : public PendingOutput {
  public:
   // Throws Error if the folder does not exist or is not writable, or if the path exists and is not
   // a regular file.
   explicit OutputFile(const std::filesystem::path& final_path);
-  // Syncs the temporary and renames it to the final path. Throws Error (failed).
+  // Syncs the temporary file to disk and renames it to the final path. Throws Error (failed).
   void commit();
 };
 
-// An output folder. Write into temporary_path().
+// An output folder. Write into temporary_path(), then call commit().
 class OutputFolder : public PendingOutput {
  public:
-  // `names` lists the entries that an earlier folder may contain. Throws Error if it contains any
-  // other entry, is not a folder or cannot be written.
+  // `names` lists the entries that an earlier folder at `final_path` may contain. Throws Error if
+  // there is any other entry, if the path is not a folder, or if it cannot be written.
   OutputFolder(const std::filesystem::path& final_path, const std::vector<std::string>& names);
-  // Syncs the temporary and replaces the complete final folder. Throws Error (failed).
+  // Syncs the temporary folder to disk; it replaces an earlier folder. Throws Error (failed).
   void commit();
 };
 
@@ -83,7 +83,7 @@ class OutputFolder : public PendingOutput {
 // the commits. Throws Error (failed) as OutputFile::commit() does.
 void commit_together(std::vector<OutputFile>& outputs);
 
-// Delays abandon_unfinished_outputs() while it exists: related outputs are committed together.
+// Delays abandon_unfinished_outputs() while the guard exists, e.g. to commit several outputs.
 class CommitGuard {
  public:
   CommitGuard();
@@ -92,23 +92,22 @@ class CommitGuard {
   std::unique_lock<std::recursive_mutex> lock_;
 };
 
-// Removes the temporary files and folders of all uncommitted outputs of this process. Afterwards,
-// threads that create, commit or drop an output block forever: call it right before the process
-// exits.
+// Removes the temporary files and folders of all uncommitted outputs of this process. Call it right
+// before the process exits: threads that create, commit or destroy an output then block forever.
 void abandon_unfinished_outputs();
 
-// True for the temporary path of an uncommitted file or folder, which a killed run leaves behind.
+// True if the file name is that of a temporary file or folder, which a killed run does not remove.
 bool is_named_unfinished(const std::filesystem::path& path);
 
 // Returns a copy of the error that names `file` instead of the present file.
 Error naming(const Error& error, const std::filesystem::path& file);
 
-// Calls `write` with `temporary`. In Errors that name `temporary`, or a file in it, replaces the
-// temporary path by `output`.
+// Calls write(temporary). If `write` throws an Error that names `temporary` or a file in that
+// folder, the path `temporary` in the Error is replaced by `output`.
 void write_named(const std::filesystem::path& temporary, const std::filesystem::path& output,
                  const std::function<void(const std::filesystem::path&)>& write);
 
-// An unnamed temporary file. The system removes it however the process ends.
+// An unnamed temporary file. The system removes it when the process ends, also after a crash.
 class TempFile {
  public:
   // Throws Error (failed) if no file can be created in the folder.
@@ -117,9 +116,9 @@ class TempFile {
   TempFile(const TempFile&) = delete;
   TempFile& operator=(const TempFile&) = delete;
 
-  // Appends bytes and returns their offset; reads bytes at an offset. Both functions are
-  // thread-safe and throw Error (failed).
+  // Appends `count` bytes and returns their offset in the file. Thread-safe. Throws Error (failed).
   std::uint64_t append(const void* bytes, std::size_t count);
+  // Reads `count` bytes from the offset `begin`. Thread-safe. Throws Error (failed).
   void read(std::uint64_t begin, void* bytes, std::size_t count) const;
 
  private:

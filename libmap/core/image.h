@@ -17,7 +17,7 @@ template <typename T>
 struct Image {
   int width = 0;
   int height = 0;
-  std::vector<T> pixels;  // width * height
+  std::vector<T> pixels;  // width * height values, row by row
 
   Image() = default;
   Image(int w, int h, const T& fill = T{})
@@ -46,7 +46,7 @@ inline std::string size_text(std::int64_t width, std::int64_t height) {
   return std::to_string(width) + " x " + std::to_string(height);
 }
 
-// Returns columns `x` to `x + width - 1`, e.g. one of several images that are stored side by side.
+// Returns columns `x` to `x + width - 1`, e.g. one of two images that are stored side by side.
 template <typename T>
 Image<T> crop_columns(const Image<T>& image, int x, int width) {
   Image<T> part(width, image.height);
@@ -55,7 +55,7 @@ Image<T> crop_columns(const Image<T>& image, int x, int width) {
   return part;
 }
 
-// Returns the bilinearly interpolated color at a pixel position, which is clamped to the image.
+// Returns the bilinearly interpolated color, 0 to 255, at a pixel position (clamped to the image).
 template <typename Pixel>
 Eigen::Vector3f bilinear_color(const Image<Pixel>& image, double x, double y) {
   const double within_x = std::clamp(x, 0.0, image.width - 1.0);

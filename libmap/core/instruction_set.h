@@ -4,10 +4,10 @@
 
 namespace libmap {
 
-// avx2: AVX2 and POPCNT. avx512: also AVX-512 F, BW, VL and VPOPCNTDQ.
+// portable: the compiler's base set. avx2: AVX2, POPCNT. avx512: also AVX-512 F, BW, VL, VPOPCNTDQ.
 enum class InstructionSet { portable, avx2, avx512 };
 
-// True if this processor supports `set` and loops for it were built; always true for `portable`.
+// True if this processor supports `set` and graspmap contains code for it; true for `portable`.
 bool has_instruction_set(InstructionSet set);
 InstructionSet best_instruction_set();  // the fastest supported set
 

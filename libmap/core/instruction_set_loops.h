@@ -1,7 +1,8 @@
-// Compiles inner loops once per instruction set. GRASPMAP_LOOPS: path of a file that defines
-// functions and, at its end, `all`, a table of them. GRASPMAP_REGISTER: size of the vector
-// registers, bytes. Include this in an anonymous namespace of a source that is compiled alone.
-// The file must not use inline functions of other sources: the linker could keep only AVX copies.
+// Compiles a file of inner loops once per instruction set. Before including this header, define
+// GRASPMAP_LOOPS as the path of that file. The file defines functions and, at its end, the table
+// `all` of these functions; in it, GRASPMAP_REGISTER is the size of the vector registers in bytes.
+// Include this header in an anonymous namespace of a source that is not part of a unity build. The
+// file must not use inline functions of other sources: the linker could keep only AVX copies.
 
 #define GRASPMAP_REGISTER 16
 namespace portable {

@@ -1,5 +1,5 @@
-// Checked parsing of untrusted JSON. The library of `Json` (nlohmann) casts between all number
-// types and does not limit the nesting depth.
+// Checked parsing of untrusted JSON. `Json` is a type of the library nlohmann, which itself casts
+// between all number types and does not limit the nesting depth.
 #pragma once
 
 #include <cstddef>
@@ -13,7 +13,7 @@
 namespace libmap {
 
 // Parses `text`. Throws Error if arrays and objects are nested deeper than 64 levels or an object
-// has more than 10,000 members (ordered_json searches linearly), and exceptions of Json::parse.
+// has more than 10,000 members (ordered_json searches linearly). Also throws as Json::parse does.
 template <typename Json>
 Json parse_json(const std::string& text) {
   constexpr int max_depth = 64;

@@ -16,7 +16,7 @@
 
 namespace libmap {
 
-// Returns the value as double if it is a real or whole number; nullopt for other types and nullptr.
+// Returns the value as double if it is a number; nullopt for a value of another type or nullptr.
 std::optional<double> number_of(const ManifestValue* value);
 
 struct ManifestInput {
@@ -26,37 +26,37 @@ struct ManifestInput {
 };
 
 struct Manifest {
-  std::string command;
-  std::string version;
-  std::vector<std::pair<std::string, ManifestValue>> parameters;
+  std::string command;                                            // e.g. "score"
+  std::string version;                                            // version of graspmap
+  std::vector<std::pair<std::string, ManifestValue>> parameters;  // by key
   std::vector<ManifestInput> inputs;
   std::string frame;                                     // frame of the output's coordinates
   std::vector<std::pair<std::string, Pose>> transforms;  // by name, e.g. "terrain_from_input"
-  // Georeference of the coordinates before the transforms site_from_map and terrain_from_input.
+  // Georeference of coordinates before the `transforms` site_from_map and terrain_from_input.
   std::optional<Georeference> georeference;
-  std::vector<std::pair<std::string, ManifestValue>> results;  // counts, residuals
-  std::vector<std::pair<std::string, double>> timings_s;       // by step, in the section "run"
-  unsigned threads = 0;                                        // of the run, in the section "run"
+  std::vector<std::pair<std::string, ManifestValue>> results;  // by key, e.g. counts and residuals
+  std::vector<std::pair<std::string, double>> timings_s;       // by step; in the section "run"
+  unsigned threads = 0;  // number of threads; in the section "run"
 
   void add_parameters(const ParameterTable& table);   // all keys with current values
   void add_results(const ResultTable& table);         // skips results without a value
-  void add_input(const std::filesystem::path& path);  // reads and hashes the file
-  const ManifestValue* find_parameter(std::string_view name) const;  // or nullptr
-  const ManifestValue* find_result(std::string_view name) const;     // or nullptr
-  const Pose* find_transform(std::string_view name) const;           // or nullptr
+  void add_input(const std::filesystem::path& path);  // hashes the file; throws as sha256_of_file
+  const ManifestValue* find_parameter(std::string_view name) const;  // nullptr if there is none
+  const ManifestValue* find_result(std::string_view name) const;     // nullptr if there is none
+  const Pose* find_transform(std::string_view name) const;           // nullptr if there is none
 };
 
 // Returns the path of an output's manifest: "map.pcd" -> "map.pcd.json".
 std::filesystem::path manifest_path(const std::filesystem::path& output);
 
-std::string to_json(const Manifest& manifest);  // in fixed order; infinity is read back as NaN
-// Parses the output of to_json; the section "run" is optional. Throws Error naming `file`.
+std::string to_json(const Manifest& manifest);  // keys in fixed order; NaN and infinity are null
+// Parses the output of to_json (null: NaN; "run" is optional). Throws Error naming `file`.
 Manifest parse_manifest(const std::string& json, const std::string& file);
-// Reads the manifest next to `output`. Returns nullopt if there is none. Throws Error naming file
-// and field if it is invalid.
+// Reads the manifest next to `output`. Returns nullopt if there is no manifest. Throws Error naming
+// the manifest's path if it is invalid.
 std::optional<Manifest> read_manifest_of(const std::filesystem::path& output);
 
-// Return the SHA-256 (FIPS 180-4) as 64 hexadecimal digits. Throw Error if the file is unreadable.
+// Returns the SHA-256 (FIPS 180-4) as 64 hexadecimal digits. Throws Error if a file is unreadable.
 std::string sha256_of_file(const std::filesystem::path& path);
 std::string sha256_of(std::string_view bytes);
 

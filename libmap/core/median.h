@@ -7,7 +7,7 @@
 
 namespace libmap {
 
-// Returns the median of at least one value; for an even number, the larger of the middle values.
+// Returns the median of >= 1 values; for an even number of values, the larger of the middle two.
 inline double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());

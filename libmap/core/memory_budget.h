@@ -37,7 +37,7 @@ class MemoryBudget {
     std::uint64_t bytes_;
   };
 
-  // Blocks until the bytes are free. A request above the whole budget waits for the whole budget.
+  // Blocks until the bytes are free. A request above the budget blocks until nothing is reserved.
   [[nodiscard]] Reservation take(std::uint64_t bytes);
 
  private:

@@ -1,4 +1,4 @@
-// Low-level file functions of outputs: locks, synchronization to disk, errors of system calls.
+// Low-level functions for output files: locks, synchronization to disk, errors of system calls.
 #pragma once
 
 #include <filesystem>
@@ -27,7 +27,7 @@ class FileLock {
   ~FileLock();
   FileLock(FileLock&&) noexcept;
   FileLock& operator=(FileLock&&) noexcept;
-  // Returns nullopt if the lock is taken.
+  // Does not wait. Returns nullopt if another object or process holds the lock.
   static std::optional<FileLock> try_lock(const std::filesystem::path& path);
 
  private:

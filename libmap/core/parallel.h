@@ -1,5 +1,5 @@
 // Parallel loops with results that do not depend on the number of threads: the chunks of a loop
-// depend on count and grain only, and reductions join the chunks in order.
+// depend on `count` and `grain` only, and reductions join the results of the chunks in order.
 #pragma once
 
 #include <cstddef>
@@ -48,7 +48,7 @@ T parallel_reduce(std::size_t count, std::size_t grain, T identity, const Chunk&
   return result;
 }
 
-// Limits the number of threads during its lifetime.
+// Limits the number of threads of parallel loops while the object exists.
 class ThreadLimit {
  public:
   explicit ThreadLimit(unsigned threads);  // 0: all hardware threads

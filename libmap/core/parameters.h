@@ -19,12 +19,12 @@ namespace libmap {
 
 enum class ParameterType { boolean, integer, real, text };  // type of a parameter's value
 
-// Interval of valid numbers. An open end excludes the end itself.
+// Interval of valid numbers.
 struct Range {
   double min = -std::numeric_limits<double>::infinity();
   double max = std::numeric_limits<double>::infinity();
-  bool min_open = false;
-  bool max_open = false;
+  bool min_open = false;  // true: `min` itself is invalid
+  bool max_open = false;  // true: `max` itself is invalid
 };
 inline constexpr Range any_number{};
 inline constexpr Range not_negative{0.0};
@@ -39,43 +39,45 @@ struct Parameter {
   std::vector<std::string> choices{};         // names of an enumeration's values; else empty
   std::function<std::string()> get;           // returns the value as text, which `set` accepts
   std::function<void(std::string_view)> set;  // throws Error naming key, value and bound
-  std::function<void()> check{};  // checks the field; throws as `set` does; empty: no bound
+  std::function<void()> check{};  // checks the field, throws as `set`; empty: any value is valid
 };
 
 class ParameterTable {
  public:
+  // Adds a parameter whose value is in `field`, which must outlive the table.
   void add(std::string key, double& field, Range range, std::string description);
-  // The text "auto" is nullopt.
+  // The text "auto" sets the field to nullopt.
   void add(std::string key, std::optional<double>& field, Range range, std::string description);
   void add(std::string key, int& field, Range range, std::string description);
   void add(std::string key, std::uint64_t& field, Range range, std::string description);
   void add(std::string key, bool& field, std::string description);
   void add(std::string key, std::string& field, std::string description);
-  // Adds an enumeration with the names of the values.
+  // Adds an enumeration; `names` contains its values with their names.
   template <typename Enum>
   void add(std::string key, Enum& field, const std::vector<std::pair<std::string, Enum>>& names,
            std::string description);
 
-  // Makes `earlier`, a key of an earlier version, a second name of the key `now`.
+  // Makes `earlier`, a key of an earlier version of graspmap, a second name of the key `now`.
   void add_former_key(std::string earlier, std::string now);
   const std::map<std::string, std::string, std::less<>>& former_keys() const {
     return former_keys_;  // current key by former key
   }
 
-  // Collects values of keys "PREFIX.KEY" as text, e.g. "gripper.opening_angle_deg", to override the
-  // values of a file that is read later. The last text of a key counts; the caller checks the keys.
+  // Makes set() accept keys "PREFIX.KEY", e.g. "gripper.opening_angle_deg", which override values
+  // of a file that is read later: set() stores KEY and text in `texts`, replacing an earlier text
+  // of KEY. `texts` must outlive the table. The table does not check KEY and text.
   void add_overrides(std::string prefix, std::vector<std::pair<std::string, std::string>>& texts);
 
   const std::vector<Parameter>& parameters() const { return parameters_; }
   std::vector<std::string> keys() const;  // in the order of insertion
   // Returns the parameter with this current or former key, or nullptr.
   const Parameter* find(std::string_view key) const;
-  // True if set() accepts this key: a parameter, or a key with the prefix of overrides.
+  // True if set() accepts this key: a parameter, or a key "PREFIX.KEY" of add_overrides().
   bool knows(std::string_view key) const;
-  // Returns all keys with their values as text, overrides included.
+  // Returns all keys with their values as text, including the texts of add_overrides().
   std::vector<std::pair<std::string, std::string>> values() const;
 
-  // Returns the first key whose values differ, or nullopt. Both tables must have the same keys.
+  // Returns the first key with different values in two tables of equal keys, or nullopt.
   std::optional<std::string> first_difference(const ParameterTable& other) const;
 
   // Sets one parameter from text. Throws Error if the key is unknown (with the nearest known key),
@@ -103,7 +105,7 @@ void check_parameters(Options options) {
   table.check();
 }
 
-// Returns the key of the first bound field that differs from the default, or nullopt.
+// Returns the key of the first field bound by `bind` that differs from its default, or nullopt.
 template <typename Options>
 std::optional<std::string> changed_key(Options options, void (*bind)(ParameterTable&, Options&)) {
   Options unset;
@@ -114,11 +116,11 @@ std::optional<std::string> changed_key(Options options, void (*bind)(ParameterTa
   return table.first_difference(defaults);
 }
 
-// Returns the flag of a key, without _m, _mm, _deg, _px, _s or _n: "voxel_size_m": "--voxel-size".
+// Returns e.g. "--voxel-size" for "voxel_size_m": without the unit _m, _mm, _deg, _px, _s or _n.
 std::string flag_of(std::string_view key);
 
-// Sets the table from YAML `text`, a map of scalars; a section "a: {b: 1}" contains the key "a.b".
-// Throws Error naming `file` for unknown keys, duplicates and values that are not scalars (before
+// Sets the table from YAML `text`, a map of scalars; a section "a: {b: 1}" sets the key "a.b".
+// Throws Error naming `file` for unknown or duplicate keys and values that are not scalars (before
 // any field is set), and for invalid values. Returns the keys of the text, sorted.
 std::vector<std::string> set_from_yaml(const ParameterTable& table, const std::string& text,
                                        const std::string& file);

@@ -16,23 +16,23 @@ namespace libmap {
 // Type of a scalar field in files; in memory, all values are doubles.
 enum class ScalarType { int8, uint8, int16, uint16, int32, uint32, float32, float64 };
 
-// Named number of each point, vertex or face, e.g. "score". A cloud or mesh has no name twice.
+// One number per point, vertex or face, e.g. "score". Names are unique in a list of fields.
 struct ScalarField {
   std::string name;
   ScalarType type = ScalarType::float32;
-  std::vector<double> values;  // one per point, vertex or face
+  std::vector<double> values;
 
   bool operator==(const ScalarField&) const = default;
 };
 
-// Returns the field of that name, or nullptr.
+// Returns the field called `name`, or nullptr.
 const ScalarField* find_field(const std::vector<ScalarField>& fields, std::string_view name);
 ScalarField* find_field(std::vector<ScalarField>& fields, std::string_view name);
 
 using Color = std::array<std::uint8_t, 3>;  // red, green, blue
 
-// Positions in meters. `normals` and `colors` are empty or as long as `positions`; fields are as
-// long as `positions`. Normals can have any length: some programs store a confidence in it.
+// Positions in meters. `normals` and `colors` are empty or have one element per point; each field
+// has one value per point. Normals can have any length: some programs store a confidence in it.
 struct PointCloud {
   std::vector<Eigen::Vector3d> positions;
   std::vector<Eigen::Vector3f> normals;
@@ -46,7 +46,6 @@ struct PointCloud {
   bool has_normals() const { return !normals.empty(); }
   bool has_colors() const { return !colors.empty(); }
 
-  // Returns the field of that name, or nullptr.
   const ScalarField* find_field(std::string_view name) const {
     return libmap::find_field(fields, name);
   }
@@ -74,8 +73,8 @@ void append_values(const std::vector<T>& more, std::vector<T>& values) {
 // Appends the values of fields; keeps only fields that both lists have, of equal name and type.
 void append_fields(const std::vector<ScalarField>& more, std::vector<ScalarField>& fields);
 
-// Returns the cloud in the target frame. Positions, a known viewpoint and the points (vp_x, vp_y,
-// vp_z) in fields are transformed; normals and the vectors (approach_x, _y, _z) are only rotated.
+// Returns the cloud in the target frame. Transforms positions, a known viewpoint and points in the
+// fields vp_x, vp_y, vp_z; only rotates normals and vectors in the fields approach_x, _y, _z.
 PointCloud transform_cloud(const PointCloud& cloud, const Pose& target_from_source);
 
 struct Bounds3d {

@@ -14,11 +14,11 @@ class PointStream {
   // Block size of streams from files; the last block can be smaller. Fixed blocks make sums
   // independent of how the points are distributed over files.
   static constexpr std::size_t block_points = 65536;
-  // Attributes that the visitor uses. The stream can omit all others.
+  // Attributes that `visit` uses. The stream can omit all other attributes.
   enum class Need { positions, positions_and_normals };
   using Visit = std::function<void(const PointCloud& block)>;
-  // Visits all points in order; can be called repeatedly. Either all blocks have normals or none
-  // has, and all have the same viewpoint.
+  // Visits all points in order; can be called repeatedly. Either all blocks or no block have
+  // normals, and all blocks have the same viewpoint.
   virtual void for_each_block(Need need, const Visit& visit) const = 0;
 };
 

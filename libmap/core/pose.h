@@ -21,8 +21,8 @@ Pose make_pose_from_rpy(const Eigen::Vector3d& translation,
 // +-90, yaw and roll have the same axis and yaw is arbitrary.
 Eigen::Vector3d roll_pitch_yaw_deg(const Pose& pose);
 
-// Returns the least-squares target_from_source of at least three corresponding columns (Umeyama
-// 1991), as a homogeneous matrix: rotation, translation and, with `with_scale`, scale.
+// Returns the least-squares transform target_from_source of >= 3 corresponding points, in columns
+// (Umeyama 1991): a homogeneous matrix of rotation, translation and, with `with_scale`, scale.
 Eigen::Matrix4d align_points(const Eigen::Matrix3Xd& source, const Eigen::Matrix3Xd& target,
                              bool with_scale);
 
@@ -30,7 +30,7 @@ Eigen::Matrix4d align_points(const Eigen::Matrix3Xd& source, const Eigen::Matrix
 // directions, it is a half turn about an arbitrary perpendicular axis.
 Eigen::Matrix3d shortest_rotation(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
 
-// Returns the nearest rotation in the least-squares sense (Kabsch 1976), e.g. of a rounded matrix.
+// Returns the rotation nearest to `matrix` in the least-squares sense (Kabsch 1976).
 Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& matrix);
 
 }  // namespace libmap

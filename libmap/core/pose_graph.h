@@ -21,9 +21,9 @@ enum class LinkType {
   user_closure = 4,
   virtual_closure = 5,
   neighbor_merged = 6,
-  pose_prior = 7,  // from = to
-  landmark = 8,    // to < 0
-  gravity = 9      // from = to
+  pose_prior = 7,  // of one node: PoseLink::from = to
+  landmark = 8,    // from a node to a landmark: PoseLink::to < 0
+  gravity = 9      // of one node: PoseLink::from = to
 };
 // Returns "neighbor", "global closure", ...; "type N" for an unknown number.
 std::string to_text(LinkType type);
@@ -32,18 +32,18 @@ using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
 // Relative pose between two nodes, given by their ids: pose_to = pose_from * from_from_to.
 struct PoseLink {
-  int from = 0;
-  int to = 0;
+  int from = 0;  // node id
+  int to = 0;    // node id; of a landmark: < 0
   LinkType type = LinkType::neighbor;
   Pose from_from_to = Pose::Identity();
   // Inverse covariance in the order x y z roll pitch yaw, m and rad.
   Matrix6d information = Matrix6d::Identity();
 };
-// True for links of a single node: pose priors and gravity. Only these have from = to.
+// True for links that concern one node (from = to): pose priors and gravity.
 bool is_absolute(const PoseLink& link);
 
-// Maximum coordinate of a pose and maximum entry of an information matrix that readers accept, so
-// that values remain in range in all file formats (some multiply the entries by 4).
+// Readers accept poses and information matrices with absolute values up to these bounds, so that
+// values remain in range in all file formats (some multiply information entries by 4).
 inline constexpr double max_position_m = 1e8;
 inline constexpr double max_information = 1e300;
 
@@ -60,13 +60,13 @@ struct GpsFix {
 struct GraphNode {
   static constexpr int invalid_weight = -9;  // RTAB-Map's weight of nodes without usable data
 
-  int id = 0;       // > 0
-  int session = 0;  // odometry does not connect nodes of different sessions
-  int weight = 0;   // >= 0 normal, -1 intermediate, -9 invalid
+  int id = 0;       // > 0, unique
+  int session = 0;  // recording session; odometry does not connect nodes of different sessions
+  int weight = 0;   // RTAB-Map's: >= 0 normal, -1 intermediate, -9 invalid
   double stamp_s = 0.0;
-  std::string label{};  // name by the user; mostly empty
-  std::optional<Pose> odometry_from_base{};
-  std::optional<Pose> truth_from_base{};            // ground truth, in a separate frame
+  std::string label{};                              // name by the user; mostly empty
+  std::optional<Pose> odometry_from_base{};         // pose by odometry
+  std::optional<Pose> truth_from_base{};            // ground truth pose, in a frame of its own
   std::optional<std::array<double, 6>> velocity{};  // x y z roll pitch yaw, m/s and rad/s
   std::optional<GpsFix> gps{};
 };
@@ -74,13 +74,13 @@ struct GraphNode {
 struct PoseGraph {
   std::vector<GraphNode> nodes;                 // by ascending id
   std::vector<PoseLink> links;                  // each link once, in one of its directions
-  std::map<int, Pose> optimized_map_from_base;  // poses stored with the scan; can be empty
+  std::map<int, Pose> optimized_map_from_base;  // by node id, stored with the scan; can be empty
 
-  // Returns nullptr if there is no such node.
+  // Returns the node with this id, or nullptr.
   const GraphNode* find_node(int id) const;
 };
 
-// Pose of a trajectory. `node` is 0 if only the time is known.
+// Pose of a trajectory. The node id `node` is 0 if only the time is known.
 struct TrajectoryPose {
   int node = 0;
   double stamp_s = 0.0;
@@ -92,8 +92,8 @@ using Trajectory = std::vector<TrajectoryPose>;
 enum class PoseSource { odometry, optimized, ground_truth };
 std::string to_text(PoseSource source);  // "odometry", "optimized", "ground-truth"
 
-// Returns the poses of a source in ascending order of nodes, without invalid nodes and nodes that
-// have no such pose.
+// Returns the poses of a source in ascending order of node ids, without invalid nodes and nodes
+// that have no pose of this source.
 Trajectory trajectory_of(const PoseGraph& graph, PoseSource source);
 
 // Returns the sum of the distances between consecutive poses, m.

@@ -1,4 +1,4 @@
-// Table of the named results of a stage, the counterpart of ParameterTable for outputs.
+// Table of the named results of a processing stage, the counterpart of ParameterTable for outputs.
 // describe(table, result) next to a result struct binds each field to a key and a description. The
 // manifest, --json, printed lists, the merging of tiles and the Python module use it.
 #pragma once
@@ -19,7 +19,7 @@ namespace libmap {
 using ManifestValue = std::variant<bool, std::int64_t, double, std::string, std::vector<double>>;
 
 struct NamedResult {
-  // `found` is the value: a boolean, a number, a text, a range of numbers, or an optional of these.
+  // `found` is the value: a boolean, a number, a text, a list of numbers, or an optional of these.
   template <typename Found>
   NamedResult(std::string result_key, const Found& found, std::string text = {})
       : key(std::move(result_key)),
@@ -34,7 +34,7 @@ struct NamedResult {
 
   std::string key;                     // with unit: "radius_m"
   std::string description;             // one line
-  ManifestValue type;                  // a default value of the type of `value`
+  ManifestValue type;                  // false, 0, "" or {}: shows the type of `value`
   bool may_be_absent;                  // true for optionals
   std::optional<ManifestValue> value;  // nullopt: null with --json, omitted in the manifest
 
@@ -74,16 +74,16 @@ struct NamedResult {
   }
 };
 
-// Rule for combining the values of a field from several tiles.
+// Rule for combining the values of a result from several tiles.
 enum class Merge { sum, max, min };
 
-// Field of a tile's result that is stored with the tile and merged over the tiles.
+// Field of a result struct that is stored with each tile and merged over the tiles.
 struct TileField {
   std::string key;
   std::variant<const std::size_t*, const double*> field;
   Merge merge;
 
-  // Returns or sets the value of the field. set() requires that the result struct is not const.
+  // Return and set the value of the field; set() requires that the result struct is not const.
   ManifestValue value() const;
   void set(const ManifestValue& value) const;
 };
@@ -93,7 +93,7 @@ class ResultTable {
   ResultTable() = default;
   ResultTable(std::initializer_list<NamedResult> results) : results_(results) {}
 
-  // Adds a result; with `merge`, `field` (std::size_t or double) is also merged over tiles.
+  // Adds a result. With `merge`, `field` (std::size_t or double) is also added as a tile field.
   template <typename Found>
   void add(std::string key, const Found& found, std::string description = {}) {
     results_.emplace_back(std::move(key), found, std::move(description));
@@ -103,7 +103,7 @@ class ResultTable {
     add_hidden(key, field, merge);
     add(std::move(key), field, std::move(description));
   }
-  // Adds a field that is merged over tiles but is not reported as a result.
+  // Adds only a tile field, which is merged over tiles but is not reported as a result.
   template <typename Number>
   void add_hidden(std::string key, const Number& field, Merge merge) {
     tile_fields_.push_back({std::move(key), &field, merge});
@@ -131,7 +131,7 @@ ResultTable described(const Result& result) {
   return table;
 }
 
-// Merges the fields of a tile into `whole` by the Merge rule of each field.
+// Merges the tile fields of `tile` into those of `whole` by the Merge rule of each field.
 template <typename Result>
 void merge_into(Result& whole, const Result& tile) {
   described(whole).merge(described(tile));

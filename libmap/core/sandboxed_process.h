@@ -21,7 +21,7 @@ class SandboxedProcess {
   using Write = std::function<void(std::string_view bytes)>;
 
   // Calls work(write) in a child process without terminal output and with at most `max_data_bytes`
-  // of memory. read() returns the written bytes. Throws Error (failed) if no process can start.
+  // of memory. read() receives the bytes of `write`. Throws Error (failed) if no child can start.
   SandboxedProcess(std::uint64_t max_data_bytes, const std::function<void(const Write&)>& work);
   ~SandboxedProcess();  // ends the child
   SandboxedProcess(const SandboxedProcess&) = delete;
@@ -29,7 +29,7 @@ class SandboxedProcess {
 
   // Reads the next bytes. Returns false if the child ended before it had written `count` bytes.
   bool read(void* bytes, std::size_t count);
-  // Closes the connection, waits for the child and returns " (signal 11)" after a crash, else "".
+  // Closes the connection, waits for the child. Returns "", or e.g. " (signal 11)" after a crash.
   std::string end();
 
  private:
@@ -63,7 +63,7 @@ class SandboxWriter {
     size(values);
     write_({reinterpret_cast<const char*>(values.data()), values.size() * sizeof values[0]});
   }
-  // Sends an Error, or nullptr for success.
+  // Sends an Error (without its file), or nullptr for success.
   void error(const Error* error);
 
  private:
@@ -71,7 +71,7 @@ class SandboxWriter {
 };
 
 // Receives a result in the parent process. If the data end too early, each function throws Error
-// with the reason `broken` and the cause of the child's end.
+// with the reason `broken` + SandboxedProcess::end().
 class SandboxReader {
  public:
   SandboxReader(SandboxedProcess& process, std::string broken)

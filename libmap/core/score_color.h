@@ -1,4 +1,4 @@
-// Colors of graspability scores, as in the legend of the thesis (README), for files and images.
+// Colors of graspability scores, as in the thesis that the README cites, for files and images.
 #pragma once
 
 #include <array>
@@ -9,9 +9,9 @@
 namespace libmap {
 
 struct ScoreClass {
-  double min_score = 0.0;  // lower limit of the class, which contains it; scores are 0 to 1
+  double min_score = 0.0;  // lower limit, included in the class; scores are 0 to 1
   Color color{};
-  const char* text = "";  // of the legend
+  const char* text = "";  // text in the legend
 };
 
 // From the best to the worst: dark green, green, yellow-green, yellow, light orange, orange, red.
@@ -24,8 +24,8 @@ inline constexpr std::array<ScoreClass, 7> score_classes{{
     {0.4, {255, 140, 0}, "0.4 to 0.5"},
     {-std::numeric_limits<double>::infinity(), {214, 24, 24}, "below 0.4"},
 }};
-inline constexpr Color below_plane_color{255, 255, 255};  // for voxels below the zero plane
-inline constexpr Color no_value_color{128, 128, 128};
+inline constexpr Color below_plane_color{255, 255, 255};  // for z < zero_plane_m of a map (libgtd)
+inline constexpr Color no_value_color{128, 128, 128};     // for NaN
 
 // Returns the color of a score's class; gray for NaN. Class limits have a tolerance of 1e-6, so
 // that storage in single precision does not change the class.

@@ -18,17 +18,17 @@ struct Table {
   std::optional<std::size_t> find_column(std::string_view name) const;  // index or nullopt
   // Returns the index of a column. Throws Error naming file, column and the nearest known column.
   std::size_t column(std::string_view name) const;
-  // Returns a cell as a number. Throws Error naming file, row (from 1) and column if it is none.
+  // Returns a cell as a number. Throws Error naming file, row (from 1) and column for other text.
   double number(std::size_t row, std::size_t column) const;
   // Returns a cell as a number, or nullopt if it is empty. Throws as number() does.
   std::optional<double> optional_number(std::size_t row, std::size_t column) const;
 };
 
 // Parses CSV text with a header line, quotes as in RFC 4180 and line ends CRLF, LF or CR. Skips a
-// UTF-8 byte order mark, empty lines and lines that begin with '#'. Throws Error if the length of a
-// row differs from the header or the separator is not a comma.
+// UTF-8 byte order mark, empty lines and lines that begin with '#'. Throws Error if there is no
+// header, a row has another length, the separator is not a comma, or a quote is not closed.
 Table parse_csv(std::string_view text, const std::string& file);
-Table read_csv(const std::filesystem::path& path);  // parses the content of the file
+Table read_csv(const std::filesystem::path& path);  // throws also if the file cannot be read
 std::string to_csv(const Table& table);             // returns CSV text with a header line
 // Returns one row of CSV text with the end of line.
 std::string csv_line(const std::vector<std::string>& cells);

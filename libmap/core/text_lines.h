@@ -20,13 +20,12 @@ struct TextLine {
   std::vector<std::string_view> words{};
 };
 
-// Reads line by line; lines without a word are skipped.
 class LineReader {
  public:
-  // `first_line` is the number of the first line of `text`.
+  // `first_line` is the number of the first line of `text`. Each of `separators` separates words.
   explicit LineReader(std::string_view text, std::size_t first_line = 1,
                       std::string_view separators = " \t\r\v\f");
-  // Reads the next line. Returns false at the end.
+  // Reads the next line that has a word. Returns false at the end.
   bool next(TextLine& line);
   std::size_t remaining() const { return text_.size(); }  // bytes after the last line read
 
@@ -45,13 +44,14 @@ std::vector<TextLine> split_lines(std::string_view text);
 
 // True for a line that begins with '#'. The line must have a word.
 inline bool is_comment(const TextLine& line) { return line.words.front().front() == '#'; }
-// Returns "line 12", the field of errors.
+// Returns e.g. "line 12", the field of Errors about this line.
 std::string name_of(const TextLine& line);
 
-// Return the words from index `first` to `first + count - 1` as finite numbers, or the word at an
-// index as an integer of 32 or 64 bits. Throw Error naming file and line: missing or invalid word.
+// Returns the words at the indices `first` to `first + count - 1` as finite numbers. Throws Error
+// naming file and line if a word is missing or invalid.
 std::vector<double> numbers_of(const TextLine& line, std::size_t first, std::size_t count,
                                const std::string& file);
+// Return the word at index `word` as an integer of 32 or 64 bits. Throw as numbers_of does.
 int integer_of(const TextLine& line, std::size_t word, const std::string& file);
 std::int64_t large_integer_of(const TextLine& line, std::size_t word, const std::string& file);
 
@@ -64,15 +64,15 @@ Error wrong_columns(const std::string& reason, const TextLine& line, const std::
 // Returns an error for a record, e.g. "node 7", that an earlier line has already defined.
 Error duplicate(const TextLine& line, const std::string& record, const std::string& file);
 
-// Throws Error if `bytes` bytes are too few for `rows` rows of `row_bytes` bytes, or for `rows`
-// lines of `words` words each. `what` names the rows in the error, e.g. "points".
+// Throws Error unless `bytes` bytes can contain `rows` rows of `row_bytes` bytes, or, in the second
+// function, `rows` lines of `words` words. `what` names the rows in the error, e.g. "points".
 void require_rows(std::uint64_t rows, std::uint64_t row_bytes, std::uint64_t bytes,
                   const std::string& what);
 void require_room_for_text(std::uint64_t rows, std::uint64_t words, std::uint64_t bytes,
                            const std::string& what);
 
-// Returns the pose of a translation (m) and a quaternion from a line. Throws Error if the length of
-// the quaternion differs from 1 by more than 5 % or a coordinate is outside -1e8 to 1e8 m.
+// Returns the pose of a translation (m) and a quaternion that `line` contains. Throws Error if the
+// quaternion's length differs from 1 by more than 5 % or a coordinate is outside -1e8 to 1e8 m.
 Pose pose_of(const TextLine& line, const Eigen::Vector3d& translation,
              const Eigen::Quaterniond& rotation, const std::string& file);
 

@@ -13,8 +13,8 @@ namespace libmap {
 
 using Triangle = std::array<std::uint32_t, 3>;  // vertex indices, counter-clockwise from outside
 
-// Positions in meters. `vertex_normals` and `vertex_colors` are empty or have one entry per vertex.
-// Vertex fields have one value per vertex, face fields one per triangle.
+// Vertices are positions in meters. `vertex_normals` and `vertex_colors` are empty or have one
+// entry per vertex. Vertex fields have one value per vertex, face fields one value per triangle.
 struct TriangleMesh {
   std::vector<Eigen::Vector3d> vertices;
   std::vector<Triangle> triangles;
@@ -37,11 +37,10 @@ Eigen::Vector3d area_normal(const TriangleMesh& mesh, const Triangle& triangle);
 // Returns the surface area in m2.
 double surface_area(const TriangleMesh& mesh);
 
-// Returns the signed volume in m3 by the divergence theorem: the enclosed volume of a closed mesh.
+// Returns the volume in a closed mesh, m3; negative if the triangles are clockwise from outside.
 double signed_volume(const TriangleMesh& mesh);
 
-// Returns unit vertex normals: area-weighted means of the normals of adjacent triangles, zero at
-// vertices without triangles.
+// Returns unit vertex normals: area-weighted means over adjacent triangles; zero without triangles.
 std::vector<Eigen::Vector3f> estimate_vertex_normals(const TriangleMesh& mesh);
 
 // Texture coordinates of a triangle's corners: 0 to 1 over the width and height of the texture
@@ -52,8 +51,8 @@ using TextureCorners = std::array<Eigen::Vector2f, 3>;
 // Page index of a triangle without texture.
 constexpr std::int32_t no_page = -1;
 
-// Mesh with texture pages. `texture_coordinates` and `page_of_triangle` have one entry per
-// triangle; triangles without texture have the page no_page.
+// Mesh with texture pages (images). `texture_coordinates` and `page_of_triangle`, an index of
+// `pages`, have one entry per triangle; triangles without texture have the page no_page.
 struct TexturedMesh {
   TriangleMesh mesh;
   std::vector<TextureCorners> texture_coordinates;

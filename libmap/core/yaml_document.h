@@ -1,4 +1,4 @@
-// Parses YAML; errors name file, key and line.
+// Parses YAML. The Errors name file, key and line.
 #pragma once
 
 #include <cstdint>
@@ -18,14 +18,13 @@ namespace libmap {
 // Maximum size of a YAML file.
 inline constexpr std::uint64_t max_yaml_bytes = std::uint64_t{16} << 20;
 
-// Calls `read` with the single document in `text`, a null node if the text is empty. Throws Error
-// naming `file` if the text is not YAML or contains several documents or more than 500,000 values;
-// adds `file` to Errors of `read`.
+// Calls read(document) with the only document in `text`, a null node if the text is empty. Throws
+// Error naming `file` if the text is not YAML or contains several documents or more than 500,000
+// values; adds `file` to Errors of `read`.
 void read_yaml(const std::string& text, const std::string& file,
                const std::function<void(const YAML::Node&)>& read);
 
-// Returns the error "unknown key" + `whose` (e.g. " of camera front"), with a suggestion of the
-// nearest known key.
+// Returns the error "unknown key" + `whose` (e.g. " of camera front") with the nearest known key.
 Error unknown_key(std::string_view key, const std::vector<std::string>& known,
                   const std::string& whose = "");
 

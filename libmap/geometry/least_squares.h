@@ -8,7 +8,7 @@
 
 namespace libmap {
 
-// Normal equations J^T W J x = -J^T W r, accumulated over residuals.
+// Normal equations J^T W J x = -J^T W r of the step x, with residuals r, weights W, Jacobian J.
 template <int size>
 struct NormalEquations {
   Eigen::Matrix<double, size, size> matrix = Eigen::Matrix<double, size, size>::Zero();
@@ -23,28 +23,28 @@ struct NormalEquations {
 
 struct LevenbergMarquardtOptions {
   int max_iterations = 100;
-  double tolerance = 1e-6;  // relative decrease of the cost below which the state has converged
-  double rounding = 1e-12;  // relative increase of the cost that is accepted as rounding
-  int max_rejected = 8;     // maximum number of consecutive rejected steps
-  double first_damping = 1e-6;
-  double min_damping = 1e-9;     // minimum; an accepted step divides the damping by 10
-  double raised_damping = 1e-4;  // minimum after a rejected step, which multiplies it by 100
+  double tolerance = 1e-6;      // relative decrease of the cost below which the state has converged
+  double rounding = 1e-12;      // accepted relative increase of the cost, by rounding errors
+  int max_rejected = 8;         // maximum number of consecutive rejected steps
+  double first_damping = 1e-6;  // damping of the first step
+  double min_damping = 1e-9;    // minimum; an accepted step divides the damping by 10
+  double raised_damping = 1e-4;  // minimum after a rejected step, which multiplies damping by 100
 };
 
 struct LeastSquaresSummary {
   double initial_cost = 0.0;
   double final_cost = 0.0;
-  int iterations = 0;  // accepted and rejected steps
-  int accepted = 0;    // accepted steps
+  int iterations = 0;  // number of accepted and rejected steps
+  int accepted = 0;    // number of accepted steps
   bool converged = false;
 };
 
-// Levenberg-Marquardt (Marquardt 1963) from a state with the finite `cost`, which never rises by
-// more than rounding. The problem has
-//   void linearize();              normal equations at the state
-//   double propose(double damping) solves them; cost of the state after the step, infinite if there
-//                                  is none
-//   void accept();                 replaces the current state by the proposed one
+// Levenberg-Marquardt (Marquardt 1963). `cost` is the finite cost of the problem's initial state.
+// The class Problem must have the functions
+//   void linearize()                computes the normal equations at the current state
+//   double propose(double damping)  solves the equations for a step; returns the cost of the state
+//                                   after the step, infinity if there is no step
+//   void accept()                   replaces the current state by the proposed state
 template <typename Problem>
 LeastSquaresSummary levenberg_marquardt(Problem& problem, double cost,
                                         const LevenbergMarquardtOptions& options) {

@@ -9,7 +9,7 @@
 
 namespace libmap {
 
-// Weighted sums over the offsets of points, m, from a nearby origin.
+// Weighted sums over the offsets of points, m, from an origin near the points.
 struct PlaneMoments {
   double weight = 0.0;                               // sum of the weights
   Eigen::Vector3d first = Eigen::Vector3d::Zero();   // sum of weight * offset
@@ -30,12 +30,12 @@ struct PlaneMoments {
 
 // Principal axes of weighted points. The first axis is the plane normal, of either sign.
 struct PlaneSpread {
-  Eigen::Vector3d center = Eigen::Vector3d::Zero();
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();     // weighted mean, m
   Eigen::Vector3d variances = Eigen::Vector3d::Zero();  // along the axes, m2, ascending
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();   // unit vectors in columns
 
-  // False for coincident points and for points with a second variance of at most `min_ratio` of the
-  // largest: points on a line have no plane.
+  // False if all points coincide, or if the second variance is at most `min_ratio` times the
+  // largest variance: points on a line have no plane.
   bool is_plane(double min_ratio) const {
     return variances[1] > min_ratio * variances[2] && variances[2] > 0.0;
   }
@@ -45,8 +45,8 @@ struct PlaneSpread {
 // `origin` and the variances are 0.
 PlaneSpread spread_of(const PlaneMoments& moments, const Eigen::Vector3d& origin);
 
-// Returns the principal axes of points with weight(point) > 0. Sums over fixed chunks make the
-// result independent of the number of threads.
+// Returns the principal axes of the points with weights weight(point); points with weights <= 0 are
+// skipped. The result does not depend on the number of threads.
 template <typename Weight>
 PlaneSpread weighted_spread(const std::vector<Eigen::Vector3d>& points,
                             const Eigen::Vector3d& origin, std::size_t points_per_chunk,

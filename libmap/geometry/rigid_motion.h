@@ -24,24 +24,24 @@ inline Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& a) {
 Eigen::Quaterniond rotation_of(const Eigen::Vector3d& rotation_vector);
 Eigen::Vector3d rotation_vector_of(const Eigen::Matrix3d& rotation);
 
-// Derivative of rotation_vector_of(R * exp(r)) by r at 0, for R = exp(rotation_vector): the inverse
-// right Jacobian of SO(3). The derivative of rotation_vector_of(exp(r) * R) is the transpose.
+// Derivative of rotation_vector_of(R * exp(r)) by r at r = 0, with R = exp(rotation_vector): the
+// inverse right Jacobian of SO(3). For rotation_vector_of(exp(r) * R), it is the transpose.
 Eigen::Matrix3d rotation_vector_derivative(const Eigen::Vector3d& rotation_vector);
 
-Pose moved(const Pose& pose, const Vector6d& step);  // moves a pose by a step in its own frame
+Pose moved(const Pose& pose, const Vector6d& step);  // moves a pose by a step in the pose's frame
 
-// Step from `from` to `to`, and the derivative of this step with respect to a step of `to`.
+// Returns the step e with moved(from, e) = to.
 Vector6d step_between(const Pose& from, const Pose& to);
+// Derivative of step_between(from, to) with respect to a step of `to`.
 Matrix6d step_derivative(const Pose& from, const Pose& to);
 
 // True if two poses differ by at most `distance_m` and `angle_rad`.
 bool is_near(const Pose& a, const Pose& b, double distance_m, double angle_rad);
 
-// Derivatives of the step of a_from_b = a^-1 b with respect to steps of a (minus the adjoint of
-// b_from_a) and b (the identity).
+// Derivatives of a step of the relative pose a_from_b = a^-1 * b with respect to steps of a and b.
 struct RelativeJacobian {
-  Matrix6d by_a;
-  Matrix6d by_b;
+  Matrix6d by_a;  // minus the adjoint of b_from_a
+  Matrix6d by_b;  // the identity
 };
 RelativeJacobian relative_jacobian(const Pose& a_from_b);
 

@@ -1,8 +1,5 @@
 // Neighbor search among points: PointTree for a fixed set of points, GrowingGrid for points added
-// between searches. Other structures exist only where these are measurably slower or where sums
-// depend on the order of the neighbors; each states a measurement:
-// libgtd/shape/point_grid.h (8 times as fast for 27 neighbors), libmap/fusion/surface_points.cc (3
-// times), libmap/surface/self_intersections.cc (boxes of triangles), Embree for rays and distances.
+// between searches. The README of this folder lists the other search structures with their reasons.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,8 +12,8 @@
 namespace libmap {
 
 struct NeighborPoint {
-  std::size_t index = 0;
-  double square_m2 = 0.0;  // squared distance
+  std::size_t index = 0;   // index in the list of points
+  double square_m2 = 0.0;  // squared distance, m2
 };
 
 // k-d tree by nanoflann. All functions are thread-safe.
@@ -28,12 +25,12 @@ class PointTree {
   PointTree(PointTree&&) noexcept;
   PointTree& operator=(PointTree&&) noexcept;
 
-  // Returns the `count` nearest points by ascending distance, or all if there are fewer. Ties are
-  // resolved by the lowest index.
+  // Returns the `count` nearest points by ascending distance, or all if there are fewer. Among
+  // equal distances, the lowest index is first.
   std::vector<NeighborPoint> nearest(const Eigen::Vector3d& point, std::size_t count) const;
-  // Returns a nearest point. The tree must not be empty.
+  // Returns the nearest point, any of several at equal distance. The tree must not be empty.
   NeighborPoint nearest(const Eigen::Vector3d& point) const;
-  // Returns the nearest point with the lowest index. The tree must not be empty.
+  // Like nearest(point), with the lowest index at equal distance. The tree must not be empty.
   NeighborPoint first_of_nearest(const Eigen::Vector3d& point) const;
   // Returns the points nearest to point n within `radius_m`, at most `count` and without point n,
   // by ascending distance.
@@ -46,22 +43,22 @@ class PointTree {
   std::unique_ptr<Index> index_;
 };
 
-// Returns the median distance, m, from a point to the nearest point at another position, over at
-// most 10000 points, spread evenly over the list. If most points are near-duplicates (first and
-// last returns, joined clouds), they are merged and the result is by_area_m of the merged points.
-// Returns 0 if all positions are equal.
+// Returns point_spacing(points).nearest_m, the spacing for most uses.
 double median_spacing(const std::vector<Eigen::Vector3d>& points);
 
 struct CloudSpacing {
-  double nearest_m = 0.0;  // median_spacing
-  double by_area_m = 0.0;  // spacing of a square grid with as many points per area
+  // Median distance from a point to the nearest point at another position. If most points are
+  // near-duplicates (multiple returns, joined clouds), nearest_m is by_area_m of the merged points.
+  double nearest_m = 0.0;
+  double by_area_m = 0.0;  // spacing of a square grid with the cloud's number of points per area
 };
-// Returns both spacings of a cloud, m; 0 if all positions are equal.
+// Returns both spacings from at most 10000 points, spread evenly over the list; 0 if all positions
+// are equal.
 CloudSpacing point_spacing(const std::vector<Eigen::Vector3d>& points);
 
 // Points in a hashed grid of cubes that starts at `origin`. nanoflann's dynamic tree takes 10 times
-// as long for 74,000 samples. Cells with equal hashes share a slot, so a search can visit points
-// outside the box; the caller checks distances anyway.
+// as long for 74,000 samples. Cells with equal hashes share a slot, so any_in_box() can also visit
+// points outside the box, which the caller must exclude.
 class GrowingGrid {
  public:
   // Searches are fastest in boxes with sides of about `cell_m`.
@@ -85,8 +82,8 @@ class GrowingGrid {
     link(static_cast<std::uint32_t>(nodes_.size() - 1));
   }
 
-  // Calls visit(position, index) for each point in the box, and for some others, until it returns
-  // true. Returns true if a call did.
+  // Calls visit(position, index) for each point in the box, and for some others, until `visit`
+  // returns true. Returns true if `visit` did.
   template <typename Visit>
   bool any_in_box(const Eigen::Vector3d& low, const Eigen::Vector3d& high,
                   const Visit& visit) const {
@@ -100,7 +97,7 @@ class GrowingGrid {
     return false;
   }
 
-  // True if a point is closer to `position` than `radius_m`, the square root of `square_m2`.
+  // True if a squared distance to `position` is below `square_m2`, the square of `radius_m`.
   bool any_nearer(const Eigen::Vector3d& position, double radius_m, double square_m2) const {
     const Eigen::Vector3d reach = Eigen::Vector3d::Constant(radius_m);
     return any_in_box(position - reach, position + reach,

@@ -11,16 +11,16 @@
 
 namespace libmap {
 
-// Index of a voxel in the grid, and the side of a thin sheet that it represents.
+// Voxel of a grid. A grid cell has two voxels, one for each side of a thin sheet of surface.
 struct VoxelSide {
   Eigen::Vector3i cell = Eigen::Vector3i::Zero();
   int side = 0;  // 0 or 1
 };
 
-// pack() packs voxels with cell indices -limit..limit-1 along each axis; unpack() is its inverse.
+// Keys exist for cell indices -voxel_cell_limit to voxel_cell_limit - 1 along each axis.
 inline constexpr int voxel_cell_limit = 1 << 20;
 
-// Layout of a key: 21 bits per axis and one bit for the side.
+// Layout of a key, from the highest bit: 21 bits each for x, y and z, and one bit for the side.
 namespace voxel_key {
 
 inline constexpr std::uint64_t axis_mask = (std::uint64_t{1} << 21U) - 1;
@@ -56,7 +56,7 @@ inline std::uint64_t scramble(std::uint64_t key) {
 
 }  // namespace voxel_key
 
-inline std::uint64_t pack(const VoxelSide& voxel) {
+inline std::uint64_t pack(const VoxelSide& voxel) {  // returns the key; inverse: unpack()
   using voxel_key::axis_bits;
   return axis_bits(voxel.cell.x()) << 43U | axis_bits(voxel.cell.y()) << 22U |
          axis_bits(voxel.cell.z()) << 1U | static_cast<std::uint64_t>(voxel.side);
@@ -79,7 +79,7 @@ inline std::uint64_t z_order(std::uint64_t key) {
 // entries are blocks of 4 x 4 x 2 voxels of one side, because neighbors are mostly in one block.
 class VoxelIndex {
  public:
-  static constexpr std::uint32_t none = 0xffffffff;
+  static constexpr std::uint32_t none = 0xffffffff;  // number of a key that is not in the table
 
   VoxelIndex() : slots_(1U << 6U) {}  // no key yet
 
@@ -103,7 +103,7 @@ class VoxelIndex {
   }
 
   std::size_t size() const { return keys_.size(); }
-  const std::vector<std::uint64_t>& keys() const { return keys_; }
+  const std::vector<std::uint64_t>& keys() const { return keys_; }  // by number
   std::vector<std::uint64_t> take_keys() && { return std::move(keys_); }
 
  private:

@@ -11,8 +11,8 @@
 
 namespace libmap {
 
-// Decodes the content of a file; `format` is "stl" or "glb". Equal corners become one vertex.
-// Throws Error without the file's name, with assimp's reason.
+// Decodes the content of a file; `format` is "stl" or "glb". Triangle corners with equal position,
+// normal and color become one vertex. Throws Error (without the file's name) with assimp's reason.
 TriangleMesh decode_by_assimp(const std::string& bytes, const std::string& format);
 
 // Texture image of a model, embedded in the model's file or in a file of its own.
@@ -30,15 +30,15 @@ struct DecodedModel {
 // Reads the .glb at `path`. Throws as decode_by_assimp does.
 DecodedModel decode_glb_model(const std::filesystem::path& path);
 
-// Returns the content of a file with the mesh; `format` is "stl" or "glb", `ascii` applies to STL.
-// Throws Error if the mesh has no triangles, or if assimp fails (failed).
+// Returns the content of a file with the mesh; `format` is "stl" or "glb", `ascii` selects text
+// STL. Throws Error if the mesh has no triangles; Error (failed) if assimp fails.
 std::string encode_by_assimp(const TriangleMesh& mesh, const std::string& format, bool ascii);
 
 // Part of a model with one texture page.
 struct ModelPart {
   TriangleMesh mesh;
-  std::vector<Eigen::Vector2f> texture_coordinates;  // per vertex, from the top left; or none
-  std::int32_t page = no_page;                       // index of an image
+  std::vector<Eigen::Vector2f> texture_coordinates;  // one per vertex, from the top left; or empty
+  std::int32_t page = no_page;                       // index of the texture image
 };
 
 // Texture image as the bytes of a file; `format` is "png" or "jpg".
@@ -47,8 +47,8 @@ struct EncodedImage {
   std::string format;
 };
 
-// Writes a .glb with embedded images and unlit materials (KHR_materials_unlit). Throws Error
-// (failed).
+// Writes the parts to a .glb with embedded images and unlit materials (KHR_materials_unlit). Throws
+// Error (failed) if the file cannot be written.
 void write_model_by_assimp(const std::filesystem::path& path, std::vector<ModelPart> parts,
                            std::vector<EncodedImage> images);
 

@@ -1,8 +1,8 @@
 // Conversion between clouds and the named columns (columns.h) that cloud files contain.
 //
-// Recognized names: x y z, X Y Z; normal_x .., nx .., Normals_0 ..; red green blue, r g b,
-// diffuse_red ... Three columns form a triple only if all three exist; all other columns become
-// scalar fields. Colors are scaled to 0-255 from 0-1 (floats, none above 1) or 0-65535 (uint16).
+// Recognized names: positions x y z, X Y Z; normals normal_x .., nx .., Normals_0 ..; colors red
+// green blue, r g b, diffuse_red ... Each needs all three columns; all other columns become scalar
+// fields. Colors are scaled to 0-255 from 0-1 (floats, none above 1) or 0-65535 (uint16).
 #pragma once
 
 #include <cstddef>
@@ -15,7 +15,7 @@
 
 namespace libmap {
 
-enum class NotFinite { drop, refuse };  // treatment of positions that are not finite
+enum class NotFinite { drop, refuse };  // points that are not finite: omit them, or throw Error
 
 struct CloudFromColumns {
   PointCloud cloud;
@@ -32,25 +32,25 @@ std::vector<Column> geometry_columns(const std::vector<Column>& columns, bool wi
 // Names of the normals' columns: nx ny nz (PLY, CSV) or normal_x normal_y normal_z (PCD).
 enum class NormalNames { short_names, long_names };
 
-// Returns columns that view `cloud`, which must outlive them. Positions are declared float32, or
-// float64 if float32 would move a coordinate by more than 1e-5 m. Throws Error if fields have the
-// recognized names of positions, normals or colors, as which they would be read back.
+// Returns columns that refer to `cloud`, which must outlive them. Column::type of positions is
+// float32, or float64 if float32 would move a coordinate by more than 1e-5 m. Throws Error if a
+// field has no name, the name of another column, or if three fields have names recognized as above.
 ColumnSet columns_of_cloud(const PointCloud& cloud, NormalNames names);
 
-// Append columns as columns_of_cloud does; they view the arrays, which must outlive `set`.
+// Append columns as columns_of_cloud does. The arrays must outlive `set`.
 void add_position_columns(const std::vector<Eigen::Vector3d>& positions, ColumnSet& set);
 void add_normal_columns(const std::vector<Eigen::Vector3f>& normals, NormalNames names,
                         ColumnSet& set);
 void add_color_columns(const std::vector<Color>& colors, ColumnSet& set);
 void add_field_columns(const std::vector<ScalarField>& fields, ColumnSet& set);
 
-// Returns the columns as scalar fields. Throws Error if two columns have equal names.
+// Returns all columns as scalar fields. Throws Error if two columns have equal names.
 std::vector<ScalarField> fields_of_columns(const ColumnSet& columns);
 
-// Adds columns red, green, blue that view packed colors of PCL (0xAARRGGBB), the first at `first`.
+// Adds columns red, green, blue of packed PCL colors (0xAARRGGBB) at `first`, `stride` bytes apart.
 void add_packed_color_columns(const std::byte* first, std::size_t stride, bool big_endian,
                               ColumnSet& set);
-// Returns the columns with red, green, blue packed into a column `rgb`, if all three exist.
+// Returns the columns; red, green and blue, if all three exist, are packed into a column `rgb`.
 ColumnSet with_packed_color(const ColumnSet& columns);
 
 // True if float32 would move a coordinate by more than 1e-5 m.

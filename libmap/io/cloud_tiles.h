@@ -24,12 +24,13 @@ namespace libmap {
 class TileStream : public PointStream {
  public:
   // Reads the headers. Throws Error naming the file if it cannot be read, if only some files have
-  // normals, or if only some are DEMs.
+  // normals, or if only some files are DEMs.
   explicit TileStream(std::vector<std::filesystem::path> tiles);
 
   const std::vector<std::filesystem::path>& tiles() const { return tiles_; }
   bool has_normals() const { return has_normals_; }
-  const Pose& viewpoint() const { return viewpoint_; }  // the identity if those of the files differ
+  // Viewpoint of all files (cloud_from_sensor); the identity if the files' viewpoints differ.
+  const Pose& viewpoint() const { return viewpoint_; }
   // Georeference of the first DEM; nullopt without DEMs.
   const std::optional<Georeference>& georeference() const { return georeference_; }
   void for_each_block(Need need, const Visit& visit) const override;
@@ -43,35 +44,35 @@ class TileStream : public PointStream {
 
 struct TileInfo {
   std::size_t points = 0;          // points with a finite position
-  std::size_t dropped_points = 0;  // other points
-  Bounds3d box;                    // of the finite positions, m; zeros without points
+  std::size_t dropped_points = 0;  // CloudReadResult::dropped_points
+  Bounds3d box;                    // bounding box of `points`, m; zeros if there are none
 };
-// Reads a file and returns the number and bounding box of its points. DEMs are read in the frame of
-// `georeference`, that of the TileStream. Throws Error naming the file if it cannot be read.
+// Reads a file and returns the number and bounding box of its points. A DEM is read in the local
+// frame of `georeference`, by default in its own. Throws Error naming the file if it is unreadable.
 TileInfo read_tile_info(const std::filesystem::path& tile,
                         const std::optional<Georeference>& georeference = std::nullopt);
 
 struct TilesReadResult {
   PointCloud cloud;                // positions and normals
-  std::size_t dropped_points = 0;  // points whose position is not finite
+  std::size_t dropped_points = 0;  // CloudReadResult::dropped_points, of all files
 };
 // Reads all files into one cloud. Throws as TileStream does.
 TilesReadResult read_tiles(const std::vector<std::filesystem::path>& tiles);
 
 // Reads the points in a rectangle from one or many cloud files, with normals, colors and fields.
-// DEMs are in the local frame of the first. Memory depends on the size of a file and of the result.
+// DEMs are read in the local frame of the first DEM. Memory depends on the size of a file.
 class TileIndex {
  public:
-  // Reads each file once and calls visit(cloud) unless it is empty. Throws Error naming the file if
-  // it cannot be read, or if only some files have normals.
+  // Reads each file once and calls visit(cloud) for each file with points. Throws Error naming the
+  // file if it cannot be read, or if only some files have normals.
   using Visit = std::function<void(const PointCloud& tile)>;
   TileIndex(std::vector<std::filesystem::path> tiles, const Visit& visit);
 
-  std::size_t points() const { return points_; }           // of all files, with finite positions
-  std::size_t dropped_points() const { return dropped_; }  // other points
+  std::size_t points() const { return points_; }           // in all files, with finite positions
+  std::size_t dropped_points() const { return dropped_; }  // see CloudReadResult, of all files
 
   // Returns the points with low <= (x, y) < high, m, in the order of the files, with the colors and
-  // fields that all files with such points have. Caches the last files, up to 4 million points.
+  // fields that all files of these points have. Caches recently used files, up to 4 million points.
   PointCloud points_in(const Eigen::Vector2d& low, const Eigen::Vector2d& high);
 
  private:

@@ -1,6 +1,5 @@
-// Named columns of numbers: the common format between the file codecs and clouds or meshes. A
-// column refers to memory that another object owns, so that reading and writing do not copy a
-// cloud.
+// Named columns of numbers: the common format between file codecs and clouds or meshes. A column
+// refers to memory that another object owns, so that reading and writing do not copy a cloud.
 #pragma once
 
 #include <array>
@@ -40,28 +39,28 @@ enum class StoredType {
   uint64
 };
 
-// Convert a type in a file to the type in memory and back (64-bit integers become float64).
+// Returns the type in memory of numbers whose type in a file is `type`.
 StoredType stored_as(ScalarType type);
+// Inverse of stored_as; float64 for 64-bit integers.
 ScalarType scalar_type_of(StoredType type);
-// Size of a number in bytes.
-std::size_t size_of(StoredType type);
+std::size_t size_of(StoredType type);  // size of a number in bytes
 
 struct Column {
   std::string name;
   ScalarType type = ScalarType::float32;    // declared type in the file
   StoredType stored = StoredType::float32;  // type in memory
   const std::byte* first = nullptr;         // address of row 0
-  std::size_t stride = 0;                   // bytes between rows
+  std::size_t stride = 0;                   // bytes from one row to the next
   bool swapped = false;                     // true: opposite of this machine's byte order
 };
 
 struct ColumnSet {
-  std::size_t rows = 0;
+  std::size_t rows = 0;  // number of rows of each column
   std::vector<Column> columns;
-  std::vector<std::shared_ptr<const void>> storage;  // owners of the viewed memory
+  std::vector<std::shared_ptr<const void>> storage;  // owners of memory of the columns, if any
 
   const Column* find(std::string_view name) const;  // nullptr if there is no such column
-  // Adds a column of `rows` numbers, owned by the set, and returns a pointer to fill it.
+  // Adds a column of `rows` numbers, owned by the set. Returns a pointer to row 0, to fill them.
   double* add_numbers(std::string name, ScalarType type);
 };
 
@@ -71,16 +70,16 @@ struct GeometryColumns {
   GeometryFileInfo info;
   ColumnSet vertices;
   std::vector<Triangle> triangles;
-  std::vector<std::uint32_t> face_of_triangle;  // row of `faces`
+  std::vector<std::uint32_t> face_of_triangle;  // row of `faces` of each triangle
   ColumnSet faces;                              // scalar fields of the faces
-  std::optional<Pose> viewpoint;                // cloud_from_sensor
+  std::optional<Pose> viewpoint;                // cloud_from_sensor; nullopt: not in the file
 };
 
 // Content to encode. Pointers other than `vertices` can be null.
 struct GeometryContent {
   const ColumnSet* vertices = nullptr;
   const std::vector<Triangle>* triangles = nullptr;  // null for a cloud
-  const ColumnSet* faces = nullptr;                  // one row per triangle
+  const ColumnSet* faces = nullptr;                  // scalar fields, one row per triangle
   const Pose* viewpoint = nullptr;  // cloud_from_sensor; not written if it is the identity
 };
 
@@ -89,22 +88,23 @@ double as_type(double value, ScalarType type);
 // True if `type` can represent `value`; always true for float types.
 bool fits_type(double value, ScalarType type);
 
-// Returns the word at an index as a number. Throws Error naming `field` and line if it is no number
-// that `type` can represent.
+// Returns the word at index `word` as a number. Throws Error naming `field` and line if the word is
+// not a number that `type` can represent.
 double number_of(const TextLine& line, std::size_t word, const std::string& field, ScalarType type);
 
-// Calls body(row, value) for each row.
+// Calls body(row, value) for each row in order; `value` is a double.
 template <typename Body>
 void for_each_value(const Column& column, std::size_t rows, const Body& body);
 // Calls body(row, value) for each row on all threads, in any order.
 template <typename Body>
 void for_each_value_in_parallel(const Column& column, std::size_t rows, const Body& body);
 
-// Appends rows begin..end-1 as packed records, each column converted to Column::type.
+// Appends rows begin..end-1 to `out` as packed records, each column converted to Column::type;
+// `swap_bytes`: in the opposite of this machine's byte order.
 void append_records(const std::vector<Column>& columns, std::size_t begin, std::size_t end,
                     bool swap_bytes, std::string& out);
 std::size_t record_size(const std::vector<Column>& columns);  // bytes per packed record
-// Appends rows begin..end-1 as text, each number in the shortest form that is read back exactly.
+// Appends rows begin..end-1 to `out` as lines of the shortest numbers that are read back exactly.
 void append_rows_of_text(const std::vector<Column>& columns, std::size_t begin, std::size_t end,
                          char separator, std::string& out);
 // Writes all rows in blocks. append(begin, end, text) appends rows begin..end-1 to `text`.
@@ -112,10 +112,9 @@ void write_rows(
     std::size_t rows, std::ostream& out,
     const std::function<void(std::size_t begin, std::size_t end, std::string& text)>& append);
 
-// Returns the pose cloud_from_sensor as tx ty tz (m) qw qx qy qz, the order of PCD files: as
-// numbers, or as text with a space before each number.
+// Returns the pose cloud_from_sensor as tx ty tz (m) qw qx qy qz, the order of PCD files.
 std::array<double, 7> viewpoint_numbers(const Pose& viewpoint);
-std::string viewpoint_words(const Pose& viewpoint);
+std::string viewpoint_words(const Pose& viewpoint);  // these numbers as text, each after a space
 // Inverse of viewpoint_numbers; nullopt if the quaternion is zero.
 std::optional<Pose> pose_of_viewpoint(const std::array<double, 7>& numbers);
 
@@ -182,7 +181,7 @@ struct BinaryRecords {
   std::uint64_t begin = 0;            // offset of the first record in the file
   std::size_t bytes = 0;              // size of a record
   std::uint64_t count = 0;            // number of records
-  std::vector<Column> columns;        // views on a block of records that the caller owns
+  std::vector<Column> columns;        // refer to a block of records that the caller owns
   Pose viewpoint = Pose::Identity();  // cloud_from_sensor
 };
 

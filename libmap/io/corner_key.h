@@ -41,7 +41,7 @@ inline Corner corner_of(const Eigen::Vector3d& position, const Eigen::Vector3f& 
 class CornerWelder {
  public:
   // Adds a corner to the mesh, with its normal and its color if they are not nullptr. Returns the
-  // index of its vertex: that of an equal earlier corner, or of a new vertex.
+  // index of the vertex of an equal earlier corner, or of a new vertex.
   std::uint32_t vertex(const Eigen::Vector3d& position, const Eigen::Vector3f* normal,
                        const Color* color, TriangleMesh& mesh) {
     const Corner corner =

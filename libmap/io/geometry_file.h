@@ -10,12 +10,12 @@
 
 namespace libmap {
 
-// Encoding of the numbers in a file; PLY has the first two.
+// Encoding of the numbers in a file; PLY supports only ascii and binary.
 enum class FileEncoding { ascii, binary, binary_compressed };
 
 struct GeometryWriteOptions {
   FileEncoding encoding =
-      FileEncoding::binary;  // a format without this encoding uses the nearest one
+      FileEncoding::binary;  // PLY: binary_compressed means binary; no effect on OBJ, OFF, CSV, GLB
   bool big_endian = false;   // byte order of a binary PLY; no effect on other files
 };
 
@@ -30,11 +30,11 @@ struct FileField {
 struct GeometryFileInfo {
   std::string format;  // "pcd", "ply", "csv", "tif", "obj", "stl", "off", "glb"
   FileEncoding encoding = FileEncoding::binary;
-  bool big_endian = false;
+  bool big_endian = false;           // byte order of binary numbers
   std::uint64_t bytes = 0;           // size of the file
-  std::uint64_t points = 0;          // points in the file, before any is dropped
+  std::uint64_t points = 0;          // points or vertices of the file, also dropped points
   std::uint64_t faces = 0;           // number of polygons
-  std::vector<FileField> fields;     // point fields with the file's names and order
+  std::vector<FileField> fields;     // point fields, with names and order of the file
   std::vector<std::string> skipped;  // content of the file that the reader ignores
 };
 

@@ -1,21 +1,21 @@
-// Reader and writer of triangle mesh files. The extension, in any case, selects the format.
+// Reader and writer of triangle mesh files. The extension (upper or lower case) selects the format.
 //
 //          read by         written by      content
 //   .ply   ply_codec       ply_codec       doubles, normals, colors, vertex and face fields
 //   .vtp   not read        VTK             doubles, normals, colors, vertex and face fields
-//   .obj   obj_codec       this file       doubles; normals, colors
-//   .off   this file       this file       doubles; geometry only
+//   .obj   obj_codec       mesh_io         doubles; normals, colors
+//   .off   mesh_io         mesh_io         doubles; geometry only
 //   .stl   assimp          assimp          float32; geometry only
 //   .glb   assimp          assimp          float32; normals, colors
 //   .tif   libmap/raster   not written     a DEM; geometry only
 //
-// float32 has 24 bits: the resolution is 2 micrometers at 16 m from the origin, and 3 cm at 500 km
-// (map coordinates). Move such a mesh to a local origin, or use .ply or .vtp, which store float64
-// if float32 would move a coordinate by more than 1e-5 m.
+// float32 resolves 2 micrometers at 16 m from the origin, but only 3 cm at 500 km (map
+// coordinates). Move a mesh far from the origin to a local origin, or use .ply or .vtp, which store
+// float64 if float32 would move a coordinate by more than 1e-5 m.
 //
-// assimp returns corners, not vertices. Equal corners are merged into one vertex, in the order of
-// first use; vertices without triangles are lost. GLB has y up by definition, this project z up:
-// writing and reading rotate about x.
+// The library assimp reads .stl and .glb as triangle corners. Equal corners are merged into one
+// vertex, in the order of first use; vertices without triangles are lost. GLB has y up by
+// definition, this project z up: writing and reading rotate by 90 degrees about x.
 #pragma once
 
 #include <filesystem>
@@ -33,10 +33,10 @@ struct MeshReadResult {
 
 enum class FileKind { cloud, mesh };  // content of a file: points only, or faces too
 
-// Reads a file, or all files of a folder into one mesh with the info of the last file; vertices on
-// seams are not merged. Polygons are split into triangle fans with the polygon's face fields; lines
-// and points are ignored. Throws Error naming the file if it cannot be read, is invalid or
-// truncated, or contains no triangle, an index out of range or a vertex that is not finite.
+// Reads a file, or all files of a folder into one mesh with the info of the last file; vertices of
+// different files are not merged. Polygons are split into triangle fans with the polygon's face
+// fields; lines and points are ignored. Throws Error naming the file if it is unreadable, invalid
+// or truncated, or contains no triangle, an index out of range or a vertex that is not finite.
 MeshReadResult read_mesh(const std::filesystem::path& path);
 
 // Returns the file itself, or the mesh files of a folder in the order of names, without hidden
@@ -44,9 +44,9 @@ MeshReadResult read_mesh(const std::filesystem::path& path);
 std::vector<std::filesystem::path> mesh_tiles(const std::filesystem::path& file_or_folder);
 
 // Writes directly to `path`; for atomic output, pass the temporary path of an OutputFile. Omits
-// attributes that the format does not have (the table above). Throws Error for an unknown
-// extension, a vertex that is not finite or too far away (require_single_precision, for .obj, .stl
-// and .glb), an index out of range and a failed write (failed).
+// attributes that the format does not have (see the table). Throws Error for an unknown extension,
+// an index out of range or a vertex that is not finite; for .obj, .stl and .glb, also as
+// require_single_precision. Throws Error (failed) if the write fails.
 void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh,
                 const GeometryWriteOptions& options = {});
 

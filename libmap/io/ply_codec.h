@@ -1,6 +1,6 @@
 // In-memory codec of PLY (Turk 1994), ascii and binary little- and big-endian, for clouds and
 // meshes. All scalar properties of `vertex` and `face` are kept, with types. The faces are the list
-// `vertex_indices` or `vertex_index`; other lists and elements are listed in info.skipped.
+// `vertex_indices` or `vertex_index`; GeometryFileInfo::skipped names other lists and elements.
 #pragma once
 
 #include <cstddef>
@@ -20,15 +20,14 @@ namespace libmap {
 // the size of the file. Throws as decode_ply does.
 GeometryFileInfo ply_info(std::string_view head, std::uint64_t file_bytes);
 
-// Returns the layout of the vertices in a binary file, with columns that refer to records at
-// `block`; nullopt if the file is ascii, or if the vertices or an element before them contain a
-// list. Throws Error as decode_ply does.
+// Returns the layout of the vertices in a binary file, with columns that refer to records at the
+// address `block`; nullopt if the file is ascii, or if the vertices or an element before the
+// vertices contain a list. Throws Error as decode_ply does.
 std::optional<BinaryRecords> ply_records(std::string_view head, std::uint64_t file_bytes,
                                          const std::byte* block);
 
 // Decodes a file. Throws Error (without the file's name) for an invalid header line, truncated data
-// (checked before memory is allocated), and a face with fewer than three corners or an index out of
-// range.
+// (checked before memory is allocated), a face with fewer than 3 corners or an index out of range.
 GeometryColumns decode_ply(const std::shared_ptr<const std::string>& bytes);
 
 // Writes a file; the viewpoint is a comment line. Throws Error for a field name that is not valid

@@ -1,6 +1,6 @@
 // In-memory encoder of VTP, ParaView's polygonal data, by VTK. Normals are point normals, colors a
-// uint8 x 3 array "rgb", scalar fields arrays of the field's type. The viewpoint is a field array
-// "viewpoint" (tx ty tz qw qx qy qz).
+// uint8 x 3 array "rgb", scalar fields arrays of the field's type. The viewpoint
+// (cloud_from_sensor) is a field array "viewpoint" (tx ty tz in m, qw qx qy qz).
 #pragma once
 
 #include <ostream>

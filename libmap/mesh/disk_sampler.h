@@ -14,21 +14,21 @@
 
 namespace libmap {
 
-// Part of a triangle, with corners in barycentric coordinates (u, v) of that triangle.
+// Part of a triangle of a mesh, or the whole triangle.
 struct Fragment {
-  std::uint32_t triangle = 0;
-  std::array<Eigen::Vector2d, 3> corners;
+  std::uint32_t triangle = 0;              // index of the triangle
+  std::array<Eigen::Vector2d, 3> corners;  // u and v in the triangle, as in TrianglePoint
 };
 
-// Fragment with the positions of the corners (m).
+// Fragment with the positions of its corners in the frame of the mesh, m.
 struct PlacedFragment {
   Fragment fragment;
   std::array<Eigen::Vector3d, 3> corners;
 
-  // Area, m^2.
+  // Return the area and the squared length of the longest side, m2.
   double area_m2() const;
-  double square_of_longest_side() const;  // m^2
-  // Bisects the longest side (Rivara 1984).
+  double square_of_longest_side() const;
+  // Returns the halves on both sides of the longest side's midpoint (Rivara 1984).
   std::array<PlacedFragment, 2> halves() const;
 };
 PlacedFragment placed(const TriangleMesh& mesh, const Fragment& fragment);
@@ -36,14 +36,14 @@ PlacedFragment placed(const TriangleMesh& mesh, const Fragment& fragment);
 // Maps two random numbers from 0 to 1 to a uniformly distributed point of the fragment.
 TrianglePoint point_of(const Fragment& fragment, double first, double second);
 
-// Range of consecutive fragments of a surface, with the bounding box.
+// Range of consecutive fragments of SurfaceFragments, with a bounding sphere.
 struct SurfaceBlock {
-  std::size_t begin = 0;  // index of the first fragment
-  std::size_t end = 0;    // index after the last fragment
-  double area_m2 = 0.0;   // of all fragments
-  Eigen::Vector3d center = Eigen::Vector3d::Zero();
-  double reach_m = 0.0;    // radius of a bounding sphere about the center
-  double longest_m = 0.0;  // longest side
+  std::size_t begin = 0;                             // index of the first fragment
+  std::size_t end = 0;                               // index after the last fragment
+  double area_m2 = 0.0;                              // total area of the fragments
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();  // center of the bounding sphere, m
+  double reach_m = 0.0;                              // radius of the bounding sphere
+  double longest_m = 0.0;                            // longest side of a fragment
 };
 
 // A surface as fragments: the triangles of a mesh, and parts of triangles that are too large.
@@ -51,13 +51,13 @@ class SurfaceFragments {
  public:
   // Takes all triangles of `mesh`, which must outlive this object.
   explicit SurfaceFragments(const TriangleMesh& mesh);
-  // Copies `triangles`, divided until no side is longer than `longest_m`. Parts without area are
-  // dropped. Throws Error if there are more than `max_parts` parts.
+  // Divides the fragments of `triangles` until no side is longer than `longest_m`. Drops parts
+  // without area. Throws Error if there are more than `max_parts` parts.
   SurfaceFragments(const SurfaceFragments& triangles, double longest_m, std::size_t max_parts);
 
   const std::vector<SurfaceBlock>& blocks() const { return blocks_; }
-  double area_m2() const;  // of all fragments
-  // Fragment with an index of a block: first the triangles, then the parts of triangles.
+  double area_m2() const;  // total area of the fragments
+  // Returns triangle `number` of the mesh or, beyond the last triangle, a part of a triangle.
   PlacedFragment fragment_at(std::size_t number) const;
 
  private:
@@ -71,10 +71,10 @@ class SurfaceFragments {
 };
 
 struct SampledSurface {
-  const TriangleMesh& mesh;  // with finite vertices
-  Eigen::Vector3d low;       // minimum of the bounding box
-  SurfaceFragments triangles;
-  double area_m2 = 0.0;  // > 0
+  const TriangleMesh& mesh;    // with finite vertices
+  Eigen::Vector3d low;         // minimum of the bounding box
+  SurfaceFragments triangles;  // all triangles of `mesh`
+  double area_m2 = 0.0;        // > 0
   // Maximum displacement by rounding positions to single precision; 0: positions are not rounded.
   double rounding_m = 0.0;
   // Samples of adjacent surfaces. New samples keep the minimum distance from these samples.
@@ -86,19 +86,20 @@ struct DiskSamples {
   std::vector<TrianglePoint> triangle_points;  // positions on the mesh before rounding
 };
 
-// Saturation density of random discs in the plane: samples * radius^2 / area. Discs of half the
-// radius cover 0.547 of the plane.
+// Expected value of samples * radius^2 / area for random samples in the plane without gaps: discs
+// of half the radius cover 0.547 of the plane.
 inline constexpr double saturation_density = 0.6965;
-// Approximate share of the samples found by darts (random points) over the whole surface.
+// Approximate share of the samples that sample_disks finds by darts over the whole surface.
 inline constexpr double dart_fraction = 0.808;
 
-// Tries random points (darts) over the whole surface. Then, if goes_on(samples so far) is true, it
-// fills the gaps; otherwise gaps remain. Throws Error if the mesh is too large for the radius.
+// Returns random samples with a minimum distance of `radius_m`. Tries random points (darts) over
+// the whole surface. Then, if goes_on(number of samples) is true, fills the gaps: parts farther
+// than `radius_m` from all samples. Throws Error if the mesh is too large for the radius.
 DiskSamples sample_disks(const SampledSurface& surface, double radius_m, std::uint64_t seed,
                          const std::function<bool(std::size_t thrown)>& goes_on,
                          Progress& progress);
 
-// Smallest distance of two positions, m; 0 for fewer than two. `expected_m` (> 0): an estimate.
+// Smallest distance of two positions, m; 0 for fewer than two. `expected_m`, > 0: its estimate.
 double smallest_distance(const std::vector<Eigen::Vector3d>& positions, double expected_m);
 
 }  // namespace libmap

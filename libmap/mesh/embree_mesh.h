@@ -12,19 +12,19 @@ struct RTCSceneTy;
 
 namespace libmap {
 
-// Positions are relative to the center of the mesh, where single precision is most accurate.
+// Positions are relative to the center of the bounding box, where float32 is most accurate.
 class EmbreeMesh {
  public:
   // Throws Error if the mesh has no triangle, an index out of range or a vertex that is not finite.
-  // `robust`: rays do not pass between two triangles at a shared edge.
+  // With `robust`, rays do not pass between two triangles at their shared edge.
   EmbreeMesh(const TriangleMesh& mesh, bool robust);
   EmbreeMesh(EmbreeMesh&&) = default;
   EmbreeMesh& operator=(EmbreeMesh&&) = default;
 
-  RTCSceneTy* scene() const { return scene_.get(); }  // relative to center()
+  RTCSceneTy* scene() const { return scene_.get(); }  // positions relative to center(), m
   const Eigen::Vector3d& center() const { return center_; }
   Eigen::Vector3d size() const { return size_; }  // size of the bounding box, m
-  // Corner of a triangle relative to center(), in double precision.
+  // Position of corner k (0 to 2) of a triangle relative to center(), m, in double precision.
   const Eigen::Vector3d& corner(std::uint32_t triangle, int k) const {
     return vertices_[triangles_[triangle][static_cast<std::size_t>(k)]];
   }

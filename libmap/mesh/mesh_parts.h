@@ -12,20 +12,20 @@
 
 namespace libmap {
 
-// Number of marks that are set.
+// Returns the number of true marks.
 std::size_t count_of(const std::vector<bool>& marks);
 
-// Returns the triangles with a set mark and the vertices of these triangles, in the original order.
-// Throws Error unless there is one mark per triangle.
+// Returns the triangles with a true mark and the vertices of these triangles, in the original
+// order. Throws Error unless there is one mark per triangle.
 TriangleMesh select_triangles(const TriangleMesh& mesh, const std::vector<bool>& keep_triangle);
 
-// Components connected by shared edges, numbered in the order of the first triangle of each.
+// Components of triangles connected by shared edges, numbered by ascending first triangle.
 struct MeshComponents {
-  std::vector<std::uint32_t> of_triangle;  // component of each triangle
-  std::vector<double> areas_m2;            // by component
+  std::vector<std::uint32_t> of_triangle;  // component number of each triangle
+  std::vector<double> areas_m2;            // area of each component
 };
 MeshComponents connected_components(const TriangleMesh& mesh);
-// As above, in a third of the time: `opposite` is opposites_of(mesh).
+// Returns connected_components(mesh) in a third of the time; `opposite` is opposites_of(mesh).
 MeshComponents connected_components(const TriangleMesh& mesh,
                                     const std::vector<HalfEdge>& opposite);
 
@@ -48,7 +48,7 @@ using TriangleCorners = std::array<Eigen::Vector3d, 3>;
 inline TriangleCorners corners_of(const TriangleMesh& mesh, const Triangle& t) {
   return {mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]};
 }
-// Divides a triangle at the midpoints of its edges: the middle part, then the part at each corner.
+// Divides a triangle at the midpoints of its sides: the middle part, then the parts at the corners.
 std::array<TriangleCorners, 4> quarters_of(const TriangleCorners& corners);
 
 // Point on a triangle: (1 - u - v) * a + u * b + v * c.
@@ -59,9 +59,9 @@ struct TrianglePoint {
 };
 Eigen::Vector3d position_on(const TriangleMesh& mesh, const TrianglePoint& point);
 
-// Returns the surface at `points` as a cloud. Vertex normals, colors and vertex fields are
-// interpolated; integer fields take the value of the nearest vertex. Without vertex normals,
-// triangle normals are used. Face fields are copied from the triangle.
+// Returns `points` as a cloud. Vertex normals, colors and vertex fields are interpolated; integer
+// fields take the value of the nearest vertex. Without vertex normals, points have the normals of
+// the triangles. Face fields are copied from the triangle.
 PointCloud points_on_surface(const TriangleMesh& mesh, const std::vector<TrianglePoint>& points);
 
 }  // namespace libmap

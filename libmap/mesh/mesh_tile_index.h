@@ -19,8 +19,8 @@ struct MeshWithMargin {
   std::size_t triangles = 0;  // number of triangles before the triangles of the margin
 };
 
-// Appends the triangles of `other` with a corner in `box` (x and y, borders included). Vertices of
-// `other` at exactly the position of a vertex of `mesh` are replaced by that vertex, which joins
+// Appends to `mesh` the triangles of `other` with a corner in `box` (x and y, m, borders included).
+// A vertex of `other` at exactly the position of a vertex of `mesh` is replaced by it, which joins
 // meshes with equal seams. Normals, colors and fields are treated as in append_mesh.
 void append_part_within(const TriangleMesh& other, const Eigen::AlignedBox2d& box,
                         TriangleMesh& mesh);
@@ -30,13 +30,13 @@ class MeshTileIndex {
   // Reads each tile once. Throws Error naming the file that cannot be read.
   explicit MeshTileIndex(std::vector<std::filesystem::path> tiles);
 
-  // Number of tiles; indices refer to the given paths.
+  // Number of tiles. A tile's index is that of its path in the constructor's argument.
   std::size_t size() const { return tiles_.size(); }
   const std::filesystem::path& path(std::size_t tile) const { return tiles_[tile].path; }
-  // Bounding box in x and y.
+  // Bounding box of the tile in x and y, m.
   const Eigen::AlignedBox2d& box(std::size_t tile) const { return tiles_[tile].box; }
 
-  // Returns the tile, and the triangles of other tiles with a corner within `margin_m` of its box.
+  // Returns the tile and the triangles of other tiles with a corner within `margin_m` of box(tile).
   // Caches recently used tiles, up to 1 million triangles. Throws Error if a file cannot be read.
   MeshWithMargin with_margin(std::size_t tile, double margin_m);
 

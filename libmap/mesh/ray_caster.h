@@ -13,10 +13,10 @@
 namespace libmap {
 
 struct RayHit {
-  static constexpr std::uint32_t no_triangle = 0xffffffff;  // value of `triangle`
+  static constexpr std::uint32_t no_triangle = 0xffffffff;  // `triangle` without intersection
 
   double distance = 0.0;       // in units of the direction's length
-  std::uint32_t triangle = 0;  // with corners a, b, c
+  std::uint32_t triangle = 0;  // index of the triangle, with corners a, b, c
   double u = 0.0;              // position: (1 - u - v) * a + u * b + v * c
   double v = 0.0;
 };
@@ -27,14 +27,13 @@ class RayCaster {
   explicit RayCaster(const TriangleMesh& mesh);
 
   // Returns the nearest intersection, origin + distance * direction, with either side of a
-  // triangle, where `near` <= distance <= `far`. Returns nullopt if there is none, or if the
-  // direction is zero or not finite. Thread-safe.
+  // triangle, where `near` <= distance <= `far`. Returns nullopt if there is no intersection, or if
+  // the direction is zero or not finite. Thread-safe.
   std::optional<RayHit> cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                              double near = 0.0, double far = 1e30) const;
 
-  // Casts many rays from one origin, fastest if neighbors in `directions` are similar. `hits`
-  // receives one element per direction, with triangle = no_triangle if there is no intersection.
-  // Throws Error if the sizes differ.
+  // Casts one ray per direction, fastest if successive directions are similar. hits[n] becomes the
+  // hit of directions[n]; triangle = no_triangle: no hit. Throws Error if the sizes differ.
   void cast_bundle(const Eigen::Vector3d& origin, std::span<const Eigen::Vector3d> directions,
                    std::span<RayHit> hits, double near = 0.0, double far = 1e30) const;
 

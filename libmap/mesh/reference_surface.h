@@ -17,9 +17,9 @@ struct NearestSurfacePoint {
   // angle-weighted pseudo-normal, which separates inside and outside (Baerentzen and Aanaes 2005).
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
   double distance_m = 0.0;  // between `position` and the query point
-  bool on_border = false;   // true if `position` is on the border of the surface
+  bool on_border = false;   // true if `position` is on the border of the mesh, or of a cloud's disc
 
-  // Distance, negative behind the surface; >= 0 if `normal` is zero.
+  // Distance, m; negative on the side opposite to `normal`; >= 0 if `normal` is zero.
   double signed_distance_m(const Eigen::Vector3d& point) const {
     return (point - position).dot(normal) < 0.0 ? -distance_m : distance_m;
   }
@@ -32,8 +32,7 @@ class ReferenceSurface {
 
   // Represents a cloud with normals by one disc per point, with a radius of twice the median point
   // spacing. Distances are to the disc of the nearest point. Discs close the gaps between points,
-  // but not holes. A point without a normal has no disc. Throws Error for no point or a non-finite
-  // point.
+  // but not holes. Points without normals have no disc. Throws Error if empty or not finite.
   explicit ReferenceSurface(const PointCloud& cloud);
 
   ~ReferenceSurface();
@@ -42,10 +41,10 @@ class ReferenceSurface {
 
   // True for a mesh and for a cloud with normals at all points.
   bool is_oriented() const;
-  // Bounds of the points or vertices.
+  // Bounding box of the points or vertices.
   const Bounds3d& bounds() const;
 
-  // Nearest point of the surface to a finite point. Thread-safe.
+  // Returns the nearest point of the surface to a finite point. Thread-safe.
   NearestSurfacePoint nearest(const Eigen::Vector3d& point) const;
 
  private:
@@ -59,7 +58,7 @@ struct PointDistances {
   std::vector<double> distance_m;         // one per point, >= 0
   std::vector<double> signed_distance_m;  // equal to distance_m if the surface is not oriented
 };
-// Distances of points to the surface. The result does not depend on the number of threads.
+// Returns the distances of points to the surface; equal for any number of threads.
 PointDistances distances_to(const ReferenceSurface& surface,
                             const std::vector<Eigen::Vector3d>& points);
 

@@ -23,8 +23,8 @@ class SurfaceDistance {
   // Copies the mesh. Throws Error if it has no triangle, an invalid index or a non-finite vertex.
   explicit SurfaceDistance(const TriangleMesh& mesh) : mesh_(mesh, false) {}
 
-  // Nearest point of the surface to a finite point. Embree finds the candidates; distances are in
-  // double precision. Thread-safe.
+  // Returns the nearest point of the surface to a finite point. Embree finds the candidates;
+  // distances are in double precision. Thread-safe.
   SurfacePoint nearest(const Eigen::Vector3d& point) const;
 
  private:
@@ -35,7 +35,7 @@ class SurfaceDistance {
 Eigen::Vector3d nearest_on_triangle(const Eigen::Vector3d& point, const Eigen::Vector3d& a,
                                     const Eigen::Vector3d& b, const Eigen::Vector3d& c);
 
-// Distance of each point from the surface, m. Throws as SurfaceDistance.
+// Returns the distance of each point from the surface, m. Throws as SurfaceDistance does.
 std::vector<double> distances_to_surface(const std::vector<Eigen::Vector3d>& points,
                                          const TriangleMesh& mesh);
 
@@ -48,18 +48,19 @@ struct DistanceStatistics {
   double max_m = 0.0;
 };
 void describe(ResultTable& table, const DistanceStatistics& statistics);  // without `count`
-// Statistics of distances in any order.
+// Returns the statistics of distances, which can be in any order.
 DistanceStatistics distance_statistics(std::vector<double> distances_m);
 
-// Random points of the surface, evenly distributed with `per_m2` points per square meter. Throws
-// Error if the mesh has no area, or for more than 100 points per triangle (limit at least 2.5
-// million and at most 10^8 points). The result does not depend on the number of threads.
+// Returns random points of the surface, evenly distributed with `per_m2` points per square meter.
+// Throws Error if the mesh has no area or there are too many points. The limit is 100 points per
+// triangle, but at least 2.5 million and at most 10^8 points.
 std::vector<TrianglePoint> sample_triangles(const TriangleMesh& mesh, double per_m2,
                                             std::uint64_t seed);
+// Returns the points of sample_triangles with positions; distance_m is 0.
 std::vector<SurfacePoint> sample_surface(const TriangleMesh& mesh, double per_m2,
                                          std::uint64_t seed);
 
-// For each sample, true if one of `points` is within `radius_m`.
+// Returns for each sample true if one of `points` is within `radius_m`.
 std::vector<bool> covered(const std::vector<Eigen::Vector3d>& samples,
                           const std::vector<Eigen::Vector3d>& points, double radius_m);
 double fraction_of(const std::vector<bool>& flags);  // share of true flags; 0 if there are no flags

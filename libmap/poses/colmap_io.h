@@ -18,24 +18,23 @@
 
 namespace libmap {
 
-// COLMAP's pixel coordinates minus this project's.
-inline constexpr double colmap_pixel_offset = 0.5;
+inline constexpr double colmap_pixel_offset = 0.5;  // pixel in COLMAP minus pixel in this project
 
 // A line of cameras.txt: "CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]".
 struct ColmapCamera {
   std::string model{};  // "PINHOLE", "OPENCV", ...
   int width = 0;        // pixels
   int height = 0;
-  std::vector<double> parameters{};  // model parameters in COLMAP's order and pixels
+  std::vector<double> parameters{};  // of the model, in COLMAP's order and pixel coordinates
 };
 
 // Returns a PINHOLE, OPENCV, FULL_OPENCV or OPENCV_FISHEYE camera. Throws Error for thin prism
 // distortion, which COLMAP does not have, and as Camera::check does.
 ColmapCamera to_colmap(const Camera& camera);
 
-// A feature of an image.
+// A feature of an image, which can be the observation of a 3D point.
 struct ColmapObservation {
-  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  // in COLMAP: pixel centers at 0.5
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  // in COLMAP's pixel coordinates
   std::int64_t point = -1;                          // POINT3D_ID; -1: no point
 };
 
@@ -47,9 +46,10 @@ struct ColmapImage {
   std::vector<ColmapObservation> observations{};
 };
 
+// Observation of a 3D point in an image.
 struct ColmapTrackElement {
   int image = 0;                // IMAGE_ID
-  std::size_t observation = 0;  // index among the image's features
+  std::size_t observation = 0;  // index in ColmapImage::observations
 };
 
 // A line of points3D.txt: "POINT3D_ID X Y Z R G B ERROR TRACK[]".
@@ -66,15 +66,16 @@ struct ColmapModel {
   std::map<std::int64_t, ColmapPoint> points{};  // by POINT3D_ID
 };
 
-// Parse and write the content of the files. parse_colmap_images throws Error naming `file` and line
-// for missing columns, invalid numbers, quaternions not of unit length and duplicate ids.
+// Parses the content of images.txt; returns the images by IMAGE_ID. Throws Error naming `file` and
+// line for missing columns, invalid numbers, quaternions not of unit length and duplicate ids.
 std::map<int, ColmapImage> parse_colmap_images(std::string_view text, const std::string& file);
+// Return the content of cameras.txt, images.txt and points3D.txt.
 std::string to_colmap_cameras(const ColmapModel& model);
 std::string to_colmap_images(const ColmapModel& model);
 std::string to_colmap_points(const ColmapModel& model);
 
 // Returns the folder with images.txt: `path`, `path`/sparse or `path`/sparse/0, as COLMAP's tools
-// create it. Throws Error if there is none or the model is binary.
+// create it. Throws Error if no folder contains the file or the model is binary.
 std::filesystem::path find_colmap_model(const std::filesystem::path& path);
 
 // Writes the three files into `folder`, which must exist. Throws Error (failed).

@@ -10,12 +10,12 @@
 namespace libmap {
 
 struct TrajectoryError {
-  std::size_t poses = 0;  // number of compared poses
+  std::size_t poses = 0;  // number of compared poses; of motions for relative_trajectory_error
   double rmse_m = 0.0;    // root mean square error of the positions
-  double mean_m = 0.0;
+  double mean_m = 0.0;    // mean position error
   double median_m = 0.0;
   double max_m = 0.0;
-  double mean_rotation_deg = 0.0;
+  double mean_rotation_deg = 0.0;  // mean angle of the rotation errors
   double max_rotation_deg = 0.0;
 };
 void describe(ResultTable& table, const TrajectoryError& error);
@@ -32,8 +32,8 @@ struct AbsoluteTrajectoryError : TrajectoryError {
 AbsoluteTrajectoryError absolute_trajectory_error(const Trajectory& estimate,
                                                   const Trajectory& truth);
 
-// Returns the errors of the motions between consecutive pairs of poses, paired as above. Throws
-// Error for fewer than 2 pairs.
+// Returns the errors of the motions between consecutive poses, which are paired as in
+// absolute_trajectory_error. Throws Error for fewer than 2 pairs.
 TrajectoryError relative_trajectory_error(const Trajectory& estimate, const Trajectory& truth);
 
 }  // namespace libmap

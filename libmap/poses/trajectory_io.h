@@ -12,9 +12,9 @@
 
 namespace libmap {
 
-// Formats, with RTAB-Map's numbers, and their names in options. `automatic` recognizes the
-// extensions .tum, .kitti, .g2o, .toro; a folder or images.txt as a COLMAP model; other files
-// (.txt, .graph, .csv) by content. Formats 1 and 2, which have other axes, must be given.
+// Formats; comments give RTAB-Map's numbers. `automatic` recognizes the extensions .tum, .kitti,
+// .g2o and .toro; a folder or images.txt as a COLMAP model; other files (.txt, .graph, .csv) by
+// content. Formats 1 and 2 have other axes, which files do not state, so they must be selected.
 enum class TrajectoryFormat {
   automatic,
   tum,                 // 10, 11
@@ -37,9 +37,9 @@ struct TrajectoryFile {
   bool of_cameras = false;          // true if the poses are of the first camera (Open3D)
 };
 
-// True if write_trajectory supports the extension: .tum, .kitti, .g2o, .toro. Otherwise
-// require_trajectory_format throws Error, which lists these extensions.
+// True if write_trajectory supports the extension: .tum, .kitti, .g2o, .toro.
 bool is_trajectory_path(const std::filesystem::path& path);
+// Throws Error, which lists these extensions, for any other extension.
 void require_trajectory_format(const std::filesystem::path& path);
 
 // Reads a file. Throws Error naming file and line if it is invalid or contains no pose.
@@ -50,12 +50,12 @@ TrajectoryFile read_trajectory(const std::filesystem::path& path,
 std::filesystem::path file_of_trajectory(const std::filesystem::path& path);
 
 // Writes in the format of the extension, directly to `path`; for atomic output, pass the temporary
-// path of an OutputFile. Throws Error for any other extension. .g2o and .toro also contain links,
-// and node ids (1, 2, ... if unknown). .tum has the node id as a ninth column if `nodes` is true or
-// stamps repeat; not all readers support this.
+// path of an OutputFile. .g2o and .toro also contain links, and node ids (1, 2, ... if unknown).
+// .tum has the node id as a ninth column, which not all readers support, if `nodes` is true or
+// stamps repeat. Throws Error for another extension; Error (failed) if the write fails.
 void write_trajectory(const std::filesystem::path& path, const TrajectoryFile& trajectory,
                       bool nodes = false);
-// Writes in a given format, as above. Throws Error for automatic, colmap and read-only formats.
+// As write_trajectory, in a given format. Throws Error for automatic, colmap, read-only formats.
 void write_trajectory_as(TrajectoryFormat format, const std::filesystem::path& path,
                          const TrajectoryFile& trajectory, bool nodes = false);
 

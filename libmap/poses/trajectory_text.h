@@ -12,12 +12,12 @@
 
 namespace libmap {
 
-// Returns text that parses to the same stamp, or to within 1e-9 s if that needs more decimals.
-// The text has no exponent, which not all readers support.
+// Returns text that parses to the same stamp, or to within 1e-9 s if more than 9 decimals are
+// needed. The text has no exponent, because not all readers support exponents.
 std::string stamp_text(double stamp_s);
 
 // TUM RGB-D benchmark: "stamp x y z qx qy qz qw", s and m (RTAB-Map's formats 1 and 10). With
-// `nodes`, the node is a ninth column (format 11). The parser accepts both, and commas.
+// `nodes`, the node id is a ninth column (format 11). The parser accepts 8 or 9 columns and commas.
 Trajectory parse_tum(std::string_view text, const std::string& file);
 std::string to_tum(const Trajectory& trajectory, bool nodes = false);
 
@@ -26,14 +26,14 @@ std::string to_tum(const Trajectory& trajectory, bool nodes = false);
 Trajectory parse_kitti(std::string_view text, const std::string& file);
 std::string to_kitti(const Trajectory& trajectory);
 
-// Open3D's trajectory log: a line of three integers, then the 4 x 4 matrix of a camera's pose
-// (optical frame), without stamps and nodes.
+// Open3D's trajectory log: per pose, a line of three integers, then the 4 x 4 matrix of a camera's
+// pose (optical frame). It has no stamps and nodes.
 Trajectory parse_open3d(std::string_view text, const std::string& file);
 
 // Ground truth of EuRoC MAV: "timestamp [ns], x, y, z, qw, qx, qy, qz, ...", poses of the body.
 Trajectory parse_euroc(std::string_view text, const std::string& file);
 
-// transforms.json of nerfstudio (instant-ngp, Blender): cameras with y up and z backward.
+// transforms.json of nerfstudio: cameras with y up, z backward. Returns poses of optical frames.
 std::vector<ImagePose> parse_nerfstudio(std::string_view text, const std::string& file);
 
 struct PoseGraphText {
@@ -52,19 +52,19 @@ struct PoseGraphText {
 // of rotations.)
 //
 // g2o has no types of links. Types are written as comments, "# graspmap:type 1 global closure",
-// that apply to the following edges; without them, edges to the next vertex are neighbors, others
-// global closures. Links other than edges between two poses (priors, gravity, landmarks) are
-// written as comments "# graspmap:edge from to ...". Other records are ignored; planar ones are an
-// Error.
+// that apply to the following edges. Without these comments, edges to the next vertex are read as
+// neighbors, other edges as global closures. Links other than edges between two poses (priors,
+// gravity, landmarks) are written as comments "# graspmap:edge from to ...". Records of planar
+// graphs are an Error; other records are ignored.
 PoseGraphText parse_g2o(std::string_view text, const std::string& file);
 std::string to_g2o(const Trajectory& poses, const std::vector<PoseLink>& links);
 
 // TORO (Grisetti et al. 2007), RTAB-Map's format 3: "VERTEX3 id x y z roll pitch yaw" and "EDGE3
 // from to x y z roll pitch yaw" with the upper triangle of the information matrix in that order;
-// angles in radians, R = Rz(yaw) Ry(pitch) Rx(roll). Types of links are guessed as in g2o without
-// comments. RTAB-Map's reader does not support comments, so none are written, and links other than
-// edges between two poses are dropped. (That reader also limits lines to 400 characters, and uses
-// the translation's information for the rotation.)
+// angles in radians, R = Rz(yaw) Ry(pitch) Rx(roll). Types of links are read as for g2o without
+// comments. RTAB-Map's reader does not support comments, so no comments are written, and links
+// other than edges between two poses are dropped. (RTAB-Map's reader also limits lines to 400
+// characters, and uses the translation's information for the rotation.)
 PoseGraphText parse_toro(std::string_view text, const std::string& file);
 std::string to_toro(const Trajectory& poses, const std::vector<PoseLink>& links);
 
@@ -74,8 +74,8 @@ enum class PoseAxes {
   optical,        // format 2: z forward, x right, y down, for the world and the moving body
   motion_capture  // format 1: optical axes for the moving body, other axes for the world
 };
-Pose from_axes(PoseAxes axes, const Pose& pose_in_file);  // returns world_from_base
-Pose to_axes(PoseAxes axes, const Pose& world_from_base);
+Pose from_axes(PoseAxes axes, const Pose& pose_in_file);   // returns world_from_base
+Pose to_axes(PoseAxes axes, const Pose& world_from_base);  // inverse of from_axes
 
 // Recognizes the format of a text by the tag or the number of columns of the first line that is not
 // a comment. Returns the extension of the format: ".tum", ".kitti", ".toro", ".g2o", ".log"

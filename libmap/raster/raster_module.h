@@ -1,5 +1,5 @@
-// Interface of libgraspmap_raster_gdal.so, the only library that links GDAL, with its 140
-// dependencies. It is loaded on the first access to a GeoTIFF.
+// Interface of libgraspmap_raster_gdal.so, the only library that links GDAL and thereby 140 other
+// libraries. It is loaded on the first access to a GeoTIFF.
 #pragma once
 
 #include <filesystem>
@@ -23,8 +23,8 @@ struct RasterModule {
 // Name of the library's only symbol, a `const RasterModule`.
 inline constexpr const char* raster_module_symbol = "graspmap_raster_module";
 
-// Loads the library once. Throws Error (failed) if graspmap was built without GDAL or the library
-// cannot be loaded.
+// Returns the module; the first call loads the library. Throws Error (failed) if graspmap was built
+// without GDAL or the library cannot be loaded.
 const RasterModule& raster_module();
 
 }  // namespace libmap

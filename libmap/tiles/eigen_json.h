@@ -1,5 +1,5 @@
-// JSON conversion (nlohmann) of Eigen vectors, matrices, poses and boxes, and of error messages,
-// for the JSON files of tile stores. Finite numbers are preserved bit for bit.
+// JSON conversion (nlohmann) of Eigen vectors, matrices (by columns), poses and boxes, and of
+// Errors (only what()), for JSON files of tile stores. Finite numbers are preserved bit for bit.
 #pragma once
 
 #include <Eigen/Geometry>

@@ -1,5 +1,5 @@
-// Temporary store of a large terrain's points on disk, sorted into tiles, from which the points in
-// a rectangle can be read without the others.
+// Temporary store of a large terrain's points on disk, sorted into tiles (xy_tile.h), so that the
+// points in a rectangle can be read without reading the other tiles.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,9 +17,9 @@
 namespace libmap {
 
 struct PointTileStoreOptions {
-  double tile_m = 1.0;                                // side of a tile; > 0
+  double tile_m = 1.0;                                // > 0: side of a tile
   bool has_normals = false;                           // true to store the points' normals
-  std::size_t buffer_bytes = std::size_t{64} << 20U;  // points beyond it are written to disk
+  std::size_t buffer_bytes = std::size_t{64} << 20U;  // buffered bytes before a write to disk
 };
 
 class PointTileStore {
@@ -28,7 +28,7 @@ class PointTileStore {
   // throw Error (failed) if the file cannot be created, written or read.
   PointTileStore(const std::filesystem::path& folder, const PointTileStoreOptions& options);
 
-  // Adds points. Positions must be finite and less than 2^40 tiles away from the origin.
+  // Adds points (with normals if has_normals), finite and less than 2^40 tiles from the origin.
   void add(const PointCloud& cloud);
   // Writes the buffered points. Call it after the last add(), to release memory.
   void finish() { flush(); }

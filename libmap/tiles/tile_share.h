@@ -14,11 +14,11 @@ struct TileShare {
   int count = 1;
 };
 
-// Convert from and to "K/N" with 1 <= K <= N <= 10^6. parse_share throws Error naming --tile.
+// Parses "K/N": share K of N, 1 <= K <= N <= 10^6. Throws Error naming --tile for other text.
 TileShare parse_share(const std::string& text);
-std::string to_text(const TileShare& share);
+std::string to_text(const TileShare& share);  // returns "K/N"
 
-// Returns a share's index range [begin, end) of `tiles` tiles. Throws Error unless number <= count.
+// Returns the range [begin, end) of a share's tile indices. Throws Error if `share` is invalid.
 std::pair<std::size_t, std::size_t> share_range(std::size_t tiles, const TileShare& share);
 
 // Returns the consecutive tiles of a share. Throws as share_range does.

@@ -6,8 +6,8 @@
 //   STORE/progress/K_of_N.jsonl journal of share K/N: one line per finished tile
 //   STORE/progress/lock         locked while a run makes the plan or completes the store
 //
-// A tile is finished if a journal line with the plan's key lists it; its file is then complete.
-// Truncated lines of a killed run are ignored.
+// A tile is finished if a journal line with the plan's key lists it; the tile's file is then
+// complete. Truncated lines of a killed run are ignored.
 #pragma once
 
 #include <cstddef>
@@ -34,7 +34,7 @@ class TileJournal {
   ~TileJournal();
   TileJournal(TileJournal&& other) noexcept;
   TileJournal& operator=(TileJournal&&) = delete;
-  // Appends one line of JSON per finished tile, whose file must exist. Throws Error (failed).
+  // Appends and syncs lines of JSON, one per tile whose file is complete. Throws Error (failed).
   void add(const std::vector<std::string>& lines);
 
  private:
@@ -49,23 +49,23 @@ class TileStore {
   // Does not access the disk.
   explicit TileStore(std::filesystem::path folder);
 
-  // Paths of the folder and of its content.
+  // Paths of the folder and of its content. index.json exists only in finished stores.
   const std::filesystem::path& folder() const { return folder_; }
   std::filesystem::path tiles() const { return folder_ / "tiles"; }
-  std::filesystem::path index_path() const { return folder_ / "index.json"; }  // of finished stores
+  std::filesystem::path index_path() const { return folder_ / "index.json"; }
   std::filesystem::path plan_path() const { return progress() / "plan.json"; }
 
   // Begins the run of a share: creates missing folders, calls check_plan() while the store is
-  // locked, and locks the journal. Throws Error if the folder is not a tile store, the errors of
-  // check_plan() and of TileJournal; a new folder is then removed again.
+  // locked, and locks the journal. Throws Error if the folder is not a tile store, and as
+  // check_plan() and TileJournal do. After an error, a new folder is removed again.
   TileJournal begin(const TileShare& share, const std::function<void()>& check_plan) const;
-  void open() const;  // creates missing folders only; throws Error if it is not a tile store
+  void open() const;  // only creates missing folders; throws Error if `folder` is no tile store
 
   // Returns the plan as text, or nullopt if there is none.
   std::optional<std::string> plan_text() const;
   void write_plan(const std::string& text) const;  // atomically
 
-  // Position of a line in a journal.
+  // Position of a line in a journal file.
   struct Line {
     std::filesystem::path journal;
     std::size_t begin = 0;  // offset of the first byte

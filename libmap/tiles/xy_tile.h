@@ -22,7 +22,7 @@ struct XyTile {
 XyTile xy_tile_at(const Eigen::Vector2d& position, double tile_m);
 
 std::string tile_file_name(const XyTile& tile, const std::string& extension);  // "piece_3_0.pcd"
-bool is_tile_file_name(const std::string& name);  // true for such names with any extension
+bool is_tile_file_name(const std::string& name);  // true for "piece_I_J.EXT", any extension
 
 // Returns the names of the tile files in `folder`, unsorted; none if there is no such folder.
 std::vector<std::string> tile_file_names(const std::filesystem::path& folder);
