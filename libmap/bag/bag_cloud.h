@@ -25,13 +25,13 @@ struct CloudMessage {
 //   - x, y, z: positions; normal_x, normal_y, normal_z or nx, ny, nz: normals.
 //   - rgb or rgba (PCL: 8 bits per channel in one number), r, g, b or red, green, blue: colors.
 //   - all other names: scalar fields NAME, or NAME_0, NAME_1, ... for several numbers per point.
-// Throws Error naming the field if x, y or z is missing, a field is a duplicate, outside the point
-// or of unknown type, a point has more than 1024 numbers, or rows or data are too short.
+// Throws Error naming the field if x, y or z is missing, a field is a duplicate, extends beyond the
+// point or has an unknown type, a point has more than 1024 numbers, or rows or data are too short.
 CloudMessage decode_cloud(MessageEncoding encoding, std::string_view bytes);
 
 struct BagCloudResult {
   std::string topic{};
-  std::string frame{};
+  std::string frame{};   // frame of the message's header
   double stamp_s = 0.0;  // stamp of the header, s; recording time if the header has no stamp
   PointCloud cloud{};
   std::size_t dropped_points = 0;  // points with a NaN or infinite position

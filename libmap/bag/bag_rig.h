@@ -29,7 +29,7 @@ struct BagRigOptions {
   double depth_scale_m = 0.0;
   double near_m = 0.0;  // minimum valid depth of the written rig; 0: as in `rig`, if given
   double far_m = std::numeric_limits<double>::infinity();  // maximum; infinity: as in `rig`
-  double tolerance_s = 0.02;  // >= 0: maximum time between an image and the stamp of its set
+  double tolerance_s = 0.02;  // >= 0: maximum time from an image to its synchronized set's stamp
   int every = 1;  // >= 1: step between exported sets of synchronized images; 1: all are exported
 };
 void bind(ParameterTable& table, BagRigOptions& options);
@@ -37,13 +37,13 @@ void bind(ParameterTable& table, BagRigOptions& options);
 // An image of the bag that is exported.
 struct BagImage {
   std::size_t camera = 0;     // index in BagRigPlan::rig
-  std::int64_t stamp_ns = 0;  // as in plan_bag_rig
+  std::int64_t stamp_ns = 0;  // stamp of the header, else recording time
 
   auto operator<=>(const BagImage&) const = default;
 };
 
 struct BagRigPlan {
-  CameraRig rig{};
+  CameraRig rig{};                    // rig to write
   std::vector<std::string> topics{};  // topic of each camera of the rig; empty: no images
   std::vector<BagImage> images{};     // images of the selected sets, ascending by camera and stamp
   // Selected sets of synchronized images (rig_io.h); do not use their `image`, an internal index.

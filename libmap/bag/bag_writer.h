@@ -47,11 +47,11 @@ struct BagTargets {
 struct BagGrid {
   std::string grid_map_topic{};
   std::string occupancy_topic{};
-  std::string frame{};
+  std::string frame{};                                 // frame whose x-y plane contains the grid
   double cell_m = 0.0;                                 // edge length of a cell
   Eigen::Vector2d corner_m = Eigen::Vector2d::Zero();  // corner with the smallest x and y
-  std::size_t columns = 0;
-  std::size_t rows = 0;
+  std::size_t columns = 0;                             // number of cells along x
+  std::size_t rows = 0;                                // number of cells along y
 
   struct Layer {
     std::string name{};

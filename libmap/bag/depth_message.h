@@ -20,8 +20,8 @@ struct DepthMessageHead {
   std::string encoding{};     // `encoding` of an Image, e.g. "16UC1"; `format` of a CompressedImage
 };
 
-// Decodes the metadata from the first 1 KiB of a message (compressed: CompressedImage, else Image).
-// Throws Error if `bytes` ends within the metadata.
+// Decodes the metadata of an Image or, if `compressed`, of a CompressedImage; 1 KiB of the message
+// is enough. Throws Error if `bytes` ends within the metadata.
 DepthMessageHead read_image_head(MessageEncoding encoding, std::string_view bytes, bool compressed);
 
 // True for depth images: 16UC1, mono16 and 32FC1; for a CompressedImage, the formats of the plugin

@@ -18,19 +18,16 @@ namespace libmap {
 // green, blue as bytes of a float32) and the cloud's scalar fields in their types; little-endian,
 // without padding. Throws Error for more than 4 GiB.
 ros_message::PointCloud2 encode_cloud(const PointCloud& cloud);
-
 // Converts a depth image to millimeters (16UC1) if image_unit_m is 0.001, else to meters (32FC1,
 // REP-118; 0: no depth).
 ros_message::Image encode_depth(const Image<std::uint16_t>& image, double image_unit_m);
-
-// Sets image size, camera matrix K, distortion D and the projection P = [K | 0].
+// Converts a camera to image size, camera matrix K, distortion D and projection P = [K | 0].
 ros_message::CameraInfo encode_camera_info(const Camera& camera);
-
+// Converts a transform; its child frame is child_frame_id.
 ros_message::TransformStamped encode_transform(const BagTransform& transform);
 
 // Converts targets to poses whose x axes are the approach directions (see BagTargets).
 ros_message::PoseArray encode_poses(const std::vector<BagTarget>& targets);
-
 // Converts targets to one list of balls, and an arrow and a text for each target (see BagTargets).
 ros_message::MarkerArray encode_markers(const BagTargets& targets,
                                         const ros_message::Header& header);

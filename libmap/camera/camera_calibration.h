@@ -82,7 +82,7 @@ struct CameraCalibrationResult {
   double width_coverage = 0.0;   // range of all corners' x as a fraction of the image width
   double height_coverage = 0.0;  // range of all corners' y as a fraction of the image height
   std::vector<CalibratedImage> images{};
-  std::vector<std::string> rejected{};  // images above max_image_error_px or unlike the others
+  std::vector<std::string> rejected{};  // above max_image_error_px, or inconsistent with others
   std::vector<std::string> repeated{};  // ignored images that show the corners of earlier images
 
   // Relative standard deviation of fx or fy, whichever is larger.

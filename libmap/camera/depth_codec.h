@@ -1,6 +1,5 @@
-// Reads and writes depth images in RTAB-Map's formats: in millimeters, RVL (Wilson 2017, "Fast
-// lossless depth image compression") and 16-bit PNG; in meters, float32 as the four channels of a
-// PNG.
+// Reads and writes depth images in RTAB-Map's formats: RVL (Wilson 2017, "Fast lossless depth image
+// compression") and 16-bit PNG in millimeters; float32 in meters as the four channels of a PNG.
 #pragma once
 
 #include <cstdint>

@@ -40,7 +40,7 @@ inline constexpr std::int64_t max_frame_pixels = std::int64_t{1} << 25;
 inline constexpr std::int64_t max_decoded_pixels = std::int64_t{1} << 27;
 
 // Decodes any image as 8-bit color; gray becomes red = green = blue, transparency is ignored.
-// Throws Error for more than `max_pixels`; the following functions, for max_frame_pixels.
+// Throws Error above `max_pixels`; the following functions throw Error above max_frame_pixels.
 ColorImage decode_color(std::string_view bytes, std::int64_t max_pixels = max_frame_pixels);
 // Decodes any image as 8-bit gray; color by ITU-R BT.601 (Y = 0.299 R + 0.587 G + 0.114 B).
 GrayImage decode_gray(std::string_view bytes);

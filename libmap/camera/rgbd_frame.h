@@ -48,8 +48,8 @@ std::vector<CameraView> camera_views(const RgbdFrame& frame);
 // Returns the maximum number of pixels of color image, depth image and all cameras together.
 std::size_t image_pixels(const RgbdFrame& frame);
 
-// Returns the number of frames to keep in memory at a time: 8 of up to 2 megapixels, fewer larger
-// ones, at least 1. Independent of the number of threads, as results must be.
+// Returns the number of frames to keep in memory at a time: 8 of up to 2 megapixels, fewer of
+// larger ones, at least 1. It does not depend on the number of threads, because results must not.
 std::size_t frames_in_batch(std::size_t max_image_pixels);
 
 }  // namespace libmap

@@ -20,7 +20,7 @@ struct SensorModel {
   double rolling_shutter_s = 0.0;        // time from the first to the last row of the color image
   double frame_time_s = 0.033;           // time between two frames
   double max_depth_correction_m = 0.01;  // maximum systematic depth error: constant term
-  double max_depth_correction_of_range = 0.02;  // term added to it, proportional to depth, m per m
+  double max_depth_correction_of_range = 0.02;  // second term, proportional to depth, m per m
 };
 void bind(ParameterTable& table, SensorModel& model);
 

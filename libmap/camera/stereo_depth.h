@@ -16,7 +16,7 @@ struct StereoDepthOptions {
   int block_px = 5;             // side of the matched window, odd, 1 to 31
   int uniqueness_percent = 10;  // minimum cost difference of best and second-best match, 0 to 100
   int left_right_px = 1;  // maximum disparity difference in the left-right check; -1: no check
-  int speckle_px = 100;   // smaller connected patches of disparity are dropped
+  int speckle_px = 100;   // minimum pixels of a connected patch of similar disparity; 0: no limit
   int min_contrast = 2;   // minimum range of gray levels in the left image's window, because
                           // uniform areas, such as overexposed ones, match anywhere
   StereoDirections directions = StereoDirections::five;
@@ -33,7 +33,7 @@ DepthImage stereo_depth(const GrayImage& left, const GrayImage& right, const Ste
                         const StereoDepthOptions& options = {});
 
 // Returns the depth images of a frame's stereo pairs, side by side like the frame's images. Throws
-// Error naming the node if the frame has no stereo pair or no images, or as above.
+// Error naming the node if the frame has no stereo pair or no images, or as for one pair.
 DepthImage stereo_depth(const RgbdFrame& frame, const StereoDepthOptions& options = {});
 
 // Returns the 8-bit luminance by ITU-R BT.601.

@@ -31,9 +31,8 @@ struct NumberStyle {
   int decimals = 0;       // number of decimals; -1: three significant digits in each cell
   bool as_given = false;  // true: all numbers are integers, shown unchanged
 };
-// Returns the format of a column: the largest number of decimals in its cells, at most three. If
-// there are fractions and the largest magnitude is below 0.01 or at least 1e9: three significant
-// digits.
+// Returns the format of a column: the largest number of decimals in its cells, at most three; three
+// significant digits if there are fractions and the largest magnitude is < 0.01 or >= 1e9.
 NumberStyle number_style(const std::vector<std::string>& cells);
 // Formats a cell, e.g. "0.98214889" as "0.982"; a number that is not finite as a dash.
 std::string shown_number(const std::string& cell, const NumberStyle& style);
@@ -58,8 +57,7 @@ std::string scroll_box(const std::string& table, const std::string& name);
 // Returns tables of parameters, inputs and results. For several outputs: a table of the values that
 // differ, with one column per output and without inputs, then a table of the common values.
 std::string parameters_html(const ReportParameters& parameters);
-// Returns command, parameters, results and inputs of each output of a run, folded and grouped by
-// folder.
+// Returns command, parameters, results and inputs of each output of a run, folded, by folder.
 std::string sources_html(const ReportContent& content);
 // Returns a table of milliseconds per step and case, with sums per command and in total.
 std::string timings_html(const TimingTable& table);

@@ -53,7 +53,7 @@ struct ReportParameters {
   std::vector<std::pair<std::string, Manifest>> outputs{};  // column heading and manifest
 };
 
-// Running times of a step of a command, as in tables 4-2 and 4-3 of the thesis.
+// Running times of a step of a command.
 struct TimingRow {
   std::string command;
   std::string step;

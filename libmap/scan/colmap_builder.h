@@ -16,7 +16,7 @@ namespace libmap {
 
 struct ColmapBuilderOptions {
   int point_spacing_px = 16;      // 1 to 10000: spacing of an image's points in x and in y
-  double depth_tolerance = 0.02;  // > 0: maximum relative difference of measured and point's depth
+  double depth_tolerance = 0.02;  // > 0: maximum relative depth difference between image and point
 };
 void bind(ParameterTable& table, ColmapBuilderOptions& options);
 

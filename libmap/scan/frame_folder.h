@@ -9,11 +9,12 @@
 //   poses.tum               odometry as lines of TUM; or poses_odometry.tum; optional
 //   poses_stored.tum        optimized poses as lines of TUM; optional
 //   links.g2o               links between nodes (edges; vertices are ignored); optional
-//   nodes.csv               instead of associations.txt: node, session, weight, stamp_s, label,
-//                           color, depth, right, calibration, baseline_m, velocity, gps. Files are
-//                           relative to the folder. A node's calibrations are separated by spaces:
-//                           one per camera, or left and right of each pair with one baseline_m.
-//   color/ depth/ right/ calibration/
+//   nodes.csv               instead of associations.txt: a table with the columns node, session,
+//                           weight, stamp_s, label, color, depth, right, calibration, baseline_m,
+//                           velocity, gps. Files are relative to the folder. Calibrations of a node
+//                           are separated by spaces: one per camera, or left and right camera of
+//                           each stereo pair with one baseline_m per pair.
+//   color/ depth/ right/ calibration/  files that nodes.csv names
 //
 // Without nodes.csv, color and depth images are paired by stamp; nodes are numbered from 1 in the
 // order of time and have the stamp of the depth image. Poses are assigned by node id if all poses
@@ -63,7 +64,7 @@ std::vector<std::pair<std::string, PoseFrame>> pose_frame_names();
 struct FrameFolderOptions {
   double depth_unit_m = 0.0002;                  // > 0: meters per unit of the 16-bit depth images
   std::string calibration = "calibration.yaml";  // file of the color camera, relative to the folder
-  // File of a separate depth camera, whose local_transform is base_from_depth; depth is then
+  // Camera file of a separate depth camera, whose local_transform is base_from_depth; depth is then
   // registered to color on reading. Empty: the stored depth is registered to color.
   std::string depth_calibration{};
   PoseFrame pose_frame = PoseFrame::camera;  // frame of the poses in the files

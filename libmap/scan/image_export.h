@@ -28,10 +28,11 @@ ImageFile image_file_of(const ScanSource& scan, int node, const std::vector<Came
 // Returns one view per camera of a node. Throws Error naming a node without color or calibration.
 std::vector<CameraView> read_views(const ScanSource& scan, int node, FrameParts parts);
 
-// Two views are similar if both conditions hold.
+// Two views are similar if their distance is less than radius_m and the angle between their optical
+// axes is at most angle_deg.
 struct ViewSelectionOptions {
-  double radius_m = 0.5;    // >= 0: distance of the positions is smaller; 0: no views are similar
-  double angle_deg = 30.0;  // 0 to 180: angle between the optical axes is not larger
+  double radius_m = 0.5;    // >= 0; 0: no views are similar
+  double angle_deg = 30.0;  // 0 to 180
 };
 void bind(ParameterTable& table, ViewSelectionOptions& options);
 

@@ -31,10 +31,11 @@ struct PoseImportOptions {
 void bind(ParameterTable& table, PoseImportOptions& options);
 
 struct ImportedPoses {
-  NodeTrajectory trajectory;  // poses by node, ascending; number of unmatched poses
+  NodeTrajectory trajectory;  // poses ascending by node id, and number of unmatched poses
   std::size_t poses_in_file = 0;
-  double scale = 1.0;                // meters per unit of the file's positions
-  double max_rig_deviation_m = 0.0;  // maximum distance of a camera's base position from the mean
+  double scale = 1.0;  // meters per unit of the file's positions
+  // Maximum distance of a node's base positions, one by each of its cameras, from their mean.
+  double max_rig_deviation_m = 0.0;
   // Reports dropped poses (the camera does not exist or has no usable calibration), and motion
   // between successive poses that differs from the scan's in length (unit) or rotation (axes).
   std::vector<std::string> warnings{};

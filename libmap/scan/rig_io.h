@@ -70,7 +70,7 @@ inline constexpr const char* rig_images_file_name = "images.csv";
 struct RigImage {
   std::size_t camera = 0;  // index in CameraRig::cameras
   double stamp_s = 0.0;
-  std::filesystem::path file{};  // a path to open, not relative to the rig
+  std::filesystem::path file{};  // path of the PNG
 };
 
 // Returns "NAME/STAMP.png" with six decimals, the file name that list_rig_images expects.
@@ -110,9 +110,8 @@ struct SynchronizedSet {
 SynchronizedSet synchronized_set_at(const std::vector<RigImage>& images, std::size_t camera_count,
                                     double stamp_s, double tolerance_s);
 
-// Returns the fullest set: of the sets at the stamps of all images, the set with the most cameras;
-// of equal ones, by the smallest sum of absolute offsets, then the earliest stamp. Throws Error if
-// `images` is empty.
+// Returns the set with the most cameras among the sets at all images' stamps; ties are resolved by
+// the smallest sum of absolute offsets, then the earliest stamp. Throws Error if `images` is empty.
 SynchronizedSet fullest_synchronized_set(const std::vector<RigImage>& images,
                                          std::size_t camera_count, double tolerance_s);
 

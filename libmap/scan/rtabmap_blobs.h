@@ -35,7 +35,7 @@ std::string to_blob(const GpsFix& fix);
 // length is not 48 bytes, a number is not finite, a coordinate exceeds 1e8 m, or the matrix is not
 // nearly a rotation.
 std::optional<Pose> decode_pose(std::string_view bytes);
-// Decodes 36 float64. Throws Error for a wrong length or a magnitude above 1e300.
+// Decodes an information matrix. Throws Error for a wrong length or a magnitude above 1e300.
 Matrix6d decode_information(std::string_view bytes);
 // Decodes a velocity; nullopt for zeros or a non-finite number. Throws Error for a wrong length.
 std::optional<std::array<double, 6>> decode_velocity(std::string_view bytes);
@@ -48,8 +48,8 @@ struct OptimizedPoseBlobs {
   std::string poses;
 };
 OptimizedPoseBlobs to_blobs(const std::map<int, Pose>& map_from_base);
-// Throws Error if Admin.opt_ids is not a matrix of int32, or Admin.opt_poses not one of 12 float32
-// per id. Only reads the headers of the blobs.
+// Throws Error if Admin.opt_ids is not a matrix of int32, or Admin.opt_poses is not a matrix of 12
+// float32 per id. Only reads the headers of the blobs.
 void require_optimized_poses(const std::string& ids_blob, const std::string& poses_blob);
 
 class SqliteFile;

@@ -58,7 +58,7 @@ struct FrameBlobs {
   std::string depth;  // depth image, or right image of a stereo pair
   std::string calibration;
 };
-// Decodes a frame; node and stamp are 0. Throws Error naming the damaged one of the three blobs.
+// Decodes a frame; node and stamp are 0. Throws Error naming the blob that is damaged.
 RgbdFrame decode_frame(const FrameBlobs& blobs, FrameParts parts = {});
 
 class RtabmapDatabase : public ScanSource {
@@ -74,7 +74,7 @@ class RtabmapDatabase : public ScanSource {
 
   // Version that the file contains (Admin.version); empty if missing.
   const std::string& version() const { return version_; }
-  // As RtabmapColumns::recognized_version.
+  // Version by the columns of the tables (RtabmapColumns::recognized_version).
   std::string recognized_version() const { return columns_.recognized_version(); }
   // Reports dropped nodes, links and poses, and unknown tables and columns.
   const std::vector<std::string>& warnings() const override { return warnings_; }

@@ -21,7 +21,7 @@ void check_laser_scan(std::string_view scan, std::string_view info);
 struct ScanFault {
   int node = 0;          // 0: the whole file
   std::string part{};    // table and column, e.g. "Data.depth"; or "frame", "graph" or "file"
-  std::string reason{};  // as in Error
+  std::string reason{};  // message of the error
 };
 
 struct ScanVerificationResult {

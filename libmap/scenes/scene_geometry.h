@@ -10,9 +10,8 @@
 
 namespace libmap {
 
-// A segment of a solid of revolution's profile. Points are (rho, a): distance from the axis,
-// position along it. Segments are ordered from the top (large a) down, with the outside on their
-// left.
+// A segment of the profile of a solid of revolution. Points are (rho, a): distance from the axis,
+// position along it. Segments are ordered from the top (large a) down; the outside is on the left.
 struct ProfileSegment {
   bool is_arc = false;                              // true: arc; false: line
   Eigen::Vector2d start = Eigen::Vector2d::Zero();  // ends of a line
@@ -108,8 +107,8 @@ class SceneGeometry {
   // True if a surface point of `solid` is visible from outside the union of all solids.
   bool is_visible(const SceneSolid& solid, const Eigen::Vector3d& position,
                   const Eigen::Vector3d& normal) const;
-  // True if `other` hides the point. Of coincident faces with equal normal, the first solid's face
-  // is visible.
+  // True if `other` hides a surface point of `solid`. Of coincident faces with equal normal, the
+  // face of the first solid in the scene is visible.
   bool is_hidden_by(const SceneSolid& solid, const SceneSolid& other,
                     const Eigen::Vector3d& position, const Eigen::Vector3d& normal) const;
 

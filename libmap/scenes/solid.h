@@ -53,9 +53,8 @@ Solid sort_solid(const Solid& solid);
 Solid refine_facets(const Solid& solid, double edge_length_m);
 
 // Return the union and difference of solids in general position (CGAL's corefinement, exact
-// predicates). A union's edges below `min_edge_m` are collapsed, except where this turns a triangle
-// by more than 30 degrees or the surface becomes non-manifold. Throw Error if the result is no
-// manifold.
+// predicates). A union's edges below `min_edge_m` are collapsed, except where a triangle turns by
+// more than 30 degrees or the surface becomes non-manifold. Throw Error for a non-manifold result.
 Solid unite(const std::vector<Solid>& solids, double min_edge_m = 0.0);
 Solid subtract(const Solid& solid, const Solid& removed);
 

@@ -45,7 +45,7 @@ struct CameraTrajectoryOptions {
   double sweep_deg = 0.0;      // angle of each loop; negative: clockwise; 0: 360, at a wall 120
   std::optional<Eigen::Vector3d> target;  // point that the camera looks at; default: the ground at
                                           // the center of the site, or the center of the wall
-  double gaze_deg = 8.0;          // standard deviation of the view direction from the target
+  double gaze_deg = 8.0;                  // standard deviation of the angle between view and target
   double sway_m = 0.01;           // standard deviation of the position from the path, per axis
   double tremor_deg = 1.0;        // standard deviation of the camera's rotation about each axis
   double frame_interval_s = 1.0;  // time between two poses
@@ -57,8 +57,8 @@ void bind(ParameterTable& table, CameraTrajectoryOptions& options);
 // the mesh's length or width from its bounding box. Throws Error for a mesh without vertices.
 double surrounding_ground_height(const TriangleMesh& mesh);
 
-// Returns the pose of the camera's body (x forward, y left, z up) in the mesh's frame, `after_s`
-// seconds after the stamp of frame `frame` (from 0).
+// Function that returns the pose of the camera's body (x forward, y left, z up) in the mesh's
+// frame, `after_s` seconds after the stamp of frame `frame` (from 0).
 using CameraMotion = std::function<Pose(std::size_t frame, double after_s)>;
 // Returns the motion on loops around a mesh. Throws Error for a mesh without vertices.
 CameraMotion camera_motion(const TriangleMesh& mesh, const CameraTrajectoryOptions& options,

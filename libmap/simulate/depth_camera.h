@@ -23,7 +23,7 @@ namespace libmap {
 
 class RayCaster;
 
-// Rays (x/z, y/z) through the pixels' centers and corners, row by row; NaN where there is none.
+// Rays (x/z, y/z) through the pixels' centers and corners, row by row; NaN if there is no ray.
 struct ViewRays {
   int width = 0;  // image size, pixels
   int height = 0;
@@ -80,8 +80,8 @@ class VisibleSurface {
   std::vector<std::shared_ptr<const Part>> parts_;
 };
 
-// The noise at range r is noise_m + noise_of_range r + noise_of_square r^2. Defaults: limits of the
-// Kinect v2 (0.5 to 4.5 m, whole millimeters), and noise of 2 mm and 0.5 % of range.
+// The noise at a range r is noise_m + noise_of_range r + noise_of_square r^2. Defaults: limits of
+// the Kinect v2 (0.5 to 4.5 m, whole millimeters), and noise of 2 mm and 0.5 % of range.
 struct DepthSensorOptions {
   double noise_m = 0.002;           // standard deviation along the ray: constant term
   double noise_of_range = 0.005;    // term proportional to range, m per m
@@ -92,7 +92,7 @@ struct DepthSensorOptions {
   double far_m = 4.5;               // maximum measured depth
   double max_incidence_deg = 80.0;  // maximum angle between ray and normal; 90: no limit
   double edge_gap_m = 0.05;         // a pixel with a larger depth discontinuity is an edge pixel
-  double flying_pixels = 0.35;      // fraction of edge pixels between foreground and background
+  double flying_pixels = 0.35;      // fraction of edge pixels that mix foreground and background
   double edge_dropouts = 0.35;      // fraction of edge pixels without depth
 
   void check() const;  // throws Error if far_m <= near_m or the sum of both fractions exceeds 1

@@ -25,8 +25,7 @@ class GroundHeights {
   double height(const Eigen::Vector2d& position) const;
   // Returns the mean point spacing in the cells that contain points; 0 without points.
   double spacing_m() const;
-  // Returns the bounding box of the points in all cells that meet the rectangle; empty without
-  // points.
+  // Bounding box of the points of all cells that intersect the rectangle; empty if there are none.
   Eigen::AlignedBox3d extent(const Eigen::AlignedBox2d& rectangle) const;
 
  private:

@@ -37,8 +37,8 @@ struct RobotCameraImage {
   DepthMeasurement measurement;  // the image in meters, and numbers of pixels
 };
 
-// Returns one image per camera of the rig, in the rig's order; it may have no depth at all. Throws
-// Error if the mesh has no triangle, or the sensor is unknown or out of a camera's range.
+// Returns one image per camera, in the rig's order; images may have no depth at all. Throws Error
+// if the mesh has no triangle, the sensor is unknown, or ranges of sensor and camera are disjoint.
 std::vector<RobotCameraImage> simulate_robot_cameras(const TriangleMesh& mesh, const CameraRig& rig,
                                                      const Pose& world_from_robot,
                                                      const RobotCamerasOptions& options);

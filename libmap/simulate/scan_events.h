@@ -39,8 +39,7 @@ struct ExtraBody {
   std::function<std::optional<Pose>(std::size_t frame)> world_from_body;  // nullopt: absent
 };
 // Returns the objects of enabled events: a person of 1.7 m who walks along y through the mesh
-// center, a stone of 30 x 24 x 20 cm near the center that moves by 40 cm, a ceiling 2.5 m above
-// ground.
+// center, a stone of 30 x 24 x 20 cm near the center that moves by 40 cm, a ceiling at 2.5 m.
 std::vector<ExtraBody> extra_bodies(const TriangleMesh& mesh, const ScanEvents& events,
                                     std::uint64_t seed);
 

@@ -26,7 +26,7 @@ namespace libmap {
 struct OdometryOptions {
   double error_of_distance = 0.01;  // standard deviation in each axis, m per m of distance
   double error_of_turn = 0.005;  // standard deviation about each axis, degrees per degree of turn
-  double turn_of_distance_deg = 0.2;  // added to it, proportional to distance; degrees per m
+  double turn_of_distance_deg = 0.2;  // second term of error_of_turn, degrees per m of distance
 };
 // Minimum standard deviations of an odometry step in and about each axis.
 inline constexpr double min_odometry_error_m = 2e-4;
@@ -100,7 +100,7 @@ ScanScene scene_of(TerrainSurface& terrain, const GroundHeights& ground,
 using FrameSink = std::function<void(const GraphNode& node, const RgbdFrame& frame)>;
 ScanSimulationResult simulate_scan(const ScanScene& scene, const ScanSimulationOptions& options,
                                    const FrameSink& sink, Progress& progress = no_progress());
-// Simulates a scan of `mesh` along the path of the options. Also throws Error without a triangle.
+// Simulates a scan of `mesh` along the options' path. Also throws Error if it has no triangle.
 ScanSimulationResult simulate_scan(const TriangleMesh& mesh, const ScanSimulationOptions& options,
                                    const FrameSink& sink, Progress& progress = no_progress());
 

@@ -50,8 +50,8 @@ void bind(ParameterTable& table, PhotoFaults& faults);
 // Errors of the stored calibration and stamps.
 struct CalibrationFaults {
   double focal_percent = 0.0;  // error of the stored focal lengths
-  double cx_px = 0.0;          // errors of the stored principal point
-  double cy_px = 0.0;
+  double cx_px = 0.0;          // error of the stored principal point in x
+  double cy_px = 0.0;          // error of the stored principal point in y
   // Translation and rotation error of the registration of depth to color, in random directions.
   double depth_shift_mm = 0.0;
   double depth_turn_deg = 0.0;
@@ -100,12 +100,12 @@ std::vector<RecordedFrame> recorded_frames(std::size_t frames, const RecordingFa
 // Applies DepthFaults::measured to the depths of a view, before noise.
 void distort_depth(SurfaceView& view, const DepthFaults& faults);
 
-// Adds multipath interference to the depths of a view; all surfaces are diffuse with this
-// reflectance (0 to 1). Light that reaches a surface via another surface travels farther than
-// direct light. The camera measures the mean of both path lengths, weighted by intensity (Fuchs
-// 2010, for path differences that are small against the modulation wavelength). Concave edges
-// appear rounded and farther away; flat and convex surfaces do not change. One reflection is
-// computed on a grid of pixels and interpolated.
+// Adds multipath interference to the depths of a view; all surfaces are diffuse with `reflectance`
+// (0 to 1). Light that reaches a surface via another surface travels farther than direct light. The
+// camera measures the mean of both path lengths, weighted by intensity (Fuchs 2010, for path
+// differences that are small against the modulation wavelength). Concave edges appear rounded and
+// farther away; flat and convex surfaces do not change. One reflection is computed on a grid of
+// pixels and interpolated.
 void add_multipath(SurfaceView& view, const VisibleSurface& surface, const ViewRays& rays,
                    const Pose& world_from_camera, double reflectance);
 

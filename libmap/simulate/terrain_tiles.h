@@ -84,7 +84,7 @@ struct TerrainTilesOptions {
 // Binds all fields except size_x_m and size_y_m.
 void bind(ParameterTable& table, TerrainTilesOptions& options);
 
-// Returns the tiles that cover the terrain, ascending by i, then j. Throws as check does.
+// Returns the tiles that cover the terrain, by i, then j. Throws as TerrainTilesOptions::check.
 std::vector<XyTile> terrain_tiles(const TerrainTilesOptions& options);
 
 // Returns the points of one tile with normals, m, z up. Each square cell of the x-y plane with side

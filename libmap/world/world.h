@@ -42,8 +42,8 @@ void bind(ParameterTable& table, WorldOptions& options);
 // Returns gravity in m/s2 for a number >= 0 and < 1e6, or earth, moon, mars; else throws Error.
 double gravity_of(const std::string& text);
 
-// Throws Error naming `field` for a name that SDF, MJCF or URDF forbids: empty, "world", with
-// "::" or a control character, or between two double underscores.
+// Throws Error naming `field` for a name that SDF, MJCF or URDF forbids: empty, "world", "__X__"
+// for any X, or with "::" or a control character.
 void require_world_name(const std::string& name, const std::string& field);
 
 struct WorldReport {
@@ -111,7 +111,7 @@ struct WorldScores {
 
 struct WorldModelInput {
   std::string name;
-  TexturedMesh visual;
+  TexturedMesh visual;  // visual mesh
   // The surface of `visual` and of its surroundings within twice ball_radius_m.
   TriangleMesh surface;
 };
@@ -124,7 +124,7 @@ WorldModel write_world_model(const std::filesystem::path& folder, const WorldMod
                              WorldReport& report);
 
 // Writes the files of world_texts to `folder`; only checks names if `folder` is empty. Throws Error
-// for a name that simulators forbid, that two models have, or that is reserved (rig, footholds).
+// for a name that simulators forbid, that two models share, or that is reserved (rig, footholds).
 void write_world(const std::filesystem::path& folder, const WorldScene& scene);
 
 }  // namespace libmap
