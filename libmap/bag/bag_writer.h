@@ -88,8 +88,8 @@ struct BagContent {
 
 // Writes one latched message per topic, directly to `path`; for atomic output, pass the temporary
 // path of an OutputFile (libmap/core/file_output.h). Throws Error for a stamp outside ROS's range,
-// an invalid topic name, a compression that the format does not support, or grids in a bag of ROS
-// 1. Throws Error (ErrorKind::failed) if a write fails.
+// an invalid topic name, a compression that the format does not support, grids in a bag of ROS 1,
+// and a failed write (ErrorKind::failed).
 void write_bag(const std::filesystem::path& path, BagFormat format, const BagContent& content,
                BagCompression compression = BagCompression::none);
 

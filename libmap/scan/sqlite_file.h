@@ -33,11 +33,11 @@ class SqliteRow {
 };
 
 // Opens a file read-only and creates no files next to it (-journal, -wal, -shm).
-//   - Rollback mode: with SQLite's locks, after waiting up to 10 s for a writer. A journal of an
-//     interrupted write is an Error, because rolling it back needs write access.
-//   - WAL mode: with -wal and -shm, so that data committed by another program are visible. With a
-//     -wal only (after a crash), the index of the -wal is kept in memory. With neither, no program
-//     has the file open, and it is read as an unchanging file.
+//   - In rollback mode, it is read with SQLite's locks, after waiting up to 10 s for a writer. A
+//     journal of an interrupted write is an Error, because rolling it back needs write access.
+//   - In WAL mode, -wal and -shm are also read, so that data committed by another program are
+//     visible. If only a -wal exists (after a crash), its index is kept in memory. If neither
+//     exists, no program has the file open, and it is read as an unchanging file.
 class SqliteFile {
  public:
   // Throws Error if the file is not an SQLite file, damaged or not readable.

@@ -18,10 +18,10 @@ struct CollisionBallOptions {
   double max_deviation_m = 0.002;  // > 0: maximum distance between surface and balls
 };
 
-// Covers the triangles that are true in `marks` with balls inside the solid with the surface
-// `body`, in the order of the triangles. No point of these triangles is farther than
-// max_deviation_m from a ball, and no point of a ball is more than max_deviation_m outside the
-// body. Triangles without area get no balls. Coordinates and radii are multiples of 10 micrometers.
+// Covers the triangles of `mesh` whose entry in `marks` is true. Returns balls inside the solid
+// with the surface `body`, by triangle. The triangles are within max_deviation_m of the balls, and
+// no ball extends more than max_deviation_m out of the solid. Triangles without area get no balls.
+// Coordinates and radii are multiples of 10 micrometers.
 std::vector<CollisionBall> cover_with_balls(const TriangleMesh& mesh,
                                             const std::vector<bool>& marks,
                                             const TriangleMesh& body,

@@ -23,9 +23,9 @@ struct HeightField {
   std::size_t rows = 0;                                // nodes along y
   double base_m = 0.0;                                 // z of height 0
   std::vector<float> heights_m;                        // above base_m, row by row; the lowest is 0
-  // Missing cells, (columns - 1) x (rows - 1), row by row: another shape must replace them, because
-  // the surface overhangs or deviates in the cell or a neighbor. Nodes between missing cells are
-  // below the surface.
+  // True for missing cells; (columns - 1) x (rows - 1) entries, row by row. Another shape must
+  // replace these cells, because the surface overhangs or deviates from the field in the cell or in
+  // a neighboring cell. Nodes between missing cells are below the surface.
   std::vector<bool> is_missing;
   // Maximum distance between field and surface, in both directions, in cells that are not missing.
   // The field may extend beyond the border of the surface by one cell.
@@ -36,7 +36,7 @@ struct HeightField {
 // or the grid has more than 2^26 nodes.
 HeightField make_height_field(const TriangleMesh& mesh, const HeightFieldOptions& options);
 
-// Returns true for a triangle above or below a missing cell; may also be true for one near a cell.
+// True for a triangle above or below a missing cell; may also be true if it is near such a cell.
 bool may_be_left_out(const HeightField& field, const TriangleMesh& mesh, const Triangle& triangle);
 
 }  // namespace libmap
