@@ -29,8 +29,8 @@ struct BagTopic {
   std::string type{};     // e.g. "sensor_msgs/PointCloud2"; ROS 2: "sensor_msgs/msg/PointCloud2"
   std::string md5sum{};   // md5sum of the type's definition; ROS 1 only
   bool latching = false;  // true if late subscribers receive the last message
-  MessageEncoding encoding = MessageEncoding::ros1;
-  std::size_t messages = 0;  // number of messages
+  MessageEncoding encoding = MessageEncoding::ros1;  // encoding of the messages
+  std::size_t messages = 0;                          // number of messages
 
   // True if messages are of the type `other`, by the name in ROS 1 or ROS 2.
   bool is(const MessageType& other) const;
@@ -42,7 +42,7 @@ struct BagTopic {
 struct BagListing {
   std::string storage{};  // "bag of ROS 1", "bag of ROS 2 (sqlite3)" or "bag of ROS 2 (mcap)"
   std::vector<BagTopic> topics{};  // topics with messages, in the order of recording
-  std::size_t messages = 0;
+  std::size_t messages = 0;        // number of messages of all topics
   double start_s = 0.0;  // recording time of the first message, s since 1970; 0 without messages
   double end_s = 0.0;    // recording time of the last message, s since 1970; 0 without messages
 };

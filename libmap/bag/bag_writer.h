@@ -34,9 +34,9 @@ struct BagTarget {
 // PoseArray along x. The y axis is the frame's y axis (z axis if the direction is along y), made
 // perpendicular to the direction.
 struct BagTargets {
-  std::string marker_topic{};
-  std::string pose_topic{};
-  std::string frame{};    // frame of positions and directions
+  std::string marker_topic{};  // topic of the MarkerArray
+  std::string pose_topic{};    // topic of the PoseArray
+  std::string frame{};         // frame of positions and directions
   double arrow_m = 0.08;  // length of an arrow; the radius of a ball is an eighth of this length
   std::vector<BagTarget> targets{};
 };
@@ -45,8 +45,8 @@ struct BagTargets {
 // nav_msgs/OccupancyGrid. Arrays contain rows * columns values, row by row from the smallest y, in
 // each row from the smallest x. NaN: unknown.
 struct BagGrid {
-  std::string grid_map_topic{};
-  std::string occupancy_topic{};
+  std::string grid_map_topic{};                        // topic of the GridMap
+  std::string occupancy_topic{};                       // topic of the OccupancyGrid
   std::string frame{};                                 // frame whose x-y plane contains the grid
   double cell_m = 0.0;                                 // edge length of a cell
   Eigen::Vector2d corner_m = Eigen::Vector2d::Zero();  // corner with the smallest x and y
@@ -61,7 +61,7 @@ struct BagGrid {
   std::vector<float> occupancy{};  // one value per cell of the OccupancyGrid, 0 to 1
 };
 
-// Static transform between frames (/tf_static).
+// Static transform between two frames.
 struct BagTransform {
   std::string parent{};
   std::string child{};

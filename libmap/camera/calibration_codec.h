@@ -34,11 +34,11 @@ struct CalibrationRecord {
 };
 
 struct StereoCalibrationRecord {
-  std::array<std::int32_t, 3> version{};
-  std::vector<double> r{};  // 3 x 3 or empty: rotation of right_from_left
-  std::vector<double> t{};  // 3 or empty: translation of right_from_left, m
-  std::vector<double> e{};  // 3 x 3 or empty: essential matrix
-  std::vector<double> f{};  // 3 x 3 or empty: fundamental matrix
+  std::array<std::int32_t, 3> version{};  // version of RTAB-Map that wrote the record
+  std::vector<double> r{};                // 3 x 3 or empty: rotation of right_from_left
+  std::vector<double> t{};                // 3 or empty: translation of right_from_left, m
+  std::vector<double> e{};                // 3 x 3 or empty: essential matrix
+  std::vector<double> f{};                // 3 x 3 or empty: fundamental matrix
   CalibrationRecord left{};
   CalibrationRecord right{};  // k, d, r and p are empty in the layouts floats_with_size and floats
   float baseline_m = 0;       // used only in the layouts floats_with_size and floats

@@ -81,9 +81,9 @@ struct CameraCalibrationResult {
   double sigma_px = 0.0;         // standard deviation of a corner in x and y, from the residuals
   double width_coverage = 0.0;   // range of all corners' x as a fraction of the image width
   double height_coverage = 0.0;  // range of all corners' y as a fraction of the image height
-  std::vector<CalibratedImage> images{};
-  std::vector<std::string> rejected{};  // above max_image_error_px, or inconsistent with others
-  std::vector<std::string> repeated{};  // ignored images that show the corners of earlier images
+  std::vector<CalibratedImage> images{};  // images that determine the result
+  std::vector<std::string> rejected{};    // above max_image_error_px, or inconsistent with others
+  std::vector<std::string> repeated{};    // ignored images that show the corners of earlier images
 
   // Relative standard deviation of fx or fy, whichever is larger.
   double relative_focal_deviation() const;

@@ -50,11 +50,11 @@ class Node;
 
 namespace libmap {
 
-// Velocity of the base when a frame is taken, in the base frame.
+// Velocity of the base at the time of a frame, in the base frame.
 struct FrameMotion {
-  double stamp_s = 0.0;                                 // stamp of the frame's color image
-  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();   // m/s
-  Eigen::Vector3d turn_rate = Eigen::Vector3d::Zero();  // rad/s
+  double stamp_s = 0.0;                                 // RgbdFrame::stamp_s of the frame
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();   // linear velocity, m/s
+  Eigen::Vector3d turn_rate = Eigen::Vector3d::Zero();  // angular velocity, rad/s
 };
 
 struct CameraFile {

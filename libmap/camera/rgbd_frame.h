@@ -22,8 +22,8 @@ struct StereoCamera {
 // one image, with equal widths and in the order of `cameras`. Depth (z, m; 0: no measurement) is
 // registered to the color camera and may have another size.
 struct RgbdFrame {
-  int node = 0;  // id of the node in the scan
-  double stamp_s = 0.0;
+  int node = 0;                       // id of the node in the scan
+  double stamp_s = 0.0;               // stamp of the node
   double depth_stamp_offset_s = 0.0;  // stamp of depth minus stamp of color; 0 if unknown
   std::vector<Camera> cameras;  // of the color images; of the depth images if there is no color
   ColorImage color;             // empty if not stored or not requested

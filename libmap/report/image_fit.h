@@ -1,4 +1,4 @@
-// Reads the images of a report, and reduces their numbers of bytes.
+// Reads the images of a report, and reduces their size in bytes.
 #pragma once
 
 #include <string>

@@ -39,13 +39,13 @@ struct ReportTable {
 struct ReportMap {
   MapView view{};
   std::optional<ReportTable> locations{};  // table of look-ups; row n has marker n of the view
-  std::optional<ReportImage> preview{};    // shown where there is no 3-D view
+  std::optional<ReportImage> preview{};    // image that is shown without a 3-D view
 };
 
 // A colored mesh, and the meaning of its colors.
 struct ReportScene {
   TriangleMesh mesh{};
-  std::vector<std::pair<Color, std::string>> legend{};
+  std::vector<std::pair<Color, std::string>> legend{};  // colors and their meanings
 };
 
 // Parameters of one or several outputs.
@@ -85,9 +85,9 @@ using ReportBody = std::variant<std::monostate, ReportImages, ReportTable, Repor
 
 struct ReportItem {
   std::string caption{};
-  std::string source{};  // shown file; empty if there are several
-  std::vector<ReportGap> gaps{};
-  ReportBody body{};
+  std::string source{};           // shown file; empty if there are several
+  std::vector<ReportGap> gaps{};  // files that cannot be shown
+  ReportBody body{};              // content; std::monostate: nothing can be shown
 };
 
 struct ReportSection {

@@ -19,8 +19,8 @@ enum class QuaternionOrder { xyzw, wxyz };
 Pose with_quaternion_order(const Pose& read, QuaternionOrder order);
 
 struct PoseImportOptions {
-  TrajectoryFormat format = TrajectoryFormat::automatic;
-  QuaternionOrder quaternion = QuaternionOrder::xyzw;
+  TrajectoryFormat format = TrajectoryFormat::automatic;  // format of the file
+  QuaternionOrder quaternion = QuaternionOrder::xyzw;     // order in the file
   // Frame of the poses in the file: the robot's base, or the first camera's optical frame. Poses in
   // files of COLMAP, nerfstudio and Open3D are always of cameras.
   PoseFrame frame = PoseFrame::base;
@@ -31,9 +31,9 @@ struct PoseImportOptions {
 void bind(ParameterTable& table, PoseImportOptions& options);
 
 struct ImportedPoses {
-  NodeTrajectory trajectory;  // poses ascending by node id, and number of unmatched poses
-  std::size_t poses_in_file = 0;
-  double scale = 1.0;  // meters per unit of the file's positions
+  NodeTrajectory trajectory;      // poses ascending by node id, and number of unmatched poses
+  std::size_t poses_in_file = 0;  // number of poses in the file
+  double scale = 1.0;             // meters per unit of the file's positions
   // Maximum distance of a node's base positions, one by each of its cameras, from their mean.
   double max_rig_deviation_m = 0.0;
   // Reports dropped poses (the camera does not exist or has no usable calibration), and motion

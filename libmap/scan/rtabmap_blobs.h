@@ -44,8 +44,8 @@ std::optional<GpsFix> decode_gps(std::string_view bytes);
 
 // Columns opt_ids and opt_poses of table Admin: matrices (matrix_codec.h) of node ids and poses.
 struct OptimizedPoseBlobs {
-  std::string ids;
-  std::string poses;
+  std::string ids;    // int32, one per node
+  std::string poses;  // 12 float32 per node
 };
 OptimizedPoseBlobs to_blobs(const std::map<int, Pose>& map_from_base);
 // Throws Error if Admin.opt_ids is not a matrix of int32, or Admin.opt_poses is not a matrix of 12

@@ -28,24 +28,24 @@ class SqliteFile;
 
 // Data of a node, recognized from the headers of its images.
 struct NodeContent {
-  int node = 0;                      // node id
-  std::optional<ImageInfo> color{};  // nullopt: not stored
-  std::optional<DepthInfo> depth{};  // nullopt: not stored
-  std::optional<ImageInfo> right{};  // right image of a stereo pair, instead of depth
-  std::size_t color_bytes = 0;       // sizes of the stored blobs; 0: not stored
-  std::size_t depth_bytes = 0;
-  Calibration calibration{};
-  std::size_t laser_scan_bytes = 0;
-  std::size_t user_data_bytes = 0;
+  int node = 0;                       // node id
+  std::optional<ImageInfo> color{};   // nullopt: not stored
+  std::optional<DepthInfo> depth{};   // nullopt: not stored
+  std::optional<ImageInfo> right{};   // right image of a stereo pair, instead of depth
+  std::size_t color_bytes = 0;        // size of the stored color image; 0: not stored
+  std::size_t depth_bytes = 0;        // size of the stored depth or right image; 0: not stored
+  Calibration calibration{};          // empty if not stored
+  std::size_t laser_scan_bytes = 0;   // size of the stored laser scan; 0: not stored
+  std::size_t user_data_bytes = 0;    // size of the stored user data; 0: not stored
   std::vector<std::string> faults{};  // part and reason for unreadable headers, e.g. "image: ..."
 };
 
 // Map stored by RTAB-Map; 0 or nullopt if a part is not stored.
 struct StoredMap {
-  int grid_width = 0;              // cells of the occupancy grid
-  int grid_height = 0;             // cells of the occupancy grid
-  double grid_resolution_m = 0.0;  // edge length of a cell
-  std::size_t cloud_points = 0;
+  int grid_width = 0;                  // cells of the occupancy grid
+  int grid_height = 0;                 // cells of the occupancy grid
+  double grid_resolution_m = 0.0;      // edge length of a cell
+  std::size_t cloud_points = 0;        // number of points of the cloud
   std::size_t polygons = 0;            // polygons of the mesh
   std::optional<ImageInfo> texture{};  // image of the mesh's texture
   std::optional<ImageInfo> preview{};  // preview image of the database

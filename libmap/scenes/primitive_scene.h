@@ -97,6 +97,7 @@ ShapeGeometry make_shape_geometry(const std::string& kind);
 // Returns the parameters of a shape (sizes, placement, name) by key. The table refers to `shape`.
 ParameterTable shape_parameters(SceneShape& shape);
 
+// Exact properties of a point on the surface of a scene.
 struct SurfaceTruth {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  // m
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();   // outward, unit length

@@ -71,7 +71,7 @@ struct SceneSolid {
 
 // Height of the ground above the ground plane, with its derivatives in x and y.
 struct GroundHeight {
-  double value = 0.0;
+  double value = 0.0;  // m
   Eigen::Vector2d gradient = Eigen::Vector2d::Zero();
   Eigen::Matrix2d hessian = Eigen::Matrix2d::Zero();
 };

@@ -37,8 +37,8 @@ struct CameraTrajectoryOptions {
   double radius_m = 0.0;       // radius of the first loop; 0: 2/3 of the mesh's smaller horizontal
                                // side (wall: larger side), limited to 0.8 to 2 m
   double last_radius_m = 0.0;  // radius of the last loop; 0: 0.7 times the radius of the first loop
-  double height_m = 0.0;  // loops: height above the ground on the first; 0: 0.6 times its radius
-                          // serpentine: height above the local mean ground; 0: 1.4 m
+  double height_m = 0.0;       // height above the ground on the first loop; 0: 0.6 times its radius
+                               // serpentine: height above the local mean ground; 0: 1.4 m
   double last_height_m = 0.0;  // height on the last loop; 0: 0.8 times the radius of the first loop
   double start_deg = 0.0;      // direction of the first loop's start, counter-clockwise from x;
                                // wall: relative to the default start

@@ -62,6 +62,7 @@ struct SiteLayout {
   double gap_m = 0.01;         // minimum distance between the footprints of two rocks
 };
 
+// Choice of locations for a field test on the rocks (field_points.h).
 struct FieldPointOptions {
   int count = 30;             // number of locations
   double min_height_m = 0.1;  // minimum height of a location above the ground

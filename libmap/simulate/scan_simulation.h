@@ -74,7 +74,7 @@ struct ScanSimulationResult {
   std::size_t edge_pixels = 0;      // sum of DepthMeasurement::edges
   std::size_t flying_pixels = 0;    // sum of DepthMeasurement::flying
   std::size_t empty_frames = 0;     // number of frames without any depth
-  double path_length_m = 0.0;
+  double path_length_m = 0.0;       // length of the camera's true path
 };
 
 // A surface to scan, and the motion of the camera.

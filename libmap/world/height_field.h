@@ -17,7 +17,7 @@ struct HeightFieldOptions {
 // The coordinates of nodes are multiples of the cell size. Each cell consists of two triangles,
 // divided by the diagonal from its lowest to its highest indices.
 struct HeightField {
-  double cell_size_m = 0.0;
+  double cell_size_m = 0.0;                            // distance between nodes
   Eigen::Vector2d corner_m = Eigen::Vector2d::Zero();  // x and y of node (0, 0)
   std::size_t columns = 0;                             // nodes along x
   std::size_t rows = 0;                                // nodes along y

@@ -51,7 +51,7 @@ struct WorldReport {
   std::size_t collision_triangles = 0;
   // Maximum distance between collision mesh and visual mesh, in both directions.
   double collision_deviation_m = 0.0;
-  std::size_t field_nodes = 0;
+  std::size_t field_nodes = 0;      // nodes of the height fields
   double field_deviation_m = 0.0;   // maximum of HeightField::deviation_m
   std::size_t missing_cells = 0;    // cells of the height fields that balls replace
   std::size_t balls = 0;            // balls that replace cells
@@ -62,9 +62,9 @@ void describe(ResultTable& table, const WorldReport& report);
 
 // A mesh that is displayed but does not collide.
 struct WorldVisual {
-  std::string file;     // .obj in the folder of meshes
-  std::string texture;  // image in the same folder; empty: none
-  Color color{160, 160, 160};
+  std::string file;            // .obj in the folder of meshes
+  std::string texture;         // image in the same folder; empty: none
+  Color color{160, 160, 160};  // color without texture
 };
 
 // A site, or one tile of a site.
