@@ -16,7 +16,7 @@
 namespace libmap {
 
 struct DepthCorrection {
-  double first_m = 0.0;            // S is constant below depth first_m and above depth last_m()
+  double first_m = 0.0;            // depth in the offset is limited to first_m ... last_m()
   double step_m = 0.0;             // distance between the spline's knots; > 0 if there is a spline
   std::vector<double> spline_m{};  // coefficients of S, at least 4; empty: the offset is 0
   std::array<double, 3> radial{};  // c: factors of r^2 (m), r^4 (m), depth r^2; r is 1 in corners
