@@ -11,7 +11,7 @@
 namespace libmap {
 
 struct SceneMeshOptions {
-  double edge_length_m = 0.01;    // > 0: maximum edge along rows and rings; 1.5 times for diagonals
+  double edge_length_m = 0.01;    // > 0: maximum edge length along grid lines; diagonals: 1.5 times
   double chord_error_m = 0.0002;  // > 0: maximum distance of triangles from round shapes, not bumps
   std::uint64_t max_triangles = 20'000'000;  // maximum number of triangles
 };

@@ -25,8 +25,8 @@ class RayCaster;
 
 // Rays (x/z, y/z) through the pixels' centers and corners, row by row; NaN if there is no ray.
 struct ViewRays {
-  int width = 0;  // image size, pixels
-  int height = 0;
+  int width = 0;                         // image width, pixels
+  int height = 0;                        // image height, pixels
   std::vector<Eigen::Vector2d> centers;  // width * height
   std::vector<Eigen::Vector2d> corners;  // (width + 1) * (height + 1); the first is at -0.5, -0.5
 };
@@ -95,7 +95,7 @@ struct DepthSensorOptions {
   double flying_pixels = 0.35;      // fraction of edge pixels that mix foreground and background
   double edge_dropouts = 0.35;      // fraction of edge pixels without depth
 
-  void check() const;  // throws Error if far_m <= near_m or the sum of both fractions exceeds 1
+  void check() const;  // throws Error if far_m <= near_m or flying_pixels + edge_dropouts > 1
 };
 void bind(ParameterTable& table, DepthSensorOptions& options);
 // Binds all fields except depth_step_m, near_m and far_m.

@@ -78,7 +78,8 @@ struct TerrainTilesOptions {
   double spacing_m = 0.01;  // mean distance between points
   RockyTerrainOptions terrain;
 
-  // Throws Error if a field is out of range, or for more than 10^6 tiles or 10^8 cells per tile.
+  // Throws Error if a field is out of range, or for more than 10^6 tiles or 10^8 cells (of side
+  // spacing_m) per tile.
   void check() const;
 };
 // Binds all fields except size_x_m and size_y_m.
