@@ -13,17 +13,18 @@
 
 namespace libmap {
 
-// Metadata in the first bytes of an image's message.
+// Metadata at the beginning of a message with an image.
 struct DepthMessageHead {
-  std::int64_t stamp_ns = 0;  // 0: none
+  std::int64_t stamp_ns = 0;  // 0: no stamp
   std::string frame{};        // optical frame of the camera
-  std::string encoding{};     // field encoding of an Image, e.g. "16UC1", or format if compressed
+  std::string encoding{};     // `encoding` of an Image, e.g. "16UC1"; `format` of a CompressedImage
 };
 
-// Decodes the metadata; 1 KiB of the message is enough. Throws Error if `bytes` ends too early.
+// Decodes the metadata of an Image or, if `compressed`, of a CompressedImage; 1 KiB of the message
+// is enough. Throws Error if `bytes` ends within the metadata.
 DepthMessageHead read_image_head(MessageEncoding encoding, std::string_view bytes, bool compressed);
 
-// True for 16UC1, mono16, 32FC1; for a CompressedImage, formats of
+// True for depth images: 16UC1, mono16 and 32FC1; for a CompressedImage, the formats of the plugin
 // compressed_depth_image_transport.
 bool is_depth_encoding(const std::string& encoding, bool compressed);
 
@@ -33,8 +34,8 @@ struct DepthUnits {
 };
 
 struct DepthMessageImage {
-  Image<std::uint16_t> image;       // in image units; 0: no measurement; 65535: saturated
-  std::size_t overflow_pixels = 0;  // number of pixels that exceed 16 bits and are set to 0
+  Image<std::uint16_t> image;       // in units of image_unit_m; 0: no depth; 65535: saturated
+  std::size_t overflow_pixels = 0;  // number of pixels set to 0 because they exceed 65534 units
 };
 
 // Decodes a depth image. Throws Error for an encoding that is not of depth, RVL compression, an
@@ -43,13 +44,13 @@ DepthMessageImage decode_depth(MessageEncoding encoding, std::string_view bytes,
                                const DepthUnits& units);
 
 struct CameraInfoMessage {
-  std::int64_t stamp_ns = 0;
-  Camera camera{};  // base_from_camera is not set
+  std::int64_t stamp_ns = 0;  // 0: no stamp
+  Camera camera{};            // base_from_camera is not set
 };
 
-// Decodes K and D; for `rectified` images P, if it is set, without distortion. Applies binning and
-// region of interest as image_geometry does. Throws Error for an uncalibrated camera or an unknown
-// distortion model.
+// Decodes the camera matrix K and distortion D or, if `rectified` is set and the message contains a
+// projection P, the pinhole camera of P. Applies binning and region of interest as ROS's
+// image_geometry does. Throws Error for an uncalibrated camera or an unknown distortion model.
 CameraInfoMessage decode_camera_info(MessageEncoding encoding, std::string_view bytes,
                                      bool rectified);
 

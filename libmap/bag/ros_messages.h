@@ -1,9 +1,9 @@
-// ROS messages in bags as plain data, without encoding (message_codec.h). Private to libmap/bag.
+// ROS messages in bags as plain structs; message_codec.h encodes them. Private to libmap/bag.
 //
-// fields(message, visit) calls visit(name, field) for each field in the order of the definition;
-// visit.ros2 is true for ROS 2. Definitions: http://docs.ros.org/en/noetic (ROS 1),
-// https://docs.ros.org/en/humble/p/sensor_msgs and other packages (ROS 2, Humble to Jazzy),
-// https://docs.ros.org/en/jazzy/p/grid_map_msgs.
+// Definitions: http://docs.ros.org/en/noetic (ROS 1), https://docs.ros.org/en/humble/p/sensor_msgs
+// and other packages (ROS 2, Humble to Jazzy), https://docs.ros.org/en/jazzy/p/grid_map_msgs. In
+// each struct, fields(message, visit) calls visit(name, field) for each field in the order of the
+// message's definition; visit.ros2 is true for ROS 2.
 #pragma once
 
 #include <array>
@@ -174,7 +174,7 @@ struct CompressedImage {
   }
 };
 
-// First fields of a message, for decoding without the rest of the bytes.
+// Message of which only the first fields are decoded: the fields that Message::head visits.
 template <typename Message>
 struct Head : Message {
   static void fields(auto& m, auto& visit) { Message::head(m, visit); }
@@ -280,7 +280,7 @@ struct MeshFile {
   }
 };
 
-// In ROS 2, the definition since Humble; earlier ones have no textures.
+// For ROS 2, this is the definition since Humble; earlier definitions have no textures.
 struct Marker {
   static constexpr MessageType type{"visualization_msgs/Marker"};
   enum : std::int32_t { ARROW = 0, SPHERE_LIST = 7, TEXT_VIEW_FACING = 9 };
@@ -429,7 +429,7 @@ struct GridMap {
   }
 };
 
-// Replaces all characters except printable ASCII by '?'.
+// Returns the text with '?' in place of all characters except printable ASCII.
 inline std::string printable(std::string line) {
   for (char& c : line)
     if (c < ' ' || c > '~') c = '?';

@@ -10,27 +10,27 @@ namespace libmap {
 
 struct BoardFit {
   Camera camera{};
-  std::vector<Pose> camera_from_board{};  // one per image
+  std::vector<Pose> camera_from_board{};  // one per image; camera: optical frame
 };
 
 struct BoardCorners {
-  std::vector<Eigen::Vector3d> in_board{};                // m
-  std::vector<std::vector<Eigen::Vector2d>> in_images{};  // px, one list per image
+  std::vector<Eigen::Vector3d> in_board{};                // corners in the board frame, m
+  std::vector<std::vector<Eigen::Vector2d>> in_images{};  // detected corners of each image, px
 };
 
-// Projects a corner (m, board frame) into the image, px; NaN behind the camera.
+// Projects a corner (board frame, m) into the image, px; NaN if the corner is behind the camera.
 Eigen::Vector2d board_pixel(const Camera& camera, const Pose& camera_from_board,
                             const Eigen::Vector3d& corner);
 
-// Sum of squared distances between corners and projections, px^2; NaN if one is behind the camera.
+// Returns the sum of squared reprojection errors, px^2; NaN if a corner is behind the camera.
 double squared_error(const BoardFit& fit, const BoardCorners& corners);
 
-// Optimizes intrinsics and board poses to a local minimum of the squared error (Ceres:
+// Optimizes intrinsics and board poses of `fit` to a local minimum of squared_error (Ceres:
 // Levenberg-Marquardt with the boards eliminated). Returns the squared error.
 double adjust_boards(BoardFit& fit, const BoardCorners& corners);
 
-// Covariance of the intrinsics (fx fy cx cy and distortion terms) for a noise of 1 px in each
-// coordinate, with the board poses marginalized. Empty if the corners do not determine the camera.
+// Returns the covariance of the intrinsics (fx fy cx cy, distortion terms) if the detected corners
+// have a standard deviation of 1 px in x and y. Empty if the corners do not determine the camera.
 Eigen::MatrixXd unit_covariance(const BoardFit& fit, const BoardCorners& corners);
 
 }  // namespace libmap

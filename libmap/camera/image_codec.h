@@ -1,8 +1,8 @@
 // Decodes and encodes images in memory: JPEG (libjpeg-turbo) and PNG (libpng).
 //
 // Sizes are read from the header and checked before memory is allocated: at most max_frame_pixels
-// or `max_pixels`, and no more than the file size permits. Decoding throws Error if an image is
-// truncated, has a wrong checksum or causes a decoder's warning; what() does not name the file.
+// (decode_color: `max_pixels`), and no more than the file size permits. Decoding throws Error if an
+// image is truncated, has a wrong checksum or causes a warning.
 #pragma once
 
 #include <array>
@@ -19,28 +19,28 @@ enum class ImageFormat { jpeg, png };            // storage format of an image
 std::string to_text(ImageFormat format);         // "JPEG", "PNG"
 std::string file_extension(ImageFormat format);  // ".jpg", ".png"
 
-// Returns the format by the first bytes; nullopt if it is neither JPEG nor PNG.
+// Returns the format by the first bytes; nullopt for other formats.
 std::optional<ImageFormat> image_format(std::string_view bytes);
 
 struct ImageInfo {
   ImageFormat format = ImageFormat::jpeg;
   int width = 0;
   int height = 0;
-  int channels = 0;  // as stored; a palette counts as 3
-  int bits = 8;      // per channel
+  int channels = 0;  // as stored; images with a palette have 3
+  int bits = 8;      // bits per channel
 };
 
-// Reads the header; `bytes` may end after it. Returns nullopt if the bytes end before the size is
-// known. Throws Error if this is neither a JPEG nor a PNG, or if the header is damaged.
+// Reads the header; `bytes` may end after the header. Returns nullopt if the bytes end before the
+// size is known. Throws Error if the bytes are neither JPEG nor PNG, or the header is damaged.
 std::optional<ImageInfo> read_image_info(std::string_view bytes);
 
-// Limit for frames of a scan, which several threads decode at once, with up to ten bytes per pixel.
+// Maximum pixels of a scan's frame; several threads decode frames, with up to ten bytes per pixel.
 inline constexpr std::int64_t max_frame_pixels = std::int64_t{1} << 25;
-// Limit for texture pages and other images, which are decoded one at a time.
+// Maximum pixels of texture pages and other images, which are decoded one at a time.
 inline constexpr std::int64_t max_decoded_pixels = std::int64_t{1} << 27;
 
 // Decodes any image as 8-bit color; gray becomes red = green = blue, transparency is ignored.
-// Throws Error for more than `max_pixels`; the following functions do so above max_frame_pixels.
+// Throws Error above `max_pixels`; the following functions throw Error above max_frame_pixels.
 ColorImage decode_color(std::string_view bytes, std::int64_t max_pixels = max_frame_pixels);
 // Decodes any image as 8-bit gray; color by ITU-R BT.601 (Y = 0.299 R + 0.587 G + 0.114 B).
 GrayImage decode_gray(std::string_view bytes);

@@ -1,5 +1,5 @@
 // Reads and writes the compressed matrices and texts in RTAB-Map databases: a zlib stream, followed
-// by rows, columns and OpenCV's type as little-endian int32.
+// by three little-endian int32: rows, columns, OpenCV's type.
 #pragma once
 
 #include <cstddef>
@@ -22,7 +22,7 @@ enum class MatrixElement {
   float32 = 5,
   float64 = 6
 };
-std::size_t bytes_of(MatrixElement element);
+std::size_t bytes_of(MatrixElement element);  // bytes of one element
 
 struct StoredMatrix {
   int rows = 0;
@@ -42,20 +42,20 @@ struct StoredMatrix {
   bool operator==(const StoredMatrix&) const = default;
 };
 
-// Reads sizes and type from the end of a blob, without `bytes`. Throws Error if they are invalid.
+// Reads sizes and type from the end of a blob; `bytes` is empty. Throws Error if they are invalid.
 StoredMatrix read_matrix_header(std::string_view blob);
 
 // Maximum compression ratio of deflate (RFC 1951: 258 bytes in two bits).
 inline constexpr std::uint64_t deflate_ratio = 1032;
 
-// Limit of decode_matrix: 16 million float32, ten revolutions of a lidar with 128 x 2048 points.
+// Maximum size for decode_matrix: 16 million float32, ten revolutions of a lidar of 128 x 2048.
 inline constexpr std::uint64_t max_matrix_bytes = std::uint64_t{1} << 26;
 
-// Decodes a matrix. Sizes are checked before memory is allocated: at most max_matrix_bytes, and no
-// more than the stream can contain. Throws Error for a damaged stream or one of wrong length.
+// Decodes a matrix. Throws Error if the stream is damaged or does not have the declared size, or,
+// before memory is allocated, if this size exceeds max_matrix_bytes or deflate_ratio.
 StoredMatrix decode_matrix(std::string_view blob);
-// Decodes a matrix of any size piecewise, in constant memory. All pieces except the last have a
-// multiple of 8 bytes. Throws Error as decode_matrix does.
+// Decodes a matrix of any size in constant memory, and calls `use` for each piece in order. All
+// pieces except the last have a multiple of 8 bytes. Throws Error as decode_matrix does.
 void for_each_matrix_chunk(std::string_view blob,
                            const std::function<void(std::string_view bytes)>& use);
 // Encodes a matrix as the blob that decode_matrix reads.

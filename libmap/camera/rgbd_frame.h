@@ -10,7 +10,7 @@
 
 namespace libmap {
 
-// A stereo pair. If it is rectified, right_from_left is a translation by -baseline_m along x.
+// A stereo pair. In a rectified pair, right_from_left is a translation by -baseline_m along x.
 struct StereoCamera {
   Camera left;
   Camera right;
@@ -19,33 +19,33 @@ struct StereoCamera {
 };
 
 // Color and depth images of one or several cameras. Images of several cameras are side by side in
-// one image, with equal widths and in the order of `cameras`. Depth (m) is registered to the color
-// camera and may have a different size.
+// one image, with equal widths and in the order of `cameras`. Depth (z, m; 0: no measurement) is
+// registered to the color camera and may have another size.
 struct RgbdFrame {
-  int node = 0;
-  double stamp_s = 0.0;
-  double depth_stamp_offset_s = 0.0;  // stamp of depth minus stamp of color, if both are known
+  int node = 0;                       // id of the node in the scan
+  double stamp_s = 0.0;               // stamp of the node
+  double depth_stamp_offset_s = 0.0;  // stamp of depth minus stamp of color; 0 if unknown
   std::vector<Camera> cameras;  // of the color images; of the depth images if there is no color
   ColorImage color;             // empty if not stored or not requested
-  DepthImage depth;
-  GrayImage right;                   // right images of stereo pairs, side by side
+  DepthImage depth;             // empty if not stored or not requested
+  GrayImage right;              // right images of stereo pairs, side by side
   std::vector<StereoCamera> stereo;  // empty without stereo; left cameras are also in `cameras`
 };
 
-// One camera's part of a frame.
+// A camera of a frame with its part of the images.
 struct CameraView {
   Camera color_camera;
-  // color_camera at the size of `depth`; as in RTAB-Map, the principal point is scaled too.
+  // color_camera, scaled to the size of `depth` with the principal point, as RTAB-Map does.
   Camera depth_camera;
   ColorImage color;
   DepthImage depth;
 };
 
-// Splits a frame by camera; empty without cameras. Throws Error naming the node if the image width
-// is not a multiple of the number of cameras.
+// Returns one view per camera of a frame, in the order of `cameras`. Throws Error naming the node
+// if an image's width is not a multiple of the number of cameras.
 std::vector<CameraView> camera_views(const RgbdFrame& frame);
 
-// Returns the largest number of pixels: all cameras together, color image, or depth image.
+// Returns the maximum number of pixels of color image, depth image and all cameras together.
 std::size_t image_pixels(const RgbdFrame& frame);
 
 // Returns the number of frames to keep in memory at a time: 8 of up to 2 megapixels, fewer of

@@ -1,5 +1,5 @@
 // Checks that the depth images of a scan agree with given poses, to detect poses in a wrong format.
-// If they disagree, finds a convention of poses or depth with which they agree.
+// If they disagree, finds a convention of poses or depth unit with which they agree.
 #pragma once
 
 #include <cstddef>
@@ -12,17 +12,17 @@
 
 namespace libmap {
 
-// Agreement of depth between pairs of frames.
+// Agreement of depth in pairs of frames.
 struct DepthAgreement {
-  std::size_t measurements = 0;  // measurements common to both frames of a pair
-  double contradicted = 0.0;     // share with a depth difference above 5 %; 1 without any
-  double difference = 0.0;       // median relative depth difference; 1 without any
+  std::size_t measurements = 0;  // pixels of a frame whose surface the other frame also measured
+  double contradicted = 0.0;  // fraction with a depth difference above 5 %; 1 without measurements
+  double difference = 0.0;    // median relative depth difference; 1 without measurements
 };
 
 struct PoseConsistency {
   std::size_t pairs = 0;  // number of compared pairs of frames
-  DepthAgreement given;
-  // Agreement with the best other convention, and the convention's name; both are empty unless this
+  DepthAgreement given;   // agreement with the given poses
+  // Agreement with the best other convention, and the name of this convention; both are empty if no
   // convention fits much better.
   DepthAgreement best{};
   std::string convention{};
@@ -31,14 +31,15 @@ struct PoseConsistency {
   std::string warning() const;
 };
 
-// Returns pairs of indices: up to 24 poses, each with the next of 59 poses that differs by 8
-// degrees or 0.1 m.
+// Returns pairs of indices in `poses`, ascending. Up to 24 evenly spaced poses are paired with the
+// first of the next 59 poses that differs by more than 8 degrees or 0.1 m, if there is one.
 std::vector<std::pair<std::size_t, std::size_t>> near_pairs_of(const Trajectory& poses);
 
-// Compares the frames of near_pairs_of(world_from_base). If they disagree, these conventions are
-// tried: quaternions as w x y z; poses of the base, the camera's optical frame or a camera with y
-// up; inverse poses; positions in other axes than the rotations; depth in a unit 5 or 1000 times
-// larger or smaller. Frames that cannot be read are ignored.
+// Compares the frames of near_pairs_of(world_from_base); unreadable frames are ignored. If 20 % of
+// the measurements or more contradict, these conventions are tried:
+//   - quaternions as w x y z
+//   - poses of the base, the camera's optical frame, or a camera with y up; inverse poses
+//   - positions in other axes than the rotations; depth unit 5 or 1000 times larger or smaller
 PoseConsistency check_pose_consistency(const ScanSource& scan, const Trajectory& world_from_base);
 
 }  // namespace libmap

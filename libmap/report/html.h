@@ -11,82 +11,67 @@
 
 namespace libmap {
 
-// Escapes a name and allows line breaks after '_', '/' and '.'.
+// Escapes a name for HTML and allows line breaks after '_', '/' and '.'.
 std::string breakable_html(std::string_view name);
-
 // Escapes JSON for a <script> element: every '<' becomes \u003c.
 std::string escape_json_in_script(std::string json);
-
-// Escapes a script or style sheet for inclusion in an element: "</script", "</style" and "<!--" are
-// escaped. Removes carriage returns, so that the bytes equal the bytes that a browser hashes.
+// Escapes "</script", "</style" and "<!--" in a script or style sheet for its element. Removes
+// carriage returns, so that a browser hashes the same bytes as csp_hash.
 std::string escape_code(std::string_view code);
-
-// Base64 by RFC 4648, section 4. Throws Error for 1 GiB or more.
+// Encodes bytes in base64 (RFC 4648, section 4). Throws Error for 1 GiB or more.
 std::string to_base64(std::string_view bytes);
-
-// Returns the hash source of `code` for a Content-Security-Policy: "'sha256-...'".
+// Returns the source expression "'sha256-...'" of `code` for a Content-Security-Policy.
 std::string csp_hash(std::string_view code);
-
-// Returns the HTML attribute ` name="value"`; nothing if the value is empty.
+// Returns the HTML attribute ` name="value"`; empty for an empty value.
 std::string attribute(std::string_view name, std::string_view value);
 
-// Format of the numbers of a column.
+// Format of the numbers in a column of a table.
 struct NumberStyle {
-  bool numeric = false;   // every cell is empty or a number
-  int decimals = 0;       // of all cells; -1: three significant digits in each cell
+  bool numeric = false;   // true if every cell is empty, "nan" or a number
+  int decimals = 0;       // number of decimals; -1: three significant digits in each cell
   bool as_given = false;  // true: all numbers are integers, shown unchanged
 };
-
-// Returns the format of a column: the maximum number of decimals of its cells, at most three; three
-// significant digits if there are fractions and the largest value is below 0.01 or at least 1e9.
+// Returns the format of a column: the largest number of decimals in its cells, at most three; three
+// significant digits if there are fractions and the largest magnitude is < 0.01 or >= 1e9.
 NumberStyle number_style(const std::vector<std::string>& cells);
-
-// Formats a cell, e.g. "0.98214889" as "0.982".
+// Formats a cell, e.g. "0.98214889" as "0.982"; a number that is not finite as a dash.
 std::string shown_number(const std::string& cell, const NumberStyle& style);
-
-// Formats a number with three significant digits, or as integer if it is one or is at least 1000,
-// up to 1e9; a dash if it is not finite.
+// Formats a number: integers, and magnitudes from 1000 to 1e9, without decimals; other numbers with
+// three significant digits; a dash if it is not finite.
 std::string short_number(double value);
 
 struct CellText {
   std::string text;
-  std::string title;  // full value if it differs from the text
+  std::string title;  // tooltip: the full value if it differs from `text`; else empty
 };
 
-// <td> element, with the class "number" if `numeric`.
+// Returns a <td> element, with the class "number" if `numeric`.
 std::string cell_html(const CellText& cell, bool numeric);
-
-// <table> element; the first column contains the row headers. Of more than 45 rows, those after the
-// first 40 are folded, unless `row_attribute` is set: the name of an attribute with the row index.
+// Returns a <table> element; the first column contains the row headers. In a table of more than 45
+// rows, the rows after the first 40 are folded. With `row_attribute`, each row has an HTML
+// attribute of this name with the row index, and no rows are folded.
 std::string table_html(const ReportTable& table, const std::string& row_attribute = {});
-
-// Scrollable box with the HTML `table`; `name` is read out by screen readers.
+// Returns a scrollable box with the HTML `table`; screen readers read out `name`.
 std::string scroll_box(const std::string& table, const std::string& name);
 
-// Parameters, inputs and results of one output as tables. For several outputs: a table of differing
-// values (without inputs) with one column per output, then the common values.
+// Returns tables of parameters, inputs and results. For several outputs: a table of the values that
+// differ, with one column per output and without inputs, then a table of the common values.
 std::string parameters_html(const ReportParameters& parameters);
-
-// Command, parameters, results and inputs of each output of a run, folded, grouped by folder.
+// Returns command, parameters, results and inputs of each output of a run, folded, by folder.
 std::string sources_html(const ReportContent& content);
-
-// Table of milliseconds per step and case, with sums per command and in total.
+// Returns a table of milliseconds per step and case, with sums per command and in total.
 std::string timings_html(const TimingTable& table);
 
-// Legend, still image, canvas, look-ups and data of a map; canvas and data only if `with_view`.
-// `preview` is the HTML that is shown where there is no view, e.g. without JavaScript.
+// Returns the HTML of a map: legend, still image, canvas, look-ups and data; canvas and data only
+// if `with_view`. `preview` is the HTML that is shown without a 3-D view, e.g. without JavaScript.
 std::string map_html(const ReportMap& map, const std::string& preview, bool with_view);
-
-// Colors of classes and flags, for the page's script.
+// Returns the colors of score classes and flags as JSON, for the page's script.
 std::string palette_json();
-
-// CSS rules of the legend's swatches, one class per color.
+// Returns CSS rules for the colors of legends, one class per color.
 std::string palette_style();
-
-// Legend, canvas and data of a scene; canvas and data only if `with_view`.
+// Returns the HTML of a scene: legend, canvas and data; canvas and data only if `with_view`.
 std::string scene_html(const ReportScene& scene, bool with_view);
-
-// Returns the approximate number of bytes that the mesh takes in the page.
+// Returns the approximate number of bytes of a mesh in the page.
 std::size_t scene_bytes(const TriangleMesh& mesh);
 
 }  // namespace libmap

@@ -18,58 +18,59 @@ namespace libmap {
 
 // A PNG, JPEG or SVG image for embedding.
 struct ReportImage {
-  std::string file{};  // path relative to the run's folder
-  std::string label{};
+  std::string file{};   // path relative to the run's folder
+  std::string label{};  // caption of this image; may be empty
   std::string bytes{};
-  std::string media_type{};
-  int width = 0;  // pixels at full size; 0: unknown
-  int height = 0;
-  std::string change{};  // difference from the file, e.g. "JPEG, quality 90"; empty: none
+  std::string media_type{};  // e.g. "image/png"
+  int width = 0;             // pixels; 0: unknown
+  int height = 0;            // pixels; 0: unknown
+  std::string change{};      // difference from the file, e.g. "JPEG, quality 90"; empty: none
 };
 
-// Shown columns of a table, with headings; empty: all.
+// Columns to show: name in the file, heading. Empty: all columns.
 using TableColumns = std::vector<std::pair<std::string, std::string>>;
 
 struct ReportTable {
-  Table table{};                         // shown columns and rows
-  std::vector<std::string> headings{};   // one per column
-  std::optional<std::uint64_t> lines{};  // lines of the file, if not all rows are shown
+  Table table{};                         // shown rows and columns
+  std::vector<std::string> headings{};   // one per shown column
+  std::optional<std::uint64_t> lines{};  // lines of the file; nullopt: all rows are shown
 };
 
 struct ReportMap {
   MapView view{};
-  std::optional<ReportTable> locations{};  // look-ups; row n corresponds to marker n
-  std::optional<ReportImage> preview{};    // shown where there is no 3-D view
+  std::optional<ReportTable> locations{};  // table of look-ups; row n has marker n of the view
+  std::optional<ReportImage> preview{};    // image that is shown without a 3-D view
 };
 
-// A colored mesh and the meaning of the colors.
+// A colored mesh, and the meaning of its colors.
 struct ReportScene {
   TriangleMesh mesh{};
-  std::vector<std::pair<Color, std::string>> legend{};
+  std::vector<std::pair<Color, std::string>> legend{};  // colors and their meanings
 };
 
+// Parameters of one or several outputs.
 struct ReportParameters {
   std::vector<std::pair<std::string, Manifest>> outputs{};  // column heading and manifest
 };
 
-// Running times per step and case, as in tables 4-2 and 4-3 of the thesis.
+// Running times of a step of a command.
 struct TimingRow {
   std::string command;
   std::string step;
-  std::vector<std::optional<double>> seconds;  // one per case
+  std::vector<std::optional<double>> seconds;  // one per case; nullopt: not executed
 };
 
 struct TimingTable {
   std::vector<std::string> cases;              // column headings
   std::vector<TimingRow> rows;                 // by command and step, in order of appearance
   std::vector<std::vector<unsigned>> threads;  // distinct numbers of threads per case
-  // True if a step that occurs in several manifests of a case was summed.
+  // True if any time is the sum over several manifests of a case.
   bool sums = false;
 };
 
 struct ReportListing {
-  std::string text{};  // first lines of a file
-  std::size_t omitted_lines = 0;
+  std::string text{};             // first lines of a file
+  std::size_t omitted_lines = 0;  // number of further lines
 };
 
 // A file that cannot be shown.
@@ -84,9 +85,9 @@ using ReportBody = std::variant<std::monostate, ReportImages, ReportTable, Repor
 
 struct ReportItem {
   std::string caption{};
-  std::string source{};  // shown file, if there is exactly one
-  std::vector<ReportGap> gaps{};
-  ReportBody body{};
+  std::string source{};           // shown file; empty if there are several
+  std::vector<ReportGap> gaps{};  // files that cannot be shown
+  ReportBody body{};              // content; std::monostate: nothing can be shown
 };
 
 struct ReportSection {
@@ -96,17 +97,17 @@ struct ReportSection {
   std::vector<ReportSection> sections{};
 };
 
-// An output of the run with its manifest, or the error if the manifest cannot be read.
+// An output of the run.
 struct ReportSource {
-  std::string output{};  // path
+  std::string output{};  // path; in ReportContent, relative to the run's folder
   Manifest manifest{};
-  std::string error{};  // empty if the manifest was read
+  std::string error{};  // reason why the manifest cannot be read; empty if it was read
 };
 
-// The heading is the report's title.
+// The section's heading is the title of the report.
 struct ReportContent : ReportSection {
   std::vector<ReportSource> sources{};
-  std::size_t more_sources = 0;  // number of unlisted outputs
+  std::size_t more_sources = 0;  // number of outputs that `sources` omits
 };
 
 }  // namespace libmap

@@ -1,4 +1,4 @@
-// Plans a report (its sections and their files) on the folder of a run, and reads the files.
+// Plans a report on the folder of a run (sections and their files), and reads the files.
 #pragma once
 
 #include <filesystem>
@@ -17,14 +17,13 @@ enum class ItemKind { image, table, map, scene, parameters, timings, listing };
 
 struct PlannedItem {
   ItemKind kind = ItemKind::listing;
-  std::vector<std::filesystem::path> files{};  // parameters: outputs
-  std::vector<std::string> labels{};           // empty, or one per file
+  std::vector<std::filesystem::path> files{};  // shown files; kind parameters: outputs
+  std::vector<std::string> labels{};           // one per file, or empty
   std::string caption{};
-  // Maps: table of look-ups, shown columns with headings, image of the map.
-  std::filesystem::path lookup{};
-  TableColumns columns{};
-  std::filesystem::path image{};
-  // Timings: heading and outputs of each column.
+  std::filesystem::path lookup{};  // kind map: table of look-ups; may be empty
+  TableColumns columns{};          // kind map: columns of `lookup` to show
+  std::filesystem::path image{};   // kind map: still image of the map; may be empty
+  // Kind timings: heading of each column, and the outputs whose times it contains.
   std::vector<std::pair<std::string, std::vector<std::filesystem::path>>> cases{};
 };
 
@@ -34,36 +33,36 @@ struct PlannedSection {
   std::vector<PlannedItem> items{};  // before the first inner section
   std::vector<PlannedSection> sections{};
 
-  // Number of items of a kind, including inner sections.
+  // Number of items of a kind in this section and all inner sections.
   std::size_t count(ItemKind kind) const;
 };
 
-// Plans the report on `folder`: parameters of all maps, one section per inner folder with its maps,
-// scenes, images, tables and texts, and the running times. The heading is the report's title.
-// Throws Error if the folder does not exist or contains nothing to show.
+// Plans the report on `folder`: parameters of all maps; one section per inner folder with its maps,
+// scenes, images, tables and texts; the running times. The heading is the report's title. Throws
+// Error if the folder does not exist or contains nothing to show.
 PlannedSection plan_report(const std::filesystem::path& folder);
 
-// Returns the outputs with a manifest in `folder` and subfolders (12 levels), in natural order.
-// Folders of tiles are included only with `tiles`, tile stores never.
+// Returns the outputs that have a manifest, in `folder` and its subfolders (12 levels), in natural
+// order. Folders of tiles are included only if `tiles` is true, tile stores never.
 std::vector<ReportSource> manifests_below(const std::filesystem::path& folder, bool tiles);
 
-// True if `a` is before `b` in natural order, with digits as numbers: "2_slopes", "10_walls".
+// True if `a` is before `b` in natural order, which compares digits as numbers: "2_a" < "10_b".
 bool natural_less(const std::string& a, const std::string& b);
 
 struct ReportReadOptions {
   std::filesystem::path folder{};    // folder of the run
-  std::filesystem::path excluded{};  // the report itself, which is not listed
-  std::size_t max_rows = 1000;       // per table
-  std::size_t max_lines = 200;       // per text file
-  std::size_t max_sources = 400;     // in the list of all outputs
+  std::filesystem::path excluded{};  // the report's file, which is not listed as an output
+  std::size_t max_rows = 1000;       // maximum number of rows of a table
+  std::size_t max_lines = 200;       // maximum number of lines of a text file
+  std::size_t max_sources = 400;     // maximum number of outputs in the list of all outputs
 };
 
-// Reads a map, with one positioned marker per row of the look-ups, if there are any. Must throw
-// Error if the map cannot be shown.
+// Function that reads a map, with a marker for each row of the table `lookup`, if given. It must
+// throw Error if the map cannot be shown.
 using MapLoader = std::function<MapView(const std::filesystem::path& map,
                                         const std::optional<std::filesystem::path>& lookup)>;
 
-// Reads the mesh of a scene. Must throw Error if the scene cannot be shown.
+// Function that reads the mesh of a scene. It must throw Error if the scene cannot be shown.
 using SceneLoader = std::function<ReportScene(const std::filesystem::path& scene)>;
 
 struct ReportReadResult {
@@ -75,12 +74,12 @@ struct ReportReadResult {
 ReportReadResult read_report_content(const PlannedSection& plan, const ReportReadOptions& options,
                                      const MapLoader& load_map, const SceneLoader& load_scene);
 
-// Reads the first `max_rows` rows of a CSV file of any size (at most 4 MiB of it). Throws Error: an
-// unreadable file, not a table, a missing column.
+// Reads the first `max_rows` rows of a CSV file of any size, from its first 4 MiB. Throws Error for
+// an unreadable file, a file that is not a table, or a missing column.
 ReportTable read_report_table(const std::filesystem::path& path, const TableColumns& columns,
                               std::size_t max_rows);
 
-// Returns the running times of each case's manifests. Equal steps of a command are summed.
+// Returns the running times in the manifests of each case. Times of equal steps are summed.
 TimingTable timing_table(const std::vector<std::pair<std::string, std::vector<Manifest>>>& cases);
 
 }  // namespace libmap

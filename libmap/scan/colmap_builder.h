@@ -1,4 +1,4 @@
-// Converts the images of a scan to a COLMAP model with points from the scan's depth images.
+// Makes a COLMAP model from the images of a scan, with 3-D points from the depth images.
 #pragma once
 
 #include <cstddef>
@@ -15,20 +15,21 @@
 namespace libmap {
 
 struct ColmapBuilderOptions {
-  int point_spacing_px = 16;      // > 0: spacing of an image's points in x and in y
-  double depth_tolerance = 0.02;  // > 0: maximum relative depth difference of identical points
+  int point_spacing_px = 16;      // 1 to 10000: spacing of an image's points in x and in y
+  double depth_tolerance = 0.02;  // > 0: maximum relative depth difference between image and point
 };
 void bind(ParameterTable& table, ColmapBuilderOptions& options);
 
 // An image observes each earlier point whose depth it measures at the point's projection, so that
 // reprojection errors are 0 by construction (stored as -1, unknown). It adds a point in each cell
-// of a pixel grid without such a point or a depth edge. Images of equal lenses share a camera.
+// of a pixel grid in which it observes no point and has no depth edge. Images of cameras with equal
+// intrinsics share a COLMAP camera.
 class ColmapBuilder {
  public:
   explicit ColmapBuilder(const ColmapBuilderOptions& options = {});  // an empty model
 
-  // Adds an image; ids start at 1 in the order of calls. An image without depth has no points and
-  // observations. Throws Error if COLMAP has no model that is equivalent to the color camera.
+  // Adds an image; image ids start at 1 in the order of calls. An image without depth has no points
+  // or observations. Throws Error if COLMAP has no model that is equivalent to the color camera.
   void add_image(const std::string& name, const CameraView& view, const Pose& world_from_camera);
 
   const ColmapModel& model() const { return model_; }

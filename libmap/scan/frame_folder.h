@@ -1,24 +1,25 @@
-// Reader of a scan stored as a folder of plain files, in the layout of the TUM RGB-D benchmark
-// (Sturm et al. 2012) or the complete layout of FrameFolderWriter.
+// Reads a scan that is stored as a folder of plain files: the layout of the TUM RGB-D benchmark
+// (Sturm et al. 2012), or the more complete layout that FrameFolderWriter writes (nodes.csv).
 //
-//   scan.yaml               keys of FrameFolderOptions; optional
+//   scan.yaml               keys of FrameFolderOptions (below); optional
 //   associations.txt        lines "stamp color stamp depth", or depth before color; if missing:
 //   rgb.txt, depth.txt      lines "stamp file"; rgb.txt is optional
-//   calibration.yaml        the camera (camera_io.h)
-//   groundtruth.txt         true poses as TUM lines; or poses_ground_truth.tum
-//   poses.tum               odometry as TUM lines; or poses_odometry.tum
-//   poses_stored.tum        optimized poses as TUM lines
-//   links.g2o               links between nodes; the file's vertices are not used
-//   nodes.csv               instead of associations.txt: node, session, weight, stamp_s, label,
-//                           color, depth, right, calibration, baseline_m, velocity, gps. Files are
-//                           relative to the folder. A node's calibrations are separated by spaces:
-//                           one per camera, or left and right of each pair with one baseline_m.
-//   color/ depth/ right/ calibration/
+//   calibration.yaml        the camera (camera_io.h); FrameFolderOptions::calibration
+//   groundtruth.txt         true poses as lines of TUM; or poses_ground_truth.tum; optional
+//   poses.tum               odometry as lines of TUM; or poses_odometry.tum; optional
+//   poses_stored.tum        optimized poses as lines of TUM; optional
+//   links.g2o               links between nodes (edges; vertices are ignored); optional
+//   nodes.csv               instead of associations.txt: a table with the columns node, session,
+//                           weight, stamp_s, label, color, depth, right, calibration, baseline_m,
+//                           velocity, gps. Files are relative to the folder. Calibrations of a node
+//                           are separated by spaces: one per camera, or left and right camera of
+//                           each stereo pair with one baseline_m per pair.
+//   color/ depth/ right/ calibration/  files that nodes.csv names
 //
-// Without nodes.csv, color and depth are paired by stamp; nodes are numbered from 1 in the order of
-// time and have the stamp of the depth image. Poses are assigned by node if all poses of a file
-// have one, else by stamp: interpolated if a pose before and one after the stamp are both within
-// pairing_tolerance_s, else the only pose within this tolerance.
+// Without nodes.csv, color and depth images are paired by stamp; nodes are numbered from 1 in the
+// order of time and have the stamp of the depth image. Poses are assigned by node id if all poses
+// of a file have one. Otherwise, a node has the pose at its stamp, interpolated between the poses
+// before and after if both are within pairing_tolerance_s, or the only pose within it.
 #pragma once
 
 #include <filesystem>
@@ -34,7 +35,7 @@
 
 namespace libmap {
 
-// Names of these files and folders.
+// Names of the files and folders above.
 namespace frame_folder_files {
 
 inline constexpr const char* options = "scan.yaml";
@@ -59,31 +60,31 @@ inline constexpr const char* calibration_folder = "calibration";
 enum class PoseFrame { camera, base };
 std::vector<std::pair<std::string, PoseFrame>> pose_frame_names();
 
-// The defaults describe folders of the TUM benchmark. Camera files are relative to the folder.
+// The defaults are for folders of the TUM benchmark.
 struct FrameFolderOptions {
   double depth_unit_m = 0.0002;                  // > 0: meters per unit of the 16-bit depth images
-  std::string calibration = "calibration.yaml";  // camera file of the color camera
-  // Camera file of a separate depth camera, in which local_transform is base_from_depth; depth is
-  // then registered to color on reading. Empty: depth is already registered.
+  std::string calibration = "calibration.yaml";  // file of the color camera, relative to the folder
+  // Camera file of a separate depth camera, whose local_transform is base_from_depth; depth is then
+  // registered to color on reading. Empty: the stored depth is registered to color.
   std::string depth_calibration{};
   PoseFrame pose_frame = PoseFrame::camera;  // frame of the poses in the files
-  double pairing_tolerance_s = 0.02;         // >= 0: maximum difference of paired stamps
+  double pairing_tolerance_s = 0.02;         // >= 0: maximum difference between paired stamps
 };
 void bind(ParameterTable& table, FrameFolderOptions& options);
 
 class FrameFolder : public ScanSource {
  public:
-  // scan.yaml overrides `defaults`. Throws Error if the folder, the list of images or a camera file
-  // is missing, or a file is invalid.
+  // Keys in scan.yaml override `defaults`. Throws Error if the folder, the list of images or a
+  // camera file is missing, or a file is invalid.
   explicit FrameFolder(const std::filesystem::path& path, const FrameFolderOptions& defaults = {});
 
   const std::filesystem::path& path() const override { return path_; }
   const PoseGraph& graph() const override { return graph_; }
-  std::string image_name(int node) const override;
-  RgbdFrame read_frame(int node, FrameParts parts = {}) const override;
+  std::string image_name(int node) const override;                       // as in ScanSource
+  RgbdFrame read_frame(int node, FrameParts parts = {}) const override;  // as in ScanSource
 
-  const FrameFolderOptions& options() const { return options_; }
-  // Reports unpaired images, pose files in which no pose matches a node, and ignored links.
+  const FrameFolderOptions& options() const { return options_; }  // `defaults` and scan.yaml
+  // Images without a partner, pose files of which no pose matches a node, and ignored links.
   const std::vector<std::string>& warnings() const override { return warnings_; }
 
  private:

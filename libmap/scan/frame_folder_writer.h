@@ -13,19 +13,18 @@
 
 namespace libmap {
 
-// Names of all files and folders that the writer can create.
+// Returns the names of all files and folders that the writer can create.
 std::vector<std::string> frame_folder_names();
 
-// Encoded images of a frame to store unchanged. Empty: the frame's image is encoded as PNG.
+// Encoded images of a frame, which are stored unchanged. Empty: the frame's image, encoded as PNG.
 struct StoredImages {
   std::string color{};  // JPEG or PNG
-  std::string depth{};  // PNG of 16-bit millimeters
+  std::string depth{};  // PNG with 16-bit depth in millimeters
   std::string right{};  // JPEG or PNG
 };
 
-// Numbers of written images, calibrations and associations.
 struct FrameFolderCounts {
-  std::size_t color_images = 0;
+  std::size_t color_images = 0;  // numbers of written files
   std::size_t depth_images = 0;
   std::size_t right_images = 0;
   std::size_t calibrations = 0;
@@ -34,15 +33,15 @@ struct FrameFolderCounts {
 
 class FrameFolderWriter {
  public:
-  // Writes to `folder`, which must exist and contain no scan. All members throw Error of kind
-  // `failed` if a file or folder cannot be written.
+  // Writes to `folder`, which must exist and contain no scan. All functions throw Error (failed) if
+  // a file or folder cannot be written.
   explicit FrameFolderWriter(std::filesystem::path folder);
 
   // Writes the images and calibrations of a frame, e.g. color/000012.jpg for node 12. Depth that is
-  // encoded here is rounded to whole millimeters, and 0 beyond 65.534 m.
+  // not in `stored` is rounded to millimeters, and 0 above 65.534 m.
   void add_frame(const RgbdFrame& frame, const StoredImages& stored = {});
 
-  // Writes nodes, poses and links of `graph`, associations and scan.yaml. Called once, at the end.
+  // Writes nodes, poses and links of `graph`, associations.txt and scan.yaml. Call once, last.
   FrameFolderCounts finish(const PoseGraph& graph);
 
  private:

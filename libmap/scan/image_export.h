@@ -1,4 +1,4 @@
-// Exports color images of a scan to files: selects representative views, and writes Bundler files.
+// Exports color images of a scan to files, selects representative views, and writes Bundler models.
 #pragma once
 
 #include <cstddef>
@@ -17,47 +17,48 @@ namespace libmap {
 std::string image_file_name(int node, std::size_t camera, const std::string& extension);
 
 struct ImageFile {
-  std::string name{};
-  std::string bytes{};  // as stored in an RTAB-Map database for a single camera; else a PNG
+  std::string name{};   // as image_file_name
+  std::string bytes{};  // a PNG; the stored file if the scan is an RTAB-Map database of one camera
 };
 
-// Returns the image file of one camera; `views` are the views of the node's frame, with color.
+// Returns the image file of camera `camera`; `views` are the views of the node's frame, with color.
 ImageFile image_file_of(const ScanSource& scan, int node, const std::vector<CameraView>& views,
                         std::size_t camera);
 
-// Reads one view per camera of a node. Throws Error naming a node without color or calibration.
+// Returns one view per camera of a node. Throws Error naming a node without color or calibration.
 std::vector<CameraView> read_views(const ScanSource& scan, int node, FrameParts parts);
 
+// Two views are similar if their distance is less than radius_m and the angle between their optical
+// axes is at most angle_deg.
 struct ViewSelectionOptions {
-  double radius_m = 0.5;    // >= 0: only views at a smaller distance are similar; 0: all are kept
-  double angle_deg = 30.0;  // 0..180: maximum angle between the optical axes of similar views
+  double radius_m = 0.5;    // >= 0; 0: no views are similar
+  double angle_deg = 30.0;  // 0 to 180
 };
 void bind(ParameterTable& table, ViewSelectionOptions& options);
 
-// Selects views greedily by descending quality and returns their indices in ascending order. Views
-// are similar if their distance is less than radius_m and the angle between their optical axes is
-// at most angle_deg. No two selected views are similar; each other view is similar to a better
-// selected view. `qualities` has one value per view; the first of equal views is better.
+// Selects views greedily by descending quality; returns their indices, ascending. A view is
+// selected if it is not similar to a selected view, so each other view is similar to a better
+// selected one. `qualities` has one value per view; the first of equal views is better.
 std::vector<std::size_t> select_views(const std::vector<Pose>& world_from_camera,
                                       const std::vector<double>& qualities,
                                       const ViewSelectionOptions& options = {});
 
-// Image and camera of a Bundler v0.3 model (Snavely, Seitz and Szeliski 2006): bundle.out, list.txt
-// and the images, which MeshLab imports as "registered rasters".
+// Image and camera of a Bundler v0.3 model (Snavely, Seitz and Szeliski 2006). The model consists
+// of bundle.out, list.txt and the images; MeshLab imports it as "registered rasters".
 struct BundlerView {
   std::string image{};  // name in list.txt, relative to the folder of list.txt
-  Camera camera{};      // centered pinhole without distortion; base_from_camera is not used
+  Camera camera{};      // centered_pinhole (color_image.h); base_from_camera is not used
   Pose world_from_camera = Pose::Identity();  // optical frame: z forward, x right, y down
 };
 
-// Returns bundle.out: "# Bundle file v0.3", the numbers of cameras and points, then for each camera
-// f k1 k2, three rows of R and t. Bundler's camera looks along -z with x right and y up:
+// Returns the text of bundle.out: "# Bundle file v0.3", the numbers of cameras and points (0), then
+// for each camera f k1 k2, three rows of R and t. A point X in the world projects to
 //   P = R * X + t,  p = -P.xy / P.z,  pixel = f * (1 + k1 |p|^2 + k2 |p|^4) * p
-// from the center of the image, x right, y up. k1 = k2 = 0, because readers interpret k1 and k2
-// differently. There are no points, because registered images need no points.
+// relative to the image center, x right, y up (Bundler's camera looks along -z). k1 = k2 = 0,
+// because readers interpret k1 and k2 differently.
 std::string to_bundle_text(const std::vector<BundlerView>& views);
 
-// Returns list.txt: one image per line.
+// Returns the text of list.txt: one image name per line.
 std::string to_bundler_list(const std::vector<BundlerView>& views);
 
 }  // namespace libmap

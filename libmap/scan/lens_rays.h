@@ -17,12 +17,12 @@ inline bool same_lens(const Camera& a, const Camera& b) {
          a.distortion == b.distortion;
 }
 
-// Keeps the table of the last lens, because most scans have one lens. Thread-safe.
+// Keeps the rays of the last lens only, because most scans have one lens. Thread-safe.
 class LensRays {
  public:
   using Table = std::vector<Eigen::Vector2d>;
 
-  // Returns ray_table(camera) (camera.h): the rays of all pixels, row by row.
+  // Returns ray_table(camera) (camera.h): the rays x/z, y/z of all pixels, row by row.
   std::shared_ptr<const Table> rays_of(const Camera& camera) {
     const std::lock_guard lock(mutex_);
     if (rays_ == nullptr || !same_lens(camera, lens_)) {

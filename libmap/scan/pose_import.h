@@ -13,36 +13,37 @@
 
 namespace libmap {
 
-// Order of a quaternion's components in a file: as the format defines, w last; or w first.
+// Order of a quaternion's components in a file: x y z w, as the formats define, or w x y z.
 enum class QuaternionOrder { xyzw, wxyz };
-// Returns a pose corrected for a quaternion that was read as x y z w but written in `order`.
+// Returns the pose that the file contains, if `read` was read as x y z w but is written in `order`.
 Pose with_quaternion_order(const Pose& read, QuaternionOrder order);
 
 struct PoseImportOptions {
-  TrajectoryFormat format = TrajectoryFormat::automatic;
-  QuaternionOrder quaternion = QuaternionOrder::xyzw;
-  // Frame of the poses in the file: the base, or the first camera's optical frame. Poses of COLMAP,
-  // nerfstudio and Open3D are always of cameras.
+  TrajectoryFormat format = TrajectoryFormat::automatic;  // format of the file
+  QuaternionOrder quaternion = QuaternionOrder::xyzw;     // order in the file
+  // Frame of the poses in the file: the robot's base, or the first camera's optical frame. Poses in
+  // files of COLMAP, nerfstudio and Open3D are always of cameras.
   PoseFrame frame = PoseFrame::base;
-  // >= 0: meters per unit of the file's positions. 0: the least-squares scale to the odometry of
-  // the scan's longest session or, without odometry, to its optimized poses (Umeyama 1991).
+  // > 0: meters per unit of the file's positions. 0: the least-squares scale (Umeyama 1991) to the
+  // odometry of the scan's longest session or, without odometry, to its optimized poses.
   double scale = 1.0;
 };
 void bind(ParameterTable& table, PoseImportOptions& options);
 
 struct ImportedPoses {
-  NodeTrajectory trajectory;
-  std::size_t poses_in_file = 0;     // number of poses in the file
-  double scale = 1.0;                // applied meters per unit
-  double max_rig_deviation_m = 0.0;  // maximum distance of a camera's base position from the mean
-  // Reports poses dropped for lack of a camera or a usable calibration, and motion between
-  // successive poses that differs from the scan's in length (wrong scale) or axes (wrong format).
+  NodeTrajectory trajectory;      // poses ascending by node id, and number of unmatched poses
+  std::size_t poses_in_file = 0;  // number of poses in the file
+  double scale = 1.0;             // meters per unit of the file's positions
+  // Maximum distance of a node's base positions, one by each of its cameras, from their mean.
+  double max_rig_deviation_m = 0.0;
+  // Reports dropped poses (the camera does not exist or has no usable calibration), and motion
+  // between successive poses that differs from the scan's in length (unit) or rotation (axes).
   std::vector<std::string> warnings{};
 };
 
-// Assigns poses to nodes as assign_nodes (trajectory_io.h) does. Images of COLMAP and nerfstudio
-// are assigned by file name without folder: the scan's file name, a node's number (`000012.jpg`,
-// `12`; `000012_1.jpg` for the second camera), or a stamp within 20 ms (`1305031102.175304.png`).
+// Assigns poses to nodes as assign_nodes (trajectory_io.h) does, but images of COLMAP and
+// nerfstudio by the file name without folder: the name of the scan's image, a node id (000012.jpg,
+// 12; 000012_1.jpg for the second camera), or a stamp within 20 ms (1305031102.175304.png).
 // If several cameras of a node have a pose, the node's pose is the mean. Throws Error naming the
 // file if no pose matches a node, two match the same camera, or the scale is undetermined.
 ImportedPoses import_poses(const std::filesystem::path& path, const ScanSource& scan,

@@ -1,5 +1,5 @@
-// Reads and writes rigs of several depth cameras on one robot, reads their images, and finds sets
-// of synchronized images. A rig is a YAML file:
+// Reads and writes rigs (several depth cameras on one robot), reads their images, and finds sets of
+// synchronized images. A rig is a YAML file:
 //
 //   depth_scale_m: 0.001       # meters per unit of the depth images
 //   near_m: 0.28               # measurements outside near..far are dropped
@@ -11,19 +11,19 @@
 //       camera_matrix: [337.2, 0, 319.5, 0, 337.2, 179.5, 0, 0, 1]
 //       robot_from_camera: [0, 0, 1, 0.2, -1, 0, 0, 0, 0, -1, 0, 0.1]   # 3 x 4, row by row
 //     - name: left
-//       calibration: left.yaml            # ... or a file, relative to this one
+//       calibration: left.yaml            # ... or a camera file, relative to this file
 //       position_m: [0.1, 0.17, 0.1]      # instead of robot_from_camera: pose of the camera's body
 //       roll_pitch_yaw_deg: [0, 0, 60]    # frame (x forward, z up, REP-103; about fixed axes)
 //       far_m: 2.0                        # replaces the rig's far_m (also depth_scale_m, near_m)
 //
-// robot_from_camera refers to the optical frame (z forward). A camera without any of these poses
-// has the local_transform of the calibration.
+// robot_from_camera is the pose of the optical frame (z forward). A camera without a pose in this
+// file has the local_transform of the camera file.
 //
 // The images are in a folder:
 //
-//   FOLDER/rig.yaml            can also be given separately
+//   FOLDER/rig.yaml            the rig; may also be elsewhere
 //   FOLDER/NAME/STAMP.png      16-bit gray, one folder per camera; STAMP in seconds, e.g. 12.340000
-//   FOLDER/images.csv          replaces the stamps in the names: columns camera, stamp_s, file
+//   FOLDER/images.csv          replaces the stamps in the file names: columns camera, stamp_s, file
 //                              (relative to FOLDER)
 #pragma once
 
@@ -40,8 +40,8 @@
 namespace libmap {
 
 struct RigCamera {
-  std::string name{};                                      // folder name: no '/', unique in the rig
-  Camera camera{};                                         // base_from_camera is robot_from_camera
+  std::string name{};                                      // name of a folder, unique in the rig
+  Camera camera{};                                         // base_from_camera: robot_from_camera
   double depth_scale_m = 0.001;                            // > 0: meters per unit of the images
   double near_m = 0.0;                                     // >= 0: minimum valid depth
   double far_m = std::numeric_limits<double>::infinity();  // > near_m: maximum valid depth
@@ -56,8 +56,8 @@ struct CameraRig {
 
 inline constexpr const char* rig_file_name = "rig.yaml";
 
-// Parses or reads a rig and checks it. Calibration files are relative to the folder of `file`.
-// Throws Error naming `file`, camera and key, and for unknown keys the nearest known key.
+// Parse or read a rig, and check it. Camera files are relative to the folder of the rig's file.
+// Throw Error naming file, camera and key; for an unknown key, also the nearest known key.
 CameraRig parse_rig(const std::string& text, const std::string& file);
 CameraRig read_rig(const std::filesystem::path& path);
 
@@ -68,25 +68,25 @@ inline constexpr const char* rig_images_file_name = "images.csv";
 
 // File of a depth image of a rig's camera.
 struct RigImage {
-  std::size_t camera = 0;  // index in the rig
+  std::size_t camera = 0;  // index in CameraRig::cameras
   double stamp_s = 0.0;
-  std::filesystem::path file{};
+  std::filesystem::path file{};  // path of the PNG
 };
 
 // Returns "NAME/STAMP.png" with six decimals, the file name that list_rig_images expects.
 std::string rig_image_name(const std::string& camera, double stamp_s);
 
-// Lists the images of the rig's cameras in `folder` by camera, then stamp, then file. A camera
-// without a folder or a row has no images. Throws Error if the folder is missing, no camera has an
-// image, a PNG's name is not a stamp, or images.csv is invalid.
+// Lists the images of the rig's cameras in `folder` by camera, then stamp, then file. A camera may
+// have no images. Throws Error if the folder is missing, no camera has an image, the name of a PNG
+// is not a stamp, or images.csv is invalid.
 std::vector<RigImage> list_rig_images(const std::filesystem::path& folder, const CameraRig& rig);
 
-// Reads an image in units of the camera's depth scale. Throws Error naming the file if it is not a
-// 16-bit gray PNG or the size differs from the camera's calibration.
+// Reads an image in units of the camera's depth_scale_m. Throws Error naming the file if it is not
+// a 16-bit gray PNG or has another size than the camera's calibration.
 Image<std::uint16_t> read_rig_units(const RigImage& image, const RigCamera& camera);
 
-// Reads an image in meters; 0 for the units 0 and 65535 (saturated). The caller applies near_m and
-// far_m. Throws as read_rig_units does.
+// Reads an image in meters; 0 where the stored value is 0 or 65535 (saturated). Does not apply
+// near_m and far_m. Throws as read_rig_units does.
 DepthImage read_rig_depth(const RigImage& image, const RigCamera& camera);
 
 // Images of a rig at one time, at most one per camera.
@@ -97,16 +97,16 @@ struct SynchronizedSet {
     // within the tolerance (not in results of synchronized_sets). missing: no image is available.
     enum class State { seen, late, missing };
     State state = State::missing;
-    std::size_t image = 0;  // index of the image nearest to stamp_s, unless missing
-    double offset_s = 0.0;  // stamp of the image minus stamp_s
+    std::size_t image = 0;  // index of the image nearest to the set's stamp, unless missing
+    double offset_s = 0.0;  // stamp of the image minus stamp of the set
   };
   std::vector<Camera> cameras{};  // one per camera of the rig
 
   std::size_t seen() const;  // number of cameras with an image in this set
 };
 
-// Returns the set at `stamp_s`: each camera's image nearest in time (the earlier one for equal
-// distances) if it is within `tolerance_s` >= 0.
+// Returns the set at `stamp_s`: each camera's image nearest in time (the earlier one of equal
+// distances), if it is within `tolerance_s` >= 0.
 SynchronizedSet synchronized_set_at(const std::vector<RigImage>& images, std::size_t camera_count,
                                     double stamp_s, double tolerance_s);
 
@@ -115,10 +115,10 @@ SynchronizedSet synchronized_set_at(const std::vector<RigImage>& images, std::si
 SynchronizedSet fullest_synchronized_set(const std::vector<RigImage>& images,
                                          std::size_t camera_count, double tolerance_s);
 
-// Splits a recording into sets in ascending order; each image is in exactly one. The earliest
-// unassigned image begins a set and is part of it. Of the stamps of the unassigned images at most
-// `tolerance_s` later, the set has the stamp at which it contains the most cameras; ties are
-// resolved as in fullest_synchronized_set.
+// Splits a recording into sets, ascending by stamp; each image is in exactly one set. Repeatedly,
+// the earliest remaining image begins a set. The set is at the stamp of a remaining image, at most
+// `tolerance_s` later, at which it contains this image and the most cameras; ties are resolved as
+// in fullest_synchronized_set.
 std::vector<SynchronizedSet> synchronized_sets(const std::vector<RigImage>& images,
                                                std::size_t camera_count, double tolerance_s);
 

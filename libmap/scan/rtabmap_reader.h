@@ -1,9 +1,8 @@
-// Reads RTAB-Map databases of all schemas from 0.10 to 0.23 (and images of older ones), without
-// RTAB-Map.
+// Reads RTAB-Map databases without RTAB-Map: versions 0.10 to 0.23, and the images of older ones.
 //
-// The schema is recognized by columns, not by version. The reader does not write to the file or the
-// folder, and another program can have the file open (see SqliteFile). Nodes, links and poses are
-// read on opening, images one node at a time.
+// The version is recognized by columns. The reader does not write to the file or its folder, and
+// another program may have the file open (see SqliteFile). Nodes, links and poses are read on
+// opening, images one node at a time.
 #pragma once
 
 #include <cstddef>
@@ -27,39 +26,39 @@ namespace libmap {
 
 class SqliteFile;
 
-// Data that a node contains, by the headers of the images. Sizes in bytes are of the stored blobs.
+// Data of a node, recognized from the headers of its images.
 struct NodeContent {
-  int node = 0;
-  std::optional<ImageInfo> color{};
-  std::optional<DepthInfo> depth{};
-  std::optional<ImageInfo> right{};  // right image of a stereo pair, instead of depth
-  std::size_t color_bytes = 0;
-  std::size_t depth_bytes = 0;
-  Calibration calibration{};
-  std::size_t laser_scan_bytes = 0;
-  std::size_t user_data_bytes = 0;
-  std::vector<std::string> faults{};  // unreadable headers and the reason, e.g. "image: ..."
+  int node = 0;                       // node id
+  std::optional<ImageInfo> color{};   // nullopt: not stored
+  std::optional<DepthInfo> depth{};   // nullopt: not stored
+  std::optional<ImageInfo> right{};   // right image of a stereo pair, instead of depth
+  std::size_t color_bytes = 0;        // size of the stored color image; 0: not stored
+  std::size_t depth_bytes = 0;        // size of the stored depth or right image; 0: not stored
+  Calibration calibration{};          // empty if not stored
+  std::size_t laser_scan_bytes = 0;   // size of the stored laser scan; 0: not stored
+  std::size_t user_data_bytes = 0;    // size of the stored user data; 0: not stored
+  std::vector<std::string> faults{};  // part and reason for unreadable headers, e.g. "image: ..."
 };
 
-// Map data stored by RTAB-Map; 0 or nullopt if not stored.
+// Map stored by RTAB-Map; 0 or nullopt if a part is not stored.
 struct StoredMap {
-  int grid_width = 0;  // cells
-  int grid_height = 0;
-  double grid_resolution_m = 0.0;  // edge length of a cell
-  std::size_t cloud_points = 0;
-  std::size_t polygons = 0;  // number of polygons of the mesh
-  std::optional<ImageInfo> texture{};
-  std::optional<ImageInfo> preview{};
+  int grid_width = 0;                  // cells of the occupancy grid
+  int grid_height = 0;                 // cells of the occupancy grid
+  double grid_resolution_m = 0.0;      // edge length of a cell
+  std::size_t cloud_points = 0;        // number of points of the cloud
+  std::size_t polygons = 0;            // polygons of the mesh
+  std::optional<ImageInfo> texture{};  // image of the mesh's texture
+  std::optional<ImageInfo> preview{};  // preview image of the database
   std::optional<Pose> last_localization_map_from_base{};
 };
 
 // Stored images and calibration of a node; empty if absent.
 struct FrameBlobs {
   std::string image;
-  std::string depth;  // or the right image of a stereo pair
+  std::string depth;  // depth image, or right image of a stereo pair
   std::string calibration;
 };
-// Decodes a frame; node and stamp are 0. Throws Error naming the damaged one of the three blobs.
+// Decodes a frame; node and stamp are 0. Throws Error naming the blob that is damaged.
 RgbdFrame decode_frame(const FrameBlobs& blobs, FrameParts parts = {});
 
 class RtabmapDatabase : public ScanSource {
@@ -70,25 +69,26 @@ class RtabmapDatabase : public ScanSource {
 
   const std::filesystem::path& path() const override { return path_; }
   const PoseGraph& graph() const override { return graph_; }
-  // Converts grayscale to color. An image in the column depth that is not depth becomes `right`.
+  // Converts gray images to color. Images without depth in the column depth become `right`.
   RgbdFrame read_frame(int node, FrameParts parts = {}) const override;
 
-  // Version stored in the file (Admin.version; empty if missing), and version by the columns.
+  // Version that the file contains (Admin.version); empty if missing.
   const std::string& version() const { return version_; }
+  // Version by the columns of the tables (RtabmapColumns::recognized_version).
   std::string recognized_version() const { return columns_.recognized_version(); }
   // Reports dropped nodes, links and poses, and unknown tables and columns.
   const std::vector<std::string>& warnings() const override { return warnings_; }
 
-  // Returns RTAB-Map's parameters by name, as of the last write; empty if they are not stored.
+  // Returns RTAB-Map's parameters by name, as last stored; empty if none are stored.
   std::map<std::string, std::string> parameters() const;
-  std::size_t word_count() const;     // visual words of the dictionary
-  std::size_t feature_count() const;  // image features of all nodes
-  // Throws Error naming the file and the column if the data are damaged.
+  std::size_t word_count() const;     // number of visual words in the dictionary
+  std::size_t feature_count() const;  // number of image features of all nodes
+  // Returns the sizes of the stored map. Throws Error naming file and column for damaged data.
   StoredMap stored_map() const;
-  // Calls `use` for each node with a row of images, in ascending order; reads headers only.
+  // Calls `use` for each node with images in the file, in ascending order. Reads headers only.
   void each_content(const std::function<void(const NodeContent&)>& use) const;
 
-  // Returns a node's stored images; color is a JPEG or PNG file. Throws Error for an unknown node.
+  // Returns a node's stored images; color is JPEG or PNG. Throws Error for an unknown node.
   FrameBlobs read_blobs(int node) const { return read_blobs(node, {}); }
 
   const SqliteFile& file() const { return *file_; }
@@ -105,7 +105,7 @@ class RtabmapDatabase : public ScanSource {
   std::vector<std::string> warnings_;
 };
 
-// True if a warning is about a table or column of a later RTAB-Map version, which is not a fault.
+// True for a warning about a table or column of a later RTAB-Map version, which is not a fault.
 bool is_about_unknown_part(const std::string& warning);
 
 }  // namespace libmap

@@ -18,11 +18,11 @@ class RtabmapColumns {
   bool has_table(const std::string& table) const { return columns_.contains(table); }
   // True if the table exists and has the column.
   bool has(const std::string& table, const std::string& column) const;
-  // Returns `column` if the table has it, else "NULL", for the list of a query.
+  // Returns `column` if the table has the column, else "NULL", as a part of an SQL query.
   std::string or_null(const std::string& table, const std::string& column) const;
 
-  // Returns the first RTAB-Map version with the newest column of the file, e.g. "0.18.0"; "before
-  // 0.10.0" if images are in separate tables.
+  // Returns the first RTAB-Map version whose schema has the newest column of the file, e.g.
+  // "0.18.0"; "before 0.10.0" if images are in separate tables.
   std::string recognized_version() const;
   // Returns tables, and columns "TABLE.COLUMN" of known tables, that no version up to 0.23 has.
   std::vector<std::string> unknown() const;

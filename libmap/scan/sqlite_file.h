@@ -32,12 +32,12 @@ class SqliteRow {
   const void* statement_;
 };
 
-// Opens a file read-only and creates no files next to it (no journal, -wal or -shm). In rollback
-// mode, the file is read with SQLite's locks, after waiting up to 10 s for a writer. In WAL mode,
-// a -wal and a -shm next to the file are both used, so that data committed by another program are
-// visible. With a -wal only (after a crash), the -wal's index is kept in memory. With neither, no
-// program has the file open, and it is read as an unchanging file. A journal of an interrupted
-// write is an Error, because only a program with write access can roll it back.
+// Opens a file read-only and creates no files next to it (-journal, -wal, -shm).
+//   - In rollback mode, it is read with SQLite's locks, after waiting up to 10 s for a writer. A
+//     journal of an interrupted write is an Error, because rolling it back needs write access.
+//   - In WAL mode, -wal and -shm are also read, so that data committed by another program are
+//     visible. If only a -wal exists (after a crash), its index is kept in memory. If neither
+//     exists, no program has the file open, and it is read as an unchanging file.
 class SqliteFile {
  public:
   // Throws Error if the file is not an SQLite file, damaged or not readable.
@@ -48,8 +48,8 @@ class SqliteFile {
 
   const std::filesystem::path& path() const { return path_; }
 
-  // Calls `use` for each row of a query with `arguments` for '?'. Thread-safe; one query runs at a
-  // time. Throws Error naming the file.
+  // Calls `use` for each row of a query, in which `arguments` replace '?' in order. Thread-safe;
+  // one query runs at a time. Throws Error naming the file.
   void each_row(const std::string& query, const std::vector<std::int64_t>& arguments,
                 const std::function<void(const SqliteRow&)>& use) const;
 
@@ -57,7 +57,7 @@ class SqliteFile {
   // Throws Error if another program keeps writing, or the disk is full.
   void copy_to(const std::filesystem::path& target) const;
 
-  // Names of all tables, and of the columns of a table (empty if it does not exist).
+  // Return the names of all tables, and of a table's columns (empty if there is no such table).
   std::set<std::string> tables() const;
   std::set<std::string> columns(const std::string& table) const;
 
@@ -70,8 +70,8 @@ class SqliteFile {
 // True if the file begins with SQLite's signature.
 bool is_sqlite_file(const std::filesystem::path& path);
 
-// Converts an exception of copying `source` or changing the copy. Corruption reported by SQLite is
-// an error of `source` (bad input); all others are failed writes of `target`.
+// Returns the Error for an exception while `source` was copied or the copy was changed: bad input
+// naming `source` if SQLite reports corruption, else a failed write of `target`.
 Error copy_error(const std::filesystem::path& source, const std::filesystem::path& target,
                  const SQLite::Exception& error);
 

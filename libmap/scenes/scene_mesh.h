@@ -11,19 +11,20 @@
 namespace libmap {
 
 struct SceneMeshOptions {
-  double edge_length_m = 0.01;    // > 0: maximum edge along rows and rings; diagonals: 1.5 times
-  double chord_error_m = 0.0002;  // > 0: maximum distance from round shapes; not for bumps
-  std::uint64_t max_triangles = 20'000'000;
+  double edge_length_m = 0.01;    // > 0: maximum edge length along grid lines; diagonals: 1.5 times
+  double chord_error_m = 0.0002;  // > 0: maximum distance of triangles from round shapes, not bumps
+  std::uint64_t max_triangles = 20'000'000;  // maximum number of triangles
 };
 
-// Meshes the visible surface with the face field "shape". Triangles are oriented outward; vertices
-// are on the exact surface. Triangles that intersect another solid are cut, with the new vertices
-// on both surfaces. Solids share these vertices with the ground; if they do not touch each other,
-// the only border is the outline of the plane. Where two solids, or a solid and a second plane,
-// overlap, cut edges agree to within the sag of a chord of edge_length_m but share no vertices;
-// parts thinner than edge_length_m may be missed. Where a solid extends beyond the outline of the
-// ground, border triangles of the ground are kept or dropped as a whole. Throws Error for an
-// invalid scene, or one with about more than max_triangles.
+// Meshes the visible surface, with the face field "shape" (index of the shape). Triangles are
+// oriented outward; vertices are on the exact surface. Where solids intersect:
+//   - Triangles are cut, with the new vertices on both surfaces.
+//   - Solids share these vertices with the ground. If they do not touch each other, the only border
+//     of the mesh is the outline of the plane.
+//   - Two solids, or a solid and a second plane, share no vertices: cut edges agree only to within
+//     the sag of a chord of edge_length_m, and parts thinner than edge_length_m may be missed.
+//   - Beyond the outline of the ground, the ground's triangles are kept or dropped as a whole.
+// Throws Error for an invalid scene, or one with about more than max_triangles.
 TriangleMesh scene_mesh(const PrimitiveScene& scene, const SceneMeshOptions& options);
 
 }  // namespace libmap

@@ -1,5 +1,5 @@
 // Coarse grid of ground heights, computed from points, for camera paths over terrain and for the
-// extent and density of terrain parts. Lengths are in meters.
+// extent and density of parts of the terrain. Lengths are in meters.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -13,17 +13,17 @@ namespace libmap {
 
 class GroundHeights {
  public:
-  static constexpr double cell_m = 0.5;
+  static constexpr double cell_m = 0.5;  // edge length of a cell
 
-  // Adds points, which must be finite, in any order.
+  // Adds points, which must be finite. The order of points has no influence.
   void add(std::span<const Eigen::Vector3d> points);
 
   bool empty() const { return cells_.empty(); }
-  const Eigen::AlignedBox2d& box() const { return box_; }  // of the points in x and y
-  // Mean height of the cells around a position, weighted by a Gaussian with a standard deviation of
-  // cell_m; the mean of all cells if no point is near, 0 without points.
+  const Eigen::AlignedBox2d& box() const { return box_; }  // bounding box in x and y
+  // Returns the mean height of the cells within about 1.5 m, weighted by a Gaussian with a standard
+  // deviation of cell_m; the mean of all cells if no cell is near, 0 without points.
   double height(const Eigen::Vector2d& position) const;
-  // Mean point spacing over the occupied cells; 0 without points.
+  // Returns the mean point spacing in the cells that contain points; 0 without points.
   double spacing_m() const;
   // Bounding box of the points of all cells that intersect the rectangle; empty if there are none.
   Eigen::AlignedBox3d extent(const Eigen::AlignedBox2d& rectangle) const;

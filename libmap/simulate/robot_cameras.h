@@ -18,32 +18,32 @@
 namespace libmap {
 
 struct RobotCamerasOptions {
-  // Name in data/sensors or a file. Limits the range, and sets the noise if `depth` has none.
-  // "auto": range and noise of `depth`.
+  // Name in data/sensors or a file (sensor_model.h), which limits the range, and sets the noise if
+  // `depth` has no noise. "auto": range and noise are those of `depth`.
   std::string sensor = "auto";
-  // The range is limited to the range of the rig's cameras, which also determine the resolution.
+  // The range is also limited to that of each camera of the rig. depth_step_m is not used.
   DepthSensorOptions depth = ideal_depth_sensor(0.0, std::numeric_limits<double>::infinity());
   DepthFaults faults{};
   double stamp_s = 0.0;           // earliest possible stamp of the images
-  double stamp_spread_s = 0.004;  // cameras without a common trigger: stamps are between stamp_s
-                                  // and this much later
+  double stamp_spread_s = 0.004;  // each camera's stamp is drawn from stamp_s to this much later,
+                                  // as without a common trigger
   std::uint64_t seed = 1;
 };
 void bind(ParameterTable& table, RobotCamerasOptions& options);
 
 struct RobotCameraImage {
   double stamp_s = 0.0;
-  Image<std::uint16_t> depth;  // in the camera's depth scale; 0: no measurement
-  DepthMeasurement measurement;
+  Image<std::uint16_t> depth;    // in units of the camera's depth_scale_m; 0: no measurement
+  DepthMeasurement measurement;  // the image in meters, and numbers of pixels
 };
 
-// Returns one image per camera of the rig, which does not move. An image may have no depth at all.
-// Throws Error if the mesh has no triangle, or the sensor is unknown or out of a camera's range.
+// Returns one image per camera, in the rig's order; images may have no depth at all. Throws Error
+// if the mesh has no triangle, the sensor is unknown, or ranges of sensor and camera are disjoint.
 std::vector<RobotCameraImage> simulate_robot_cameras(const TriangleMesh& mesh, const CameraRig& rig,
                                                      const Pose& world_from_robot,
                                                      const RobotCamerasOptions& options);
 
-// Height of the highest surface at (x, y), m. Throws Error if there is none.
+// Returns z of the highest surface at (x, y), m. Throws Error if there is no surface.
 double ground_height(const TriangleMesh& mesh, double x_m, double y_m);
 
 }  // namespace libmap

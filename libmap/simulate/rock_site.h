@@ -1,9 +1,9 @@
-// Test sites: uneven ground with rocks, or a wall with climbing holds.
+// Describes test sites: uneven ground with rocks, or a wall with climbing holds.
 //
-// The ground is a rectangle centered on the origin of the ground frame, with the ground's normal as
-// z axis. Rocks are defined in the ground frame. `tilt_deg` is the rotation about x into the site
-// frame: 0 is level ground, 90 a wall that faces -y, more an overhanging wall. The lower edge of
-// the ground stays at z = 0.
+// The ground is a rectangle centered on the origin of the ground frame, whose z axis is the
+// ground's normal. Rocks are defined in the ground frame. `tilt_deg` is the rotation about x from
+// the ground frame to the site frame. 0: level ground; 90: a wall that faces -y; above 90: an
+// overhanging wall. The lower edge of the ground stays at z = 0.
 #pragma once
 
 #include <cstddef>
@@ -21,88 +21,89 @@
 
 namespace libmap {
 
-// block: a broken rock with a flat top, facets and chipped edges. cobble: a rounded stone. dome: a
-// rounded hump, widest at its base. Climbing holds, +y up: jug (a bowl behind a lip), sloper (a
-// flat dome), crimp (a small edge), pinch (narrow, undercut).
+// Shapes of rocks. block: broken, with a flat top, facets and chipped edges; cobble: rounded; dome:
+// a rounded hump, widest at its base. Shapes of climbing holds, in which +y is up: jug (a bowl
+// behind a lip), sloper (a flat dome), crimp (a small edge), pinch (narrow, undercut).
 enum class RockShape { block, cobble, dome, jug, sloper, crimp, pinch };
 std::vector<std::pair<std::string, RockShape>> rock_shape_names();
-bool is_hold(RockShape shape);
+bool is_hold(RockShape shape);  // true for the shapes of climbing holds
 
 struct SiteRock {
   std::string name;
   RockShape shape = RockShape::block;
-  double x_m = 0.0;  // center, in the ground frame
+  double x_m = 0.0;  // center of the rock in the ground frame
   double y_m = 0.0;
-  double height_m = 0.3;      // of the top above the ground at (x, y)
-  double width_m = 0.3;       // along the rock's x axis, above the ground
-  double depth_m = 0.3;       // along the rock's y axis
-  double yaw_deg = 0.0;       // rotation about z, counter-clockwise
-  int sides = 6;              // walls of a block
-  int ledges = 0;             // lower blocks that are merged with it
+  double height_m = 0.3;      // height of the top above the ground at (x, y)
+  double width_m = 0.3;       // extent along the rock's x axis
+  double depth_m = 0.3;       // extent along the rock's y axis
+  double yaw_deg = 0.0;       // rotation of the rock's axes about z, counter-clockwise
+  int sides = 6;              // number of walls of a block
+  int ledges = 0;             // number of lower blocks that are merged with a block
   double overhang_deg = 0.0;  // outward tilt of a third of a block's walls
   double cleft_m = 0.0;       // depth of a wedge cut into a block's top; 0: none
-  double roughness = 1.0;     // relative amplitude of the surface relief; 0: smooth
+  double roughness = 1.0;     // factor of the default surface relief; 0: smooth
   std::uint64_t seed = 0;     // random seed of shape and colors
 };
 
 enum class GroundTexture { soil, rock, panel };  // colors of the ground
 
 struct SiteGround {
-  double size_x_m = 4.0;  // extent of the rectangle
-  double size_y_m = 4.0;
+  double size_x_m = 4.0;   // extent of the ground in x
+  double size_y_m = 4.0;   // extent of the ground in y
   double relief_m = 0.02;  // maximum height of the random relief
   double tilt_deg = 0.0;   // 0: level; 90: a wall
   GroundTexture texture = GroundTexture::soil;
 };
 
-// Area for rocks without a given position, which is drawn from the site's seed.
+// Area in which rocks without a given position are placed at random.
 struct SiteLayout {
   double site_size_m = 3.0;    // side of the square that contains the rocks, around the origin
   double free_square_m = 1.5;  // side of the square without rocks, around the origin
   double gap_m = 0.01;         // minimum distance between the footprints of two rocks
 };
 
+// Choice of locations for a field test on the rocks (field_points.h).
 struct FieldPointOptions {
   int count = 30;             // number of locations
-  double min_height_m = 0.1;  // above the ground
-  double radius_m = 0.04;     // of the neighborhood that determines the kind
+  double min_height_m = 0.1;  // minimum height of a location above the ground
+  double radius_m = 0.04;     // radius of the surface that determines a location's kind
 };
 
 struct RockSite {
-  std::uint64_t seed = 1;  // of missing rock values, positions, relief and colors
+  std::uint64_t seed = 1;  // random seed of missing rock values, positions, relief and colors
   SiteGround ground;
   SiteLayout layout;
   FieldPointOptions field_points;
-  std::vector<SceneShape> bumps;  // of kind Bump
+  std::vector<SceneShape> bumps;  // shapes of type Bump only
   std::vector<SiteRock> rocks;
 
   // Throws Error if a rock has a value out of range or extends beyond the ground.
   void check() const;
-  Pose site_from_ground() const;
+  Pose site_from_ground() const;  // rotation by tilt_deg
 };
 
-// Tables of the parameters of a rock, the ground, ... by key. A table refers to its argument.
+// Return tables of the parameters by key, as in YAML. A table refers to its argument.
 ParameterTable rock_parameters(SiteRock& rock);
 ParameterTable ground_parameters(SiteGround& ground);
 ParameterTable layout_parameters(SiteLayout& layout);
 ParameterTable field_point_parameters(FieldPointOptions& options);
 
-// A rock of given shape and height; all other dimensions are drawn from `seed`.
+// Returns a rock of given shape and height; all other dimensions are drawn from `seed`.
 SiteRock draw_rock(RockShape shape, double height_m, std::uint64_t seed);
 
 struct RockToPlace {
-  std::size_t rock = 0;    // index in the site
-  bool keeps_yaw = false;  // true: the yaw of the rock is given
+  std::size_t rock = 0;    // index in RockSite::rocks
+  bool keeps_yaw = false;  // true: the rock keeps its yaw; false: yaw is drawn too
 };
-// Draws positions, and yaw unless it is kept, for these rocks, largest footprint first, such that
-// the footprints satisfy the layout. Holds have a yaw of at most 25 degrees. Throws Error naming
+// Draws the positions of these rocks, those with the largest footprints first, such that all
+// footprints satisfy the layout. A drawn yaw of a hold is at most 25 degrees. Throws Error naming
 // the first rock that cannot be placed.
 void place_rocks(RockSite& site, std::vector<RockToPlace> rocks);
 
 // Height of the ground above z = 0 of the ground frame: bumps and random relief.
 class GroundRelief {
  public:
-  explicit GroundRelief(const RockSite& site);  // relief is drawn from the site's seed
+  explicit GroundRelief(const RockSite& site);  // relief is drawn from RockSite::seed
   double height(double x_m, double y_m) const;  // m
 
  private:
@@ -123,14 +124,14 @@ class GroundRelief {
 //     - {name: R01, height_m: 0.67, overhang_deg: 15}
 //     - {name: C01, shape: cobble, height_m: 0.15, x_m: 1, y_m: 0.2}
 //
-// All keys are optional. A rock requires its height; missing values are drawn from the rock's seed,
-// and a missing seed from the site's seed. Rocks without x_m and y_m are placed within the layout.
-// `seed` replaces the file's seed. Throws Error naming `file`, the entry, the key, the value and
-// the bound, and the nearest known key for an unknown one.
+// All keys are optional, except the height of a rock. Missing values of a rock are drawn from its
+// seed; a missing seed is drawn from the site's seed. Rocks without x_m and y_m are placed within
+// the layout. `seed` replaces the file's seed. Throws Error naming `file`, entry, key, value and
+// bound; for an unknown key, also the nearest known key.
 RockSite parse_site(const std::string& text, const std::string& file,
                     std::optional<std::uint64_t> seed = std::nullopt);
 
-// Complete YAML of a site, with all drawn values. parse_site returns an equal site.
+// Returns complete YAML of a site, with all drawn values. parse_site returns an equal site.
 std::string to_yaml(const RockSite& site);
 
 }  // namespace libmap

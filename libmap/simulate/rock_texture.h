@@ -9,16 +9,13 @@
 
 namespace libmap {
 
-// Weathered rock at a point (m): tones, grain, cracks, lichen and crystals. One seed per stone.
+// Color of weathered rock at a point (m): tones, grain, cracks, lichen. Use one seed per stone.
 Color rock_color(const Eigen::Vector3d& point, std::uint64_t seed);
-
-// Dry soil with gravel.
+// Color of dry soil with gravel at a point (m).
 Color soil_color(const Eigen::Vector3d& point, std::uint64_t seed);
-
-// A painted wooden panel with scuff marks; `point` in the panel's frame, z out of the wall.
+// Color of a painted wooden panel with scuffs; `point` (m) in the panel's frame, z out of the wall.
 Color panel_color(const Eigen::Vector3d& point, std::uint64_t seed);
-
-// A speckled climbing hold of cast resin; the seed determines the color.
+// Color of a speckled climbing hold of resin at a point (m); the seed determines the base color.
 Color hold_color(const Eigen::Vector3d& point, std::uint64_t seed);
 
 }  // namespace libmap

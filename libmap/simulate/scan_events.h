@@ -1,5 +1,5 @@
-// Events during a simulated scan: moving objects, sunlight, a view of the ceiling. All are disabled
-// by default. Options number frames from 1, like nodes; functions number frames from 0.
+// Events during a simulated scan: a person, a stone, sunlight, a view of the ceiling. All are
+// disabled by default. Options number frames from 1, like nodes; functions number frames from 0.
 #pragma once
 
 #include <cstddef>
@@ -25,25 +25,25 @@ struct ScanEvents {
   int ceiling_first_frame = 0;  // first frame of a view of a plain ceiling; 0: never
   int ceiling_frames = 10;      // number of frames with the ceiling
 
-  bool looks_up(std::size_t frame) const;  // true if the camera views the ceiling
-  // The body's pose, rotated upward if it looks at the ceiling.
+  bool looks_up(std::size_t frame) const;  // true if the camera looks at the ceiling
+  // Returns the camera body's pose, rotated upward in frames in which it looks at the ceiling.
   Pose seen_pose(const Pose& world_from_body, std::size_t frame) const;
-  // Maximum depth in this frame of a camera with the range `far_m`.
+  // Returns the maximum measured depth in a frame, for a camera with the maximum `far_m`.
   double far_at(std::size_t frame, double far_m) const;
 };
 void bind(ParameterTable& table, ScanEvents& events);
 
-// An object that is not part of the site, with a pose in each frame; nullopt if absent.
+// An object that is not part of the site.
 struct ExtraBody {
   std::shared_ptr<const VisibleSurface> surface;
-  std::function<std::optional<Pose>(std::size_t frame)> world_from_body;
+  std::function<std::optional<Pose>(std::size_t frame)> world_from_body;  // nullopt: absent
 };
-// Objects of the enabled events: a person of 1.7 m who walks along y through the mesh center; a
-// stone of 30 x 24 x 20 cm near the center, moved by 40 cm; a ceiling 2.5 m above the ground.
+// Returns the objects of enabled events: a person of 1.7 m who walks along y through the mesh
+// center, a stone of 30 x 24 x 20 cm near the center that moves by 40 cm, a ceiling at 2.5 m.
 std::vector<ExtraBody> extra_bodies(const TriangleMesh& mesh, const ScanEvents& events,
                                     std::uint64_t seed);
 
-// Merges another view of the same camera into `view`, keeping the nearer surface of each pixel.
+// Merges another view from the same camera into `view`: each pixel shows the nearer surface.
 void merge_nearer(SurfaceView& view, const SurfaceView& other);
 
 }  // namespace libmap

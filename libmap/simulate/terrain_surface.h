@@ -1,5 +1,5 @@
-// Surface of a large terrain for simulated scans: a height field of points, triangulated in square
-// tiles of the x-y plane (Delaunay). Only tiles in view and a cache of earlier tiles are in memory.
+// Surface of a large terrain for simulated scans: a height field of points, triangulated (Delaunay)
+// in square tiles of the x-y plane. Only tiles in view and a cache of earlier tiles are in memory.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -17,25 +17,26 @@
 
 namespace libmap {
 
-// View frustum of a camera: bounds of the rays (x/z, y/z), and maximum depth.
+// View frustum of a camera.
 struct ViewRange {
-  Eigen::AlignedBox2d rays;  // bounds of (x/z, y/z)
-  double far_m = 0.0;        // maximum z
+  Eigen::AlignedBox2d rays;  // bounds of the rays (x/z, y/z)
+  double far_m = 0.0;        // maximum depth z
 };
+// Returns the frustum of all rays through pixel centers and corners, up to the depth `far_m`.
 ViewRange view_range(const ViewRays& rays, double far_m);
 
-// Returns a Delaunay triangulation in the x-y plane with vertex normals: the triangles that
-// intersect the rectangle and have a circumradius of at most `max_radius_m`, so that wider gaps
-// stay open. The result is the same for any point set that contains all points within
-// 4 * `max_radius_m` of the rectangle, except for the diagonals of squares of four points.
+// Returns a Delaunay triangulation in the x-y plane with vertex normals: the triangles whose
+// bounding boxes intersect the rectangle and whose circumradius is at most `max_radius_m` (wider
+// gaps stay open). It is the same for all point sets that contain the same points within 4 *
+// `max_radius_m` of the rectangle, except for the diagonals of squares of four points.
 TriangleMesh triangulate_plan(const std::vector<Eigen::Vector3d>& points,
                               const Eigen::AlignedBox2d& rectangle, double max_radius_m);
 
 struct TerrainSurfaceOptions {
-  double tile_spacings = 256.0;       // side of a tile in point spacings; rounded to a multiple
-                                      // of GroundHeights::cell_m
-  double gap_spacings = 5.0;          // maximum circumradius of triangles in point spacings
-  std::size_t kept_points = 500'000;  // maximum in memory, unless more are in view at once
+  double tile_spacings = 256.0;       // side of a tile in mean point spacings; rounded to a
+                                      // multiple of GroundHeights::cell_m
+  double gap_spacings = 5.0;          // maximum circumradius of triangles in mean point spacings
+  std::size_t kept_points = 500'000;  // maximum number of points in memory, unless more are in view
   std::uint64_t texture_seed = 1;     // seed of rock_color()
 };
 
@@ -45,14 +46,13 @@ class TerrainSurface {
   TerrainSurface(const PointTileStore& points, const GroundHeights& heights,
                  const TerrainSurfaceOptions& options = {});
 
-  // Returns, for each of several cameras, the surface in view from all poses of the camera. The
-  // result does not depend on earlier calls and stays valid after later ones.
+  // Returns the surface in view of each of several cameras, which may have several poses. The
+  // result does not depend on earlier calls and stays valid after later calls.
   std::vector<VisibleSurface> seen_from(const std::vector<std::vector<Pose>>& world_from_camera,
                                         const ViewRange& range);
 
-  // Number of triangulations so far, and of points in memory.
-  std::size_t tiles_made() const { return made_; }
-  std::size_t points_in_memory() const;
+  std::size_t tiles_made() const { return made_; }  // number of triangulated tiles so far
+  std::size_t points_in_memory() const;             // number of points of the cached tiles
 
  private:
   using TilePosition = std::pair<std::int64_t, std::int64_t>;

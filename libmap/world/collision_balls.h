@@ -1,4 +1,4 @@
-// Covers a surface from behind with spheres (balls), for simulators that collide only convex hulls.
+// Covers a surface from behind with balls, for simulators that collide meshes as convex hulls.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,14 +14,14 @@ struct CollisionBall {
 };
 
 struct CollisionBallOptions {
-  double max_radius_m = 0.05;      // > 0: maximum radius, without max_deviation_m, which is added
-  double max_deviation_m = 0.002;  // > 0: maximum distance between balls and surface
+  double max_radius_m = 0.05;      // > 0: maximum radius, before max_deviation_m is added to it
+  double max_deviation_m = 0.002;  // > 0: maximum distance between surface and balls
 };
 
-// Covers the marked triangles with balls inside of `body`, in the order of the triangles; `marks`
-// has one entry per triangle. No point of a marked triangle is farther than `max_deviation_m` from
-// a ball, and no point of a ball is more than `max_deviation_m` outside the body. Triangles without
-// area get no balls. Coordinates and radii are whole multiples of 10 micrometers.
+// Covers the triangles of `mesh` whose entry in `marks` is true. Returns balls inside the solid
+// with the surface `body`, by triangle. The triangles are within max_deviation_m of the balls, and
+// no ball extends more than max_deviation_m out of the solid. Triangles without area get no balls.
+// Coordinates and radii are multiples of 10 micrometers.
 std::vector<CollisionBall> cover_with_balls(const TriangleMesh& mesh,
                                             const std::vector<bool>& marks,
                                             const TriangleMesh& body,

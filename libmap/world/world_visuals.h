@@ -12,12 +12,12 @@ namespace libmap {
 
 // Unit to which coordinates in OBJ files are rounded; float32 resolves 2e-6 m at 16 m.
 constexpr double mesh_unit_m = 1e-6;
-// Rounds vertices to this unit, and normals to three decimals, for short files.
+// Rounds vertices to mesh_unit_m, and normals to three decimals, so that files are shorter.
 void round_vertices(TriangleMesh& mesh);
 
-// Returns the mesh with the vertex colors as a texture, in which each triangle has 2 x 2 texels;
-// bilinear interpolation between the texels gives the linear interpolation of the vertex colors.
-// Without vertex colors, the result has no page.
+// Returns the mesh with its vertex colors as a texture. Each triangle has 2 x 2 texels; bilinear
+// interpolation of the texels is linear interpolation of the vertex colors. Without vertex colors,
+// the result has no page.
 TexturedMesh bake_vertex_colors(TriangleMesh mesh);
 
 // Returns the triangles of one page (no_page: the triangles without texture), with this page alone
@@ -30,11 +30,11 @@ struct ColoredMesh {
   TriangleMesh mesh;
 };
 
-// A square on the surface for each point of a map, one mesh per color. Points farther than size_m
-// from the surface are omitted.
+// Squares on the surface, with sides of size_m: one for each point of a map. Points farther than
+// size_m from the surface are omitted.
 struct ScoreSquares {
-  std::vector<ColoredMesh> meshes;
-  std::size_t on_surface = 0;  // number of points within size_m of the surface
+  std::vector<ColoredMesh> meshes;  // one mesh per color, ascending by red, green, blue
+  std::size_t on_surface = 0;       // number of points within size_m of the surface
 };
 ScoreSquares score_squares(const std::vector<Eigen::Vector3d>& points,
                            const std::vector<Color>& colors, double size_m,
