@@ -21,7 +21,7 @@ inline constexpr int element_neighborhood = 3;
 class FusionTiling {
  public:
   using Cell = Eigen::Array<std::int64_t, 2, 1>;
-  // Tiles of about `tile_m`. `grid_origin` is the grid's origin in the world. Points are up to
+  // `tile_m` is the side of a tile, `grid_origin` the grid's origin in the world. Points are up to
   // `shift_m` from their elements, and measurements affect elements within `disc_m`.
   FusionTiling(double tile_m, double voxel_m, const Eigen::Vector3d& grid_origin, double shift_m,
                double disc_m)

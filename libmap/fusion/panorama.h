@@ -26,8 +26,8 @@ struct PanoramaView {
 
 struct PanoramaOptions {
   int stride_px = 1;  // >= 1: uses every n-th row and column
-  // >= 0: drops flying pixels, with a depth that differs by more than this from both neighbors in a
-  // row or column; 0: keeps all.
+  // >= 0: drops flying pixels, i.e. pixels whose depth differs by more than this from both
+  // neighbors in the row or column; 0: keeps all pixels.
   double flying_pixel_jump_m = 0.0;
   // Adds unit normals of the surface through a pixel and its four neighbors, towards the camera;
   // zero if neighbors are missing or neighboring depths differ by more than normal_jump_m.
