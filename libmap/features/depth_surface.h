@@ -50,8 +50,7 @@ class DepthSurface {
   void set_camera(const Camera& depth_camera);
   // Rescales the noise from the depth noise model `before` to `after`.
   void set_noise(const DepthNoise& before, const DepthNoise& after);
-  // Applies the correction to the depths and recomputes the normals. Drops planes whose corrected
-  // depth is not positive.
+  // Applies the correction to the depths and recomputes the normals. Drops planes with depths <= 0.
   void correct(const DepthCorrection& correction);
   int step_px() const { return step_px_; }
   const std::vector<Cell>& cells() const { return cells_; }

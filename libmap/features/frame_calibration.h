@@ -29,8 +29,7 @@ struct CameraTiming {
   double rolling_shutter_s = 0.0;  // time from the first to the last image row
 };
 
-// Differences from the stored calibration, one element per camera of the rig. An empty list means
-// no difference.
+// Differences from the stored calibration, one element per camera of the rig; empty: no difference.
 struct SensorCalibration {
   std::vector<IntrinsicsStep> intrinsics{};
   std::vector<DepthCorrection> depth{};

@@ -41,8 +41,7 @@ struct DepthFusionOptions {
   double disc_radius_voxels = 1.5;  // > 0: radius of the discs in which measurements are averaged
   // >= 0: pose error of a frame along the normal. Above 0, the nearest frame cannot dominate.
   double pose_error_m = 0.0;
-  // >= 0: maximum number of rounds of registration (frame_registration) before fusion; 0: the poses
-  // are used unchanged.
+  // >= 0: maximum number of rounds of registration before fusion; 0: poses are used unchanged.
   int registration_rounds = 3;
   // true: poses are already refined with depth and color, so only color can confirm a registration.
   bool refined_poses = false;

@@ -33,8 +33,7 @@ class FusionTiling {
         frame_margin_(element_margin_ + element_neighborhood + 1 +
                       static_cast<int>(std::ceil((shift_m + disc_m) / voxel_m))) {}
 
-  // Calls use(tile) for each tile affected by a frame with measurements inside `reach` (m, grid
-  // frame).
+  // Calls use(tile) for each tile that a frame with the box `reach` (m, grid frame) affects.
   template <typename Use>
   void each_tile(const Eigen::AlignedBox3d& reach, const Use& use) const {
     const auto tile_of = [&](const Eigen::Vector3d& position, int margin) -> Cell {

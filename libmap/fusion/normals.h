@@ -1,5 +1,4 @@
-// Estimates normals of a cloud from planes through each point's neighbors, and orients normals
-// towards the sensor.
+// Estimates normals of a cloud by planes through neighboring points, and orients the normals.
 #pragma once
 
 #include <Eigen/Core>

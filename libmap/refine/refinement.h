@@ -1,6 +1,5 @@
 // Pose refinement of a scan: features, rounds of loop closures with pose graph optimization, bundle
-// adjustment, calibration and ICP. If held-out observations fit worse after a stage, its result is
-// rejected and reported.
+// adjustment, calibration and ICP. Rejects a stage after which held-out observations fit worse.
 #pragma once
 
 #include <cstdint>

@@ -119,8 +119,7 @@ using CalibrationMoves = std::map<int, std::vector<Vector6d>>;
 CalibrationMoves calibration_moves(const RefinementInput& input, const RefinementState& state,
                                    SensorCalibration& deviations);
 
-// Returns the options with default values replaced by the values of options.sensor. Throws Error
-// for an unknown sensor.
+// Replaces default values by the values of options.sensor. Throws Error for an unknown sensor.
 RefinementOptions with_sensor(RefinementOptions options);
 // Throws Error if two options determine the scale.
 void require_one_scale(const RefinementOptions& options);
