@@ -21,10 +21,10 @@ Projection project(const Eigen::Vector3d& point, const Eigen::Vector2d& focal_px
 // Effect of camera calibration on one observation, linearized at a known calibration. The first
 // four fields are true if the camera's parameters of this kind are estimated.
 struct CalibratedObservation {
-  bool intrinsics = false;
-  bool depth = false;
-  bool registration = false;
-  bool timing = false;
+  bool intrinsics = false;                 // focal lengths and principal point
+  bool depth = false;                      // DepthCorrection
+  bool registration = false;               // pose of the depth camera relative to the color camera
+  bool timing = false;                     // CameraTiming
   DepthCorrection::Terms terms{};          // basis values of the depth correction at the feature
   bool has_depth = true;                   // false: the depth was measured on another surface
   double added_m = 0.0;                    // change of depth by the known registration and timing
@@ -47,8 +47,8 @@ struct CalibratedResidual {
   Eigen::Vector3d residual = Eigen::Vector3d::Zero();
   Eigen::Matrix<double, 3, 6> by_pose;    // by a step of the pose (rigid_motion.h)
   Eigen::Matrix<double, 3, 6> by_motion;  // by the base's velocity; set only if timing is estimated
-  Eigen::Matrix3d by_point;
-  Eigen::Matrix<double, 3, spline_at> by_camera;  // 0 for known parameters
+  Eigen::Matrix3d by_point;               // by the point in the map frame
+  Eigen::Matrix<double, 3, spline_at> by_camera;  // by the parameters before spline_at; 0 if known
   Eigen::RowVector4d depth_by_spline;  // depth by four parameters from spline_at + terms.first on
 };
 

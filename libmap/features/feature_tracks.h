@@ -18,7 +18,7 @@ namespace libmap {
 struct MatchingOptions {
   double max_ratio = 0.8;  // > 0: maximum distance ratio of nearest to second nearest descriptor
   int held_out = 10;       // >= 2: one in this many features is used for evaluation only
-  RelativePoseOptions estimate{};
+  RelativePoseOptions estimate{};  // relative pose of the frames
 };
 
 // Indices of two frames in the list of frames; first < second.
@@ -83,8 +83,8 @@ struct FeatureTracks {
   std::size_t split = 0;             // dropped matches: a track would join frames without a link
 };
 
-// linked: every two frames of a track have a link, and a point with many observations becomes
-// several tracks. The normal equations are then as sparse as the graph of the links.
+// Frames that a track may join. linked: every two frames of a track have a link. A point with many
+// observations then becomes several tracks, and normal equations are as sparse as the links.
 enum class TrackFrames { any, linked };
 
 // Joins matches into tracks by union-find, in ascending order of chi-square. Drops a match that

@@ -35,7 +35,7 @@ struct FeatureOptions {
   double scale_noise = 0.06;      // >= 0: pixel noise per px of feature size, added in quadrature
   double surface_noise_m = 5e-4;  // >= 0: standard deviation of depth, not reduced by averaging
   int surface_step_px = 3;        // 1 to 32: minimum step of the grid of planes
-  DepthPlaneOptions planes{};     // planes of the depth images
+  DepthPlaneOptions planes{};     // fit of planes to the depth images, with depth range and noise
   // The following fields have no command option.
   bool surfaces_only = false;  // true: color is not read, and frames have no features
   // Maximum memory of the surfaces of all frames; find_features increases the step to observe it.
@@ -91,7 +91,7 @@ FeatureResult find_features(const ScanSource& scan, const std::vector<int>& node
                             const FeatureOptions& options = {}, Progress& progress = no_progress(),
                             const FeatureCache* cache = nullptr);
 
-// Appends the features of one image to `frame`; the camera is the last one of frame.cameras.
+// Appends the features of one image to `frame`. The image is from the last of frame.cameras.
 void add_features(const CameraView& view, const DepthPlanes& planes, const FeatureOptions& options,
                   FrameFeatures& frame);
 

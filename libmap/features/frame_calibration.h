@@ -70,12 +70,12 @@ Pose color_from_depth_of(const FrameFeatures& frame, const Feature& feature,
 // Change of a feature's depth if the depth camera is at `color_from_depth` instead of its stored
 // pose relative to the color camera.
 struct RegisteredDepth {
-  bool known = false;  // false, and values 0: the depth was measured on another surface
-  double added_m = 0.0;
+  bool known = false;    // false, and values 0: the depth was measured on another surface
+  double added_m = 0.0;  // change of the depth
   // Derivative of the depth by s in moved(Pose::Identity(), s) * color_from_depth (rigid_motion.h).
   Vector6d by_step = Vector6d::Zero();
 };
-inline constexpr float unknown_depth_m = 1.0F;  // standard deviation of an unknown depth
+inline constexpr float unknown_depth_m = 1.0F;  // standard deviation of an unknown depth, m
 RegisteredDepth registered_depth(const FrameFeatures& frame, const Feature& feature,
                                  const Pose& color_from_depth);
 // Returns true if the feature is on a plane of the depth image as stored; false at depth edges.

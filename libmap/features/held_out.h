@@ -41,7 +41,7 @@ struct SurfaceResidual {
   double noise_m = 0.0;     // standard deviation of the distance
   double range_m = 0.0;     // larger range of the two measurements
 };
-inline constexpr int held_out_samples = 60;  // approximate number per frame
+inline constexpr int held_out_samples = 60;  // approximate number of depth samples per frame
 // Returns the residuals from which surface_costs computes costs, in the same order.
 std::vector<SurfaceResidual> surface_residuals(const std::vector<FrameFeatures>& frames,
                                                const std::vector<FeatureLink>& links,
@@ -49,8 +49,8 @@ std::vector<SurfaceResidual> surface_residuals(const std::vector<FrameFeatures>&
                                                int samples = held_out_samples);
 
 struct HeldOutCosts {
-  std::vector<double> matches;
-  std::vector<double> surfaces;
+  std::vector<double> matches;   // match_costs
+  std::vector<double> surfaces;  // surface_costs
 };
 // Returns the costs of all held-out observations at the given poses.
 HeldOutCosts held_out_costs(const std::vector<FrameFeatures>& frames,

@@ -39,7 +39,8 @@ struct DepthFusionOptions {
   std::string sensor = "auto";
   DepthPlaneOptions planes{};
   double disc_radius_voxels = 1.5;  // > 0: radius of the discs in which measurements are averaged
-  // >= 0: pose error of a frame along the normal. Above 0, the nearest frame cannot dominate.
+  // >= 0: standard deviation of a frame's position along the normal, due to pose errors. A value
+  // above 0 prevents the nearest frame from dominating the mean.
   double pose_error_m = 0.0;
   // >= 0: maximum number of rounds of registration before fusion; 0: poses are used unchanged.
   int registration_rounds = 3;
@@ -98,8 +99,9 @@ struct FusionPlan {
   std::vector<std::pair<int, Error>> skipped{};  // nodes of unusable frames, with the reason
   std::vector<int> redundant{};                  // nodes of frames without new information
   int registration_rounds = 0;                   // rounds that moved frames; 0: poses are unchanged
-  bool registration_rejected = false;            // true also for refined poses without color
-  RegistrationCheck registration_check{};        // of the first round
+  // true: the first round was rejected, or poses are refined and there is no color to check them.
+  bool registration_rejected = false;
+  RegistrationCheck registration_check{};  // of the first round
   // RMS deviation of frames' surface heights from the mean height, with given and final poses.
   double disagreement_before_m = 0.0;
   double disagreement_after_m = 0.0;

@@ -22,7 +22,7 @@ namespace libmap {
 
 struct DepthPlaneOptions : DepthSensor {
   int radius_px = 3;               // 1 to 7: radius of the disc of pixels that a plane is fitted to
-  double min_pair_fraction = 0.5;  // 0 to 1: minimum share of pairs in the disc that agree
+  double min_pair_fraction = 0.5;  // 0 to 1: minimum share of agreeing pairs (fit_depth_planes)
 };
 
 // Numbers of pixels by outcome.
@@ -61,7 +61,7 @@ enum class FittedPixels { all, in_cells };
 
 // Fits planes to the pixels of one depth image (m) and adds the planes in `cells` to the voxels of
 // the grid, weighted by cosine, support and depth noise. Both values of `fitted` result in the same
-// voxels, except at edges of blocks if subsampling_level > 0. Returns the pixels by outcome.
+// voxels, except at block edges if cells.subsampling_level > 0. Returns numbers of pixels.
 DepthPixelCounts add_depth_planes(const DepthImage& depth, const PixelRays& rays,
                                   const Pose& grid_from_camera, const DepthPlaneOptions& options,
                                   double voxel_size_m, const TileMask& cells, FittedPixels fitted,

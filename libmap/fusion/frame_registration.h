@@ -1,4 +1,5 @@
 // Corrects poses of depth frames so that the surfaces of the frames agree. Private to depth_fusion.
+// A height is the distance of a frame's surface from a surface element, along the normal.
 #pragma once
 
 #include <Eigen/Core>

@@ -13,7 +13,7 @@
 namespace libmap {
 
 struct NormalEstimationOptions {
-  int neighbors = 16;  // 3 to 1000: points to which a plane is fitted, with the point itself
+  int neighbors = 16;  // 3 to 1000: nearest points to which a plane is fitted, with the point
 };
 void bind(ParameterTable& table, NormalEstimationOptions& options);
 

@@ -11,8 +11,9 @@
 
 namespace libmap {
 
-// Side, in voxels, of blocks of the x-y plane. Points that only one or two frames measured are
-// dropped if other frames contradict at least half of these points in a block and its neighbors.
+// Side, in voxels, of blocks of the x-y plane. All points of a block that only one or two frames
+// measured are dropped if other frames contradict (see through or miss) at least half of the points
+// of this kind in the block and its neighbors.
 inline constexpr int contradiction_block = 16;
 
 struct SurfacePointOptions {

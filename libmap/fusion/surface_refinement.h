@@ -64,8 +64,8 @@ struct RefinedSurface {
 
 // Refines the elements, in meters, with all views. `pose_error_m` >= 0 is the standard deviation of
 // a whole frame along the normal. `each_group(add)` must call add(views) for groups of views until
-// all views were added, in the order of frames.
-// The order of views affects the result by rounding only; the number of threads does not.
+// all views were added, in the order of frames. The order of frames affects the result by rounding
+// only; the number of threads does not.
 using AddViews = std::function<void(std::span<const RefinementView>)>;
 RefinedSurface refine_surface(std::vector<SurfaceElement> elements, const DepthSensor& sensor,
                               const SurfaceSearch& search, double pose_error_m,
@@ -73,10 +73,10 @@ RefinedSurface refine_surface(std::vector<SurfaceElement> elements, const DepthS
 
 // Mean height of one frame's measurements in the disc around an element.
 struct SurfaceObservation {
-  std::uint32_t element = 0;
-  std::uint32_t frame = 0;
-  float height_m = 0.0F;     // above the element, along the normal
-  float variance_m2 = 0.0F;  // variance of height_m due to noise
+  std::uint32_t element = 0;  // index of the element
+  std::uint32_t frame = 0;    // RefinementView::frame
+  float height_m = 0.0F;      // above the element, along the normal
+  float variance_m2 = 0.0F;   // variance of height_m due to noise
 };
 
 // Measures the height of the surface above each element (in meters) in each view. Returns the

@@ -33,11 +33,11 @@ struct BundleAdjustmentOptions {
   bool refine_depth = false;         // a DepthCorrection per camera
   bool refine_registration = false;  // pose of the depth camera relative to the color camera
   bool refine_timing = false;        // a CameraTiming per camera and a velocity per node
-  // Standard deviations of the priors.
-  double focal_prior = 0.02;            // > 0: of the focal length, relative
-  double center_prior_px = 8.0;         // > 0: of the principal point
-  double depth_prior = 4.0;             // > 0: of the depth correction, relative to the depth noise
-  double depth_smoothness_prior = 0.7;  // > 0: of the spline's second differences, also relative
+  // Standard deviations of the priors, > 0. Depth priors are relative to the depth noise.
+  double focal_prior = 0.02;            // of the focal length, relative to the focal length
+  double center_prior_px = 8.0;         // of the principal point
+  double depth_prior = 4.0;             // of the depth correction
+  double depth_smoothness_prior = 0.7;  // of the second differences of the correction's spline
   double depth_knot_m = 0.2;            // >= 0.02: distance of the knots of the correction's spline
   CalibrationBounds bounds{};
   // The following fields have no command option.
@@ -86,7 +86,7 @@ struct BundleAdjustmentResult {
   double depth_rms_m = 0.0;          // RMS residual of inliers
   std::size_t outliers = 0;          // observations with a weight below one half
   int iterations = 0;
-  bool converged = false;  // the result is usable
+  bool converged = false;  // true: the result is usable
 };
 
 // Adjusts poses, points and the camera parameters that `options` frees. The resulting poses are for

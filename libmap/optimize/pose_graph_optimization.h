@@ -37,8 +37,8 @@ struct LinkGroupResult {
   double rotation_rms_deg = 0.0;
 };
 
-// Nodes that are connected by links. The gauge node is fixed, but its tilt is free if the component
-// has gravity links, and its whole pose if it has priors.
+// Nodes that are connected by links. The pose of the gauge node is fixed. However, its tilt is free
+// if the component has gravity links, and its whole pose is free if the component has priors.
 struct GraphComponent {
   std::vector<int> nodes;
   int gauge_node = 0;

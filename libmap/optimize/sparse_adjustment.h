@@ -26,7 +26,7 @@ class TrackSystem {
 
   struct Totals {
     double cost = 0.0;
-    std::size_t tracks = 0;  // with observations from two or more poses
+    std::size_t tracks = 0;  // number of tracks with observations from two or more poses
     std::size_t observations = 0;
     std::size_t outliers = 0;    // observations with a weight below one half
     double pixel_squares = 0.0;  // sum of squared image residuals of the inliers, px^2

@@ -88,8 +88,8 @@ std::set<FramePair> candidate_pairs(const RefinementInput& input, const Refineme
 // Links pairs of frames by features and optimizes the pose graph.
 StageResult link_stage(const RefinementInput& input, const RefinementState& state, int round,
                        const std::vector<FramePair>& pairs);
-// Aligns frames without feature links to consecutive and near frames by depth, from the present
-// poses, and adds the results to other_links.
+// Links frames without feature links to consecutive and near frames by aligning depth, from the
+// present poses. Adds these links, which have no matches, to feature_links.
 StageResult depth_link_stage(const RefinementInput& input, const RefinementState& state);
 // Drops feature links that the pose graph has rejected. Returns the number of dropped links.
 std::size_t drop_rejected_links(RefinementState& state);

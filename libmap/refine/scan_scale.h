@@ -57,8 +57,8 @@ ScaleEstimate scale_by_lengths(const std::vector<FrameFeatures>& frames,
 std::optional<ScaleEstimate> scale_by_odometry(const std::vector<GraphLinkResult>& links,
                                                const std::map<int, Pose>& map_from_base);
 
-// Scales positions about the position of `fixed_node` (the origin if it has no pose), and the depth
-// of the calibration after registration and correction. `cameras`: number of cameras.
+// Scales positions about the position of `fixed_node` (the origin if it has no pose), and
+// DepthCorrection::scale of all `cameras` in `calibration`.
 void apply_scale(double factor, int fixed_node, std::size_t cameras,
                  std::map<int, Pose>& map_from_base, SensorCalibration& calibration);
 

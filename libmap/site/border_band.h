@@ -16,10 +16,10 @@ struct BorderBandOptions {
   // 99.5 % quantile of all cells.
   double white_level = 0.0;
   double max_width_m = 0.25;  // > 0: maximum width of the band
-  double min_side_m = 0.5;    // > 0: minimum side of the area inside
-  double min_seen = 0.4;  // (0, 1]: minimum share of each side's length along which it is visible
-  double min_z_m = -0.1;  // minimum height of the band above the ground
-  double max_z_m = 0.15;  // maximum height of the band above the ground
+  double min_side_m = 0.5;    // > 0: minimum side of the area inside the band
+  double min_seen = 0.4;      // (0, 1]: minimum share of each side along which the band is visible
+  double min_z_m = -0.1;      // minimum height of the band above the ground
+  double max_z_m = 0.15;      // maximum height of the band above the ground
 };
 void bind(ParameterTable& table, BorderBandOptions& options);
 

@@ -17,8 +17,9 @@
 
 namespace libmap {
 
-// Part of the map that is kept. whole: everything, only leveled. size: the best-centered rectangle
-// of a given size (site_rectangle). border: the area inside a white band (border_band).
+// Part of the map that is kept. whole: everything, only leveled. box, polygon: a given area. size:
+// the best-centered rectangle of a given size (site_rectangle). border: the area inside a white
+// band (border_band).
 enum class CropRegion { whole, box, polygon, size, border };
 
 // Frame of a box or polygon. level: ground at z = 0, x and y near the axes of the map, rotated by

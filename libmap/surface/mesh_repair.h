@@ -19,7 +19,7 @@ double size_of(const TriangleMesh& mesh);
 // Returns a triangle's smallest height (2 area / longest side), m; 0 for a repeated vertex.
 double lowest_height(const TriangleMesh& mesh, const Triangle& triangle);
 
-// Triangles are degenerate if the smallest height is at most degenerate_height * size_of(mesh).
+// Returns for each triangle true if lowest_height <= degenerate_height * size_of(mesh).
 constexpr double degenerate_height = 1e-9;
 std::vector<bool> degenerate_triangles(const TriangleMesh& mesh);
 

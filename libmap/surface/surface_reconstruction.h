@@ -71,7 +71,7 @@ struct SurfaceReconstructionResult {
   std::size_t dropped_points = 0;     // points with a normal that is zero or not finite
   std::size_t samples = 0;            // number of samples: one per cell and side of the surface
   int octree_depth = 0;               // poisson; otherwise 0
-  std::size_t trimmed_triangles = 0;  // removed by trimming
+  std::size_t trimmed_triangles = 0;  // removed: too far from points, or against their normals
   StageTimings timings_s;
 };
 void describe(ResultTable& table, const SurfaceReconstructionResult& result);

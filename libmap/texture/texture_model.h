@@ -3,7 +3,7 @@
 // Steps: rate the photographs that see each triangle (texture_views), assign one photograph per
 // triangle with short seams (label_triangles), pack the resulting charts onto pages
 // (texture_atlas), estimate the relative exposure (estimate_exposure), and blend the colors of the
-// best photographs of each surface point (paint_texture). Seams are edges between two photographs.
+// best photographs of each surface point (paint_texture). Seam: edge between two photographs.
 #pragma once
 
 #include <cstddef>

@@ -26,7 +26,7 @@ class PhotoProjector {
 
   const Camera& camera() const { return camera_; }
   const Eigen::Vector3d& position() const { return position_; }  // of the camera, world frame
-  // Rotates a direction.
+  // Rotates a direction from the camera frame to the world frame.
   Eigen::Vector3d to_world(const Eigen::Vector3d& direction_in_camera) const {
     return camera_from_world_.transpose() * direction_in_camera;
   }

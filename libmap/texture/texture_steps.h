@@ -121,7 +121,7 @@ struct TexturePaint {
 };
 
 // Paints all charts of `atlas` into the pages of `model`, the result of atlas.make_model. Texels
-// outside all triangles get the color of the chart's nearest triangle. Independent of threads.
+// outside all triangles get the color of the chart's nearest triangle. Independent of thread count.
 void paint_texture(const TextureAtlas& atlas, const TexturePaint& paint, TexturedMesh& model,
                    Progress& progress);
 

@@ -26,8 +26,7 @@ struct TextStyle {
 // Returns width and line height of `text`, px. Throws Error (failed) if the font is not installed.
 Eigen::Vector2d text_size(const std::string& text, const TextStyle& style);
 
-// Returns `text` if it is at most `width_px` wide, else a prefix and "..."; empty if "..." is
-// wider.
+// Returns `text` if at most `width_px` wide, else a prefix and "..."; empty if "..." is wider.
 std::string shortened_text(const std::string& text, const TextStyle& style, double width_px);
 
 // Output of a canvas: an image or an SVG document.

@@ -14,9 +14,8 @@
 
 namespace libmap {
 
-// automatic: the texture if there is one; else Coloring::field; else the field "hold_probability"
-// or
-//   "score" as in mode score; else own colors unless all are equal; else height.
+// automatic: the texture if there is one; else Coloring::field; else "hold_probability" or "score"
+//   as in mode score; else own colors unless all are equal; else height.
 // own:    colors stored in the data.
 // score:  a field from 0 to 1 in the seven classes of the graspability map's legend.
 // field:  any scalar field, or "x", "y", "z", on a color scale.
@@ -54,7 +53,7 @@ struct Legend {
 
 struct Coloring {
   ColorMode mode = ColorMode::automatic;
-  std::string field{};                     // mode `field`; in mode `score`, empty: "score"
+  std::string field{};                     // mode `field`; mode `score` (empty: "score")
   std::optional<double> load_n{};          // load of the field hold_probability, N, for the legend
   ColorScale scale = ColorScale::viridis;  // modes `field` and `height`
   // Values at the ends of the scale. If equal: the 2nd and 98th percentile of the data (minimum and

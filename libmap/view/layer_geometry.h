@@ -31,8 +31,8 @@ struct PreparedLayer {
 
 // Prepares a layer. A textured mesh becomes one layer per page, which refers to the page in
 // `layer`, and one of triangles without a page, in untextured_color. Other shapes become one layer.
-// Throws Error as color_points does, for an array of wrong length, and in mode `texture` without
-// one.
+// Throws Error as color_points does, for an array of wrong length, and for mode `texture` if there
+// is no texture.
 std::vector<PreparedLayer> prepare_layers(const SceneLayer& layer, const Pose& terrain_from_scene);
 
 inline constexpr Color untextured_color{128, 128, 128};
