@@ -38,7 +38,7 @@ struct FeatureOptions {
   DepthPlaneOptions planes{};     // fit of planes to the depth images, with depth range and noise
   // The following fields have no command option.
   bool surfaces_only = false;  // true: color is not read, and frames have no features
-  // Maximum memory of the surfaces of all frames; find_features increases the step to observe it.
+  // Maximum memory of the surfaces of all frames, bytes; surface_step_px is increased if necessary.
   std::size_t max_surface_bytes = std::size_t{256} << 20U;
   std::size_t max_frames_in_memory = 300;  // with more, descriptors are stored on disk
 };

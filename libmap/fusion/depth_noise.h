@@ -27,7 +27,7 @@ struct DepthSensor {
 };
 
 struct SensorModel;
-// Sets range and noise in `sensor` to the values of the model where they have the default values.
+// Replaces default values of the range limits and the noise in `sensor` by the model's values.
 void apply(const SensorModel& model, DepthSensor& sensor);
 
 }  // namespace libmap

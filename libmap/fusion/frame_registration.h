@@ -17,9 +17,9 @@ struct FrameRegistrationOptions {
   double rotation_error_deg = 1.0;
   // > 0: heights that differ by more than this from the heights of other frames have less weight.
   double scatter_m = 0.005;
-  // > 0: with more observations per frame, their weights are reduced to those of this number. This
-  // limits the weight of heights against the given poses: with noisy normals, motions along a plane
-  // seem to improve the fit.
+  // > 0: mean number of observations per frame above which all weights are reduced in proportion.
+  // Limits the weight of heights against the given poses, because with noisy normals, motions along
+  // a plane seem to improve the fit.
   double independent_heights = 150.0;
 };
 

@@ -52,7 +52,7 @@ class FusionFrames {
   // Removes the depth of all other frames from the cache.
   void evict_others(std::span<const FusionFrame> frames);
 
-  // Returns true if the first of these frames has a color image.
+  // Returns true if the first element of `frames` has a color image.
   bool has_color(std::span<const FusionFrame> frames);
 
   std::shared_ptr<const PixelRays> rays_of(const Camera& camera) { return rays_.rays_of(camera); }

@@ -11,9 +11,9 @@
 
 namespace libmap {
 
-// Side, in voxels, of blocks of the x-y plane. All points of a block that only one or two frames
-// measured are dropped if other frames contradict (see through or miss) at least half of the points
-// of this kind in the block and its neighbors.
+// Side, in voxels, of blocks of the x-y plane. Points that only one or two frames measured are
+// dropped from a block if other frames contradict (see through or miss) at least half of them in
+// the block and its eight neighbors.
 inline constexpr int contradiction_block = 16;
 
 struct SurfacePointOptions {

@@ -70,8 +70,8 @@ struct BundleAdjustmentResult {
   std::map<int, Pose> map_from_base;
   std::vector<Eigen::Vector3d> points;  // map frame, one per track; 0 with fewer than two poses
   SensorCalibration calibration;        // estimated parameters; empty without any
-  // Each differs from `calibration` by one standard deviation along one of the independent
-  // directions of the parameters that change the poses' positions most.
+  // Each alternative differs from `calibration` by one standard deviation, in one of the
+  // independent directions in parameter space that change the poses' positions most.
   std::vector<SensorCalibration> alternatives;
   SensorCalibration deviations;  // of intrinsics and timing; empty without `alternatives`
   // Information matrix of steps of the poses (rigid_motion.h) at the optimum, in the order of
@@ -93,17 +93,17 @@ struct BundleAdjustmentResult {
 // frames to which the resulting calibration is applied (calibrate()). `links` are links of the pose
 // graph that are not from the tracks, e.g. odometry. The gauge node of each component is fixed.
 // `start` is the initial calibration; by default the stored cameras and the motion between poses.
-// If there are `system_tracks`, only the information is computed from them: from tracks of
-// TrackFrames::linked, it is sparse and slightly smaller. Memory is proportional to (number of
-// poses)^2. Throws Error if an option is out of range.
+// `system_tracks`, if any, replace `tracks` in the information matrix only; with tracks of
+// TrackFrames::linked, the matrix is sparse and slightly smaller. Memory is proportional to (number
+// of poses)^2. Throws Error if an option is out of range.
 BundleAdjustmentResult adjust_bundle(
     const std::vector<FrameFeatures>& frames, const std::vector<FeatureTrack>& tracks,
     const std::map<int, Pose>& map_from_base, const std::vector<GraphLinkResult>& links,
     const std::vector<GraphComponent>& components, const BundleAdjustmentOptions& options = {},
     const std::vector<FeatureTrack>& system_tracks = {}, const SensorCalibration& start = {});
 
-// Builds tracks from feature links and adjusts them with adjust_bundle. From 120 poses on, it uses
-// adjust_sparse (sparse_adjustment.h) instead, unless camera parameters are free. Throws as above.
+// Builds tracks from feature links and adjusts them as above. From 120 poses on, adjust_sparse
+// (sparse_adjustment.h) is used, unless camera parameters are free. Throws Error as above.
 BundleAdjustmentResult adjust_bundle(
     const std::vector<FrameFeatures>& frames, const std::vector<FeatureLink>& feature_links,
     const std::map<int, Pose>& map_from_base, const std::vector<GraphLinkResult>& links,

@@ -27,8 +27,8 @@ struct IcpOptions {
   int samples = 1500;            // >= 1: approximate number of samples per frame
   double max_distance_m = 0.03;  // > 0: initial maximum distance between a sample and its plane
   double max_normal_angle_deg = 35.0;  // maximum angle between normals of sample and plane
-  double correlation = 4.0;  // >= 1: number of samples with the information of an independent one
-  // 0 to 1: directions with a smaller ratio of their eigenvalue to the largest one are ignored.
+  double correlation = 4.0;  // >= 1: number of samples that count as one independent sample
+  // 0 to 1: directions are ignored whose eigenvalue is smaller, relative to the largest eigenvalue.
   double max_degenerate_ratio = 0.002;
   // The width of the robust loss decreases slowly, for inaccurate initial poses (graduated
   // non-convexity, Blake and Zisserman 1987). No command option.
@@ -53,8 +53,8 @@ struct IcpResult {
 };
 
 // Aligns the surfaces of frames with a pose. `prior` is the information matrix of steps from
-// `map_from_base` (BundleAdjustmentResult::information), one block per pose. It determines
-// directions that the surfaces do not constrain. For IcpMode::links, `links` selects the pairs. The
+// `map_from_base` (BundleAdjustmentResult::information), one block per pose, for directions that
+// the surfaces do not constrain. For IcpMode::links, `links` selects the pairs. The
 // gauge node of each component is fixed. Returns the input poses and the prior if there are no
 // pairs or the alignment diverges. The result does not depend on the number of threads. Throws
 // Error if the size of `prior` is not the number of poses.

@@ -36,7 +36,7 @@ inline double robust_weight(const Eigen::Vector3d& residual, double scale) {
 struct BundleView {
   std::vector<const Pose*> poses;                  // by index of the pose
   const std::vector<Vector6d>* motions = nullptr;  // by index of the pose; nullptr: no motion
-  const double* camera_params = nullptr;           // of all cameras
+  const double* camera_params = nullptr;           // parameters of all cameras
 
   explicit BundleView(const std::map<int, Pose>& map_from_base) {
     for (const auto& [node, pose] : map_from_base) poses.push_back(&pose);
@@ -156,7 +156,7 @@ struct JointProblem {
 struct JointState {
   std::map<int, Pose> poses;
   std::vector<Vector6d> motions;  // by pose, base frame, m/s and rad/s
-  Eigen::VectorXd camera_params;  // of all cameras
+  Eigen::VectorXd camera_params;  // parameters of all cameras
   std::vector<Eigen::Vector3d> points;
 };
 

@@ -1,4 +1,4 @@
-// Detects depth that is not registered to color, and registers it coarsely before refinement.
+// Detects depth that is not registered to color, and registers depth coarsely before refinement.
 #pragma once
 
 #include <memory>

@@ -14,7 +14,7 @@ enum class StartPoses { automatic, odometry, stored, visual };
 
 struct InitialPoses {
   std::map<int, Pose> map_from_base;
-  // Nodes of each part, ascending. Poses of one part (sessions, joined by links) are in one frame.
+  // Groups of nodes (sessions, joined by links) with poses in one coordinate frame; nodes ascend.
   std::vector<std::vector<int>> parts;
   std::vector<int> without_pose;  // valid nodes without a pose
   std::string source;             // "odometry", "stored", "links", or "visual" (no poses)

@@ -21,7 +21,7 @@ struct LoopClosureDetectionOptions : MatchingOptions {
   int near_candidates = 10;    // >= 0: maximum number of near candidates per frame
   int similar_candidates = 4;  // >= 0: maximum number of candidates by appearance per frame
   int neighbors = 2;           // >= 0: number of following frames with which a frame is matched
-  // > 0: maximum chi-square of a closure against the pose graph; 99.9 % of true ones have less.
+  // > 0: maximum chi-square against the pose graph; 99.9 % of true closures have less.
   double max_graph_chi_square = 22.5;
   double graph_slack_m = 0.01;   // >= 0: added to the pose graph's position noise, in quadrature
   double graph_slack_deg = 0.4;  // >= 0: added to the pose graph's rotation noise, in quadrature

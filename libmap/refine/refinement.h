@@ -80,7 +80,7 @@ struct StageReport {
   std::vector<std::pair<std::string, double>> metrics{};  // name and value
   std::vector<std::string> warnings{};
   std::optional<StageError> error{};           // nullopt without true poses
-  std::optional<StageError> rejected_error{};  // of the poses of a rejected stage
+  std::optional<StageError> rejected_error{};  // error of the poses of a rejected stage
   double seconds = 0.0;                        // elapsed time
   double processor_seconds = 0.0;              // processor time of all threads
 };

@@ -108,7 +108,7 @@ std::vector<FeatureLink> rematched_links(const RefinementInput& input,
 // Returns the information matrix of steps of the poses with the state's calibration.
 BlockSystem information_of(const RefinementInput& input, const RefinementState& state);
 
-// Aligns overlapping depth images by ICP, all or only linked ones (IcpOptions::mode).
+// Aligns depth images by ICP: all overlapping images, or only linked images (IcpOptions::mode).
 StageResult surface_stage(const RefinementInput& input, const RefinementState& state);
 
 // Steps by node. A node's pose has one step per independent direction of the calibration: its

@@ -22,7 +22,7 @@ struct KnownLength {
   };
   End from;
   End to;
-  double length_m = 0.0;  // > 0
+  double length_m = 0.0;  // > 0: true length
 };
 
 // Parses NODE:X:Y-NODE:X:Y=METERS with pixels X:Y of the first camera, e.g.
@@ -53,7 +53,7 @@ ScaleEstimate scale_by_lengths(const std::vector<FrameFeatures>& frames,
                                const std::vector<KnownLength>& lengths);
 
 // Estimates the scale from the translations of accepted odometry links (LinkType::neighbor) and
-// their information. Returns nullopt if there are none.
+// their information. Returns nullopt if there is no accepted odometry link.
 std::optional<ScaleEstimate> scale_by_odometry(const std::vector<GraphLinkResult>& links,
                                                const std::map<int, Pose>& map_from_base);
 

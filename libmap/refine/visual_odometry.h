@@ -28,7 +28,7 @@ void bind(ParameterTable& table, VisualOdometryOptions& options);
 struct TrackingStart {
   std::map<int, int> session;           // by node, 0 by default; tracking stops between sessions
   std::map<int, Pose> map_from_base;    // known poses by node, which are not changed
-  std::vector<std::vector<int>> parts;  // disjoint groups of nodes with known poses in one frame
+  std::vector<std::vector<int>> parts;  // disjoint groups, known poses in one coordinate frame
   std::map<int, Pose> first;            // pose of a new part's first node; the identity by default
 
   int session_of(int node) const {
@@ -51,7 +51,7 @@ std::string describe(const std::vector<TrackingLoss>& losses);
 
 struct VisualOdometryResult {
   std::map<int, Pose> map_from_base;    // by node: all frames, and the known poses
-  std::vector<std::vector<int>> parts;  // groups of nodes with poses in one frame, >= 1 node each
+  std::vector<std::vector<int>> parts;  // groups of nodes with poses in one coordinate frame
   // Links of tracked frames (LinkType::neighbor) and of relocalized frames (local_space_closure).
   std::vector<FeatureLink> links;
   std::vector<PoseLink> depth_links;  // links of frames tracked by depth only
@@ -63,10 +63,10 @@ struct VisualOdometryResult {
 
 // Tracks frames in the order of the list. A frame that matches neither the key frame nor the last
 // frame (verify_pairs) is tracked by depth (align_pair), from the pose that constant motion or a
-// few matches (guess_motion) predict. If this fails too, the frame is lost. It is relocalized if
-// the motions to two earlier frames agree. Otherwise, it begins a new part, which a later key frame
-// may join to another part. Covariances of links (estimate_relative_pose) are multiplied by the
-// chi-square of their matches per degree of freedom. Throws Error if an option is out of range.
+// few matches (guess_motion) predict. If this fails too, the frame is lost. A lost frame is
+// relocalized if its motions to two earlier frames agree. Otherwise, it begins a new part, which a
+// later key frame may join to another part. Covariances of links are multiplied by the chi-square
+// of the matches per degree of freedom. Throws Error if an option is out of range.
 VisualOdometryResult track_frames(const std::vector<FrameFeatures>& frames,
                                   const TrackingStart& start,
                                   const LoopClosureDetectionOptions& matching,

@@ -50,7 +50,7 @@ class CloudStatistics {
 
   std::size_t points() const { return points_; }           // points with a normal
   std::size_t dropped_points() const { return dropped_; }  // points without a normal
-  const Bounds3d& bounds() const { return bounds_; }       // of the points with a normal
+  const Bounds3d& bounds() const { return bounds_; }       // bounds of the points with a normal
   // Origin of the grid.
   Eigen::Vector3d origin() const { return (bounds_.min + bounds_.max) / 2; }
   // Median of `expected_error`, accurate to 1.6 %; 0 if no point has an expected error.

@@ -12,7 +12,7 @@ namespace libmap {
 struct SurfaceSample {
   Eigen::Vector3f position = Eigen::Vector3f::Zero();  // m, relative to a common origin
   Eigen::Vector3f normal = Eigen::Vector3f::Zero();    // unit, outwards
-  float weight = 1.0F;                                 // > 0
+  float weight = 1.0F;                                 // > 0: weight in the fit
   float spacing_m = 0.0F;                              // local distance between samples
 };
 

@@ -19,7 +19,7 @@ struct TextureAtlasOptions {
   int texture_size = 4096;        // 64 to 16384: maximum width and height of a page, pixels
   double texel_size_m = 0.0;      // >= 0: side of a texel on the surface; 0: from texels_per_pixel
   double texels_per_pixel = 1.5;  // 0.05 to 8: texels per photograph pixel, along one side
-  // Charts are scaled down to fit this number, unless the padding alone needs more. 0: no limit.
+  // >= 0: charts are scaled down to fit this number of pages, unless padding needs more; 0: never.
   int max_pages = 64;
   int padding_px = 3;  // 1 to 64: width of the extrapolated border of each chart, texels
 };

@@ -72,7 +72,7 @@ TextureExposure estimate_exposure(std::span<const ColorObservation> observations
 // different photographs. The energy is minimized by exact dynamic programming over forests of
 // triangles while all other triangles keep their photographs (block coordinate descent as in
 // Thuerck et al. 2016, "A Fast, Massively Parallel Solver for Large, Irregular Pairwise Markov
-// Random Fields"), alternating with forests of regions of one photograph. No step increases it.
+// Random Fields"), alternating with forests of regions of one photograph.
 
 constexpr std::uint32_t no_photo = 0xffffffff;
 

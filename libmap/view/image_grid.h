@@ -34,7 +34,7 @@ struct ImageGridOptions {
   std::vector<std::string> column_titles;  // above the columns; may be empty
   std::vector<std::string> row_titles;     // before the rows; may be empty
   SharedView shared_view = SharedView::sheet;
-  std::string background = "#5f6b7a";  // of scenes
+  std::string background = "#5f6b7a";  // behind scenes: "#rrggbb" or a name
   bool scale_bar = true;
   std::vector<Legend> legends;  // shown before the legends of the scenes
 };

@@ -18,7 +18,7 @@ struct PreparedLayer {
   std::vector<Eigen::Vector3d> positions;  // all finite
   std::vector<Color> colors;               // one per position
   std::vector<Eigen::Vector3f> normals;    // empty, or one per position of length 1 or 0
-  std::vector<Triangle> triangles;         // of a mesh
+  std::vector<Triangle> triangles;         // empty if not a mesh
   bool is_mesh = false;
   bool cubes = false;          // points are cubes, otherwise squares
   bool shaded = false;         // shaded by normals, or cubes by the direction of their sides
