@@ -156,7 +156,7 @@ class TileFusion {
              const FusionPlan* known = nullptr);
   ~TileFusion();
 
-  const FusionPlan& plan() const;
+  const FusionPlan& plan() const;            // plan of all tiles
   const std::vector<XyTile>& tiles() const;  // tiles with frames, in ascending order
   struct Tile {
     PointCloud cloud;
