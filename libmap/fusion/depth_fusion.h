@@ -46,8 +46,8 @@ struct DepthFusionOptions {
   int registration_rounds = 3;
   // true: poses are already refined with depth and color, so only color can confirm a registration.
   bool refined_poses = false;
-  // >= 0: skips frames that add less than 1/enough_views to the information of earlier frames on
-  // nearly all of the frame's surface; 0: all frames are fused.
+  // >= 0: skips a frame that adds less than 1/enough_views to the information (inverse variance) of
+  // earlier frames on nearly all of the frame's surface; 0: fuses all frames.
   double enough_views = 10.0;
   SurfacePointOptions points{};
   // Adds points one voxel beyond measured edges, unless views see through these points.

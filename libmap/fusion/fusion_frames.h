@@ -22,8 +22,8 @@ namespace libmap {
 
 struct FusionFrame {
   int node = 0;
-  Pose grid_from_base = Pose::Identity();
-  std::size_t image_pixels = 0;  // number of pixels of the frame's images
+  Pose grid_from_base = Pose::Identity();  // grid frame: world frame with origin at grid_origin
+  std::size_t image_pixels = 0;            // number of pixels of the frame's images
   // Box in the grid frame, m, around the cameras and all measured points.
   Eigen::AlignedBox3d reach;
   double max_ray_length = 1.0;   // maximum ratio of a ray's length to its depth

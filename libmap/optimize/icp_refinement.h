@@ -24,7 +24,7 @@ struct IcpOptions {
   int iterations = 12;           // >= 1: maximum number of iterations
   int pairs_per_frame = 8;       // >= 1: for global, frames with the largest overlap per frame
   double min_overlap = 0.25;     // 0 to 1: for global, minimum overlap as a share of samples
-  int samples = 1500;            // >= 1: approximate number of samples per frame
+  int samples = 1500;            // >= 1: approximate number of surface samples per frame
   double max_distance_m = 0.03;  // > 0: initial maximum distance between a sample and its plane
   double max_normal_angle_deg = 35.0;  // maximum angle between normals of sample and plane
   double correlation = 4.0;  // >= 1: number of samples that count as one independent sample

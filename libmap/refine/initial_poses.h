@@ -16,7 +16,7 @@ struct InitialPoses {
   std::map<int, Pose> map_from_base;
   // Groups of nodes (sessions, joined by links) with poses in one coordinate frame; nodes ascend.
   std::vector<std::vector<int>> parts;
-  std::vector<int> without_pose;  // valid nodes without a pose
+  std::vector<int> without_pose;  // nodes without a pose, except with GraphNode::invalid_weight
   std::string source;             // "odometry", "stored", "links", or "visual" (no poses)
 };
 

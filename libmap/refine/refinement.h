@@ -1,5 +1,6 @@
 // Pose refinement of a scan: features, rounds of loop closures with pose graph optimization, bundle
-// adjustment, calibration and ICP. Rejects a stage after which held-out observations fit worse.
+// adjustment, calibration and ICP. A stage is rejected if held-out observations (held_out.h) fit
+// worse after it.
 #pragma once
 
 #include <cstdint>

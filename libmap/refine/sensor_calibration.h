@@ -40,7 +40,7 @@ CalibrationParts parts_of(const SensorCalibration& calibration);
 
 struct CalibrationChoice {
   CalibrationParts parts{true, true, true, true};  // parts that may be estimated
-  bool only_if_better = true;  // require that the held-out data fit clearly better
+  bool only_if_better = true;  // require that held-out data (held_out.h) fit clearly better
   bool drop_unneeded = true;   // drop parts that do not clearly improve the fit
   // Estimate the registration in all cases. Required for depth with a coarse registration, because
   // other parts would absorb the error of this registration.
