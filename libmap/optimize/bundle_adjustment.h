@@ -93,9 +93,9 @@ struct BundleAdjustmentResult {
 // frames to which the resulting calibration is applied (calibrate()). `links` are links of the pose
 // graph that are not from the tracks, e.g. odometry. The gauge node of each component is fixed.
 // `start` is the initial calibration; by default the stored cameras and the motion between poses.
-// `system_tracks`, if any, replace `tracks` in the information matrix only; with tracks of
-// TrackFrames::linked, the matrix is sparse and slightly smaller. Memory is proportional to (number
-// of poses)^2. Throws Error if an option is out of range.
+// `system_tracks`, if any, replace `tracks` in information, counts and residuals (add_information);
+// with TrackFrames::linked, the information matrix is sparse and slightly smaller. Memory is
+// proportional to (number of poses)^2. Throws Error if an option is out of range.
 BundleAdjustmentResult adjust_bundle(
     const std::vector<FrameFeatures>& frames, const std::vector<FeatureTrack>& tracks,
     const std::map<int, Pose>& map_from_base, const std::vector<GraphLinkResult>& links,
